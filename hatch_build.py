@@ -1,11 +1,15 @@
-"""What travels in the wheel beside the package: pages and one sample. Editable installs read them in place."""
+"""What travels in the wheel beside the package: pages and samples. Editable installs read them in place."""
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-TRAVELS = {"web_assets": "studio/web/assets", "sample_sessions/walk": "studio/sessions/samples/walk"}
+SAMPLES = ("walk", "planar_arm", "branched_arms")
+TRAVELS = {
+    "web_assets": "studio/server/assets",
+    **{f"sample_sessions/{name}": f"studio/sessions/samples/{name}" for name in SAMPLES},
+}
 
 
-class PagesAndSample(BuildHookInterface):
+class PagesAndSamples(BuildHookInterface):
     """Adds them to a standard wheel only: copies beside an editable install would hide later changes."""
 
     PLUGIN_NAME = "custom"

@@ -9,6 +9,7 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from studio.diagnostics_archive import diagnostics as diagnostics
     from studio.errors import StudioError as StudioError
     from studio.operations.behaviours import learn as learn
     from studio.operations.behaviours import models as models
@@ -17,12 +18,19 @@ if TYPE_CHECKING:
     from studio.operations.cameras import calibrate as calibrate
     from studio.operations.cameras import unalign as unalign
     from studio.operations.comparing import compare as compare
+    from studio.operations.comparing import sweep as sweep
+    from studio.operations.course import course as course
     from studio.operations.footage import add_footage as add_footage
     from studio.operations.footage import import_footage as import_footage
     from studio.operations.footage import new_session as new_session
     from studio.operations.footage import record as record
     from studio.operations.footage import synchronise as synchronise
     from studio.operations.footage import synthesize as synthesize
+    from studio.operations.gallery import gallery as gallery
+    from studio.operations.inspecting import compare_runs as compare_runs
+    from studio.operations.inspecting import seeds as seeds
+    from studio.operations.inspecting import view as view
+    from studio.operations.inspecting import why as why
     from studio.operations.masks import background as background
     from studio.operations.masks import mask_quality as mask_quality
     from studio.operations.opening import bodies as bodies
@@ -31,6 +39,7 @@ if TYPE_CHECKING:
     from studio.operations.opening import open_run as open_run
     from studio.operations.opening import open_session as open_session
     from studio.operations.opening import way as way
+    from studio.operations.own_bodies import edit_body as edit_body
     from studio.operations.person import fit_subject as fit_subject
     from studio.operations.person import initialise as initialise
     from studio.operations.person import subject as subject
@@ -43,6 +52,9 @@ if TYPE_CHECKING:
     from studio.operations.results import refine as refine
     from studio.operations.results import smooth as smooth
     from studio.operations.results import verify as verify
+    from studio.operations.sharing import share as share
+    from studio.operations.subjects import subjects as subjects
+    from studio.operations.subjects import together as together
     from studio.operations.tracking import correct as correct
     from studio.operations.tracking import go_on as go_on
     from studio.operations.tracking import live as live
@@ -55,16 +67,23 @@ if TYPE_CHECKING:
 _PLACES = {
     "errors": ("StudioError",),
     "self_check": ("doctor",),
+    "diagnostics_archive": ("diagnostics",),
     "operations.opening": ("bodies", "list_runs", "list_sessions", "open_run", "open_session", "way",),
     "operations.footage": ("add_footage", "import_footage", "new_session", "record", "synchronise", "synthesize",),
     "operations.cameras": ("align", "board", "calibrate", "unalign",),
     "operations.masks": ("background", "mask_quality",),
+    "operations.subjects": ("subjects", "together",),
+    "operations.gallery": ("gallery",),
+    "operations.own_bodies": ("edit_body",),
     "operations.person": ("fit_subject", "initialise", "subject",),
     "operations.tracking": ("correct", "go_on", "live", "new_run", "replay", "resume_live", "track",),
     "operations.results": ("check", "evaluate", "export_run", "list_tracks", "markers", "read_track", "refine",
                            "smooth", "verify",),
+    "operations.sharing": ("share",),
     "operations.behaviours": ("learn", "models",),
-    "operations.comparing": ("compare",),
+    "operations.comparing": ("compare", "sweep",),
+    "operations.course": ("course",),
+    "operations.inspecting": ("compare_runs", "seeds", "view", "why",),
 }  # fmt: skip
 _PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}
 

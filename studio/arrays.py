@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
+Floats = NDArray[np.float32]
 Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 _one_at_a_time = threading.Lock()
 

@@ -1,21 +1,22 @@
 """What a verb takes, declared once: in the signature of its function.
 
 A parameter is `name: Annotated[type, Field(description=…, ge=…)] = default`. Made from that line are the option of the
-command line (`cli.deriving`), the entry of the HTTP body (`web.requests`), the check of a call from Python
-(`operation`) and the page of the guide. `Terminal` and `Web` say where a door differs from the rule.
+command line (`cli.deriving`), the entry of the HTTP body (`server.requests`), the check of a call from Python
+(`operation`) and the page of the guide. `Terminal` and `Web` say where one of the two differs from the rule.
 """
 
 import functools
 import inspect
 import types
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, ParamSpec, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, ParamSpec, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 from annotated_types import BaseMetadata, Ge, Gt, Le
+from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 
@@ -25,6 +26,7 @@ from studio.registry import Registry
 
 P = ParamSpec("P")
 R = TypeVar("R")
+F = TypeVar("F", bound=Callable[..., object])
 
 REQUIRED = inspect.Parameter.empty
 PROGRESS = "progress"
@@ -36,11 +38,11 @@ LARGEST = 2**63 - 1
 class Terminal:
     """How the command line takes a parameter, where the rule (`--name`, of the parameter's type) is not meant.
 
-    spelling : "--from", "--copy/--reference". metavar : of its value. kind : its type there. left_out : no option.
+    option : "--from", "--copy/--reference". metavar : of its value. kind : its type there. left_out : no option.
     required : whether it has to be given where there is no default.
     """
 
-    spelling: str = ""
+    option: str = ""
     metavar: str = ""
     kind: Any = None
     left_out: bool = False
@@ -50,7 +52,7 @@ class Terminal:
 @dataclass(frozen=True, slots=True)
 class Web:
     """How an HTTP body takes a parameter. By the rule text is a name (letters, digits, - and _), null its default, and
-    what may be a path is left out, since nobody far away chooses files of this machine.
+    what may be a path is left out, since no one far away chooses files of this machine.
 
     name : of the entry. kind : its type there. left_out : no entry of the body.
     """
@@ -61,7 +63,7 @@ class Web:
 
 
 @dataclass(frozen=True, slots=True)
-class Whose:
+class Target:
     """The parameter is what the verb is about: "session" or "run"; the addresses of HTTP name it, not the body."""
 
     kind: str
@@ -77,7 +79,7 @@ class OneOf:
 @dataclass(frozen=True, slots=True)
 class Knobs:
     """The parameter is knobs by name. listed : those that are options of their own on the command line. others : any
-    other is taken too, as --set KNOB=VALUE. with_defaults : tell them in the help.
+    other is taken too, as --set KNOB=VALUE. with_defaults : name them in the help.
     """
 
     listed: Callable[[], Iterable[Knob]] = tuple
@@ -116,9 +118,9 @@ class Parameter:
     def option(self) -> str:
         """Its option on the command line: "--from"; "" for an argument."""
         mark = self.terminal
-        if self.whose or (self.default is REQUIRED and not mark.spelling):
+        if self.target or (self.default is REQUIRED and not mark.option):
             return ""
-        option = mark.spelling or f"--{self.name.replace('_', '-')}"
+        option = mark.option or f"--{self.name.replace('_', '-')}"
         if self.default is True and "/" not in option:
             option += f"/--no-{option.removeprefix('--')}"
         return option
@@ -127,12 +129,12 @@ class Parameter:
     def web(self) -> Web:
         """How HTTP takes it."""
         found = self.mark(Web) or Web(left_out=any(kind is Path for kind in alternatives(self.kind)))
-        return Web(left_out=True) if self.whose else found
+        return Web(left_out=True) if self.target else found
 
     @property
-    def whose(self) -> str:
+    def target(self) -> str:
         """ "session" or "run" where it is what the verb is about."""
-        mark = self.mark(Whose)
+        mark = self.mark(Target)
         return mark.kind if mark else ""
 
     def limited(self, kind: Any) -> Any:  # noqa: ANN401 - a type
@@ -156,8 +158,8 @@ class Parameter:
 
     @property
     def is_plain(self) -> bool:
-        """Whether every door takes it as the same type, so that one check does for all."""
-        return not (self.whose or self.any_name) and self.terminal.kind is None and self.web.kind is None
+        """Whether Python, terminal and HTTP take it as the same type, so that one check does for all."""
+        return not (self.target or self.any_name) and self.terminal.kind is None and self.web.kind is None
 
 
 @dataclass(frozen=True)
@@ -199,7 +201,7 @@ class Operation:
 
     @cached_property
     def _readers(self) -> dict[str, TypeAdapter[Any]]:
-        """What reads each parameter that every door takes alike."""
+        """What reads each parameter that is taken alike everywhere."""
         plain = [entry for entry in self.parameters.values() if entry.is_plain]
         return {entry.name: TypeAdapter(entry.limited(entry.kind), config=CONFIG) for entry in plain}
 
@@ -233,6 +235,25 @@ def operation(function: Callable[P, R]) -> Callable[P, R]:
     return call
 
 
+def taking(declares: Callable[..., object], without: Sequence[str] = ()) -> Callable[[F], F]:
+    """Let a function that takes any keyword take what another one, or a dataclass, declares after its own first
+    parameters. without : of these. What the function declares itself goes before them.
+    """
+
+    def take(function: F) -> F:
+        own, hints = inspect.signature(function), function.__annotations__
+        entries = {name: one for name, one in own.parameters.items() if one.kind is not one.VAR_KEYWORD}
+        for name, entry in inspect.signature(declares).parameters.items():
+            if name not in entries and name not in without:
+                entries[name] = entry.replace(kind=entry.KEYWORD_ONLY)
+                hints[name] = declares.__annotations__[name]
+        ranked = sorted(entries.values(), key=lambda one: (one.kind, one.name in own.parameters))
+        setattr(function, "__signature__", own.replace(parameters=ranked))  # noqa: B010 - functions lack it in types
+        return function
+
+    return take
+
+
 DECLARED = "__operation__"
 
 
@@ -247,13 +268,18 @@ def alternatives(kind: Any) -> tuple[Any, ...]:  # noqa: ANN401 - a type, which 
 
 
 def _without_numpy(value: object) -> object:
-    return value.tolist() if isinstance(value, np.generic | np.ndarray) else value
+    if isinstance(value, np.generic | np.ndarray):
+        return cast("np.generic[Any] | NDArray[Any]", value).tolist()
+    return value
 
 
 Seed = Annotated[int, Field(ge=0, le=LARGEST, description="The same seed gives the same result.")]
 Body = Annotated[
     str,
-    Field(description="Kinematic tree; default: the session's. Its subject still scales it."),
+    Field(
+        description="Kinematic tree, by name or as a .toml, .urdf or .xml file, scaled by the session's subject;"
+        " default: the session's."
+    ),
     Terminal(metavar="NAME"),
 ]
 Model = Annotated[str, Field(description="Behaviour model, by name or file."), Terminal(metavar="MODEL")]

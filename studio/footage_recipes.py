@@ -1,4 +1,4 @@
-"""Recipes of footage by name: the three functions that the studio uses of the room `synthesis`.
+"""Recipes of footage by name: the five functions that the studio uses of the room `synthesis`.
 
 Making footage is a leaf: no room of the product imports it. These functions load the room on first use, like a
 command's module.
@@ -30,6 +30,18 @@ def person_of_recipe(
     options, frames : in place of the recipe's own. Raises StudioError, for a recipe without a person too.
     """
     return _synthesis("recipes").person_of_recipe(recipe, skeleton, options, frames)
+
+
+def missing_data(recipe: str | Path) -> str:
+    """Why a recipe cannot be rendered here: the first file of the real data that it names and that is not there; ""
+    where all are. Raises StudioError for a recipe that cannot be read.
+    """
+    return _synthesis("real_data").missing_data(_synthesis("recipe_file").find_recipe(recipe))
+
+
+def real_footage(place: str) -> Path | None:
+    """Footage that cannot be shipped, by its place in the folder of the real data; None where it is not there."""
+    return _synthesis("real_data").real_footage(place)
 
 
 def synthesize(

@@ -6,7 +6,7 @@ an OSError for a corrupt archive's offsets), so readers do not list what may com
 
 import errno
 import stat
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -23,7 +23,7 @@ KINDS = (
 
 
 @contextmanager
-def foreign_file(path: Path, wrong: type[StudioError], what: str, remedy: str) -> Iterator[None]:
+def foreign_file(path: Path, wrong: type[StudioError], what: str, remedy: str) -> Generator[None]:
     """Read a file (or a folder of files) inside. what : what it should be, "a video". remedy : what to do if it is not.
 
     Raises `wrong` naming the file for whatever is raised inside, and for a pipe, socket or device, before anything of

@@ -9,12 +9,15 @@ import functools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from studio.errors import SettingsError
 
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
 Value = bool | int | float | str
-S = TypeVar("S")
+S = TypeVar("S", bound="DataclassInstance")
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,9 +64,15 @@ next_frame_knob = functools.partial(knob, takes_effect="next frame")
 """A knob that takes effect with the next frame."""
 
 
+def knobs_of(settings: object) -> tuple[Knob, ...]:
+    """The knobs of a settings class, or of a value of one, in the order of their lines; `group` is the class's `title`
+    attribute.
+    """
+    return _knobs_of_class(settings if isinstance(settings, type) else type(settings))
+
+
 @functools.cache
-def knobs_of(settings_type: type) -> tuple[Knob, ...]:
-    """The knobs of a settings class, in the order of their lines; `group` is the class's `title` attribute."""
+def _knobs_of_class(settings_type: type[Any]) -> tuple[Knob, ...]:
     group = getattr(settings_type, "title", settings_type.__name__)
     found: list[Knob] = []
     for entry in dataclasses.fields(settings_type):
@@ -132,9 +141,11 @@ def changed(settings: S, changes: Mapping[str, object]) -> S:
 
     Raises SettingsError for an unknown name or a value outside its range.
     """
-    declared = {entry.name: entry for entry in knobs_of(type(settings))}
+    declared = {entry.name: entry for entry in knobs_of(settings)}
     for name in changes:
         if name not in declared:
             raise SettingsError(f"There is no setting '{name}'.", f"Known: {', '.join(sorted(declared))}.")
-    checked_changes = {name: checked(declared[name], value) for name, value in changes.items()}
-    return dataclasses.replace(settings, **checked_changes)  # pyright: ignore[reportArgumentType]
+    checked_changes: dict[str, Any] = {
+        name: checked(declared[name], value) for name, value in changes.items()
+    }
+    return dataclasses.replace(settings, **checked_changes)

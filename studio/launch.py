@@ -4,7 +4,7 @@ import logging
 import logging.handlers
 import re
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -12,19 +12,19 @@ import click
 import uvicorn
 
 from studio.errors import StudioError
+from studio.jobs.commands import Start, about
+from studio.jobs.control import StudioControl
 from studio.runs.new_run import prepare_run
+from studio.runs.samples import install_sample
 from studio.scene.window_scenes import WindowScenes
+from studio.server.access import binding_rule, new_token
+from studio.server.app import build_app
+from studio.server.app_state import STATE_NAME
+from studio.server.safe_paths import default_footage_roots
 from studio.sessions.atomic_files import write_text
 from studio.sessions.process_lock import ProcessLock
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
-from studio.web.access import binding_rule, new_token
-from studio.web.app import build_app
-from studio.web.doors import STATE_NAME
-from studio.web.safe_paths import default_footage_roots
-from studio.web.samples import install_sample
-from studio.worker.commands import Start, about
-from studio.worker.control import StudioControl
 
 Announce = Callable[[str], None]
 
@@ -58,18 +58,20 @@ def serve(
     *,
     open_run: str | None = None,
     track: bool = False,
+    name: str = "",
     announce: Announce = click.echo,
 ) -> None:
     """Serve the studio on a workspace until Ctrl-C.
 
     port : 0 takes a free one. open_session, open_run : what the printed address shows first; with `track`
-    the run is tracked at once. announce : called once with the address. Raises StudioError for a host that
+    the run is tracked at once. announce : called once with the addresses (`printed`). name : the host name of a
+    proxy with TLS before the studio, which is served at https://NAME/ then. Raises StudioError for a host that
     needs `allow_remote`, a port that is taken, or a workspace that cannot be written.
     """
-    hosts = binding_rule(host, allow_remote)
+    hosts = binding_rule(host, allow_remote, name)
     workspace = Workspace(workspace_root)
     log_path = _log_to_file(workspace.root / STATE_NAME)
-    token = new_token()
+    token, viewers_token = new_token(), new_token()
     with _alone_on(workspace.root) as show_address, _listening(host, port) as listener:
         show_address(f"http://{_named(host)}:{listener.getsockname()[1]}")
         control = StudioControl(workspace)
@@ -79,13 +81,16 @@ def serve(
                 control,
                 WindowScenes(workspace, control),
                 token,
+                viewers_token=viewers_token,
                 hosts=hosts,
                 footage_roots=default_footage_roots(workspace.root),
                 log_path=log_path,
             )
             if track and open_session and open_run:
                 _track(control, workspace.session(open_session), open_run)
-            announce(f"Open {address(host, listener.getsockname()[1], token, open_session, open_run)}")
+            at = f"https://{name}" if name else f"http://{_named(host)}:{listener.getsockname()[1]}"
+            shown = (address(at, key, open_session, open_run) for key in (token, viewers_token))
+            announce(printed(*shown, plainly=allow_remote and not name))
             _serve_until_stopped(app, listener)
         finally:
             control.close()
@@ -107,11 +112,22 @@ def prepare_demo(workspace_root: Path) -> Session:
     return install_sample(Workspace(workspace_root), "walk")
 
 
-def address(host: str, port: int, token: str, session: str | None = None, run: str | None = None) -> str:
-    """The address to open; it holds the token."""
+def printed(full: str, viewers: str, plainly: bool) -> str:
+    """What is said once the studio is served. plainly : other machines reach it without TLS."""
+    lines = [f"Open {full}", f"For viewers, who change nothing: {viewers}"]
+    if plainly:
+        lines.append(
+            "Between machines all of this, tokens too, travels unencrypted: use it in a network that you trust, or put "
+            "a proxy with TLS before it (--name; see the guide), or a tunnel (ssh -L)."
+        )
+    return "\n".join(lines)
+
+
+def address(at: str, token: str, session: str | None = None, run: str | None = None) -> str:
+    """The address to open; it holds the token. at : scheme, host and port."""
     query = f"&session={session}" if session else ""
     query += f"&run={run}" if session and run else ""
-    return f"http://{_named(host)}:{port}/?token={token}{query}"
+    return f"{at}/?token={token}{query}"
 
 
 def _named(host: str) -> str:
@@ -132,7 +148,7 @@ def served_at(root: Path) -> str:
 
 
 @contextmanager
-def _alone_on(root: Path) -> Iterator[Callable[[str], None]]:
+def _alone_on(root: Path) -> Generator[Callable[[str], None]]:
     """Hold the lock of a served workspace; yields the function that stores the address. Raises WorkspaceServedError."""
     folder = root / STATE_NAME
     lock = ProcessLock.take(folder / SERVER_LOCK)

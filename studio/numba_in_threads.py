@@ -49,9 +49,9 @@ CONTRACTED: dict[str, Any] = {**EXACT, "fastmath": {"contract", "nsz"}}
 FAST: dict[str, Any] = {**EXACT, "fastmath": {"contract", "reassoc", "nsz", "arcp", "afn"}}
 """Sums may be made in any order, so that all of it vectorises. Not a number and infinity keep their meaning (no
 `nnan`, `ninf`): a point that cannot be projected must compare as unseen."""
-EXACT_INLINED, CONTRACTED_INLINED, FAST_INLINED = (
-    {**options, "forceinline": True} for options in (EXACT, CONTRACTED, FAST)
-)
+EXACT_INLINED: dict[str, Any] = {**EXACT, "forceinline": True}
+CONTRACTED_INLINED: dict[str, Any] = {**CONTRACTED, "forceinline": True}
+FAST_INLINED: dict[str, Any] = {**FAST, "forceinline": True}
 
 TURNS = 4
 """How often each thread takes blocks, if all are equally quick."""

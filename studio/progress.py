@@ -102,11 +102,14 @@ def left_in_words(seconds: float | None) -> str:
     """An estimate no finer than it is: "about 40 s left", "about 3 min left", "about 2.5 h left"; "" for none."""
     if seconds is None or not math.isfinite(seconds) or seconds <= 0.0:
         return ""
+    return f"{duration_in_words(seconds)} left"
+
+
+def duration_in_words(seconds: float) -> str:
+    """An expected duration no finer than it is: "about 40 s", "about 3 min", "about 2.5 h"."""
     if seconds < 100.0:
-        return f"about {max(seconds, 1.0):.0f} s left"
-    if seconds < 5400.0:
-        return f"about {seconds / 60.0:.0f} min left"
-    return f"about {seconds / 3600.0:.1f} h left"
+        return f"about {max(seconds, 1.0):.0f} s"
+    return f"about {seconds / 60.0:.0f} min" if seconds < 5400.0 else f"about {seconds / 3600.0:.1f} h"
 
 
 def _pace(taken: Sequence[tuple[float, float]]) -> tuple[float, float]:

@@ -22,13 +22,13 @@ import numpy as np
 
 from studio.declaring import Terminal
 from studio.errors import StudioError
+from studio.jobs.batch import track_to_end
 from studio.launch import PORT, served_at
 from studio.numba_in_threads import numba
 from studio.runs.new_run import prepare_run
+from studio.runs.samples import install_sample
+from studio.runs.self_contained import assets_folder
 from studio.sessions.workspace import Workspace
-from studio.web.pages import assets_folder
-from studio.web.samples import install_sample
-from studio.worker.batch import track_to_end
 
 PACKAGE = "capture-studio"
 OLDEST_PYTHON = (3, 11)

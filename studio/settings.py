@@ -14,10 +14,10 @@ from typing import Any
 from studio.errors import SettingsError
 from studio.evidence.settings import EvidenceSettings
 from studio.knobs import Knob, Value, changed, knob, knobs_of
-from studio.tracking.catalogue import TRACKERS
-from studio.tracking.frame_refinement import FrameRefinementSettings
-from studio.tracking.recovery_settings import RecoverySettings
-from studio.weighting.catalogue import WEIGHTINGS
+from studio.likelihood.catalogue import WEIGHTINGS
+from studio.trackers.catalogue import TRACKERS
+from studio.trackers.frame_refinement import FrameRefinementSettings
+from studio.trackers.recovery_settings import RecoverySettings
 
 GROUPS = ("tracker", "weighting", "evidence", "refinement", "recovery", "recording")
 DEFAULT_TRACKER, DEFAULT_WEIGHTING = "annealed", "edge-region-silhouette"
@@ -126,7 +126,7 @@ def changed_settings(settings: RunSettings, changes: Mapping[str, object]) -> Ru
 
     Raises SettingsError for an unknown name or a value that is not allowed.
     """
-    owner = {entry.name: group for group in GROUPS for entry in knobs_of(type(getattr(settings, group)))}
+    owner = {entry.name: group for group in GROUPS for entry in knobs_of(getattr(settings, group))}
     by_group: dict[str, dict[str, object]] = {}
     for name, value in changes.items():
         if name not in owner:
@@ -157,13 +157,13 @@ def in_todays_names(recorded: Mapping[str, Any]) -> dict[str, Any]:
 
 def all_knobs(settings: RunSettings) -> tuple[Knob, ...]:
     """Every knob of a run, group after group."""
-    return tuple(entry for group in GROUPS for entry in knobs_of(type(getattr(settings, group))))
+    return tuple(entry for group in GROUPS for entry in knobs_of(getattr(settings, group)))
 
 
 def values(settings: RunSettings) -> dict[str, Value]:
     """Every knob's value by its flat name."""
     groups = [getattr(settings, group) for group in GROUPS]
-    return {entry.name: getattr(group, entry.name) for group in groups for entry in knobs_of(type(group))}
+    return {entry.name: getattr(group, entry.name) for group in groups for entry in knobs_of(group)}
 
 
 def knob_table() -> tuple[Knob, ...]:

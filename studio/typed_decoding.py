@@ -8,9 +8,9 @@ encode, 3 to encode an event and 1.4 to list two hundred runs, and its errors na
 """
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
-from typing import TypeVar
+from typing import Any, TypeGuard, TypeVar
 
 import msgspec
 
@@ -19,8 +19,18 @@ T = TypeVar("T")
 _one_at_a_time = threading.Lock()
 
 
+def is_table(value: object) -> TypeGuard[dict[str, Any]]:
+    """Whether a value out of a text without a type is a table."""
+    return isinstance(value, dict)
+
+
+def is_list(value: object) -> TypeGuard[Sequence[Any]]:
+    """Whether a value out of a text without a type is a list, or a tuple that would become one."""
+    return isinstance(value, list | tuple)
+
+
 @contextmanager
-def _refusals_as_one_kind() -> Iterator[None]:
+def _refusals_as_one_kind() -> Generator[None]:
     """What parsers raise of bytes that are no UTF-8, texts that are nested too deep, or numbers with thousands of
     digits, as DecodeError.
     """

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array, Bytes
 from studio.calibration.board_pattern import drawn
 from studio.calibration.boards import Board
 from studio.geometry.camera import Camera
@@ -14,9 +15,6 @@ from studio.geometry.projection import project
 from studio.geometry.rigid import rigid, transform
 from studio.geometry.rotations import axis_turn, rotation_from_vector
 from studio.synthesis.cameras import pixel_rays
-
-Array = NDArray[np.float64]
-Bytes = NDArray[np.uint8]
 
 LARGEST_TEXTURE = 3000.0
 LEVELS = 5

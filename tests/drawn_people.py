@@ -4,13 +4,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.forward_kinematics import limb_frames
 from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project
 
-Array = NDArray[np.float64]
 RING = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
 
 

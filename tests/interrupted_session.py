@@ -37,8 +37,8 @@ def interrupted(
         made = {"frame_count": len(frames), "masks": "", "path": f"videos/{camera.name}.mp4"}
         cameras.append(dataclasses.replace(camera, **made))
     footage.close()
-    told = FootageSource(fps, len(frames), tuple(cameras))
-    write_manifest(folder, msgspec.structs.replace(source.manifest, name=folder.name, footage=told))
+    partial = FootageSource(fps, len(frames), tuple(cameras))
+    write_manifest(folder, msgspec.structs.replace(source.manifest, name=folder.name, footage=partial))
     return Session(folder)
 
 

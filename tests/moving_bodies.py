@@ -4,12 +4,20 @@ from pathlib import Path
 
 import ezc3d
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
 
-Array = NDArray[np.float64]
+
+def standing(body: BodyModel, **angles: float) -> Array:
+    """(D,) upright with the pelvis 950 mm above the floor; angles : radians more, by the parameter's name."""
+    names = [entry.name for entry in body.parameters]
+    pose = body.neutral.copy()
+    pose[names.index("pelvis_z")] = 950.0
+    for name, angle in angles.items():
+        pose[names.index(name)] += angle
+    return pose
 
 
 def swinging(body: BodyModel, frames: int, fps: float, seed: int = 3) -> Array:

@@ -13,7 +13,7 @@ from studio.runs.new_run import prepare_run
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.tracking.side_exchange import kinds_of
+from studio.trackers.side_exchange import kinds_of
 
 LAST, EXCHANGED = 36, range(12, 28)
 

@@ -4,13 +4,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.person import SIDES, PersonMotion, Skeleton, joint_points
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project
 from studio.geometry.rotations import axis_turn
 from studio.synthesis.gait import add_arm, trunk
 
-Array = NDArray[np.float64]
 Masks = dict[int, dict[str, NDArray[np.uint8]]]
 
 SOLE = 0.022

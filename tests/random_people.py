@@ -12,7 +12,7 @@ from studio.capture.calibration_files import write_calibration
 from studio.geometry.camera import Camera
 from studio.geometry.rotations import axis_turn
 from studio.motion_files.trc import write_trc
-from studio.sessions.importers.importing import import_source
+from studio.sessions.importers.importing import ImportOptions, import_source
 from studio.sessions.session import Session
 from studio.synthesis.gait import add_arm, trunk
 from studio.synthesis.person import yaw_pitch_roll
@@ -106,5 +106,5 @@ def people_session(
     (source / "truth").mkdir()
     write_trc(source / "truth" / "people.trc", marker_motion(motion))
     write_subject(subject, source / "subject.toml")
-    import_source(source, folder, fps=FPS)
+    import_source(source, folder, ImportOptions(fps=FPS))
     return Session(folder)

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.catalogue import load_body
 from studio.body.inverse_kinematics import pose_from_markers
 from studio.body.model import BodyModel
@@ -18,8 +18,6 @@ from studio.synthesis.person import marker_lengths, skeleton_of_height
 from studio.synthesis.renderer import Renderer
 from studio.synthesis.rooms import ROOMS
 from studio.synthesis.wardrobes import WARDROBES
-
-Array = NDArray[np.float64]
 
 SIZE = (640, 480)
 POSTURES = (("run", 12), ("handstand", 24), ("box", 96), ("run", 26), ("box", 70))
@@ -71,8 +69,8 @@ def drawn_skeleton(rng: np.random.Generator) -> Skeleton:
 def drawn_and_seen(rng: np.random.Generator) -> tuple[Skeleton, float, tuple[Camera, ...]]:
     """A person, the height as it is told (± 3 cm), mm, and four cameras around."""
     skeleton = drawn_skeleton(rng)
-    told = skeleton.height + float(rng.uniform(-30.0, 30.0))
-    return skeleton, told, RIGS["corners"](SIZE, rng)
+    measured = skeleton.height + float(rng.uniform(-30.0, 30.0))
+    return skeleton, measured, RIGS["corners"](SIZE, rng)
 
 
 def renderer_of(cameras: tuple[Camera, ...], motion: PersonMotion, seed: int, noise: float) -> Renderer:
@@ -86,8 +84,8 @@ def drawn_person(
 ) -> DrawnPerson:
     """The person of a seed. jitter : radians by which the angles of `poses` are off."""
     rng = np.random.default_rng(np.random.SeedSequence((seed, 0xD2A)))
-    skeleton, told, cameras = drawn_and_seen(rng)
-    body, _ = fit_subject(load_body(body_name), Subject(body=body_name, height_mm=told))
+    skeleton, measured, cameras = drawn_and_seen(rng)
+    body, _ = fit_subject(load_body(body_name), Subject(body=body_name, height_mm=measured))
     frames, poses, lengths = [], [], {}
     for number, (motion_name, at) in enumerate(POSTURES[:postures]):
         motion = make_motion(motion_name, skeleton, at + 2, 60.0, {})
@@ -104,4 +102,4 @@ def drawn_person(
         angles = np.array([entry.kind == "angle" for entry in body.parameters])
         poses.append(pose + angles * rng.normal(0.0, jitter, len(pose)))
     true = {group: lengths[pair] for group, pair in MEASURED.items()}
-    return DrawnPerson(skeleton, told, body, cameras, tuple(frames), true, np.array(poses))
+    return DrawnPerson(skeleton, measured, body, cameras, tuple(frames), true, np.array(poses))

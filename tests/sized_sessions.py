@@ -23,7 +23,7 @@ FPS = 60.0
 def make_sized_session(folder: Path, seed: int) -> tuple[Session, dict[str, float], float]:
     """A session of the person of a seed, the true lengths by group, and the height as it was told (± 3 cm), mm."""
     rng = np.random.default_rng(np.random.SeedSequence((seed, 0xE2E)))
-    skeleton, told, cameras = drawn_and_seen(rng)
+    skeleton, measured, cameras = drawn_and_seen(rng)
     for camera in cameras:
         (folder / "pictures" / camera.name).mkdir(parents=True)
     for name in ("calibration", "background"):
@@ -60,7 +60,7 @@ def make_sized_session(folder: Path, seed: int) -> tuple[Session, dict[str, floa
     )
     write_manifest(folder, manifest)
     lengths = marker_lengths(motion)
-    return Session(folder), {group: lengths[pair] for group, pair in MEASURED.items()}, told
+    return Session(folder), {group: lengths[pair] for group, pair in MEASURED.items()}, measured
 
 
 def _postures(skeleton: Skeleton) -> PersonMotion:

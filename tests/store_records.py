@@ -6,7 +6,7 @@ from studio.runs.search_space import default_sigma, parameter_names
 from studio.sessions.manifest import now
 from studio.sessions.run_record import RunRecord
 from studio.sessions.session import Session
-from studio.tracking.tracker import Carried, Estimate, FrameResult, LayerRecord, ParticleSet
+from studio.trackers.tracker import Estimate, FilterState, FrameResult, LayerRecord, ParticleSet
 
 
 def layer_of(frame: int, layer: int, *, count: int = 12, size: int = 4) -> LayerRecord:
@@ -41,7 +41,7 @@ def result_of(frame: int, *, count: int = 12, size: int = 4, layers: int = 3) ->
     )
     estimate = Estimate(poses[0], poses.mean(axis=0), poses[1], -0.5 - frame)
     return FrameResult(
-        frame, estimate, layers, layers * count, 1, 12.0, Carried(particles, poses[0], poses[2])
+        frame, estimate, layers, layers * count, 1, 12.0, FilterState(particles, poses[0], poses[2])
     )
 
 

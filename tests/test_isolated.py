@@ -45,14 +45,16 @@ def test_errors_and_progress_come_through_and_one_process_serves_many() -> None:
     with pytest.raises(FootageError, match="is odd") as caught:
         isolated(FootageError, crashing_readers.refuse, PLACE)
     assert caught.value.hint == "Give another."
-    told: list[tuple[int, int]] = []
+    reports: list[tuple[int, int]] = []
     readers = {
-        isolated(FootageError, crashing_readers.count, PLACE, lambda done, total: told.append((done, total)))
+        isolated(
+            FootageError, crashing_readers.count, PLACE, lambda done, total: reports.append((done, total))
+        )
         for _ in range(2)
     }
     assert len(readers) == 1
     assert os.getpid() not in readers
-    assert told == [(number, 5) for number in range(5)] * 2
+    assert reports == [(number, 5) for number in range(5)] * 2
 
 
 def test_who_asks_may_stop_it() -> None:

@@ -19,8 +19,8 @@ import pytest
 from studio import launch
 from studio.errors import AccessError, StudioError
 from studio.launch import RedactedFormatter, address, prepare_demo, serve
+from studio.runs.samples import sample_folder
 from studio.sessions.workspace import Workspace
-from studio.web.samples import sample_folder
 
 SERVE = """
 import sys
@@ -72,7 +72,9 @@ def test_the_printed_address_opens_the_studio_and_ctrl_c_closes_everything(
     assert process.wait(20) == 0
     assert process.stdout is not None
     rest = process.stdout.read()
-    assert rest == "closed\n"
+    assert re.fullmatch(
+        rf"For viewers, who change nothing: {re.escape(base)}/\?token=[\w-]{{43}}\nclosed\n", rest
+    )
     _, alive = psutil.wait_procs(family, timeout=20)
     assert alive == []
 
@@ -145,8 +147,15 @@ def test_a_workspace_that_is_a_file_is_named(tmp_path: Path) -> None:
     ],
 )
 def test_addresses(host: str, shown: str) -> None:
-    assert address(host, 80, "t") == f"http://{shown}:80/?token=t"
-    assert address(host, 80, "t", "walk", "run-1").endswith("&session=walk&run=run-1")
+    assert launch._named(host) == shown
+    assert address(f"http://{shown}:80", "t") == f"http://{shown}:80/?token=t"
+    assert address("https://a.example", "t", "walk", "run-1").endswith("/?token=t&session=walk&run=run-1")
+
+
+def test_two_addresses_are_printed_and_a_word_about_tls_where_others_come_in() -> None:
+    lines = launch.printed("http://a/?token=1", "http://a/?token=2", plainly=False).splitlines()
+    assert lines == ["Open http://a/?token=1", "For viewers, who change nothing: http://a/?token=2"]
+    assert "unencrypted" in launch.printed("x", "y", plainly=True)
 
 
 def test_the_demo_s_session_is_copied_once_and_never_overwritten(tmp_path: Path) -> None:

@@ -21,8 +21,8 @@ def estimates(parts: Sequence[float], at_once: int = 1) -> list[tuple[float, flo
     left.after("work", 0, len(parts))
     for done in range(1, len(parts)):
         now += parts[done - 1]
-        if done % at_once == 0 and (told := left.after("work", done, len(parts))) is not None:
-            found.append((told, sum(parts[done:])))
+        if done % at_once == 0 and (left_now := left.after("work", done, len(parts))) is not None:
+            found.append((left_now, sum(parts[done:])))
     return found
 
 
@@ -37,14 +37,14 @@ def factors(draw: Draw, count: int, seeds: int = 20) -> tuple[list[float], int]:
 @pytest.mark.parametrize("at_once", [1, 2])
 def test_constant_work_is_known_after_a_twentieth(count: int, at_once: int) -> None:
     found = estimates([2.0] * count, at_once)
-    assert [told for told, _ in found] == pytest.approx([truth for _, truth in found])
+    assert [left_now for left_now, _ in found] == pytest.approx([truth for _, truth in found])
     assert len(found) >= (0.9 * count - 10) / at_once
 
 
 def test_one_frame_of_six_hundred_foretells_nothing() -> None:
     """The first takes 211 s, as it compiles: it once said "126704 s left" of five minutes."""
     found = estimates([211.0] + [0.5] * 599)
-    assert all(told == pytest.approx(truth) for told, truth in found)
+    assert all(left_now == pytest.approx(truth) for left_now, truth in found)
     assert len(found) > 500
 
 
@@ -72,8 +72,8 @@ def quickening(rng: random.Random, i: int, n: int) -> float:
 @pytest.mark.parametrize("draw", [jittery, wild, slowing, drifting, quickening])
 @pytest.mark.parametrize("count", [100, 600])
 def test_what_is_said_holds_to_a_factor_of_two(draw: Draw, count: int) -> None:
-    found, told = factors(draw, count)
-    assert told == 20, "it must be said at some time"
+    found, left_now = factors(draw, count)
+    assert left_now == 20, "it must be said at some time"
     wrong = sum(factor > 2.0 for factor in found) / len(found)
     # Two standard errors: one in twenty may be off, and none is absurd.
     assert wrong <= 0.05

@@ -8,6 +8,7 @@ import pytest
 from studio.errors import SettingsError
 from studio.evidence.settings import EvidenceSettings
 from studio.knobs import knobs_of
+from studio.likelihood.catalogue import WEIGHTINGS
 from studio.settings import (
     DEFAULT_WEIGHTING,
     RecordingSettings,
@@ -21,8 +22,7 @@ from studio.settings import (
     settings_from_values,
     values,
 )
-from studio.tracking.catalogue import TRACKERS
-from studio.weighting.catalogue import WEIGHTINGS
+from studio.trackers.catalogue import TRACKERS
 
 PAIRS = [(tracker, weighting) for tracker in sorted(TRACKERS) for weighting in sorted(WEIGHTINGS)]
 
@@ -59,6 +59,13 @@ def test_the_table_has_every_settings_class_once() -> None:
     assert len({(entry.group, entry.name) for entry in table}) == len(table)
     for settings_type in (EvidenceSettings, RecordingSettings, TRACKERS["condensation"].settings_type):
         assert set(knobs_of(settings_type)) <= set(table)
+
+
+def test_the_knobs_of_values_are_those_of_their_class_and_keep_no_value() -> None:
+    tracker = default_settings().tracker
+    assert knobs_of(tracker) is knobs_of(type(tracker))
+    changed = changed_settings(default_settings(), {"layers": 7}).tracker
+    assert knobs_of(changed) is knobs_of(tracker)
 
 
 def test_the_issues_defaults() -> None:

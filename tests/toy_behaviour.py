@@ -1,15 +1,13 @@
 """A small behaviour to learn in a moment: a planar arm that waves in one of two ways, each again and again."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.behaviour.model import BehaviourModel
 from studio.behaviour.model_learning import learn_model
 from studio.behaviour.settings import LearningSettings
 from studio.body.catalogue import load_body
 from studio.knobs import changed
-
-Array = NDArray[np.float64]
 
 FPS = 25.0
 SETTINGS = changed(

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from studio.comparison.findings import Chart, Heat, Series, Table
-from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.footage_cache import FootageCache
 from studio.comparison.statistics import number
 from studio.comparison.trials import Outcome, Scale, Trial
 from studio.errors import StudioError
@@ -23,7 +23,7 @@ from studio.reproduction.experiment import Experiment, Part
 SETTINGS = ("plain", "clever")
 
 
-def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
+def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
     """Errors around 40 ("plain") and 30 ("clever"); does what `deed` says."""
     with Path(arguments["log"]).open("a") as log:
         log.write(f"{os.getpid()} {arguments['setting']} {arguments['seed']}\n")

@@ -1,6 +1,7 @@
 """A prepared run tracked in the test's own process, without a tracking process around it."""
 
 from collections.abc import Iterator
+from concurrent.futures import Executor
 from contextlib import contextmanager
 
 import numpy as np
@@ -13,10 +14,10 @@ from studio.sessions.stored_run import StoredRun
 
 
 @contextmanager
-def opened(session: Session, run: StoredRun) -> Iterator[TrackingRun]:
+def opened(session: Session, run: StoredRun, storing: Executor | None = None) -> Iterator[TrackingRun]:
     """The run, opened for tracking on its session's footage."""
     problems = ProblemSource(session, run.body(), run.cameras())
-    tracking = TrackingRun(run, problems)
+    tracking = TrackingRun(run, problems, storing)
     try:
         yield tracking
     finally:

@@ -8,10 +8,10 @@ PATIENCE = 20.0
 """Seconds."""
 
 
-def until(condition: Callable[[], object]) -> None:
+def until(condition: Callable[[], object], patience: float = PATIENCE) -> None:
     """Return when the condition holds; fails when it never does."""
     moment = threading.Event()
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + patience
     while not condition():
         assert time.monotonic() < deadline, "it never came about"
         moment.wait(0.01)

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.behaviour.automaton import ROOT, Automaton, Context
 from studio.errors import BehaviourError
 
-Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 # A label counts in the ε test if the context gives it at least this probability: the γ_min of Ron et al.

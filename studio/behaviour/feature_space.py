@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.model import MOVE, BodyModel
 from studio.errors import BehaviourError
 
-Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 
@@ -44,7 +44,7 @@ class FeatureSpace:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the d modelled parameters."""
-        return tuple(self.parameters[column] for column in self.columns)
+        return tuple(self.parameters[int(column)] for column in self.columns)
 
     def angles(self, poses: Array) -> Array:
         """(N, D) poses to the (N, d) modelled parameters, unchanged."""
@@ -126,7 +126,7 @@ def feature_space(body: BodyModel, fps: float) -> FeatureSpace:
             f"Body '{body.name}' has only a position and an orientation.",
             "Take a body with joints.",
         )
-    entries = [body.parameters[column] for column in columns]
+    entries = [body.parameters[int(column)] for column in columns]
     limits = np.array([(entry.lower, entry.upper) for entry in entries])
     limited = np.isfinite(limits).all(axis=1)
     middle = body.neutral[columns]

@@ -21,14 +21,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.behaviour.gaussian_mixture import GaussianMixture
 from studio.behaviour.mixture_kernels import losses_without, replace_component, shares_of
 from studio.errors import BehaviourError
 from studio.progress import Progress
-
-Array = NDArray[np.float64]
 
 COVARIANCES = ("full", "diagonal")
 
@@ -60,7 +58,8 @@ class Search:
 
     most : components at the start. least : fewest tried. covariance : "full" or "diagonal". tolerance : EM has
     settled when a sweep changes the message length by less than this, nats a point. patience : components removed in a
-    row without a shorter message before the search ends; 0 goes on to `least`.
+    row without a shorter message before the search ends; 0 goes on to `least`. floor : variances (p,) added to every
+    component, beside FLOOR; () for none.
     """
 
     most: int
@@ -68,6 +67,7 @@ class Search:
     covariance: str = "full"
     tolerance: float = 1e-3
     patience: int = 0
+    floor: tuple[float, ...] = ()
 
 
 def fit_mixture(
@@ -80,7 +80,7 @@ def fit_mixture(
     """
     _check(points, search)
     state = _Components(points, rng, search)
-    best, history, fruitless = None, [], 0
+    best, history, fruitless = None, list[Settled](), 0
     while True:
         sweeps = state.settle(search.tolerance)
         settled = Settled(state.size, state.message_length(), state.log_likelihood, sweeps)
@@ -134,7 +134,9 @@ class _Components:
         self.parameters = parameters_of(self.dimensions, search.covariance)
         size = min(search.most, self.count)
         variance = max(float(points.var(axis=0).mean()), 1e-300)
-        self.floor = FLOOR * variance
+        self.floor = FLOOR * variance * np.eye(self.dimensions)
+        if search.floor:
+            self.floor = self.floor + np.diag(search.floor)
         self.weights = np.full(size, 1.0 / size)
         self.means = self.points[rng.choice(self.count, size, replace=False)].copy()
         self.covariances = np.repeat(
@@ -198,7 +200,7 @@ class _Components:
             covariance = (away * share[:, None]).T @ away / share.sum()
         else:
             covariance = np.diag(share @ (away * away) / share.sum())
-        self.covariances[number] = covariance + self.floor * np.eye(self.dimensions)
+        self.covariances[number] = covariance + self.floor
         densities = self._densities(number)
         log_weights = np.log(self.weights)
         replace_component(self.log_densities, log_weights, number, densities, math.log(strength), self.totals)

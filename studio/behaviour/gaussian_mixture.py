@@ -7,7 +7,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from studio.arrays import Array
+
 IntArray = NDArray[np.int64]
 
 
@@ -41,6 +42,13 @@ class GaussianMixture:
         """(K, p, p) square roots V √D Vᵀ of the covariances (Caillette et al. 2007, 5.2)."""
         values, vectors = np.linalg.eigh(self.covariances)
         return (vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]) @ vectors.transpose(0, 2, 1)
+
+    @property
+    def variances(self) -> Array:
+        """(p,) variances of the whole mixture in each dimension."""
+        mean = self.weights @ self.means
+        inner = np.diagonal(self.covariances, axis1=1, axis2=2)
+        return self.weights @ (inner + (self.means - mean) ** 2)
 
     def log_densities(self, points: Array) -> Array:
         """(n, K) natural logs of the components' densities at the points (n, p), weights left out."""

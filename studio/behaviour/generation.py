@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
+from studio.arrays import Array
 from studio.behaviour.automaton import Automaton
 from studio.behaviour.gaussian_mixture import GaussianMixture
 from studio.behaviour.model import BehaviourModel
 from studio.errors import BehaviourError
 
-Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 

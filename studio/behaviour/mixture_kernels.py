@@ -1,13 +1,12 @@
+# pyright: standard
 """The inner loops of component-wise EM: shares of one component, and the mixture's density when it is replaced."""
 
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.numba_in_threads import KERNEL, njit
-
-Array = NDArray[np.float64]
 
 # Components below e^-40 of the mixture's density do not change it.
 NOTHING = -40.0

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.behaviour.automaton import Automaton
 from studio.behaviour.automaton_learning import ContextTest, learn_automaton
 from studio.behaviour.feature_space import FeatureSpace
@@ -22,7 +23,6 @@ from studio.behaviour.root_motion import RootMotion
 from studio.behaviour.settings import LearningSettings
 from studio.errors import BehaviourError
 
-Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 

@@ -25,6 +25,8 @@ from studio.foreign_files import foreign_file
 from studio.typed_decoding import decode_json
 
 VERSION = 2
+# Models of before the knob have clusters without a floor.
+WITHOUT_FLOOR = {"cluster_floor": 0.0}
 KIND = "studio behaviour model"
 
 
@@ -162,14 +164,14 @@ def _root_arrays(root: RootMotion | None) -> dict[str, NDArray[np.generic]]:
     return places | _mixture_arrays("root", root.changes)
 
 
-def _root(head: _Head, arrays: dict[str, NDArray]) -> RootMotion | None:
+def _root(head: _Head, arrays: dict[str, NDArray[Any]]) -> RootMotion | None:
     if "root_columns" not in arrays:
         return None
     frame = RootFrame(arrays["root_columns"], arrays["root_turning"], head.heading, arrays["root_level"])
     return RootMotion(frame, _mixture("root", arrays))
 
 
-def _model(head: _Head, arrays: dict[str, NDArray]) -> BehaviourModel:
+def _model(head: _Head, arrays: dict[str, NDArray[Any]]) -> BehaviourModel:
     """The model of a head and arrays. Raises ValueError, KeyError, IndexError or TypeError where they do not fit."""
     space = FeatureSpace(
         head.body,
@@ -199,7 +201,7 @@ def _model(head: _Head, arrays: dict[str, NDArray]) -> BehaviourModel:
     )
     labels = _split(arrays["labels"], arrays["label_lengths"])
     making = Making(
-        settings=LearningSettings(**head.settings),  # pyright: ignore[reportArgumentType]
+        settings=LearningSettings(**(WITHOUT_FLOOR | head.settings)),  # pyright: ignore[reportArgumentType]
         sources=head.sources,
         frames=len(arrays["labels"]),
         labels=tuple(labels),
@@ -213,7 +215,7 @@ def _model(head: _Head, arrays: dict[str, NDArray]) -> BehaviourModel:
     return model
 
 
-def _mixture(name: str, arrays: dict[str, NDArray]) -> GaussianMixture:
+def _mixture(name: str, arrays: dict[str, NDArray[Any]]) -> GaussianMixture:
     return GaussianMixture(arrays[f"{name}_weights"], arrays[f"{name}_means"], arrays[f"{name}_covariances"])
 
 
@@ -251,7 +253,7 @@ def _check_shapes(model: BehaviourModel) -> None:
         raise ValueError("states")
 
 
-def _split(values: NDArray, lengths: NDArray) -> list[NDArray]:
+def _split(values: NDArray[Any], lengths: NDArray[Any]) -> list[NDArray[Any]]:
     return np.split(values, np.cumsum(lengths)[:-1])
 
 

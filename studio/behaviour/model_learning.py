@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.behaviour.feature_space import FeatureSpace, feature_space
 from studio.behaviour.figueiredo_jain import FLOOR, Search, fit_mixture
 from studio.behaviour.gaussian_mixture import GaussianMixture
@@ -17,7 +18,6 @@ from studio.body.model import BodyModel
 from studio.errors import BehaviourError
 from studio.progress import Progress
 
-Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 
@@ -41,7 +41,10 @@ def learn_model(
     reduction = fit_reduction(everything, settings.reduced_dimensions)
     points = reduction.reduced(everything)
     search = Search(
-        most=settings.most_clusters, covariance=settings.covariance, patience=settings.clustering_patience
+        most=settings.most_clusters,
+        covariance=settings.covariance,
+        patience=settings.clustering_patience,
+        floor=cluster_floor(settings, points.var(axis=0)),
     )
     found, _ = fit_mixture(points, rng, search, progress)
     # A cluster that is no frame's likeliest one is not used as a label.
@@ -66,11 +69,18 @@ def learn_model(
     return BehaviourModel(space, reduction, mixture, dynamics, automaton, prototypes, making, root)
 
 
+def cluster_floor(settings: LearningSettings, variances: Array) -> tuple[float, ...]:
+    """The variances (p,) that every cluster has at least, of points with these variances (p,); () for none."""
+    if settings.cluster_floor == 0.0:
+        return ()
+    return tuple(float(value) for value in settings.cluster_floor * variances)
+
+
 def _features(space: FeatureSpace, recordings: Sequence[Array]) -> list[Array]:
     """The features of every recording. Raises BehaviourError naming a recording without features."""
     if not recordings:
         raise BehaviourError("There is no recording to learn from.", "Give at least one.")
-    found = []
+    found: list[Array] = []
     for number, poses in enumerate(recordings):
         try:
             found.append(space.features(poses))

@@ -20,11 +20,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.behaviour.model import BehaviourModel
 from studio.behaviour.prediction_kernels import choose_arcs, rooted_noise
 from studio.errors import BehaviourError
 
-Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 ENTERING = ("resample", "blend")

@@ -1,3 +1,4 @@
+# pyright: standard
 """The inner loops of prediction: the choice of Eq. 3 over the transitions there are, and noise of Eq. 4."""
 
 import math
@@ -5,9 +6,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.numba_in_threads import KERNEL, njit
 
-Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 

@@ -9,11 +9,9 @@ clusters were found, those that particles track best with.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.behaviour.gaussian_mixture import GaussianMixture
-
-Array = NDArray[np.float64]
 
 SMALLEST_SCALE = 1e-9
 

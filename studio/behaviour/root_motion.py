@@ -15,12 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.behaviour.gaussian_mixture import GaussianMixture
 from studio.behaviour.prediction_kernels import rooted_noise
 from studio.behaviour.reduction import full_clusters
 from studio.body.model import MOVE, TURN, BodyModel, Joint, Step
 
-Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 LEAST_SHARE = 1e-3

@@ -43,6 +43,11 @@ class LearningSettings:
         "full", choices=("full", "diagonal"), takes_effect="new run",
         help="Shape of the clusters where they are found; a full one needs more frames.",
     )  # fmt: skip
+    cluster_floor: float = knob(
+        0.0, 0.0, 0.5, 0.001, label="cluster floor", takes_effect="new run",
+        help="Least variance of a cluster where it is found, as a share of that of all frames in each dimension. "
+        "0 lets clusters shrink onto the frames that were learnt, so that other performances lie in none.",
+    )  # fmt: skip
     reduced_dimensions: int = knob(
         6, 0, 200, 1, label="reduced dimensions", takes_effect="new run",
         help="Principal components in which clusters are found; 0 takes the whole feature space.",

@@ -9,8 +9,8 @@ import dataclasses
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Bytes
 from studio.benchmarks.timing import quickest
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_frames
@@ -26,9 +26,6 @@ from studio.synthesis.arm_footage import filled
 from studio.synthesis.cameras import ring_camera
 from studio.volume.reconstruction import HullSettings, Reconstructor
 from studio.volume.tracking_space import box_of
-
-Array = NDArray[np.float64]
-Bytes = NDArray[np.uint8]
 
 WIDTH, HEIGHT, FOCAL = 320, 240, 300.0
 DISTANCE, LOW, HIGH, MIDDLE = 3300.0, 1500.0, 2500.0, 950.0

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.benchmarks.timing import quickest
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_ends
@@ -20,22 +21,20 @@ from studio.body.model import BodyModel
 from studio.evidence.edges import bodytrack_edges, proximity_edges
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.geometry.camera import Camera
+from studio.likelihood.bodytrack import BodytrackSettings, BodytrackWeigher
+from studio.likelihood.edge_region import EdgeRegionProblem, EdgeRegionSettings, EdgeRegionWeigher
+from studio.likelihood.edge_region_kernels import loads_only
+from studio.likelihood.edge_region_silhouette import EdgeRegionSilhouetteSettings, EdgeRegionSilhouetteWeigher
+from studio.likelihood.edge_silhouette import EdgeSilhouetteSettings, EdgeSilhouetteWeigher
+from studio.likelihood.outline_kernels import LANES
+from studio.likelihood.outlines import OutlineProjector
+from studio.likelihood.problem import FrameLikelihood
+from studio.likelihood.silhouette_areas import FULL, HALF
+from studio.likelihood.template import TemplateSettings, TemplateWeigher
 from studio.numba_in_threads import numba
 from studio.progress import Progress
 from studio.synthesis.arm_footage import filled
 from studio.synthesis.cameras import ring_camera
-from studio.weighting.bodytrack import BodytrackSettings, BodytrackWeigher
-from studio.weighting.edge_region import EdgeRegionProblem, EdgeRegionSettings, EdgeRegionWeigher
-from studio.weighting.edge_region_kernels import loads_only
-from studio.weighting.edge_region_silhouette import EdgeRegionSilhouetteSettings, EdgeRegionSilhouetteWeigher
-from studio.weighting.edge_silhouette import EdgeSilhouetteSettings, EdgeSilhouetteWeigher
-from studio.weighting.outline_kernels import LANES
-from studio.weighting.outlines import OutlineProjector
-from studio.weighting.problem import FrameProblem
-from studio.weighting.silhouette_areas import FULL, HALF
-from studio.weighting.template import TemplateSettings, TemplateWeigher
-
-Array = NDArray[np.float64]
 
 WIDTH, HEIGHT = 640, 480
 FOCAL, DISTANCE, ABOVE = 560.0, 3300.0, 1700.0
@@ -60,7 +59,7 @@ def run_benchmark(
     body_name: str = "human31", repeats: int = 80, progress: Progress | None = None
 ) -> dict[str, object]:
     """Evaluations a second of every weighting, on one thread unless noted, and the limit of
-    edge-region's.
+    edge-region's; "fractions": of bare loads, of as many samples as another weighting reads.
 
     repeats : of every measurement. progress : called with (step, done, total). Changes the number of Numba's threads
     while it runs, and sets it back."""
@@ -77,14 +76,19 @@ def run_benchmark(
     best = timed(contests, repeats, progress)
     rates = {contest.name: contest.evaluations / best[contest.name] for contest in contests}
     most = rates.pop(limit.name)
-    rate = rates["edge_region"]
+    rate, two = rates["edge_region"], rates.get("edge_region_two_threads")
+    samples = weigher.samples_per_evaluation
+    bodytrack = BodytrackWeigher(body, cameras, BodytrackSettings()).problem(evidence["bodytrack"])
+    bodytrack_samples = float(bodytrack.terms(poses)[2].sum(axis=1).mean())
     return {
         "edge_region": {
             "evaluations_per_second": round(rate),
-            "samples": weigher.samples_per_evaluation,
+            "samples": samples,
             "load_limit_per_second": round(most),
             "fraction_of_load_limit": round(rate / most, 3),
+            **({"two_threads": round(two / rate, 3)} if two else {}),
         },
+        "fractions": {"bodytrack": round(rates["bodytrack"] * bodytrack_samples / (most * samples), 3)},
         "others_evaluations_per_second": {
             name: round(found) for name, found in rates.items() if name != "edge_region"
         },
@@ -130,7 +134,7 @@ def weighing_contests(
 ) -> list[Contest]:
     """Every weighting on one thread, edge-region on two as well."""
     aware = EdgeRegionWeigher(body, cameras, EdgeRegionSettings(occlusion_aware=True))
-    problems: dict[str, FrameProblem] = {
+    problems: dict[str, FrameLikelihood] = {
         "edge_region": problem,
         "edge_region_occlusion_aware": aware.problem(evidence["proximity"]),
         "bodytrack": BodytrackWeigher(body, cameras, BodytrackSettings()).problem(evidence["bodytrack"]),
@@ -146,9 +150,9 @@ def weighing_contests(
 
 def silhouette_problems(
     body: BodyModel, cameras: tuple[Camera, ...], evidence: FrameEvidence
-) -> dict[str, FrameProblem]:
+) -> dict[str, FrameLikelihood]:
     """The weightings with the bidirectional silhouette, at half and at full resolution."""
-    found: dict[str, FrameProblem] = {}
+    found: dict[str, FrameLikelihood] = {}
     for resolution in (HALF, FULL):
         edges = EdgeSilhouetteSettings(silhouette_resolution=resolution)
         three = EdgeRegionSilhouetteSettings(silhouette_resolution=resolution)
@@ -189,5 +193,5 @@ def timed(contests: list[Contest], repeats: int, progress: Progress | None) -> d
     )
 
 
-def _weighing(problem: FrameProblem, poses: Array) -> Callable[[], object]:
+def _weighing(problem: FrameLikelihood, poses: Array) -> Callable[[], object]:
     return lambda: problem.weigh(poses)

@@ -24,6 +24,10 @@ from studio.benchmarks.live_stages import (
 )
 from studio.capture.frame_clock import ReplayClock
 from studio.errors import RunError
+from studio.jobs.control import StudioControl
+from studio.jobs.events import Event, StateChanged
+from studio.jobs.live_tracking import track_live
+from studio.jobs.watchers import Subscription
 from studio.progress import Progress
 from studio.runs.live_summary import LiveSummary, summary_of
 from studio.runs.new_run import prepare_run
@@ -32,10 +36,6 @@ from studio.sessions.manifest import write_manifest
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
-from studio.worker.control import StudioControl
-from studio.worker.events import Event, StateChanged
-from studio.worker.live_tracking import track_live
-from studio.worker.watchers import Subscription
 
 # A live run in its own process as in the studio, with the scene open and a viewer connected.
 
@@ -121,9 +121,9 @@ def run_live_benchmark(report: Progress, seconds: float = SECONDS) -> dict[str, 
         request = live_request(model, seconds)
         watched = track_watched(workspace, session, prepare_run(session, **request), report)
         pressed = _pressed(workspace, session, {**request, "name": "pressed", "last": None}, report)
-        alone_run = prepare_run(session, **{**request, "name": "alone"})
+        alone_run = prepare_run(session, **dict[str, Any](request, name="alone"))
         alone = track_watched(workspace, session, alone_run, report, scene=False)
-        fast_run = prepare_run(session, **{**request, "name": "fast"})
+        fast_run = prepare_run(session, **dict[str, Any](request, name="fast"))
         fast = track_live(
             session,
             fast_run,

@@ -15,6 +15,7 @@ from studio.behaviour.model_learning import learn_model
 from studio.behaviour.settings import LearningSettings
 from studio.body.catalogue import load_body
 from studio.capture.footage import folded
+from studio.capture.footage_source import CameraSource
 from studio.progress import Progress, unheard
 from studio.sessions.manifest import write_manifest
 from studio.sessions.session import Session
@@ -40,7 +41,7 @@ def lengthen(session: Session, seconds: float, progress: Progress = unheard) -> 
     if count <= source.frame_count:
         return
     footage = session.footage()
-    cameras = []
+    cameras: list[CameraSource] = []
     for number, camera in enumerate(source.cameras):
         clip = [footage.picture(camera.name, frame) for frame in range(source.frame_count)]
         path = session.path / camera.path

@@ -13,23 +13,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from studio.behaviour.model_file import read_model
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.pipeline import EvidenceMaker
+from studio.likelihood.blobs import BlobWeigher
+from studio.likelihood.catalogue import WEIGHTINGS
 from studio.numba_in_threads import numba
 from studio.progress import Progress
 from studio.runs.live_summary import LiveSummary
 from studio.runs.search_space import search_space, session_sigma
 from studio.sessions.session import Session
 from studio.settings import changed_settings, default_settings
-from studio.tracking.catalogue import TRACKERS
-from studio.tracking.tracker import Carried, generator, start_of
-from studio.weighting.blobs import BlobWeigher
-from studio.weighting.catalogue import WEIGHTINGS
-
-Array = NDArray[np.float64]
+from studio.trackers.catalogue import TRACKERS
+from studio.trackers.tracker import FilterState, Foreseeing, generator, start_of
+from studio.typed_decoding import is_table
 
 TRACKER, WEIGHTING = "behaviour", "blobs"
 CHANGES: Mapping[str, object] = {"particles": 1000, "hull_depth": 7}
@@ -122,7 +120,8 @@ def _measured(session: Session, model: Path, progress: Progress | None) -> dict[
         clock.lap("reconstruction")
         particles = tracker.begin_frame(generator(0, frame, -1), carried, space, settings.tracker)
         clock.lap("prediction and evaluation")
-        expected = tracker.expectations(particles, space, settings.tracker)  # pyright: ignore[reportAttributeAccessIssue]
+        assert isinstance(tracker, Foreseeing)
+        expected = tracker.expectations(particles, space, settings.tracker)
         informed = problem.expecting(expected, carried.memory)
         clock.lap("blob fitting")
         weighed, _ = tracker.step_layer(
@@ -130,7 +129,7 @@ def _measured(session: Session, model: Path, progress: Progress | None) -> dict[
         )
         pose = tracker.end_frame(weighed, space, settings.tracker).pose
         clock.lap("prediction and evaluation")
-        carried = Carried(weighed, pose, carried.estimate, informed.remembered(pose))
+        carried = FilterState(weighed, pose, carried.estimate, informed.remembered(pose))
         clock.lap("the rest")
         if progress is not None:
             progress("a live frame's stages", frame + 1, frames)
@@ -159,15 +158,15 @@ def live_figures(found: LiveSummary) -> dict[str, object]:
     }
 
 
-def in_words(report: Mapping[str, object]) -> str:
+def in_words(report: Mapping[str, Any]) -> str:
     """The benchmark's document as a table for a person."""
     lines = [f"Live: {report['setting']}", f"  {'stage, ms on one core':32}{'ours':>8}{'Table 1':>10}"]
-    for row in report["stages"]:  # pyright: ignore[reportGeneralTypeIssues]
+    for row in report["stages"]:
         paper = "" if row["paper_ms"] is None else f"{row['paper_ms']:.1f}"
         lines.append(f"  {row['stage']:32}{row['ms']:8.1f}{paper:>10}")
     for key, words in RUNS.items():
         run = report.get(key)
-        if isinstance(run, dict):
+        if is_table(run):
             latency = run["latency_ms"]
             lines.append(
                 f"  {words}: {run['frames_per_second']:.1f} frames a second, {run['dropped']} of "

@@ -5,11 +5,11 @@ import time
 from dataclasses import dataclass
 
 from studio.errors import RunError
+from studio.jobs.control import StudioControl
+from studio.jobs.events import Event, FrameFinished, StateChanged
+from studio.jobs.watchers import Subscription
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.worker.control import StudioControl
-from studio.worker.events import Event, FrameFinished, StateChanged
-from studio.worker.watchers import Subscription
 
 PATIENCE_SECONDS = 120.0
 SURVIVALS = (0.4, 0.5)

@@ -60,7 +60,7 @@ class _Branch:
 
 def _joint_branches(body: BodyModel) -> list[list[_Branch]]:
     """Equivalent branches of each joint with three angles, parents first."""
-    found = []
+    found: list[list[_Branch]] = []
     for index, joint in enumerate(body.joints):
         ball = _ball(joint)
         if ball is None:

@@ -23,7 +23,7 @@ A body file is TOML. Lengths in mm, angles in degrees. The body's name is the fi
     [[joints]]                        # parents before children
     name = "left_shin"
     parent = "left_thigh"             # or "world"
-    type = "hinge"                    # fixed 0, hinge 1, two-axis 2, ball 3 angles; free 3 and 3 lengths
+    type = "hinge"                    # fixed 0, hinge 1, two-axis 2, ball 3 angles; slide 1 length; free 3 and 3
     sequence = [                      # from the parent's frame to this one, each step in the frame so far
         { move = "z", by = "-thigh_length" },      # mm, [-]dimension or [-]length parameter
         { turn = "y", by = "left_knee" },          # degrees, or [-]angle parameter
@@ -94,7 +94,7 @@ class JointEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     name: str
     parent: str
-    type: Literal["fixed", "hinge", "two-axis", "ball", "free"]
+    type: Literal["fixed", "hinge", "slide", "two-axis", "ball", "free"]
     sequence: tuple[StepEntry, ...] = ()
 
 

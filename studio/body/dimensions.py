@@ -31,6 +31,13 @@ def with_usual_feet(body: BodyModel) -> BodyModel:
     return with_dimensions(body, {name: share * height for name, share in missing.items() if share})
 
 
+def follows_height(body: BodyModel) -> bool:
+    """Whether any of the body's lengths is a published share of a person's height."""
+    return body.definition is not None and any(
+        entry.of_height is not None for entry in body.definition.dimensions.values()
+    )
+
+
 def with_dimensions(body: BodyModel, changes: Mapping[str, float]) -> BodyModel:
     """The body with some dimensions changed: its steps, limbs and markers are rebuilt.
 

@@ -196,7 +196,7 @@ class Dragger:
         inside = np.where(np.isfinite(upper - lower), 1e-9 * (upper - lower), 1e-9)
         begin = np.clip(pose[free], lower + inside, upper - inside) / scale
         limits = (lower / scale, upper / scale)
-        answer = least_squares(residuals, begin, slopes, limits, max_nfev=MOST_STEPS, xtol=1e-6, ftol=1e-6)  # pyright: ignore[reportArgumentType]
+        answer = least_squares(residuals, begin, slopes, limits, max_nfev=MOST_STEPS, xtol=1e-6, ftol=1e-6)
         found = pose.copy()
         found[free] = np.clip(answer.x * scale, lower, upper)
         return found

@@ -7,7 +7,7 @@ motions world_from_joint: three axis columns and the origin (mm).
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from studio.arrays import Array
 from studio.body.model import MOVE, BodyModel, kinematic_tables
@@ -69,7 +69,16 @@ def checked_poses(body: BodyModel, poses: ArrayLike) -> Array:
 
 
 @numba.njit(cache=True, nogil=True)
-def place_joints(poses, parent, first_step, kind, axis, parameter, value, frames):
+def place_joints(
+    poses: Array,
+    parent: NDArray[np.integer],
+    first_step: NDArray[np.integer],
+    kind: NDArray[np.integer],
+    axis: NDArray[np.integer],
+    parameter: NDArray[np.integer],
+    value: Array,
+    frames: Array,
+) -> None:
     """Fill frames (N, F, 3, 4) with world_from_joint of poses (N, D); the rest as in `KinematicTables`."""
     for n in range(poses.shape[0]):
         for f in range(parent.shape[0]):
@@ -87,7 +96,7 @@ def place_joints(poses, parent, first_step, kind, axis, parameter, value, frames
 
 
 @numba.njit(cache=True, nogil=True)
-def take_step(frame, kind, axis, amount):
+def take_step(frame: Array, kind: int, axis: int, amount: float) -> None:
     """Multiply frame (3, 4) from the right by one elementary motion, in place. amount : mm or radians."""
     if kind == MOVE:
         for row in range(3):

@@ -150,7 +150,7 @@ class _MarkerProblem:
         inside = np.where(np.isfinite(upper - lower), 1e-9 * (upper - lower), 1e-9)
         begin = np.clip(pose[free], lower + inside, upper - inside) / scale
         limits = (lower / scale, upper / scale)
-        answer = least_squares(residuals, begin, slopes, limits, max_nfev=200)  # pyright: ignore[reportArgumentType]
+        answer = least_squares(residuals, begin, slopes, limits, max_nfev=200)
         return full(answer.x[None])[0]
 
     def offsets(self, poses: Array) -> Array:

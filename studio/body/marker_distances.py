@@ -78,7 +78,7 @@ class MarkerDistances:
 
     def rigid(self) -> dict[str, float]:
         """All pairs whose distance no pose changes and some dimension sets, mm."""
-        found = {}
+        found: dict[str, float] = {}
         for one, two in itertools.combinations(self.markers, 2):
             pair = f"{one}_{two}"
             length = float(self.distances([pair], self.start)[0])

@@ -25,7 +25,7 @@ ON_TOES, IN_THE_AIR = (
     0.8,
     1.4,
 )  # of the toes' reach: greatest height of a standing ankle; least in the air
-LOST_BELOW, LOST_ABOVE, LOST_SHARE = np.radians(-40.0), np.radians(75.0), 0.05
+LOST_BELOW, LOST_ABOVE, LOST_SHARE = float(np.radians(-40.0)), float(np.radians(75.0)), 0.05
 
 
 def mended(motion: PersonMotion) -> PersonMotion:
@@ -57,7 +57,7 @@ def with_knees_forward(motion: PersonMotion) -> PersonMotion:
     for side in SIDES:
         thigh = motion.turns[f"{side}_thigh"]
         begins = np.flatnonzero(np.trace(_steps(thigh), axis1=1, axis2=2) < TURNED_OVER) + 1
-        ahead = (thigh[:, :, 0] * motion.turns["pelvis"][:, :, 0]).sum(axis=1)
+        ahead: Array = (thigh[:, :, 0] * motion.turns["pelvis"][:, :, 0]).sum(axis=1)
         odd = np.searchsorted(begins, np.arange(motion.frame_count), side="right") % 2 == 1
         behind = odd if np.where(odd, -ahead, ahead).sum() >= 0.0 else ~odd
         if not len(begins):

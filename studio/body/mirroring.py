@@ -32,20 +32,25 @@ class Mirror:
 
     def __init__(self, body: BodyModel) -> None:
         self.body = body
-        self._twin = _parameter_twins(body)
+        self.twins = _parameter_twins(body)
+        """(D,) each parameter's place, or that of its like on the other side."""
         self.limb_twins = name_twins([limb.name for limb in body.drawn])
         sides = np.array([limb.side for limb in body.drawn])
-        if not (self.limb_twins != np.arange(len(sides))).any() or not (sides == "left").any():
+        self.pairs = self.limb_twins != np.arange(len(sides))
+        """(L,) which drawn limbs have a twin."""
+        if not self.pairs.any() or not (sides == "left").any():
             raise BodyError(
                 f"Body '{body.name}' has no left and right limbs to exchange.",
                 "Choose a body whose limbs come in left and right.",
             )
         rest = limb_ends(body, body.neutral)[0]
         across = (rest[sides == "left"] - rest[self.limb_twins][sides == "left"]).mean(axis=(0, 1))
-        self._across = across / np.linalg.norm(across)
+        self.across: Array = across / np.linalg.norm(across)
+        """(3,) the body's left in its rest pose."""
         self._joint = root_joint(body)
         self._root = _parameters_of(body, self._joint)
-        self._sign = self._signs()
+        self.signs = self._signs()
+        """(D,) ±1: how a parameter follows its twin."""
 
     def mirrored(self, pose: Array) -> Array:
         """The pose (D,) mirrored, with the same place and facing."""
@@ -63,7 +68,7 @@ class Mirror:
     @property
     def turns(self) -> bool:
         """Whether the body's root can turn."""
-        return any(self.body.parameters[at].kind == "angle" for at in self._root.tolist())
+        return any(self.body.parameters[int(at)].kind == "angle" for at in self._root)
 
     def exchanged(self, pose: Array, own: Indices, limbs: Indices) -> Array:
         """The pose (D,) with each of a pair's limbs (indices of drawn ones) where its twin is, as near as the pair's
@@ -83,7 +88,7 @@ class Mirror:
 
     def _exchanged(self, pose: Array) -> Array:
         rest = self.body.neutral
-        swapped = rest + self._sign * (np.asarray(pose) - rest)[self._twin]
+        swapped = rest + self.signs * (np.asarray(pose) - rest)[self.twins]
         swapped[self._root] = np.asarray(pose)[self._root]
         return swapped
 
@@ -96,9 +101,9 @@ class Mirror:
     def sideways(self, pose: Array) -> Array:
         """(3,) the body's left, level if it can be."""
         if self._joint < 0:
-            return self._across
+            return self.across
         frames = joint_frames(self.body, np.stack([self.body.neutral, pose]))[:, self._joint, :, :3]
-        own = frames[1] @ frames[0].T @ self._across
+        own = frames[1] @ frames[0].T @ self.across
         level = own * [1.0, 1.0, 0.0]
         return level / np.linalg.norm(level) if np.linalg.norm(level) > LEVEL else own
 
@@ -120,7 +125,7 @@ class Mirror:
         """The pose with its `free` parameters where the limbs are nearest to `target`, limits kept, and half the sum of
         squares that remains. limbs : which drawn ones, None for all.
         """
-        entries = [self.body.parameters[at] for at in free.tolist()]
+        entries = [self.body.parameters[int(at)] for at in free]
         scale = np.array([1.0 if entry.kind == "angle" else MM_PER_RADIAN for entry in entries])
         lower = np.array([entry.lower for entry in entries]) / scale
         upper = np.array([entry.upper for entry in entries]) / scale
@@ -149,13 +154,13 @@ class Mirror:
         if not len(free):
             return pose.copy(), 0.0
         limits = (lower, upper)
-        answer = least_squares(residuals, begin, slopes, limits, max_nfev=60)  # pyright: ignore[reportArgumentType]
+        answer = least_squares(residuals, begin, slopes, limits, max_nfev=60)
         return placed(answer.x[None])[0], float(answer.cost)
 
     def _beginnings(self, pose: Array) -> list[Array]:
         """The pose, and the pose with half a turn about each of the root's axes."""
         found = [pose]
-        for place in self._root.tolist():
+        for place in map(int, self._root):
             if self.body.parameters[place].kind == "angle":
                 turned = pose.copy()
                 turned[place] += math.pi
@@ -175,15 +180,15 @@ class Mirror:
                     turns[step.parameter] += vector_from_rotation(turn)
         # A parameter that turns both sides against each other sums to zero, and is its own mirror image.
         # A turn is an axial vector: in the mirror its part along the mirror's normal stays.
-        mirrored = 2.0 * (turns @ self._across)[:, None] * self._across - turns
-        along = np.einsum("dk,dk->d", mirrored[self._twin], turns)
+        mirrored = 2.0 * (turns @ self.across)[:, None] * self.across - turns
+        along = np.einsum("dk,dk->d", mirrored[self.twins], turns)
         return np.where(along < -0.01 * SMALL**2, -1.0, 1.0)
 
 
 def name_twins(names: list[str]) -> Indices:
     """Each name's place, or that of the one that says left where it says right."""
     places = {name: at for at, name in enumerate(names)}
-    found = []
+    found: list[int] = []
     for at, name in enumerate(names):
         other = name.replace("left", "right") if "left" in name else name.replace("right", "left", 1)
         found.append(places.get(other, at))

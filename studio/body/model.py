@@ -154,6 +154,13 @@ def kinematic_tables(body: BodyModel) -> KinematicTables:
     )
 
 
+def moving_joint(body: BodyModel, joint: int) -> int:
+    """The joint itself or, as far as joints are fixed, the one above; -1: it is fixed to the world."""
+    while joint >= 0 and all(step.parameter < 0 for step in body.joints[joint].steps):
+        joint = body.joints[joint].parent
+    return joint
+
+
 def extremities(body: BodyModel) -> tuple[int, ...]:
     """Indices of the drawn limbs on which no other drawn limb's joint hangs."""
     carried: set[int] = set()

@@ -14,12 +14,19 @@ from studio.body.definition import WORLD, BodyDefinition, JointEntry, ParameterE
 from studio.body.model import MOVE, TURN, BodyModel, Joint, Limb, Marker, Parameter, Step
 from studio.errors import BodyError
 from studio.foreign_files import foreign_file
-from studio.typed_decoding import decode_toml
+from studio.typed_decoding import decode_toml, is_list
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_ .]*")
 
 # Number of angles and lengths that a joint of each type is driven by.
-FREEDOMS = {"fixed": (0, 0), "hinge": (1, 0), "two-axis": (2, 0), "ball": (3, 0), "free": (3, 3)}
+FREEDOMS = {
+    "fixed": (0, 0),
+    "hinge": (1, 0),
+    "slide": (0, 1),
+    "two-axis": (2, 0),
+    "ball": (3, 0),
+    "free": (3, 3),
+}
 
 
 def check_definition(definition: BodyDefinition, file: str) -> None:
@@ -346,6 +353,6 @@ def _with_names(text: str, problem: str) -> str:
         return problem.replace("`", "'")
     group, index, rest = place.group(1), int(place.group(2)), place.group(3)
     entries = msgspec.toml.decode(text).get(group)
-    name = entries[index].get("name", f"number {index + 1}") if isinstance(entries, list) else index
+    name = entries[index].get("name", f"number {index + 1}") if is_list(entries) else index
     cause = problem.replace("`", "'").split(" - at ")[0]
     return f"{group.removesuffix('s')} '{name}'{', ' + rest if rest else ''}: {cause}"

@@ -169,7 +169,7 @@ def lowest_of_sole(motion: PersonMotion, side: str) -> Array:
 
 def _middles(recorded: RecordedMotion, family: Family) -> tuple[Array, Array]:
     """(F, 3) the middles between the hips and between the shoulders."""
-    places = []
+    places: list[Array] = []
     for segment in ("thigh", "upper_arm"):
         begin = family.bone(segment).begin
         both = [recorded.positions[:, recorded.index(family.named(begin, side))] for side in (0, 1)]
@@ -228,7 +228,7 @@ def _rest_length(recorded: RecordedMotion, family: Family, segment: str, side: i
 
 def _frames(up: Array, left: Array) -> Array:
     """(F, 3, 3) frames with z along `up` and y as close to `left` as that allows; (F, 3) each."""
-    z = up / np.linalg.norm(up, axis=1, keepdims=True)
-    x = np.cross(left, z)
+    z: Array = up / np.linalg.norm(up, axis=1, keepdims=True)
+    x: Array = np.cross(left, z)
     x /= np.linalg.norm(x, axis=1, keepdims=True)
     return np.stack([x, np.cross(z, x), z], axis=-1)

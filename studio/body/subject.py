@@ -96,7 +96,7 @@ def subject_from_shape(body: BodyModel, numbers: ArrayLike) -> Subject:
     if not order or len(values) != len(order):
         cause = f"A shape of {len(values)} numbers does not fit body '{body.name}', which takes {len(order)}."
         raise BodyError(cause, "Check that the shape file and the body belong together.")
-    lengths, ratios = {}, {}
+    lengths, ratios = dict[str, float](), dict[str, float]()
     for name, value in zip(order, values.tolist(), strict=True):
         (ratios if _is_ratio(body, name) else lengths)[name] = value
     subject = Subject(body=body.name, dimensions_mm=lengths, ratios=ratios)
@@ -177,7 +177,7 @@ def _levelled(body: BodyModel, given: Mapping[str, float]) -> dict[str, float]:
     """The body's own dimensions with the mean of left and right on either side, unless they were
     given.
     """
-    levelled = {}
+    levelled: dict[str, float] = {}
     for name, value in body.dimensions.items():
         other = name.replace("left_", "right_") if "left_" in name else name.replace("right_", "left_")
         if other != name and other in body.dimensions and name not in given and other not in given:

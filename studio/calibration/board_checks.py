@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from studio.arrays import Array, Indices
-from studio.calibration.board_poses import pair_pose, view_of
+from studio.calibration.board_poses import BoardView, pair_pose, view_of
 from studio.calibration.boards import Board, Sighting
 from studio.calibration.extrinsics import Rig
 from studio.calibration.fault_hypotheses import explained
@@ -61,8 +61,8 @@ def mirrored_cameras(
 
     With two cameras either of them may be the mirrored one.
     """
-    views = {name: {} for name in rig_names}
-    backwards = {name: {} for name in rig_names}
+    views: dict[str, dict[int, BoardView]] = {name: {} for name in rig_names}
+    backwards: dict[str, dict[int, BoardView]] = {name: {} for name in rig_names}
     for sighting in sightings:
         if sighting.camera not in views:
             continue
@@ -131,7 +131,7 @@ def board_disagreement(cameras: Sequence[Camera], board: Board, sightings: Seque
     NaN if no two cameras share a frame.
     """
     pairs = _shared(cameras, sightings)
-    values = []
+    values: list[float] = []
     for one, two, frames in pairs:
         errors = [_two_views(cameras[one], cameras[two], *couple, board)[1] for couple in frames]
         values.append(min(float(np.median(np.concatenate(errors))), CLIPPED_PX))
@@ -157,7 +157,7 @@ def _shared(
 ) -> list[tuple[int, int, list[tuple[Sighting, Sighting]]]]:
     """Pairs of cameras with the frames that both saw, with four common corners or more."""
     seen = {(sighting.camera, sighting.frame): sighting for sighting in sightings}
-    found = []
+    found: list[tuple[int, int, list[tuple[Sighting, Sighting]]]] = []
     for one, two in combinations(range(len(cameras)), 2):
         names = cameras[one].name, cameras[two].name
         frames = sorted({frame for name, frame in seen if name == names[0] and (names[1], frame) in seen})

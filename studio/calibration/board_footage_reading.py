@@ -42,9 +42,9 @@ class HowTaken:
     footage; board pictures that lie as that already stay as they are.
     """
 
-    offsets: Mapping[str, int] = field(default_factory=dict)
-    turned: Mapping[str, int] = field(default_factory=dict)
-    sizes: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    offsets: Mapping[str, int] = field(default_factory=dict[str, int])
+    turned: Mapping[str, int] = field(default_factory=dict[str, int])
+    sizes: Mapping[str, tuple[int, int]] = field(default_factory=dict[str, tuple[int, int]])
 
     def upright(self, camera: str, picture: Bytes) -> Bytes:
         """A recording's picture, turned as the footage of its camera is."""
@@ -221,12 +221,12 @@ def footage_picture(footage: BoardFootage, frame: int) -> Bytes:
 def _pictures(footage: BoardFootage, count: int, frames: Indices) -> Iterator[tuple[int, str, Bytes]]:
     """Frame number, name and picture."""
     if footage.video is None:
-        for frame in frames.tolist():
+        for frame in map(int, frames):
             yield frame, footage.pictures[frame].name, read_picture(footage.pictures[frame])
         return
     reader = VideoReader(footage.video, count)
     try:
-        for frame in frames.tolist():
+        for frame in map(int, frames):
             yield frame, f"frame {frame}", reader.read(frame)
     finally:
         reader.close()

@@ -45,7 +45,7 @@ def write_board_pdf(board: Board, path: Path, page: str = "a4") -> None:
     width, height = (long, short) if landscape else (short, long)
     document = FPDF(orientation="landscape" if landscape else "portrait", unit="mm", format=(short, long))
     document.set_auto_page_break(False)
-    document.set_title(f"Calibration board {board.spelling}")
+    document.set_title(f"Calibration board {board.text}")
     document.add_page()
     document.set_fill_color(0, 0, 0)
     left, top = (width - pattern.width) / 2.0, MARGIN + (room[1] - pattern.height) / 2.0
@@ -66,10 +66,10 @@ def write_board_pdf(board: Board, path: Path, page: str = "a4") -> None:
 def _words(board: Board) -> str:
     sizes = f"squares of {board.square_mm:g} mm"
     if board.kind == "chessboard":
-        return f"Chessboard, {board.columns} x {board.rows} inner corners, {sizes}.  studio: {board.spelling}"
+        return f"Chessboard, {board.columns} x {board.rows} inner corners, {sizes}.  studio: {board.text}"
     return (
         f"ChArUco board, {board.columns} x {board.rows} {sizes}, markers of {board.marker_mm:g} mm, {board.dictionary}."
-        f"  studio: {board.spelling}"
+        f"  studio: {board.text}"
     )
 
 

@@ -91,8 +91,9 @@ def pair_pose(first: str, second: str, views: Mapping[str, Mapping[int, BoardVie
     frames = sorted(set(views[first]) & set(views[second]))
     if not frames:
         return None
-    frames = [frames[k] for k in np.unique(np.linspace(0, len(frames) - 1, MOST_VOTES // 4).astype(int))]
-    votes, voters, distances = [], [], []
+    chosen = np.unique(np.linspace(0, len(frames) - 1, MOST_VOTES // 4).astype(int))
+    frames = [frames[int(k)] for k in chosen]
+    votes, voters, distances = list[Array](), list[int](), list[float]()
     for frame in frames:
         one, two = views[first][frame], views[second][frame]
         # Turning the board for both cameras changes nothing, so only the second one's may be turned.

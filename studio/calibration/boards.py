@@ -102,7 +102,7 @@ class Board:
         return self.kind == "chessboard" and (across + down) % 2 == 0
 
     @property
-    def spelling(self) -> str:
+    def text(self) -> str:
         """The board as `board_from_text` reads it."""
         if self.kind == "chessboard":
             return f"chessboard:{self.columns}x{self.rows},{self.square_mm:g}"

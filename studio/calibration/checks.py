@@ -22,12 +22,14 @@ def check_calibration(
     sightings: Sequence[Sighting] = (),
     masks: Masks | None = None,
     height_mm: float | None = None,
+    scale: float = 1.0,
     distances_mm: Mapping[tuple[str, str], float] | None = None,
 ) -> tuple[Finding, ...]:
     """All findings on a calibration, blocking ones first; none for a good one.
 
     footage_sizes : (width, height) of each camera's footage. board, sightings : board footage taken with these
     cameras. masks : silhouettes of one person, frame → camera → (H, W), nonzero = person. height_mm : the person's.
+    scale : of the body beside a person (`scale_of`).
     distances_mm : measured distances between two cameras' lenses. Each argument adds checks.
     """
     sizes = {sighting.camera: sighting.size for sighting in sightings} | dict(footage_sizes or {})
@@ -37,7 +39,7 @@ def check_calibration(
         if board is not None and sightings:
             found += board_findings(cameras, board, sightings)
         if masks and not blocking(found):
-            found += silhouette_findings(cameras, masks, height_mm, board)
+            found += silhouette_findings(cameras, masks, height_mm, board, scale)
         if not any(finding.code in ("scale", "square-size") for finding in found):
             found += distance_findings(cameras, distances_mm or {}, board)
     return tuple(sorted(found, key=lambda finding: finding.severity != "blocks"))

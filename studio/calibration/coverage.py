@@ -30,7 +30,7 @@ class Coverage:
     def empty_parts(self) -> tuple[str, ...]:
         """Parts of the picture, in words, in which not a quarter of the cells saw a corner."""
         rows, columns = self.counts.shape
-        down, across = (np.arange(count) * 3 // count for count in (rows, columns))
+        down, across = (np.arange(int(count)) * 3 // count for count in (rows, columns))
         names = (("top left", "top", "top right"), ("left", "centre", "right"))
         names = (*names, ("bottom left", "bottom", "bottom right"))
         return tuple(

@@ -14,7 +14,7 @@ import cv2.aruco
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Array, Bytes, Indices
+from studio.arrays import Array, Bytes, Floats, Indices
 from studio.calibration.boards import Board, Sighting
 
 FEWEST_CORNERS = 6
@@ -39,7 +39,9 @@ class BoardFinder:
 
     def find(self, picture: Bytes, camera: str, frame: int, name: str = "") -> Sighting | None:
         """The board in a (H, W, 3) BGR or (H, W) grey picture, None if fewer than six of its corners are seen."""
-        grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY) if picture.ndim == 3 else picture
+        grey = picture
+        if picture.ndim == 3:
+            grey = np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
         found, mirrored = self._corners(grey), False
         if found is None and self._mirrored_too:
             found, mirrored = self._corners(np.ascontiguousarray(grey[:, ::-1])), True
@@ -48,7 +50,7 @@ class BoardFinder:
         size = (int(grey.shape[1]), int(grey.shape[0]))
         return Sighting(camera, frame, name or f"frame {frame}", size, *found, mirrored=mirrored)
 
-    def _corners(self, grey: NDArray) -> tuple[Indices, Array] | None:
+    def _corners(self, grey: Bytes) -> tuple[Indices, Array] | None:
         if self._charuco is not None:
             return _charuco_corners(self.board, self._charuco, grey)
         pixels = _chessboard_corners(self.board, grey, self._thorough)
@@ -74,14 +76,14 @@ def _charuco_detector(board: Board) -> cv2.aruco.CharucoDetector:
 
 
 def _charuco_corners(
-    board: Board, detector: cv2.aruco.CharucoDetector, grey: NDArray
+    board: Board, detector: cv2.aruco.CharucoDetector, grey: Bytes
 ) -> tuple[Indices, Array] | None:
     """(K,) ids and (K, 2) pixels.
 
     OpenCV 4.10 gives corners half a pixel off; all are refined again here, in a window that leaves the markers out.
     """
     corners, ids, _, _ = detector.detectBoard(grey)
-    if ids is None or len(ids) < FEWEST_CORNERS:
+    if ids is None or len(ids) < FEWEST_CORNERS:  # pyright: ignore[reportUnnecessaryComparison] - it may be
         return None
     order = np.argsort(np.ravel(ids))
     numbers = np.ravel(ids)[order].astype(np.int64)
@@ -96,7 +98,7 @@ def _charuco_corners(
     return numbers[kept], np.asarray(fine[kept], dtype=np.float64)
 
 
-def _spacing(board: Board, ids: Indices, pixels: NDArray) -> float:
+def _spacing(board: Board, ids: Indices, pixels: NDArray[np.floating]) -> float:
     """Pixels from corner to corner: the median over all pairs, by their distance on the board."""
     plan = np.linalg.norm(board.points[ids][:, None] - board.points[ids][None], axis=-1) / board.square_mm
     seen = np.linalg.norm(pixels[:, None] - pixels[None], axis=-1)
@@ -104,7 +106,7 @@ def _spacing(board: Board, ids: Indices, pixels: NDArray) -> float:
     return float(np.median(seen[far] / plan[far]))
 
 
-def _chessboard_corners(board: Board, grey: NDArray, thorough: bool) -> Array | None:
+def _chessboard_corners(board: Board, grey: Bytes, thorough: bool) -> Array | None:
     """(K, 2) all corners row by row in the board's order, None if not all are seen.
 
     The first look is at the picture made small, its corners refined at full size; without `thorough` it is the only
@@ -126,7 +128,7 @@ def on_a_plane(board: Board, pixels: Array) -> bool:
     """Whether all (K, 2) corners are a picture of the board's plane, give or take what a lens may bend."""
     flat = board.points[:, :2]
     homography, _ = cv2.findHomography(flat, pixels, 0)
-    if homography is None:
+    if homography is None:  # pyright: ignore[reportUnnecessaryComparison] - it may be
         return False
     across, down = board.corners
     off = cv2.perspectiveTransform(flat[None], homography)[0] - pixels
@@ -134,9 +136,10 @@ def on_a_plane(board: Board, pixels: Array) -> bool:
     return bool(np.sqrt((off**2).sum(axis=1).mean()) < OFF_PLANE * spacing)
 
 
-def _small_search(grey: NDArray, size: tuple[int, int], flags: int) -> NDArray | None:
+def _small_search(grey: Bytes, size: tuple[int, int], flags: int) -> Floats | None:
     scale = FIRST_LOOK / max(grey.shape)
-    small = cv2.resize(grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    resized = cv2.resize(grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    small = np.asarray(resized, dtype=np.uint8)
     corners = _search(small, size, flags)
     if corners is None:
         return None
@@ -144,18 +147,18 @@ def _small_search(grey: NDArray, size: tuple[int, int], flags: int) -> NDArray |
     return _refined(grey, (np.asarray(corners, dtype=np.float32).reshape(-1, 1, 2) + 0.5) / scale - 0.5, size)
 
 
-def _search(grey: NDArray, size: tuple[int, int], flags: int) -> NDArray | None:
+def _search(grey: Bytes, size: tuple[int, int], flags: int) -> Floats | None:
     seen, corners = cv2.findChessboardCornersSB(grey, size, flags=cv2.CALIB_CB_NORMALIZE_IMAGE | flags)
-    return corners if seen else None
+    return np.asarray(corners, dtype=np.float32) if seen else None
 
 
-def _classic_search(grey: NDArray, size: tuple[int, int]) -> NDArray | None:
+def _classic_search(grey: Bytes, size: tuple[int, int]) -> Floats | None:
     flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_FAST_CHECK
     seen, corners = cv2.findChessboardCorners(grey, size, flags=flags)
     return _refined(grey, np.asarray(corners, dtype=np.float32).reshape(-1, 1, 2), size) if seen else None
 
 
-_SEARCHES: tuple[Callable[[NDArray, tuple[int, int]], NDArray | None], ...] = (
+_SEARCHES: tuple[Callable[[Bytes, tuple[int, int]], Floats | None], ...] = (
     partial(_small_search, flags=0),
     partial(_small_search, flags=cv2.CALIB_CB_EXHAUSTIVE),
     partial(_search, flags=cv2.CALIB_CB_ACCURACY),
@@ -165,16 +168,17 @@ _SEARCHES: tuple[Callable[[NDArray, tuple[int, int]], NDArray | None], ...] = (
 """Quickest first; the first two are for large pictures."""
 
 
-def _refined(grey: NDArray, corners: NDArray, size: tuple[int, int]) -> NDArray:
+def _refined(grey: Bytes, corners: Floats, size: tuple[int, int]) -> Floats:
     """(K, 1, 2) corners moved to where the gradients around them meet."""
     rows = corners.reshape(size[1], size[0], 2)
     spacing = float(np.median(np.linalg.norm(np.diff(rows, axis=0), axis=-1)))
     reach = int(np.clip(0.25 * spacing, 2, 11))
     until = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 50, 0.002)
-    return cv2.cornerSubPix(grey, corners.astype(np.float32), (reach, reach), (-1, -1), until)
+    fine = cv2.cornerSubPix(grey, corners.astype(np.float32), (reach, reach), (-1, -1), until)
+    return np.asarray(fine, dtype=np.float32)
 
 
-def _in_order(board: Board, grid: Array, grey: NDArray) -> Array:
+def _in_order(board: Board, grid: Array, grey: Bytes) -> Array:
     """(rows, columns, 2) corners, not mirrored, beginning where the board begins."""
     along, downwards = grid[0, -1] - grid[0, 0], grid[-1, 0] - grid[0, 0]
     if along[0] * downwards[1] - along[1] * downwards[0] < 0.0:
@@ -185,7 +189,7 @@ def _in_order(board: Board, grid: Array, grey: NDArray) -> Array:
     return grid if _outer_level(grid, grey) <= _outer_level(turned, grey) else turned
 
 
-def _outer_level(grid: Array, grey: NDArray) -> float:
+def _outer_level(grid: Array, grey: Bytes) -> float:
     """Grey level of the squares diagonally before the first corner and inside of it; both have one colour."""
     inner = grid[:2, :2].mean(axis=(0, 1))
     outer = 2.0 * grid[0, 0] - inner

@@ -20,7 +20,7 @@ from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
 from studio.geometry.rigid import compose, inverse, rigid
 from studio.geometry.rotations import rotation_from_vector, vector_from_rotation
-from studio.progress import Progress
+from studio.progress import Progress, unheard
 
 MOST_FRAMES = 90
 CLIPPED_PX = 30.0
@@ -68,9 +68,9 @@ def solve_rig(
     Raises CalibrationError naming the cameras that share no board view with the others.
     """
     names = tuple(sorted(lenses, key=natural_key))
-    report = progress or (lambda step, done, total: None)
+    report = progress or unheard
     seen = _Seen(board, names, lenses, views_by_camera(board, sightings, lenses))
-    pairs = []
+    pairs: list[PairPose] = []
     couples = list(combinations(names, 2))
     for number, (first, second) in enumerate(couples):
         report("Comparing cameras", number, len(couples))
@@ -121,8 +121,8 @@ def _tree(names: Sequence[str], pairs: Sequence[PairPose]) -> dict[str, Array]:
 
 def _chosen_frames(seen: _Seen) -> list[int]:
     """Frames that two or more cameras saw; if there are many, those that serve the least served pairs."""
-    together = {}
-    for frame in sorted(set().union(*(seen.views[name] for name in seen.names))):
+    together: dict[int, list[tuple[str, str]]] = {}
+    for frame in sorted(set[int]().union(*(seen.views[name] for name in seen.names))):
         pairs = list(combinations([name for name in seen.names if frame in seen.views[name]], 2))
         if pairs:
             together[frame] = pairs
@@ -163,7 +163,7 @@ def _board_poses(
 def _cost(board: Board, pose: Array, camera: Array, lens: Lens, view: BoardView) -> tuple[float, float]:
     """Clipped mean pixels between a board's pose and a view, and the same counted from the board's other end."""
     sighting = view.sighting
-    costs = []
+    costs: list[float] = []
     for ids in (sighting.ids, len(board.points) - 1 - sighting.ids):
         local = board.points[ids] @ pose[:, :3].T + pose[:, 3]
         seen = local @ camera[:, :3].T + camera[:, 3]
@@ -215,7 +215,7 @@ def _lens_row(lens: Lens) -> Array:
 def _rig(seen: _Seen, frames: Sequence[int], bundle: Bundle, used: Observations) -> Rig:
     """The cameras and boards of a bundle, with what is left of errors on the observations that were used."""
     errors = errors_of(bundle, used)
-    cameras, rms, views = [], {}, {}
+    cameras, rms, views = list[Camera](), dict[str, float](), dict[str, int]()
     for number, name in enumerate(seen.names):
         fx, fy, cx, cy = bundle.lenses[number, :4]
         vector = bundle.cameras[number]
@@ -250,7 +250,7 @@ def moved(rig: Rig, new_from_old: Array) -> Rig:
 def moved_cameras(cameras: Sequence[Camera], new_from_old: Array) -> tuple[Camera, ...]:
     """Cameras in another world: (3, 4) new_from_old."""
     back = inverse(new_from_old)
-    found = []
+    found: list[Camera] = []
     for camera in cameras:
         pose = compose(rigid(camera.rotation, camera.translation), back)
         found.append(replace(camera, rotation=pose[:, :3].copy(), translation=pose[:, 3].copy()))

@@ -89,7 +89,7 @@ def triangulated(cameras: Sequence[Camera], clicks: Mapping[str, Array]) -> Arra
                 f"A point in '{name}' lies more than {FARTHEST_PIXEL:g} pixels outside its picture.",
                 "Click each point where it is seen.",
             )
-    points = []
+    points: list[Array] = []
     for number in range(len(next(iter(clicks.values()), np.zeros((0, 2))))):
         rows = [
             _lines(known[name], pixels[number])
@@ -116,12 +116,12 @@ def floor_from_points(points: Array, cameras: Sequence[Camera]) -> Array:
     _, extents, axes = np.linalg.svd(points - middle)
     if extents[1] < STRETCHED * extents[0]:
         raise CalibrationError("The floor points lie on a line.", "Click points that span a triangle.")
-    up = axes[2]
+    up: Array = axes[2]
     above = np.mean([(camera.centre - middle) @ up for camera in cameras])
     up = up if above > 0.0 else -up
     origin = points[0] - ((points[0] - middle) @ up) * up
     along = points[1] - points[0]
-    x = along - (along @ up) * up
+    x: Array = along - (along @ up) * up
     if np.linalg.norm(x) < 1e-9:
         raise CalibrationError("The first two floor points are the same.", "Click two that lie apart.")
     x = x / np.linalg.norm(x)

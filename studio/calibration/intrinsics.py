@@ -97,9 +97,9 @@ def solve_lens(board: Board, sightings: Sequence[Sighting]) -> Lens:
         del used[worst]
         solution, model = _fitted(board, used, size)
     doubt = _profiled_deviation(board, used, size, solution)
-    tilts = np.degrees(
-        np.arccos(np.clip([abs(cv2.Rodrigues(turn)[0][2, 2]) for turn in solution.turns], 0, 1))
-    )
+    turns: list[Array] = list(solution.turns)
+    upright = [abs(float(np.asarray(cv2.Rodrigues(turn)[0], dtype=np.float64)[2, 2])) for turn in turns]
+    tilts = np.degrees(np.arccos(np.clip(upright, 0, 1)))
     place = {id(sighting): number for number, sighting in enumerate(used)}
     residuals = tuple(
         PictureResidual(sighting.picture, sighting.frame, np.nan, np.nan, dropped[id(sighting)])
@@ -178,7 +178,7 @@ def _profiled_deviation(
     flags |= cv2.CALIB_ZERO_TANGENT_DIST if len(sightings) < MANY else 0
     count = sum(len(sighting.ids) for sighting in sightings)
     focal = float(np.mean(np.diag(solution.matrix)[:2]))
-    rises = []
+    rises: list[float] = []
     for share in (1.0 - PROFILED, 1.0 + PROFILED):
         held = _solved(board, sightings, size, flags, share * focal, solution.matrix[:2, 2])
         rises.append(2.0 * count * max((held.rms / max(solution.rms, 1e-9)) ** 2 - 1.0, 1e-12))

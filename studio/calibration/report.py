@@ -23,7 +23,7 @@ def report_of(calibrated: Calibrated) -> dict[str, object]:
     rig = calibrated.rig
     cameras = {camera.name: camera for camera in rig.cameras} if rig is not None else {}
     return {
-        "board": calibrated.board.spelling,
+        "board": calibrated.board.text,
         "floor": calibrated.floor,
         "usable": not blocking(calibrated.findings),
         "findings": [asdict(finding) | {"cameras": list(finding.cameras)} for finding in calibrated.findings],

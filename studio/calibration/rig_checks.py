@@ -67,7 +67,7 @@ def looks_at_one_place(cameras: Sequence[Camera]) -> tuple[str, ...]:
     target = common_target(tuple(cameras))
     if target is None:
         return ()
-    away = []
+    away: list[str] = []
     for camera in cameras:
         seen = camera.rotation @ target + camera.translation
         if seen[2] <= 0.0 or np.hypot(seen[0], seen[1]) > FAR_FROM_AXES * seen[2]:

@@ -69,7 +69,13 @@ def aligned_cameras(cameras: Sequence[Camera], outlines: Outlines) -> AlignedCam
         robust = ROBUST_PIXELS * np.sqrt(2.0 * (np.sqrt(1.0 + (missed / ROBUST_PIXELS) ** 2) - 1.0))
         return np.concatenate([robust * np.sign(missed), PULL * flat / TURN_SPREAD])
 
-    found = least_squares(residuals, start.ravel(), x_scale=TURN_SPREAD, diff_step=1e-6, max_nfev=60)
+    found = least_squares(
+        residuals,
+        start.ravel(),
+        x_scale=TURN_SPREAD,
+        diff_step=1e-6,  # pyright: ignore[reportArgumentType] - one number for all
+        max_nfev=60,
+    )
     turns = np.asarray(found.x, dtype=np.float64).reshape(-1, 3)
     return AlignedCameras(
         cameras=turned(cameras, turns),
@@ -82,7 +88,7 @@ def aligned_cameras(cameras: Sequence[Camera], outlines: Outlines) -> AlignedCam
 
 def turned(cameras: Sequence[Camera], turns: Array) -> tuple[Camera, ...]:
     """Cameras turned about their own centres by rotation vectors (V, 3), radians, in their own frames."""
-    found = []
+    found: list[Camera] = []
     for camera, turn in zip(cameras, turns, strict=True):
         rotation = rotation_from_vector(turn) @ camera.rotation
         found.append(dataclasses.replace(camera, rotation=rotation, translation=-rotation @ camera.centre))
@@ -128,7 +134,7 @@ def _tangents(one: Camera, two: Camera, first: Array, second: Array) -> tuple[fl
     angles = [np.arctan2(ray @ aside, ray @ ahead) for ray in (first, second)]
     if max(float(np.ptp(each)) for each in angles) > WIDEST:
         return float("nan"), float("nan")
-    missed = []
+    missed: list[float] = []
     for pick in (np.argmin, np.argmax):
         ends = [int(pick(each)) for each in angles]
         apart = float(angles[0][ends[0]] - angles[1][ends[1]])

@@ -37,26 +37,36 @@ within the tolerance."""
 
 
 def silhouette_findings(
-    cameras: Sequence[Camera], masks: Masks, height_mm: float | None = None, board: Board | None = None
+    cameras: Sequence[Camera],
+    masks: Masks,
+    height_mm: float | None = None,
+    board: Board | None = None,
+    scale: float = 1.0,
 ) -> tuple[Finding, ...]:
-    """Whether cameras fit the silhouettes (frame → camera → mask) of one person, and the person's height."""
+    """Whether cameras fit the silhouettes (frame → camera → mask) of one person, and the person's height. scale : of
+    the body beside a person, where it is another one (`scale_of`).
+    """
     outlines = outlines_of(cameras, masks)
     found = explained(
         cameras, lambda tried: silhouette_disagreement(tried, outlines), GOOD, "silhouettes", LEAST
     )
     if found:
         return found
-    return stature_findings(postures(cameras, masks), height_mm, board)
+    return stature_findings(postures(cameras, masks), height_mm, board, scale)
 
 
 def stature_findings(
-    found: Sequence[Posture], height_mm: float | None = None, board: Board | None = None
+    found: Sequence[Posture],
+    height_mm: float | None = None,
+    board: Board | None = None,
+    scale: float = 1.0,
 ) -> tuple[Finding, ...]:
     """Findings from the size of a person. A wrong unit shows in any posture; other faults only in the height of a
     standing person.
     """
+    usual = USUAL_HEIGHT * scale
     known, words = (
-        (USUAL_HEIGHT, "a usual height (about 1.6 m)")
+        (usual, f"a usual height (about {0.001 * usual:.2g} m)")
         if height_mm is None
         else (height_mm, f"the height given ({height_mm:.0f} mm)")
     )
@@ -94,7 +104,7 @@ def outlines_of(cameras: Sequence[Camera], masks: Masks) -> dict[int, dict[str, 
 
 def silhouette_disagreement(cameras: Sequence[Camera], outlines: Mapping[int, Mapping[str, Array]]) -> float:
     """How far tangent planes miss, as a share of the person's extent; NaN if no pair of views determines it."""
-    values = []
+    values: list[float] = []
     for one, two in combinations(cameras, 2):
         misses = [
             _miss(one, two, views[one.name], views[two.name])

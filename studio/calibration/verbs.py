@@ -30,7 +30,7 @@ from studio.capture.naming import listed, natural_key
 from studio.capture.sanity import common_target, quarter_turns
 from studio.errors import CalibrationError
 from studio.geometry.rigid import rigid
-from studio.progress import Progress
+from studio.progress import Progress, unheard
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,7 +79,7 @@ def calibrate(
             "Lenses of a file alone give no cameras.", "Give footage of all cameras at once."
         )
     names = tuple(names) or _names(extrinsics or intrinsics)
-    solving = _Solving(board, names, floor, taken, progress or (lambda step, done, total: None))
+    solving = _Solving(board, names, floor, taken, progress or unheard)
     together = solving.together(extrinsics) if extrinsics is not None else []
     used: dict[str, tuple[Sighting, ...]] = {}
     if lenses is None and intrinsics is not None and intrinsics.is_file():
@@ -148,7 +148,7 @@ class _Solving:
             seen = look_for_lens(finder, name, entry, self.progress, self.taken)
             if len(seen) < FEWEST_PICTURES:
                 raise CalibrationError(
-                    f"The board {self.board.spelling} is found in {len(seen)} pictures of camera {name}.",
+                    f"The board {self.board.text} is found in {len(seen)} pictures of camera {name}.",
                     "Check the board's kind and numbers (inner corners for a chessboard), light and sharpness.",
                 )
             found[name] = tuple(chosen_for_lens(seen)[0])
@@ -160,7 +160,7 @@ class _Solving:
             self.progress(f"Solving the lens of camera {name}", number, len(used))
             if not sightings:
                 raise CalibrationError(
-                    f"The board {self.board.spelling} is found in no picture of camera {name}.",
+                    f"The board {self.board.text} is found in no picture of camera {name}.",
                     "Check the board's kind and numbers, or show it to this camera.",
                 )
             found[name] = solve_lens(self.board, sightings)
@@ -220,7 +220,7 @@ class _Solving:
         elif path.suffix.lower() == ".json":
             return clicked_floor(read_clicks(path), rig.cameras).new_from_old, f"points of {path.name}"
         else:
-            seen = []
+            seen: list[Sighting] = []
             finder = BoardFinder(self.board)
             footage = by_camera(list_footage(path), [camera.name for camera in rig.cameras])
             for name, entry in footage.items():

@@ -66,7 +66,7 @@ class _Pen:
         share = np.linspace(0.0, 1.0, PIECES)[:, None]
         points = (1.0 - share) * np.array(start) + share * np.array(end)
         pixels, seen = self._pixels(points)
-        whole = pixels.round().astype(int).tolist()
+        whole = np.where(seen[:, None], pixels, 0.0).round().astype(int).tolist()
         pieces = [pair for pair in range(PIECES - 1) if seen[pair] and seen[pair + 1]]
         for shade, wide in ((HALO, width + 2), (colour, width))[width == 1 :]:
             for first in pieces:

@@ -79,7 +79,7 @@ class Calibration:
     unit_note: str
     sources: tuple[Path, ...]
     sizes_known: bool = True
-    crops: dict[str, AssumedCrop] = field(default_factory=dict)
+    crops: dict[str, AssumedCrop] = field(default_factory=dict[str, AssumedCrop])
     notes: tuple[str, ...] = ()
 
 

@@ -98,7 +98,7 @@ class FoundCameras:
     sources: tuple[Path, ...]
     unposed: tuple[Intrinsics, ...] = ()
     sizes_known: bool = True
-    crops: dict[str, AssumedCrop] = field(default_factory=dict)
+    crops: dict[str, AssumedCrop] = field(default_factory=dict[str, AssumedCrop])
     notes: tuple[str, ...] = ()
 
 

@@ -242,7 +242,7 @@ Line = tuple[int, int, str]
 def _logical_lines(lines: list[str]) -> list[Line]:
     """The lines of the first document; a list that goes over several is one line."""
     found: list[Line] = []
-    opened, parts, begun = 0, [], (0, 0)
+    opened, parts, begun = 0, list[str](), (0, 0)
     for number, raw in enumerate(lines[1:], 2):
         if not opened and raw.startswith(("---", "...")):
             if found:

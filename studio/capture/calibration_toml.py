@@ -20,6 +20,7 @@ from studio.capture.sanity import check_rotation
 from studio.errors import CalibrationError
 from studio.foreign_files import foreign_file
 from studio.geometry.camera import Camera
+from studio.typed_decoding import is_table
 
 CANONICAL, VERSION = "capture-studio", 1
 
@@ -38,7 +39,7 @@ def read_toml(path: Path) -> FoundCameras:
     """The cameras of a TOML calibration. Raises CalibrationError naming file, camera and entry."""
     document = _document(path)
     metadata = document.get("metadata")
-    metadata = metadata if isinstance(metadata, dict) else {}
+    metadata = metadata if is_table(metadata) else {}
     version = metadata.get("version", VERSION) if metadata.get("format") == CANONICAL else VERSION
     if not isinstance(version, int) or version > VERSION:
         raise CalibrationError(
@@ -60,7 +61,7 @@ def read_toml(path: Path) -> FoundCameras:
             lens.placed(_rotation(where, table), _numbers(where, table, "translation", (3,)), turns)
         )
         crop = table.get("assumed_crop")
-        if isinstance(crop, dict):
+        if is_table(crop):
             crops[name] = _crop(where, crop)
     return FoundCameras(tuple(cameras), _unit(metadata), (path,), tuple(unposed), crops=crops)
 
@@ -94,7 +95,7 @@ def is_canonical(path: Path) -> bool:
         metadata = _document(path).get("metadata", {})
     except CalibrationError:
         return False
-    return isinstance(metadata, dict) and metadata.get("format") == CANONICAL
+    return is_table(metadata) and metadata.get("format") == CANONICAL
 
 
 def _document(path: Path) -> dict[str, object]:
@@ -106,8 +107,8 @@ def _document(path: Path) -> dict[str, object]:
 def _camera_tables(document: dict[str, object]) -> dict[str, dict[str, object]]:
     """The sections that hold cameras, by name; Caliscope's lie one level down."""
     nested = document.get("cameras")
-    source = nested if isinstance(nested, dict) else document
-    return {key: table for key, table in source.items() if isinstance(table, dict) and "matrix" in table}
+    source = nested if is_table(nested) else document
+    return {key: table for key, table in source.items() if is_table(table) and "matrix" in table}
 
 
 def _name(section: str, table: dict[str, object]) -> str:
@@ -176,4 +177,4 @@ def _unit(metadata: dict[str, object]) -> str:
     if metadata.get("unit") in ("mm", "m"):
         return str(metadata["unit"])
     board = metadata.get("board")
-    return "mm" if isinstance(board, dict) and "square_length_mm" in board else ""
+    return "mm" if is_table(board) and "square_length_mm" in board else ""

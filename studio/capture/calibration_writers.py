@@ -138,8 +138,9 @@ def without_k3(camera: Camera) -> tuple[Array, float]:
     radius = np.sqrt(square)
     powers = np.stack([square * radius, square**2 * radius], axis=1)
     k1, k2, p1, p2, k3 = camera.distortion
-    added = np.linalg.lstsq(powers, k3 * square**3 * radius, rcond=None)[0]
-    left = np.abs(powers @ added - k3 * square**3 * radius)
+    bent: Array = k3 * square**3 * radius
+    added = np.linalg.lstsq(powers, bent, rcond=None)[0]
+    left = np.abs(powers @ added - bent)
     focal = max(camera.matrix[0, 0], camera.matrix[1, 1])
     return np.array([k1 + added[0], k2 + added[1], p1, p2, 0.0]), float(focal * left.max())
 

@@ -6,9 +6,10 @@ address, and a read that takes too long is an error instead of a wait.
 
 import fractions
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import av
@@ -127,18 +128,20 @@ def replayed_video(
 
 
 @contextmanager
-def _opened(address: CameraAddress) -> Iterator[av.container.InputContainer]:
-    given = {"format": FORMATS[address.kind], "timeout": (SECONDS_TO_OPEN, SECONDS_TO_READ)}
+def _opened(address: CameraAddress) -> Generator[av.container.InputContainer]:
+    opened = partial(
+        av.open, mode="r", format=FORMATS[address.kind], timeout=(SECONDS_TO_OPEN, SECONDS_TO_READ)
+    )
     options = OPTIONS[address.kind]
     if address.kind == "rtsp":
-        with relayed(address, SECONDS_TO_OPEN) as url, av.open(url, options=options, **given) as container:
+        with relayed(address, SECONDS_TO_OPEN) as url, opened(url, options=options) as container:
             yield container
         return
     try:
-        container = av.open(address.url, options=options, **given)
+        container = opened(address.url, options=options)
     except (av.error.FFmpegError, OSError):
         # Not every device speaks JPEG.
-        container = av.open(address.url, **given)
+        container = opened(address.url)
     with container:
         yield container
 
@@ -158,7 +161,7 @@ def _shots(
             continue
         content = bytes(packet) if is_jpeg else b""
         for frame in frames:
-            if isinstance(frame, av.VideoFrame) and not frame.is_corrupt:
+            if not frame.is_corrupt:
                 kept = content if HUFFMAN_TABLES in content else b""
                 yield Shot(_pixels(frame), kept, came)
 

@@ -30,6 +30,9 @@ from studio.errors import FootageError, NotFoundError
 
 EXCLUSIONS = "exclusions"
 """Folder of a session with a painted picture a camera."""
+HIDDEN = "hidden"
+"""Beside cameras' folders of masks, a folder with the same names: pictures, white where the masks say nothing of the
+subject, for another one is in front of it."""
 KEPT_BYTES = 24_000_000
 """Pictures kept for each camera: eight of 1920x1080/2, twenty-six of 640x480."""
 KEPT_BYTES_IN_ALL = 96_000_000
@@ -81,6 +84,11 @@ class Footage:
             for camera in source.cameras
             if camera.masks
         }
+        self._hidden = {
+            camera.name: _Kept(_mask_reader(path), camera, thresholded_mask)
+            for camera in source.cameras
+            if camera.masks and (path := hidden_beside(folder / camera.masks)).is_dir()
+        }
 
     def picture(self, camera: str, frame: int) -> Bytes:
         """(H, W, 3) uint8 BGR of one camera; read-only. Raises NotFoundError, FootageError."""
@@ -89,6 +97,11 @@ class Footage:
     def mask(self, camera: str, frame: int) -> Bytes | None:
         """(H, W) uint8, 0 or 255, the mask that came with the data, or None where the camera has none."""
         kept = self._masks.get(camera)
+        return None if kept is None else kept.read(self._checked(frame))
+
+    def hidden(self, camera: str, frame: int) -> Bytes | None:
+        """(H, W) uint8, 255 where a camera's mask says nothing of the subject, or None where it does everywhere."""
+        kept = self._hidden.get(camera)
         return None if kept is None else kept.read(self._checked(frame))
 
     def pictures(self, frame: int) -> FramePictures:
@@ -155,13 +168,13 @@ class Footage:
 
     def release(self, camera: str) -> None:
         """Close a camera's files and forget its last pictures; the next read opens them again."""
-        for kept in filter(None, (self._pictures[camera], self._masks.get(camera))):
+        for kept in filter(None, (self._pictures[camera], self._masks.get(camera), self._hidden.get(camera))):
             kept.release()
         give_back_freed_memory(of_late=True)
 
     def close(self) -> None:
         """Close all files."""
-        for kept in (*self._pictures.values(), *self._masks.values()):
+        for kept in (*self._pictures.values(), *self._masks.values(), *self._hidden.values()):
             kept.close()
         if sum(kept.read_count for kept in self._pictures.values()) >= MANY_PICTURES:
             give_back_freed_memory()
@@ -225,6 +238,11 @@ def background_turn(turned: int, footage: tuple[int, int], background: tuple[int
 def colour_as_it_is(picture: Bytes) -> Bytes:
     """The picture itself."""
     return picture
+
+
+def hidden_beside(masks: Path) -> Path:
+    """Where what is hidden lies, of a camera's folder of masks."""
+    return masks.parent / HIDDEN / masks.name
 
 
 def thresholded_mask(picture: Bytes) -> Bytes:
@@ -343,7 +361,7 @@ def folded(frame: int, count: int) -> int:
     return min(place, 2 * count - 2 - place)
 
 
-class ToAndFro(Footage):
+class PingPong(Footage):
     """A session's footage with every frame under many numbers; `frame_count` still says how many it has."""
 
     _reached: dict[str, int] | None = None

@@ -51,7 +51,7 @@ class FrameSpool:
             band = np.empty((self.count, bottom - top, *self.shape[1:]), np.uint8)
             for index, part in enumerate(band):
                 self._file.seek((index * height + top) * row_bytes)
-                self._file.readinto(part.data)  # type: ignore[attr-defined]
+                self._file.readinto(part.data)
             yield top, band
 
     def __enter__(self) -> Self:

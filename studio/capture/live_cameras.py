@@ -16,6 +16,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -172,9 +173,7 @@ class LiveCamera:
     ) -> None:
         self.address, self._clock, self._silence = address, clock, silence
         self._released = threading.Event()
-        self._open = open_camera or (
-            lambda address, wait: open_stream(address, wait, clock, self._released.is_set)
-        )
+        self._open: Open = open_camera or partial(open_stream, clock=clock, released=self._released.is_set)
         self._lock = threading.Lock()
         self._stopping = threading.Event()
         self._recent: deque[Shot] = deque(maxlen=KEPT_SHOTS)

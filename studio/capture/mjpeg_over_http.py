@@ -6,6 +6,7 @@ followed, and no part is larger than a picture can be, whatever its header says.
 
 import re
 from collections.abc import Callable, Generator, Iterator
+from http import HTTPStatus
 from urllib.parse import unquote, urlsplit
 
 import httpx
@@ -45,7 +46,7 @@ def mjpeg_parts(
         ):
             if response.is_redirect:
                 raise _wrong(address, "it leads to another address, which is not followed")
-            if response.status_code != httpx.codes.OK:
+            if response.status_code != HTTPStatus.OK:
                 raise _wrong(address, f"it answers {response.status_code} {response.reason_phrase}".strip())
             named = BOUNDARY.search(response.headers.get("content-type", ""))
             boundary = named[1].strip().lstrip("-").encode("latin-1", "replace") if named else b""
@@ -74,7 +75,7 @@ class _Password(httpx.Auth):
         try:
             digested = digest.send(response)
         except StopIteration:
-            if response.status_code == httpx.codes.UNAUTHORIZED:
+            if response.status_code == HTTPStatus.UNAUTHORIZED:
                 yield next(httpx.BasicAuth(*self._given).auth_flow(request))
             return
         yield digested

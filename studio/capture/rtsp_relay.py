@@ -10,7 +10,7 @@ import select
 import socket
 import ssl
 import threading
-from collections.abc import Iterator
+from collections.abc import Generator
 from urllib.parse import urlsplit
 
 from studio.capture.camera_addresses import CameraAddress, machine_of
@@ -24,7 +24,7 @@ LOOK_SECONDS = 0.5
 
 
 @contextlib.contextmanager
-def relayed(address: CameraAddress, patience: float) -> Iterator[str]:
+def relayed(address: CameraAddress, patience: float) -> Generator[str]:
     """The address (with its name and password) at which FFmpeg reaches the camera while the block lasts.
 
     patience : seconds to connect. Raises FootageError, OSError.

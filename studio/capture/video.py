@@ -234,7 +234,7 @@ def _measured(path: Path, on_frame: Callable[[int, int], None]) -> VideoMeasure:
                     f"'{path.name}' changes its size at frame {len(times)}.", "Re-encode it with one size."
                 )
             width, height = size
-            times.append(frame.time if frame.time is not None else float("nan"))
+            times.append(frame.time if frame.pts is not None else float("nan"))
             if len(times) > MAX_FRAMES:
                 raise FootageError(f"'{path.name}' has more than {MAX_FRAMES} frames.", "Cut it into pieces.")
             on_frame(len(times), announced)
@@ -346,7 +346,7 @@ def _decoded(
                 rotation = frame.rotation
             yield frame
             number += 1
-            last = f" after {frame.time:.3f} s" if frame.time is not None else ""
+            last = f" after {frame.time:.3f} s" if frame.pts is not None else ""
     except (av.error.FFmpegError, OSError) as problem:
         raise FootageError(
             f"'{path.name}' is damaged or cut at frame {number}{last} ({reason(problem)}).",

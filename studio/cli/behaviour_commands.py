@@ -7,7 +7,7 @@ import click
 
 from studio.cli.deriving import Call, command_of
 from studio.operations.behaviours import LearntModel, learn, models
-from studio.training.model_shelf import ModelSummary
+from studio.training.model_repository import ModelSummary
 
 
 class _Sources(click.Command):
@@ -67,13 +67,13 @@ def learn_command(call: Call) -> dict[str, object]:
 @command_of(models)
 def models_command(call: Call) -> dict[str, object]:
     found: tuple[ModelSummary, ...] = call()
-    told = [
+    result = [
         asdict(model)
         | {"entropy_train": _or_none(model.entropy_train), "entropy_test": _or_none(model.entropy_test)}
         for model in found
     ]
     lines = [_line(model) for model in found]
-    return {"models": told, "text": "\n".join(lines) or "No models yet; 'studio learn' makes them."}
+    return {"models": result, "text": "\n".join(lines) or "No models yet; 'studio learn' makes them."}
 
 
 def _or_none(value: float) -> float | None:

@@ -4,6 +4,7 @@ import dataclasses
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -12,12 +13,15 @@ from studio.benchmarks.kernels import run_benchmark
 from studio.benchmarks.live import run_live_benchmark
 from studio.benchmarks.live_stages import in_words
 from studio.benchmarks.reannealing import measure_reannealing
+from studio.benchmarks.results_table import in_lines, remember, rows_of, this_machine
+from studio.benchmarks.whole_frames import DEFAULT, WORKLOADS, measure_frames
 from studio.cli.output import command, progress
+from studio.jobs.control import StudioControl
 from studio.progress import Progress
 from studio.runs.new_run import prepare_run
+from studio.runs.samples import install_sample
 from studio.sessions.workspace import Workspace
-from studio.web.samples import install_sample
-from studio.worker.control import StudioControl
+from studio.typed_decoding import is_table
 
 
 def _kernels(report: Progress) -> dict[str, object]:
@@ -46,6 +50,7 @@ def _live(report: Progress) -> dict[str, object]:
     return {"live": run_live_benchmark(report)}
 
 
+FRAMES = "frames"
 PARTS: dict[str, Callable[[Progress], dict[str, object]]] = {
     "kernels": _kernels,
     "hulls": _hulls,
@@ -54,19 +59,64 @@ PARTS: dict[str, Callable[[Progress], dict[str, object]]] = {
 }
 
 
-@click.command()
+@click.command("bench")
 @click.option(
-    "--only", type=click.Choice(tuple(PARTS)), multiple=True, help="Measure this alone; may be repeated."
+    "--only",
+    type=click.Choice((*PARTS, FRAMES)),
+    multiple=True,
+    help="Measure this alone; may be repeated.",
+)
+@click.option(
+    "--workload",
+    type=click.Choice(tuple(WORKLOADS)),
+    multiple=True,
+    help="Whole frames of this: the default tracker, or what the published benchmark computes; default: both.",
+)
+@click.option(
+    "--trace",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Write the stages of whole frames, thread by thread, for a viewer of Chrome traces.",
 )
 @command
-def bench(only: tuple[str, ...]) -> dict[str, object]:
-    """Measure kernels against bare memory loads, hulls beside the paper's, a slider's answer, live tracking."""
-    told: dict[str, object] = {}
+def bench_command(only: tuple[str, ...], workload: tuple[str, ...], trace: Path | None) -> dict[str, object]:
+    """Measure kernels against bare memory loads, whole frames, hulls beside the paper's, a slider's answer, live
+    tracking: a table beside what is aimed at, and every figure below it. Each call is added to a history.
+    """
+    if trace is not None and len(workload) != 1:
+        workload = (DEFAULT,)
+    # Who asks for a workload or a trace asks for whole frames.
+    parts = only or ((FRAMES,) if workload else (*PARTS, FRAMES))
+    result: dict[str, Any] = {}
+    machine = this_machine()
     with progress("Measuring") as report:
-        for name in only or tuple(PARTS):
-            told |= PARTS[name](report)
-    lines = [f"{key:24} {value}" for key, value in told.items() if key != "live"]
-    live = told.get("live")
-    if isinstance(live, dict):
+        for name in parts:
+            if name != FRAMES:
+                result |= PARTS[name](report)
+                continue
+            result[FRAMES] = {}
+            for kind in workload or tuple(WORKLOADS):
+                times = measure_frames(kind, report)
+                result[FRAMES][kind] = times.figures()
+                if trace is not None:
+                    times.trace.write(trace)
+    rows = rows_of(result)
+    place = remember(machine, rows)
+    lines = [
+        f"{machine.processor}, {machine.cores} cores, {machine.system}, Python {machine.python}, Numba "
+        f"{machine.numba}; load {machine.load:g} before",
+        *in_lines(rows),
+        "",
+    ]
+    lines += [f"{key:24} {value}" for key, value in result.items() if key not in ("live", FRAMES)]
+    for kind, figures in result.get(FRAMES, {}).items():
+        lines.append(f"whole frames, {kind}: {figures['ms']} ms, {figures['evaluations']} evaluations")
+        lines += [
+            f"  {stage['thread']:12} {stage['stage']:20} {stage['busy_ms']:7.2f} ms busy {stage['ms']:7.2f} ms"
+            for stage in figures["stages"]
+        ]
+    live = result.get("live")
+    if is_table(live):
         lines.append(in_words(live))
-    return {**told, "text": "\n".join(lines)}
+    lines.append(f"Added to the history in {place}.")
+    document = {"machine": dataclasses.asdict(machine), "rows": rows, **result, "history": str(place)}
+    return {**document, "text": "\n".join(lines)}

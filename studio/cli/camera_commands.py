@@ -45,10 +45,10 @@ def _pair(text: str) -> tuple[str, str]:
 def board_command(call: Call) -> dict[str, object]:
     made, place = call(), call.given["to"]
     return {
-        "board": made.spelling,
+        "board": made.text,
         "page": call.given["page"],
         "written": str(place),
-        "text": f"{place}: {made.spelling}\nCalibrate with: studio calibrate FOLDER --board {made.spelling}",
+        "text": f"{place}: {made.text}\nCalibrate with: studio calibrate FOLDER --board {made.text}",
     }
 
 

@@ -1,4 +1,4 @@
-"""`studio compare`."""
+"""Trackers compared, knobs swept: `compare`, `sweep`."""
 
 from collections.abc import Mapping
 
@@ -8,7 +8,8 @@ from studio.cli.deriving import Call, command_of
 from studio.cli.reading import frame_range
 from studio.comparison.candidates import LINEUPS, VARIANTS, read_assignments
 from studio.comparison.comparison_findings import document, table_text
-from studio.operations.comparing import USUAL, Compared, compare
+from studio.comparison.sweep import read_grid, sweep_document, sweep_text
+from studio.operations.comparing import USUAL, Compared, SweptGrid, compare, sweep
 
 LABELS = "\n".join(f"  {name}: {variant.help}" for name, variant in VARIANTS.items())
 GROUPS = "\n".join(f"  {name}: {', '.join(members)}" for name, members in LINEUPS.items())
@@ -45,3 +46,21 @@ def compare_command(
     done: Compared = call(trackers=names, first=first, last=last, changes=read_assignments(assignments))
     folder, text = str(done.kept.folder), table_text(done.comparison)
     return {**document(done.comparison), "folder": folder, "text": text}
+
+
+VARY = click.option(
+    "--vary",
+    "grid",
+    multiple=True,
+    required=True,
+    metavar="KNOB=A,B,…",
+    help="A knob and its values; again for more knobs, whose combinations are tracked.",
+)
+
+
+@command_of(sweep, VARY, FRAMES, without=("vary", "first", "last"))
+def sweep_command(call: Call, grid: tuple[str, ...], frames: str) -> Mapping[str, object]:
+    first, last = frame_range(frames)
+    done: SweptGrid = call(vary=read_grid(grid), first=first, last=last)
+    folder, text = str(done.kept.folder), sweep_text(done.sweep)
+    return {**sweep_document(done.sweep), "folder": folder, "text": text}

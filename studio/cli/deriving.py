@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args, get_origin
 import click
 
 from studio.cli.output import MemberChoice, command, shown_progress
-from studio.cli.reading import camera_numbers, chosen_knobs, frame_numbers, measured
+from studio.cli.reading import camera_numbers, chosen_knobs, frame_numbers, measured, place, places
 from studio.declaring import PROGRESS, REQUIRED, Knobs, OneOf, Parameter, alternatives, declared
 from studio.knobs import Knob, allowed
 from studio.sessions.workspace import Workspace
@@ -16,6 +16,7 @@ from studio.sessions.workspace import Workspace
 READERS: dict[Any, tuple[str, Callable[[Sequence[str], str], object]]] = {
     Mapping[str, int]: ("CAMERA=NUMBER", camera_numbers),
     Mapping[str, float]: ("NAME=MM", measured),
+    Sequence[tuple[float, float]]: ("X,Y", places),
 }
 """Types whose options are repeated, by what is written and how it is read."""
 SET = "changes"
@@ -40,7 +41,7 @@ class Call:
 
     def do(self, verb: Callable[..., object], **given: object) -> Any:  # noqa: ANN401 - what the verb returns
         """Do another verb to the same session or run."""
-        about = [entry.name for entry in declared(verb).parameters.values() if entry.whose]
+        about = [entry.name for entry in declared(verb).parameters.values() if entry.target]
         return self._done(verb, {name: self.given[name] for name in about if name in self.given} | given)
 
     @staticmethod
@@ -87,40 +88,40 @@ def _options(entry: Parameter) -> list[click.Parameter]:
     mark = entry.terminal
     if mark.left_out:
         return []
-    if entry.whose:
-        parts = ("session", "run") if entry.whose == "run" else ("session",)
+    if entry.target:
+        parts = ("session", "run") if entry.target == "run" else ("session",)
         return [*(click.Argument([part]) for part in parts)]
     knobs = entry.mark(Knobs)
     if knobs is not None:
         return _knob_options(entry, knobs)
     kind = mark.kind or entry.kind
     required = entry.default is REQUIRED and mark.required
-    spelling = entry.option
-    if not spelling:
+    option = entry.option
+    if not option:
         many = kind in (Sequence[str], Sequence[str | Path])
         own: dict[str, Any] = {"nargs": -1} if many else {"type": _click_type(entry, kind)}
         return [click.Argument([entry.name], required=True, metavar=mark.metavar or None, **own)]
     shown: dict[str, Any] = {"help": entry.help, "required": required}
     if kind is bool:
         switch: dict[str, Any] = {"default": entry.default, "show_default": entry.default}
-        return [click.Option([spelling, entry.name], is_flag=True, **shown, **switch)]
+        return [click.Option([option, entry.name], is_flag=True, **shown, **switch)]
     several = next((READERS[one] for one in alternatives(kind) if one in READERS), None)
     if several is not None or Sequence[str] in alternatives(kind):
         metavar = mark.metavar or (several[0] if several else None)
         shown["help"] = f"{entry.help.removesuffix('.')}; again for more."
-        return [click.Option([spelling, entry.name], multiple=True, metavar=metavar, **shown)]
+        return [click.Option([option, entry.name], multiple=True, metavar=metavar, **shown)]
     if Sequence[int] in alternatives(kind):
-        return [click.Option([spelling, entry.name], default="", metavar="A,B,…", **shown)]
-    told = entry.default if entry.default not in (None, "", REQUIRED) else None
+        return [click.Option([option, entry.name], default="", metavar="A,B,…", **shown)]
+    default = entry.default if entry.default not in (None, "", REQUIRED) else None
     given: dict[str, Any] = {
-        "default": told,
-        "show_default": told is not None,
+        "default": default,
+        "show_default": default is not None,
         "metavar": mark.metavar or None,
     }
-    return [click.Option([spelling, entry.name], type=_click_type(entry, kind), **given, **shown)]
+    return [click.Option([option, entry.name], type=_click_type(entry, kind), **given, **shown)]
 
 
-def _click_type(entry: Parameter, kind: Any) -> click.ParamType | type:  # noqa: ANN401 - a type
+def _click_type(entry: Parameter, kind: Any) -> "click.ParamType[Any] | type":  # noqa: ANN401 - a type
     members = entry.mark(OneOf)
     if members is not None:
         return MemberChoice(members.registry)
@@ -137,14 +138,14 @@ def _click_type(entry: Parameter, kind: Any) -> click.ParamType | type:  # noqa:
 
 def knob_option(entry: Knob, with_default: bool) -> click.Option:
     """The option of a knob; numbers are passed as text, which its declaration reads."""
-    spelling = [f"--{entry.name.replace('_', '-')}", entry.name]
+    option = [f"--{entry.name.replace('_', '-')}", entry.name]
     if entry.default is False:
-        return click.Option(spelling, is_flag=True, default=None, help=entry.help)
+        return click.Option(option, is_flag=True, default=None, help=entry.help)
     if entry.choices:
-        return click.Option(spelling, type=click.Choice(entry.choices), help=entry.help)
+        return click.Option(option, type=click.Choice(entry.choices), help=entry.help)
     default = f"; default {entry.default}" if with_default else ""
     words = f"{entry.help} ({allowed(entry)}{default})"
-    return click.Option(spelling, metavar=click.types.convert_type(entry.kind).name.upper(), help=words)
+    return click.Option(option, metavar=click.types.convert_type(entry.kind).name.upper(), help=words)
 
 
 def _knob_options(entry: Parameter, knobs: Knobs) -> list[click.Parameter]:
@@ -158,9 +159,9 @@ def _given(entry: Parameter, options: Mapping[str, Any]) -> dict[str, object]:
     """What was given for a parameter, {} for nothing. Raises StudioError for what cannot be read."""
     if entry.terminal.left_out:
         return {}
-    if entry.whose:
+    if entry.target:
         session = Workspace().resolve(options["session"])
-        return {entry.name: session.run(options["run"]) if entry.whose == "run" else session}
+        return {entry.name: session.run(options["run"]) if entry.target == "run" else session}
     knobs = entry.mark(Knobs)
     if knobs is not None:
         chosen: dict[str, object] = {**chosen_knobs(options.get(SET, ()))}
@@ -172,4 +173,6 @@ def _given(entry: Parameter, options: Mapping[str, Any]) -> dict[str, object]:
         value = several[1](value, entry.option)
     elif Sequence[int] in kinds:
         value = frame_numbers(value)
+    elif tuple[float, float] in kinds and value is not None:
+        value = place(value, entry.option)
     return {} if value is None else {entry.name: value}

@@ -1,9 +1,10 @@
-"""`doctor`, which loads all of the studio; no other command waits for that."""
+"""`doctor` and `diagnostics`, which load all of the studio; no other command waits for that."""
 
 from dataclasses import asdict
 
 from studio.cli.deriving import Call, command_of
 from studio.cli.output import EXIT_CODE, FOUND_FAULTS
+from studio.diagnostics_archive import diagnostics
 from studio.self_check import doctor
 
 
@@ -16,4 +17,14 @@ def doctor_command(call: Call) -> dict[str, object]:
         EXIT_CODE: 0 if all(one.good for one in found) else FOUND_FAULTS,
         "checks": [asdict(one) for one in found],
         "text": "\n".join(lines),
+    }
+
+
+@command_of(diagnostics)
+def diagnostics_command(call: Call) -> dict[str, object]:
+    place, parts = call()
+    return {
+        "archive": str(place),
+        "parts": list(parts),
+        "text": f"{place}: {', '.join(parts)}. Look through it before you send it.",
     }

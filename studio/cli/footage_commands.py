@@ -68,7 +68,7 @@ def synthesize_command(call: Call) -> dict[str, object]:
 def record_command(call: Call) -> dict[str, object]:
     found = call()
     footage = found.session.manifest.footage
-    told: dict[str, object] = {
+    result: dict[str, object] = {
         "session": found.session.name,
         "frames": footage.frame_count,
         "fps": footage.fps,
@@ -77,7 +77,7 @@ def record_command(call: Call) -> dict[str, object]:
         "warnings": list(found.warnings),
     }
     if found.standing is not None:
-        told["cameras"] = {
+        result["cameras"] = {
             name: {
                 "pictures": one.pictures,
                 "repeated": one.repeated,
@@ -87,7 +87,7 @@ def record_command(call: Call) -> dict[str, object]:
             for name, one in found.standing.figures.items()
         }
     words = f"{found.session.name}: {footage.frame_count} frames of {len(footage.cameras)} cameras at {footage.fps:g}"
-    return {**told, "text": f"{words} a second; {found.spread.in_words}"}
+    return {**result, "text": f"{words} a second; {found.spread.in_words}"}
 
 
 def spread_figures(spread: SpreadFigures) -> dict[str, object]:

@@ -1,110 +1,83 @@
-"""The command line's front door."""
+"""The command `studio`."""
 
+import ast
+import functools
 import importlib
 import importlib.metadata
+import re
+from pathlib import Path
 
 import click
 
-# A command's module is imported when the command is asked for, so that none waits for what it does not use.
+# A command's module is imported when the command is called, so that no other waits for it: here is the module in this
+# room, and the function whose docstring says what the command does.
 COMMANDS = {
-    "demo": (
-        "serving_commands",
-        "demo",
-        "Track the bundled walk in the browser: prints the address to open.",
-    ),
-    "serve": ("serving_commands", "serve", "Open the studio on a workspace: prints the address to open."),
-    "import": ("footage_commands", "import_command", "Make a session from footage and calibration."),
-    "new": ("footage_commands", "new_command", "Make an empty session."),
-    "add-footage": ("footage_commands", "add_footage_command", "Add footage to a session that is there."),
-    "way": ("session_commands", "way_command", "Tell how far a session is, and what is next."),
-    "synchronise": (
-        "footage_commands",
-        "synchronise_command",
-        "Put a session's cameras in step and turn them: estimated, by hand, by times.",
-    ),
-    "calibrate": (
-        "camera_commands",
-        "calibrate_command",
-        "Solve cameras from footage of a printed board.",
-    ),
-    "board": ("camera_commands", "board_command", "Make a calibration board to print, as PDF."),
-    "background": (
-        "mask_commands",
-        "background_command",
-        "Choose where a session's masks come from, and see how well its views agree.",
-    ),
-    "align": (
-        "camera_commands",
-        "align_command",
-        "Turn cameras a little so that the silhouettes of all views agree.",
-    ),
-    "subject": (
-        "person_commands",
-        "subject_command",
-        "Write down who is in front of the cameras: a height, lengths.",
-    ),
-    "fit-subject": (
-        "person_commands",
-        "fit_subject_command",
-        "Find limb lengths and radii on the silhouettes of a few frames.",
-    ),
-    "initialise": (
-        "person_commands",
-        "initialise_command",
-        "Find the pose in a frame, and with it a start pose.",
-    ),
-    "track": ("tracking_commands", "track_command", "Track a session and store the run."),
-    "live": (
-        "tracking_commands",
-        "live_command",
-        "Track a session as its pictures come, dropping what comes too fast.",
-    ),
-    "record": ("footage_commands", "record_command", "Record live cameras all at once into a session."),
-    "evaluate": ("result_commands", "evaluate_command", "Measure a run against the true markers."),
-    "check": ("result_commands", "check_command", "Tell how well a run fits its pictures, frame by frame."),
-    "refine": (
-        "result_commands",
-        "refine_command",
-        "Refine a run's poses on the silhouettes, kept beside them.",
-    ),
-    "smooth": ("result_commands", "smooth_command", "Smooth a run's poses in time, fill short gaps."),
-    "correct": (
-        "tracking_commands",
-        "correct_command",
-        "Give a run the right pose in a frame and track on from it.",
-    ),
-    "compare": (
-        "comparison_commands",
-        "compare_command",
-        "Compare trackers fairly on a session with a truth.",
-    ),
-    "learn": ("behaviour_commands", "learn_command", "Learn what a body tends to do from recorded motion."),
-    "models": ("behaviour_commands", "models_command", "List the behaviour models."),
-    "export": (
-        "result_commands",
-        "export_command",
-        "Write a run's motion to BVH, C3D, TRC, GLB, video and more.",
-    ),
-    "synthesize": ("footage_commands", "synthesize_command", "Render footage with exact truth."),
-    "reproduce": (
-        "reproduction_commands",
-        "reproduce_command",
-        "Rerun the papers' experiments: numbers, charts and verdicts.",
-    ),
-    "bodies": ("session_commands", "bodies_command", "List the bodies."),
-    "runs": ("session_commands", "runs_command", "List the runs."),
-    "verify": (
-        "result_commands",
-        "verify_command",
-        "Compare all that is stored with its checksums; repair frames.",
-    ),
-    "doctor": (
-        "doctor_commands",
-        "doctor_command",
-        "Try all that the studio stands on, and say what to do.",
-    ),
-    "bench": ("bench_commands", "bench", "Measure kernels, hulls, a slider's answer and live tracking."),
+    "demo": ("serving_commands", "cli.serving_commands.demo_command"),
+    "serve": ("serving_commands", "cli.serving_commands.serve_command"),
+    "import": ("footage_commands", "operations.footage.import_footage"),
+    "new": ("footage_commands", "operations.footage.new_session"),
+    "add-footage": ("footage_commands", "operations.footage.add_footage"),
+    "way": ("session_commands", "operations.opening.way"),
+    "synchronise": ("footage_commands", "operations.footage.synchronise"),
+    "calibrate": ("camera_commands", "operations.cameras.calibrate"),
+    "board": ("camera_commands", "operations.cameras.board"),
+    "background": ("mask_commands", "operations.masks.background"),
+    "subjects": ("subject_commands", "operations.subjects.subjects"),
+    "together": ("subject_commands", "operations.subjects.together"),
+    "align": ("camera_commands", "operations.cameras.align"),
+    "subject": ("person_commands", "operations.person.subject"),
+    "fit-subject": ("person_commands", "operations.person.fit_subject"),
+    "initialise": ("person_commands", "operations.person.initialise"),
+    "track": ("tracking_commands", "operations.tracking.track"),
+    "live": ("tracking_commands", "operations.tracking.live"),
+    "record": ("footage_commands", "operations.footage.record"),
+    "evaluate": ("result_commands", "operations.results.evaluate"),
+    "check": ("result_commands", "operations.results.check"),
+    "view": ("inspection_commands", "operations.inspecting.view"),
+    "why": ("inspection_commands", "operations.inspecting.why"),
+    "seeds": ("inspection_commands", "operations.inspecting.seeds"),
+    "compare-runs": ("inspection_commands", "operations.inspecting.compare_runs"),
+    "refine": ("result_commands", "operations.results.refine"),
+    "smooth": ("result_commands", "operations.results.smooth"),
+    "correct": ("tracking_commands", "operations.tracking.correct"),
+    "compare": ("comparison_commands", "operations.comparing.compare"),
+    "sweep": ("comparison_commands", "operations.comparing.sweep"),
+    "learn": ("behaviour_commands", "operations.behaviours.learn"),
+    "models": ("behaviour_commands", "operations.behaviours.models"),
+    "export": ("result_commands", "operations.results.export_run"),
+    "share": ("result_commands", "operations.sharing.share"),
+    "synthesize": ("footage_commands", "operations.footage.synthesize"),
+    "course": ("result_commands", "operations.course.course"),
+    "reproduce": ("reproduction_commands", "cli.reproduction_commands.reproduce_command"),
+    "gallery": ("session_commands", "operations.gallery.gallery"),
+    "bodies": ("session_commands", "operations.opening.bodies"),
+    "edit-body": ("session_commands", "operations.own_bodies.edit_body"),
+    "runs": ("session_commands", "cli.session_commands.runs_command"),
+    "verify": ("result_commands", "operations.results.verify"),
+    "doctor": ("doctor_commands", "self_check.doctor"),
+    "diagnostics": ("doctor_commands", "diagnostics_archive.diagnostics"),
+    "bench": ("bench_commands", "cli.bench_commands.bench_command"),
 }
+ROOT = Path(__file__).parents[1]
+
+
+def load(name: str) -> click.Command:
+    """A command, imported."""
+    module, _ = COMMANDS[name]
+    return getattr(importlib.import_module(f"studio.cli.{module}"), f"{name.replace('-', '_')}_command")
+
+
+def summary(name: str) -> str:
+    """What a command does, to the first stop of the docstring: read from the source, which is not imported for it."""
+    module, _, function = COMMANDS[name][1].rpartition(".")
+    about = _docstrings(module)[function].split("\n\n")[0]
+    return re.split(r"[.;:](?:\s|$)", " ".join(about.split()), maxsplit=1)[0] + "."
+
+
+@functools.cache
+def _docstrings(module: str) -> dict[str, str]:
+    tree = ast.parse((ROOT / f"{module.replace('.', '/')}.py").read_text("utf-8"))
+    return {one.name: ast.get_docstring(one) or "" for one in tree.body if isinstance(one, ast.FunctionDef)}
 
 
 class _Commands(click.Group):
@@ -114,14 +87,11 @@ class _Commands(click.Group):
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in COMMANDS:
-            return None
-        module, name, _ = COMMANDS[cmd_name]
-        return getattr(importlib.import_module(f"studio.cli.{module}"), name)
+        return load(cmd_name) if cmd_name in COMMANDS else None
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
-            formatter.write_dl([(name, summary) for name, (_, _, summary) in COMMANDS.items()])
+            formatter.write_dl([(name, summary(name)) for name in COMMANDS])
 
 
 @click.group(

@@ -28,7 +28,7 @@ OWN = (
         "--plates",
         multiple=True,
         metavar="CAMERA=FILE|FOLDER",
-        help="Pictures or clips of the empty room: one a camera, or a folder whose names tell the cameras.",
+        help="Pictures or clips of the empty room: one a camera, or a folder named after the cameras.",
     ),
     click.option(
         "--exclude",
@@ -55,18 +55,22 @@ def background_command(
     for word in exclude:
         if word != UNUSED:
             exclude_region(session, *_region(word))
-    if source is None and call.given["knobs"]:
+    if source is None and (call.given.get("strokes") or call.given.get("run")):
+        raise FootageError("Strokes are a source of masks.", "Give --source strokes too.")
+    if source is None and call.given.get("subject_at"):
+        source = "subject"
+    if source is None and call.given.get("knobs"):
         raise FootageError("Knobs are kept with a background.", "Give --source too, or try them on the page.")
     if source is not None:
         call(session=session, source=source, exclude_unused=UNUSED in exclude)
         session = Session(session.path)
     comparable = len(session.manifest.footage.cameras) > 1 and session.is_calibrated
     if quality or (comparable if source is not None else not plates and not exclude):
-        return _told(session, call.do(mask_quality, frames=frame_numbers(frames)))
-    return _told(session, None)
+        return _answer(session, call.do(mask_quality, frames=frame_numbers(frames)))
+    return _answer(session, None)
 
 
-def _told(session: Session, found: MaskQuality | None) -> dict[str, object]:
+def _answer(session: Session, found: MaskQuality | None) -> dict[str, object]:
     knobs = msgspec.to_builtins(session_settings(session).evidence)
     if found is None:
         return {"session": session.name, "settings": knobs, "text": f"Background of {session.name} is set."}
@@ -75,6 +79,11 @@ def _told(session: Session, found: MaskQuality | None) -> dict[str, object]:
         f"  {view.in_words()}".rstrip()
         for view in found.views
     ]
+    if found.subjects > 1:
+        lines.append(
+            f"{found.subjects} subjects are in view: say which one with --subject-at X,Y"
+            f" ('studio subjects {session.name}' says where they stand)."
+        )
     lines += [f"The calibration is in doubt: {finding}" for finding in found.doubts]
     names = ("camera", "agreement", "covered", "inside", "denied", "usable")
     return {
@@ -84,6 +93,7 @@ def _told(session: Session, found: MaskQuality | None) -> dict[str, object]:
             {name: getattr(view, name) for name in names} | {"note": view.in_words()} for view in found.views
         ],
         "usable": found.usable,
+        "subjects": found.subjects,
         "doubts": [msgspec.to_builtins(finding) for finding in found.doubts],
         "hull_litres": list(found.hull_litres),
         "settings": knobs,

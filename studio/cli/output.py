@@ -7,7 +7,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, ParamSpec
@@ -40,7 +40,7 @@ SAID = ".notes-said.json"
 messages = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
-class MemberChoice(click.Choice):
+class MemberChoice(click.Choice):  # pyright: ignore[reportMissingTypeArgument] - not generic before click 8.2
     """A member of a registry by name; what is wrong with one that a package adds is said where it is chosen."""
 
     def __init__(self, registry: Registry[Any]) -> None:
@@ -72,14 +72,14 @@ def command(function: Callable[P, Mapping[str, object]]) -> Callable[P, None]:
         with errors_in_words():
             result = dict(function(*arguments, **options))
             code = int(str(result.pop(EXIT_CODE, 0)))
-            tell(result, as_json)
+            print_result(result, as_json)
         if code:
             sys.exit(code)
 
     return body
 
 
-def tell(result: Mapping[str, object], as_json: bool) -> None:
+def print_result(result: Mapping[str, object], as_json: bool) -> None:
     """Print a result for a person, or as one JSON object."""
     values = dict(result)
     text = values.pop("text", None)
@@ -92,11 +92,11 @@ def tell(result: Mapping[str, object], as_json: bool) -> None:
 
 
 class TerminatedError(KeyboardInterrupt):
-    """The system told the process to end (SIGTERM): everything that answers Ctrl-C answers this."""
+    """The process is to end (SIGTERM): everything that answers Ctrl-C answers this."""
 
 
 @contextmanager
-def termination_as_interrupt() -> Iterator[None]:
+def termination_as_interrupt() -> Generator[None]:
     """While the block lasts a SIGTERM is raised in it, once, as Ctrl-C is; in the main thread only."""
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -115,7 +115,7 @@ def termination_as_interrupt() -> Iterator[None]:
 
 
 @contextmanager
-def errors_in_words() -> Iterator[None]:
+def errors_in_words() -> Generator[None]:
     """Turn whatever goes wrong into a cause, a remedy and an exit code; never a traceback."""
     try:
         with termination_as_interrupt():
@@ -181,7 +181,7 @@ def notes(lines: Iterable[str], once_in: Path | None = None) -> None:
 
 
 @contextmanager
-def progress(title: str) -> Iterator[Progress]:
+def progress(title: str) -> Generator[Progress]:
     """Progress on standard error with the time that is left; yields `report(step in words, done, total)`.
 
     A bar on a terminal; in a log file a line now and then.

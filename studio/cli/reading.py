@@ -39,6 +39,23 @@ def measured(words: Sequence[str], option: str) -> dict[str, float]:
     return _by_name(words, option, float, "Write a name and a number: {} RHip_RKnee=420.")
 
 
+def place(word: str, option: str) -> tuple[float, float]:
+    """X,Y as numbers. Raises FootageError."""
+    try:
+        x, y = (float(number) for number in word.split(","))
+    except ValueError:
+        raise FootageError(
+            f"'{option} {word}' cannot be understood.",
+            f"Write x and y on the floor, in metres: {option} 0.4,-1.2.",
+        ) from None
+    return x, y
+
+
+def places(words: Sequence[str], option: str) -> tuple[tuple[float, float], ...]:
+    """X,Y words. Raises FootageError."""
+    return tuple(place(word, option) for word in words)
+
+
 def chosen_knobs(assignments: Iterable[str]) -> dict[str, str]:
     """KNOB=VALUE pairs. Raises SettingsError where there is no '='."""
     changes: dict[str, str] = {}

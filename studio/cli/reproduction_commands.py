@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from studio.cli.output import errors_in_words, note, progress, tell
+from studio.cli.output import errors_in_words, note, print_result, progress
 from studio.comparison.findings import FAILED
 from studio.comparison.findings_document import REPORT, REPRODUCTIONS, SUMMARY, Document
 from studio.comparison.trials import Scale
@@ -46,10 +46,10 @@ def reproduce_command(
     with errors_in_words():
         folder = (out or workspace_root() / REPRODUCTIONS).expanduser().absolute()
         if name == "list":
-            tell(_listed(folder), as_json)
+            print_result(_listed(folder), as_json)
             return
         found = _run(find_experiments(name), folder, scale_of(seeds, quick), processes)
-        tell(_told(found, folder), as_json)
+        print_result(_answer(found, folder), as_json)
         if any(document["verdict"] == FAILED for document in found.documents):
             sys.exit(NOT_CONCLUDED)
 
@@ -68,7 +68,7 @@ def _run(
 
 
 def _listed(folder: Path) -> Document:
-    lines = []
+    lines: list[Document] = []
     for experiment in EXPERIMENTS.values():
         found = read_findings(folder, experiment.name)
         lines.append(
@@ -89,8 +89,8 @@ def _listed(folder: Path) -> Document:
     return {"experiments": lines, "text": text}
 
 
-def _told(found: Reproduction, folder: Path) -> Document:
-    lines = []
+def _answer(found: Reproduction, folder: Path) -> Document:
+    lines: list[str] = []
     for document in found.documents:
         lines.append(f"{document['name']}: {_verdict(document)}")
         lines += [f"  {number_in_words(number)}" for number in document["numbers"]]

@@ -1,4 +1,6 @@
-"""What becomes of a run: `refine`, `smooth`, `check`, `evaluate`, `export`, `verify`."""
+"""What becomes of a run: `refine`, `smooth`, `check`, `evaluate`, `export`, `share`, `verify`; the guide's
+`course`.
+"""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -9,11 +11,14 @@ from studio.cli.deriving import Call, command_of
 from studio.cli.output import EXIT_CODE, FOUND_FAULTS
 from studio.evaluation.report import as_document, in_words
 from studio.export.formats import FORMATS
+from studio.operations.course import Course, course
 from studio.operations.results import Verified, check, evaluate, export_run, refine, smooth, verify
+from studio.operations.sharing import Shared, share
 from studio.runs.refining import MadeTrack
 from studio.runs.tracks import track_named
 from studio.runs.verifying import Repair, Verification
-from studio.runs.way_step import counted
+from studio.runs.workflow_step import counted
+from studio.sessions.stored_run import StoredRun
 
 
 @command_of(refine)
@@ -57,7 +62,7 @@ def _made(call: Call, made: MadeTrack, more: dict[str, object], words: str) -> d
 @command_of(check)
 def check_command(call: Call) -> dict[str, object]:
     run, found = call.given["run"], call()
-    damage, told = run.damage(), msgspec.to_builtins(found)
+    damage, result = run.damage(), msgspec.to_builtins(found)
     return {
         "session": run.session_name,
         "run": run.name,
@@ -65,7 +70,7 @@ def check_command(call: Call) -> dict[str, object]:
         "damage": damage,
         "inside_mean": found.inside_mean,
         "poor": list(found.poor),
-        **{name: value for name, value in told.items() if name not in ("schema", "stamp", "count")},
+        **{name: value for name, value in result.items() if name not in ("schema", "stamp", "count")},
         "text": f"{run.session_name} / {run.name}, track '{found.track}': {found.in_words()}. {damage}".rstrip(),
     }
 
@@ -98,6 +103,21 @@ def export_command(call: Call) -> dict[str, object]:
         "checked": done.checked,
         "notes": list(done.notes),
         "text": f"{names} ({done.size / 1e6:.2f} MB): {of_track}{done.checked}.",
+    }
+
+
+@command_of(share)
+def share_command(call: Call) -> dict[str, object]:
+    run: StoredRun = call.given["run"]
+    shared: Shared = call()
+    words = f"{shared.path} ({shared.size / 1e6:.2f} MB): looks into frame {shared.frame}."
+    return {
+        "session": run.session_name,
+        "run": run.name,
+        "file": str(shared.path),
+        "bytes": shared.size,
+        "frame": shared.frame,
+        "text": words,
     }
 
 
@@ -134,3 +154,11 @@ def _repaired(entry: Repair) -> str:
         f"; {entry.same} of {entry.compared} stored poses are the same bit for bit" if entry.compared else ""
     )
     return f"{entry.run}: {counted(len(entry.frames), 'frame')} tracked again{same}."
+
+
+@command_of(course)
+def course_command(call: Call) -> dict[str, object]:
+    done: Course = call()
+    names = [run.name for run in done.runs]
+    words = f"{done.session.name}: {', '.join(names)} are there. Read on at /guide/course of 'studio serve'."
+    return {"session": done.session.name, "runs": names, "text": words}

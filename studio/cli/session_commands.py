@@ -1,4 +1,4 @@
-"""What there is and how it stands: `bodies`, `runs`, `way`."""
+"""What there is and how it stands: `gallery`, `bodies`, `edit-body`, `runs`, `way`."""
 
 from dataclasses import asdict
 
@@ -6,8 +6,10 @@ import click
 
 from studio.cli.deriving import Call, command_of
 from studio.cli.output import command
+from studio.operations.gallery import Gallery, gallery
 from studio.operations.opening import bodies, way
-from studio.runs.way import Way
+from studio.operations.own_bodies import EditedBody, edit_body
+from studio.runs.workflow import Workflow
 from studio.sessions.stored_run import damage_in_words
 from studio.sessions.workspace import Workspace
 
@@ -31,6 +33,46 @@ def bodies_command(call: Call) -> dict[str, object]:
         for entry in entries
     ]
     return {"bodies": entries, "text": "\n".join(lines)}
+
+
+@command_of(gallery)
+def gallery_command(call: Call) -> dict[str, object]:
+    found: Gallery = call()
+    cards: list[dict[str, object]] = [
+        {
+            "name": one.card.name,
+            "title": one.card.title,
+            "kind": one.card.kind,
+            "there": one.there,
+            "missing": one.missing,
+            "data": one.card.data,
+            "commands": list(one.card.commands),
+        }
+        for one in found.cards
+    ]
+    if found.made is not None:
+        return {"session": found.made.name, "cards": cards, "text": f"Session '{found.made.name}' is there."}
+    how = {"sample": "bundled", "recipe": "rendered", "elsewhere": "imported"}
+    lines: list[str] = []
+    for one in found.cards:
+        card = one.card
+        state = "there" if one.there else (one.missing and "data missing") or how[card.kind]
+        lines.append(f"{card.name:18} {state:14} {card.title}. {card.words}")
+        lines += [f"{'':18} {'':14} {line}" for line in (card.data, *card.commands) if line and not one.there]
+    return {"session": "", "cards": cards, "text": "\n".join(lines)}
+
+
+@command_of(edit_body)
+def edit_body_command(call: Call) -> dict[str, object]:
+    found: EditedBody = call()
+    return {
+        "body": found.body.name,
+        "title": found.body.title,
+        "dimensions": dict(found.body.dimensions),
+        "notes": list(found.notes),
+        "file": str(found.file or ""),
+        "text": f"Saved as '{found.body.name}' ({found.file})." if found.file else found.text.rstrip("\n"),
+    }
 
 
 @click.command("runs")
@@ -70,7 +112,7 @@ def runs_command(session: str | None) -> dict[str, object]:
 
 @command_of(way)
 def way_command(call: Call) -> dict[str, object]:
-    found: Way = call()
+    found: Workflow = call()
     lines = [
         f"{MARKS[step.state]} {step.step:12} {step.words}{f'  ({step.why})' if step.why else ''}"
         for step in found.steps

@@ -26,8 +26,8 @@ from studio.operations.tracking import (
 from studio.runs.sides import exchanged_sides, in_words
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.tracking.catalogue import TRACKERS
-from studio.tracking.tracker import LIMB_LOST, LOST, NO_EVIDENCE, RECOVERED
+from studio.trackers.catalogue import TRACKERS
+from studio.trackers.tracker import LIMB_LOST, LOST, NO_EVIDENCE, RECOVERED
 
 FRAMES = click.option(
     "--frames",
@@ -37,7 +37,7 @@ FRAMES = click.option(
 )
 POSES = click.option("--poses", type=click.Path(path_type=Path), help="Write the poses as CSV.")
 RESUME = click.option(
-    "--resume", metavar="RUN", help="Track a stored run on, as it was asked for; same result as unbroken."
+    "--resume", metavar="RUN", help="Track a stored run on, as it was begun; same result as unbroken."
 )
 
 
@@ -60,7 +60,7 @@ def track_command(call: Call, frames: str, poses: Path | None, resume: str | Non
     if poses:
         _write_poses(run, poses)
     record, went = run.record, _went(run)
-    told = {
+    result = {
         **_which(run),
         "frames": record.frame_count,
         "evaluations_per_frame": done.evaluations_per_frame,
@@ -75,12 +75,12 @@ def track_command(call: Call, frames: str, poses: Path | None, resume: str | Non
     )
     if exchanged := exchanged_sides(run):
         text += f"\n{in_words(exchanged)}"
-        told["exchanged"] = list(exchanged)
+        result["exchanged"] = list(exchanged)
     if record.behaviour:
-        told["behaviour"] = record.behaviour
+        result["behaviour"] = record.behaviour
     if TRACKERS[record.tracker].scales_likelihood:
-        told["likelihood_scale"] = done.likelihood_scale
-    return {**told, "text": text}
+        result["likelihood_scale"] = done.likelihood_scale
+    return {**result, "text": text}
 
 
 RESUME_LIVE = click.option("--resume", metavar="RUN", help="Go on with a live run that was ended.")
@@ -101,7 +101,7 @@ def live_command(call: Call, resume: str | None, again: str | None) -> dict[str,
         return _replayed(session, call.do(replay, run=session.run(again), name=call.given.get("name", "")))
     done: TrackedLive = call.do(resume_live, run=session.run(resume)) if resume else call()
     found, run = done.summary, done.run
-    told: dict[str, object] = {
+    result: dict[str, object] = {
         **_which(run),
         "frames": len(found.tracked),
         "dropped": list(found.dropped),
@@ -117,13 +117,13 @@ def live_command(call: Call, resume: str | None, again: str | None) -> dict[str,
     text = f"{done.session.name} / {run.name}: {live_words(found)}"
     if done.standing is not None:
         standing = done.standing
-        told |= {"sets": standing.sets, "ended": standing.ended, **spread_figures(standing.spreads)}
-        told["stopped"] = [
+        result |= {"sets": standing.sets, "ended": standing.ended, **spread_figures(standing.spreads)}
+        result["stopped"] = [
             {"camera": one.camera, "state": one.state, "at": one.seconds, "noticed_after": one.silent}
             for one in standing.notices
         ]
         text += f"; {standing.spreads.in_words}"
-    return {**told, "text": text}
+    return {**result, "text": text}
 
 
 def _replayed(session: Session, done: Replayed) -> dict[str, object]:

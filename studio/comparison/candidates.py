@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 
 from studio.errors import SettingsError
 from studio.settings import RunSettings, changed_settings, default_settings, values
-from studio.tracking.catalogue import TRACKERS, knobs_for_evaluations
-from studio.tracking.swarm_settings import PARTITIONS
-from studio.tracking.tracker import Value
+from studio.trackers.catalogue import TRACKERS, knobs_for_evaluations
+from studio.trackers.swarm_settings import PARTITIONS
+from studio.trackers.tracker import Value
 
 LABEL = re.compile(r"[A-Za-z0-9_-]{1,40}")
 WEIGHTING = "weighting"
@@ -66,7 +66,7 @@ class Lineup:
     weighting: str
     evaluations: int
     layers: int = DEFAULT_LAYERS
-    changes: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
+    changes: Mapping[str, Mapping[str, Value]] = field(default_factory=dict[str, Mapping[str, Value]])
 
 
 def candidates(lineup: Lineup) -> tuple[Candidate, ...]:
@@ -130,7 +130,7 @@ def _candidate(name: str, lineup: Lineup) -> Candidate:
             f"'{name}' does not differ from '{tracker}'.",
             f"Change a knob of it, as in --set {name}.KNOB=VALUE; labels with knobs of their own: {known}.",
         )
-    variant = VARIANTS[name].changes if name in VARIANTS else {}
+    variant: Mapping[str, Value] = VARIANTS[name].changes if name in VARIANTS else {}
     requested = {**shared, **variant, **own}
     layers = (
         getattr(changed_settings(settings, requested).tracker, "layers", 0)

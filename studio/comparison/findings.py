@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from studio.comparison.trials import Plain
 
-VERDICTS = ("reproduced", "better", "not reproduced", "answered")
+VERDICTS = ("reproduced", "better", "undecided", "not reproduced", "answered")
 # In place of a verdict where a trial failed or no conclusion could be drawn.
 FAILED = "failed"
 # Least seeds of a firm verdict.
@@ -71,8 +71,8 @@ class Number:
 
     ours : over all seeds; low, high : its bootstrap 95 % interval over seeds. paper : None where the paper
     prints none. better : "lower" or "higher" if a difference to that side is an improvement, "" if not. seeds :
-    their number. verdict : "reproduced" where the interval contains the paper's value, "better" where
-    it lies wholly on the better side, else "not reproduced"; "answered" without a paper's value.
+    their number. verdict : one of VERDICTS, by the rule of `comparison.statistics`; "answered" where no claim rests on
+    the number.
     """
 
     name: str
@@ -118,4 +118,4 @@ class Findings:
     numbers: tuple[Number, ...] = ()
     tables: tuple[Table, ...] = ()
     charts: tuple[Chart, ...] = ()
-    settings: Mapping[str, Plain] = field(default_factory=dict)
+    settings: Mapping[str, Plain] = field(default_factory=dict[str, Plain])

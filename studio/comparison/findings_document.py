@@ -4,14 +4,15 @@ NaN and infinity become null; numbers keep six significant figures, more than a 
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from studio.comparison.findings import FAILED, FIRM_SEEDS, Findings, Heading
 from studio.comparison.kept_trials import plain
 from studio.comparison.statistics import firmness
-from studio.comparison.trials import Plain, Scale
+from studio.comparison.trials import Plain, Scale, is_mapping
+from studio.typed_decoding import is_list
 
 FIGURES = 6
 Document = dict[str, Any]
@@ -26,7 +27,8 @@ class Making:
     """Origin of findings.
 
     scale : of the experiment. trials : their number. seconds : of all of them in sequence. software : version that
-    drew the conclusion; measured_by : versions that measured the trials. date : UTC, ISO 8601.
+    drew the conclusion; measured_by : versions that measured the trials. date : UTC, ISO 8601. commits : of the code
+    that measured the trials, as far as they are known.
     """
 
     scale: Scale
@@ -35,6 +37,7 @@ class Making:
     software: str
     measured_by: tuple[str, ...]
     date: str
+    commits: tuple[str, ...] = ()
 
 
 def as_document(heading: Heading, findings: Findings, making: Making) -> Document:
@@ -89,6 +92,7 @@ def _head(heading: Heading, making: Making) -> Document:
         "trials": making.trials,
         "seconds": round(making.seconds, 1),
         "software": making.software,
+        "commits": list(making.commits),
         "date": making.date,
     }
 
@@ -100,7 +104,7 @@ def _seeds(findings: Findings, making: Making) -> int:
 
 
 def _notes(findings: Findings, making: Making) -> list[str]:
-    notes = []
+    notes: list[str] = []
     few = firmness(_seeds(findings, making))
     if few:
         notes.append(f"The verdict is {few}.")
@@ -116,9 +120,9 @@ def _without_nan(value: Plain) -> Any:  # noqa: ANN401
     """The value with finite numbers of six figures and null for all other floats."""
     if isinstance(value, float):
         return float(f"{value:.{FIGURES}g}") if math.isfinite(value) else None
-    if isinstance(value, Mapping):
+    if is_mapping(value):
         return {str(key): _without_nan(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
+    if is_list(value):
         return [_without_nan(entry) for entry in value]
     as_number = getattr(value, "item", None)
     return _without_nan(as_number()) if callable(as_number) else value

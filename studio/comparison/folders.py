@@ -1,8 +1,10 @@
 """The comparisons of a session: folders, listing, trash and restoring."""
 
+import contextlib
 import os
 from collections.abc import Mapping
 from dataclasses import asdict
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +17,13 @@ from studio.comparison.kept_comparison import (
 )
 from studio.comparison.kept_trials import plain
 from studio.comparison.plan import Plan
-from studio.errors import NotFoundError, SessionError
+from studio.errors import NotFoundError, SessionError, StudioError
 from studio.runs.new_run import software_version
 from studio.sessions import atomic_files
 from studio.sessions.manifest import now
 from studio.sessions.names import checked_name, free_name, inside, is_name
 from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import TRASH_NAME, Workspace
 
 FOLDER_NAME = "comparisons"
@@ -42,13 +45,18 @@ def new_comparison(folder: Path, plan: Plan) -> KeptComparison:
     return KeptComparison(folder)
 
 
-def place_of(session: Session, name: str = "") -> Path:
-    """The folder for a comparison of a session; without a name comparison-1, comparison-2, …"""
+def place_of(session: Session, name: str = "", *, sweep: bool = False) -> Path:
+    """The folder for a comparison of a session; without a name comparison-1, comparison-2, … or sweep-1, sweep-2, … A
+    sweep's name is none that runs of an earlier one bear.
+    """
     folder = session.path / FOLDER_NAME
-    taken = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
-    return folder / (
-        checked_name(name, "comparison") if name else free_name(f"comparison-{len(taken) + 1}", taken)
-    )
+    taken: set[str] = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
+    if name:
+        return folder / checked_name(name, "comparison")
+    if not sweep:
+        return folder / free_name(f"comparison-{len(taken) + 1}", taken)
+    taken |= {run.name.rpartition("-p")[0] for run in session.runs()}
+    return folder / next(name for number in count(1) if (name := f"sweep-{number}") not in taken)
 
 
 def kept_comparisons(session: Session) -> tuple[KeptComparison, ...]:
@@ -82,6 +90,17 @@ def unfinished_like(session: Session, plan: Plan) -> KeptComparison | None:
         if same and kept.status() in ("interrupted", "cancelled", "failed"):
             return kept
     return None
+
+
+def runs_of(session: Session, kept: KeptComparison) -> dict[str, StoredRun]:
+    """The runs that were made for a comparison's trials, by the notes that say so (`KeptComparison.note_of`)."""
+    begin = kept.note_of("")
+    found: dict[str, StoredRun] = {}
+    for run in session.runs():
+        # One that cannot be read is none of them.
+        with contextlib.suppress(StudioError):
+            found |= {note: run for note in run.record.notes if note.startswith(begin)}
+    return found
 
 
 def throw_away(workspace: Workspace, session: Session, kept: KeptComparison) -> Path:

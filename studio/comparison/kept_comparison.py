@@ -18,6 +18,7 @@ from studio.comparison.findings import Heading
 from studio.comparison.findings_document import Making, as_document
 from studio.comparison.kept_trials import KeptTrials, measured_by, plain
 from studio.comparison.plan import Comparison, Plan
+from studio.comparison.sweep import Sweep, sweep_csv, sweep_document
 from studio.comparison.trials import Scale, Trial
 from studio.sessions import atomic_files
 from studio.sessions.manifest import now
@@ -68,6 +69,13 @@ class KeptComparison:
         """The folder's name."""
         return self.folder.name
 
+    def note_of(self, trial: str) -> str:
+        """What the record of a run says that was made for a trial of this name; "": how all of these begin. It stays
+        where a comparison comes back from the trash under another name.
+        """
+        record = self.record()
+        return f"A trial of comparison {record.name}, made {record.created}: {trial}"
+
     @property
     def kept_trials(self) -> KeptTrials:
         """The measured outcomes."""
@@ -107,15 +115,17 @@ class KeptComparison:
         ended = msgspec.structs.replace(self.record(), ended=how, problem=problem)
         RECORD.write(self.folder / RECORD_NAME, ended)
 
-    def finish(self, comparison: Comparison) -> None:
+    def finish(self, found: Comparison | Sweep) -> None:
         """Write the result, the frames first, so that both exist once there is a result."""
-        atomic_files.write_text(self.folder / FRAMES_NAME, frames_csv(comparison))
-        atomic_files.write_bytes(
-            self.folder / RESULT_NAME, msgspec.json.encode(result_of(comparison)) + b"\n"
-        )
+        if isinstance(found, Sweep):
+            frames, result = sweep_csv(found), sweep_document(found)
+        else:
+            frames, result = frames_csv(found), result_of(found)
+        atomic_files.write_text(self.folder / FRAMES_NAME, frames)
+        atomic_files.write_bytes(self.folder / RESULT_NAME, msgspec.json.encode(result) + b"\n")
 
     def result(self) -> dict[str, Any] | None:
-        """Numbers (`document`), `findings` and `per_frame`, None while it is not finished."""
+        """Numbers (`document`), `findings` and `per_frame`, of a sweep `sweep_document`; None while unfinished."""
         path = self.folder / RESULT_NAME
         return decode_json(path.read_bytes(), dict[str, Any]) if path.is_file() else None
 

@@ -14,16 +14,16 @@ from pathlib import Path
 from typing import Any
 
 import studio
-from studio.comparison.trials import Plain
+from studio.comparison.trials import Plain, is_mapping
+from studio.likelihood.catalogue import WEIGHTINGS
 from studio.runs.new_run import software_version
 from studio.sessions.atomic_files import write_text
-from studio.tracking.catalogue import TRACKERS
-from studio.weighting.catalogue import WEIGHTINGS
+from studio.trackers.catalogue import TRACKERS
 
 # Rooms whose code affects outcomes; pages, commands and reports do not.
 SCIENCE = (
-    *("geometry", "motion_files", "body", "capture", "evidence", "volume", "weighting", "behaviour"),
-    *("tracking", "runs", "evaluation", "training"),
+    *("geometry", "motion_files", "body", "capture", "evidence", "volume", "likelihood", "behaviour"),
+    *("trackers", "runs", "evaluation", "training"),
 )
 
 
@@ -33,6 +33,7 @@ class KeptOutcome:
 
     measured : plain values, None where it failed. failure : why, "" where it did not. seconds : its duration. software
     : version that measured it. finished : UTC, ISO 8601. label, arguments : of the trial, for readers of the file.
+    commit : of the code that measured it, "" where that is not known.
     """
 
     measured: Mapping[str, Plain] | None
@@ -42,6 +43,7 @@ class KeptOutcome:
     finished: str
     label: str
     arguments: Mapping[str, Plain]
+    commit: str = ""
 
 
 class KeptTrials:
@@ -93,6 +95,6 @@ def _plain_value(value: Any) -> Any:  # noqa: ANN401
     as_list = getattr(value, "tolist", None)
     if callable(as_list):
         return as_list()
-    if isinstance(value, Mapping):
+    if is_mapping(value):
         return dict(value)
     raise TypeError(f"A {type(value).__name__} is not a plain value.")

@@ -6,8 +6,8 @@ them: `trials`, `conclude`. Trials are made and measured as those of the experim
 """
 
 import hashlib
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
@@ -18,12 +18,13 @@ from studio.comparison.statistics import SignTest, sign_test
 from studio.comparison.tracked import Attempt, Tracked, tracking_trial
 from studio.comparison.trials import Outcome, Trial
 from studio.errors import RunError, TruthError
+from studio.likelihood.catalogue import WEIGHTINGS
 from studio.runs.behaviour_models import ChosenModel, chosen_model, needs_model
 from studio.runs.new_run import checked_frames, start_of
 from studio.sessions.session import Session
 from studio.settings import DEFAULT_WEIGHTING
-from studio.tracking.frame_refinement import FrameRefinementSettings
-from studio.weighting.catalogue import WEIGHTINGS
+from studio.trackers.frame_refinement import FrameRefinementSettings
+from studio.trackers.tracker import Value
 
 MOST_SEEDS = 1000
 
@@ -32,7 +33,9 @@ MOST_SEEDS = 1000
 class Plan:
     """The plan of a comparison. footage : the session's folder. session : its name. first, last : frames, half open.
     fps : of the footage. body : a name, "" for the session's own. behaviour : name of the model of those that need one,
-    "" for none; behaviour_digest : of its file; behaviour_path : its present path.
+    "" for none; behaviour_digest : of its file; behaviour_path : its present path. vary : of a sweep the values of each
+    knob, whose combinations are the entrants, and evaluations are then the most of any; empty where trackers are
+    compared. fit_shape, despite_findings : of a sweep's runs.
     """
 
     footage: str
@@ -47,6 +50,9 @@ class Plan:
     behaviour: str = ""
     behaviour_digest: str = ""
     behaviour_path: str = ""
+    vary: Mapping[str, tuple[Value, ...]] = field(default_factory=dict[str, tuple[Value, ...]])
+    fit_shape: bool = False
+    despite_findings: bool = False
 
     @property
     def frame_count(self) -> int:
@@ -142,14 +148,7 @@ def plan_comparison(
             "Take one made by 'studio synthesize', or import it with a truth/*.trc.",
         )
     weighting = WEIGHTINGS[lineup.weighting or session.manifest.weighting or DEFAULT_WEIGHTING].name
-    if (
-        not 0 < len(seeds) <= MOST_SEEDS
-        or len(set(seeds)) < len(seeds)
-        or not all(0 <= one < 2**63 for one in seeds)
-    ):
-        raise RunError(
-            f"The seeds {list(seeds)[:8]} cannot be used.", "Give different whole numbers of 0 or more."
-        )
+    check_seeds(seeds)
     begin, end = checked_frames(session, first, last)
     model = session.body(body or None)
     start_of(session, model, None)
@@ -171,10 +170,22 @@ def plan_comparison(
     )
 
 
+def check_seeds(seeds: Sequence[int]) -> None:
+    """Raise RunError for seeds that cannot be used."""
+    if (
+        not 0 < len(seeds) <= MOST_SEEDS
+        or len(set(seeds)) < len(seeds)
+        or not all(0 <= one < 2**63 for one in seeds)
+    ):
+        raise RunError(
+            f"The seeds {list(seeds)[:8]} cannot be used.", "Give different whole numbers of 0 or more."
+        )
+
+
 def trials(plan: Plan) -> tuple[Trial, ...]:
     """One a tracker and seed; every tracker's first seed first, so that an early look compares them all."""
     return tuple(
-        tracking_trial(candidate.name, _attempt(plan, candidate, seed))
+        tracking_trial(candidate.name, attempt_of(plan, candidate, seed))
         for seed in plan.seeds
         for candidate in plan.entrants
     )
@@ -210,7 +221,8 @@ def _chosen_model(
     return None
 
 
-def _attempt(plan: Plan, candidate: Candidate, seed: int) -> Attempt:
+def attempt_of(plan: Plan, candidate: Candidate, seed: int) -> Attempt:
+    """What a trial tracks."""
     guided = plan.behaviour_path and needs_model(candidate.tracker, candidate.settings().tracker)
     return Attempt(
         plan.footage,

@@ -1,7 +1,11 @@
 """Intervals, tests and verdicts on numbers over several seeds.
 
-The verdict's rule: the bootstrap 95 % interval over the seeds contains the paper's value (reproduced), lies
-wholly on the better side of it (better), or does not (not reproduced). It is firm with FIRM_SEEDS seeds or more.
+The verdict's rule, for a value that the paper prints. "better" where the bootstrap 95 % interval over the seeds lies
+wholly on the better side of it. "reproduced" where two one-sided tests show equality within EQUAL_WITHIN: the 90 %
+interval, whose ends are those of two tests at 5 % (Schuirmann 1987), lies between the margins; where one side is better
+the test against the worse margin alone (no worse than the paper). "not reproduced" where the 95 % interval leaves the
+paper's value out. Else "undecided": too few seeds for so wide a scatter. A narrow interval beside the paper's value is
+thus equal to it, and a wide one around it shows nothing. A verdict is firm with FIRM_SEEDS seeds or more.
 """
 
 import math
@@ -10,16 +14,22 @@ from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import stats
 
+from studio.arrays import Array
 from studio.comparison.findings import FIRM_SEEDS, Number
 
-Array = NDArray[np.float64]
+HARDEST_FIRST = ("not reproduced", "undecided", "reproduced", "better")
+
 # Statistic of a sample; one that takes `axis`, like NumPy's, is many times as fast.
-Statistic = Callable[..., ArrayLike]
+Statistic = Callable[..., Array]
 
 RESAMPLES, LEVEL = 9999, 0.95
+ONE_SIDED = 0.9
+"""Level of the interval whose two ends are each a one-sided test at 5 %."""
+EQUAL_WITHIN = 0.1
+"""The margin of equality, of every experiment: values are equal where their ratio lies between 1 / 1.1 and 1.1."""
 SEED = 20050213
 
 
@@ -32,19 +42,21 @@ class SignTest(NamedTuple):
     p: float
 
 
-def bootstrap_interval(values: Iterable[float], statistic: Statistic = np.mean) -> tuple[float, float]:
-    """Low and high end of a statistic's bootstrap 95 % interval (bias-corrected and accelerated; percentiles where that
+def bootstrap_interval(
+    values: Iterable[float], statistic: Statistic = np.mean, level: float = LEVEL
+) -> tuple[float, float]:
+    """Low and high end of a statistic's bootstrap interval (bias-corrected and accelerated; percentiles where that
     is not defined), always the same for the same values. One value, or equal ones: that value twice; none: NaN twice.
     """
-    return _interval((np.array(list(values), dtype=np.float64),), statistic)
+    return _interval((np.array(list(values), dtype=np.float64),), statistic, level)
 
 
-def ratio_interval(ours: ArrayLike, theirs: ArrayLike) -> tuple[float, float]:
+def ratio_interval(ours: ArrayLike, theirs: ArrayLike, level: float = LEVEL) -> tuple[float, float]:
     """The interval of mean(ours) / mean(theirs), both of the same seeds in the same order.
 
     Raises ValueError where they are not equally many.
     """
-    return _interval(_pairs(ours, theirs), _ratio)
+    return _interval(_pairs(ours, theirs), _ratio, level)
 
 
 def sign_test(ours: ArrayLike, theirs: ArrayLike) -> SignTest:
@@ -72,7 +84,8 @@ def number(
     kept = [float(value) for value in values if math.isfinite(value)]
     ours = float(np.asarray(statistic(np.array(kept)))) if kept else math.nan
     low, high = bootstrap_interval(kept, statistic)
-    verdict = verdict_of(low, high, paper, better)
+    tested = (low, high) if paper is None else bootstrap_interval(kept, statistic, ONE_SIDED)
+    verdict = verdict_of((low, high), tested, paper, better)
     return Number(name, ours, low, high, unit, paper, better, len(kept), verdict)
 
 
@@ -93,33 +106,45 @@ def ratio_number(
     first, second = first[finite], second[finite]
     value = float(_ratio(first, second)) if len(first) else math.nan
     low, high = ratio_interval(first, second)
-    return Number(
-        name, value, low, high, unit, paper, better, len(first), verdict_of(low, high, paper, better)
-    )
+    tested = (low, high) if paper is None else ratio_interval(first, second, ONE_SIDED)
+    verdict = verdict_of((low, high), tested, paper, better)
+    return Number(name, value, low, high, unit, paper, better, len(first), verdict)
 
 
-def verdict_of(low: float, high: float, paper: float | None, better: str = "") -> str:
-    """The verdict on an interval: "answered" without a paper's value, else by the rule above."""
+def equal_to(value: float) -> tuple[float, float]:
+    """The values between which a ratio or a measured size counts as equal to `value`; ends in order."""
+    ends = value / (1.0 + EQUAL_WITHIN), value * (1.0 + EQUAL_WITHIN)
+    return min(ends), max(ends)
+
+
+def verdict_of(
+    interval: tuple[float, float], tested: tuple[float, float], paper: float | None, better: str = ""
+) -> str:
+    """The verdict by the rule above, "answered" without a paper's value.
+
+    interval : the 95 % interval. tested : the 90 % interval, of the two one-sided tests.
+    """
     if better not in ("", "lower", "higher"):
         raise ValueError(f"better is '{better}', not 'lower', 'higher' or ''.")
     if paper is None:
         return "answered"
-    if low <= paper <= high:
+    (low, high), (least, most) = interval, tested
+    if not (math.isfinite(low) and math.isfinite(high)):
+        return "not reproduced"
+    if (better == "lower" and high < paper) or (better == "higher" and low > paper):
+        return "better"
+    lower_end, upper_end = equal_to(paper)
+    if (least >= lower_end or better == "lower") and (most <= upper_end or better == "higher"):
         return "reproduced"
-    on_better_side = (better == "lower" and high < paper) or (better == "higher" and low > paper)
-    return "better" if on_better_side else "not reproduced"
+    return "undecided" if low <= paper <= high else "not reproduced"
 
 
 def overall(verdicts: Iterable[str]) -> str:
-    """The overall verdict: "not reproduced" as soon as one is, "better" only where all comparable ones are,
-    "answered" where none is comparable.
+    """The verdict of the hardest of several claims: the first of HARDEST_FIRST that one of them has; "answered" where
+    nothing is compared.
     """
-    compared = [verdict for verdict in verdicts if verdict != "answered"]
-    if not compared:
-        return "answered"
-    if "not reproduced" in compared:
-        return "not reproduced"
-    return "reproduced" if "reproduced" in compared else "better"
+    found = set(verdicts)
+    return next((verdict for verdict in HARDEST_FIRST if verdict in found), "answered")
 
 
 def firmness(seeds: int) -> str:
@@ -129,7 +154,7 @@ def firmness(seeds: int) -> str:
     return f"not firm: {seeds} {'seed' if seeds == 1 else 'seeds'} of at least {FIRM_SEEDS}"
 
 
-def _interval(samples: tuple[Array, ...], statistic: Statistic) -> tuple[float, float]:
+def _interval(samples: tuple[Array, ...], statistic: Statistic, level: float) -> tuple[float, float]:
     count = len(samples[0])
     if count == 0:
         return math.nan, math.nan
@@ -144,7 +169,7 @@ def _interval(samples: tuple[Array, ...], statistic: Statistic) -> tuple[float, 
                 samples,
                 statistic,
                 n_resamples=RESAMPLES,
-                confidence_level=LEVEL,
+                confidence_level=level,
                 method=method,
                 paired=len(samples) > 1,
                 rng=np.random.default_rng(SEED),

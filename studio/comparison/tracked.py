@@ -10,17 +10,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.behaviour.model import BehaviourModel
 from studio.behaviour.model_file import read_model
 from studio.body.inverse_kinematics import known_markers, pose_from_markers
 from studio.body.model import BodyModel
 from studio.body.subject import read_subject
-from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.footage_cache import FootageCache
 from studio.comparison.trials import Trial, kept_as
 from studio.errors import NotFoundError, TruthError
 from studio.evaluation.errors import evaluate, rows_of_frames
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
+from studio.likelihood.catalogue import WEIGHTINGS
 from studio.motion_files.trc import read_trc
 from studio.runs.behaviour_models import check_prediction, fitting, model_folders, model_path
 from studio.runs.following import Following
@@ -29,14 +31,10 @@ from studio.runs.shape_on_the_way import WEIGHTING, shaped_body
 from studio.runs.sides import known_silhouettes
 from studio.sessions.session import Session
 from studio.settings import RunSettings, changed_settings, default_settings
-from studio.tracking.frame_refinement import FrameRefiner
-from studio.tracking.refinement import Distances
-from studio.tracking.side_exchange import with_sides_right
-from studio.tracking.tracker import LayerRecord, start_of
-from studio.weighting.catalogue import WEIGHTINGS
-
-Array = NDArray[np.float64]
-
+from studio.trackers.frame_refinement import FrameRefiner
+from studio.trackers.refinement import Distances
+from studio.trackers.side_exchange import with_sides_right
+from studio.trackers.tracker import LayerRecord, start_of
 
 AS_PUBLISHED: Mapping[str, Any] = {"refine_frames": False}
 """Knobs without refinement, as in the papers; an attempt that refines sets them."""
@@ -58,7 +56,7 @@ class Attempt:
     tracker: str
     weighting: str
     seed: int
-    changes: Mapping[str, Any] = field(default_factory=dict)
+    changes: Mapping[str, Any] = field(default_factory=dict[str, Any])
     first: int = 0
     last: int | None = None
     every: int = 1
@@ -82,7 +80,8 @@ class Attempt:
     @classmethod
     def of_plain(cls, arguments: Mapping[str, Any]) -> "Attempt":
         """From a trial's arguments, as read from JSON."""
-        return cls(**{**arguments, "cameras": tuple(arguments.get("cameras", ()))})
+        words: dict[str, Any] = {**arguments, "cameras": tuple(arguments.get("cameras", ()))}
+        return cls(**words)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +103,7 @@ class Tracked:
     lost_limbs: list[str]
     evaluations: int
     seconds: float
-    named: list[list[str]] = field(default_factory=list)
+    named: list[list[str]] = field(default_factory=list[list[str]])
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +119,7 @@ UNCHANGED = Changed()
 
 def track(
     attempt: Attempt,
-    shelf: FootageShelf,
+    cache: FootageCache,
     *,
     on_layer: Callable[[LayerRecord], None] | None = None,
     on_frame: Callable[[int, int], None] | None = None,
@@ -130,7 +129,7 @@ def track(
 
     Raises TruthError for a footage without truth and what tracking raises.
     """
-    session = shelf.session(attempt.footage)
+    session = cache.session(attempt.footage)
     if session.truth_path is None:
         raise TruthError(f"Session '{session.name}' has no truth.", "Take one made by 'studio synthesize'.")
     subject = read_subject(session.path / attempt.subject) if attempt.subject else None
@@ -144,7 +143,7 @@ def track(
     def evidence(frame: int, name: str = attempt.weighting) -> FrameEvidence:
         """The evidence of a frame for a weighting."""
         kind, pictures = WEIGHTINGS[name].edge_kind, WEIGHTINGS[name].reads_pictures
-        return spoilt.evidence(shelf.evidence(session, cameras, frame, settings.evidence, kind, pictures))
+        return spoilt.evidence(cache.evidence(session, cameras, frame, settings.evidence, kind, pictures))
 
     start = _start_pose(session, body, attempt.first, fps)
     if attempt.shape_frames and start is not None:
@@ -234,6 +233,11 @@ def _cameras(session: Session, names: tuple[str, ...]) -> tuple[Camera, ...]:
     return tuple(camera for camera in known if not names or camera.name in names)
 
 
+def start_of_attempt(session: Session, body: str, first: int) -> tuple[float, ...] | None:
+    """The pose that an attempt starts from. body : a name, "" for the session's own."""
+    return _start_pose(session, session.body(body or None), first, session.manifest.fps)
+
+
 def _start_pose(session: Session, body: BodyModel, first: int, fps: float) -> tuple[float, ...] | None:
     """The session's start pose; for a later first frame, and for a body other than the session's, the pose
     fitted to the true markers of that frame.
@@ -265,6 +269,6 @@ def tracking_trial(group: str, attempt: Attempt) -> Trial:
 
 
 @kept_as("tracking_trials.measure_tracking")
-def measure_tracking(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
+def measure_tracking(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
     """Track; the fields of `Tracked`."""
-    return asdict(track(Attempt.of_plain(arguments), shelf))
+    return asdict(track(Attempt.of_plain(arguments), cache))

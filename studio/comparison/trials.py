@@ -4,14 +4,21 @@ import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeGuard, TypeVar
 
-from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.footage_cache import FootageCache
 from studio.errors import StudioError
 
 # Numbers, text, lists and dictionaries: the types of JSON.
 Plain = Any
-Measure = Callable[[Mapping[str, Plain], FootageShelf], dict[str, Plain]]
+
+
+def is_mapping(value: Plain) -> TypeGuard[Mapping[str, Plain]]:
+    """Whether a plain value is a dictionary."""
+    return isinstance(value, Mapping)
+
+
+Measure = Callable[[Mapping[str, Plain], FootageCache], dict[str, Plain]]
 M = TypeVar("M", bound=Callable[..., Any])
 NAMED_BELOW = "studio.experiments"
 

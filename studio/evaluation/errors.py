@@ -3,7 +3,7 @@
 The measure is that of Balan, Sigal & Black 2005 and HumanEva: the mean Euclidean distance of the markers in
 a frame, without any alignment, in mm. Beside it stand the two usual aligned ones: moved to the root marker
 (MPJPE), and after the best similarity (PA-MPJPE). A limb is lost in a frame when one of its markers is off
-by more than LOST_MM (the threshold of MPI-INF-3DHP's PCK).
+by more than LOST_MM (the threshold of MPI-INF-3DHP's PCK), at a person's size (`scale_of`).
 """
 
 from dataclasses import dataclass, field
@@ -15,11 +15,15 @@ from numpy.typing import NDArray
 from studio.arrays import Array, Indices
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
+from studio.body.scale import scale_of
 from studio.errors import TruthError
 from studio.motion_files.trc import MarkerMotion
 from studio.runs.marker_lines import marker_links, marker_sides
 
 FEWEST_POINTS = 3
+UNALIGNED, RIGID, SIMILARITY = "none", "rigid", "similarity"
+ON_A_LINE = 1e-3
+"""Points lie on a line where their second extent is less than this share of the first."""
 
 
 def moved_to_root(points: Array, truth_points: Array, root: int) -> Array:
@@ -38,11 +42,36 @@ def similarity_aligned(points: Array, truth_points: Array) -> Array:
     size = float(np.sum(spread**2))
     if size == 0.0:
         return np.broadcast_to(to_middle, points.shape).copy()
+    turn, stretched = _turn(spread, target)
+    return stretched / size * spread @ turn.T + to_middle
+
+
+def _turn(spread: Array, target: Array) -> tuple[Array, float]:
+    """(3, 3) the turn that lays points (M, 3) about the origin on others, and the sum of their products there."""
     left, stretches, right = np.linalg.svd(target.T @ spread)
     signs = np.array([1.0, 1.0, np.sign(np.linalg.det(left) * np.linalg.det(right))])
-    turn = (left * signs) @ right
-    scale = float(np.sum(stretches * signs)) / size
-    return scale * spread @ turn.T + to_middle
+    return (left * signs) @ right, float(np.sum(stretches * signs))
+
+
+def laid_on(truth_points: Array, found: Array, seen: NDArray[np.bool_], how: str) -> tuple[Array, str]:
+    """True points of another world (K, M, 3) laid on the found ones by one motion for all frames, and what it was.
+
+    seen : (K, M) points that count. how : RIGID, or SIMILARITY, which scales as well. Raises TruthError for fewer than
+    three points, or points on a line.
+    """
+    points, goal = truth_points[seen], found[seen]
+    middle, to = points.mean(axis=0), goal.mean(axis=0)
+    extents = np.linalg.svd(points - middle, compute_uv=False)
+    if len(points) < FEWEST_POINTS or extents[1] <= ON_A_LINE * extents[0]:
+        raise TruthError(
+            "The true points that the body has too are fewer than three, or lie on a line: they cannot be aligned.",
+            "Name more of the body's markers as the truth does, or give the truth in the session's world.",
+        )
+    turn, stretched = _turn(points - middle, goal - to)
+    scale = stretched / float(np.sum((points - middle) ** 2)) if how == SIMILARITY else 1.0
+    scaled = f", scaled by {scale:.4g}" if how == SIMILARITY else ""
+    words = f"{how}, one motion for {len(found)} frames, fitted to {len(points)} points{scaled}"
+    return scale * (truth_points - middle) @ turn.T + to, words
 
 
 LOST_MM = 150.0
@@ -51,12 +80,13 @@ TRUNK = "head and trunk"
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """Errors of a run against a truth, mm; without alignment unless noted.
+    """Errors of a run against a truth, mm; without alignment unless noted (`alignment`: of the truth as a whole).
 
     frames : the frames that were measured (those that the truth has a row for). mean_mm : mean over frames
     of the frames' means; std_mm : their standard deviation; worst_mm : the worst frame's mean. lost_frames
     : how many frames have any limb lost, lost_frame_numbers : which; lost_limbs : limbs lost in any frame;
-    lost_by_frame : the limbs lost in each of `frames`.
+    lost_threshold_mm : the distance from which a marker's limb is lost. lost_by_frame : the limbs lost in each of
+    `frames`.
     per_frame_mm : in the order of `frames`. root_aligned_mm : with the root marker laid on the true one.
     procrustes_mm : after the best turn, scale and move of each frame, None where no frame has three
     markers. without_offsets_mm : with each marker's constant offset removed, which two definitions of a joint or a
@@ -81,28 +111,42 @@ class Evaluation:
     root_aligned_mm: float
     procrustes_mm: float | None
     unmatched_markers: tuple[str, ...]
-    angles_deg: dict[str, float] = field(default_factory=dict)
+    angles_deg: dict[str, float] = field(default_factory=dict[str, float])
     mean_angle_deg: float | None = None
-    directions_deg: dict[str, float] = field(default_factory=dict)
+    directions_deg: dict[str, float] = field(default_factory=dict[str, float])
     mean_direction_deg: float | None = None
     without_offsets_mm: float | None = None
     common_offset_mm: float | None = None
-    offsets_mm: dict[str, float] = field(default_factory=dict)
+    offsets_mm: dict[str, float] = field(default_factory=dict[str, float])
+    lost_threshold_mm: float = LOST_MM
+    alignment: str = UNALIGNED
 
 
-def evaluate(poses: Array, frames: Indices, body: BodyModel, truth: MarkerMotion, fps: float) -> Evaluation:
+def lost_mm(body: BodyModel) -> float:
+    """Distance of a marker from the true one from which its limb counts as lost, mm."""
+    return LOST_MM * scale_of(body)
+
+
+def evaluate(
+    poses: Array, frames: Indices, body: BodyModel, truth: MarkerMotion, fps: float, align: str = UNALIGNED
+) -> Evaluation:
     """The errors of poses (K, D) of the given frames (K,) of a body against true markers.
 
     The truth's first row is frame 0; its other rows belong to the frames nearest to (Time - first Time) ×
-    fps. Raises TruthError when no marker or no frame is common to both.
+    fps. align : RIGID or SIMILARITY lays a truth of another world on the run first, by one motion for all frames.
+    Raises TruthError when no marker or no frame is common to both.
     """
     names, of_body, of_truth, unmatched = _common_markers(body, truth)
     numbers, kept, truth_points = _common_frames(np.asarray(frames), truth, of_truth, fps)
     found = marker_points(body, np.asarray(poses, dtype=float)[kept])[:, of_body]
     seen = np.asarray(np.isfinite(truth_points).all(axis=2))
+    words = UNALIGNED
+    if align != UNALIGNED:
+        truth_points, words = laid_on(truth_points, found, seen, align)
     distances = np.where(seen, np.linalg.norm(found - truth_points, axis=2), np.nan)
     per_frame = np.nanmean(distances, axis=1)
-    lost = np.nan_to_num(distances) > LOST_MM
+    threshold = lost_mm(body)
+    lost = np.nan_to_num(distances) > threshold
     in_frame = np.asarray(lost.any(axis=1))
     limbs = limb_of_markers(body)
     return Evaluation(
@@ -125,6 +169,8 @@ def evaluate(poses: Array, frames: Indices, body: BodyModel, truth: MarkerMotion
         root_aligned_mm=_root_aligned(found, truth_points, seen),
         procrustes_mm=_procrustes(found, truth_points, seen),
         unmatched_markers=unmatched,
+        lost_threshold_mm=threshold,
+        alignment=words,
         **_degrees_off(found, truth_points, marker_links(body, names), names),
         **_constant_part(found - truth_points, names),
     )
@@ -134,10 +180,11 @@ def _constant_part(off: Array, names: tuple[str, ...]) -> dict[str, Any]:
     """The fields of `Evaluation` about constant offsets. off : (K, M, 3), NaN where the truth has none."""
     known = np.isfinite(off[..., 0]).any(axis=0)
     off = off[:, known]
-    offsets = np.nanmean(off, axis=0)
+    offsets: Array = np.nanmean(off, axis=0)
     lengths = np.linalg.norm(offsets, axis=1)
+    rest: Array = np.linalg.norm(off - offsets, axis=2)
     return {
-        "without_offsets_mm": float(np.nanmean(np.linalg.norm(off - offsets, axis=2))),
+        "without_offsets_mm": float(np.nanmean(rest)),
         "common_offset_mm": float(np.linalg.norm(offsets.mean(axis=0))),
         "offsets_mm": {
             name: float(length) for name, length in zip(np.array(names)[known].tolist(), lengths, strict=True)
@@ -201,15 +248,28 @@ def limb_of_markers(body: BodyModel) -> dict[str, str]:
     """Marker to the limb it is counted with: all that is neither left nor right is one limb, head and
     trunk; the others are grouped as the body's parameters are (a person has five limbs).
     """
-    owned: dict[int, str] = {}
-    for index, joint in enumerate(body.joints):
-        moved = [step.parameter for step in joint.steps if step.parameter >= 0]
-        owned[index] = body.parameters[moved[0]].limb if moved else owned.get(joint.parent, TRUNK)
-    sides = marker_sides(body)
+    owned, sides = _limb_of_joints(body), marker_sides(body)
     return {
         marker.name: TRUNK if sides[marker.name] == "middle" else owned[marker.joint]
         for marker in body.markers
     }
+
+
+def limb_of_drawn(body: BodyModel) -> dict[str, str]:
+    """Drawn limb to the limb that its markers are counted with; in a body without markers each is its own."""
+    if not body.markers:
+        return {limb.name: limb.name for limb in body.drawn}
+    owned = _limb_of_joints(body)
+    return {limb.name: TRUNK if limb.side == "middle" else owned[limb.joint] for limb in body.drawn}
+
+
+def _limb_of_joints(body: BodyModel) -> dict[int, str]:
+    """The limb of the parameters that move each joint, or the one above it."""
+    owned: dict[int, str] = {}
+    for index, joint in enumerate(body.joints):
+        moved = [step.parameter for step in joint.steps if step.parameter >= 0]
+        owned[index] = body.parameters[moved[0]].limb if moved else owned.get(joint.parent, TRUNK)
+    return owned
 
 
 def _common_markers(
@@ -260,7 +320,7 @@ def _root_aligned(found: Array, truth_points: Array, seen: NDArray[np.bool_]) ->
     """Mean over frames of the markers' mean distance, mm, the root (the first marker seen, in the body's
     order) laid on the true one.
     """
-    means = []
+    means: list[float] = []
     for points, goal, there in zip(found, truth_points, seen, strict=True):
         laid = moved_to_root(points[there], goal[there], 0)
         means.append(float(np.linalg.norm(laid - goal[there], axis=1).mean()))
@@ -269,7 +329,7 @@ def _root_aligned(found: Array, truth_points: Array, seen: NDArray[np.bool_]) ->
 
 def _procrustes(found: Array, truth_points: Array, seen: NDArray[np.bool_]) -> float | None:
     """Mean over frames of the markers' mean distance, mm, after the best similarity of each frame."""
-    means = []
+    means: list[float] = []
     for points, goal, there in zip(found, truth_points, seen, strict=True):
         if there.sum() >= FEWEST_POINTS:
             laid = similarity_aligned(points[there], goal[there])

@@ -2,12 +2,12 @@
 
 from dataclasses import asdict
 
-from studio.evaluation.errors import LOST_MM, Evaluation
+from studio.evaluation.errors import UNALIGNED, Evaluation
 
 
 def as_document(evaluation: Evaluation) -> dict[str, object]:
     """The evaluation as plain JSON values, the threshold of a lost limb beside it."""
-    return {**asdict(evaluation), "lost_threshold_mm": LOST_MM, "alignment": "none"}
+    return {**asdict(evaluation)}
 
 
 def _constant_part(evaluation: Evaluation) -> list[str]:
@@ -22,15 +22,18 @@ def _constant_part(evaluation: Evaluation) -> list[str]:
 
 def in_words(evaluation: Evaluation) -> str:
     """The evaluation as text: every number with its alignment and threshold."""
-    procrustes = evaluation.procrustes_mm
+    procrustes, threshold = evaluation.procrustes_mm, evaluation.lost_threshold_mm
+    aligned = evaluation.alignment != UNALIGNED
+    mean = "mean, so aligned  " if aligned else "mean, no alignment"
     lines = [
         f"frames measured      {len(evaluation.frames)}",
-        f"mean, no alignment   {evaluation.mean_mm:.1f} mm (± {evaluation.std_mm:.1f} over frames)",
+        *([f"truth laid on the run  {evaluation.alignment}"] if aligned else []),
+        f"{mean}   {evaluation.mean_mm:.1f} mm (± {evaluation.std_mm:.1f} over frames)",
         f"worst frame          {evaluation.worst_mm:.1f} mm",
         f"root aligned         {evaluation.root_aligned_mm:.1f} mm",
         f"after Procrustes     {'-' if procrustes is None else f'{procrustes:.1f} mm'}",
         *_constant_part(evaluation),
-        f"frames with a limb lost (a marker off by more than {LOST_MM:.0f} mm)  {evaluation.lost_frames}",
+        f"frames with a limb lost (a marker off by more than {threshold:.0f} mm)  {evaluation.lost_frames}",
     ]
     if evaluation.lost_limbs:
         lines.append(f"limbs lost           {', '.join(evaluation.lost_limbs)}")

@@ -15,11 +15,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Bytes, Floats
 from studio.evidence.settings import EvidenceSettings
 from studio.numba_in_threads import EXACT, KERNEL, njit
-
-Bytes = NDArray[np.uint8]
-Floats = NDArray[np.float32]
 
 GAIN_STRIDE = 8
 GAIN_RANGE = (0.5, 2.0)
@@ -63,7 +61,7 @@ class GaussianBackground:
             self.variance = np.ascontiguousarray(deviation, dtype=np.float32) ** 2
         self._samples = self.mean[::GAIN_STRIDE, ::GAIN_STRIDE].astype(np.float32)
         self._in_range = (self._samples > GAIN_LEAST_LEVEL) & (self._samples < GAIN_MOST_LEVEL)
-        self.is_grey = float(np.mean(np.ptp(self._samples, axis=2))) < GREY_SPREAD
+        self.is_grey = float(np.ptp(self._samples, axis=2).mean()) < GREY_SPREAD
 
     def foreground(self, picture: Bytes, settings: EvidenceSettings) -> Bytes:
         """(H, W) uint8, 255 where the picture differs and is no shadow."""
@@ -164,7 +162,7 @@ def gaussian_from_median(frames: Bytes) -> GaussianBackground:
 
 
 @njit(**KERNEL)
-def median_and_distance(values):
+def median_and_distance(values: Bytes) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Median of each column and the median distance from it. values : (K, P) uint8. Returns two (P,)
     float32."""
     count, pixels = values.shape
@@ -182,7 +180,16 @@ def median_and_distance(values):
 
 
 @njit(**EXACT, fastmath=True)
-def differing_pixels(picture, mean, variance, gain, threshold, noise, darkest, colour):
+def differing_pixels(
+    picture: Bytes,
+    mean: NDArray[np.uint8 | np.float32],
+    variance: NDArray[np.float32],
+    gain: NDArray[np.float32],
+    threshold: np.float32,
+    noise: np.float32,
+    darkest: np.float32,
+    colour: np.float32,
+) -> Bytes:
     """255 where a colour differs by more than sqrt(threshold) deviations and the pixel is no shadow.
 
     picture : (H, W, 3) uint8. mean : (H, W, 3) uint8 or float32. variance : (H or 1, W, 3) float32. noise : least

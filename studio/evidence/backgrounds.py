@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Bytes
 from studio.capture.footage import Footage
 from studio.capture.pictures import is_picture, read_picture
 from studio.capture.video import VideoReader, measure_video
@@ -26,7 +27,6 @@ from studio.evidence.background import (
 from studio.evidence.combined_background import combine
 from studio.evidence.yuv_background import YuvBackground, independent_background, learn_background
 
-Bytes = NDArray[np.uint8]
 FittedKind = Literal["gaussian", "median", "combined", "mog2", "knn"]
 
 CLIP_FRAMES = 60

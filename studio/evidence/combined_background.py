@@ -24,12 +24,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array, Bytes, Floats
 from studio.evidence.background import GaussianBackground
 from studio.evidence.colour_fit import fitted_line
 from studio.numba_in_threads import KERNEL, njit
-
-Bytes = NDArray[np.uint8]
-Floats = NDArray[np.float32]
 
 AGREES = 16.0
 """Grey levels in any colour: within this a frame agrees with the plate."""
@@ -178,8 +176,9 @@ def _goes_on_better(plate: Floats, footage: Floats, region: Region, unsure: Byte
     y, x, inside = region
     known = (unsure[y, x] == 0).astype(np.float32)
     window = (2 * reach + 1, 2 * reach + 1)
-    near = cv2.boxFilter(known, -1, window)
-    around = cv2.boxFilter(footage[y, x] * known[..., None], -1, window) / np.maximum(near, 1e-6)[..., None]
+    near = np.asarray(cv2.boxFilter(known, -1, window), dtype=np.float32)
+    seen = np.asarray(cv2.boxFilter(footage[y, x] * known[..., None], -1, window), dtype=np.float32)
+    around = seen / np.maximum(near, 1e-6)[..., None]
     core = cv2.erode(inside.astype(np.uint8), np.ones((reach | 1, reach | 1), np.uint8)) > 0
     rim = inside & ~core & (near > 0.1)
     if not rim.any():
@@ -207,14 +206,16 @@ def background_nearby(frames: Bytes, mean: Floats, unsure: Bytes, factor: float 
         share[:] = 0.5
         for reach in (_fewer(reach, factor) for reach in reversed(REACHES)):
             window = (2 * reach + 1, 2 * reach + 1)
-            near = cv2.boxFilter(known, -1, window)
-            found = cv2.boxFilter(empty, -1, window) / np.maximum(near, 1e-6)
+            near = np.asarray(cv2.boxFilter(known, -1, window), dtype=np.float32)
+            found = np.asarray(cv2.boxFilter(empty, -1, window), dtype=np.float32) / np.maximum(near, 1e-6)
             np.copyto(share, found, where=near > ENOUGH_KNOWN)
     return shares
 
 
 @njit(**KERNEL)
-def agreeing_frames(frames, low, high):
+def agreeing_frames(
+    frames: Bytes, low: Floats, high: Floats
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]:
     """Mean and deviation (H, W, 3) float32 over the frames between low and high, and their number (H, W).
 
     frames : (K, H, W, 3) uint8. Zeros where none agrees.
@@ -248,7 +249,13 @@ def agreeing_frames(frames, low, high):
 
 
 @njit(**KERNEL)
-def fill_from_most_alike(frames, unsure, shares, mean, deviation):
+def fill_from_most_alike(
+    frames: Bytes,
+    unsure: NDArray[np.bool_],
+    shares: NDArray[np.float32],
+    mean: NDArray[np.float32],
+    deviation: NDArray[np.float32],
+) -> None:
     """Fill mean and deviation (H, W, 3) where unsure (H, W) from the frames that agree with the best one.
 
     frames : (K, H, W, 3) uint8. shares : (K, h, w) of `background_nearby`; a frame's vote is its VOTE-th power: few
@@ -284,7 +291,18 @@ def fill_from_most_alike(frames, unsure, shares, mean, deviation):
 
 
 @njit(**KERNEL)
-def fill_finely(plate, frames, top, selected, origin, shares, gains, offsets, fewest, out):
+def fill_finely(
+    plate: Bytes,
+    frames: Bytes,
+    top: int,
+    selected: NDArray[np.bool_],
+    origin: Bytes,
+    shares: NDArray[np.float32],
+    gains: Floats,
+    offsets: Floats,
+    fewest: int,
+    out: Bytes,
+) -> None:
     """`Combination.fill`: apply the decisions of coarse pictures to each pixel of finer ones."""
     count, rows, width = frames.shape[:3]
     height = len(out)
@@ -346,7 +364,7 @@ def fill_finely(plate, frames, top, selected, origin, shares, gains, offsets, fe
 
 
 @njit(**KERNEL, inline="always")
-def is_near(values, k, j):
+def is_near(values: Array, k: int, j: int) -> bool:
     """Whether rows k and j of values (K, 3) differ by at most AGREES in each colour."""
     return (
         abs(values[k, 0] - values[j, 0]) <= AGREES

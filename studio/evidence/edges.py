@@ -13,9 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Bytes
 from studio.numba_in_threads import KERNEL, njit
-
-Bytes = NDArray[np.uint8]
 
 EDGE_WIDTH = 4.0
 """Pixels on which the gradient of a body's edge passes the threshold; thinner edges stay below 1. On the sample walk
@@ -68,7 +67,7 @@ def bodytrack_taps() -> NDArray[np.float32]:
 
 
 @njit(**KERNEL)
-def edge_pixels(image, least):
+def edge_pixels(image: Bytes, least: float) -> Bytes:
     """255 where the squared magnitude of the plain Sobel sums is at least `least` (64 times Sobel / 8's).
 
     image : (H, W) uint8. The outermost pixels are 0.
@@ -89,7 +88,7 @@ def edge_pixels(image, least):
 
 
 @njit(**KERNEL)
-def blur_twice_truncated(image, taps):
+def blur_twice_truncated(image: Bytes, taps: NDArray[np.float32]) -> Bytes:
     """Rows, then columns, each sum of 7 in float32 cut off to 8 bits; a border of 3 pixels is 0.
 
     image : (H, W) uint8. taps : (7,) float32. The sums are written out so that they vectorise over a row.

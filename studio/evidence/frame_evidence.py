@@ -2,13 +2,8 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from studio.arrays import Bytes
 from studio.evidence.yuv_background import YuvBackground
-
-Bytes = NDArray[np.uint8]
-
 
 EDGE_KINDS = ("proximity", "bodytrack", "none", "hull")
 """Maps that a weighting reads; "hull": no map, but the evidence of a visual hull (knob hull_evidence)."""
@@ -22,6 +17,8 @@ class ViewEvidence:
     edges : (H, W) uint8 edge proximity map, 255 = on an edge (Eq. 14's p = edges / 255).
     background : the camera's empty view where the hull is to be carved from pixels; None: from the mask. A view
     with a background may have a mask of zeros, where none is needed.
+    hidden : (H, W) uint8, above 0 where the mask says nothing of the body, for somebody else is in front of it; None:
+    nowhere.
     """
 
     camera: str
@@ -29,6 +26,7 @@ class ViewEvidence:
     mask: Bytes
     edges: Bytes
     background: YuvBackground | None = None
+    hidden: Bytes | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)

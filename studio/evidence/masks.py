@@ -8,10 +8,9 @@ import cv2.typing
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Bytes
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
-
-Bytes = NDArray[np.uint8]
 
 
 def cleaned(mask: Bytes, settings: EvidenceSettings) -> Bytes:

@@ -8,11 +8,12 @@ takes half the time.
 import functools
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Bytes
 from studio.capture.footage import Footage
 from studio.errors import FootageError
 from studio.evidence.backgrounds import Backgrounds, FittedKind
@@ -20,9 +21,9 @@ from studio.evidence.edges import bodytrack_edges, proximity_edges
 from studio.evidence.frame_evidence import EDGE_KINDS, FrameEvidence, ViewEvidence
 from studio.evidence.masks import cleaned
 from studio.evidence.settings import EvidenceSettings
+from studio.evidence.threshold import between_thresholds
 from studio.geometry.camera import Camera
-
-Bytes = NDArray[np.uint8]
+from studio.tracing import span
 
 KINDS: dict[str, FittedKind] = {"median": "median", "combined": "combined", "mog2": "mog2", "knn": "knn"}
 """Models by the knob's value; all others are Gaussians."""
@@ -62,18 +63,29 @@ class EvidenceMaker:
         if self._executor is None:
             views = [self.view(camera, frame) for camera in self.cameras]
         else:
-            views = list(self._executor.map(lambda camera: self.view(camera, frame), self.cameras))
+            views = list(self._executor.map(partial(self.view, frame=frame), self.cameras))
         return FrameEvidence(frame, tuple(views))
 
     def view(self, camera: str, frame: int) -> ViewEvidence:
         """One camera's evidence."""
-        picture = self._footage.picture(camera, frame)
+        with span("decode", frame):
+            picture = self._footage.picture(camera, frame)
         if self.hull_of_pixels:
             nothing = _nothing(picture.shape[0], picture.shape[1])
             background = self._backgrounds.yuv(camera, self.settings.hull_noise)
             return ViewEvidence(camera, picture, nothing, nothing, background)
-        mask = self.finished_mask(camera, self.raw_mask(camera, frame, picture))
-        return ViewEvidence(camera, picture, mask, self._edges(picture, mask))
+        with span("mask", frame):
+            mask = self.finished_mask(camera, self.raw_mask(camera, frame, picture))
+        given = self.settings.background_model in ("auto", "mask")
+        return self.of_mask(camera, frame, mask, self._footage.hidden(camera, frame) if given else None)
+
+    def of_mask(self, camera: str, frame: int, mask: Bytes, hidden: Bytes | None) -> ViewEvidence:
+        """One camera's evidence with a mask (H, W), 0 or 255, in place of the one that is made of its picture. hidden :
+        as in `ViewEvidence`.
+        """
+        picture = self._footage.picture(camera, frame)
+        with span("edges", frame):
+            return ViewEvidence(camera, picture, mask, self._edges(picture, mask), hidden=hidden)
 
     def _from_pixels(self) -> bool:
         """Whether a hull is carved from pixels: by the knob; "auto": if all cameras have an empty view, none masks."""
@@ -98,15 +110,21 @@ class EvidenceMaker:
             mask = self._footage.mask(camera, frame)
             if mask is not None:
                 return RawMask(mask, self.settings.mask_clean_given)
+        if choice == "threshold":
+            return RawMask(between_thresholds(picture, self.settings), True)
         kind: FittedKind = KINDS.get(choice, "gaussian")
         model = self._backgrounds.model(camera, kind)
         return RawMask(model.foreground(picture, self.settings), True)
 
     def finished_mask(self, camera: str, raw: RawMask) -> Bytes:
         """(H, W) 0 or 255: a raw mask, cleaned if `to_clean`, without excluded areas."""
-        mask = cleaned(raw.mask, self.settings) if raw.to_clean else raw.mask
         excluded = self._backgrounds.exclusion(camera)
-        return mask if excluded is None else np.where(excluded > 0, np.uint8(0), mask)
+
+        def without(mask: Bytes) -> Bytes:
+            return mask if excluded is None else np.where(excluded > 0, np.uint8(0), mask)
+
+        # Before cleaning too: what does not count is not the largest piece.
+        return without(cleaned(without(raw.mask), self.settings)) if raw.to_clean else without(raw.mask)
 
     def _edges(self, picture: Bytes, mask: Bytes) -> Bytes:
         """The edge map that the weighting uses."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from studio.evidence.yuv_background import LEAST_NOISE
 from studio.knobs import next_frame_knob
 
-BACKGROUND_MODELS = ("auto", "mask", "gaussian", "median", "combined", "mog2", "knn")
+BACKGROUND_MODELS = ("auto", "mask", "gaussian", "median", "combined", "mog2", "knn", "threshold")
 HULL_EVIDENCE = ("auto", "pixels", "masks")
 
 
@@ -22,7 +22,8 @@ class EvidenceSettings:
         help="mask: the masks that came with the footage; gaussian: difference from the plate or empty clip,"
         " else from the footage's median; median: from the footage's median; combined: the plate where the footage"
         " confirms it, else the footage's most frequent colour; mog2, knn: OpenCV's"
-        " models, trained on the empty clip, else on the footage; auto: masks that came with it, else gaussian.",
+        " models, trained on the empty clip, else on the footage; threshold: by brightness and colour; auto: masks that"
+        " came with it, else gaussian.",
     )
     mask_threshold: float = next_frame_knob(
         4.0,
@@ -68,6 +69,50 @@ class EvidenceSettings:
         0.005,
         label="shadow colour tolerance",
         help="How far a shadow's colour may lie from the background's, as a share of its brightness.",
+    )
+    mask_darkest: int = next_frame_knob(
+        128,
+        0,
+        255,
+        1,
+        label="darkest of the subject",
+        unit="grey levels",
+        help="Where masks are made by threshold: darker pixels are not the subject.",
+    )
+    mask_brightest: int = next_frame_knob(
+        255,
+        0,
+        255,
+        1,
+        label="brightest of the subject",
+        unit="grey levels",
+        help="Where masks are made by threshold: brighter pixels are not the subject.",
+    )
+    mask_hue: float = next_frame_knob(
+        0.0,
+        0.0,
+        360.0,
+        5.0,
+        label="hue of the subject",
+        unit="°",
+        help="Where masks are made by threshold: 0 red, 60 yellow, 120 green, 180 cyan, 240 blue, 300 magenta.",
+    )
+    mask_hue_reach: float = next_frame_knob(
+        180.0,
+        5.0,
+        180.0,
+        5.0,
+        label="hue within",
+        unit="°",
+        help="Where masks are made by threshold: how far a hue may lie from the subject's; 180 = any.",
+    )
+    mask_saturation: float = next_frame_knob(
+        0.0,
+        0.0,
+        1.0,
+        0.05,
+        label="least saturation",
+        help="Where masks are made by threshold: paler pixels are not the subject; 0 = grey ones count too.",
     )
     mask_opening: int = next_frame_knob(
         3,

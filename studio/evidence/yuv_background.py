@@ -11,11 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Bytes = NDArray[np.uint8]
-Floats = NDArray[np.float32]
+from studio.arrays import Array, Bytes, Floats
 
 SHADOW = 0.1
 """Share of the luminance that a shadow takes away."""

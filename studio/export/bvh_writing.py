@@ -6,6 +6,7 @@ are. What a frame has no pose for is interpolated: BVH cannot say "missing".
 """
 
 import warnings
+from typing import Literal, cast
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -21,6 +22,8 @@ from studio.motion_files.recorded_motion import followed
 DECIMALS = {"mm": 4, "cm": 5, "m": 7}
 END_SITE = "End Site"
 ROWS_A_STEP = 500
+Order = Literal["ZXY", "ZYX", "XYZ", "XZY", "YXZ", "YZX"]
+"""Of rotation channels, as `ExportOptions.euler` allows them."""
 
 
 def write_bvh(task: ExportTask) -> Written:
@@ -29,7 +32,7 @@ def write_bvh(task: ExportTask) -> Written:
     skeleton = skeleton_of(motion.body, task.options.rest)
     names, note = joint_names(skeleton.names, task.options.names)
     moves, turns = skeleton.animated(motion.poses)
-    order = task.options.euler
+    order = cast("Order", task.options.euler)
     angles = smooth_angles(axes.turns(turns), order)
     with task.place.open("w", encoding="ascii", errors="replace", newline="\n") as stream:
         stream.write("\n".join(_hierarchy(skeleton, names, axes, order)))
@@ -50,7 +53,7 @@ def write_bvh(task: ExportTask) -> Written:
     return Written((task.place,), checked, tuple(notes))
 
 
-def smooth_angles(turns: Array, order: str) -> Array:
+def smooth_angles(turns: Array, order: Order) -> Array:
     """(K, J, 3) degrees of rotations (K, J, 3, 3) in an order of axes, without needless jumps from row to row.
 
     Of the two Euler triples of a rotation, plus whole turns, the one nearest the row before is taken.
@@ -59,11 +62,12 @@ def smooth_angles(turns: Array, order: str) -> Array:
     with warnings.catch_warnings():
         # At gimbal lock one of the angles is free; scipy says so and sets it to zero, which is a valid triple.
         warnings.simplefilter("ignore", UserWarning)
-        first = Rotation.from_matrix(turns.reshape(-1, 3, 3)).as_euler(order).reshape(*shape, 3)
+        turned = Rotation.from_matrix(turns.reshape(-1, 3, 3))
+        first = turned.as_euler(order).reshape(*shape, 3)
     other = np.stack([first[..., 0] + np.pi, np.pi - first[..., 1], first[..., 2] + np.pi], axis=-1)
     chosen = first.copy()
     for row in range(1, len(first)):
-        near = [
+        near: list[Array] = [
             entry - 2.0 * np.pi * np.round((entry - chosen[row - 1]) / (2.0 * np.pi))
             for entry in (first[row], other[row])
         ]

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pygltflib as gltf
@@ -68,24 +69,30 @@ def read_glb(path: Path) -> GlbFile:
     for index, node in enumerate(document.nodes):
         for child in node.children or ():
             parents[child] = index
-    tracks = {}
+    tracks: dict[tuple[int, str], tuple[Array, Array]] = {}
     animation = document.animations[0]
     for channel in animation.channels:
-        sampler = animation.samplers[channel.sampler]  # pyright: ignore[reportArgumentType, reportCallIssue]
+        target = channel.target
+        assert channel.sampler is not None
+        assert target is not None
+        assert target.node is not None
+        sampler = animation.samplers[channel.sampler]
         times, values = (_values(document, blob, index) for index in (sampler.input, sampler.output))
-        tracks[channel.target.node, channel.target.path] = (times[:, 0], values)  # pyright: ignore[reportOptionalMemberAccess]
+        tracks[target.node, str(target.path)] = (times[:, 0], values)
     return GlbFile(
         tuple(str(node.name) for node in document.nodes),
         tuple(parents),
         np.array([node.translation or (0.0, 0.0, 0.0) for node in document.nodes]),
-        tracks,  # pyright: ignore[reportArgumentType]
+        tracks,
     )
 
 
 def _values(document: gltf.GLTF2, blob: bytes, index: int | None) -> Array:
-    accessor = document.accessors[index]  # pyright: ignore[reportArgumentType, reportCallIssue]
-    view = document.bufferViews[accessor.bufferView]  # pyright: ignore[reportArgumentType, reportCallIssue]
-    width = WIDTHS[accessor.type]  # pyright: ignore[reportArgumentType]
+    assert index is not None
+    accessor = document.accessors[index]
+    assert accessor.bufferView is not None
+    view = document.bufferViews[accessor.bufferView]
+    width = WIDTHS[str(accessor.type)]
     start = (view.byteOffset or 0) + (accessor.byteOffset or 0)
     values = np.frombuffer(blob, dtype="<f4", count=accessor.count * width, offset=start)
     return values.reshape(accessor.count, width).astype(np.float64)
@@ -104,7 +111,7 @@ class Packing:
 
     def add(
         self,
-        values: NDArray,
+        values: NDArray[Any],
         kind: str,
         target: int | None = None,
         storage: str = "f4",

@@ -5,8 +5,11 @@ whose signs do not jump, read by linear interpolation; frames without a pose are
 extras list these.
 """
 
+from typing import Any
+
 import numpy as np
 import pygltflib as gltf
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from studio.arrays import Array, Indices
@@ -118,7 +121,7 @@ def _add_nodes(document: gltf.GLTF2, skeleton: Skeleton, names: tuple[str, ...],
         place = standing[joint] if parents[joint] < 0 else skeleton.offsets[joint]
         children = [1 + child for child, parent in enumerate(parents) if parent == joint]
         document.nodes.append(
-            gltf.Node(name=name, translation=AXES.points(place).tolist(), children=children or None)  # pyright: ignore[reportArgumentType]
+            gltf.Node(name=name, translation=AXES.points(place).tolist(), children=children or None)
         )
 
 
@@ -137,9 +140,9 @@ def _add_mesh(document: gltf.GLTF2, packing: Packing, skeleton: Skeleton, standi
     pivots, frames = (part[0] for part in skeleton.tree.placed(skeleton.body.neutral[None]))
     origins = skeleton.tree.origins(skeleton.body.neutral[None])[0]
     tokens = colour_tokens(dark=True)
-    primitives = []
+    primitives: list[gltf.Primitive] = []
     for side in SIDES:
-        vertices, normals, joints, faces = [], [], [], []
+        vertices, normals, joints, faces = list[Array](), list[Array](), list[Indices](), list[Indices]()
         count = 0
         for limb in (limb for limb in skeleton.body.drawn if limb.side == side):
             joint = skeleton.tree.whole[limb.joint]
@@ -172,7 +175,7 @@ def _add_mesh(document: gltf.GLTF2, packing: Packing, skeleton: Skeleton, standi
     document.scenes[0].nodes.append(len(document.nodes) - 1)  # pyright: ignore[reportOptionalMemberAccess]
 
 
-def _first_of_four(values: Array) -> Array:
+def _first_of_four(values: NDArray[Any]) -> NDArray[Any]:
     filled = np.zeros((len(values), 4), dtype=values.dtype)
     filled[:, 0] = values
     return filled

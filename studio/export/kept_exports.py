@@ -13,7 +13,7 @@ from studio.export.options import ExportOptions
 from studio.export.task import Writer
 from studio.progress import Progress, unheard
 from studio.runs.tracks import BEST, RAW, best_track, read_track, track_digest, track_names
-from studio.runs.way_results import ExportedFile
+from studio.runs.workflow_results import ExportedFile
 from studio.sessions.record_files import RecordFile
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -80,7 +80,7 @@ def export_into_run(
 
 def kept_exports(run: StoredRun) -> tuple[KeptExport, ...]:
     """The run's exports, newest first; a file of which nothing is known is left out."""
-    found = []
+    found: list[KeptExport] = []
     for path in (run.folder / FOLDER).glob(f"*{SAID}"):
         try:
             kept = _RECORD.read(path)

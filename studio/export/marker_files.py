@@ -1,5 +1,7 @@
 """Points over time as TRC and C3D, gaps as gaps."""
 
+from pathlib import Path
+
 import numpy as np
 
 from studio.arrays import Array
@@ -49,7 +51,7 @@ def write_c3d_file(task: ExportTask) -> Written:
             f"C3D counts at most {MOST_C3D_FRAMES} frames and this motion has {count}.",
             "Export fewer frames (first, last), a lower frame rate, or split it into several files (split).",
         )
-    files, worst = [], 0.0
+    files, worst = list[Path](), 0.0
     for part, first in enumerate(range(0, count, MOST_C3D_FRAMES)):
         last = min(first + MOST_C3D_FRAMES, count)
         place = task.place

@@ -16,7 +16,7 @@ from studio.errors import ExportError
 from studio.export.options import ExportOptions
 from studio.runs.tracks import Track, read_track
 from studio.sessions.stored_run import StoredRun
-from studio.tracking.tracker import LOST, NO_EVIDENCE
+from studio.trackers.tracker import LOST, NO_EVIDENCE
 
 UNSEEN = (LOST, NO_EVIDENCE)
 LATE = 1e-9
@@ -125,7 +125,7 @@ def _at_rate(motion: Motion, fps: float) -> Motion:
     confidence = np.where(below == above, motion.confidence[below], confidence)
     states = tuple(
         motion.states[low] if low == high or motion.states[low] == motion.states[high] else ""
-        for low, high in zip(below, above, strict=True)
+        for low, high in zip(map(int, below), map(int, above), strict=True)
     )
     notes = (*motion.notes, f"Brought from {motion.fps:g} to {fps:g} frames a second by poses in between.")
     if far:

@@ -91,7 +91,7 @@ def joint_names(own: tuple[str, ...], names: str) -> tuple[tuple[str, ...], str]
     if names == OWN:
         return own, ""
     known = name_map(names).joints
-    renames, kept = [], []
+    renames, kept = list[str](), list[str]()
     for name in own:
         renamed = known.get(name, name)
         if name not in known or renamed in renames:

@@ -29,7 +29,7 @@ def write_videos(task: ExportTask) -> Written:
             f"There is no camera '{task.options.camera[:64]}' in this session.", f"It has {', '.join(names)}."
         )
     count = len(task.motion.frames)
-    files, sizes = [], []
+    files, sizes = list[Path](), list[tuple[int, int]]()
     for index, camera in enumerate(chosen):
         place = task.place
         if not task.options.camera and len(names) > 1:

@@ -85,7 +85,7 @@ def _pieces(steps: tuple[Step, ...]) -> list[tuple[Step, ...]]:
     """
     varying = [index for index, step in enumerate(steps) if _varies(step)]
     last = varying[-1] if varying else -1
-    pieces, start, turned = [], 0, False
+    pieces, start, turned = list[tuple[Step, ...]](), 0, False
     for index, step in enumerate(steps):
         if step.kind == TURN:
             turned = turned or _varies(step)
@@ -189,7 +189,7 @@ def _aims(body: BodyModel) -> dict[int, tuple[Array, Array]]:
     if np.linalg.norm(across) < NOTHING_MM:
         return {}
     across /= np.linalg.norm(across)
-    aims = {}
+    aims: dict[int, tuple[Array, Array]] = {}
     for side, outwards in (("L", across), ("R", -across)):
         for start, end in CHAINS:
             here, there = index[side + start], index[side + end]

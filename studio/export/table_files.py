@@ -1,8 +1,11 @@
+# pyright: reportUnknownVariableType=false, reportUnknownArgumentType=false
+# pyarrow has no types.
 """Poses and points as tables and arrays: CSV, Parquet, NPZ. Gaps are empty, null or NaN; confidence goes along."""
 
 import csv
 import json
 import math
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -88,7 +91,7 @@ def write_npz(task: ExportTask) -> Written:
     frames = joint_frames(motion.body, motion.poses)
     frames[~motion.known] = np.nan
     poses = np.where(motion.known[:, None], motion.poses, np.nan)
-    arrays = {
+    arrays: dict[str, Any] = {
         "frames": motion.numbers,
         "times": motion.times,
         "states": np.array(motion.states),

@@ -36,11 +36,11 @@ class _Bone:
     """
 
     name: str
-    direction: list[float] = field(default_factory=list)
+    direction: list[float] = field(default_factory=list[float])
     length: float = -1.0
     axis: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
     order: str = "XYZ"
-    angles: list[int] = field(default_factory=list)
+    angles: list[int] = field(default_factory=list[int])
 
 
 @dataclass(slots=True)
@@ -49,8 +49,8 @@ class _Skeleton:
 
     unit: float = INCH
     degrees: bool = True
-    bones: dict[str, _Bone] = field(default_factory=dict)
-    parents: dict[str, str] = field(default_factory=dict)
+    bones: dict[str, _Bone] = field(default_factory=dict[str, _Bone])
+    parents: dict[str, str] = field(default_factory=dict[str, str])
 
 
 def read_acclaim(motion: Path, skeleton: Path | None = None, fps: float = CMU_RATE) -> RecordedMotion:

@@ -60,11 +60,11 @@ class BvhFile:
 class _Hierarchy:
     """The hierarchy of a file. channels : of each joint the words after their number."""
 
-    names: list[str] = field(default_factory=list)
-    parents: list[int] = field(default_factory=list)
-    is_end: list[bool] = field(default_factory=list)
-    offsets: list[list[float]] = field(default_factory=list)
-    channels: list[list[str]] = field(default_factory=list)
+    names: list[str] = field(default_factory=list[str])
+    parents: list[int] = field(default_factory=list[int])
+    is_end: list[bool] = field(default_factory=list[bool])
+    offsets: list[list[float]] = field(default_factory=list[list[float]])
+    channels: list[list[str]] = field(default_factory=list[list[str]])
 
 
 def read_bvh(path: Path, unit_mm: float = CMU_UNIT) -> RecordedMotion:
@@ -125,7 +125,7 @@ def read_bvh_file(path: Path) -> BvhFile:
 
 def _read_hierarchy(path: Path, lines: list[str]) -> tuple[_Hierarchy, int]:
     """The joints, and the number of the line "MOTION" (from 0)."""
-    found, open_joints, pending, is_end = _Hierarchy(), [], "", False
+    found, open_joints, pending, is_end = _Hierarchy(), list[int](), "", False
     for index, text in enumerate(lines):
         words = text.split()
         head, line = (words[0] if words else ""), index + 1
@@ -178,7 +178,7 @@ def _read_rows(path: Path, lines: list[str], at: int, width: int) -> tuple[float
     (step,) = numbers(path, at + 3, timed[2:])
     if not 1e-4 <= step <= 1.0:
         raise at_line(path, at + 3, f"a frame time of {step:g} s is not 0.0001 to 1", REMEDY)
-    rows = []
+    rows: list[list[float]] = []
     for index in range(at + 3, len(lines)):
         words = lines[index].split()
         if words and len(words) != width:

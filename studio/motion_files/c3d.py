@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import ezc3d
 import numpy as np
@@ -33,7 +34,7 @@ def read_c3d(path: Path) -> MarkerMotion:
 
 def _read(path: Path) -> MarkerMotion:
     with foreign_file(path, StudioError, "a C3D file that can be read", REMEDY):
-        content = ezc3d.c3d(str(path))
+        content: Any = ezc3d.c3d(str(path))
         settings = content["parameters"]["POINT"]
         labels = [str(label).strip() for label in settings["LABELS"]["value"]]
         unit = str(next(iter(settings["UNITS"]["value"]), "mm")).strip().lower() or "mm"
@@ -59,7 +60,7 @@ def write_c3d(path: Path, motion: MarkerMotion, *, up: str, source: Mapping[str,
 
     up : the file's vertical axis, "y" or "z". source : named values that go with the file.
     """
-    content = ezc3d.c3d()
+    content: Any = ezc3d.c3d()
     # A file that states no frame rate for analogue data is refused by some readers: there is none, at one sample.
     content["parameters"]["POINT"]["RATE"]["value"] = [motion.rate]
     content["parameters"]["POINT"]["UNITS"]["value"] = [motion.unit]
@@ -82,7 +83,7 @@ def write_c3d(path: Path, motion: MarkerMotion, *, up: str, source: Mapping[str,
 
 def read_c3d_points(path: Path) -> Array:
     """(F, P, 3) the points of a file of `write_c3d`, in its unit and axes; NaN where the residual says missing."""
-    content = ezc3d.c3d(str(path))
+    content: Any = ezc3d.c3d(str(path))
     points = np.array(content["data"]["points"], dtype=np.float64)[:3].transpose(2, 1, 0)
     residuals = np.array(content["data"]["meta_points"]["residuals"])[0].T
     points[residuals < RESIDUAL_SEEN] = np.nan

@@ -114,7 +114,7 @@ def text_lines(path: Path) -> list[str]:
 
 def numbers(path: Path, line: int, words: list[str]) -> list[float]:
     """Words as finite numbers. Raises StudioError naming file, line and word."""
-    values = []
+    values: list[float] = []
     for word in words:
         try:
             value = float(word)

@@ -19,7 +19,7 @@ from studio.sessions.session import BODIES_NAME
 from studio.sessions.workspace import Workspace
 from studio.training.learning import Learnt, read_sources
 from studio.training.learning import learn as learn_from
-from studio.training.model_shelf import ModelSummary, keep_model, list_models, place_for_model
+from studio.training.model_repository import ModelSummary, keep_model, list_models, place_for_model
 from studio.training.oversampling import OversamplingSettings
 from studio.training.sources import FPS, Recording
 
@@ -109,7 +109,7 @@ def models() -> tuple[ModelSummary, ...]:
 
 
 def settings_of(knobs: Mapping[str, object]) -> tuple[LearningSettings, OversamplingSettings]:
-    """Knobs of learning and of the training material, told apart by name. Raises SettingsError."""
+    """Knobs of learning and of the training material, distinguished by name. Raises SettingsError."""
     groups = (LearningSettings(), OversamplingSettings())
     known = [{entry.name for entry in knobs_of(type(group))} for group in groups]
     strange = sorted(set(knobs) - known[0] - known[1])

@@ -11,7 +11,7 @@ from studio.calibration.board_pdf import PAGES, usual_board, write_board_pdf
 from studio.calibration.boards import Board, board_from_text
 from studio.calibration.findings import Finding
 from studio.calibration.verbs import Calibrated
-from studio.declaring import Terminal, Web, Whose, operation
+from studio.declaring import Target, Terminal, Web, operation
 from studio.errors import SettingsError
 from studio.geometry.camera import Camera
 from studio.operations.opening import SessionName, open_session
@@ -53,7 +53,7 @@ def calibrate(
     source: Annotated[
         SessionName,
         Field(description="A session, or a folder with intrinsics/ and extrinsics/."),
-        Whose(""),
+        Target(""),
         Terminal(kind=str, metavar="SESSION_OR_FOLDER"),
     ],
     board: Annotated[

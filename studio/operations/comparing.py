@@ -1,4 +1,4 @@
-"""Trackers compared fairly on a session with a truth."""
+"""Trackers compared fairly on a session with a truth; knobs swept over a grid of values."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,15 +11,20 @@ from studio.comparison.candidates import DEFAULT_LAYERS, Lineup
 from studio.comparison.folders import differences, new_comparison, place_of, unfinished_like
 from studio.comparison.kept_comparison import RECORD_NAME, KeptComparison
 from studio.comparison.plan import Comparison, Plan, plan_comparison
-from studio.declaring import Body, Model, OneOf, Terminal, Web, operation
+from studio.comparison.sweep import Sweep, expected, plan_sweep, run_name
+from studio.declaring import Body, Despite, Knobs, Model, OneOf, Terminal, Values, Web, operation
 from studio.errors import RunError, SessionError
+from studio.jobs.comparison_run import done_before, run_comparison, run_sweep
+from studio.jobs.process_executor import cores
+from studio.likelihood.catalogue import WEIGHTINGS
 from studio.operations.opening import SessionName, open_session
 from studio.operations.progress import Reporting, reporting, say
 from studio.runs.behaviour_models import needs_model
+from studio.runs.new_run import own_knobs
+from studio.sessions.names import checked_name
 from studio.sessions.session import Session
-from studio.tracking.catalogue import TRACKERS
-from studio.weighting.catalogue import WEIGHTINGS
-from studio.worker.comparison_run import done_before, run_comparison
+from studio.trackers.catalogue import TRACKERS
+from studio.trackers.tracker import Value
 
 MOST_TRACKERS = 12
 USUAL = tuple(name for name in sorted(TRACKERS) if not needs_model(name, None))
@@ -110,6 +115,102 @@ def compare(
     return Compared(comparison, kept)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class SweptGrid:
+    """A sweep and where it is kept; its runs are the session's."""
+
+    sweep: Sweep
+    kept: KeptComparison
+
+
+@operation
+def sweep(
+    session: SessionName,
+    *,
+    vary: Annotated[
+        Mapping[str, Sequence[object]],
+        Field(description="Values by knob; every combination of them is tracked."),
+        Terminal(left_out=True),
+        Web(kind=dict[str, list[Value]]),
+    ],
+    seeds: Annotated[int, Field(ge=1, le=1000, description="Runs of each combination: seeds from 0 on.")] = 3,
+    tracker: Annotated[
+        str, Field(description="Default: the session's own, else annealed."), OneOf(TRACKERS)
+    ] = "",
+    weighting: Annotated[
+        str, Field(description="The likelihood; default: the session's own."), OneOf(WEIGHTINGS)
+    ] = "",
+    body: Body = "",
+    behaviour: Model = "",
+    first: Annotated[int | None, Field(ge=0, description="Default: the frame of the start pose.")] = None,
+    last: Annotated[
+        int | None, Field(ge=1, description="The frame after the last one; default: all.")
+    ] = None,
+    knobs: Annotated[
+        Values,
+        Field(description="Any other knob, of all runs."),
+        Knobs(own_knobs, others=True, with_defaults=False),
+    ] = None,
+    fit_shape: Annotated[
+        bool,
+        Field(description="Each run begins with the radii, hands, feet and head that its first frames show."),
+        Terminal("--fit-shape/--keep-shape"),
+    ] = True,
+    despite_findings: Despite = False,
+    name: Annotated[
+        str, Field(description="Of the sweep, with which its runs' names begin; default: numbered.")
+    ] = "",
+    processes: Annotated[
+        int | None, Field(ge=1, description="Runs at once; default: one a core."), Web(left_out=True)
+    ] = None,
+    progress: Reporting = None,
+) -> SweptGrid:
+    """Track every combination of some knobs' values with several seeds, and compare the runs.
+
+    Says how many runs that are and about how long they take before it begins. Every run is stored in the session with
+    its frames; after Ctrl-C the same call goes on. Measures are errors where the session has a truth, and how well the
+    body fits the masks.
+
+    Raises StudioError for an unknown knob or a value out of its range; then nothing was made.
+    """
+    opened = open_session(session)
+    plan = plan_sweep(
+        opened,
+        vary,
+        range(seeds),
+        tracker=tracker,
+        weighting=weighting,
+        knobs=knobs,
+        body=body,
+        behaviour=behaviour,
+        first=first,
+        last=last,
+        fit_shape=fit_shape,
+        despite_findings=despite_findings,
+    )
+    kept = kept_sweep(opened, plan, name)
+    wait = expected(opened, plan, processes or cores(), cores())
+    before = done_before(kept, plan)
+    say(progress, [wait.in_words, *([f"{before} of {wait.runs} runs are there already."] if before else [])])
+    with reporting(progress, f"{opened.name} / {kept.name}") as report:
+        found = run_sweep(kept, opened, report, processes=processes)
+    say(progress, [f"Kept in {kept.folder}"])
+    return SweptGrid(found, kept)
+
+
+def kept_sweep(session: Session, plan: Plan, name: str = "") -> KeptComparison:
+    """The folder of a sweep: one of the same request that is not finished, else a new one. Raises SessionError."""
+    if not name:
+        again = unfinished_like(session, plan)
+        if again is not None:
+            return again
+    folder = place_of(session, name, sweep=True)
+    checked_name(run_name(folder.name, plan, len(plan.entrants) * len(plan.seeds) - 1), "run of a sweep")
+    if (folder / RECORD_NAME).is_file():
+        return _same(folder, plan)
+    return new_comparison(folder, plan)
+
+
 def planned(
     session: Session,
     trackers: Sequence[str],
@@ -134,7 +235,7 @@ def planned(
 
 
 def _kept(session: Session, plan: Plan, name: str, out: Path | None) -> KeptComparison:
-    """The folder to work in: one that asked for the same and is not finished, else a new one.
+    """The folder to work in: one of the same request that is not finished, else a new one.
 
     Raises SessionError for a folder that holds something else, or cannot be written.
     """
@@ -143,14 +244,7 @@ def _kept(session: Session, plan: Plan, name: str, out: Path | None) -> KeptComp
             return unfinished_like(session, plan) or new_comparison(place_of(session), plan)
         folder = (out or place_of(session, name)).absolute()
         if (folder / RECORD_NAME).is_file():
-            kept = KeptComparison(folder)
-            other = differences(plan, kept.plan())
-            if other:
-                raise RunError(
-                    f"'{folder}' holds a comparison with other {', '.join(other)}.",
-                    "Choose another folder or name.",
-                )
-            return kept
+            return _same(folder, plan)
         if folder.is_dir() and not any(folder.iterdir()):
             folder.rmdir()
         return new_comparison(folder, plan)
@@ -158,3 +252,15 @@ def _kept(session: Session, plan: Plan, name: str, out: Path | None) -> KeptComp
         raise SessionError(
             f"A comparison cannot be kept in '{error.filename}'.", "Choose another folder with --out."
         ) from None
+
+
+def _same(folder: Path, plan: Plan) -> KeptComparison:
+    """What a folder holds, if it is of the same request. Raises RunError."""
+    kept = KeptComparison(folder)
+    other = differences(plan, kept.plan())
+    if other:
+        raise RunError(
+            f"'{folder}' holds a comparison with other {', '.join(other)}.",
+            "Choose another folder or name.",
+        )
+    return kept

@@ -4,27 +4,33 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any
 
 from pydantic import Field
 
 from studio.capture.camera_addresses import CameraAddress, address_from_text, check_names
 from studio.capture.synchrony import MOST_SECONDS, Synchrony
 from studio.capture.timestamps import TimedOffsets
-from studio.declaring import Body, Terminal, Web, Whose, operation
+from studio.declaring import Body, Target, Terminal, Web, operation, taking
 from studio.errors import FootageError, SessionError
 from studio.footage_recipes import synthesize as synthesize_recipe
+from studio.jobs.camera_readers import CameraReaders
+from studio.jobs.stream_recording import RecordingStanding, StreamRecording, recording_folder
 from studio.operations.opening import SessionName, open_session
 from studio.operations.progress import Reporting, reporting, say
 from studio.progress import Progress
 from studio.sessions.footage_changes import FootageChange, change_footage, recorded_offsets, synchrony_of
-from studio.sessions.importers.importing import ImportOptions, ImportReport, import_source
+from studio.sessions.importers.importing import (
+    ImportOptions,
+    ImportReport,
+    Offsets,
+    Rotations,
+    import_source,
+)
 from studio.sessions.importers.importing import add_footage as add_to_session
 from studio.sessions.recordings import SpreadFigures, calibration_given, check_cameras, import_recording
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace, begin_session
-from studio.worker.camera_readers import CameraReaders
-from studio.worker.stream_recording import RecordingStanding, StreamRecording, recording_folder
 
 LOOK_SECONDS = 0.2
 
@@ -35,62 +41,6 @@ Into = Annotated[
     str | Path,
     Field(description="Name of the new session in the workspace, or a path."),
     Terminal("--into", "SESSION", kind=str),
-]
-Place = Annotated[str | None, Field(max_length=4096)]
-Chosen = Annotated[
-    str | Path | None,
-    Field(description="Which calibration to take, where there are several."),
-    Terminal(kind=Path),
-    Web(kind=Place),
-]
-Rate = Annotated[
-    float | None,
-    Field(gt=0, le=10_000, description="Frames per second, where the footage does not say (pictures)."),
-]
-Trial = Annotated[
-    str | None,
-    Field(description="Which trial, where a folder holds several."),
-    Terminal(metavar="NAME"),
-    Web(kind=Place),
-]
-Turn = Literal[0, 90, 180, 270]
-Offsets = Annotated[
-    Mapping[str, int] | None,
-    Field(
-        max_length=64,
-        description="By camera: the frame of its footage that was taken with frame 0 of the others.",
-    ),
-    Terminal("--offset", "CAMERA=FRAMES"),
-]
-Rotations = Annotated[
-    Mapping[str, int] | None,
-    Field(
-        max_length=64,
-        description="By camera: degrees clockwise (0, 90, 180 or 270) by which its pictures are turned.",
-    ),
-    Terminal("--rotate", "CAMERA=DEGREES"),
-    Web(kind=dict[str, Turn]),
-]
-Unit = Annotated[
-    Literal["", "mm", "m"],
-    Field(
-        description="The calibration's unit, where it is taken wrongly; default: what the file says or its size."
-    ),
-]
-Up = Annotated[
-    Literal["x", "y", "z", "-x", "-y", "-z"],
-    Field(description="The axis of the calibration's world that points up."),
-]
-Wrong = Annotated[
-    bool,
-    Field(
-        description="Take a calibration that would make results wrong (z not up, a wrong unit), with a warning."
-    ),
-]
-Copy = Annotated[
-    bool,
-    Field(description="Copy the footage, or refer to it where it lies."),
-    Terminal("--copy/--reference"),
 ]
 
 
@@ -118,20 +68,13 @@ def new_session(
 
 
 @operation
+@taking(ImportOptions, without=("replace",))
 def import_footage(
     source: Source,
     into: Into,
     *,
-    calibration: Chosen = None,
-    fps: Rate = None,
-    trial: Trial = None,
-    offsets: Offsets = None,
-    rotations: Rotations = None,
-    unit: Unit = "",
-    up: Up = "z",
-    despite_findings: Wrong = False,
-    copy: Copy = True,
     progress: Reporting = None,
+    **options: Any,  # noqa: ANN401 - of the types that are declared
 ) -> Session:
     """Make a session from a folder (or an archive) of footage and calibration, checking one against the other.
 
@@ -140,52 +83,33 @@ def import_footage(
     Raises StudioError; then nothing was made.
     """
     with reporting(progress, "Importing") as report:
-        found = import_source(
-            Path(source),
-            Workspace().place_for(into),
-            calibration=calibration,
-            fps=fps,
-            copy=copy,
-            trial=trial,
-            offsets=offsets,
-            rotations=rotations,
-            unit=unit,
-            up=up,
-            despite_findings=despite_findings,
-            progress=report,
-        )
-    say(progress, (*found.notes, *(f"Warning: {warning}" for warning in found.warnings)))
+        place = Workspace().place_for(into)
+        found = import_source(Path(source), place, ImportOptions(**options), progress=report)
+    _say_found(found, progress)
     return found.session
 
 
 @operation
+@taking(ImportOptions)
 def add_footage(
     session: SessionName,
     source: Source,
     *,
-    calibration: Chosen = None,
-    fps: Rate = None,
-    trial: Trial = None,
-    offsets: Offsets = None,
-    rotations: Rotations = None,
-    unit: Unit = "",
-    up: Up = "z",
-    replace: Annotated[bool, Field(description="Forget all cameras that the source does not name.")] = False,
-    despite_findings: Wrong = False,
-    copy: Copy = True,
     progress: Reporting = None,
+    **options: Any,  # noqa: ANN401 - of the types that are declared
 ) -> ImportReport:
     """Add the footage of a folder to a session that is there, before or after it is calibrated.
 
     Raises StudioError; then the session is as it was.
     """
-    options = ImportOptions(
-        calibration, fps, copy, trial, offsets or {}, rotations or {}, unit, up, despite_findings, replace
-    )
     with reporting(progress, "Adding") as report:
-        added = add_to_session(open_session(session), Path(source), options, progress=report)
-    say(progress, (*added.notes, *(f"Warning: {warning}" for warning in added.warnings)))
+        added = add_to_session(open_session(session), Path(source), ImportOptions(**options), progress=report)
+    _say_found(added, progress)
     return added
+
+
+def _say_found(found: ImportReport, progress: Reporting) -> None:
+    say(progress, (*found.notes, *(f"Warning: {warning}" for warning in found.warnings)))
 
 
 @operation
@@ -301,7 +225,7 @@ def record(
     calibration: Annotated[
         SessionName,
         Field(description="The cameras' calibration, a file or folder; or a session that has it."),
-        Whose(""),
+        Target(""),
         Terminal("--calibration", "CALIBRATION|SESSION", kind=str),
     ],
     *,

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,12 +12,11 @@ from studio.capture.pictures import painted_picture, png_of
 from studio.declaring import Knobs, Terminal, Values, Web, operation
 from studio.operations.opening import SessionName, open_session
 from studio.operations.progress import Reporting, reporting, say
-from studio.runs.background_setup import BackgroundSetup, set_up_background
+from studio.runs.background_setup import BackgroundSetup, BackgroundSource, set_up_background
 from studio.runs.mask_quality import MaskQuality, measure_masks
 from studio.sessions.background_files import polygon_exclusion, set_backgrounds, set_exclusion
 from studio.sessions.session import Session
-
-BackgroundSource = Literal["plate", "clip", "median", "combined"]
+from studio.sessions.stroke_files import strokes_of_file
 
 
 @operation
@@ -42,6 +41,15 @@ def background(
         Terminal(left_out=True),
         Web(left_out=True),
     ] = None,
+    strokes: Annotated[
+        str | Path | None,
+        Field(description="File of brush strokes (JSON), in place of the session's."),
+        Web(left_out=True),
+    ] = None,
+    run: Annotated[
+        str,
+        Field(max_length=64, description="A tracked run: its model's projection helps to carry strokes."),
+    ] = "",
     knobs: Annotated[
         Values,
         Field(max_length=64, description="Knobs of the masks, by name."),
@@ -54,9 +62,25 @@ def background(
     exclude_unused: Annotated[
         bool, Field(description="What no view's hull comes near does not count."), Terminal(left_out=True)
     ] = False,
+    subject_at: Annotated[
+        tuple[float, float] | None,
+        Field(
+            description="Of several in view, follow the one who stands here in the first frame: x and y on the floor in"
+            " metres. The others are cut out of the masks."
+        ),
+        Terminal(metavar="X,Y"),
+    ] = None,
     progress: Reporting = None,
 ) -> BackgroundSetup:
     """Choose where a session's masks come from, what does not count, and (on the command line) see how good they are.
+
+    Sources: a background ("plate", "clip", "median", "combined"), "person" (a network cuts a person out: no picture of
+    the empty room, about a twentieth of a second a picture), "strokes" (anything, from a few brush strokes in one
+    picture of each camera or in more), "threshold" (by brightness and colour: knobs `mask_darkest`, `mask_brightest`,
+    `mask_hue`, `mask_hue_reach`, `mask_saturation`), "masks" (those that came with the footage), "best" (all of these
+    are tried, and each camera gets the one under which views agree and borders lie on edges of the picture), "subject"
+    (the masks in use, cut down to the one of several who stands at `subject_at`; with any other source that place cuts
+    the masks made of it).
 
     Agreement is the smaller of two shares: of a camera's mask that the visual hull of all views covers, and of the
     hull's silhouette that lies in the mask. From 0.9 on masks are called usable.
@@ -75,6 +99,9 @@ def background(
             knobs=knobs,  # pyright: ignore[reportArgumentType]
             tune=tune,
             exclude_unused=exclude_unused,
+            strokes=None if strokes is None else strokes_of_file(opened, Path(strokes)),
+            run=run,
+            subject_at=subject_at,
             progress=report,
         )
     say(progress, made.notes)

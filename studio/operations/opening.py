@@ -1,25 +1,26 @@
 """Sessions and runs as a person names them, and what there is."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.catalogue import list_bodies, load_body
 from studio.body.model import BodyModel
-from studio.declaring import Whose, operation
+from studio.declaring import Target, operation
 from studio.errors import RunError
 from studio.export.kept_exports import exported_files
 from studio.runs.tracks import Track
-from studio.runs.way import Way, way_of
-from studio.runs.way_results import newest_run
+from studio.runs.workflow import Workflow, workflow_of
+from studio.runs.workflow_results import newest_run
 from studio.sessions.session import BODIES_NAME, RUNS_NAME, Session
 from studio.sessions.stored_run import RunSummary, StoredRun
 from studio.sessions.workspace import Workspace
 
-SessionName = Annotated[Session | str | Path, Whose("session")]
+SessionName = Annotated[Session | str | Path, Target("session")]
 """A session that was opened, its name in the workspace (STUDIO_WORKSPACE), or its folder."""
 
 
@@ -39,6 +40,14 @@ class Tracked:
     evaluations_per_frame: int
     likelihood_scale: float = float("nan")
 
+    def to_xarray(self, frames: Iterable[int] | None = None) -> Any:  # noqa: ANN401 - xarray.Dataset
+        """The particles with layers as a dimension (`StoredRun.to_xarray`). Raises StudioError without xarray."""
+        return self.run.to_xarray(frames)
+
+    def _repr_html_(self) -> str:
+        """The run as a notebook shows it."""
+        return self.run.as_html()
+
     @property
     def frames(self) -> NDArray[np.int64]:
         """(K,) the frames that were tracked."""
@@ -50,7 +59,7 @@ class Tracked:
         return self.track.poses
 
 
-RunName = Annotated[Tracked | StoredRun | str | Path, Whose("run")]
+RunName = Annotated[Tracked | StoredRun | str | Path, Target("run")]
 """A run that was tracked or opened, "SESSION/RUN" as in the workspace, or its folder."""
 
 
@@ -94,8 +103,8 @@ def bodies() -> tuple[BodyModel, ...]:
 
 
 @operation
-def way(session: SessionName) -> Way:
+def way(session: SessionName) -> Workflow:
     """Tell how far a session is on the way from footage to an exported motion, and what is next."""
     opened = open_session(session)
     run = newest_run(opened)
-    return way_of(opened, exports=exported_files(run) if run else ())
+    return workflow_of(opened, exports=exported_files(run) if run else ())

@@ -1,45 +1,36 @@
 """The person in front of the cameras: size, shape, and the pose to begin with."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field
 
 from studio.body.model import BodyModel
-from studio.body.subject import SHORTEST_MM, TALLEST_MM, Subject
-from studio.declaring import Body, Model, OneOf, Seed, Terminal, operation
+from studio.body.subject import Subject
+from studio.declaring import Body, Model, OneOf, Seed, Terminal, operation, taking
+from studio.likelihood.catalogue import WEIGHTINGS
 from studio.operations.opening import SessionName, open_session
 from studio.operations.progress import Reporting, reporting, say
 from studio.runs.initialising import WEIGHTING, InitialPose, keep_pose
 from studio.runs.initialising import initialise as initialise_session
 from studio.runs.new_run import checked_frames
-from studio.runs.subject_choice import body_of_choice, choose_subject, keep_fitted
+from studio.runs.subject_choice import body_of_choice, choose_body, choose_subject, keep_fitted
 from studio.runs.subject_fitting import (
-    COUNT,
-    MOST_FRAMES,
     FitRequest,
     FittedSubject,
+    Height,
     fit_session_subject,
     keep_subject,
 )
-from studio.weighting.catalogue import WEIGHTINGS
-
-Own = Annotated[Body, Field(description="Kinematic tree; default: the session's.")]
 
 
 @operation
 def subject(
     session: SessionName,
     height_mm: Annotated[
-        float | None,
-        Field(
-            ge=SHORTEST_MM,
-            le=TALLEST_MM,
-            description="Of the person, mm; all lengths follow by published proportions.",
-        ),
-        Terminal("--height"),
+        Height, Field(description="Of the person, mm; all lengths follow by published proportions.")
     ] = None,
     *,
     lengths_mm: Annotated[
@@ -47,11 +38,12 @@ def subject(
         Field(description="Measured lengths between markers, such as RHip_RKnee, mm."),
         Terminal("--length", "PAIR=MM"),
     ] = None,
-    body: Own = "",
+    body: Body = "",
     progress: Reporting = None,
 ) -> BodyModel:
     """Write down who is in front of a session's cameras (new runs then have that body), and return the body in that
-    size; with no measure given, as it is.
+    size; with nothing given, as it is. A body alone, such as an animal's or one of your own, is as large as its file
+    says; the subject before stays beside it as subject-before.toml.
 
     With nothing but a height every length, hands and feet included, is its published share of it (sources: the body
     file).
@@ -60,7 +52,7 @@ def subject(
     """
     opened = open_session(session)
     if height_mm is None and not lengths_mm:
-        found, notes = opened.body_with_notes(body or None)
+        found, notes = (choose_body(opened, body) if body else opened).body_with_notes()
     else:
         wanted = Subject(
             body=body or opened.manifest.body, height_mm=height_mm, lengths_mm=dict(lengths_mm or {})
@@ -72,37 +64,10 @@ def subject(
 
 
 @operation
+@taking(FitRequest, without=("particles", "layers"))
 def fit_subject(
     session: SessionName,
     *,
-    frames: Annotated[
-        Sequence[int],
-        Field(max_length=MOST_FRAMES, description="To look at; default: chosen for their variety."),
-    ] = (),
-    count: Annotated[int, Field(ge=1, le=MOST_FRAMES, description="How many frames to choose.")] = COUNT,
-    symmetric: Annotated[
-        bool, Field(description="Left and right alike."), Terminal("--symmetric/--asymmetric")
-    ] = True,
-    lengths: Annotated[bool, Field(description="Fit lengths.")] = True,
-    radii: Annotated[bool, Field(description="Fit radii.")] = True,
-    height_mm: Annotated[
-        float | None,
-        Field(
-            ge=SHORTEST_MM,
-            le=TALLEST_MM,
-            description="Known to a few centimetres, mm; default: the subject's.",
-        ),
-        Terminal("--height"),
-    ] = None,
-    height_spread: Annotated[
-        float,
-        Field(ge=0, description="How far off the height may be, mm: 15 for a measured one, 60 for a guess."),
-    ] = FitRequest().height_spread,
-    run: Annotated[
-        str, Field(description="Whose poses to begin with; default: the newest."), Terminal(metavar="RUN")
-    ] = "",
-    body: Own = "",
-    seed: Seed = 0,
     keep: Annotated[
         bool, Field(description="Make it the session's subject; the old one stays beside it.")
     ] = True,
@@ -112,6 +77,7 @@ def fit_subject(
         Terminal(kind=Path),
     ] = None,
     progress: Reporting = None,
+    **options: Any,  # noqa: ANN401 - of the types that are declared
 ) -> FittedSubject:
     """Find limb lengths and radii of the person in a session, together with the poses of a few frames.
 
@@ -121,20 +87,8 @@ def fit_subject(
     Raises RunError where nothing is to be seen in a frame, or nothing may change.
     """
     opened = open_session(session)
-    request = FitRequest(
-        frames=tuple(frames),
-        count=count,
-        symmetric=symmetric,
-        lengths=lengths,
-        radii=radii,
-        run=run,
-        body=body,
-        height_mm=height_mm,
-        height_spread=height_spread,
-        seed=seed,
-    )
     with reporting(progress, f"{opened.name}: subject") as report:
-        found = fit_session_subject(opened, request, progress=report)
+        found = fit_session_subject(opened, FitRequest(**options), progress=report)
     if into is not None:
         return dataclasses.replace(found, file=keep_subject(opened, found, Path(into)))
     return dataclasses.replace(found, file=keep_fitted(opened, found)) if keep else found
@@ -147,7 +101,7 @@ def initialise(
         int, Field(ge=0, description="Where the start pose is sought."), Terminal("--frame")
     ] = 0,
     *,
-    body: Own = "",
+    body: Body = "",
     behaviour: Annotated[Model, Field(description="Its prototypes are poses to try.")] = "",
     weighting: Annotated[str, Field(description="What tells poses apart."), OneOf(WEIGHTINGS)] = WEIGHTING,
     seed: Seed = 0,

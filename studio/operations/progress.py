@@ -1,6 +1,6 @@
-"""Who hears how far a verb is: a function of one's own, a bar where somebody is looking, or a door's own display."""
+"""Where a verb reports its progress: a function of one's own, a bar on a terminal, or the caller's display."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +14,7 @@ from studio.progress import Progress, TimeLeft, left_in_words, unheard
 
 @dataclass(frozen=True, slots=True)
 class Display:
-    """How a door shows what a verb does. watch : begins a stage of that title. say : shows lines at once; with a folder
+    """How a command shows what a verb does. watch : begins a stage of that title. say : shows lines; with a folder
     (a session's) each but the first time that it is said of what lies there.
     """
 
@@ -23,11 +23,11 @@ class Display:
 
 
 Reporting = Progress | Display | bool | None
-"""A function of one's own; True for a bar, False for nothing; None for a bar where somebody is looking."""
+"""A function of one's own; True for a bar, False for nothing; None for a bar on a terminal or in a notebook."""
 
 
 @contextmanager
-def reporting(progress: Reporting, title: str) -> Iterator[Progress]:
+def reporting(progress: Reporting, title: str) -> Generator[Progress]:
     """What a verb reports to. A function that raises ends the verb, and nothing half done is kept."""
     console = Console(stderr=True, highlight=False)
     if isinstance(progress, Display):
@@ -49,7 +49,7 @@ def say(progress: Reporting, lines: Iterable[str], once_in: Path | None = None) 
 
 
 @contextmanager
-def bar(console: Console, title: str) -> Iterator[Progress]:
+def bar(console: Console, title: str) -> Generator[Progress]:
     """A bar with the time that is left."""
     columns = (
         TextColumn("{task.description}", markup=False),

@@ -1,17 +1,19 @@
 """What a run holds, what is made of it afterwards, how good it is, and files for other programs."""
 
 import importlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
 from studio.body.forward_kinematics import marker_points
+from studio.calibration.carried_points import carried
+from studio.capture.calibration_files import read_calibration
 from studio.declaring import Knobs, Terminal, Values, operation
 from studio.errors import TruthError
-from studio.evaluation.errors import Evaluation
+from studio.evaluation.errors import RIGID, SIMILARITY, UNALIGNED, Evaluation
 from studio.evaluation.errors import evaluate as evaluate_poses
 from studio.export.exporting import ExportReport
 from studio.export.exporting import export_run as write_run
@@ -19,7 +21,8 @@ from studio.export.formats import FORMATS, format_of_file
 from studio.export.options import ExportOptions
 from studio.export.task import Writer
 from studio.knobs import changed, knobs_of
-from studio.motion_files.trc import MarkerMotion, read_trc
+from studio.motion_files.trc import MarkerMotion
+from studio.motion_files.truth_files import ANY_WORLD, read_truth
 from studio.operations.opening import RunName, SessionName, open_run, open_session, session_of
 from studio.operations.progress import Reporting, reporting, say
 from studio.runs.checking import EVERY, RunCheck, check_run
@@ -28,8 +31,8 @@ from studio.runs.tracks import BEST, Track, best_track, track_names
 from studio.runs.tracks import read_track as read_stored_track
 from studio.runs.verifying import Repair, Verification, repair
 from studio.runs.verifying import verify as verify_session
-from studio.tracking.refinement import RefinementSettings
-from studio.tracking.smoothing import SmoothingSettings
+from studio.trackers.refinement import RefinementSettings
+from studio.trackers.smoothing import SmoothingSettings
 
 TrackName = Annotated[
     str,
@@ -138,27 +141,57 @@ def evaluate(
     *,
     truth: Annotated[
         str | Path | None,
-        Field(description="TRC file; default: the session's own truth."),
+        Field(description="TRC file, or CSV of named points; default: the session's own truth."),
         Terminal(kind=Path),
     ] = None,
+    truth_cameras: Annotated[
+        str | Path | None,
+        Field(
+            description="Calibration of the same cameras, in whose world the points of a CSV are: each is projected"
+            " with it and triangulated with the session's."
+        ),
+        Terminal(kind=Path),
+    ] = None,
+    align: Annotated[
+        Literal["", "none", "rigid", "similarity"],
+        Field(
+            description="How a truth of another world is laid on the run, once for all frames; default: not at all, but"
+            " a CSV without --truth-cameras rigidly (similarity where its header names no unit)."
+        ),
+    ] = "",
     track: TrackName = BEST,
     progress: Reporting = None,
 ) -> Evaluation:
     """Measure a run against the true markers: mm without alignment, root-aligned, after Procrustes.
 
-    Raises TruthError.
+    Raises TruthError; CalibrationError for cameras that do not fit the truth.
     """
     stored = open_run(run)
     opened = session_of(stored)
     path = Path(truth) if truth is not None else opened.truth_path
     if path is None:
-        raise TruthError(f"Session '{opened.name}' has no truth.", "Give one with --truth FILE.trc.")
+        raise TruthError(
+            f"Session '{opened.name}' has no truth.", "Give one with --truth FILE (.trc, or .csv of points)."
+        )
     if track == BEST:
         best = best_track(stored)
         track = best.name
         say(progress, [best.note] if best.note else [])
     chosen = read_stored_track(stored, track)
-    return evaluate_poses(chosen.poses, chosen.frames, stored.body(), read_trc(path), stored.record.fps)
+    motion = read_truth(path, stored.record.fps)
+    if truth_cameras is not None:
+        theirs = read_calibration(Path(truth_cameras)).cameras
+        positions, missed = carried(motion.positions, theirs, stored.cameras())
+        motion = replace(motion, positions=positions)
+        say(
+            progress,
+            [f"The truth was carried over by the cameras' pictures, {missed:.1f} px off in the median."],
+        )
+    elif not align and path.suffix.lower() in ANY_WORLD:
+        align = RIGID if motion.unit else SIMILARITY
+    return evaluate_poses(
+        chosen.poses, chosen.frames, stored.body(), motion, stored.record.fps, align or UNALIGNED
+    )
 
 
 @operation
@@ -190,7 +223,7 @@ def export_run(
 
 
 def scene_writer() -> Writer:
-    """What writes a run's scene as a recording; found by name, since the scene is a door like those above."""
+    """What writes a run's scene as a recording; found by name, since the scene is a storey above."""
     return importlib.import_module("studio.scene.recording").record_scene
 
 

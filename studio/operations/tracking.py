@@ -1,18 +1,36 @@
 """Tracking: from footage or live cameras, gone on with, again without the clock, corrected."""
 
-import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Concatenate, ParamSpec, TypeVar
 
 from pydantic import Field
 
-from studio.declaring import Body, Despite, Knobs, Model, OneOf, Seed, Terminal, Values, Web, operation
+from studio.declaring import (
+    Body,
+    Despite,
+    Knobs,
+    Model,
+    OneOf,
+    Seed,
+    Terminal,
+    Values,
+    Web,
+    operation,
+    taking,
+)
 from studio.errors import RunError, SettingsError
+from studio.jobs.batch import BatchResult, track_to_end
+from studio.jobs.camera_tracking import LiveRecordingRequest, track_cameras
+from studio.jobs.live_tracking import replay_live, track_live
+from studio.jobs.set_recording import SetStanding
+from studio.likelihood.catalogue import WEIGHTINGS
 from studio.operations.footage import Cameras, addresses_of
 from studio.operations.opening import RunName, SessionName, Tracked, open_run, open_session, session_of
 from studio.operations.progress import Reporting, reporting, say
+from studio.progress import Progress
 from studio.runs.correcting import prepare_correction, track_backwards
 from studio.runs.live_replay import Comparison, prepare_replay
 from studio.runs.live_request import last_of
@@ -23,12 +41,7 @@ from studio.sessions.names import free_name
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
-from studio.tracking.catalogue import TRACKERS
-from studio.weighting.catalogue import WEIGHTINGS
-from studio.worker.batch import BatchResult, track_to_end
-from studio.worker.camera_tracking import TakeWish, track_cameras
-from studio.worker.live_tracking import replay_live, track_live
-from studio.worker.take_recording import TakeStanding
+from studio.trackers.catalogue import TRACKERS
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -38,61 +51,55 @@ def of_new_run(
     make: Callable[Concatenate[Session, P], StoredRun],
 ) -> Callable[[Callable[..., R]], Callable[Concatenate[SessionName, P], R]]:
     """Let a verb take what a new run is made of, of a session by its name."""
-    own = {"session": SessionName, "progress": Reporting}
-
-    def take(function: Callable[..., R]) -> Callable[Concatenate[SessionName, P], R]:
-        function.__annotations__ = {
-            **make.__annotations__,
-            **own,
-            "return": function.__annotations__["return"],
-        }
-        shown, kept = inspect.signature(make), inspect.signature(function).parameters
-        entries = [kept.get(name, entry) for name, entry in shown.parameters.items()]
-        function.__signature__ = shown.replace(parameters=entries)  # pyright: ignore[reportFunctionMemberAccess]
-        return function
-
-    return take
+    return taking(make)
 
 
 @operation
 @of_new_run(prepare_run)
-def new_run(session: SessionName, *, progress: Reporting = None, **asked: object) -> StoredRun:
+def new_run(session: SessionName, *, progress: Reporting = None, **options: object) -> StoredRun:
     """A new run, ready to be tracked; what is left out is the session's own or the studio's default.
 
     Raises StudioError naming what is wrong; then nothing was made.
     """
     opened = open_session(session)
     with reporting(progress, f"{opened.name}: preparing") as report:
-        return prepare_run(opened, **asked, progress=report)  # pyright: ignore[reportArgumentType]
+        return prepare_run(opened, **options, progress=report)  # pyright: ignore[reportArgumentType]
 
 
 @operation
 @of_new_run(prepare_run)
-def track(session: SessionName, *, progress: Reporting = None, **asked: object) -> Tracked:
+def track(session: SessionName, *, progress: Reporting = None, **options: object) -> Tracked:
     """Track a session and store the run; Ctrl-C cancels, what was tracked stays and can be gone on with.
 
     The same seed gives the same run.
 
     Raises StudioError.
     """
-    return go_on(new_run(session, progress=progress, **asked), progress=progress)  # pyright: ignore[reportArgumentType]
+    return go_on(new_run(session, progress=progress, **options), progress=progress)  # pyright: ignore[reportArgumentType]
 
 
 @operation
 def go_on(run: RunName, *, progress: Reporting = None) -> Tracked:
     """Track a run on that was interrupted: bit for bit what it would have been."""
     stored = open_run(run)
-    opened = session_of(stored)
     _say_notes(stored, progress)
+
+    def how_far() -> str:
+        return f"{stored.summary().done} of {stored.record.frame_count} frames tracked."
+
+    with _reporting(stored, progress, how_far) as report:
+        return _tracked(stored, track_to_end(session_of(stored), stored, report))
+
+
+@contextmanager
+def _reporting(run: StoredRun, progress: Reporting, how_far: Callable[[], str]) -> Generator[Progress]:
+    """What tracking a run reports to. Ctrl-C is passed on once it is said how far it came."""
+    title = f"{run.session_name} / {run.name}"
     try:
-        with reporting(progress, f"{opened.name} / {stored.name}") as report:
-            return _tracked(stored, track_to_end(opened, stored, report))
+        with reporting(progress, title) as report:
+            yield report
     except KeyboardInterrupt:
-        done = stored.summary().done
-        say(
-            progress,
-            [f"{opened.name} / {stored.name}: {done} of {stored.record.frame_count} frames tracked."],
-        )
+        say(progress, [f"{title}: {how_far()}"])
         raise
 
 
@@ -105,7 +112,7 @@ class TrackedLive:
     session: Session
     run: StoredRun
     summary: LiveSummary
-    standing: TakeStanding | None = None
+    standing: SetStanding | None = None
 
 
 @operation
@@ -154,7 +161,7 @@ def live(
     Raises StudioError.
     """
     opened = open_session(session)
-    asked = {
+    options = {
         "tracker": tracker,
         "weighting": weighting,
         "body": body,
@@ -170,9 +177,9 @@ def live(
             raise RunError(
                 "Live cameras have no footage to begin in, repeat or go on with.", "Leave that out."
             )
-        wish = TakeWish(_place(opened, into), seconds, keep_start=keep_start)
-        with reporting(progress, wish.into.name) as report:
-            found = track_cameras(opened, addresses_of(cameras), wish, asked, report)
+        request = LiveRecordingRequest(_place(opened, into), seconds, keep_start=keep_start)
+        with reporting(progress, request.into.name) as report:
+            found = track_cameras(opened, addresses_of(cameras), request, options, report)
         _say_notes(found.run, progress)
         say(progress, [notice.in_words for notice in found.standing.notices])
         return TrackedLive(found.session, found.run, found.summary, found.standing)
@@ -182,7 +189,7 @@ def live(
         raise RunError("Footage that repeats has no end.", "Say how long with --seconds.")
     with reporting(progress, f"{opened.name}: getting ready") as report:
         last = last_of(opened, first, seconds, repeat)
-        run = prepare_run(opened, **asked, first=first, last=last, to_and_fro=repeat, progress=report)  # pyright: ignore[reportArgumentType]
+        run = prepare_run(opened, **options, first=first, last=last, ping_pong=repeat, progress=report)  # pyright: ignore[reportArgumentType]
     return resume_live(run, progress=progress)
 
 
@@ -190,14 +197,10 @@ def live(
 def resume_live(run: RunName, *, progress: Reporting = None) -> TrackedLive:
     """Go on with a live run that was ended."""
     stored = open_run(run)
-    opened = session_of(stored)
     _say_notes(stored, progress)
-    try:
-        with reporting(progress, f"{opened.name} / {stored.name}") as report:
-            return TrackedLive(opened, stored, track_live(opened, stored, report))
-    except KeyboardInterrupt:
-        say(progress, [f"{opened.name} / {stored.name}: {live_words(summary_of(stored))}"])
-        raise
+    opened = session_of(stored)
+    with _reporting(stored, progress, lambda: live_words(summary_of(stored))) as report:
+        return TrackedLive(opened, stored, track_live(opened, stored, report))
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,19 +265,18 @@ def correct(
     new = corrected_run(stored, frame, pose, from_track, back_to, name)
     if back_to is None:
         return go_on(new, progress=progress)
-    opened, done = session_of(stored), [0]
+    done = 0
 
     def counted(step: str, count: int, total: int) -> None:
-        done[0] = count
+        nonlocal done
+        done = count
         report(step, count, total)
 
-    with reporting(progress, f"{opened.name} / {new.name}") as report:
-        try:
-            track_backwards(opened, new, counted)
-        except KeyboardInterrupt:
-            words = f"{done[0]} frames tracked backwards, the others are the old run's."
-            say(progress, [f"{opened.name} / {new.name}: {words}"])
-            raise
+    def how_far() -> str:
+        return f"{done} frames tracked backwards, the others are the old run's."
+
+    with _reporting(new, progress, how_far) as report:
+        track_backwards(session_of(stored), new, counted)
     return _tracked(new, None)
 
 
@@ -300,7 +302,7 @@ def corrected_run(
 
 
 def _place(session: Session, into: str | Path | None) -> Path:
-    """Where the take of live cameras is made: beside its session unless said otherwise."""
+    """Where the recording of live cameras is made: beside its session unless said otherwise."""
     if into:
         return Workspace().place_for(into)
     taken = {path.name for path in session.path.parent.iterdir()}

@@ -7,6 +7,7 @@ from types import MappingProxyType
 from studio.errors import NotFoundError
 from studio.reproduction import fleischmann
 from studio.reproduction.caillette import (
+    cluster_floor,
     clusters_and_states,
     dynamics,
     models,
@@ -14,6 +15,7 @@ from studio.reproduction.caillette import (
     table_1,
 )
 from studio.reproduction.deutscher_reid import (
+    carried_and_crossed,
     layers_of_a_body,
     localisation,
     particles_needed,
@@ -22,7 +24,7 @@ from studio.reproduction.deutscher_reid import (
     weight_of_a_knee,
 )
 from studio.reproduction.experiment import Experiment
-from studio.reproduction.open_questions import generalisation, robustness
+from studio.reproduction.open_questions import evaluations, generalisation, posterior, robustness
 
 # New experiments are added here.
 LISTED: tuple[Experiment, ...] = (
@@ -30,6 +32,7 @@ LISTED: tuple[Experiment, ...] = (
     weight_of_a_knee.FIG_7,
     tracked_people.FIG_8,
     *tracked_people.THREE_CAMERAS,
+    *carried_and_crossed.EXPERIMENTS,
     particles_needed.MORE_LAYERS,
     tracked_people.ENOUGH_PARTICLES,
     *localisation.EXPERIMENTS,
@@ -44,15 +47,19 @@ LISTED: tuple[Experiment, ...] = (
     *fleischmann.EXPERIMENTS,
     fleischmann.COMPUTATION_TIME,
     clusters_and_states.EXPERIMENT,
+    cluster_floor.EXPERIMENT,
     table_1.EXPERIMENT,
     dynamics.FIG_11_EXPERIMENT,
     *dynamics.FIG_12_EXPERIMENTS,
+    dynamics.AS_PRINTED_EXPERIMENT,
     models.FIG_13,
     scalability.EXPERIMENT,
     models.ONLINE_LEARNING,
     dynamics.BEST_TRACKER,
     *robustness.EXPERIMENTS,
     generalisation.EXPERIMENT,
+    evaluations.EXPERIMENT,
+    posterior.EXPERIMENT,
 )
 
 ALL = "all"

@@ -1,37 +1,76 @@
-"""Numbers over seeds compared with a paper's claims."""
+"""Numbers over seeds compared with a paper's claims.
 
+Three kinds of claim. A value that the paper prints: `comparison.statistics.number`. That something holds, of which the
+paper shows one run: `share`. That one thing is smaller than another, or than a bound: `ratio`, `beyond`. An
+experiment's verdict is that of its hardest claim; a number that no claim of the paper rests on (a setting of ours, a
+time on another machine) is shown without a verdict.
+"""
+
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.stats import binomtest
 
-from studio.comparison.findings import Number, Table
-from studio.comparison.statistics import number, ratio_number, sign_test
+from studio.comparison.findings import Number, Plain, Table
+from studio.comparison.statistics import equal_to, number, ratio_number, sign_test
 
-EQUAL, LOWER = "equal", "lower"
+EQUAL, LOWER, HIGHER = "equal", "lower", "higher"
 HALF = 0.5
+ONE_SIDED_P = 0.05
 
 
 def share(name: str, held: Iterable[bool], paper: float | None = 1.0) -> Number:
-    """Share of the seeds in which something holds. A minority of the seeds never counts as reproduced, even
-    where the interval is wide enough to contain the paper's value.
+    """Share of the seeds in which something holds, with its exact (Clopper & Pearson) 95 % interval.
+
+    paper : 1 where the paper shows that it holds, 0 where it shows that it does not, None without a claim. Reproduced
+    where significantly more than half of the seeds are as the paper's (exact binomial test, one-sided at 5 %), not
+    reproduced where significantly fewer, else undecided; five seeds that agree suffice, of ten it takes nine.
     """
-    found = number(name, [float(value) for value in held], "of 1", paper=paper)
-    if found.verdict == "reproduced" and paper is not None and abs(found.ours - paper) > HALF:
-        return replace(found, verdict="not reproduced")
-    return found
+    seen = [bool(value) for value in held]
+    holds, count = sum(seen), len(seen)
+    if not count:
+        return number(name, [], "of 1", paper=paper)
+    interval = binomtest(holds, count).proportion_ci(method="exact")
+    verdict = "answered"
+    if paper is not None:
+        agreeing = holds if paper > HALF else count - holds
+        more, fewer = (
+            binomtest(agreeing, count, HALF, alternative=side).pvalue for side in ("greater", "less")
+        )
+        verdict = "not reproduced" if fewer <= ONE_SIDED_P else "undecided"
+        verdict = "reproduced" if more <= ONE_SIDED_P else verdict
+    low, high = float(interval.low), float(interval.high)
+    return Number(name, holds / count, low, high, "of 1", paper, "", count, verdict)
 
 
 def ratio(name: str, ours: Sequence[float], theirs: Sequence[float], claim: str = "") -> Number:
     """The ratio of two settings' errors, paired by seed.
 
-    claim : "equal" (1 lies in the interval, or ours is better), "lower" (the whole interval lies below 1), or none.
+    claim : "equal" (no larger than 1 by the margin of equality), "lower" (`beyond` 1), or none.
     """
     found = ratio_number(name, ours, theirs, "×", paper=1.0 if claim == EQUAL else None, better="lower")
-    if claim == LOWER:
-        return replace(found, verdict="reproduced" if found.high < 1.0 else "not reproduced")
-    return found
+    return beyond(found, 1.0, LOWER) if claim == LOWER else found
+
+
+def beyond(found: Number, bound: float, side: str) -> Number:
+    """The number with the verdict on the claim that it is lower (or higher) than a bound: reproduced where the whole
+    interval is, not reproduced where none of it is by more than the margin of equality, else undecided.
+    """
+    if not (math.isfinite(found.low) and math.isfinite(found.high)):
+        return replace(found, better=side, verdict="not reproduced")
+    lower_end, upper_end = equal_to(bound)
+    shown = found.high < bound if side == LOWER else found.low > bound
+    denied = found.low >= lower_end if side == LOWER else found.high <= upper_end
+    verdict = "reproduced" if shown else "not reproduced" if denied else "undecided"
+    return replace(found, better=side, verdict=verdict)
+
+
+def beside(found: Number) -> Number:
+    """The number beside the paper's, without a verdict: no claim rests on it."""
+    return replace(found, verdict="answered")
 
 
 def geometric_mean(values: Any, axis: int = -1) -> Any:  # noqa: ANN401 - what NumPy's own mean takes and gives
@@ -45,7 +84,7 @@ def sign_tests(
     """Sign tests of pairs of settings over seeds and frames, a line a pair. of : a setting's errors of seeds, and of
     all their frames. Frames of one run are correlated, so that their p is too small.
     """
-    rows = []
+    rows: list[tuple[Plain, ...]] = []
     for first, second in pairs:
         tests = [sign_test(ours, theirs) for ours, theirs in zip(of(first), of(second), strict=True)]
         counts = [

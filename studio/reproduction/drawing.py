@@ -4,12 +4,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from studio.arrays import Array
 from studio.comparison.findings import Chart, Heat, Series, Table
 from studio.comparison.statistics import Statistic, bootstrap_interval
 
-Array = NDArray[np.float64]
 Values = Mapping[str, Sequence[float]]
 T = TypeVar("T")
 

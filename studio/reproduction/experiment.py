@@ -18,17 +18,6 @@ from studio.comparison.trials import Measure, Outcome, Scale, Trial
 
 T = TypeVar("T")
 Part = Number | Table | Chart | Mapping[str, Any] | str
-Verdict = Callable[[Sequence[Number]], str]
-
-
-def verdict_on(*parts: str) -> Verdict:
-    """A verdict on the numbers whose names contain one of these parts; without any, on all numbers."""
-    return lambda numbers: overall(
-        number.verdict for number in numbers if not parts or any(part in number.name for part in parts)
-    )
-
-
-ON_ALL = verdict_on()
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,17 +27,18 @@ class Experiment(Heading):
     name : as typed on the command line. source : paper and figure. claim : the paper's, in our words. trials : all
     at a scale. measure : one trial's plain measurements (a module-level function: it runs in other
     processes). shown : the results of all outcomes, in the order of the trials: numbers with their verdicts,
-    tables, charts, notes (text) and settings (mappings). verdict : overall, from the numbers. footage : recipes whose
-    sessions must be rendered first. alone : the trials measure time: they run one after the other when nothing else
-    runs, in a process that may use all cores (every other trial has one core and shares the memory's bandwidth).
+    tables, charts, notes (text) and settings (mappings). footage : recipes whose sessions must be rendered first. alone
+    : the trials measure time: they run one after the other when nothing else runs, in a process that may use all cores
+    (every other trial has one core and shares the memory's bandwidth). long : why all seeds take hours here, "" where
+    they do not. The verdict is that of the hardest claim, in every experiment.
     """
 
     trials: Callable[[Scale], tuple[Trial, ...]]
     measure: Measure
     shown: Callable[[Sequence[Outcome]], Iterable[Part]]
-    verdict: Verdict = ON_ALL
     footage: tuple[str, ...] = ()
     alone: bool = False
+    long: str = ""
 
     def conclude(self, outcomes: Sequence[Outcome]) -> Findings:
         """The findings. Raises what reading the outcomes raises."""
@@ -70,7 +60,12 @@ class Experiment(Heading):
                 case _:
                     settings.update(part)
         return Findings(
-            self.verdict(numbers), " ".join(notes), tuple(numbers), tuple(tables), tuple(charts), settings
+            overall(number.verdict for number in numbers),
+            " ".join(notes),
+            tuple(numbers),
+            tuple(tables),
+            tuple(charts),
+            settings,
         )
 
 

@@ -91,12 +91,21 @@ def summary_markdown(results: Document) -> str:
         )
         cells = (
             f"{document['title']} (`{document['name']}`)",
-            document["source"],
+            f"{document['source']}; {_origin(document)}",
             verdict,
             numbers or document["words"],
         )
         lines.append(f"| {' | '.join(cell.replace('|', '∣').replace(chr(10), ' ') for cell in cells)} |")
     return "\n".join([*lines, "", f"{results['software']}, {results['date']}", ""])
+
+
+def _origin(document: Document) -> str:
+    """Seeds and commits of an experiment's numbers."""
+    seeds = f"{document['seeds']} {'seed' if document['seeds'] == 1 else 'seeds'}"
+    # Findings that an older version wrote name no commit.
+    commits: list[str] = document.get("commits") or []
+    quick = ", a quick look" if document["quick"] else ""
+    return f"{seeds}{quick}" + (f", commit {', '.join(commits)}" if commits else "")
 
 
 def number_in_words(number: Document) -> str:

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from studio.comparison.kept_trials import plain
-from studio.comparison.trials import Plain, Scale, Trial, TrialJob, measure_name
+from studio.comparison.trials import Plain, Scale, Trial, TrialJob, is_mapping, measure_name
 from studio.errors import StudioError
 from studio.reproduction.experiment import Experiment
 from studio.sessions.manifest import read_manifest
 from studio.synthesis.recipe_file import find_recipe, read_recipe
 from studio.synthesis.recipes import RECIPE_COPY
+from studio.typed_decoding import is_list
 
 FULL_SEEDS, QUICK_SEEDS = 10, 3
 
@@ -107,16 +108,14 @@ def frames_of(arguments: Plain) -> int | None:
     """The last frame named in a trial's arguments, as in `Attempt` ("last", half open); None without one. If there is
     an attempt among them, parts without a last frame do not count.
     """
-    if not isinstance(arguments, Mapping):
+    if not is_mapping(arguments):
         return None
     if "attempt" in arguments:
-        frames = [
-            value["last"] for value in arguments.values() if isinstance(value, Mapping) and "last" in value
-        ]
+        frames = [value["last"] for value in arguments.values() if is_mapping(value) and "last" in value]
         return None if None in frames else max(frames, default=None)
     if "last" in arguments:
         return arguments["last"]
-    within = [frames_of(value) for value in arguments.values() if isinstance(value, Mapping)]
+    within = [frames_of(value) for value in arguments.values() if is_mapping(value)]
     named = [frames for frames in within if frames is not None]
     return max(named) if named and len(named) == len(within) else None
 
@@ -137,6 +136,6 @@ def _texts(value: Plain) -> set[str]:
     """All strings in a plain value."""
     if isinstance(value, str):
         return {value}
-    if isinstance(value, Mapping):
+    if is_mapping(value):
         value = list(value.values())
-    return set().union(*map(_texts, value)) if isinstance(value, list | tuple) else set()
+    return set[str]().union(*map(_texts, value)) if is_list(value) else set()

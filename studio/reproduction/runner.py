@@ -14,16 +14,17 @@ from studio.comparison.findings_document import Document, Making, as_document, f
 from studio.comparison.kept_trials import KeptOutcome, KeptTrials, measured_by
 from studio.comparison.trials import Outcome, Scale, Trial, TrialJob, failure_in_words
 from studio.errors import RunError, SessionError, StudioError
+from studio.jobs.trials import TrialResult, run_jobs
 from studio.progress import Progress
 from studio.reproduction.experiment import Experiment
 from studio.reproduction.findings_files import FOOTAGE, TRIALS, write_findings, write_overview
 from studio.reproduction.plan import PlannedExperiment, each_once, footage_needed, is_rendered, plan
+from studio.reproduction.provenance import commit
 from studio.sessions.atomic_files import PARTIAL_PREFIX, discard, move_into_place, new_folder_beside
 from studio.sessions.manifest import FILE_NAME as MANIFEST
 from studio.sessions.manifest import now
 from studio.sessions.process_lock import ProcessLock
 from studio.synthesis.recipes import synthesize
-from studio.worker.trials import TrialResult, run_jobs
 
 LOCK = "reproduction.lock"
 SECONDS_BETWEEN_REPORTS = 30.0
@@ -103,7 +104,7 @@ class _Work:
         """Render, run and conclude what is missing."""
         self._conclude_what_is_done()
         missing = [job for key, job in self._jobs.items() if key not in self._kept]
-        runnable = []
+        runnable: list[TrialJob] = []
         problems = self._render(footage_needed(missing))
         for job in missing:
             problem = next((problems[name] for name in job.footage if name in problems), "")
@@ -123,7 +124,7 @@ class _Work:
 
     def _render(self, needed: dict[str, int | None]) -> dict[str, str]:
         """Render missing footage; returns the failures with their reasons. needed : recipes to frames."""
-        problems = {}
+        problems: dict[str, str] = {}
         for left_by_a_killed_command in (self._out / FOOTAGE).glob(f"{PARTIAL_PREFIX}*"):
             discard(left_by_a_killed_command)
         for name, frames in needed.items():
@@ -163,6 +164,7 @@ class _Work:
             now(),
             job.label,
             job.arguments,
+            commit(),
         )
         self._folder.write(job.key, outcome)
         self._kept[job.key] = outcome
@@ -200,6 +202,7 @@ def conclude(planned: PlannedExperiment, kept: Mapping[str, KeptOutcome]) -> Doc
         measured_by(),
         tuple(sorted({outcome.software for outcome in outcomes})),
         now(),
+        tuple(sorted({outcome.commit for outcome in outcomes} - {""})),
     )
     reasons = [("", planned.problem)] if planned.problem else []
     reasons += [(outcome.label, outcome.failure) for outcome in outcomes if outcome.measured is None]

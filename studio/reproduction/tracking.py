@@ -8,30 +8,29 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.comparison.findings import Chart, Number, Series, Table
 from studio.comparison.statistics import number
 from studio.comparison.tracked import Attempt, Tracked, measure_tracking, tracking_trial
 from studio.comparison.trials import Outcome, Scale, Trial
 from studio.reproduction.claims import ratio, sign_tests
 from studio.reproduction.drawing import seeds_and_mean, table_over
-from studio.reproduction.experiment import ON_ALL, Experiment, Part, Verdict, grouped
-from studio.tracking.catalogue import knobs_for_evaluations
+from studio.reproduction.experiment import Experiment, Part, grouped
+from studio.trackers.catalogue import knobs_for_evaluations
 
-Array = NDArray[np.float64]
 Runs = Sequence[Tracked]
 Groups = Mapping[str, Runs]
 
 
 @dataclass(frozen=True, slots=True)
-class Contender:
+class Candidate:
     """A tracker with settings, as a line of a chart. changes : knobs by flat name."""
 
     name: str
     tracker: str
     weighting: str
-    changes: Mapping[str, Any] = field(default_factory=dict)
+    changes: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     def attempt(self, footage: str, seed: int, evaluations: int, **wanted: Any) -> Attempt:  # noqa: ANN401
         """A run of `evaluations` evaluations a frame, 0 where the knobs give them. wanted : other fields of
@@ -49,10 +48,10 @@ class Line:
     """
 
     name: str
-    contender: Contender
+    contender: Candidate
     footage: str
     evaluations: int = 0
-    wanted: Mapping[str, Any] | Callable[[int], Mapping[str, Any]] = field(default_factory=dict)
+    wanted: Mapping[str, Any] | Callable[[int], Mapping[str, Any]] = field(default_factory=dict[str, Any])
 
     def trial(self, seed: int) -> Trial:
         """The trial of a seed."""
@@ -69,7 +68,7 @@ def tracked_experiment(
     *,
     lines: Callable[[bool], Iterable[Line]],
     shown: Callable[[dict[str, list[Tracked]]], Iterable[Part]],
-    verdict: Verdict = ON_ALL,
+    long: str = "",
 ) -> Experiment:
     """An experiment of tracked footage. lines : the settings, for a preview or in full. shown : the results of
     the runs by line.
@@ -87,8 +86,8 @@ def tracked_experiment(
         trials,
         measure_tracking,
         lambda found: shown(by_group(found)),
-        verdict,
         footage,
+        long=long,
     )
 
 

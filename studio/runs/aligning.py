@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Bytes
 from studio.calibration.silhouette_alignment import AlignedCameras, aligned_cameras
 from studio.calibration.silhouette_checks import outlines_of
 from studio.errors import CalibrationError
@@ -17,8 +17,6 @@ from studio.runs.mask_quality import spread_frames
 from studio.runs.session_settings import session_settings
 from studio.sessions.calibration_changes import CalibrationChange, NewCalibration, replace_calibration
 from studio.sessions.session import Session
-
-Bytes = NDArray[np.uint8]
 
 FRAMES = 16
 WORTHWHILE = 3.0

@@ -18,8 +18,8 @@ from studio.sessions.names import is_name
 from studio.sessions.session import Session
 from studio.sessions.workspace import workspace_root
 from studio.settings import RunSettings
-from studio.tracking.catalogue import TRACKERS
-from studio.tracking.shared_knobs import BEHAVIOUR
+from studio.trackers.catalogue import TRACKERS
+from studio.trackers.shared_knobs import BEHAVIOUR
 
 MODELS_NAME, SUFFIX = "models", ".behaviour"
 

@@ -13,6 +13,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.model import BodyModel
 from studio.errors import RunError
 from studio.evidence.backgrounds import Backgrounds
@@ -20,6 +21,7 @@ from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.pipeline import EvidenceMaker
 from studio.geometry.camera import Camera
+from studio.likelihood.overlay import overlay_points
 from studio.progress import Progress, unheard
 from studio.runs.jumps import Jump, jumps_of
 from studio.runs.overlay_drawing import projected_silhouette
@@ -30,20 +32,19 @@ from studio.sessions.record_files import RecordFile
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.settings import RunSettings, settings_from_values
-from studio.tracking.agreement import Agreement
-from studio.tracking.hidden_areas import without_hidden
-from studio.tracking.loss_detection import anything_seen
-from studio.tracking.start_candidates import facing
-from studio.tracking.tracker import LIMB_LOST_SHARE
-from studio.weighting.overlay import overlay_points
-
-Array = NDArray[np.float64]
+from studio.trackers.agreement import Agreement
+from studio.trackers.hidden_areas import without_hidden
+from studio.trackers.loss_detection import anything_seen
+from studio.trackers.start_candidates import facing
+from studio.trackers.tracker import LIMB_LOST_SHARE
 
 FOLDER = "checks"
 SCHEMA_VERSION = 1
 EVERY = 10
 GOOD_SHARE = 0.85
 """A frame with a smaller share of the model's pixels in the masks does not fit."""
+EXPLAINED_SHARE = 0.7
+"""Of all masks' pixels: where the body explains fewer, something else is in the masks: somebody else, a shadow."""
 DOUBTFUL = 0.6
 """Agreement of the silhouettes (f_s) below which a frame is marked."""
 FASTEST_TURN = 2700.0
@@ -100,9 +101,23 @@ class RunCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
         return float(np.mean(known)) if known else float("nan")
 
     @property
+    def covered_mean(self) -> float:
+        """Mean share of the masks' pixels under the model, of all checked frames and cameras; NaN if there is none."""
+        known = [share for row in self.covered for share in row if share is not None]
+        return float(np.mean(known)) if known else float("nan")
+
+    @property
+    def is_beside_others(self) -> bool:
+        """Whether the masks show much that this body does not explain."""
+        return self.covered_mean < EXPLAINED_SHARE
+
+    @property
     def good(self) -> bool:
         """Whether nothing needs attention."""
-        return not (self.poor or self.lost or self.turned or self.jumps or self.lost_limbs)
+        wrong = (
+            self.poor or self.lost or self.turned or self.jumps or self.lost_limbs or self.is_beside_others
+        )
+        return not wrong
 
     @property
     def lost_limbs(self) -> dict[str, tuple[int, ...]]:
@@ -118,6 +133,10 @@ class RunCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
         """A one-line summary; jumps by frame and limb."""
         parts = [f"{100 * self.inside_mean:.0f} % of the model in the masks"]
         parts += [f"{len(self.poor)} of {len(self.frames)} checked frames do not fit"] if self.poor else []
+        if self.is_beside_others:
+            parts.append(
+                f"only {100 * self.covered_mean:.0f} % of the masks explained: is somebody else in view?"
+            )
         parts += [f"{len(self.lost)} lost"] if self.lost else []
         parts += [f"{limb} off the masks in {len(own)} of them" for limb, own in self.lost_limbs.items()]
         parts += [f"{len(self.turned)} sudden turns"] if self.turned else []
@@ -153,7 +172,8 @@ def check_run(
     rows = range(0, len(chosen.frames), max(1, every))
     settings = _settings(run)
 
-    shares, denied, agreement = [], list[DeniedLimb](), Agreement(body, cameras)
+    shares: list[tuple[tuple[float | None, ...], tuple[float | None, ...]]] = []
+    denied, agreement = list[DeniedLimb](), Agreement(body, cameras)
     with contextlib.closing(footage_of(session, run)) as footage, run.results() as results:
         known = set(results.frames())
         maker = EvidenceMaker(cameras, footage, Backgrounds(footage), settings.evidence, "none")
@@ -162,7 +182,7 @@ def check_run(
             evidence = maker.evidence(int(chosen.frames[row]))
             frame, pose = evidence.frame, chosen.poses[row]
             shares.append(frame_shares(body, cameras, pose, evidence, settings))
-            hidden = results.result(frame).carried.memory if frame in known else {}
+            hidden: Mapping[str, Array] = results.result(frame).carried.memory if frame in known else {}
             denied += _denied(agreement, pose, evidence, hidden)
     check = RunCheck(
         track=chosen.name,

@@ -21,6 +21,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Bytes
+from studio.body.scale import scale_of
 from studio.capture.footage import Footage
 from studio.capture.frame_spool import FrameSpool
 from studio.errors import RunError
@@ -38,7 +40,6 @@ from studio.volume.hull_silhouette import silhouette
 from studio.volume.reconstruction import Reconstructor
 from studio.volume.tracking_space import Box, box_of
 
-Bytes = NDArray[np.uint8]
 Part = TypeVar("Part")
 
 FRAMES = 20
@@ -96,7 +97,14 @@ def clean_plates(
         )
     footage = session.footage()
     try:
-        cleaning = _Cleaning(cameras, footage, dataclasses.replace(settings, **CLEARED), frames, progress)
+        cleaning = _Cleaning(
+            cameras,
+            footage,
+            dataclasses.replace(settings, **CLEARED),
+            frames,
+            progress,
+            scale_of(session.body()),
+        )
         return cleaning.run(session.path)
     finally:
         footage.close()
@@ -123,8 +131,9 @@ class _Cleaning:
         settings: EvidenceSettings,
         frames: int,
         report: Progress,
+        scale: float,
     ) -> None:
-        self.footage, self.report = footage, report
+        self.footage, self.report, self.scale = footage, report, scale
         self.cameras = cameras
         self.middle = tuple(camera.reduced(COMBINED_SIDE) for camera in cameras)
         self.small = tuple(camera.reduced(COVER_SIDE) for camera in cameras)
@@ -143,7 +152,7 @@ class _Cleaning:
             firsts.append(first)
             pictures.append(seen)
             masks.append(found)
-        space = box_of(self.cameras)
+        space = box_of(self.cameras, scale=self.scale)
         taken = self._covers(masks, self._carvers(space, FIRST_CARVING))
         for _ in range(ROUNDS - 1):
             masks = [
@@ -152,7 +161,7 @@ class _Cleaning:
             ]
             taken = self._covers(masks, self._carvers(space, CARVING))
         del pictures, masks
-        plates = {}
+        plates: dict[str, CleanPlate] = {}
         for camera, first, covers in zip(self.cameras, firsts, taken, strict=True):
             plates[camera.name] = self._plate(camera, first, covers, folder)
         self.report("making the background", self.total, self.total)
@@ -230,7 +239,7 @@ class _Cleaning:
                     first.combination.fill(plate, band, top, unseen, picture)
         never = empty < FEWEST_EMPTY
         reach = round(WIDE_REACH * taken.shape[2] / camera.width)
-        near = cv2.dilate(taken.max(axis=0), _disc(reach))
+        near = np.asarray(cv2.dilate(taken.max(axis=0), _disc(reach)), dtype=np.uint8)
         unused = cv2.resize(255 * (1 - near), picture.shape[1::-1], interpolation=cv2.INTER_NEAREST)
         filled = _filled_in(picture, never & (_enlarged(first.doubtful, camera) > 0), FILLING)
         return CleanPlate(filled, float(np.mean(never)), np.asarray(unused, dtype=np.uint8))
@@ -291,7 +300,7 @@ def median_of_empty(frames: Bytes, taken: Bytes, fallback: Bytes) -> tuple[Bytes
 
 
 @njit(cache=True, nogil=True)
-def fill_medians_of_empty(frames, taken, top, out, empty):
+def fill_medians_of_empty(frames: Bytes, taken: Bytes, top: int, out: Bytes, empty: Bytes) -> None:
     """`median_of_empty` of a band of rows from `top` on: frames (K, rows, W, 3). out (H, W, 3) and empty (H, W) are
     filled there, out only where enough is empty.
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-import studio
 from studio.errors import StudioError
+from studio.runs.self_contained import assets_folder
 
 Colour = tuple[int, int, int]
 LAYER_STOPS = 10
@@ -54,10 +54,8 @@ class ColourTokens:
 
 
 def tokens_file() -> Path:
-    """The path of `tokens.css`: beside the pages in an installed package, in `web_assets` in a checkout."""
-    package = Path(studio.__file__).parent
-    installed = package / "web" / "assets" / "tokens.css"
-    return installed if installed.is_file() else package.parent / "web_assets" / "tokens.css"
+    """The path of `tokens.css`, which lies beside the pages."""
+    return assets_folder() / "tokens.css"
 
 
 def parse_tokens(text: str) -> dict[str, ColourTokens]:

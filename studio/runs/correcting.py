@@ -16,8 +16,8 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.branches import within_limits
 from studio.errors import RunError, SessionError
 from studio.geometry.reach import within_reach
@@ -35,8 +35,6 @@ from studio.sessions.run_record import BEHAVIOUR_NAME, CAMERAS_NAME, RunRecord, 
 from studio.sessions.session import Session, free_run_name
 from studio.sessions.stored_run import BODY_FOLDER, StoredRun
 from studio.settings import settings_from_values
-
-Array = NDArray[np.float64]
 
 
 def prepare_correction(
@@ -130,7 +128,7 @@ def _track_again(tracking: TrackingRun, frame: int, cancelled: Callable[[], bool
 
 def _check_frames(run: StoredRun, frame: int, backwards_to: int | None) -> None:
     record = run.record
-    if record.to_and_fro:
+    if record.ping_pong:
         raise RunError(
             f"Run '{run.name}' plays its footage forwards and backwards.", "Track the footage once instead."
         )

@@ -7,37 +7,38 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.behaviour.model import BehaviourModel
 from studio.evidence.distance_maps import silhouettes_by_camera
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.runs.run_behaviour import learner_of
 from studio.settings import RunSettings
-from studio.tracking.catalogue import TRACKERS
-from studio.tracking.frame_loop import search_frame
-from studio.tracking.frame_refinement import FrameRefiner, space_after
-from studio.tracking.tracker import Carried, FrameProblem, FrameResult, LayerRecord, SearchSpace
-
-Array = NDArray[np.float64]
+from studio.trackers.catalogue import TRACKERS
+from studio.trackers.frame_loop import search_frame
+from studio.trackers.frame_refinement import FrameRefiner, space_after
+from studio.trackers.tracker import FilterState, FrameLikelihood, FrameResult, LayerRecord, SearchSpace
 
 
 @dataclass(eq=False)
 class Following:
     """Tracks consecutive frames given to `step`. carried : state for the next frame. refiner : None: no refinement.
+    overlap_of : a frame's number and a pose (D,) to their silhouettes' overlap, for online learning; None: not known.
 
-    poses, log_weights, memories : results and the search's memory so far, one each frame.
+    poses, log_weights, memories, overlaps : results and the search's memory so far, one each frame.
     """
 
     settings: RunSettings
     space: SearchSpace
-    carried: Carried
+    carried: FilterState
     seed: int
     refiner: FrameRefiner | None = None
     on_layer: Callable[[LayerRecord], None] | None = None
-    poses: list[Array] = field(default_factory=list)
-    log_weights: list[float] = field(default_factory=list)
-    memories: list[Mapping[str, Array]] = field(default_factory=list)
+    overlap_of: Callable[[int, Array], float] | None = None
+    poses: list[Array] = field(default_factory=list[Array])
+    log_weights: list[float] = field(default_factory=list[float])
+    memories: list[Mapping[str, Array]] = field(default_factory=list[Mapping[str, Array]])
+    overlaps: list[float] = field(default_factory=list[float])
 
     def __post_init__(self) -> None:
         self._learner = learner_of(self.space.behaviour, self.settings, self.seed)
@@ -49,7 +50,7 @@ class Following:
             return self.space.behaviour
         return self._learner.model_in(len(self.poses), self._tracked)
 
-    def step(self, frame: int, problem: FrameProblem, seen: FrameEvidence | None = None) -> FrameResult:
+    def step(self, frame: int, problem: FrameLikelihood, seen: FrameEvidence | None = None) -> FrameResult:
         """Search a frame. seen : its masks, if it is to be refined."""
         settings, number, space = self.settings, len(self.poses), self.space
         if self._learner is not None:
@@ -75,7 +76,12 @@ class Following:
         self.poses.append(result.estimate.pose)
         self.log_weights.append(result.estimate.log_weight)
         self.memories.append(result.carried.memory)
+        known = None if self._learner is None else self.overlap_of
+        self.overlaps.append(float("nan") if known is None else known(frame, result.estimate.pose))
         return result
 
-    def _tracked(self, count: int) -> tuple[Array, Array]:
-        return np.array(self.poses[:count]), np.array(self.log_weights[:count])
+    def _tracked(self, count: int) -> tuple[Array, Array, Array]:
+        poses, log_weights, overlaps = (
+            np.array(known[:count]) for known in (self.poses, self.log_weights, self.overlaps)
+        )
+        return poses, log_weights, overlaps

@@ -4,13 +4,11 @@ import dataclasses
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Bytes
 from studio.capture.footage import open_footage
 from studio.errors import NotFoundError
 from studio.sessions.session import Session
-
-Bytes = NDArray[np.uint8]
 
 
 def bare_picture(session: Session, camera: str, frame: int, height: int | None = None) -> Bytes:

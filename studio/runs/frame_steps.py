@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from studio.sessions.results_reader import ResultsReader
 from studio.sessions.run_record import RunRecord
-from studio.tracking.tracker import Carried, FrameResult, SearchSpace, start_of
+from studio.trackers.tracker import FilterState, FrameResult, SearchSpace, start_of
 
 LONGEST_SECONDS = 0.25
 """Limbs swing: after a longer time than this a body is no further from where it was."""
@@ -31,7 +31,7 @@ def space_over(space: SearchSpace, steps: int) -> SearchSpace:
     return dataclasses.replace(space, sigma=steps * space.sigma, steps=steps)
 
 
-def carried_over(carried: Carried, steps: int, steps_before: int) -> Carried:
+def carried_over(carried: FilterState, steps: int, steps_before: int) -> FilterState:
     """The last frame's state with its last movement scaled from `steps_before` frames to `steps`."""
     last, before = carried.estimate, carried.previous_estimate
     if steps == steps_before or last is None or before is None:
@@ -39,7 +39,7 @@ def carried_over(carried: Carried, steps: int, steps_before: int) -> Carried:
     return dataclasses.replace(carried, previous_estimate=last - (last - before) * (steps / steps_before))
 
 
-class HandedOn:
+class FrameHistory:
     """The state that each frame of a run starts from. results : of the run. tracked : its finished frames, ascending.
 
     The last frames are kept in memory, so that a live run may store them a little later.
@@ -48,7 +48,7 @@ class HandedOn:
     def __init__(self, results: ResultsReader, record: RunRecord, tracked: Sequence[int]) -> None:
         self._results, self._record = results, record
         self._recent = tuple(tracked[-2:])
-        self._carried: tuple[int, Carried] | None = None
+        self._carried: tuple[int, FilterState] | None = None
 
     def stored(self, result: FrameResult) -> None:
         """Add the next finished frame."""
@@ -65,7 +65,7 @@ class HandedOn:
             return 1
         return steps_between(self._before(frame)[0], frame, self._record.fps)
 
-    def into(self, frame: int) -> Carried:
+    def into(self, frame: int) -> FilterState:
         """The state that a frame starts from: the result of the frame tracked before; in a run's first frame its start
         pose; in a corrected frame the given pose; when tracking backwards, the result of the frame after it.
         """

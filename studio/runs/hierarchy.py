@@ -2,16 +2,16 @@
 
 It is derived from the tree and so holds for any body: the root is what hangs on the world; a limb (an
 arm, the head; the groups of the body file) is cut in two behind the first of its two longest drawn parts, at the
-elbow or the knee; limbs of one kind (both legs) are those whose names differ in their side only.
+elbow or the knee, unless others hang on it; limbs of one kind (both legs) are those whose names differ in their side
+only.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.body.model import BodyModel
-from studio.tracking.tracker import Hierarchy
-
-Indices = NDArray[np.int64]
+from studio.arrays import Indices
+from studio.body.model import BodyModel, moving_joint
+from studio.trackers.tracker import Hierarchy
 
 ROOT, NEAR, FAR = 0, 1, 2
 SIDES = ("left", "right")
@@ -22,9 +22,11 @@ def hierarchy_of(body: BodyModel) -> Hierarchy:
     joint = _joints(body)
     depth = np.full(len(body.parameters), NEAR, dtype=np.int64)
     for limb in _limbs(body):
+        if _carries(body, limb, joint):
+            continue
         rows = np.array([row for row, entry in enumerate(body.parameters) if entry.limb == limb])
         depth[rows[joint[rows] >= _cut(body, {int(number) for number in joint[rows]})]] = FAR
-    depth[[body.joints[number].parent < 0 for number in joint]] = ROOT
+    depth[[moving_joint(body, body.joints[int(number)].parent) < 0 for number in joint]] = ROOT
     lengths = np.array([entry.kind == "length" for entry in body.parameters])
     position = lengths & (depth == ROOT)
     return Hierarchy(depth, position, _subspaces(body, joint, depth, position), _pairs(body, depth))
@@ -64,7 +66,7 @@ def _subspaces(body: BodyModel, joint: Indices, depth: Indices, position: NDArra
     """(D,) subspace numbers in the order of the tree, parents first."""
     limbs = _limbs(body)
     first_joint = {limb: _least(joint, [entry.limb == limb for entry in body.parameters]) for limb in limbs}
-    keys = []
+    keys: list[tuple[int, bool, int, int]] = []
     for row, entry in enumerate(body.parameters):
         if depth[row] == ROOT:
             keys.append((0, not position[row], 0, 0))
@@ -82,7 +84,7 @@ def _carries(body: BodyModel, limb: str, joint: Indices) -> bool:
 
 
 def _ancestors(body: BodyModel, number: int) -> set[int]:
-    found = set()
+    found: set[int] = set()
     while (number := body.joints[number].parent) >= 0:
         found.add(number)
     return found

@@ -7,18 +7,16 @@ silhouettes' borders, and limbs contradicted by the silhouettes are redrawn, as 
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.branches import within_limits
 from studio.body.model import BodyModel
 from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
-from studio.tracking.agreement import Agreement
-from studio.tracking.frame_refinement import Hypothesis, SeenFrame, redrawn
-from studio.tracking.refinement import RefinementSettings, Refiner
-
-Array = NDArray[np.float64]
+from studio.trackers.agreement import Agreement
+from studio.trackers.frame_refinement import Hypothesis, SeenFrame, redrawn
+from studio.trackers.refinement import RefinementSettings, Refiner
 
 ROUNDS = 3
 """Passes: a limb may be found only once another one has moved away."""

@@ -9,38 +9,37 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.behaviour.model_file import read_model
 from studio.body.dimensions import with_usual_feet
 from studio.body.model import BodyModel
+from studio.body.scale import scale_of
 from studio.errors import RunError
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
+from studio.likelihood.catalogue import WEIGHTINGS
 from studio.progress import Progress, unheard
 from studio.runs.behaviour_models import fitting, model_folders, model_path
 from studio.runs.initial_limbs import limbs_put_right
 from studio.runs.problem_source import ProblemSource
 from studio.runs.search_space import parameter_names, search_space, session_sigma
 from studio.runs.session_settings import session_settings
-from studio.runs.way_step import enumerated
+from studio.runs.workflow_step import enumerated
 from studio.sessions.made_from import note
 from studio.sessions.named_rows import write_pose
 from studio.sessions.names import free_name
 from studio.sessions.session import START_POSE_NAME, Session
 from studio.settings import DEFAULT_TRACKER, RunSettings
-from studio.tracking.initialisation import PER_FAMILY, THOROUGH, Effort, FoundStart, StartSearch
-from studio.tracking.loss_detection import Onlooker, anything_seen
-from studio.tracking.start_candidates import facing, start_candidates
-from studio.tracking.tracker import LIMB_LOST_SHARE, FrameProblem, SearchSpace
+from studio.trackers.initialisation import PER_FAMILY, THOROUGH, Effort, FoundStart, StartSearch
+from studio.trackers.loss_detection import Onlooker, anything_seen
+from studio.trackers.start_candidates import facing, start_candidates
+from studio.trackers.tracker import LIMB_LOST_SHARE, FrameLikelihood, SearchSpace
 from studio.volume.alignment import root_parameters
 from studio.volume.body_space import space_of
 from studio.volume.hull import Hull
 from studio.volume.reconstruction import HullSettings, reconstruct
 from studio.volume.tracking_space import HEIGHT, Box
-from studio.weighting.catalogue import WEIGHTINGS
-
-Array = NDArray[np.float64]
 
 WEIGHTING = "edge-silhouette"
 """The likelihood that separates poses best: of 20 moments of the Lee walk's twin (human31) it found all, 24 mm off on
@@ -194,7 +193,7 @@ def hull_of(
 ) -> tuple[Hull | None, Box, str]:
     """The hull of a frame's masks (None if there is none), the search volume, and why there is no hull."""
     if len(cameras) < FEWEST_VIEWS:
-        box = _before(cameras[0]) if len(root_parameters(body)) else space_of(body, cameras)
+        box = _before(cameras[0], scale_of(body)) if len(root_parameters(body)) else space_of(body, cameras)
         return None, box, "One camera makes no hull: the body was searched for in the middle of its view."
     box = space_of(body, cameras)
     hull = reconstruct(evidence, cameras, box, HullSettings(hull_depth=HULL_DEPTH))
@@ -207,18 +206,20 @@ def hull_of(
     return hull, box, ""
 
 
-def _before(camera: Camera) -> Box:
-    """The search volume in the middle of one camera's view: around its axis at hip height, if that is near."""
+def _before(camera: Camera, scale: float) -> Box:
+    """The search volume in the middle of one camera's view: around its axis at hip height, if that is near. scale : of
+    the body (`scale_of`).
+    """
     ahead, centre = camera.rotation[2], camera.centre
-    distance = (HIPS - centre[2]) / ahead[2] if ahead[2] else np.inf
-    place = centre + ahead * (distance if NEAR < distance < FAR else AHEAD)
-    half = np.array([AROUND, AROUND, 0.0])
-    return Box(place * [1, 1, 0] - half, place * [1, 1, 0] + half + [0.0, 0.0, HEIGHT])
+    distance = (scale * HIPS - centre[2]) / ahead[2] if ahead[2] else np.inf
+    place = centre + ahead * (distance if scale * NEAR < distance < scale * FAR else scale * AHEAD)
+    half = scale * np.array([AROUND, AROUND, 0.0])
+    return Box(place * [1, 1, 0] - half, place * [1, 1, 0] + half + [0.0, 0.0, scale * HEIGHT])
 
 
 def whole_problem(
     body: BodyModel, cameras: tuple[Camera, ...], settings: RunSettings, evidence: FrameEvidence
-) -> FrameProblem:
+) -> FrameLikelihood:
     """A frame as a function of the body's poses, with feet also where the body is tracked without: their direction
     distinguishes front from back.
     """
@@ -228,7 +229,7 @@ def whole_problem(
 
 
 def seek(
-    problem: FrameProblem,
+    problem: FrameLikelihood,
     space: SearchSpace,
     body: BodyModel,
     hull: Hull | None,

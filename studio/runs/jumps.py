@@ -9,14 +9,15 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
+from studio.body.scale import scale_of
 from studio.runs.tracks import Track, stretches
 
-Array = NDArray[np.float64]
-
 LEAST_MM = 25.0
-"""A second difference (mm a frame²) below this is no jump, however still the limb is otherwise."""
+"""A second difference (mm a frame², of a person: `scale_of`) below this is no jump, however still the limb is
+otherwise."""
 SPREADS = 8.0
 """Threshold above the median of the track, in robust standard deviations."""
 TIMES = 4.0
@@ -49,11 +50,11 @@ def jumps_of(body: BodyModel, track: Track) -> tuple[Jump, ...]:
     if not body.markers:
         return ()
     points = marker_points(body, track.poses)
-    limbs = marker_limbs(body)
+    limbs, least = marker_limbs(body), LEAST_MM * scale_of(body)
     found: dict[int, list[Jump]] = {}
     for limb in dict.fromkeys(limbs):
         own = points[:, [at for at, name in enumerate(limbs) if name == limb]]
-        for jump in _limb_jumps(limb, track.frames, own):
+        for jump in _limb_jumps(limb, track.frames, own, least):
             found.setdefault(jump.frame, []).append(jump)
     several = len(set(limbs)) > 2
     result: list[Jump] = []
@@ -74,8 +75,8 @@ def marker_limbs(body: BodyModel) -> tuple[str, ...]:
     return tuple(owned[marker.joint] for marker in body.markers)
 
 
-def _limb_jumps(limb: str, frames: NDArray[np.int64], points: Array) -> list[Jump]:
-    """The jumps of one limb. points : (K, M, 3) its markers."""
+def _limb_jumps(limb: str, frames: NDArray[np.int64], points: Array, least: float) -> list[Jump]:
+    """The jumps of one limb. points : (K, M, 3) its markers. least : mm, of any jump."""
     bends = np.full(len(frames), np.nan)
     parts = [part for part in stretches(frames) if part.stop - part.start > 2]
     for part in parts:
@@ -86,8 +87,8 @@ def _limb_jumps(limb: str, frames: NDArray[np.int64], points: Array) -> list[Jum
         return []
     usual = float(np.median(known))
     spread = DEVIATION * float(np.median(np.abs(known - usual)))
-    level = max(LEAST_MM, usual + SPREADS * spread)
-    jumps = []
+    level = max(least, usual + SPREADS * spread)
+    jumps: list[Jump] = []
     for part in parts:
         high = [row for row in range(part.start + 1, part.stop - 1) if bends[row] > level]
         for run in _runs(high):

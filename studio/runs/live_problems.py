@@ -14,7 +14,7 @@ from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
 from studio.runs.problem_source import ProblemSource, evidence_key, problem_key
 from studio.settings import RunSettings
-from studio.tracking.tracker import FrameProblem
+from studio.trackers.tracker import FrameLikelihood
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,7 +25,7 @@ class Ready:
 
     arrival: Arrival
     evidence: FrameEvidence
-    problem: FrameProblem
+    problem: FrameLikelihood
     evidence_key: Hashable
     problem_key: Hashable
     began: float
@@ -67,7 +67,7 @@ class LiveProblems:
         """Make a prepared frame the current one."""
         self._at_hand = ready
 
-    def problem(self, frame: int, settings: RunSettings) -> FrameProblem:
+    def problem(self, frame: int, settings: RunSettings) -> FrameLikelihood:
         """The frame as a function of poses."""
         ready = self._at_hand
         if ready is not None and ready.problem_key == problem_key(frame, settings):

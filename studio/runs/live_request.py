@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from studio.errors import RunError
 from studio.sessions.session import Session
 from studio.settings import RunSettings
-from studio.tracking.recovery_settings import SPREAD
+from studio.trackers.recovery_settings import SPREAD
 
 
 def live_changes(changes: Mapping[str, object]) -> dict[str, object]:
@@ -19,9 +19,9 @@ def live_changes(changes: Mapping[str, object]) -> dict[str, object]:
     return {"recovery": SPREAD, **changes}
 
 
-def check_live(settings: RunSettings, *, live: bool, to_and_fro: bool) -> None:
+def check_live(settings: RunSettings, *, live: bool, ping_pong: bool) -> None:
     """Raises RunError for what is possible only live, or not live."""
-    if to_and_fro and not live:
+    if ping_pong and not live:
         raise RunError(
             "Only a live run can play its footage forwards and backwards.",
             "Make it a live run, or leave this option out.",
@@ -33,11 +33,11 @@ def check_live(settings: RunSettings, *, live: bool, to_and_fro: bool) -> None:
         )
 
 
-def last_of(session: Session, first: int, seconds: float | None, to_and_fro: bool) -> int | None:
+def last_of(session: Session, first: int, seconds: float | None, ping_pong: bool) -> int | None:
     """The frame after the last one of a live run of `seconds`; None: the footage's end. Raises RunError."""
     if seconds is None:
         return None
     if not (math.isfinite(seconds) and seconds > 0.0):
         raise RunError(f"A live run cannot take {seconds:g} seconds.", "Give a number above 0.")
     last = first + max(1, math.ceil(seconds * session.manifest.fps))
-    return last if to_and_fro else min(last, session.manifest.frame_count)
+    return last if ping_pong else min(last, session.manifest.frame_count)

@@ -7,23 +7,21 @@ compares). `frame_steps` has the effect of dropped frames on the search.
 Frames are set by `take` and searched by `step_layer`. An executor stores the results in order, a moment later.
 """
 
-import contextlib
 import dataclasses
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Executor
 
 from studio.errors import RunError
 from studio.runs.live_problems import LiveProblems, Ready
 from studio.runs.live_summary import LiveMeter, LiveStanding
 from studio.runs.pace import Progress
-from studio.runs.storing_behind import StoringBehind
-from studio.runs.take_following import SetNumbers
+from studio.runs.set_following import SetNumbers
 from studio.runs.tracking_run import TrackingRun
 from studio.sessions.stored_run import StoredRun
 from studio.settings import RunSettings
-from studio.tracking.frame_loop import FrameSearch
-from studio.tracking.tracker import FrameResult, LayerRecord
+from studio.trackers.frame_loop import FrameSearch
+from studio.trackers.tracker import FrameResult, LayerRecord
 
 OVER = "finished"
 REHEARSALS = 3
@@ -45,8 +43,7 @@ class LiveRun(TrackingRun):
         self._clock, self._live_problems = clock, problems
         self._came: tuple[int, float] | None = None
         self.latency_ms = float("nan")
-        super().__init__(run, problems)
-        self._behind = StoringBehind(storing)
+        super().__init__(run, problems, storing)
         self._measure_again()
         self._over = self._reader.ended() == OVER
 
@@ -86,16 +83,8 @@ class LiveRun(TrackingRun):
         self._over = True
         self._writer.mark_ended(OVER)
 
-    def when_stored(self, action: Callable[[], None]) -> None:
-        """Call `action` once all finished frames are stored: in the storing thread, or at once after the run's end."""
-        with self._astray_where_it_fails():
-            self._behind.do(action)
-        if self.finished:
-            self._wait_for_disk()
-
     def save(self) -> None:
-        """As `TrackingRun.save`, after all waiting results are stored."""
-        self._wait_for_disk()
+        """As `TrackingRun.save`."""
         self._came = None
         self.meter.paused()
         super().save()
@@ -123,25 +112,26 @@ class LiveRun(TrackingRun):
             )
             while not search.finished:
                 search.step(problem, version, settings.tracker)
-            carried = self.result_of(search, settings).carried
+            carried = self.result_of(search, settings, ()).carried
 
     def _next(self, result: FrameResult) -> None:
         super()._next(result)
         if self.next_frame >= self.record.last:
             self.end()
 
-    def _store(self, result: FrameResult, settings: RunSettings) -> None:
-        came, ready = self._came, self._clock()
-        times = None
-        if came is not None and came[0] == result.frame:
-            times = (came[1], ready)
+    def _store(
+        self, result: FrameResult, settings: RunSettings, came: tuple[float, float] | None = None
+    ) -> None:
+        at_hand, ready = self._came, self._clock()
+        times = came
+        if at_hand is not None and at_hand[0] == result.frame:
+            times = (at_hand[1], ready)
             self.meter.tracked(result.frame, *times)
         else:
             # Continued after a pause: its latency does not count.
             self.meter.passed(result.frame)
         self.latency_ms = 1e3 * (times[1] - times[0]) if times else float("nan")
-        layers, kept = tuple(self._layers), settings.recording.record_particles
-        self._behind.do(lambda: self._writer.write_frame(result, layers, kept, came=times))
+        super()._store(result, settings, times)
 
     def keep(
         self,
@@ -153,25 +143,10 @@ class LiveRun(TrackingRun):
         alone: bool = False,
     ) -> None:
         """As `TrackingRun.keep`; a finished run continues from there."""
-        self._wait_for_disk()
         super().keep(result, layers, version, settings, alone=alone)
         self._over = False
 
-    def _wait_for_disk(self) -> None:
-        """Wait until all is stored. Raises SessionError if a frame, and so all after it, could not be."""
-        with self._astray_where_it_fails():
-            self._behind.wait()
-
-    @contextlib.contextmanager
-    def _astray_where_it_fails(self) -> Iterator[None]:
-        try:
-            yield
-        except BaseException:
-            self._astray = True
-            raise
-
     def _load_again(self) -> None:
-        self._wait_for_disk()
         super()._load_again()
         self._measure_again()
 

@@ -5,14 +5,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.errors import NotFoundError
-from studio.runs.take_following import SetNumbers
+from studio.runs.set_following import SetNumbers
+from studio.sessions.live_recordings import read_sets
 from studio.sessions.stored_run import StoredRun
-from studio.sessions.takes import read_sets
-
-Array = NDArray[np.float64]
 
 WATCHED = 60
 """Frames over which rate and latency on screen are computed."""
@@ -51,7 +49,7 @@ class LiveMeter:
         """tracked : frames done already. sets : of a recording, where a number without a set was incomplete; None:
         every number has its pictures.
         """
-        self._sets = sets if sets is not None and sets.of_a_take else None
+        self._sets = sets if sets is not None and sets.of_a_recording else None
         self._came, self._incomplete = 0, 0
         self._tracked, self._newest = len(tracked), tracked[0] - 1 if tracked else None
         if tracked:

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Bytes
+from studio.body.scale import scale_of
 from studio.calibration.findings import Finding, blocking
 from studio.errors import RunError
 from studio.evidence.backgrounds import Backgrounds
@@ -23,6 +25,7 @@ from studio.geometry.camera import Camera
 from studio.progress import Progress
 from studio.runs.session_settings import session_settings
 from studio.runs.silhouette_doubts import MEASURED, height_of, person_alone, silhouette_doubts
+from studio.runs.subject_masks import count_subjects
 from studio.sessions.made_from import note
 from studio.sessions.session import Session
 from studio.volume.hull import Hull
@@ -32,15 +35,13 @@ from studio.volume.hull_silhouette import silhouette
 from studio.volume.reconstruction import Reconstructor
 from studio.volume.tracking_space import Box, box_of
 
-Bytes = NDArray[np.uint8]
-
 FRAMES = 5
 COARSE = HullSettings(hull_depth=6)
 FINE = HullSettings(hull_depth=8, hull_edge_share=0.5, hull_least_views=2)
 ROUGH = dataclasses.replace(FINE, hull_depth=7)
 """Hull settings where many hulls are needed: to find which camera removes something, which knobs are better."""
 MARGIN = 120.0
-"""Margin (mm) around the coarse hull in which the fine one is carved."""
+"""Margin (mm, of a person: `scale_of`) around the coarse hull in which the fine one is carved."""
 LEAST_PIECE = 0.05
 """Of the largest piece's volume."""
 JUDGED_SIDE = 480
@@ -80,7 +81,7 @@ class ViewQuality:
         """What the user should check, "" if the masks are good."""
         if np.isnan(self.agreement):
             return "The mask, or the hull that all views allow, is empty: check the masks of all cameras."
-        sentences = []
+        sentences: list[str] = []
         if self.denied > BLAMED:
             share = f"{100.0 * self.denied:.0f} %"
             sentences.append(f"The mask has holes: it alone removes {share} of what the other cameras see.")
@@ -97,18 +98,19 @@ class ViewQuality:
 @dataclass(frozen=True, slots=True)
 class MaskQuality:
     """The quality of all cameras' masks in some frames. hull_litres : the hull's volume in each. doubts : findings of
-    the silhouettes on the calibration.
+    the silhouettes on the calibration. subjects : seen in two frames or more (in one, of one), 0: not counted.
     """
 
     frames: tuple[int, ...]
     views: tuple[ViewQuality, ...]
     hull_litres: tuple[float, ...]
     doubts: tuple[Finding, ...] = ()
+    subjects: int = 0
 
     @property
     def usable(self) -> bool:
-        """Whether every camera's masks are usable and show no fault of the calibration."""
-        return all(view.usable for view in self.views) and not blocking(self.doubts)
+        """Whether every camera's masks are usable, of one subject, and show no fault of the calibration."""
+        return all(view.usable for view in self.views) and self.subjects < 2 and not blocking(self.doubts)
 
     @property
     def worst(self) -> str:
@@ -126,6 +128,8 @@ class MaskQuality:
         """The agreement of the worst camera, as text."""
         if stops := blocking(self.doubts):
             return f"the calibration is in doubt: {stops[0].message}"
+        if self.subjects > 1:
+            return f"{self.subjects} subjects are in view: say which of them the masks shall be of"
         least = min(float(np.nan_to_num(view.agreement)) for view in self.views)
         if self.usable:
             return f"every view agrees by {least:.2f} or more"
@@ -142,9 +146,9 @@ def mask_quality(
 ) -> MaskQuality:
     """The quality of a session's masks in some frames (default: five, evenly spread).
 
-    blame : compute what each camera alone removes (most of the time; else 0), and check the calibration by the
-    silhouettes. Only one camera's pictures are held at a time. Raises RunError for a single camera,
-    FootageError, NotFoundError.
+    blame : compute what each camera alone removes (most of the time; else 0), check the calibration by the
+    silhouettes, and count the subjects. Only one camera's pictures are held at a time. Raises RunError for a single
+    camera, FootageError, NotFoundError.
     """
     cameras = session.cameras()
     if len(cameras) < 2:
@@ -153,6 +157,7 @@ def mask_quality(
             "Check its masks by eye instead.",
         )
     small = tuple(camera.reduced(JUDGED_SIDE) for camera in cameras)
+    scale = scale_of(session.body())
     footage = session.footage()
     try:
         chosen = tuple(frames) or spread_frames(footage.frame_count, FRAMES)
@@ -171,16 +176,19 @@ def mask_quality(
                     people[frame].put(camera.name, person_alone(mask))
             footage.release(camera.name)
             backgrounds.release(camera.name)
-        counted = []
+        counted: list[FrameCounts] = []
+        seen: list[int] = []
         for done, frame in enumerate(chosen):
             if progress is not None:
                 progress("comparing masks", len(cameras) * len(masks) + done, total)
-            counted.append(count_frame(masks[frame], small, blame))
+            seen += [count_subjects(masks[frame], small, scale)] if blame else []
+            counted.append(count_frame(masks[frame], small, blame, scale=scale))
     finally:
         footage.close()
     found = summed(chosen, tuple(camera.name for camera in cameras), counted)
-    doubts = silhouette_doubts(cameras, people, height_of(session)) if blame else ()
-    return dataclasses.replace(found, doubts=doubts)
+    doubts = silhouette_doubts(cameras, people, height_of(session), scale) if blame else ()
+    subjects = sorted(seen, reverse=True)[:2][-1] if seen else 0
+    return dataclasses.replace(found, doubts=doubts, subjects=subjects)
 
 
 def measure_masks(
@@ -215,13 +223,18 @@ class FrameCounts:
 
 
 def count_frame(
-    masks: Sequence[Bytes], cameras: tuple[Camera, ...], blame: bool = True, fineness: HullSettings = FINE
+    masks: Sequence[Bytes],
+    cameras: tuple[Camera, ...],
+    blame: bool = True,
+    fineness: HullSettings = FINE,
+    scale: float = 1.0,
 ) -> FrameCounts:
     """The pixels that `ViewQuality`'s shares are made of.
 
     masks : (H, W) 0 or 255, in the order of the cameras. fineness : of the hull that the masks are compared with.
+    scale : of the body (`scale_of`).
     """
-    box = person_box(masks, cameras)
+    box = person_box(masks, cameras, scale)
     whole = None if box is None else _large_hull(Reconstructor(cameras, box, fineness), masks)
     mask = np.array([np.count_nonzero(one) for one in masks])
     covers = [_silhouette(whole, camera) for camera in cameras]
@@ -248,13 +261,13 @@ def denied_pixels(
     return denied
 
 
-def person_box(masks: Sequence[Bytes], cameras: tuple[Camera, ...]) -> Box | None:
-    """A box around the large pieces of a coarse hull; None for an empty hull."""
-    coarse = Reconstructor(cameras, box_of(cameras), COARSE).shape(masks)
+def person_box(masks: Sequence[Bytes], cameras: tuple[Camera, ...], scale: float = 1.0) -> Box | None:
+    """A box around the large pieces of a coarse hull; None for an empty hull. scale : of the body (`scale_of`)."""
+    coarse = Reconstructor(cameras, box_of(cameras, scale=scale), COARSE).shape(masks)
     if coarse.empty:
         return None
     coarse = _large_pieces(coarse)
-    reach = 0.5 * coarse.edges[:, None] + MARGIN
+    reach = 0.5 * coarse.edges[:, None] + MARGIN * scale
     return Box((coarse.centres - reach).min(axis=0), (coarse.centres + reach).max(axis=0))
 
 

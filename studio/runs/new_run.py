@@ -4,21 +4,24 @@ Defaults come from the session (body, subject, start pose, σ0, tracker, likelih
 run's record has everything that its poses depend on.
 """
 
-from importlib import metadata, resources
+from importlib import metadata
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import Field
 
+from studio.arrays import Array
 from studio.body.branches import within_limits
+from studio.body.catalogue import body_file_text
 from studio.body.model import BodyModel
 from studio.body.subject import Subject, read_subject
-from studio.declaring import Body, Despite, Knobs, Model, OneOf, Seed, Terminal, Values, Web, Whose
+from studio.declaring import Body, Despite, Knobs, Model, OneOf, Seed, Target, Terminal, Values, Web
 from studio.errors import BodyError, RunError, StudioError
 from studio.geometry.reach import within_reach
 from studio.knobs import Knob
+from studio.likelihood.catalogue import WEIGHTINGS
 from studio.progress import Progress, unheard
 from studio.runs.behaviour_models import chosen_model
 from studio.runs.initialising import InitialPose, initialise
@@ -33,10 +36,7 @@ from studio.sessions.run_record import RunRecord
 from studio.sessions.session import Session, free_run_name
 from studio.sessions.stored_run import StoredRun
 from studio.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, knob_table, values
-from studio.tracking.catalogue import TRACKERS
-from studio.weighting.catalogue import WEIGHTINGS
-
-Array = NDArray[np.float64]
+from studio.trackers.catalogue import TRACKERS
 
 DISTRIBUTION = "capture-studio"
 DESPITE = "Tracked despite: "
@@ -58,7 +58,7 @@ Numbers = list[float] | None
 
 
 def prepare_run(
-    session: Annotated[Session, Whose("session")],
+    session: Annotated[Session, Target("session")],
     *,
     tracker: Annotated[
         str, Field(description="Default: the session's own, else annealed."), OneOf(TRACKERS)
@@ -122,13 +122,19 @@ def prepare_run(
         Field(description="Track at the footage's rate, dropping frames rather than falling behind."),
         Terminal(left_out=True),
     ] = False,
-    to_and_fro: Annotated[
+    ping_pong: Annotated[
         bool,
         Field(
             description="A live run plays the footage forwards and backwards; last may lie behind the end."
         ),
         Terminal(left_out=True),
     ] = False,
+    note: Annotated[
+        str,
+        Field(description="A line for the run's record: what it was made for."),
+        Terminal(left_out=True),
+        Web(left_out=True),
+    ] = "",
     progress: Progress = unheard,
 ) -> StoredRun:
     """A new run, ready to be tracked; what is left out is the session's own or the studio's default.
@@ -142,18 +148,18 @@ def prepare_run(
     tracker = tracker or session.manifest.tracker or DEFAULT_TRACKER
     weighting = weighting or session.manifest.weighting or DEFAULT_WEIGHTING
     settings = session_settings(session, tracker, weighting, live_changes(knobs or {}) if live else knobs)
-    check_live(settings, live=live, to_and_fro=to_and_fro)
+    check_live(settings, live=live, ping_pong=ping_pong)
     measures = subject if isinstance(subject, Subject) or subject is None else read_subject(Path(subject))
     given: Array | None = None
     if start_pose is not None:
         tree, fps = session.body(body or None, measures), session.manifest.fps
         given, start_source, first = given_pose(start_pose, start_source, tree, fps, first)
     own_start = given is None and not live
-    first, last = checked_frames(session, _first(session, first, last, own_start), last, endless=to_and_fro)
+    first, last = checked_frames(session, _first(session, first, last, own_start), last, endless=ping_pong)
     if not 0 <= seed < 2**63:
         raise RunError(f"The seed {seed} cannot be used.", "Give a whole number of 0 or more.")
     tree, notes = session.body_with_notes(body or None, measures)
-    notes = (*notes, *(f"{DESPITE}{doubt}" for doubt in doubts))
+    notes = (*([note] if note else []), *notes, *(f"{DESPITE}{doubt}" for doubt in doubts))
     model = chosen_model(session, tree, settings, behaviour)
     if model is not None and model.note:
         notes = (*notes, model.note)
@@ -191,10 +197,10 @@ def prepare_run(
         notes=tuple(notes),
         behaviour=model.name if model else "",
         live=live,
-        to_and_fro=to_and_fro,
+        ping_pong=ping_pong,
         subject_dimensions=before if before != tree.dimensions else {},
     )
-    text = _body_text(session, body or tree.name)
+    text = body_file_text(body or tree.name, session.body_folders)
     return session.new_run(record, text, model.path if model else None)
 
 
@@ -289,13 +295,3 @@ def software_version() -> str:
         return metadata.version(DISTRIBUTION)
     except metadata.PackageNotFoundError:
         return "not installed"
-
-
-def _body_text(session: Session, name: str) -> str:
-    """The text of the body's file, stored so that later changes of it do not affect the run."""
-    if name.endswith(".toml"):
-        return Path(name).read_text(encoding="utf-8")
-    for folder in session.body_folders:
-        if (folder / f"{name}.toml").is_file():
-            return (folder / f"{name}.toml").read_text(encoding="utf-8")
-    return (resources.files("studio.body") / "models" / f"{name}.toml").read_text(encoding="utf-8")

@@ -11,16 +11,17 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array, Bytes
 from studio.evidence.frame_evidence import ViewEvidence
 from studio.runs.colour_tokens import Colour, ColourTokens
 
-Array = NDArray[np.float64]
-Bytes = NDArray[np.uint8]
-
-OVERLAYS = ("outline", "truth", "mask", "edges", "samples", "particles")
+OVERLAYS = ("outline", "filled", "truth", "mask", "edges", "samples", "cost", "particles")
 
 _SHIFT = 4
 _MASK_SHARE = 0.5
+_FILLED_SHARE = 0.45
+_FULL = 255.0
+_COST_LEVELS = 10
 _HALO = (12, 12, 12)
 _FARTHEST = 1.0e5
 
@@ -32,7 +33,8 @@ class ViewMarks:
     contours : L closed polylines (K, 2), one a limb; empty for a limb that is not seen. sides : L times "left",
     "right" or "middle".
     edge_samples, region_samples : (K, 2). clouds : one (points (K, 2), colour) a layer, drawn in order.
-    truth : (S, 2, 2) ends of the lines of the reference's stick figure.
+    truth : (S, 2, 2) ends of the lines of the reference's stick figure. own : the token of all its own contours, "" for
+    the colours of the limbs' sides. beside : other bodies, the contours of each with its token.
     """
 
     contours: tuple[Array, ...]
@@ -41,6 +43,8 @@ class ViewMarks:
     region_samples: Array
     clouds: tuple[tuple[Array, Colour], ...] = ()
     truth: Array = field(default_factory=lambda: np.zeros((0, 2, 2)))
+    own: str = ""
+    beside: tuple[tuple[tuple[Array, ...], str], ...] = ()
 
 
 NO_MARKS = ViewMarks((), (), np.zeros((0, 2)), np.zeros((0, 2)))
@@ -60,6 +64,8 @@ def draw_view(
     if "particles" in layers:
         for points, colour in marks.clouds:
             picture = _with_dots(picture, points, colour, scale, radius=0.9)
+    if "filled" in layers:
+        picture = _with_fillings(picture, marks, tokens, scale)
     if "outline" in layers:
         picture = _with_outlines(picture, marks, tokens, scale)
     if "truth" in layers:
@@ -67,7 +73,24 @@ def draw_view(
     if "samples" in layers:
         picture = _with_dots(picture, marks.region_samples, tokens["sample-region"], scale, radius=0.8)
         picture = _with_dots(picture, marks.edge_samples, tokens["sample-edge"], scale, radius=0.8)
+    if "cost" in layers:
+        for points, map_ in ((marks.region_samples, view.mask), (marks.edge_samples, view.edges)):
+            picture = _with_costs(picture, points, map_, tokens, scale)
     return picture
+
+
+def sample_costs(points: Array, map_: Bytes) -> Array:
+    """(K,) what each sample point (K, 2) adds to the error: (1 − p)² of its nearest pixel of a map, 255 for p = 1
+    (Deutscher & Reid 2005, Eq. 14, 15); 1 outside the map.
+    """
+    costs = np.ones(len(points))
+    if not map_.size or not len(points):
+        return costs
+    pixels = np.round(np.nan_to_num(points, nan=-1.0)).astype(np.int64)
+    inside = ((pixels >= 0) & (pixels < (map_.shape[1], map_.shape[0]))).all(axis=1)
+    columns, rows = pixels[inside].T
+    costs[inside] = (1.0 - map_[rows, columns] / _FULL) ** 2
+    return costs
 
 
 def projected_silhouette(contours: tuple[Array, ...], height: int, width: int, scale: float = 1.0) -> Bytes:
@@ -118,13 +141,49 @@ def _with_mask(
     return np.round(tint).astype(np.uint8)
 
 
+def _bodies(marks: ViewMarks) -> list[tuple[Array, str]]:
+    """The contours of all bodies, each with its token."""
+    names = [marks.own or f"limb-{side}" for side in marks.sides]
+    others = [(contour, token) for contours, token in marks.beside for contour in contours]
+    return [*zip(marks.contours, names, strict=True), *others]
+
+
+def _with_fillings(picture: Bytes, marks: ViewMarks, tokens: ColourTokens, scale: float) -> Bytes:
+    filled = picture.copy()
+    for contour, name in _bodies(marks):
+        if _is_drawable(contour):
+            cv2.fillPoly(filled, [_fixed_point(contour, scale)], _bgr(tokens[name]), cv2.LINE_AA, _SHIFT)
+    return np.asarray(
+        cv2.addWeighted(filled, _FILLED_SHARE, picture, 1.0 - _FILLED_SHARE, 0.0), dtype=np.uint8
+    )
+
+
+def _with_costs(picture: Bytes, points: Array, map_: Bytes, tokens: ColourTokens, scale: float) -> Bytes:
+    """Sample points by what they cost, cheap ones below dear ones."""
+    if not map_.size:
+        return picture
+    shares = sample_costs(points, map_)
+    levels = np.minimum((shares * _COST_LEVELS).astype(np.int64), _COST_LEVELS - 1)
+    for level in range(_COST_LEVELS):
+        colour = tokens.layer(level, _COST_LEVELS)
+        picture = _with_dots(picture, points[levels == level], colour, scale, radius=1.1)
+    return picture
+
+
 def _with_outlines(picture: Bytes, marks: ViewMarks, tokens: ColourTokens, scale: float) -> Bytes:
     thin = max(1, round(1.2 * scale))
-    for colours, thickness in ((None, thin + 2), (tokens, thin)):
-        for contour, side in zip(marks.contours, marks.sides, strict=True):
+    # Its own body is drawn last, others with a broader line: all are seen where they lie on one another.
+    own, others = _bodies(marks)[: len(marks.contours)], _bodies(marks)[len(marks.contours) :]
+    broad = thin + 2 if others else thin
+    for colours, drawn, thickness in (
+        (None, others + own, broad + 2),
+        (tokens, others, broad),
+        (tokens, own, thin),
+    ):
+        for contour, name in drawn:
             if not _is_drawable(contour):
                 continue
-            colour = _HALO if colours is None else _bgr(colours[f"limb-{side}"])
+            colour = _HALO if colours is None else _bgr(colours[name])
             pixels = _fixed_point(contour, scale)
             cv2.polylines(picture, [pixels], True, colour, thickness, cv2.LINE_AA, _SHIFT)
     return picture

@@ -8,14 +8,14 @@ import threading
 import time
 import weakref
 from collections import OrderedDict
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array, Bytes, Indices
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
 from studio.capture.footage import Footage
@@ -26,29 +26,39 @@ from studio.evidence.frame_evidence import ViewEvidence
 from studio.evidence.pipeline import EvidenceMaker
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project
+from studio.likelihood.catalogue import WEIGHTINGS
+from studio.likelihood.overlay import overlay_points
 from studio.motion_files.trc import MarkerMotion, read_trc
 from studio.runs.colour_tokens import colour_tokens
 from studio.runs.marker_lines import marker_links
+from studio.runs.moved_knobs import stored_settings
 from studio.runs.overlay_drawing import NO_MARKS, OVERLAYS, ViewMarks, draw_view, upright
 from studio.runs.run_footage import footage_of
 from studio.runs.session_settings import session_settings
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.settings import RunSettings, settings_from_values
-from studio.tracking.tracker import LayerRecord
-from studio.weighting.catalogue import WEIGHTINGS
-from studio.weighting.overlay import overlay_points
+from studio.settings import RunSettings
+from studio.trackers.tracker import LayerRecord
 
-Array = NDArray[np.float64]
-Bytes = NDArray[np.uint8]
 Found = TypeVar("Found")
 
 REST_SECONDS = 20.0
-_NEED_EVIDENCE = {"mask", "edges"}
+_NEED_EVIDENCE = {"mask", "edges", "cost"}
+_NEED_EDGES = {"edges", "cost"}
+_NEED_BODY = {"outline", "filled", "mask", "samples", "cost"}
 _KEPT_COMPOSERS, _KEPT_PIXELS = 3, 18_000_000
 """Composers kept at most, and pixels of all their cameras. A pixel takes about 100 bytes (decoder, background,
 pictures), so two sessions of four full-HD cameras take 1.7 GB.
 """
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OtherBody:
+    """Another body in a picture. pose : (D,) of it. colour : a token. body : whose, None for that of the pose shown."""
+
+    pose: Array
+    colour: str
+    body: BodyModel | None = None
 
 
 class ViewComposer:
@@ -89,19 +99,33 @@ class ViewComposer:
         limbs: Sequence[int] = (),
         height: int | None = None,
         body: BodyModel | None = None,
+        beside: Sequence[OtherBody] = (),
+        own: str = "",
     ) -> Bytes:
         """(h, w, 3) BGR picture of a camera as stored (not turned), with layers of `OVERLAYS` over it.
 
-        pose : (D,) whose limbs are projected, None for none; body : whose, other than the session's. clouds : the
-        layers whose particles are drawn, at the far ends of `limbs` (indices of drawn limbs; none: all). height : of
-        the result, None for the stored size. Raises NotFoundError for a camera or frame that does not exist,
-        StudioError for an unknown layer.
+        pose : (D,) whose limbs are projected, None for none; body : whose, other than the session's. beside : other
+        bodies; own : the colour token of the one itself, "" for those of its limbs' sides. clouds : the layers whose
+        particles are drawn, at the far ends of `limbs` (indices of drawn limbs; none: all). height : of the result,
+        None for the stored size. Raises NotFoundError for a camera or frame that does not
+        exist, StudioError for an unknown layer.
         """
         _check_layers(layers)
         with self._lock:
             self._used, self._rests = time.monotonic(), False
             view = self._view(frame, camera, layers)
             marks = self._marks(camera, frame, layers, pose, clouds, limbs, body or self.body)
+            if {"outline", "filled"} & set(layers):
+                lenses, settings = (self.cameras[camera],), self._settings.weighting
+                others = [
+                    (
+                        overlay_points(other.body or body or self.body, lenses, other.pose, settings)[0],
+                        other.colour,
+                    )
+                    for other in beside
+                ]
+                drawn = tuple((seen.contours, colour) for seen, colour in others)
+                marks = replace(marks, own=own, beside=drawn)
         scale = 1.0 if height is None else height / view.picture.shape[0]
         return draw_view(view, marks, tuple(layers), colour_tokens(dark=True), scale=scale)
 
@@ -131,7 +155,7 @@ class ViewComposer:
         if not _NEED_EVIDENCE & set(layers):
             nothing = np.zeros((0, 0), dtype=np.uint8)
             return ViewEvidence(camera, self._footage.picture(camera, frame), nothing, nothing)
-        kind = WEIGHTINGS[self._settings.weighting_name].edge_kind if "edges" in layers else "none"
+        kind = WEIGHTINGS[self._settings.weighting_name].edge_kind if _NEED_EDGES & set(layers) else "none"
         # A hull may be carved without masks; the overlay shows one all the same.
         kind = "none" if kind == "hull" else kind
         lenses = tuple(self.cameras.values())
@@ -151,7 +175,7 @@ class ViewComposer:
         lens = self.cameras[camera]
         truth = self._truth_lines(lens, frame) if "truth" in layers else NO_MARKS.truth
         dots = self._dots(lens, clouds, limbs) if "particles" in layers else ()
-        if pose is None or not {"outline", "mask", "samples"} & set(layers):
+        if pose is None or not _NEED_BODY & set(layers):
             return replace(NO_MARKS, clouds=dots, truth=truth)
         seen = overlay_points(body, (lens,), pose, self._settings.weighting)[0]
         return ViewMarks(
@@ -169,7 +193,7 @@ class ViewComposer:
         tokens = colour_tokens(dark=True)
         count = max((record.layer for record in clouds), default=0) + 1
         chosen = list(limbs) or list(range(len(self.body.drawn)))
-        drawn = []
+        drawn: list[tuple[Array, tuple[int, int, int]]] = []
         for record in sorted(clouds, key=lambda entry: entry.layer):
             ends = limb_ends(self.body, record.poses)[:, chosen, 1].reshape(-1, 3)
             drawn.append((project(camera, ends)[0], tokens.layer(record.layer, count)))
@@ -178,7 +202,9 @@ class ViewComposer:
     def _truth_lines(self, camera: Camera, frame: int) -> Array:
         if self._truth is None:
             return NO_MARKS.truth
-        rows = np.round((self._truth.times - self._truth.times[0]) * self._footage.fps).astype(np.int64)
+        rows: Indices = np.round(
+            (self._truth.times - float(self._truth.times[0])) * self._footage.fps
+        ).astype(np.int64)
         place = int(np.searchsorted(rows, frame))
         links = marker_links(self.body, self._truth.names)
         if place >= len(rows) or rows[place] != frame or not links:
@@ -203,12 +229,14 @@ def compose_view(
     turned: bool = True,
     settings: RunSettings | None = None,
     body: BodyModel | None = None,
+    beside: Sequence[OtherBody] = (),
+    own: str = "",
 ) -> Bytes:
     """(h, w, 3) BGR: a camera's picture of a frame, upright (`turned`), with layers of `OVERLAYS` over it.
 
     pose : (D,) instead of the run's stored pose. height : of the picture as shown. settings : other than
-    the run's, for masks and samples. body : of `pose`, if not the run's or session's. Raises StudioError for
-    what does not exist.
+    the run's, for masks and samples. body : of `pose`, if not the run's or session's. beside : other bodies
+    beside it; own : the colour token of the one itself. Raises StudioError for what does not exist.
     """
     composer = _composer(session, run)
     composer.use(settings or _settings_of(session, run))
@@ -227,7 +255,15 @@ def compose_view(
     if height is not None:
         stored_height = round(height * lens.height / lens.width) if turns % 2 else height
     picture = composer.compose(
-        frame, camera, layers, pose=pose, clouds=records, height=stored_height, body=body
+        frame,
+        camera,
+        layers,
+        pose=pose,
+        clouds=records,
+        height=stored_height,
+        body=body,
+        beside=beside,
+        own=own,
     )
     return upright(picture, turns)
 
@@ -264,10 +300,7 @@ def _composer(session: Session, run: StoredRun | None) -> ViewComposer:
 def _settings_of(session: Session, run: StoredRun | None) -> RunSettings:
     if run is None:
         return session_settings(session)
-    with run.results() as results:
-        history = results.settings_history()
-    values: Mapping[str, object] = history[-1].values if history else run.record.settings
-    return settings_from_values(run.record.tracker, run.record.weighting, values)
+    return stored_settings(run)[1]
 
 
 def _truth_of(session: Session) -> MarkerMotion | None:

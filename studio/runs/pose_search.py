@@ -6,12 +6,13 @@ The result never has a lower likelihood than the given pose.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.branches import within_limits
 from studio.errors import RunError
 from studio.evidence.distance_maps import silhouette_distances
 from studio.geometry.reach import within_reach
+from studio.likelihood.catalogue import WEIGHTINGS
 from studio.progress import Progress, unheard
 from studio.runs.problem_source import ProblemSource
 from studio.runs.refined_frames import JUDGE
@@ -20,14 +21,11 @@ from studio.runs.session_settings import session_settings
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.settings import RunSettings, settings_from_values
-from studio.tracking.catalogue import TRACKERS
-from studio.tracking.frame_loop import search_frame
-from studio.tracking.loss_detection import Onlooker, anything_seen
-from studio.tracking.refinement import RefinementSettings, Refiner
-from studio.tracking.tracker import Carried, ParticleSet
-from studio.weighting.catalogue import WEIGHTINGS
-
-Array = NDArray[np.float64]
+from studio.trackers.catalogue import TRACKERS
+from studio.trackers.frame_loop import search_frame
+from studio.trackers.loss_detection import Onlooker, anything_seen
+from studio.trackers.refinement import RefinementSettings, Refiner
+from studio.trackers.tracker import FilterState, ParticleSet
 
 TRACKER = "annealed"
 SHORT = {"particles": 150, "layers": 8, "start_repeats": 1}
@@ -94,7 +92,7 @@ def better_pose(
     found = search_frame(
         TRACKERS[TRACKER],
         problem,
-        Carried(ParticleSet(given[None], np.zeros(1))),
+        FilterState(ParticleSet(given[None], np.zeros(1))),
         space,
         seed=seed,
         frame=frame,

@@ -18,10 +18,11 @@ from studio.evidence.distance_maps import silhouettes_by_camera
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.pipeline import EvidenceMaker
 from studio.geometry.camera import Camera
+from studio.likelihood.catalogue import WEIGHTINGS
 from studio.sessions.session import Session
 from studio.settings import RunSettings
-from studio.tracking.tracker import FrameProblem
-from studio.weighting.catalogue import WEIGHTINGS
+from studio.tracing import span
+from studio.trackers.tracker import FrameLikelihood
 
 KEPT_FRAMES = 4
 """Evidence kept: the current frame, the prepared one, and two earlier ones."""
@@ -58,12 +59,12 @@ class ProblemSource:
         self._executor = executor
         self._views = views
         self._keeping, self._making = threading.Lock(), threading.Lock()
-        self._coming: tuple[Hashable, Future[FrameProblem]] | None = None
+        self._coming: tuple[Hashable, Future[FrameLikelihood]] | None = None
         self._evidence: OrderedDict[Hashable, FrameEvidence] = OrderedDict()
-        self._problems: OrderedDict[Hashable, FrameProblem] = OrderedDict()
+        self._problems: OrderedDict[Hashable, FrameLikelihood] = OrderedDict()
         self._weighers: OrderedDict[Hashable, Any] = OrderedDict()
 
-    def problem(self, frame: int, settings: RunSettings) -> FrameProblem:
+    def problem(self, frame: int, settings: RunSettings) -> FrameLikelihood:
         """The frame as a function of poses. Raises FootageError, NotFoundError."""
         self._await(problem_key(frame, settings))
         problem = self._problem(frame, settings)
@@ -108,15 +109,20 @@ class ProblemSource:
             self._weighers.clear()
             self.footage.close()
 
-    def _problem(self, frame: int, settings: RunSettings) -> FrameProblem:
+    def _problem(self, frame: int, settings: RunSettings) -> FrameLikelihood:
         key = problem_key(frame, settings)
         found = self._kept(self._problems, key)
         if found is not None:
             return found
+        with span("prepare", frame):
+            return self._made(frame, settings, key)
+
+    def _made(self, frame: int, settings: RunSettings, key: Hashable) -> FrameLikelihood:
         evidence = self.evidence(frame, settings)
         if settings.refinement.refine_frames:
-            silhouettes_by_camera(evidence, settings.refinement.refine_frame_points)
-        with self._making:
+            with span("distances", frame):
+                silhouettes_by_camera(evidence, settings.refinement.refine_frame_points)
+        with self._making, span("maps", frame):
             weigher = self._weigher(settings, self.cameras_in(frame))
             return self._keep(self._problems, key, weigher.problem(evidence), KEPT_FRAMES)
 

@@ -6,7 +6,7 @@ Nothing is stored unless it is kept. One set of settings holds for the whole fra
 from studio.errors import RunError
 from studio.runs.tracking_run import TrackingRun
 from studio.settings import RunSettings
-from studio.tracking.tracker import FrameResult, LayerRecord
+from studio.trackers.tracker import FrameResult, LayerRecord
 
 
 class Reannealing:
@@ -32,7 +32,7 @@ class Reannealing:
 
     def result(self) -> FrameResult:
         """The frame's result. Raises RunError while layers are left."""
-        return self._tracking.result_of(self._search, self.settings)
+        return self._tracking.result_of(self._search, self.settings, self.layers)
 
     def keep(self, *, alone: bool = False) -> None:
         """Make this the run's frame; later frames, which followed from the old one, are dropped unless `alone`."""

@@ -13,21 +13,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
+from studio.likelihood.catalogue import WEIGHTINGS
 from studio.runs.problem_source import ProblemSource
 from studio.runs.tracks import Track, stretches
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.settings import RunSettings, SettingsHistory, default_settings, settings_from_values
-from studio.tracking.hidden_areas import without_hidden
-from studio.tracking.loss_detection import Onlooker, Sight
-from studio.tracking.refinement import Distances, FrameLoss, RefinementSettings, Refiner, mm_at
-from studio.tracking.refinement_over_time import HELD, MovementRefiner, Window, windows
-from studio.tracking.tracker import LOST, NO_EVIDENCE
-from studio.weighting.catalogue import WEIGHTINGS
-
-Array = NDArray[np.float64]
+from studio.trackers.hidden_areas import without_hidden
+from studio.trackers.loss_detection import Onlooker, Sight
+from studio.trackers.refinement import Distances, FrameLoss, RefinementSettings, Refiner, mm_at
+from studio.trackers.refinement_over_time import HELD, MovementRefiner, Window, windows
+from studio.trackers.tracker import LOST, NO_EVIDENCE
 
 JUDGE = "edge-region-silhouette"
 """The likelihood used where the run's own reads pictures instead of masks (blobs need a prediction)."""

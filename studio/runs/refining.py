@@ -7,8 +7,8 @@ from contextlib import closing
 from dataclasses import asdict, dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.forward_kinematics import marker_points
 from studio.errors import RunError
 from studio.progress import Progress, unheard
@@ -35,10 +35,8 @@ from studio.runs.tracks import (
 from studio.sessions.names import checked_name
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.tracking.refinement import RefinementSettings
-from studio.tracking.smoothing import Smoothed, SmoothingSettings, rms_second_difference, smooth
-
-Array = NDArray[np.float64]
+from studio.trackers.refinement import RefinementSettings
+from studio.trackers.smoothing import Smoothed, SmoothingSettings, rms_second_difference, smooth
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -162,7 +160,7 @@ def check_making(run: StoredRun, source: str, into: str, replace: bool) -> None:
         raise RunError(
             f"Run '{run.name}' has a track '{into}' already.", "Choose another name, or replace it."
         )
-    if run.record.to_and_fro:
+    if run.record.ping_pong:
         raise RunError(
             f"Run '{run.name}' plays its footage forwards and backwards.", "Track the footage once instead."
         )

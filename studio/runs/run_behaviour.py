@@ -3,18 +3,16 @@
 import dataclasses
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.behaviour.model import BehaviourModel
 from studio.behaviour.model_file import write_model
 from studio.runs.search_space import search_space
 from studio.sessions.results_store import ResultsReader
 from studio.sessions.stored_run import StoredRun
 from studio.settings import RunSettings, settings_from_values
-from studio.tracking.online_learning import OnlineLearner
-from studio.tracking.tracker import Carried, SearchSpace
-
-Array = NDArray[np.float64]
+from studio.trackers.online_learning import OnlineLearner
+from studio.trackers.tracker import RECOVERED, TRACKED, FilterState, SearchSpace
 
 LEARNT_NAME = "learnt.behaviour"
 """In the run's folder: the learnt model at its end, for other runs."""
@@ -24,7 +22,8 @@ def learner_of(model: BehaviourModel | None, settings: RunSettings, seed: int) -
     """The online learner of a run's model; None without a model or online learning."""
     if model is None or not getattr(settings.tracker, "online_learning", False):
         return None
-    return OnlineLearner(model, settings.tracker.learning_interval, seed)
+    tracker = settings.tracker
+    return OnlineLearner(model, tracker.learning_interval, seed, tracker.learning_overlap)
 
 
 class RunBehaviour:
@@ -48,7 +47,7 @@ class RunBehaviour:
         model = self._learner.model_in(frame - self._run.record.first, self._tracked)
         return dataclasses.replace(self.space, behaviour=model)
 
-    def carried_into(self, frame: int, carried: Carried) -> Carried:
+    def carried_into(self, frame: int, carried: FilterState) -> FilterState:
         """The state from the frame before, in terms of this frame's model."""
         if self._learner is None:
             return carried
@@ -66,7 +65,11 @@ class RunBehaviour:
         if self._learner is not None and model is not None:
             write_model(model, self._run.folder / LEARNT_NAME)
 
-    def _tracked(self, count: int) -> tuple[Array, Array]:
-        """Poses (K, D) and log-weights (K,) of the run's first frames."""
+    def _tracked(self, count: int) -> tuple[Array, Array, Array]:
+        """Poses (K, D), log-weights (K,) and overlaps (K,) of the run's first frames; no overlap where the run itself
+        says that the body, or a limb, was lost.
+        """
         _, poses = self._results.poses()
-        return poses[:count], self._results.timeline().log_weights[:count]
+        line = self._results.timeline()
+        known = np.isin(np.array(line.tracking[:count]), (TRACKED, RECOVERED))
+        return poses[:count], line.log_weights[:count], np.where(known, line.overlaps[:count], 0.0)

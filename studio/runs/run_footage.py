@@ -1,6 +1,6 @@
 """The footage of a run, whose frame numbers may differ from the files'."""
 
-from studio.capture.footage import Footage, ToAndFro
+from studio.capture.footage import Footage, PingPong
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 
@@ -11,7 +11,7 @@ def footage_of(session: Session, run: StoredRun | None) -> Footage:
     Raises FootageError if a file is gone.
     """
     footage = session.footage()
-    if run is None or not run.record.to_and_fro:
+    if run is None or not run.record.ping_pong:
         return footage
     footage.close()
-    return ToAndFro(footage.source, footage.folder)
+    return PingPong(footage.source, footage.folder)

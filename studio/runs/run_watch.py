@@ -10,34 +10,31 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
+from studio.likelihood.catalogue import WEIGHTINGS, LossLimit
 from studio.runs.initialising import hull_of, seek, whole_problem
 from studio.sessions.results_reader import ResultsReader
 from studio.settings import RunSettings, default_settings
-from studio.tracking.initialisation import PER_FAMILY, QUICK
-from studio.tracking.loss_detection import Onlooker, WeightWatch, anything_seen
-from studio.tracking.particles import unweighted
-from studio.tracking.recovery_settings import INITIALISE, OFF
-from studio.tracking.start_candidates import start_candidates
-from studio.tracking.tracker import (
+from studio.trackers.initialisation import PER_FAMILY, QUICK
+from studio.trackers.loss_detection import Onlooker, WeightWatch, anything_seen
+from studio.trackers.particles import unweighted
+from studio.trackers.recovery_settings import INITIALISE, OFF
+from studio.trackers.start_candidates import start_candidates
+from studio.trackers.tracker import (
     LIMB_LOST,
     LOST,
     NO_EVIDENCE,
     RECOVERED,
     TRACKED,
-    Carried,
-    FrameProblem,
+    FilterState,
+    FrameLikelihood,
     FrameResult,
     ParticleSet,
     SearchSpace,
 )
-from studio.weighting.catalogue import WEIGHTINGS, LossLimit
-
-Array = NDArray[np.float64]
 
 SEEKING = "edge-region-silhouette"
 """The likelihood used for recovery; recovery was measured with it."""
@@ -57,7 +54,7 @@ class Sightings(Protocol):
         """In the order of the views."""
         ...
 
-    def problem(self, frame: int, settings: RunSettings) -> FrameProblem:
+    def problem(self, frame: int, settings: RunSettings) -> FrameLikelihood:
         """The frame as a function of poses."""
         ...
 
@@ -108,7 +105,7 @@ class RunWatch:
         """Forget what was read, because stored frames have changed."""
         self._known = self._sought = None
 
-    def start(self, frame: int, carried: Carried, space: SearchSpace) -> tuple[Carried, bool]:
+    def start(self, frame: int, carried: FilterState, space: SearchSpace) -> tuple[FilterState, bool]:
         """The start of a frame's search, and whether it is a search for a lost body."""
         settings = self._settings_in(frame)
         if self._problems is None or settings.recovery.recovery == OFF or not self._is_due(frame, settings):
@@ -120,7 +117,7 @@ class RunWatch:
         key = (frame, settings.recovery.recovery, settings.evidence)
         if self._sought is None or self._sought[0] != key:
             self._sought = (key, self._found(frame, carried, space, settings, masks))
-        return Carried(self._sought[1], memory=carried.memory), True
+        return FilterState(self._sought[1], memory=carried.memory), True
 
     def is_sought(self, frame: int) -> bool:
         """Whether `start` searches for a lost body in that frame, as far as the frames before decide it."""
@@ -130,7 +127,7 @@ class RunWatch:
         return anything_seen(self._problems.evidence(frame, _seeking(settings)))
 
     def judged(
-        self, result: FrameResult, carried: Carried, problem: FrameProblem | None, sought: bool
+        self, result: FrameResult, carried: FilterState, problem: FrameLikelihood | None, sought: bool
     ) -> FrameResult:
         """The result with its tracking state; without evidence, the incoming pose is held.
 
@@ -142,6 +139,7 @@ class RunWatch:
             return result
         evidence = self._problems.evidence(result.frame, settings)
         sight = self._onlooker.sight(evidence, result.estimate.pose, problem)
+        result = dataclasses.replace(result, notes=(*result.notes, *sight.notes))
         before = self._standing(result.frame)
         if self._anew(result.frame):
             before = dataclasses.replace(before, state=TRACKED, doubts=0)
@@ -217,7 +215,7 @@ class RunWatch:
     def _found(
         self,
         frame: int,
-        carried: Carried,
+        carried: FilterState,
         space: SearchSpace,
         settings: RunSettings,
         masks: FrameEvidence,
@@ -267,7 +265,7 @@ def _weighed(settings: RunSettings) -> tuple[object, ...]:
     return settings.weighting_name, settings.weighting, settings.evidence
 
 
-def _held(result: FrameResult, carried: Carried) -> FrameResult:
+def _held(result: FrameResult, carried: FilterState) -> FrameResult:
     """The frame's result with the incoming pose and particles, at rest."""
     estimate, pose = result.estimate, carried.estimate
     if pose is None and carried.particles is not None:

@@ -1,15 +1,14 @@
 """The search space of a body: names, limits, σ0, the parameters of each limb, and the tree."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.behaviour.model import BehaviourModel
 from studio.body.model import BodyModel
+from studio.body.scale import scale_of
 from studio.runs.hierarchy import hierarchy_of
 from studio.sessions.session import Session
-from studio.tracking.tracker import SearchSpace
-
-Array = NDArray[np.float64]
+from studio.trackers.tracker import SearchSpace
 
 SHARE_OF_MAX_STEP = 0.5
 """σ0 as a share of the largest movement expected from one frame to the next (Deutscher & Reid 2005, 3.1)."""
@@ -41,6 +40,7 @@ def search_space(body: BodyModel, sigma: Array, behaviour: BehaviourModel | None
         limb=np.array([number[limb] for limb in limbs], dtype=np.int64),
         hierarchy=hierarchy_of(body),
         behaviour=behaviour,
+        scale=scale_of(body),
     )
 
 

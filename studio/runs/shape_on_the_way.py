@@ -18,15 +18,19 @@ from dataclasses import dataclass
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.dimensions import with_dimensions
 from studio.body.model import BodyModel
+from studio.body.scale import scale_of
 from studio.body.shape_space import ShapeSpace, dimension_kinds, shape_space
 from studio.errors import NotFoundError, SessionError
 from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
+from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
+from studio.likelihood.catalogue import WEIGHTINGS
+from studio.likelihood.shape_silhouettes import ShapePrograms
 from studio.progress import Progress
 from studio.runs.following import Following
 from studio.runs.problem_source import ProblemSource
@@ -36,15 +40,11 @@ from studio.sessions.made_from import digests
 from studio.sessions.record_files import RecordFile
 from studio.sessions.session import Session
 from studio.settings import RunSettings, default_settings
-from studio.tracking.frame_refinement import FrameRefiner
-from studio.tracking.loss_detection import Onlooker, anything_seen
-from studio.tracking.shape_prior import ShapePrior, ShapeSpreads
-from studio.tracking.shape_refinement import ShapeRefiner
-from studio.tracking.tracker import start_of
-from studio.weighting.catalogue import WEIGHTINGS
-from studio.weighting.shape_silhouettes import ShapePrograms
-
-Array = NDArray[np.float64]
+from studio.trackers.frame_refinement import FrameRefiner
+from studio.trackers.loss_detection import Onlooker, anything_seen
+from studio.trackers.shape_prior import ShapePrior, ShapeSpreads
+from studio.trackers.shape_refinement import ShapeRefiner
+from studio.trackers.tracker import start_of
 
 TRACKER, WEIGHTING = "annealed", "edge-region-silhouette"
 FIRST_FRAMES, FEWEST_FRAMES, FITTED_FRAMES = 30, 8, 8
@@ -56,7 +56,7 @@ LEAST_OVERLAP = 0.6
 STEP = "fitting the shape"
 SCHEMA_VERSION, FOLDER = 1, "shapes"
 WORDED = 5.0
-"""mm: smaller changes are not reported."""
+"""mm (of a person: `scale_of`): smaller changes are not reported."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -198,7 +198,7 @@ def fitted_shape(
     space = shape_space(body, lengths="ends")
     prior = ShapePrior(space, ShapeSpreads(), None)
     borders = [silhouette_distances(frame) for frame in frames]
-    found = ShapeRefiner(ShapePrograms(space), cameras, borders, prior).refine(
+    found = ShapeRefiner(ShapePrograms(space), cameras, borders, prior, lengths_known=True).refine(
         np.zeros(len(space.groups)), poses
     )
     shaped = space.body_of(found.shape)
@@ -231,7 +231,7 @@ def _words(found: FittedShape, frames: range) -> str:
     changed = [
         f"{name.replace('_', ' ')} {one:.0f} → {other:.0f}"
         for name, (one, other) in found.sizes.items()
-        if abs(other - one) >= WORDED
+        if abs(other - one) >= WORDED * scale_of(found.body)
     ]
     listed = f": {', '.join(changed)} mm" if changed else ""
     return (
@@ -241,13 +241,16 @@ def _words(found: FittedShape, frames: range) -> str:
 
 
 def _key(session: Session, body: BodyModel, settings: RunSettings, start: Array, frames: range) -> str:
-    """A digest of all that the fit depends on."""
+    """A digest of all that the fit depends on; of the evidence's knobs those that are not at their defaults, so that
+    another knob leaves the fits that are kept.
+    """
+    evidence, usual = msgspec.to_builtins(settings.evidence), msgspec.to_builtins(EvidenceSettings())
     made_of = (
         SCHEMA_VERSION,
         digests(session, ("footage", "calibration", "masks")),
         body.name,
         dict(body.dimensions),
-        repr(settings.evidence),
+        {name: value for name, value in evidence.items() if value != usual[name]},
         start.tolist(),
         (frames.start, frames.stop),
     )

@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.model import BodyModel
 from studio.evidence.distance_maps import silhouettes_by_camera
 from studio.evidence.frame_evidence import FrameEvidence
@@ -29,12 +29,10 @@ from studio.runs.tracks import (
     write_track,
 )
 from studio.sessions.stored_run import StoredRun
-from studio.tracking.hidden_areas import without_hidden
-from studio.tracking.loss_detection import Onlooker
-from studio.tracking.refinement import Distances, mm_at
-from studio.tracking.side_exchange import with_sides_right
-
-Array = NDArray[np.float64]
+from studio.trackers.hidden_areas import without_hidden
+from studio.trackers.loss_detection import Onlooker
+from studio.trackers.refinement import Distances, mm_at
+from studio.trackers.side_exchange import with_sides_right
 
 BORDER_POINTS = 150
 EXCHANGED = "exchanged"
@@ -94,7 +92,7 @@ def known_silhouettes(
 
 def can_be_looked_at(run: StoredRun) -> bool:
     """Whether the run's frames are those of its footage in order."""
-    return not (run.record.live or run.record.to_and_fro)
+    return not (run.record.live or run.record.ping_pong)
 
 
 def exchanged_sides(run: StoredRun) -> tuple[str, ...]:

@@ -5,9 +5,7 @@ metres for millimetres. A calibration file alone cannot show these, and without 
 import dataclasses
 from collections.abc import Mapping
 
-import numpy as np
-from numpy.typing import NDArray
-
+from studio.arrays import Bytes
 from studio.calibration.checks import Masks, check_calibration
 from studio.calibration.findings import Finding
 from studio.errors import CalibrationError, StudioError
@@ -16,8 +14,6 @@ from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
 from studio.sessions.made_from import changed_inputs, origin_of
 from studio.sessions.session import Session
-
-Bytes = NDArray[np.uint8]
 
 PERSON_ALONE = EvidenceSettings(
     mask_opening=0, mask_closing=0, mask_fill_holes=0, mask_min_component=0, mask_keep_components=1
@@ -34,17 +30,21 @@ def person_alone(mask: Bytes) -> Bytes:
 
 
 def silhouette_doubts(
-    cameras: tuple[Camera, ...], masks: Mapping[int, Mapping[str, Bytes]], height_mm: float | None
+    cameras: tuple[Camera, ...],
+    masks: Mapping[int, Mapping[str, Bytes]],
+    height_mm: float | None,
+    scale: float = 1.0,
 ) -> tuple[Finding, ...]:
     """Faults of a calibration that explain the silhouettes; none where they agree, or where nothing explains them (poor
     masks disagree too, and are reported by camera). masks : frame → camera → (H, W).
 
-    A wrong size only warns if a height is given: the height may be wrong.
+    A wrong size only warns if a height is given: the height may be wrong. scale : of the body beside a person
+    (`scale_of`).
     """
     known = {finding.code for finding in check_calibration(cameras)}
     seen: Masks = masks
-    found = []
-    for finding in check_calibration(cameras, masks=seen, height_mm=height_mm):
+    found: list[Finding] = []
+    for finding in check_calibration(cameras, masks=seen, height_mm=height_mm, scale=scale):
         if finding.code in known or finding.code == UNEXPLAINED:
             continue
         by_height = finding.code in SIZES and height_mm is not None

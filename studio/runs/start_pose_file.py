@@ -5,8 +5,8 @@ stores it in the session.
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.inverse_kinematics import known_markers, pose_from_markers
 from studio.body.model import BodyModel
 from studio.errors import RunError, TruthError
@@ -17,8 +17,6 @@ from studio.sessions.made_from import note
 from studio.sessions.named_rows import pose_frame, read_pose, write_pose
 from studio.sessions.names import free_name
 from studio.sessions.session import START_POSE_NAME, Session
-
-Array = NDArray[np.float64]
 
 FEWEST_MARKERS = 4
 

@@ -8,7 +8,7 @@ from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
 from studio.body.subject import Subject, fit_subject, write_subject
 from studio.errors import BodyError
-from studio.runs.subject_fitting import FittedSubject, keep_subject
+from studio.runs.subject_fitting import FittedSubject, keep_subject, replace_subject
 from studio.sessions.made_from import note
 from studio.sessions.session import SUBJECT_NAME, Session, described_anew
 
@@ -32,6 +32,16 @@ def choose_subject(session: Session, subject: Subject) -> Session:
     body_of_choice(session, subject)
     write_subject(subject, session.path / SUBJECT_NAME)
     return _with_body(session, subject.body)
+
+
+def choose_body(session: Session, body: str) -> Session:
+    """Make a body, as large as its file says, the session's own; the subject before, whose measures would change it, is
+    kept as subject-before.toml. Raises BodyError.
+    """
+    subject = Subject(body=body)
+    body_of_choice(session, subject)
+    replace_subject(session, subject)
+    return _with_body(session, body)
 
 
 def keep_fitted(session: Session, found: FittedSubject) -> Path:

@@ -9,21 +9,26 @@ dimensions, so that every later run of the session has this body.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
+from studio.arrays import Array
 from studio.body.branches import within_limits
 from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
 from studio.body.shape_space import ShapeSpace, levelled, shape_space
-from studio.body.subject import Subject, fit_subject, write_subject
+from studio.body.subject import SHORTEST_MM, TALLEST_MM, Subject, fit_subject, write_subject
+from studio.declaring import Body, Seed, Terminal
 from studio.errors import RunError
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.pipeline import EvidenceMaker
+from studio.likelihood.shape_silhouettes import ShapeSilhouettes
 from studio.progress import Progress, unheard
 from studio.runs.initialising import initialise
 from studio.runs.search_space import parameter_names
@@ -33,13 +38,10 @@ from studio.runs.tracks import REFINED, SIDES, best_track, read_track
 from studio.sessions.calibration_changes import stale_runs
 from studio.sessions.names import free_name
 from studio.sessions.session import SUBJECT_NAME, Session
-from studio.tracking.loss_detection import anything_seen
-from studio.tracking.shape_prior import ShapePrior, ShapeSpreads
-from studio.tracking.shape_refinement import RefinedShape, ShapeRefiner
-from studio.tracking.shape_search import ShapeSearch, ShapeSearchSettings
-from studio.weighting.shape_silhouettes import ShapeSilhouettes
-
-Array = NDArray[np.float64]
+from studio.trackers.loss_detection import anything_seen
+from studio.trackers.shape_prior import ShapePrior, ShapeSpreads
+from studio.trackers.shape_refinement import RefinedShape, ShapeRefiner
+from studio.trackers.shape_search import ShapeSearch, ShapeSearchSettings
 
 COUNT = 5
 MOST_FRAMES = 24
@@ -47,26 +49,37 @@ ANGLE_SPREAD, PLACE_SPREAD = 0.35, 60.0
 """rad and mm: spread of the initial poses."""
 
 
+Height = Annotated[float | None, Field(ge=SHORTEST_MM, le=TALLEST_MM), Terminal("--height")]
+
+
 @dataclass(frozen=True, slots=True)
 class FitRequest:
-    """The parameters of a fit.
-
-    frames : to use; () chooses `count`. symmetric : left and right alike. lengths, radii : what may change. run :
-    whose poses to start from, "" for the session's newest run of this body that has them. body : "" for the session's.
-    height_mm : as known to a few centimetres; None takes the subject's. height_spread : mm, its standard deviation;
-    silhouettes override a height that is off by many times that.
+    """The parameters of a fit. Silhouettes override a height that is off by many times its spread (a standard
+    deviation). particles, layers : of the search.
     """
 
-    frames: tuple[int, ...] = ()
-    count: int = COUNT
-    symmetric: bool = True
-    lengths: bool = True
-    radii: bool = True
-    run: str = ""
-    body: str = ""
-    height_mm: float | None = None
-    height_spread: float = 15.0
-    seed: int = 0
+    frames: Annotated[
+        Sequence[int],
+        Field(max_length=MOST_FRAMES, description="To look at; default: chosen for their variety."),
+    ] = ()
+    count: Annotated[int, Field(ge=1, le=MOST_FRAMES, description="How many frames to choose.")] = COUNT
+    symmetric: Annotated[
+        bool, Field(description="Left and right alike."), Terminal("--symmetric/--asymmetric")
+    ] = True
+    lengths: Annotated[bool, Field(description="Fit lengths.")] = True
+    radii: Annotated[bool, Field(description="Fit radii.")] = True
+    height_mm: Annotated[
+        Height, Field(description="Known to a few centimetres, mm; default: the subject's.")
+    ] = None
+    height_spread: Annotated[
+        float,
+        Field(ge=0, description="How far off the height may be, mm: 15 for a measured one, 60 for a guess."),
+    ] = 15.0
+    run: Annotated[
+        str, Field(description="Whose poses to begin with; default: the newest."), Terminal(metavar="RUN")
+    ] = ""
+    body: Body = ""
+    seed: Seed = 0
     particles: int = 24
     layers: int = 40
 
@@ -137,7 +150,9 @@ def fit_session_subject(
     found = search.run(start)
     progress("refining lengths and radii", 0, 1)
     borders = [silhouette_distances(one) for one in evidence]
-    refiner = ShapeRefiner(silhouettes.programs, session.cameras(), borders, prior)
+    refiner = ShapeRefiner(
+        silhouettes.programs, session.cameras(), borders, prior, lengths_known=not request.lengths
+    )
     refined = refiner.refine(found.shape, found.poses, request.seed, others=(start,))
     fitted = space.body_of(refined.shape)
     return FittedSubject(
@@ -166,11 +181,16 @@ def keep_subject(session: Session, found: FittedSubject, into: Path | None = Non
     if into is not None:
         write_subject(found.subject, into)
         return into
+    return replace_subject(session, found.subject)
+
+
+def replace_subject(session: Session, subject: Subject) -> Path:
+    """Write a session's subject; the old one is kept as subject-before.toml."""
     own = session.path / SUBJECT_NAME
     if own.exists():
         taken = {path.stem for path in session.path.glob("*.toml")}
         own.rename(session.path / f"{free_name('subject-before', taken)}.toml")
-    write_subject(found.subject, own)
+    write_subject(subject, own)
     return own
 
 
@@ -198,12 +218,12 @@ def _first_poses(
     stored = _stored_poses(session, body, request.run)
     if stored is not None:
         numbers, poses, name = stored
-        frames = request.frames or varied_frames(body, numbers, poses, request.count)
+        frames = tuple(request.frames) or varied_frames(body, numbers, poses, request.count)
         rows = {int(number): row for row, number in enumerate(numbers)}
         if all(frame in rows for frame in frames):
             return frames, poses[[rows[frame] for frame in frames]], f"run {name}"
-    frames = request.frames or varied_frames(body, np.arange(count), None, request.count)
-    found = []
+    frames = tuple(request.frames) or varied_frames(body, np.arange(count), None, request.count)
+    found: list[Array] = []
     for done, frame in enumerate(frames):
 
         def report_frame(step: str, part: int, whole: int, done: int = done) -> None:
@@ -243,7 +263,7 @@ def _evidence(session: Session, frames: Sequence[int], report: Progress) -> tupl
     try:
         settings = session_settings(session).evidence
         maker = EvidenceMaker(session.cameras(), footage, Backgrounds(footage), settings, "none")
-        found = []
+        found: list[FrameEvidence] = []
         for done, frame in enumerate(frames):
             report("reading the frames", done, len(frames))
             evidence = maker.evidence(frame)

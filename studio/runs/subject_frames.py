@@ -3,10 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
-
-Array = NDArray[np.float64]
 
 MOST_LOOKED_AT = 400
 

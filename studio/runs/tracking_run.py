@@ -6,29 +6,35 @@ a frame, or after its process was killed, gives the same poses bit for bit as an
 an unfinished frame are applied again at the same layers.
 """
 
+import contextlib
 import dataclasses
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
 from typing import Protocol
 
 import numpy as np
 
-from studio.errors import NotFoundError, RunError
+from studio.errors import NotFoundError, RunError, SessionError
 from studio.evidence.distance_maps import silhouettes_by_camera
-from studio.runs.frame_steps import HandedOn, space_over
+from studio.numba_in_threads import numba
+from studio.runs.frame_steps import FrameHistory, space_over
 from studio.runs.pace import Pace, Progress
 from studio.runs.run_behaviour import RunBehaviour
 from studio.runs.run_watch import RunWatch, Sightings
+from studio.runs.storing_behind import StoringBehind
 from studio.sessions.results_codec import particle_arrays, particles_from
 from studio.sessions.results_store import ResultsReader, ResultsWriter
 from studio.sessions.stored_run import StoredRun
 from studio.settings import RunSettings, SettingsEntry, SettingsHistory, settings_from_values, values
-from studio.tracking.catalogue import TRACKERS
-from studio.tracking.frame_loop import FrameSearch, SearchState, held_over
-from studio.tracking.frame_refinement import FrameRefiner, space_after
-from studio.tracking.tracker import Carried, FrameProblem, FrameResult, LayerRecord
+from studio.tracing import span
+from studio.trackers.catalogue import TRACKERS
+from studio.trackers.frame_loop import FrameSearch, SearchState, held_over
+from studio.trackers.frame_refinement import FrameRefiner, space_after
+from studio.trackers.layer_record import search_notes
+from studio.trackers.tracker import FilterState, FrameLikelihood, FrameResult, LayerRecord
 
 # The newest settings and their version; called before each layer.
 SettingsSource = Callable[[], tuple[int, RunSettings]]
@@ -37,7 +43,7 @@ SettingsSource = Callable[[], tuple[int, RunSettings]]
 class Problems(Protocol):
     """A source of frames (`ProblemSource`, or a toy in tests)."""
 
-    def problem(self, frame: int, settings: RunSettings) -> FrameProblem:
+    def problem(self, frame: int, settings: RunSettings) -> FrameLikelihood:
         """The frame as a function of poses."""
         ...
 
@@ -54,12 +60,16 @@ class Stepped:
 
 
 class TrackingRun:
-    """Tracks a stored run. A second one for the same run raises RunError. Close it when done."""
+    """Tracks a stored run. A second one for the same run raises RunError. Close it when done.
 
-    def __init__(self, run: StoredRun, problems: Problems) -> None:
+    storing : an executor of one thread, which stores each frame while the next one is searched; None: at once.
+    """
+
+    def __init__(self, run: StoredRun, problems: Problems, storing: Executor | None = None) -> None:
         self.run, self.record, self.problems = run, run.record, problems
         self.tracker = TRACKERS[self.record.tracker]
-        self._reader = ResultsReader(run.folder)
+        self._behind, self._astray = StoringBehind(storing), False
+        self._reader = ResultsReader(run.folder, self._wait_for_disk)
         self._behaviour = RunBehaviour(run, self._reader)
         self._watch = RunWatch(
             problems,
@@ -74,6 +84,8 @@ class TrackingRun:
         self._refiner = FrameRefiner(problems.body, problems.cameras, self.record.seed) if seen else None
         self._writer = ResultsWriter(run.folder)
         self._pace = Pace()
+        self._seconds, self._frames = 0.0, 0
+        """Spent on so many frames since it was last stored how long they took."""
         try:
             self._load()
         except BaseException:
@@ -84,6 +96,7 @@ class TrackingRun:
         """Save an unfinished frame, and release the run even if saving fails."""
         try:
             self.save()
+            self.keep_time()
         finally:
             self._free()
 
@@ -122,7 +135,7 @@ class TrackingRun:
         end = max([*frames, *damaged], default=self.record.first - 1) + 1
         self.next_frame = max(backwards, default=min(damaged, default=end))
         self.done = len(frames)
-        self._handed = HandedOn(self._reader, self.record, [at for at in frames if at < self.next_frame])
+        self._handed = FrameHistory(self._reader, self.record, [at for at in frames if at < self.next_frame])
 
     def _take_up_partial(self) -> None:
         partial = self._reader.partial()
@@ -148,6 +161,7 @@ class TrackingRun:
 
     def _load_again(self) -> None:
         """Discard everything not in the store, except the source of the settings."""
+        self._wait_for_disk()
         source = self.settings_source
         self._behaviour.forget()
         self._watch.forget()
@@ -159,6 +173,26 @@ class TrackingRun:
         """Whether every frame has a result."""
         return not self._astray and self.next_frame >= self.record.last
 
+    def when_stored(self, action: Callable[[], None]) -> None:
+        """Call `action` once all finished frames are stored: in the storing thread, or at once after the run's end."""
+        with self._astray_where_it_fails():
+            self._behind.do(action)
+        if self.finished:
+            self._wait_for_disk()
+
+    def _wait_for_disk(self) -> None:
+        """Wait until all is stored. Raises SessionError if a frame, and so all after it, could not be."""
+        with self._astray_where_it_fails():
+            self._behind.wait()
+
+    @contextlib.contextmanager
+    def _astray_where_it_fails(self) -> Generator[None]:
+        try:
+            yield
+        except BaseException:
+            self._astray = True
+            raise
+
     @property
     def layers_done(self) -> int:
         """Layers done of the frame at hand; 0 between frames."""
@@ -166,7 +200,7 @@ class TrackingRun:
 
     def step_layer(self) -> Stepped:
         """Do one layer of the next frame; after its last layer the frame is stored. Raises RunError when finished,
-        SessionError if it cannot be stored: then the run continues from the stored frames.
+        SessionError if this frame or one before could not be stored: then the run continues from the stored frames.
         """
         if self._astray:
             self._load_again()
@@ -176,11 +210,13 @@ class TrackingRun:
         frame = self.next_frame
         version, settings, is_new = self._settings_for(frame, self.layers_done)
         search = self._search or self._new_search(frame)
-        problem = self.problems.problem(frame, self._held_in(frame, settings))
-        record = search.step(problem, version, settings.tracker)
+        with span("wait for the frame", frame):
+            problem = self.problems.problem(frame, self._held_in(frame, settings))
+        with span("search", frame):
+            record = search.step(problem, version, settings.tracker)
         self._search, self._saved, self._astray = search, False, search.finished
         self._layers.append(record)
-        result = self.result_of(search, settings) if search.finished else None
+        result = self.result_of(search, settings, self._layers) if search.finished else None
         if result is not None:
             self._store(result, settings)
             self._astray = False
@@ -188,24 +224,38 @@ class TrackingRun:
         self._spent.append(time.perf_counter() - began)
         if result is not None:
             self._pace.add(self._spent)
+            self._seconds, self._frames = self._seconds + sum(self._spent), self._frames + 1
             self._spent = []
         return Stepped(record, result, settings if is_new else None)
 
-    def result_of(self, search: FrameSearch, settings: RunSettings) -> FrameResult:
-        """The result of a finished search of a frame, with its tracking state."""
-        found = search.result(settings.tracker)
+    def result_of(
+        self, search: FrameSearch, settings: RunSettings, layers: Sequence[LayerRecord]
+    ) -> FrameResult:
+        """The result of a finished search of a frame, with its tracking state. layers : its records."""
+        found = dataclasses.replace(search.result(settings.tracker), notes=search_notes(layers))
         held = self._held_in(search.frame, settings)
         problem = search.problem or self.problems.problem(search.frame, held)
-        if self._refiner is not None and isinstance(self.problems, Sightings):
-            evidence = self.problems.evidence(search.frame, held)
-            found = self._refiner.refined(
-                found, partial(silhouettes_by_camera, evidence), problem, settings.refinement
-            )
+        seen = self.problems if isinstance(self.problems, Sightings) else None
+        if self._refiner is not None and seen is not None and settings.refinement.refine_frames:
+            evidence = seen.evidence(search.frame, held)
+            with span("refine", search.frame):
+                found = self._refiner.refined(
+                    found, partial(silhouettes_by_camera, evidence), problem, settings.refinement
+                )
         carried, sought = self.carried_into(search.frame), self._watch.is_sought(search.frame)
-        return self._watch.judged(found, carried, problem, sought)
+        with span("conclude", search.frame):
+            return self._watch.judged(found, carried, problem, sought)
 
-    def _store(self, result: FrameResult, settings: RunSettings) -> None:
-        self._writer.write_frame(result, self._layers, settings.recording.record_particles)
+    def _store(
+        self, result: FrameResult, settings: RunSettings, came: tuple[float, float] | None = None
+    ) -> None:
+        layers, kept = tuple(self._layers), settings.recording.record_particles
+
+        def store() -> None:
+            with span("store", result.frame):
+                self._writer.write_frame(result, layers, kept, came=came)
+
+        self._behind.do(store)
 
     def _next(self, result: FrameResult) -> None:
         self._handed.stored(result)
@@ -217,6 +267,7 @@ class TrackingRun:
             self.next_frame += 1
             self.done += 1
         if self.finished:
+            self._wait_for_disk()
             self._behaviour.keep()
 
     def save(self) -> None:
@@ -224,6 +275,7 @@ class TrackingRun:
 
         A finished frame that could not be stored is not saved; it is searched again.
         """
+        self._wait_for_disk()
         if self._astray or self._search is None or self._saved or self._search.state.particles is None:
             return
         state = self._search.state
@@ -235,6 +287,15 @@ class TrackingRun:
         self._writer.write_partial(self.next_frame, state.layers_done, arrays, self._layers)
         self._saved = True
 
+    def keep_time(self, seconds: float = 0.0) -> None:
+        """Store how long the frames took since the last time. seconds : that were spent on the run as a whole, too."""
+        if self._frames and not self.record.live:
+            # A disk that refuses it is no reason to refuse the run.
+            with contextlib.suppress(SessionError):
+                threads = int(numba.get_num_threads())
+                self._writer.add_time(self._seconds + seconds, self._frames, threads)
+        self._seconds, self._frames = 0.0, 0
+
     def mark_cancelled(self) -> None:
         """Note in the store that the user cancelled the run."""
         self.save()
@@ -242,6 +303,9 @@ class TrackingRun:
 
     def mark_going_on(self) -> None:
         """Note that a run is resumed that was cancelled or whose disk was full."""
+        # A frame that could not be stored meanwhile is tracked again.
+        with contextlib.suppress(SessionError):
+            self._wait_for_disk()
         if self._astray:
             self._load_again()
         if self._reader.ended():
@@ -302,7 +366,7 @@ class TrackingRun:
             carried, sought = self._watch.start(frame, carried, space)
         elif sought := self._watch.is_sought(frame):
             # The state already has its result.
-            carried = Carried(None, memory=carried.memory)
+            carried = FilterState(None, memory=carried.memory)
         repeats = 1
         if self._handed.is_first(frame) or sought:
             repeats = self._settings_at(frame)[1].tracker.start_repeats
@@ -317,8 +381,8 @@ class TrackingRun:
             state=state,
         )
 
-    def carried_into(self, frame: int) -> Carried:
-        """The state that a frame starts from (`frame_steps.HandedOn.into`)."""
+    def carried_into(self, frame: int) -> FilterState:
+        """The state that a frame starts from (`frame_steps.FrameHistory.into`)."""
         return self._handed.into(frame)
 
     def search_again(self, frame: int) -> FrameSearch:
@@ -346,6 +410,7 @@ class TrackingRun:
 
         alone : keep the later frames, which do not depend on it.
         """
+        self._wait_for_disk()
         if alone:
             self._writer.write_frame(result, layers, settings.recording.record_particles)
             self._watch.forget()

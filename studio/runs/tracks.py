@@ -18,16 +18,15 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import read_archive
+from studio.arrays import Array, read_archive
 from studio.errors import NotFoundError, SessionError
 from studio.foreign_files import foreign_file
-from studio.sessions.atomic_files import write_bytes
+from studio.sessions.atomic_files import write_bytes, writing
 from studio.sessions.names import checked_name, is_name
 from studio.sessions.stored_run import StoredRun
-from studio.tracking.tracker import TRACKING_STATES
+from studio.trackers.tracker import TRACKING_STATES
 from studio.typed_decoding import decode_json
 
-Array = NDArray[np.float64]
 Plain = Any
 """What JSON can hold."""
 
@@ -57,7 +56,7 @@ class Track:
     poses: Array
     confidence: Array
     states: tuple[str, ...]
-    made_by: Mapping[str, Plain] = field(default_factory=dict)
+    made_by: Mapping[str, Plain] = field(default_factory=dict[str, Plain])
 
 
 def track_names(run: StoredRun) -> tuple[str, ...]:
@@ -92,7 +91,7 @@ def best_track(run: StoredRun, among: Sequence[str] = (SMOOTHED, REFINED, SIDES)
     """The first existing track of `among` (by default smoothed, refined, sides), else the raw one. Tracks whose source
     has changed since do not count. Raises SessionError if one is damaged.
     """
-    names, outdated = track_names(run), []
+    names, outdated = track_names(run), list[str]()
     for name in among:
         if name in names:
             if _up_to_date(run, read_track(run, name), names):
@@ -204,14 +203,17 @@ def write_track(run: StoredRun, track: Track, *, replace: bool = False) -> Path:
         states=np.array([KNOWN_STATES.index(state) for state in track.states], dtype="|u1"),
         made_by=np.array(msgspec.json.encode(dict(track.made_by)).decode()),
     )
-    path.parent.mkdir(exist_ok=True)
+    with writing("The track", path):
+        path.parent.mkdir(exist_ok=True)
     write_bytes(path, stream.getvalue())
     return path
 
 
 def drop_track(run: StoredRun, name: str) -> None:
-    """Remove a derived track, if there is one."""
-    _path(run, name).unlink(missing_ok=True)
+    """Remove a derived track, if there is one. Raises StudioError where that is not allowed."""
+    path = _path(run, name)
+    with writing("The track", path):
+        path.unlink(missing_ok=True)
 
 
 def stretches(frames: NDArray[np.int64]) -> tuple[slice, ...]:
@@ -247,7 +249,7 @@ def _from_entries(name: str, entries: Mapping[str, NDArray[Any]]) -> Track:
     """A track from its file's arrays. Raises ValueError, DecodeError."""
     if int(entries["schema"]) > SCHEMA_VERSION:
         raise ValueError(f"schema version {int(entries['schema'])} is newer than this studio")
-    codes = entries["states"].tolist()
+    codes: list[int] = entries["states"].tolist()
     if any(code >= len(KNOWN_STATES) for code in codes):
         raise ValueError("an unknown state")
     return Track(

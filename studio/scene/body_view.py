@@ -1,27 +1,41 @@
 """The body in the scene: a mesh for each drawn limb, made once in the limb's frame; a pose only moves it."""
 
+from collections.abc import Callable
+
 import numpy as np
 import trimesh
 import viser
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from studio.arrays import Array
 from studio.body.forward_kinematics import joint_frames
 from studio.body.model import BodyModel, Limb
+from studio.evaluation.errors import limb_of_drawn
 from studio.runs.colour_tokens import ColourTokens
 from studio.scene import METRES_PER_MM
 
-Array = NDArray[np.float64]
-
 SECTIONS = 28
+_DIMMED = 0.3
 _CAGE_SECTIONS, _CAGE_SCALE = 10, (1.03, 1.03, 1.0)
 
 
 class BodyView:
-    """A body at one pose. name : the nodes' path. ghost : a grey cage, for the stored answer beside another one."""
+    """A body at one pose. name : the nodes' path. ghost : a cage, for what stands beside the answer, in the
+    colour of the token `colour`. clicked : called with the name of a limb as errors are counted by, in a
+    thread of viser's.
+    """
 
-    def __init__(self, server: viser.ViserServer, body: BodyModel, *, name: str, ghost: bool = False) -> None:
-        self._body, self._ghost = body, ghost
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        body: BodyModel,
+        *,
+        name: str,
+        ghost: bool = False,
+        clicked: Callable[[str], None] | None = None,
+    ) -> None:
+        self._body, self._ghost, self.colour = body, ghost, "ghost"
+        self.limb_of = limb_of_drawn(body)
         meshes = [limb_mesh(limb, _CAGE_SECTIONS if ghost else SECTIONS) for limb in body.drawn]
         self.handles = [
             server.scene.add_mesh_simple(
@@ -38,16 +52,25 @@ class BodyView:
             )
             for limb, mesh in zip(body.drawn, meshes, strict=True)
         ]
+        if clicked is not None:
+            for limb, handle in zip(body.drawn, self.handles, strict=True):
+                handle.on_click(lambda _, name=self.limb_of[limb.name]: clicked(name))
 
-    def show(self, pose: Array | None, tokens: ColourTokens, opacity: float = 1.0) -> None:
-        """Move every limb to a pose (radians, mm); None hides the body."""
+    def show(
+        self, pose: Array | None, tokens: ColourTokens, opacity: float = 1.0, chosen: str | None = None
+    ) -> None:
+        """Move every limb to a pose (radians, mm); None hides the body. chosen : a limb as errors are counted by; the
+        others are dimmed.
+        """
         if pose is not None:
+            limbs = tuple(self.limb_of.values())
             wxyz, positions = limb_frames(self._body, pose)
-            for handle, turn, place in zip(self.handles, wxyz, positions, strict=True):
+            for handle, limb, turn, place in zip(self.handles, limbs, wxyz, positions, strict=True):
+                dimmed = opacity * (_DIMMED if chosen in limbs and limb != chosen else 1.0)
                 handle.wxyz, handle.position = turn, place
-                handle.opacity = None if opacity >= 1.0 else float(opacity)
+                handle.opacity = None if dimmed >= 1.0 else float(dimmed)
         for handle, limb in zip(self.handles, self._body.drawn, strict=True):
-            handle.color = tokens["ghost" if self._ghost else f"limb-{limb.side}"]
+            handle.color = tokens[self.colour if self._ghost else f"limb-{limb.side}"]
             handle.visible = pose is not None
 
 

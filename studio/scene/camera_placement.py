@@ -13,14 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from studio.arrays import Array, Bytes
 from studio.geometry.camera import Camera
 from studio.runs.overlay_drawing import upright
 from studio.scene import METRES_PER_MM
 
 _VIEW_MARGIN = 1.04
-
-Array = NDArray[np.float64]
-Bytes = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

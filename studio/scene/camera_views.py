@@ -12,11 +12,10 @@ import trimesh
 import viser
 from numpy.typing import NDArray
 
+from studio.arrays import Bytes
 from studio.geometry.camera import Camera
 from studio.runs.colour_tokens import ColourTokens
 from studio.scene.camera_placement import PicturePlane, StraightPicture, picture_plane, straight_picture
-
-Bytes = NDArray[np.uint8]
 
 DEPTH = 0.8
 BACKDROP_DEPTH = 14.0

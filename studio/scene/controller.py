@@ -12,28 +12,39 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVarTuple
 
+import numpy as np
 import viser
-from numpy import float64
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.dragging import Dragger
+from studio.body.forward_kinematics import limb_ends
 from studio.body.mirroring import Mirror
+from studio.body.model import BodyModel
+from studio.body.scale import scale_of
 from studio.errors import BodyError, StudioError
+from studio.jobs import commands
+from studio.jobs.control import StudioControl
+from studio.jobs.events import Acknowledged, Event, FrameFinished, StateChanged
 from studio.knobs import Value, checked
-from studio.runs.colour_tokens import colour_tokens
+from studio.runs.colour_tokens import ColourTokens, colour_tokens
 from studio.runs.pose_search import BetterPose
 from studio.runs.start_pose_file import keep_start_pose
+from studio.scene import METRES_PER_MM
+from studio.scene.body_trial import TrialView, trial_pose
 from studio.scene.controls import Change
+from studio.scene.floor_view import FloorView
 from studio.scene.model import (
     Model,
     Selection,
     Subject,
+    Trial,
     advance,
     camera_clicked,
     edit_pose,
     hear,
+    limb_clicked,
     opened,
     refuse,
     request,
@@ -48,21 +59,24 @@ from studio.scene.panel import Panel, dress, notify
 from studio.scene.pose_edit import begun, edit_of, ended, moved, saved
 from studio.scene.pose_handles import PoseHandles, drag
 from studio.scene.pose_refining import PoseRefining, outcome
-from studio.scene.scene_views import SceneViews
+from studio.scene.scene_views import SceneViews, first_view
 from studio.sessions.workspace import Workspace
 from studio.settings import all_knobs
-from studio.worker import commands
-from studio.worker.control import StudioControl
-from studio.worker.events import Acknowledged, Event, FrameFinished, StateChanged
-
-Array = NDArray[float64]
 
 REDRAW_SECONDS = 1.0 / 30.0
 PICTURE_SECONDS, LIVE_PICTURE_SECONDS = 1.0 / 10.0, 1.0 / 2.0
 """Composing pictures ten times a second costs a third of a core, which a live run needs."""
+PICTURES_WAIT = 0.06
+"""Seconds without another change after which pictures are composed, so that a burst of changes, as a frame that is
+annealed again, has its clouds first and its pictures once."""
 IDLE_SECONDS = 0.5
+EYE_TOLERANCE = 0.02
+"""Metres within which a viewer has not moved."""
 _LOG = logging.getLogger(__name__)
 _WAKE = Event("", "")
+
+
+Values = TypeVarTuple("Values")
 
 
 class SceneController:
@@ -85,10 +99,15 @@ class SceneController:
         self._refining: PoseRefining | None = None
         self._events = process.subscribe()
         self._inbox: deque[tuple[Change, tuple[Any, ...], bool]] = deque()
-        self._drawings = Due(REDRAW_SECONDS), Due(PICTURE_SECONDS)
+        self._drawings = Due(REDRAW_SECONDS), Due(PICTURE_SECONDS, PICTURES_WAIT)
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="scene", daemon=True)
         self._theme = ""
+        self.bare = False
+        """Whether it has no controls."""
+        self._looking: viser.CameraHandle | None = None
+        self._trial: TrialView | None = None
+        self._floor: FloorView | None = None
         self.panel = Panel(server, self.post, self.request_knobs, self.refine_pose, self.save_pose)
         server.on_client_connect(self._greet)
 
@@ -105,7 +124,9 @@ class SceneController:
             self._thread.join(timeout=10.0)
         self._close()
 
-    def post(self, change: Change, *values: Any, announce: bool = True) -> None:  # noqa: ANN401 - what the change takes
+    def post(
+        self, change: Callable[[Model, *Values], Model], *values: *Values, announce: bool = True
+    ) -> None:
         """Queue a change. announce : whether `moved` is called for it; callers from outside know already."""
         self._inbox.append((change, values, announce))
         self._events.put(_WAKE)
@@ -120,7 +141,29 @@ class SceneController:
         self, model: Model, session: str, run: str, frame: int | None = None, layer: int | None = None
     ) -> Model:
         """Show a session ("" : none) and one of its runs ("" : none), a frame (None: as it is), a layer."""
-        return select(show_frame(self._open(model, session, run), frame), layer=layer)
+        model = replace(self._open(model, session, run), trial=None)
+        return select(show_frame(model, frame), layer=layer)
+
+    def try_body(self, model: Model, session: str, body: BodyModel | None) -> Model:
+        """Show a body that is being made in place of a session's own, or ("") alone on the floor; None: no longer."""
+        model = self._open(model, session, "")
+        if self.opened is not None and model.trial is None:
+            model = show_frame(model, self.opened.session.start_pose_frame())
+        trial = None if body is None else Trial(body, trial_pose(body, self.opened))
+        if trial is not None and model.trial is None and self.opened is None:
+            self._show_alone(trial)
+        return replace(model, trial=trial)
+
+    def _show_alone(self, trial: Trial) -> None:
+        """Let viewers see a body without a session."""
+        place, scale = limb_ends(trial.body, trial.pose)[0].reshape(-1, 3), scale_of(trial.body)
+        with self._server.atomic():
+            self._floor = FloorView(self._server, [place.mean(axis=0)], scale)
+        eye = first_view(place * METRES_PER_MM, [], scale)
+        view = self._server.initial_camera
+        view.position, view.look_at = eye
+        for client in self._server.get_clients().values():
+            _put(client, (*map(float, eye[0]), *map(float, eye[1])))
 
     def propose_pose(self, model: Model, session: str, pose: Array, text: str, frame: int | None) -> Model:
         """Show a found start pose (D,) without a run, if it fits the session's body.
@@ -245,6 +288,7 @@ class SceneController:
             self._server,
             found,
             clicked=lambda camera: self.post(camera_clicked, camera),
+            limb_clicked=lambda limb: self.post(limb_clicked, limb),
             volume_made=lambda: self.post(lambda model: replace(model)),
             failed=lambda problem: self.post(self._fail, problem),
         )
@@ -266,17 +310,45 @@ class SceneController:
         if self.opened is not None:
             self.opened.close()
         self.views = self.opened = self.handles = self._refining = None
+        self._trial = self._floor = None
 
     def _fail(self, _: Model, problem: StudioError) -> Model:
         raise problem
 
     async def _greet(self, client: viser.ClientHandle) -> None:
         def place(model: Model) -> Model:
+            if model.selection.eye is not None:
+                _put(client, model.selection.eye)
             if self.views is not None:
                 self.views.cameras.place(client)
             return model
 
         self.post(place)
+        client.camera.on_update(lambda camera: setattr(self, "_looking", camera))
+
+    def look_from(self, model: Model, eye: tuple[float, ...] | None) -> Model:
+        """Put the viewers' eyes at a place, looking at another (6,) metres; None: the usual place."""
+        if eye == model.selection.eye:
+            return model
+        for client in self._server.get_clients().values():
+            _put(client, self._usual_eye() if eye is None else eye)
+        return select(model, eye=eye)
+
+    def _usual_eye(self) -> tuple[float, ...]:
+        view = self._server.initial_camera
+        return (*map(float, view.position), *map(float, view.look_at))
+
+    def _note_eye(self, model: Model) -> Model:
+        """Note from where a viewer looks, once it looks freely."""
+        camera, self._looking = self._looking, None
+        if camera is None or model.selection.look_through is not None:
+            return model
+        seen = (*map(float, camera.position), *map(float, camera.look_at))
+        is_usual = np.allclose(seen, self._usual_eye(), atol=EYE_TOLERANCE)
+        before = model.selection.eye
+        if before is not None and np.allclose(seen, before, atol=EYE_TOLERANCE):
+            return model
+        return select(model, eye=None if is_usual else tuple(round(number, 2) for number in seen))
 
     # The thread.
 
@@ -285,6 +357,8 @@ class SceneController:
         while not self._stopping.is_set():
             self._listen(self._patience())
             self._take_posts()
+            if self._looking is not None:
+                self._happen(self._note_eye, ())
             now = time.monotonic()
             if self.model.playback.playing:
                 self._happen(advance, (now - before,))
@@ -346,8 +420,10 @@ class SceneController:
             self.model = after
         if self.model is before:
             return
-        self._drawings[0].is_wanted = True
-        self._drawings[1].is_wanted |= not same_pictures(before, self.model)
+        now = time.monotonic()
+        self._drawings[0].want(now)
+        if self._drawings[1].is_wanted or not same_pictures(before, self.model):
+            self._drawings[1].want(now)
         edit = self.model.edit
         if self._refining is not None and (edit is None or edit.refining is None):
             self._refining.stop()
@@ -387,6 +463,25 @@ class SceneController:
             self.views.show(model, moment, tokens)
         if self.handles is not None and model.edit is not None:
             self.handles.show(model.edit, tokens)
+        self._draw_trial(model, tokens)
+        # Knobs and poses are not of a body that is being made.
+        has_controls = not self.bare and model.trial is None
+        if self.panel.tabs.visible != has_controls:
+            self.panel.tabs.visible = has_controls
+
+    def _draw_trial(self, model: Model, tokens: ColourTokens) -> None:
+        """Draw the body that is being made, anew where it changed."""
+        trial = model.trial
+        with self._server.atomic():
+            if self._trial is not None and (trial is None or self._trial.trial is not trial):
+                self._trial.remove()
+                self._trial = None
+            if trial is None:
+                return
+            self._trial = self._trial or TrialView(self._server, trial)
+            self._trial.show(tokens, model.selection.look_through is None)
+            if self._floor is not None:
+                self._floor.show(tokens)
 
     def _draw_pictures(self) -> None:
         moment = self._moment()
@@ -394,28 +489,47 @@ class SceneController:
             self.views.hang_pictures(self.model, moment, colour_tokens(self.model.options.dark))
 
 
-class Due:
-    """A redraw, pending or not, at most once in `pause` seconds."""
+def _put(client: viser.ClientHandle, eye: tuple[float, ...]) -> None:
+    """Put a viewer's eye at a place, looking at another (6,) metres."""
+    with client.atomic():
+        client.camera.position, client.camera.look_at = np.array(eye[:3]), np.array(eye[3:])
 
-    def __init__(self, pause: float) -> None:
-        self.pause, self.is_wanted, self._last = pause, False, float("-inf")
+
+class Due:
+    """A redraw, pending or not, at most once in `pause` seconds. calm : seconds without a further change that it waits
+    for, no longer than the pause.
+    """
+
+    def __init__(self, pause: float, calm: float = 0.0) -> None:
+        self.pause, self.calm, self.is_wanted = pause, calm, False
+        self._last = self._first = self._newest = float("-inf")
+
+    def want(self, now: float) -> None:
+        """Note a change that is to be drawn."""
+        if not self.is_wanted:
+            self._first = now
+        self._newest, self.is_wanted = now, True
 
     def is_due(self, now: float) -> bool:
-        """Whether it is pending and its pause is over."""
-        return self.is_wanted and now - self._last >= self.pause
+        """Whether it is pending and neither its pause nor further changes hold it up."""
+        return self.is_wanted and now >= self._from()
 
     def waits(self, now: float) -> float:
-        """Seconds until its pause is over."""
-        return max(0.0, self._last + self.pause - now)
+        """Seconds until it is due, if nothing changes meanwhile."""
+        return max(0.0, self._from() - now)
 
     def done(self, now: float) -> None:
         """Note that it was drawn."""
         self._last, self.is_wanted = now, False
 
+    def _from(self) -> float:
+        return max(self._last + self.pause, min(self._newest + self.calm, self._first + self.pause))
+
 
 def picture_pause(state: StateChanged) -> float:
-    """Seconds between two updates of the pictures."""
-    return LIVE_PICTURE_SECONDS if state.live is not None and state.state == "tracking" else PICTURE_SECONDS
+    """Seconds between two updates of the pictures; what is searched comes first."""
+    searches = state.state == "reannealing" or (state.live is not None and state.state == "tracking")
+    return LIVE_PICTURE_SECONDS if searches else PICTURE_SECONDS
 
 
 def subject_of(found: OpenedRun) -> Subject:

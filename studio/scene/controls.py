@@ -1,5 +1,6 @@
 """Connects viser's inputs with the model: user input is reported, the model's value is shown."""
 
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -24,13 +25,13 @@ class Control:
     from another thread a value could be written between a person's change and the report of it.
     """
 
-    def __init__(self, handle: Any, post: Post, change: Change) -> None:  # noqa: ANN401 - any input handle
+    def __init__(self, handle: Any, post: Post, change: Callable[[Model, Any], Model]) -> None:  # noqa: ANN401 - any input handle
         self.handle = handle
         self._loop = handle._impl.gui_api._event_loop
         self._change = change
         self._reported = self._decided = 0
 
-        async def report(event: viser.GuiEvent) -> None:
+        async def report(event: viser.GuiEvent[Any]) -> None:
             if event.client_id is not None:
                 self._reported += 1
                 post(self._decide, event.target.value)
@@ -46,19 +47,31 @@ class Control:
         self._loop.call_soon_threadsafe(self._write, value)
 
     def _write(self, value: object) -> None:
-        if self._reported == self._decided and not self.handle._impl.removed:
-            self.handle.value = value
+        with _removing:
+            if self._reported == self._decided and not self.handle._impl.removed:
+                self.handle.value = value
 
     def remove(self) -> None:
         """Take the input out of the panel."""
-        self.handle.remove()
+        take_out(self.handle)
+
+
+_removing = threading.Lock()
+
+
+def take_out(handle: Any) -> None:  # noqa: ANN401 - an input or a folder of them
+    """Take an input, or a folder with all its inputs, out of the panel: nothing is written to them any more, for the
+    browser knows them no longer.
+    """
+    with _removing:
+        handle.remove()
 
 
 def on_press(handle: Any, post: Post, change: Change) -> None:  # noqa: ANN401 - a button or a group of them
     """Change the model when a button is pressed; for a group with the label of the pressed one."""
     is_group = isinstance(handle, viser.GuiButtonGroupHandle)
 
-    async def report(event: viser.GuiEvent) -> None:
+    async def report(event: viser.GuiEvent[Any]) -> None:
         post(change, *((event.target.value,) if is_group else ()))
 
     handle.on_click(report)

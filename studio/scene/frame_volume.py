@@ -14,11 +14,11 @@ from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from numpy import float64
-from numpy.typing import NDArray
-
+from studio.arrays import Array
 from studio.capture.video import give_back_freed_memory
 from studio.errors import StudioError
+from studio.likelihood.blob_settings import BlobSettings
+from studio.likelihood.blobs import BlobProblem, blob_mixture
 from studio.numba_in_threads import numba
 from studio.runs.problem_source import ProblemSource
 from studio.scene.opened_run import Moment, OpenedRun
@@ -26,10 +26,6 @@ from studio.settings import RunSettings, default_settings
 from studio.volume.alignment import root_parameters
 from studio.volume.blob_model import BlobMixture, BlobModel
 from studio.volume.hull import Hull
-from studio.weighting.blob_settings import BlobSettings
-from studio.weighting.blobs import BlobProblem, blob_mixture
-
-Array = NDArray[float64]
 
 BLOBS = "blobs"
 FEWEST_VIEWS = 2
@@ -114,7 +110,7 @@ class FrameVolumes:
             return _Request((frame, chosen.evidence, chosen.weighting), frame, chosen, None, {})
         key = (frame, chosen.evidence, chosen.weighting, pose.tobytes())
         before = self._opened.result(frame - 1) if key not in self._kept else None
-        memory = before.carried.memory if before is not None else {}
+        memory: Mapping[str, Array] = before.carried.memory if before is not None else {}
         return _Request(key, frame, chosen, pose.copy(), memory)
 
     def _work(self) -> None:

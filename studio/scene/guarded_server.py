@@ -9,11 +9,12 @@ import contextlib
 import hmac
 import secrets
 import threading
-from collections.abc import Iterator
+from collections.abc import Generator
 
 import rich
 import viser
 from viser.infra import WebsockClientConnection
+from websockets.asyncio.server import ServerConnection
 
 RELAY_HEADER = "X-Studio-Relay"
 _POLICY_VIOLATION = 1008
@@ -41,7 +42,7 @@ class GuardedServer(viser.ViserServer):
     @property
     def is_viewed(self) -> bool:
         """Whether a browser is connected."""
-        return bool(self._websock_server._live_connections)
+        return bool(self._connections())
 
     def request_share_url(self, verbose: bool = True) -> str | None:
         """None: the scene is never published."""
@@ -52,8 +53,11 @@ class GuardedServer(viser.ViserServer):
         with _quietly():
             super().stop()
 
+    def _connections(self) -> dict[int, ServerConnection]:
+        return self._websock_server._live_connections  # pyright: ignore[reportPrivateUsage] - viser offers none
+
     async def _refuse_strangers(self, client: WebsockClientConnection) -> None:
-        connection = self._websock_server._live_connections.get(client.client_id)
+        connection = self._connections().get(client.client_id)
         if connection is None or connection.request is None:
             return
         shown = connection.request.headers.get_all(RELAY_HEADER)
@@ -66,7 +70,7 @@ class GuardedServer(viser.ViserServer):
 
 
 @contextlib.contextmanager
-def _quietly() -> Iterator[None]:
+def _quietly() -> Generator[None]:
     """Silences viser, which prints its own address and its end even when not verbose: a second address misleads."""
     # One at a time: two that overlap would leave the console silent for good.
     with _CONSOLE:

@@ -6,14 +6,12 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
+from studio.arrays import Array, Bytes
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
 from studio.runs.colour_tokens import Colour, ColourTokens
 from studio.runs.marker_lines import marker_links, marker_sides
 from studio.scene import METRES_PER_MM
-
-Array = NDArray[np.float64]
-Bytes = NDArray[np.uint8]
 
 
 class LinesView:

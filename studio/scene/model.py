@@ -9,21 +9,17 @@ import bisect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from numpy import float64
-from numpy.typing import NDArray
-
+from studio.arrays import Array
 from studio.body.dragging import Dragger
 from studio.body.mirroring import Mirror
 from studio.body.model import BodyModel, extremities
+from studio.jobs.events import Event, FrameFinished, LayerFinished, SettingsApplied, StateChanged
 from studio.knobs import Value
 from studio.runs.marker_lines import extremity_markers
 from studio.runs.tracks import RAW
 from studio.scene.pose_edit import PoseEdit, ended
 from studio.settings import RunSettings, all_knobs, changed_settings, values
-from studio.tracking.tracker import FrameResult, LayerRecord
-from studio.worker.events import Event, FrameFinished, LayerFinished, SettingsApplied, StateChanged
-
-Array = NDArray[float64]
+from studio.trackers.tracker import FrameResult, LayerRecord
 
 SEARCHING = ("tracking", "compiling")
 NEAR_THE_END = 3
@@ -36,8 +32,9 @@ class Selection:
     """The selection of a window. session, run : names, "" while none is open. frame : None while there is none.
 
     layer : one layer's cloud, None for all together. limb, parameter, camera : names. particle : a row of the layer's
-    cloud. look_through : the camera whose place the viewers take, None for the free view. follow : the frame moves on
-    with the tracking. editing : whether a pose is edited.
+    cloud. look_through : the camera whose place the viewers take, None for the free view. eye : from where a viewer
+    looks freely, place and what is looked at (6,) metres, None for the usual place. follow : the frame moves on with
+    the tracking. editing : whether a pose is edited.
     """
 
     session: str = ""
@@ -49,6 +46,7 @@ class Selection:
     particle: int | None = None
     camera: str | None = None
     look_through: str | None = None
+    eye: tuple[float, ...] | None = None
     follow: bool = True
     editing: bool = False
 
@@ -159,8 +157,8 @@ class Knobs:
 
     settings: RunSettings
     since: tuple[int, int] | None = None
-    requested: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
-    drafts: Mapping[str, Value] = field(default_factory=dict)
+    requested: Mapping[str, Mapping[str, Value]] = field(default_factory=dict[str, Mapping[str, Value]])
+    drafts: Mapping[str, Value] = field(default_factory=dict[str, Value])
 
     @property
     def shown(self) -> dict[str, Value]:
@@ -172,9 +170,26 @@ class Knobs:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Ghost:
+    """A body beside the answer, as a cage. pose : (D,) radians and mm. colour : a token."""
+
+    pose: Array
+    colour: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trial:
+    """A body that is being made, at a pose (D,): it stands in place of the session's own, or alone."""
+
+    body: BodyModel
+    pose: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Model:
     """Everything that a scene shows. search : state of the tracking process. subject, knobs, edit : None while nothing
-    is open. frames : the stored ones, ascending.
+    is open. frames : the stored ones, ascending. ghosts : bodies beside the answer, of the shown frame. trial : a body
+    that is being made.
     """
 
     search: StateChanged
@@ -186,6 +201,8 @@ class Model:
     frames: tuple[int, ...] = ()
     knobs: Knobs | None = None
     edit: PoseEdit | None = None
+    ghosts: tuple[Ghost, ...] = ()
+    trial: Trial | None = None
 
     @property
     def is_searching(self) -> bool:
@@ -206,10 +223,12 @@ class Model:
 def same_pictures(one: Model, other: Model) -> bool:
     """Whether the pictures on the cameras of two models are the same; layers as they come are not drawn on them."""
     return (
-        (one.selection, one.options) == (other.selection, other.options)
+        (replace(one.selection, eye=None), one.options) == (replace(other.selection, eye=None), other.options)
         and one.subject is other.subject
         and one.frames is other.frames
         and one.edit is other.edit
+        and one.ghosts is other.ghosts
+        and one.trial is other.trial
         and one.live.result is other.live.result
         and (one.knobs and one.knobs.settings) is (other.knobs and other.knobs.settings)
     )
@@ -229,7 +248,9 @@ def opened(
 ) -> Model:
     """Another session or run is open: its newest frame is shown. subject : None where there is nothing to draw."""
     # Refusals of earlier requests are still reported; their values are of another run.
-    requested = {} if model.knobs is None else {key: {} for key in model.knobs.requested}
+    requested: Mapping[str, Mapping[str, Value]] = (
+        {} if model.knobs is None else {key: {} for key in model.knobs.requested}
+    )
     return replace(
         model,
         selection=Selection(
@@ -241,6 +262,8 @@ def opened(
         frames=tuple(frames),
         knobs=None if settings is None else Knobs(settings, requested=requested),
         edit=edit,
+        ghosts=(),
+        trial=None,
     )
 
 
@@ -248,8 +271,22 @@ def select(model: Model, **changes: object) -> Model:
     """Change the selection by the names of `Selection`. A particle is one of a frame's layer and goes with it."""
     if {"frame", "layer"} & changes.keys():
         changes = {"particle": None} | changes
-    after = replace(model.selection, **changes)  # pyright: ignore[reportArgumentType]
-    return model if after == model.selection else replace(model, selection=after)
+    after = replace(model.selection, **changes)
+    if after == model.selection:
+        return model
+    ghosts = model.ghosts if after.frame == model.selection.frame else ()
+    return replace(model, selection=after, ghosts=ghosts)
+
+
+def discard_what_if(model: Model) -> Model:
+    """Forget the frame that was annealed again: the stored result is shown."""
+    return replace(model, live=LiveSearch()) if model.live.reannealed else model
+
+
+def show_ghosts(model: Model, ghosts: Sequence[Ghost]) -> Model:
+    """Draw bodies beside the answer until another frame is shown; those of another body are left out."""
+    size = 0 if model.subject is None else len(model.subject.body.parameters)
+    return replace(model, ghosts=tuple(ghost for ghost in ghosts if len(ghost.pose) == size))
 
 
 def show_frame(model: Model, frame: int | None) -> Model:
@@ -278,6 +315,11 @@ def look_through(model: Model, camera: str | None) -> Model:
     return select(model, look_through=camera)
 
 
+def limb_clicked(model: Model, limb: str) -> Model:
+    """Choose a limb, or let it go."""
+    return select(model, limb=None if limb == model.selection.limb else limb)
+
+
 def camera_clicked(model: Model, camera: str) -> Model:
     """Look through a camera, or stop looking through it."""
     return look_through(model, None if camera == model.selection.look_through else camera)
@@ -285,7 +327,7 @@ def camera_clicked(model: Model, camera: str) -> Model:
 
 def change_options(model: Model, changes: Mapping[str, object]) -> Model:
     """Change what is shown, by the names of `ViewOptions`."""
-    options = replace(model.options, **changes)  # pyright: ignore[reportArgumentType]
+    options = replace(model.options, **changes)
     return model if options == model.options else replace(model, options=options)
 
 

@@ -3,23 +3,24 @@
 from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array, Indices
 from studio.body.model import BodyModel
 from studio.errors import NotFoundError, SessionError, StudioError
 from studio.geometry.camera import Camera
 from studio.motion_files.trc import MarkerMotion, read_trc
+from studio.runs.moved_knobs import settings_with_moved
 from studio.runs.tracks import RAW, Track, read_track, track_names, track_stamp
 from studio.scene.model import LiveSearch
 from studio.sessions.results_store import ResultsReader
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.settings import RunSettings, default_settings, settings_from_values
-from studio.tracking.tracker import FrameResult, LayerRecord
-
-Array = NDArray[np.float64]
+from studio.settings import RunSettings, default_settings
+from studio.trackers.tracker import FrameResult, LayerRecord
 
 _KEPT_FRAMES = 8
 
@@ -143,7 +144,7 @@ class OpenedRun:
         """
         if self.truth is None:
             return None
-        rows = np.round((self.truth.times - self.truth.times[0]) * self.fps).astype(np.int64)
+        rows: Indices = np.round((self.truth.times - float(self.truth.times[0])) * self.fps).astype(np.int64)
         place = int(np.searchsorted(rows, frame))
         return self.truth.positions[place] if place < len(rows) and rows[place] == frame else None
 
@@ -155,14 +156,8 @@ class OpenedRun:
         return self.body.neutral if stored is None else stored
 
     def settings(self) -> RunSettings:
-        """The settings last in use in the run, else the defaults."""
-        if self.run is None or self.results is None:
-            return default_settings()
-        record = self.run.record
-        history = self.results.settings_history()
-        return settings_from_values(
-            record.tracker, record.weighting, history[-1].values if history else record.settings
-        )
+        """The settings that the run goes on with, else the defaults."""
+        return default_settings() if self.run is None else settings_with_moved(self.run)
 
     def moment(
         self,
@@ -223,7 +218,10 @@ def _at_least(count: int, records: Sequence[LayerRecord]) -> int:
     return max(count, *(record.layer + 1 for record in records)) if records else count
 
 
-def _keep(store: OrderedDict, key: int, value: object) -> None:
+Kept = TypeVar("Kept")
+
+
+def _keep(store: OrderedDict[int, Kept], key: int, value: Kept) -> None:
     store[key] = value
     while len(store) > _KEPT_FRAMES:
         store.popitem(last=False)

@@ -5,6 +5,7 @@ from html import escape
 import numpy as np
 import viser
 
+from studio.jobs.events import StateChanged
 from studio.runs.colour_tokens import ColourTokens
 from studio.scene.controls import Change, Post
 from studio.scene.model import Model
@@ -12,8 +13,7 @@ from studio.scene.opened_run import Moment
 from studio.scene.pose_panel import PosePanel
 from studio.scene.settings_panel import Request, SettingsPanel
 from studio.scene.show_panel import ShowPanel, css
-from studio.tracking.tracker import LIMB_LOST, LOST, NO_EVIDENCE, RECOVERED
-from studio.worker.events import StateChanged
+from studio.trackers.tracker import LIMB_LOST, LOST, NO_EVIDENCE, RECOVERED
 
 PANEL_WIDTH = 310
 MARKS = {
@@ -36,7 +36,7 @@ class Panel:
         gui.main_panel.set_width(PANEL_WIDTH)
         self.status = gui.add_html("")
         self.mark = gui.add_html("", visible=False)
-        tabs = gui.add_tab_group()
+        self.tabs = tabs = gui.add_tab_group()
         search, show, weighting, masks, pose = (
             tabs.add_tab(name) for name in ("Search", "Show", "Likelihood", "Masks", "Pose")
         )
@@ -80,6 +80,8 @@ def notify(server: viser.ViserServer, title: str, body: str, *, bad: bool = Fals
 def status_html(model: Model) -> str:
     """The shown run and its state: two lines."""
     selection, state, subject = model.selection, model.search, model.subject
+    if model.trial is not None:
+        return _two_lines(model.trial.body.title, "As it is being made.")
     if subject is None or model.is_searched or state.state == "lost":
         return search_html(state)
     first, last = subject.span
@@ -97,7 +99,9 @@ def search_html(state: StateChanged) -> str:
     messages = [part for part in (state.message, state.hint) if part]
     if state.live is not None:
         return _two_lines(name, " · ".join(messages) or state.live.in_words)
-    parts = [f"frame {state.frame}", f"{state.done} of {state.last - state.first} done"]
+    parts = [f"{state.done} of {state.last - state.first} done"]
+    if state.frame < state.last:
+        parts.insert(0, f"frame {state.frame}")
     if state.state == "tracking" and state.frames_per_second == state.frames_per_second:
         parts.append(f"{state.frames_per_second:.3g} fps")
     if state.state == "tracking" and state.seconds_left == state.seconds_left:

@@ -9,15 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
 from studio.runs.colour_tokens import ColourTokens
 from studio.scene import METRES_PER_MM
-from studio.tracking.tracker import LayerRecord
-
-Array = NDArray[np.float64]
+from studio.trackers.tracker import LayerRecord
 
 FAR_END = 1
 MOST_DRAWN = 4000

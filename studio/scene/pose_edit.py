@@ -3,13 +3,11 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from studio.arrays import Array
 from studio.body.dragging import Dragger
 from studio.body.mirroring import Mirror
-
-Array = NDArray[np.float64]
 
 REMEMBERED = 200
 UNDO, RESET = "undo", "reset"

@@ -4,17 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 from viser.transforms import SO3
 
+from studio.arrays import Array
 from studio.body.dragging import Dragger
 from studio.runs.colour_tokens import ColourTokens
 from studio.scene import METRES_PER_MM
 from studio.scene.controls import Post
 from studio.scene.model import Model, edit_pose
 from studio.scene.pose_edit import PoseEdit, dragged
-
-Array = NDArray[np.float64]
 
 RADIUS = 0.032
 GRIP_SCALE, ROOT_SCALE = 0.28, 0.5

@@ -5,7 +5,7 @@ import math
 import viser
 
 from studio.body.model import BodyModel, Parameter
-from studio.scene.controls import Change, Control, Post, on_press
+from studio.scene.controls import Change, Control, Post, on_press, take_out
 from studio.scene.model import Model, Subject, edit_pose
 from studio.scene.pose_edit import (
     MIRROR,
@@ -79,7 +79,7 @@ class PosePanel:
     def _offer(self, subject: Subject, edit: PoseEdit) -> None:
         """Make the controls of another body."""
         for folder in self._folders:
-            folder.remove()
+            take_out(folder)
         self._body, self._folders, self.sliders = subject.body, [], {}
         groups: dict[str, list[int]] = {}
         for index, parameter in enumerate(subject.body.parameters):

@@ -6,13 +6,13 @@ needs nothing else. In gaps the body is hidden.
 
 import base64
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
 import zstandard
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.forward_kinematics import limb_ends
 from studio.errors import ExportError
 from studio.export.task import ExportTask, Written, agreed
@@ -22,8 +22,6 @@ from studio.scene.body_view import BodyView, limb_frames
 from studio.scene.camera_views import CameraView
 from studio.scene.floor_view import FloorView
 from studio.scene.guarded_server import GuardedServer
-
-Array = NDArray[np.float64]
 
 BODY = "/body"
 PAGE = ".html"
@@ -37,7 +35,7 @@ class Recording(NamedTuple):
     """The content of a recording. seconds : its length. messages : (time, message) in order, as viser decodes them."""
 
     seconds: float
-    messages: list[tuple[float, dict]]
+    messages: list[tuple[float, dict[str, Any]]]
 
 
 def record_scene(task: ExportTask) -> Written:

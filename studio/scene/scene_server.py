@@ -8,31 +8,33 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
+from studio.body.model import BodyModel
 from studio.errors import SettingsError
+from studio.jobs.control import StudioControl
 from studio.scene.controller import SceneController
 from studio.scene.guarded_server import GuardedServer
 from studio.scene.model import (
+    Ghost,
     Selection,
     ViewOptions,
     change_options,
+    discard_what_if,
     look_through,
     select,
     set_playback,
     show_frame,
+    show_ghosts,
 )
 from studio.sessions.workspace import Workspace
-from studio.worker.control import StudioControl
-
-Array = NDArray[np.float64]
 
 
 class SceneServer:
     """The scene of one window. process : the tracking process, shared by all windows.
 
     moved : called with every move that the scene's own controls, its playback or the tracking make, in the scene's
-    thread; it returns at once. Moves made through `show_run` and its like are not reported.
+    thread; it returns at once. bare : without controls. Moves made through `show_run` and its like are not reported.
     """
 
     def __init__(
@@ -40,9 +42,12 @@ class SceneServer:
         workspace: Workspace,
         process: StudioControl,
         moved: Callable[[Selection], None] = lambda _: None,
+        *,
+        bare: bool = False,
     ) -> None:
         self._server = GuardedServer()
         self._controller = SceneController(self._server, workspace, process, moved)
+        self._controller.bare = bare
         self._controller.start()
         self.poses = ScenePoses(self._controller)
         self.port: int = self._server.get_port()
@@ -91,6 +96,24 @@ class SceneServer:
     def look_through(self, camera: str | None) -> None:
         """Put the viewers into a camera's place, or back where they were (None or "")."""
         self._controller.post(look_through, camera or None, announce=False)
+
+    def look_from(self, eye: Sequence[float] | None) -> None:
+        """Put the viewers' eyes at a place, looking at another: (6,) metres; None: the usual place."""
+        place = None if eye is None else tuple(map(float, eye))
+        self._controller.post(self._controller.look_from, place, announce=False)
+
+    def discard_what_if(self) -> None:
+        """Forget the frame that was annealed again."""
+        self._controller.post(discard_what_if, announce=False)
+
+    def show_ghosts(self, ghosts: Sequence[tuple[str, Sequence[float]]]) -> None:
+        """Draw bodies beside the answer until another frame is shown: a colour's token and a pose (D,) of each."""
+        shown = [Ghost(np.array(pose, dtype=np.float64), colour) for colour, pose in ghosts]
+        self._controller.post(show_ghosts, shown, announce=False)
+
+    def try_body(self, session: str, body: BodyModel | None) -> None:
+        """Show a body that is being made in place of a session's own, or ("") alone; None: no longer."""
+        self._controller.post(self._controller.try_body, session, body, announce=False)
 
     def set_options(self, **changes: object) -> None:
         """Change what is drawn, by the names of `ViewOptions`. Raises SettingsError for a name that is none."""

@@ -1,35 +1,36 @@
 """All objects in the scene of an opened session or run: made when it is opened, then only moved."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 
+from studio.arrays import Array, Bytes
 from studio.body.forward_kinematics import limb_ends
+from studio.body.scale import scale_of
 from studio.errors import StudioError
 from studio.runs.colour_tokens import ColourTokens
-from studio.runs.overlay_pictures import ViewComposer
+from studio.runs.overlay_pictures import OtherBody, ViewComposer
 from studio.scene import METRES_PER_MM
 from studio.scene.body_view import BodyView
 from studio.scene.camera_views import LONGEST_SIDE, CameraViews
 from studio.scene.floor_view import FloorView
 from studio.scene.frame_volume import FrameVolumes, has_blobs
 from studio.scene.line_views import TrailView, TruthView
-from studio.scene.model import Model
+from studio.scene.model import Ghost, Model
 from studio.scene.opened_run import Moment, OpenedRun
 from studio.scene.particle_view import CloudStyle, ParticleView
 from studio.scene.volume_view import VolumeView
-from studio.tracking.tracker import LOST, NO_EVIDENCE
+from studio.trackers.tracker import LOST, NO_EVIDENCE
 
-Array = NDArray[np.float64]
-
-DOUBTFUL, EDITED, STORED = 0.35, 0.6, 0.35
+DOUBTFUL, EDITED, STORED, GHOST = 0.35, 0.6, 0.35, 0.6
 """Opacity of a body that is held or known to be lost, of one being edited (so that handles behind a limb can be
-grasped), and of the stored result beside another."""
+grasped), of the stored result beside another, and of bodies that were asked for beside the answer."""
 TRAIL_SECONDS = 1.0
 _VIEW_ELEVATION = 0.34
+_ASKANCE = 0.7
+"""Radians from straight ahead, where there are no cameras: what is longer than high is seen at its length."""
 _LEAST_DISTANCE, _MOST_DISTANCE = 2.6, 9.0
 _FIELD_OF_VIEW = 0.85
 _LOOK_HIGHER = np.array([0.0, 0.0, 0.2])
@@ -38,8 +39,8 @@ _LOOK_HIGHER = np.array([0.0, 0.0, 0.2])
 class SceneViews:
     """Draws a model of an opened run. Used by the scene's thread only.
 
-    clicked : called with a camera's name when it is clicked. volume_made, failed : called when a hull was made, or
-    with the reason why it cannot be. All three are called in other threads.
+    clicked, limb_clicked : called with the name of a camera or limb that is clicked. volume_made, failed : called when
+    a hull was made, or with the reason why it cannot be. All are called in other threads.
     """
 
     def __init__(
@@ -48,15 +49,17 @@ class SceneViews:
         opened: OpenedRun,
         *,
         clicked: Callable[[str], None] = lambda _: None,
+        limb_clicked: Callable[[str], None] = lambda _: None,
         volume_made: Callable[[], None] = lambda: None,
         failed: Callable[[StudioError], None] = lambda _: None,
     ) -> None:
         self._server, self._opened = server, opened
         body, centres = opened.body, [camera.centre for camera in opened.cameras]
         self._person = limb_ends(body, opened.start_pose()[None])[0].reshape(-1, 3)
-        self.floor = FloorView(server, [*centres, self._person.mean(axis=0)])
-        self.body = BodyView(server, body, name="/body")
+        self.floor = FloorView(server, [*centres, self._person.mean(axis=0)], scale_of(body))
+        self.body = BodyView(server, body, name="/body", clicked=limb_clicked)
         self.beside = BodyView(server, body, name="/stored", ghost=True)
+        self.ghosts: list[BodyView] = []
         self.particles = ParticleView(server, body)
         self.trails = TrailView(server, body)
         self.volume = VolumeView(server, body)
@@ -93,25 +96,53 @@ class SceneViews:
         )
         markers = subject.listed("trail_markers", options) if options.trails else ()
         through = model.selection.look_through
+        is_free = through is None
         with self._server.atomic():
-            self.body.show(moment.pose if options.body else None, tokens, min(options.body_opacity, most))
-            self.beside.show(moment.beside if options.stored else None, tokens, STORED)
+            opacity, limb = min(options.body_opacity, most), model.selection.limb
+            # Through a camera the body is the outline in the picture.
+            own = moment.pose if options.body and is_free and model.trial is None else None
+            self.body.show(own, tokens, opacity, limb)
+            self.beside.show(moment.beside if options.stored and is_free else None, tokens, STORED)
+            self._show_ghosts((*(model.ghosts if is_free else ()), *chosen_particle(model, moment)), tokens)
             self.truth.show(moment.truth if options.truth else None, tokens)
             self.particles.show(moment.records if options.particles else (), style, tokens)
             self.trails.show(moment.frame, markers, int(options.trail_frames), tokens)
             self.volume.show(volume, moment.pose, tokens, hull=options.hull, blobs=options.blobs)
             self.cameras.show(tokens, options.cameras, options.pictures, through)
             # Through a camera the floor is the one in the picture.
-            self.floor.show(tokens, through is None)
+            self.floor.show(tokens, is_free)
+
+    def _show_ghosts(self, ghosts: Sequence[Ghost], tokens: ColourTokens) -> None:
+        """Draw bodies beside the answer; their meshes are made when they are first needed."""
+        for at in range(len(self.ghosts), len(ghosts)):
+            self.ghosts.append(BodyView(self._server, self._opened.body, name=f"/beside/{at}", ghost=True))
+        for at, view in enumerate(self.ghosts):
+            ghost = ghosts[at] if at < len(ghosts) else None
+            if ghost is not None:
+                view.colour = ghost.colour
+            view.show(None if ghost is None else ghost.pose, tokens, GHOST)
 
     def hang_pictures(self, model: Model, moment: Moment, tokens: ColourTokens) -> None:
         """Compose the pictures of a moment and hang them on the cameras; one that cannot be made stays unchanged."""
         subject, knobs, options, selection = model.subject, model.knobs, model.options, model.selection
         if subject is None or knobs is None or not (options.pictures or selection.look_through):
             return
+        trial = model.trial
         records = [record for record in moment.records if selection.layer in (None, record.layer)]
-        pictures = {}
+        pictures: dict[str, Bytes] = {}
+        # Beside a frame that is annealed again stands the stored result, beside a compared run the others.
+        others = [] if moment.beside is None else [OtherBody(moment.beside, "before")]
+        others += [OtherBody(ghost.pose, ghost.colour) for ghost in model.ghosts]
+        own = (
+            "after"
+            if moment.beside is not None
+            else "series-0"
+            if any(ghost.colour.startswith("series") for ghost in model.ghosts)
+            else ""
+        )
         for camera in self._opened.cameras:
+            is_behind = camera.name == selection.look_through
+            overlays = (*options.overlays, "outline") if is_behind else options.overlays
             shrink = min(1.0, LONGEST_SIDE / max(camera.width, camera.height))
             try:
                 if self._composer is None:
@@ -121,11 +152,14 @@ class SceneViews:
                 pictures[camera.name] = self._composer.compose(
                     subject.span[0] if moment.frame is None else moment.frame,
                     camera.name,
-                    options.overlays,
-                    pose=moment.pose,
+                    tuple(dict.fromkeys(overlays)),
+                    pose=moment.pose if trial is None else trial.pose,
+                    body=None if trial is None else trial.body,
                     clouds=records,
                     limbs=subject.chosen_limbs(options),
                     height=round(camera.height * shrink),
+                    beside=others,
+                    own=own,
                 )
             except StudioError:
                 continue
@@ -138,6 +172,7 @@ class SceneViews:
         position, middle = first_view(
             self._person * METRES_PER_MM,
             [camera.centre * METRES_PER_MM for camera in self._opened.cameras],
+            scale_of(self._opened.body),
         )
         view = self._server.initial_camera
         view.position, view.look_at, view.fov = position, middle, _FIELD_OF_VIEW
@@ -155,17 +190,28 @@ class SceneViews:
             self._trails_of, self._trails_read = (track, frames), now
 
 
-def first_view(person: Array, cameras: list[Array]) -> tuple[Array, Array]:
-    """A place to look from (3,) and at (3,), metres. person : (K, 3) its limbs' ends. cameras : their centres (3,)."""
-    middle = (person.min(axis=0) + person.max(axis=0)) / 2.0 + _LOOK_HIGHER
+def chosen_particle(model: Model, moment: Moment) -> tuple[Ghost, ...]:
+    """The chosen particle of the shown layer (of the last one where all are shown), as a body beside the answer."""
+    chosen, layer = model.selection.particle, model.selection.layer
+    record = next((one for one in reversed(moment.records) if layer in (None, one.layer)), None)
+    if chosen is None or record is None or chosen >= len(record.poses):
+        return ()
+    return (Ghost(record.poses[chosen], "accent"),)
+
+
+def first_view(person: Array, cameras: list[Array], scale: float = 1.0) -> tuple[Array, Array]:
+    """A place to look from (3,) and at (3,), metres. person : (K, 3) its limbs' ends. cameras : their centres (3,).
+    scale : of the body beside a person.
+    """
+    middle = (person.min(axis=0) + person.max(axis=0)) / 2.0 + scale * _LOOK_HIGHER
     height = float(np.ptp(person[:, 2]))
     away = [float(np.linalg.norm(centre - middle)) for centre in cameras]
     wanted = max(2.3 * height, 1.1 * float(np.mean(away)) if away else 0.0)
-    distance = float(np.clip(wanted, _LEAST_DISTANCE, _MOST_DISTANCE))
+    distance = float(np.clip(wanted, scale * _LEAST_DISTANCE, scale * _MOST_DISTANCE))
     # Towards the gap between the first camera and its neighbour.
     bearings = [float(np.arctan2(centre[1] - middle[1], centre[0] - middle[0])) for centre in cameras]
     gaps = [np.mod(other - bearings[0], 2.0 * np.pi) for other in bearings[1:]]
     half = min(gaps) / 2.0 if gaps and 0.2 < min(gaps) < 2.6 else 0.5
-    bearing = bearings[0] + half if bearings else 0.0
+    bearing = bearings[0] + half if bearings else _ASKANCE
     toward = np.array([np.cos(bearing), np.sin(bearing), _VIEW_ELEVATION])
     return middle + distance * toward, middle

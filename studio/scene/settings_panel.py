@@ -6,14 +6,15 @@ changed value carries a dot in its label and a button that puts the default back
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import viser
 
 from studio.knobs import Knob, Value, allowed, knobs_of
-from studio.scene.controls import Control, Post, on_press
+from studio.scene.controls import Control, Post, on_press, take_out
 from studio.scene.model import Knobs, Model
 from studio.settings import RunSettings, values
-from studio.tracking.catalogue import presets
+from studio.trackers.catalogue import presets
 
 FOREMOST = 6
 NO_PRESET = "choose …"
@@ -64,19 +65,19 @@ class SettingsPanel:
 
     def _build(self, settings: RunSettings) -> None:
         for folder in self._folders:
-            folder.remove()
+            take_out(folder)
         self._folders, self._resets, self.inputs = [], [], {}
         now = values(settings)
         with self._search, self._folder():
             self.since = self._gui.add_markdown("")
             self._add_presets(now)
-            tracker = knobs_of(type(settings.tracker))
+            tracker = knobs_of(settings.tracker)
             self._add(tracker[:FOREMOST], now)
             others = [
                 ("More of the search", tracker[FOREMOST:]),
-                ("Refinement", knobs_of(type(settings.refinement))),
-                ("When lost", knobs_of(type(settings.recovery))),
-                ("Recording", knobs_of(type(settings.recording))),
+                ("Refinement", knobs_of(settings.refinement)),
+                ("When lost", knobs_of(settings.recovery)),
+                ("Recording", knobs_of(settings.recording)),
             ]
             for label, declared in others:
                 if declared:
@@ -85,7 +86,7 @@ class SettingsPanel:
             self._add_reset([*tracker[:FOREMOST], *(knob for _, declared in others for knob in declared)])
         for tab, group in ((self._weighting, settings.weighting), (self._masks, settings.evidence)):
             with tab, self._folder():
-                declared = knobs_of(type(group))
+                declared = knobs_of(group)
                 self._add(declared, now)
                 self._add_reset(declared)
 
@@ -112,7 +113,11 @@ class SettingsPanel:
         changeable = tuple(knob for knob in declared if knob.takes_effect != "new run")
         button = self._gui.add_button("Reset to defaults", color="gray", visible=False)
         defaults = {knob.name: knob.default for knob in changeable}
-        on_press(button, self._post, lambda model: self._request(model, defaults))
+
+        def reset(model: Model) -> Model:
+            return self._request(model, defaults)
+
+        on_press(button, self._post, reset)
         self._resets.append((button, changeable))
 
 
@@ -127,7 +132,11 @@ class KnobInput:
         )
         # A group of one button is small and stands in line with its input.
         self.reset = gui.add_button_group(" ", (f"reset to {in_words(knob, knob.default)}",), visible=False)
-        on_press(self.reset, post, lambda model, _: request(model, {knob.name: knob.default}))
+
+        def put_back(model: Model, _pressed: str) -> Model:
+            return request(model, {knob.name: knob.default})
+
+        on_press(self.reset, post, put_back)
 
     def show(self, value: Value) -> None:
         """Show the knob's value."""
@@ -182,13 +191,11 @@ def slider_range(knob: Knob, value: Value) -> tuple[float, float, float]:
     return round(start, 9), round(end, 9), step
 
 
-def _make(gui: viser.GuiApi, knob: Knob, value: Value) -> viser.GuiInputHandle:
+def _make(gui: viser.GuiApi, knob: Knob, value: Value) -> viser.GuiInputHandle[Any]:
     default = in_words(knob, knob.default)
     hint = f"{knob.help} Default {default}; {allowed(knob)}. Takes effect: {knob.takes_effect}."
-    label, more = (
-        title(knob, value != knob.default),
-        {"hint": hint, "disabled": knob.takes_effect == "new run"},
-    )
+    label = title(knob, value != knob.default)
+    more: dict[str, Any] = {"hint": hint, "disabled": knob.takes_effect == "new run"}
     if knob.kind is bool:
         return gui.add_checkbox(label, bool(value), **more)
     if knob.choices:

@@ -2,18 +2,25 @@
 
 from collections.abc import Callable
 from html import escape
+from typing import Any
 
 import viser
 
 from studio.body.model import BodyModel
 from studio.runs.colour_tokens import ColourTokens
 from studio.runs.overlay_drawing import OVERLAYS
-from studio.scene.controls import Control, Post
+from studio.scene.controls import Control, Post, take_out
 from studio.scene.frame_volume import has_blobs
 from studio.scene.model import Model, Subject, change_options, tick_listed
 from studio.scene.opened_run import Moment
 
-OVERLAY_WORDS = {"edges": "edge map", "samples": "sample points", "outline": "outlines"}
+OVERLAY_WORDS = {
+    "edges": "edge map",
+    "samples": "sample points",
+    "outline": "outlines",
+    "filled": "filled bodies",
+    "cost": "cost of the samples",
+}
 SWITCHES = (
     ("body", "body", "The body's cones: left limbs cyan, right limbs yellow, torso and head magenta."),
     ("truth", "truth", "The reference as a stick figure, where the session has one."),
@@ -81,7 +88,7 @@ class ShowPanel:
 
     def _list_body(self, subject: Subject) -> None:
         for folder in self._lists:
-            folder.remove()
+            take_out(folder)
         self.ticks = {key: control for key, control in self.ticks.items() if key[0] == "overlays"}
         self._body, self._lists = subject.body, []
         for title, name, entries in (
@@ -97,7 +104,7 @@ class ShowPanel:
     def _add(
         self,
         name: str,
-        handle: viser.GuiInputHandle,
+        handle: viser.GuiInputHandle[Any],
         meant: Callable[[float], object] = lambda value: value,
     ) -> None:
         """meant : converts an input's value to the option's."""

@@ -12,15 +12,13 @@ import viser
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from studio.arrays import Array, Bytes
 from studio.body.model import BodyModel
 from studio.runs.colour_tokens import ColourTokens
 from studio.scene import METRES_PER_MM
 from studio.scene.frame_volume import FrameVolume
 from studio.volume.blob_model import BlobMixture, BlobModel
 from studio.volume.hull import Hull
-
-Array = NDArray[np.float64]
-Bytes = NDArray[np.uint8]
 
 BLOB_REACH = 2.0
 SOLID = 0.75

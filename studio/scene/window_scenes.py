@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 from studio.capture.video import give_back_freed_memory
 from studio.errors import StudioError
+from studio.jobs.control import StudioControl
 from studio.scene.model import Selection
 from studio.scene.recording import record_scene
 from studio.scene.scene_server import SceneServer
 from studio.sessions.workspace import Workspace
-from studio.worker.control import StudioControl
 
 MOST_SCENES = 32
 """A scene takes two threads, six file descriptors and about 25 MB with four cameras of 640 × 480."""
@@ -61,8 +61,9 @@ class WindowScenes:
         """
         self._moved = moved
 
-    def scene(self, window: str) -> SceneServer:
-        """The scene of a window, built where there is none yet (that blocks for some 30 ms).
+    def scene(self, window: str, bare: bool = False) -> SceneServer:
+        """The scene of a window, built where there is none yet (that blocks for some 30 ms). bare : without controls,
+        for who may only look.
 
         Raises TooManyScenesError when no other scene can make room.
         """
@@ -70,7 +71,9 @@ class WindowScenes:
             entry = self._entries.get(window)
             if entry is None:
                 self._make_room()
-                scene = SceneServer(self._workspace, self._process, lambda shown: self._moved(window, shown))
+                scene = SceneServer(
+                    self._workspace, self._process, lambda shown: self._moved(window, shown), bare=bare
+                )
                 entry = self._entries[window] = _Entry(scene, 0.0)
             entry.used = time.monotonic()
             return entry.scene

@@ -9,7 +9,7 @@ import shutil
 import stat
 import tarfile
 import zipfile
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Generator, Iterator
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from pathlib import Path
@@ -126,7 +126,7 @@ def unpacked(folder: Path) -> Path:
 
 
 @contextlib.contextmanager
-def folder_of(source: Path, parts: Collection[str], beside: Path) -> Iterator[Path]:
+def folder_of(source: Path, parts: Collection[str], beside: Path) -> Generator[Path]:
     """A source's folder: itself, or the content of an archive, unpacked beside `beside` while it is in use.
 
     parts : as of `unwrapped`. Raises ArchiveError, PathRefused.
@@ -145,7 +145,7 @@ def folder_of(source: Path, parts: Collection[str], beside: Path) -> Iterator[Pa
 
 
 @contextlib.contextmanager
-def _entries(archive: Path) -> Iterator[Iterator[_Entry]]:
+def _entries(archive: Path) -> Generator[Iterator[_Entry]]:
     if archive.name.lower().endswith(TARS):
         with tarfile.open(archive) as tar:
             yield (_tar_entry(tar, member) for member in tar if member.name not in (".", "./"))

@@ -11,7 +11,7 @@ import os
 import shutil
 import sqlite3
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -57,7 +57,7 @@ def copy_file(source: Path, path: Path) -> None:
 
 def new_folder_beside(path: Path) -> Path:
     """An empty hidden folder next to `path`, to be filled and then given to `move_into_place`. Raises SessionError."""
-    with writing("What belongs beside", path):
+    with writing("The folder", path.parent):
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
         except FileExistsError as error:
@@ -85,7 +85,7 @@ def discard(folder: Path) -> None:
 
 
 @contextlib.contextmanager
-def made_whole(place: Path) -> Iterator[Path]:
+def made_whole(place: Path) -> Generator[Path]:
     """An empty hidden folder to be filled, which is then renamed to `place`; where anything fails, nothing is left.
 
     Raises SessionError if something is at the place.
@@ -139,7 +139,7 @@ def unwritable(what: str, path: Path, error: OSError | sqlite3.Error | UnicodeDe
 
 
 @contextmanager
-def writing(what: str, path: Path) -> Iterator[None]:
+def writing(what: str, path: Path) -> Generator[None]:
     """What the disk refuses inside, in words; that something is there already passes. what : as of `unwritable`. Raises
     SessionError.
     """

@@ -2,40 +2,63 @@
 
 background/…                 plates and clips; the manifest names the one in use
 exclusions/<camera>.png      white where nothing counts: a bystander, a monitor
+person_masks/<n>/<camera>/…  masks that the studio made of a person, a PNG a frame, as those that come with footage; the
+                             manifest names those in use
+stroke_masks/<n>/<camera>/…  those made of brush strokes (`stroke_files`)
+chosen_masks/<n>/<camera>/…  those of the source that suits each camera best
+subject_masks/<n>/<camera>/… those of one of several subjects in view; subject_masks/<n>/whole/<camera>/… those of all,
+                             of which they were cut
 evidence.json                knobs of `evidence.settings` that new runs of the session start with, and the
-                             given backgrounds, where cleaned ones are in use
+                             given backgrounds and masks, where others are in use
 """
 
+import contextlib
 import dataclasses
-from collections.abc import Mapping
+import shutil
+from collections.abc import Generator, Iterable, Mapping
 from pathlib import Path
 
 import msgspec
 import numpy as np
 
 from studio.arrays import Array, Bytes
-from studio.capture.footage import EXCLUSIONS, background_turn
+from studio.capture.footage import EXCLUSIONS, background_turn, turned_picture
 from studio.capture.footage_source import CameraSource
 from studio.capture.pictures import check_picture, is_picture, painted_picture, png_of, with_polygon
 from studio.capture.video import measure_video
 from studio.errors import FootageError, NotFoundError
 from studio.evidence.backgrounds import check_plate_size
 from studio.sessions import atomic_files
+from studio.sessions.names import free_name, name_from
 from studio.sessions.record_files import RecordFile
 from studio.sessions.session import Session, described_anew
 
 EVIDENCE_NAME, BACKGROUND_NAME = "evidence.json", "background"
-SCHEMA_VERSION = 1
+PERSON_MASKS, STROKE_MASKS, CHOSEN_MASKS, SUBJECT_MASKS = HOMES = (
+    "person_masks",
+    "stroke_masks",
+    "chosen_masks",
+    "subject_masks",
+)
+WHOLE = "whole"
+SCHEMA_VERSION = 2
+MASKS_GONE = (
+    "The masks that the studio made were of the footage as it was before, and are gone: make them again with 'studio"
+    " background SESSION --source person' (or strokes, or best)."
+)
 
 Knob = bool | int | float | str
 
 
 class SessionEvidence(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """knobs : by flat name. given : camera to the given background, where a cleaned one is in use."""
+    """knobs : by flat name. given : camera to the given background, where a cleaned one is in use. given_masks : camera
+    to the masks that came with its footage, "" for none, where the studio's own are in use.
+    """
 
     schema: int = SCHEMA_VERSION
     knobs: dict[str, Knob] = {}
     given: dict[str, str] = {}
+    given_masks: dict[str, str] = {}
 
 
 _RECORD = RecordFile(
@@ -44,6 +67,8 @@ _RECORD = RecordFile(
     "Remove it, and set the background again.",
     ("Session '{name}' has no background.", "Set it again."),
     SCHEMA_VERSION,
+    # Version 1 knew no masks of the studio's own.
+    {1: lambda entries: entries},
 )
 
 
@@ -68,7 +93,7 @@ def use_cleaned(session: Session, contents: Mapping[str, Bytes]) -> Session:
     folder = session.path / BACKGROUND_NAME
     folder.mkdir(exist_ok=True)
     given = {source.name: source.background for source in session.manifest.footage.cameras}
-    names = {}
+    names: dict[str, str] = {}
     for camera, picture in contents.items():
         place = folder / f"{_source(session, camera).name}-clean.png"
         atomic_files.write_bytes(place, png_of(picture))
@@ -103,7 +128,7 @@ def set_backgrounds(session: Session, files: Mapping[str, Path]) -> Session:
         check_plate_size(given, size, path.name)
     folder = session.path / BACKGROUND_NAME
     folder.mkdir(exist_ok=True)
-    names = {}
+    names: dict[str, str] = {}
     for camera, path in files.items():
         place = folder / f"{camera}{path.suffix.lower()}"
         if place.resolve() != path.resolve():
@@ -121,6 +146,139 @@ def use_backgrounds(session: Session, names: Mapping[str, str]) -> Session:
     cameras = tuple(
         dataclasses.replace(source, background=names.get(source.name, source.background))
         for source in footage.cameras
+    )
+    changed = dataclasses.replace(footage, cameras=cameras)
+    return described_anew(session, msgspec.structs.replace(session.manifest, footage=changed))
+
+
+class MadeMasks:
+    """A folder that is filled with masks of a session, which then takes its place."""
+
+    def __init__(self, session: Session, folder: Path) -> None:
+        self.folder = folder
+        self._sources = {source.name: source for source in session.manifest.footage.cameras}
+        self._places: dict[str, str] = {}
+        for name, source in self._sources.items():
+            self._places[name] = free_name(name_from(name, "camera"), set(self._places.values()))
+            with atomic_files.writing("The masks in", folder):
+                (folder / self._places[name]).mkdir()
+            # Masks are counted as the file's frames are, of which the session's first is not the first.
+            for before in range(-source.offset, 0):
+                self.put(name, before, np.zeros((source.height, source.width), np.uint8))
+
+    def put(self, camera: str, frame: int, mask: Bytes) -> None:
+        """Write a mask (H, W), 0 or 255, of a frame of the session, as the camera's file shows it: not turned."""
+        source = self._sources[camera]
+        with atomic_files.writing("The masks in", self.folder):
+            stored = turned_picture(mask, -source.turned % 360)
+            self._path(camera, frame).write_bytes(png_of(stored))
+
+    def take_over(self, camera: str, frame: int, stored: Path) -> None:
+        """Put a mask that lies in the session as this would write it."""
+        with atomic_files.writing("The masks in", self.folder):
+            self._path(camera, frame).write_bytes(stored.read_bytes())
+
+    @property
+    def folders(self) -> dict[str, str]:
+        """Camera to the name of its masks' folder in this one."""
+        return dict(self._places)
+
+    def names(self, place: str) -> dict[str, str]:
+        """Camera to its masks' folder. place : of this folder in the session."""
+        return {camera: f"{place}/{name}" for camera, name in self._places.items()}
+
+    def _path(self, camera: str, frame: int) -> Path:
+        return self.folder / self._places[camera] / mask_name(self._sources[camera], frame)
+
+
+def mask_name(source: CameraSource, frame: int) -> str:
+    """The file of a camera's mask of a frame of the session, counted as its footage's file is."""
+    return f"{source.offset + frame:06d}.png"
+
+
+def made_folders(session: Session, home: str) -> list[Path]:
+    """The folders of masks of one of HOMES, the newest last."""
+    found = [path for path in (session.path / home).glob("*") if path.name.isdigit()]
+    return sorted(found, key=lambda path: int(path.name))
+
+
+@contextlib.contextmanager
+def made_masks(session: Session, home: str) -> Generator[MadeMasks]:
+    """Masks to be filled in; at the end, unless anything failed, they take their place in `home`, one of HOMES, and are
+    used.
+
+    Earlier ones stay until `forget_unused_masks`. Raises SessionError.
+    """
+    numbers = [int(path.name) for path in made_folders(session, home)]
+    place = f"{home}/{max(numbers, default=0) + 1}"
+    with atomic_files.made_whole(session.path / place) as folder:
+        made = MadeMasks(session, folder)
+        yield made
+    evidence = read_evidence(session)
+    write_evidence(session, msgspec.structs.replace(evidence, given_masks=given_masks_of(session)))
+    use_masks(session, made.names(place))
+
+
+def given_masks_of(session: Session) -> dict[str, str]:
+    """Camera to the masks that came with its footage, "" for none, whatever masks are in use."""
+    given = read_evidence(session).given_masks
+    return {
+        source.name: given.get(source.name, "") if has_made_masks(source) else source.masks
+        for source in session.manifest.footage.cameras
+    }
+
+
+def has_made_masks(source: CameraSource) -> bool:
+    """Whether the masks in use are the studio's own."""
+    return home_of_masks(source) != ""
+
+
+def home_of_masks(source: CameraSource) -> str:
+    """Which of HOMES the masks in use lie in, "" for none."""
+    home = source.masks.partition("/")[0]
+    return home if home in HOMES else ""
+
+
+def without_made_masks(session: Session, cameras: Iterable[CameraSource]) -> tuple[CameraSource, ...]:
+    """Some of the session's cameras, with the masks that came with their footage."""
+    given = given_masks_of(session)
+    return tuple(
+        dataclasses.replace(source, masks=given[source.name]) if has_made_masks(source) else source
+        for source in cameras
+    )
+
+
+def use_given_masks(session: Session) -> Session:
+    """The session with the masks in use that came with its footage."""
+    if not any(map(has_made_masks, session.manifest.footage.cameras)):
+        return session
+    cameras = without_made_masks(session, session.manifest.footage.cameras)
+    write_evidence(session, msgspec.structs.replace(read_evidence(session), given_masks={}))
+    return use_masks(session, {source.name: source.masks for source in cameras})
+
+
+def forget_unused_masks(session: Session) -> None:
+    """Remove masks of the studio's own that no camera refers to any more, and unfinished ones. The newest made of
+    strokes stay, for later strokes change but a part of them.
+    """
+    cameras = session.manifest.footage.cameras
+    used = {Path(*Path(source.masks).parts[:2]) for source in cameras if has_made_masks(source)}
+    of_strokes = made_folders(session, STROKE_MASKS)
+    if of_strokes and not any(place.parts[0] == STROKE_MASKS for place in used):
+        used.add(of_strokes[-1].relative_to(session.path))
+    for home in HOMES:
+        for path in list((session.path / home).glob("*")):
+            if path.relative_to(session.path) not in used:
+                shutil.rmtree(path, ignore_errors=True)
+        with contextlib.suppress(OSError):
+            (session.path / home).rmdir()
+
+
+def use_masks(session: Session, names: Mapping[str, str]) -> Session:
+    """The session with other masks in its manifest: camera to a path within the session, "" for none."""
+    footage = session.manifest.footage
+    cameras = tuple(
+        dataclasses.replace(source, masks=names.get(source.name, source.masks)) for source in footage.cameras
     )
     changed = dataclasses.replace(footage, cameras=cameras)
     return described_anew(session, msgspec.structs.replace(session.manifest, footage=changed))

@@ -31,7 +31,7 @@ from studio.sessions.manifest import SessionManifest
 from studio.sessions.names import inside
 from studio.sessions.run_record import CAMERAS_NAME
 from studio.sessions.session import CAMERAS_PATH, THUMBNAIL_NAME, Session, described_anew
-from studio.typed_decoding import decode_json
+from studio.typed_decoding import decode_json, is_list, is_table
 
 EARLIER = "earlier"
 REPORT_NAME = "cameras.report.json"
@@ -49,8 +49,8 @@ class NewCalibration:
 
     cameras: tuple[Camera, ...]
     source: str
-    originals: Mapping[str, bytes] = field(default_factory=dict)
-    crops: Mapping[str, AssumedCrop] = field(default_factory=dict)
+    originals: Mapping[str, bytes] = field(default_factory=dict[str, bytes])
+    crops: Mapping[str, AssumedCrop] = field(default_factory=dict[str, AssumedCrop])
     matching: tuple[CameraMatch, ...] = ()
     notes: tuple[str, ...] = ()
     calibrated: Calibrated | None = None
@@ -197,8 +197,8 @@ def _correct_report(path: Path, new: NewCalibration) -> None:
         return
     places = {camera.name: np.round(camera.centre, 3).tolist() for camera in new.cameras}
     entries = report.get("cameras")
-    for entry in entries if isinstance(entries, list) else []:
-        if isinstance(entry, dict) and entry.get("name") in places:
+    for entry in entries if is_list(entries) else ():
+        if is_table(entry) and entry.get("name") in places:
             entry["position_mm"] = places[str(entry["name"])]
     report["floor"] = new.floor
     atomic_files.write_bytes(path, msgspec.json.format(msgspec.json.encode(report), indent=2))

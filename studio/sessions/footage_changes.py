@@ -21,11 +21,18 @@ from studio.capture.timestamps import TimedOffsets, offsets_from_times, read_tim
 from studio.capture.video import probe_video
 from studio.errors import FootageError, SessionError
 from studio.progress import Progress
+from studio.sessions.background_files import (
+    MASKS_GONE,
+    forget_unused_masks,
+    has_made_masks,
+    without_made_masks,
+)
 from studio.sessions.importers.measuring import checked_turn, in_step
 from studio.sessions.made_from import adopt
 from studio.sessions.run_record import FILE_NAME as RUN_FILE_NAME
 from studio.sessions.session import START_POSE_NAME, THUMBNAIL_NAME, Session, described_anew
 from studio.sessions.stored_run import StoredRun
+from studio.sessions.stroke_files import OUTDATED, STROKES_NAME
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +68,7 @@ def change_footage(
     )
     (session.path / THUMBNAIL_NAME).unlink(missing_ok=True)
     changed = described_anew(session, manifest)
+    forget_unused_masks(changed)
     stale = stale_runs(changed)
     return FootageChange(changed, tuple(_consequences(changed, before, after, stale)), stale)
 
@@ -119,6 +127,8 @@ def _changed(
         )
         for camera in source.cameras
     )
+    if any(camera.offset != old.offset for camera, old in zip(cameras, source.cameras, strict=True)):
+        cameras = without_made_masks(session, cameras)
     count = min(camera.last for camera in cameras)
     if count < 1:
         words = ", ".join(
@@ -173,6 +183,10 @@ def _consequences(
 ) -> list[str]:
     notes = [f"{after.frame_count} frames are in all cameras (there were {before.frame_count})."]
     moved = any(a.offset != b.offset for a, b in zip(before.cameras, after.cameras, strict=True))
+    if any(map(has_made_masks, before.cameras)) and not any(map(has_made_masks, after.cameras)):
+        notes.append(MASKS_GONE)
+    if (session.path / STROKES_NAME).exists():
+        notes.append(OUTDATED)
     if stale:
         notes.append(
             f"Run {listed(stale)} was tracked before this change: its poses stay, but pictures and overlays now"

@@ -37,7 +37,9 @@ class RecordFile(Generic[Record]):
     remedy: str
     missing: tuple[str, str]
     version: int = 1
-    migrations: Mapping[int, Callable[[Entries], Entries]] = field(default_factory=dict)
+    migrations: Mapping[int, Callable[[Entries], Entries]] = field(
+        default_factory=dict[int, Callable[[Entries], Entries]]
+    )
 
     def read(self, path: Path, default: Record | None = None) -> Record:
         """The record in a file, `default` where there is none. Raises NotFoundError without one, SessionError."""

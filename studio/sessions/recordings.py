@@ -78,7 +78,7 @@ def import_recording(
     else:
         place.mkdir()
         shutil.copyfile(calibration, place / calibration.name)
-    report = import_source(folder, into, calibration=None, progress=progress)
+    report = import_source(folder, into, progress=progress)
     spreads = spreads_of(folder / TIMES_NAME, report.session)
     shutil.copyfile(folder / TIMES_NAME, report.session.path / TIMES_NAME)
     spread_note = f"{spreads.in_words[0].upper()}{spreads.in_words[1:]}."

@@ -28,7 +28,15 @@ from numpy.typing import NDArray
 
 from studio.arrays import Array, Indices, read_archive
 from studio.errors import SessionError
-from studio.tracking.tracker import TRACKING_STATES, Carried, Estimate, FrameResult, LayerRecord, ParticleSet
+from studio.trackers.tracker import (
+    TRACKING_STATES,
+    Estimate,
+    FilterState,
+    FrameResult,
+    LayerRecord,
+    ParticleSet,
+)
+from studio.typed_decoding import is_table
 
 LEVEL = 1
 LARGEST_BLOB = 1 << 30
@@ -92,16 +100,20 @@ models have one number less.
 
 
 def pack_layer(record: LayerRecord, particles: int | None = None) -> bytes:
-    """A layer's record with at most `particles` of its set (None: all)."""
+    """A layer's record with at most `particles` of its set (None: all), and the parents of all of the next."""
     rows = kept_rows(record.log_weights, len(record.poses) if particles is None else particles)
-    return pack(
-        {
-            "numbers": np.array([getattr(record, name) for name in LAYER_NUMBERS], dtype=np.float64),
-            "vectors": np.stack([getattr(record, name) for name in LAYER_VECTORS]),
-            "poses": record.poses[rows],
-            "log_weights": record.log_weights[rows],
-        }
-    )
+    numbers = record.rows[rows] if len(record.rows) else rows
+    arrays: dict[str, NDArray[Any]] = {
+        "numbers": np.array([getattr(record, name) for name in LAYER_NUMBERS], dtype=np.float64),
+        "vectors": np.stack([getattr(record, name) for name in LAYER_VECTORS]),
+        "poses": record.poses[rows],
+        "log_weights": record.log_weights[rows],
+    }
+    if record.parents.size:
+        arrays["parents"] = record.parents.astype("<i4")
+    if len(record.rows) or len(rows) < len(record.poses):
+        arrays["rows"] = numbers.astype("<i4")
+    return pack(arrays)
 
 
 def unpack_layer(blob: bytes) -> LayerRecord:
@@ -111,7 +123,9 @@ def unpack_layer(blob: bytes) -> LayerRecord:
     numbers |= {name: int(numbers[name]) for name in LAYER_COUNTS}
     vectors = dict(zip(LAYER_VECTORS, arrays["vectors"], strict=True))
     sets = {name: arrays[name] for name in ("poses", "log_weights")}
-    return LayerRecord(**{"model_free_share": math.nan, **numbers, **vectors, **sets})
+    later = {name: arrays[name].astype(np.int64) for name in ("parents", "rows") if name in arrays}
+    entries: dict[str, Any] = {"model_free_share": math.nan, **numbers, **vectors, **sets, **later}
+    return LayerRecord(**entries)
 
 
 def pack_result(result: FrameResult) -> bytes:
@@ -124,6 +138,8 @@ def pack_result(result: FrameResult) -> bytes:
     if result.disagreement:
         arrays["limbs"] = np.array(list(result.disagreement))
         arrays["disagreement"] = np.array(list(result.disagreement.values()))
+    if result.notes:
+        arrays["notes"] = np.array(result.notes)
     vectors = [estimate.pose, estimate.mean, estimate.mode]
     arrays["vectors"] = np.stack(vectors if estimate.searched is None else [*vectors, estimate.searched])
     return pack(arrays)
@@ -151,10 +167,11 @@ def unpack_result(blob: bytes) -> FrameResult:
         disagreement=dict(zip(map(str, arrays["limbs"]), map(float, arrays["disagreement"]), strict=True))
         if "limbs" in arrays
         else {},
+        notes=tuple(map(str, arrays["notes"])) if "notes" in arrays else (),
     )
 
 
-def carried_arrays(carried: Carried) -> dict[str, Array]:
+def carried_arrays(carried: FilterState) -> dict[str, Array]:
     """The state carried to the next frame, as named arrays; None has no entry."""
     arrays: dict[str, Array] = {}
     if carried.estimate is not None:
@@ -167,10 +184,10 @@ def carried_arrays(carried: Carried) -> dict[str, Array]:
     return arrays
 
 
-def carried_from(arrays: dict[str, Array]) -> Carried:
+def carried_from(arrays: dict[str, Array]) -> FilterState:
     """The inverse of `carried_arrays`."""
     particles = particles_from(arrays) if "set_poses" in arrays else None
-    return Carried(
+    return FilterState(
         particles, arrays.get("estimate"), arrays.get("previous_estimate"), _with_prefix(arrays, "memory_")
     )
 
@@ -240,7 +257,7 @@ class Sums:
     def wrong_layers(self, blobs: Mapping[int, bytes]) -> list[int]:
         """The layers that are missing, surplus or damaged."""
         sums = self._sums.get("layers")
-        known = sums if isinstance(sums, dict) else {}
+        known: dict[str, Any] = sums if is_table(sums) else {}
         found = {str(layer): checksum([blob]) for layer, blob in blobs.items()}
         return sorted(
             int(layer) for layer in known.keys() | found.keys() if known.get(layer) != found.get(layer)

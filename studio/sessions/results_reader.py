@@ -1,16 +1,16 @@
 """Reading a run's results while they are written, from any thread of any process (see `results_store`)."""
 
-import json
 import math
 import sqlite3
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
+from msgspec import DecodeError
 
 from studio.arrays import Array, Indices
 from studio.errors import DamagedError, NotFoundError, SessionError
@@ -26,7 +26,8 @@ from studio.sessions.results_codec import (
     unpack_result,
 )
 from studio.settings import SettingsEntry
-from studio.tracking.tracker import TRACKED, FrameResult, LayerRecord
+from studio.trackers.tracker import TRACKED, FrameResult, LayerRecord
+from studio.typed_decoding import decode_json
 
 FILE_NAME = "results.sqlite"
 UNREADABLE = (sqlite3.DatabaseError, UnicodeDecodeError)
@@ -36,6 +37,8 @@ SCHEMA_VERSION = 2
 one converts it to this version.
 """
 Unpacked = TypeVar("Unpacked")
+Row = tuple[Any, ...]
+"""As SQLite gives it."""
 LATER_TABLES = (("tracking", ("state", "overlap", "doubts")), ("arrivals", ("arrived", "ready")))
 UNWATCHED = (TRACKED, None, 0)
 """State, overlap and doubts of a frame that was stored before a loss could be noticed."""
@@ -51,6 +54,17 @@ class PartialFrame:
     frame: int
     next_layer: int
     state: dict[str, Array]
+
+
+@dataclass(frozen=True, slots=True)
+class TimeTaken:
+    """Seconds that tracking so many frames took, their evidence and the look at the whole run included, in a process of
+    so many threads.
+    """
+
+    seconds: float
+    frames: int
+    threads: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,15 +89,17 @@ class ResultsReader:
 
     All methods may be called from any thread. Damaged stores raise SessionError, missing entries
     NotFoundError.
+
+    settle : called before each reading; it waits for what is still to be stored, and may raise.
     """
 
-    def __init__(self, run_folder: Path) -> None:
-        self._folder = run_folder
+    def __init__(self, run_folder: Path, settle: Callable[[], None] | None = None) -> None:
+        self._folder, self._settle = run_folder, settle
         self._lock = threading.RLock()
         self._within = False
         self._connection: sqlite3.Connection | None = None
-        self._known: tuple[object, list[tuple], dict[int, str]] | None = None
-        self._fitting: dict[int, tuple[str, tuple]] = {}
+        self._known: tuple[object, list[Row], dict[int, str]] | None = None
+        self._fitting: dict[int, tuple[str, Row]] = {}
 
     def __enter__(self) -> "ResultsReader":
         return self
@@ -170,7 +186,7 @@ class ResultsReader:
         """One layer of a frame, finished or not. Raises DamagedError as `layers`."""
         blobs = self._layer_blobs(frame)
         if layer not in blobs:
-            raise self._missing(f"layer {layer} of frame {frame}")
+            raise self._missing(f"layer {layer + 1} of frame {frame}")
         return self._layer(frame, layer, blobs[layer])
 
     def poses(self) -> tuple[Indices, Array]:
@@ -184,7 +200,7 @@ class ResultsReader:
     def timeline(self) -> Timeline:
         """Weight, time and effort of every finished frame that is whole."""
         rows = self._whole_rows()
-        columns = list(zip(*rows, strict=True)) if rows else [[]] * 12
+        columns = list(zip(*rows, strict=True)) if rows else [()] * 12
         whole = [np.array(columns[index], dtype=np.int64) for index in (0, 3, 4, 5)]
         real = [np.array(columns[index], dtype=np.float64) for index in (1, 2)]
         went = [row[7:10] if row[7] is not None else UNWATCHED for row in rows]
@@ -197,10 +213,10 @@ class ResultsReader:
 
     # ------------------------------------------------------------------ integrity
 
-    def _whole_rows(self) -> list[tuple]:
+    def _whole_rows(self) -> list[Row]:
         return self._state(True)[0]
 
-    def _state(self, blobs: bool) -> tuple[list[tuple], dict[int, str]]:
+    def _state(self, blobs: bool) -> tuple[list[Row], dict[int, str]]:
         """The rows of the intact frames, and the damage of the others; cached until the store changes."""
         version, known = self._query("PRAGMA data_version"), self._known
         if known is not None and known[0] == (version, blobs):
@@ -213,7 +229,7 @@ class ResultsReader:
         self._known = ((version, blobs), whole, damaged)
         return whole, damaged
 
-    def _damage(self, frame: int, text: str, row: tuple | None, blobs: bool) -> str:
+    def _damage(self, frame: int, text: str, row: Row | None, blobs: bool) -> str:
         """The parts of a frame that do not match their checksums, as text; "" if all match or did before."""
         if row is None:
             return LOST
@@ -228,7 +244,7 @@ class ResultsReader:
             VERIFIED.add(self._folder, frame, text)
         return ""
 
-    def _rows(self) -> list[tuple]:
+    def _rows(self) -> list[Row]:
         """Every finished frame's numbers and pose, without blobs; columns missing in older stores are NULL."""
         columns, joined = ROWS, ""
         for table, names in LATER_TABLES:
@@ -272,7 +288,7 @@ class ResultsReader:
         return blobs
 
     def _layer(self, frame: int, layer: int, blob: bytes) -> LayerRecord:
-        return self._unpacked(frame, f"layer {layer}", unpack_layer, blob)
+        return self._unpacked(frame, f"layer {layer + 1}", unpack_layer, blob)
 
     def _unpacked(self, frame: int, part: str, unpack: Callable[[bytes], Unpacked], blob: bytes) -> Unpacked:
         try:
@@ -300,13 +316,20 @@ class ResultsReader:
         rows = self._query('SELECT version, frame, layer, "values" FROM settings ORDER BY version')
         wrong = self.damaged_settings()
         if wrong:
-            raise SessionError(
-                f"Version {wrong[0]} of the settings of run '{self._folder.name}' is damaged on the disk.",
-                "Repair the run with 'studio verify --repair', or start it again.",
-            )
-        return [
-            SettingsEntry(version, frame, layer, json.loads(text)) for version, frame, layer, text in rows
-        ]
+            raise self._damaged_version(wrong[0])
+        found: list[SettingsEntry] = []
+        for version, frame, layer, text in rows:
+            try:
+                found.append(SettingsEntry(version, frame, layer, decode_json(text.encode(), dict[str, Any])))
+            except (DecodeError, AttributeError):  # stores without checksums; a damaged text may be a number
+                raise self._damaged_version(version) from None
+        return found
+
+    def _damaged_version(self, version: int) -> SessionError:
+        return SessionError(
+            f"Version {version} of the settings of run '{self._folder.name}' is damaged on the disk.",
+            "Repair the run with 'studio verify --repair', or start it again.",
+        )
 
     def damaged_settings(self) -> list[int]:
         """The versions of the settings that are lost or damaged."""
@@ -362,6 +385,11 @@ class ResultsReader:
         rows = self._query("SELECT value FROM meta WHERE key = 'ended'")
         return rows[0][0] if rows else ""
 
+    def time_taken(self) -> TimeTaken | None:
+        """What tracking took; None for a run that is live, copied, being tracked or of an older studio."""
+        rows = self._query("SELECT value FROM meta WHERE key = 'time'")
+        return time_from(rows[0][0]) if rows else None
+
     def _missing(self, what: str) -> NotFoundError:
         return NotFoundError(
             f"Run '{self._folder.name}' has no {what}.",
@@ -369,7 +397,7 @@ class ResultsReader:
         )
 
     @contextmanager
-    def _snapshot(self) -> Iterator[None]:
+    def _snapshot(self) -> Generator[None]:
         """All that is read inside is of one moment; a writer may go on meanwhile."""
         with self._lock:
             opened = not self._within and (self._connection is not None or bool(self._query("SELECT 1")))
@@ -385,8 +413,10 @@ class ResultsReader:
                 with suppress(SessionError):
                     self._query("ROLLBACK")
 
-    def _query(self, sql: str, values: tuple[int, ...] = ()) -> list[tuple]:
+    def _query(self, sql: str, values: tuple[int, ...] = ()) -> list[Row]:
         with self._lock:
+            if self._settle is not None and not self._within:
+                self._settle()
             try:
                 if self._connection is None:
                     if not (self._folder / FILE_NAME).exists():
@@ -400,27 +430,45 @@ class ResultsReader:
                 ) from None
 
 
+def time_from(text: str) -> TimeTaken | None:
+    """What `add_time` wrote; None for what it did not."""
+    try:
+        return decode_json(text, TimeTaken)
+    except DecodeError:
+        return None
+
+
 def _named(layers: Iterable[int]) -> str:
-    return ", ".join(f"layer {layer}" for layer in layers)
+    return ", ".join(f"layer {layer + 1}" for layer in layers)
 
 
 def _open_to_read(path: Path) -> sqlite3.Connection:
     """A read-only connection; also to a store in a read-only folder."""
-    address = path.resolve().as_uri()
     try:
-        connection = sqlite3.connect(
-            f"{address}?mode=rw", uri=True, timeout=10.0, isolation_level=None, check_same_thread=False
-        )
+        return _opened(path, "mode=rw")
+    except sqlite3.OperationalError:
+        return _opened(path, "immutable=1")
+
+
+def _opened(path: Path, way: str) -> sqlite3.Connection:
+    address = f"{path.resolve().as_uri()}?{way}"
+    connection = sqlite3.connect(
+        address, uri=True, timeout=10.0, isolation_level=None, check_same_thread=False
+    )
+    try:
         connection.execute("PRAGMA query_only = ON")
         connection.execute("SELECT 1 FROM sqlite_master LIMIT 1").fetchall()
-    except sqlite3.OperationalError:
-        connection = sqlite3.connect(
-            f"{address}?immutable=1", uri=True, timeout=10.0, isolation_level=None, check_same_thread=False
-        )
-    check_version(connection, path)
+        check_version(connection, path)
+    except BaseException:
+        connection.close()
+        raise
     # A blob that a flipped bit made a text fits no checksum, and is no reason not to read the others.
-    connection.text_factory = lambda content: content.decode("utf-8", "replace")
+    connection.text_factory = _readable
     return connection
+
+
+def _readable(content: bytes) -> str:
+    return content.decode("utf-8", "replace")
 
 
 def check_version(connection: sqlite3.Connection, path: Path) -> None:
@@ -428,7 +476,6 @@ def check_version(connection: sqlite3.Connection, path: Path) -> None:
     with suppress(*UNREADABLE):
         row = connection.execute("SELECT value FROM meta WHERE key = 'schema'").fetchone()
         if row is not None and str(row[0]).isdigit() and int(row[0]) > SCHEMA_VERSION:
-            connection.close()
             raise SessionError(
                 f"'{path}' has schema version {row[0]}, this studio knows versions up to {SCHEMA_VERSION}.",
                 "Open it with a newer studio.",

@@ -11,7 +11,7 @@ import json
 import math
 import sqlite3
 import threading
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Generator, Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -30,8 +30,15 @@ from studio.sessions.results_codec import (
     pack_result,
     sums_text,
 )
-from studio.sessions.results_reader import FILE_NAME, SCHEMA_VERSION, UNREADABLE, ResultsReader, check_version
-from studio.tracking.tracker import FrameResult, LayerRecord
+from studio.sessions.results_reader import (
+    FILE_NAME,
+    SCHEMA_VERSION,
+    UNREADABLE,
+    ResultsReader,
+    check_version,
+    time_from,
+)
+from studio.trackers.tracker import FrameResult, LayerRecord
 
 Value = bool | int | float | str
 
@@ -99,7 +106,7 @@ def copy_frames(source: Path, into: Path, last: int | None = None) -> None:
         if "checksums" in known:
             connection.execute(
                 "INSERT INTO main.checksums SELECT what, number, sums FROM old.checksums WHERE "
-                "(what = ?1 AND number < ?2) OR (what = ?3 AND number IN (SELECT version FROM main.settings))",
+                "(what = ? AND number < ?) OR (what = ? AND number IN (SELECT version FROM main.settings))",
                 (FRAME, end, SETTINGS),
             )
         connection.execute("COMMIT")
@@ -266,6 +273,18 @@ class ResultsWriter:
             ]
         )
 
+    def add_time(self, seconds: float, frames: int, threads: int) -> None:
+        """Add what tracking so many frames took, all included, to the run's (`ResultsReader.time_taken`). threads : of
+        the process, which count for the whole run.
+        """
+        with self.together():
+            row = self._connection.execute("SELECT value FROM meta WHERE key = 'time'").fetchone()
+            before = time_from(row[0]) if row else None
+            if before is not None:
+                seconds, frames = seconds + before.seconds, frames + before.frames
+            text = json.dumps({"seconds": round(seconds, 3), "frames": frames, "threads": threads})
+            self._connection.execute("INSERT OR REPLACE INTO meta VALUES ('time', ?)", (text,))
+
     def mark_ended(self, how: str) -> None:
         """Note that the user cancelled the run (`how`: "cancelled"), that a live one is over ("finished"), or with ""
         that it is resumed.
@@ -276,7 +295,7 @@ class ResultsWriter:
             self._transaction([("DELETE FROM meta WHERE key = 'ended'", ())])
 
     @contextlib.contextmanager
-    def together(self) -> Iterator[None]:
+    def together(self) -> Generator[None]:
         """All that is written inside arrives in one transaction, or nothing of it. Raises SessionError."""
         with self._one_at_a_time:
             if self._within:
@@ -292,7 +311,7 @@ class ResultsWriter:
                 self._within = False
 
     @contextlib.contextmanager
-    def _begun(self) -> Iterator[None]:
+    def _begun(self) -> Generator[None]:
         """A transaction. Raises the first error, and leaves none open."""
         if self._connection.in_transaction:
             # An earlier one could not even be rolled back: closing does that.

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import msgspec
 
-from studio.sessions.record_files import RecordFile
+from studio.sessions.record_files import RecordFile, renamed
 
 Value = bool | int | float | str
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 FILE_NAME = "run.json"
 CAMERAS_NAME = "cameras.toml"
 BEHAVIOUR_NAME = "behaviour.model"
@@ -29,7 +29,7 @@ class RunRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     text. sigma : σ0 of every parameter from frame to frame, rad and mm. software : the studio's version. notes : for
     readers of the results. behaviour : name of the behaviour model whose copy the run keeps, "" without one. live :
     frames came on a clock and those that came too fast were dropped; the results store lists the tracked ones.
-    to_and_fro : the footage is played forwards and backwards without end (`capture.footage`), so that `last` may lie
+    ping_pong : the footage is played forwards and backwards without end (`capture.footage`), so that `last` may lie
     behind its end. made_from : the run that was corrected, "" if none: other frames are that run's. corrected : the
     frame that restarts at corrected_pose. backwards_to : None where the frames after it follow from it; else these are
     the old ones, and from it down to this frame each was tracked from the one after it. subject_dimensions : the
@@ -57,7 +57,7 @@ class RunRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     notes: tuple[str, ...] = ()
     behaviour: str = ""
     live: bool = False
-    to_and_fro: bool = False
+    ping_pong: bool = False
     made_from: str = ""
     corrected: int | None = None
     corrected_pose: tuple[float, ...] | None = None
@@ -83,6 +83,7 @@ _RECORD = RecordFile(
     "Start a new run.",
     ("There is no run '{name}'.", "List the runs with 'studio runs'."),
     SCHEMA_VERSION,
+    {1: renamed(to_and_fro="ping_pong")},
 )
 
 

@@ -4,6 +4,7 @@ import contextlib
 import os
 import sqlite3
 from pathlib import Path
+from typing import Any
 
 from studio.errors import RunError, SessionError
 from studio.sessions.atomic_files import unwritable
@@ -100,7 +101,7 @@ def _copy(broken: sqlite3.Connection, whole: sqlite3.Connection, first: int, las
     return lost
 
 
-def _rows(connection: sqlite3.Connection, sql: str) -> list[tuple] | None:
+def _rows(connection: sqlite3.Connection, sql: str) -> list[tuple[Any, ...]] | None:
     """The rows, None where they cannot be read."""
     try:
         return connection.execute(sql).fetchall()
@@ -108,7 +109,7 @@ def _rows(connection: sqlite3.Connection, sql: str) -> list[tuple] | None:
         return [] if "no such table" in str(error) else None
 
 
-def _put(connection: sqlite3.Connection, table: str, rows: list[tuple]) -> None:
+def _put(connection: sqlite3.Connection, table: str, rows: list[tuple[Any, ...]]) -> None:
     for row in rows:
         with contextlib.suppress(sqlite3.DatabaseError):
             connection.execute(f"INSERT OR REPLACE INTO {table} VALUES ({', '.join('?' * len(row))})", row)

@@ -2,7 +2,8 @@
 
 Folder: `session.json`, `videos/` or `pictures/<camera>/`, `masks/<camera>/`, `background/`,
 `calibration/original.*` and `calibration/cameras.toml`, `truth/*.trc`, `subject.toml`, `start_pose.csv`,
-`sigma.csv`, `thumbnail.jpg`, `bodies/*.toml` (bodies of this session's own), `runs/<run>/`.
+`sigma.csv`, `thumbnail.jpg`, `bodies/*.toml` (bodies of this session's own), `beside/<n>/` (of other subjects in view:
+`subject.toml`, `start_pose.csv`, `truth.trc`), `runs/<run>/`.
 """
 
 from functools import cached_property
@@ -65,13 +66,15 @@ def jpeg(picture: np.ndarray, longest: int = WIDTH) -> bytes:
     encoder.pix_fmt = "yuvj420p"
     encoder.time_base = 1  # pyright: ignore[reportAttributeAccessIssue]
     encoder.options = {"qmin": str(QUALITY), "qmax": str(QUALITY)}
-    packets = [*encoder.encode(small), *encoder.encode(None)]
-    return b"".join(bytes(packet) for packet in packets)
+    packets = encoder.encode(small) + encoder.encode(None)  # pyright: ignore[reportUnknownVariableType] - of no stream
+    return b"".join(map(bytes, packets))  # pyright: ignore[reportUnknownArgumentType]
 
 
 CAMERAS_PATH = Path("calibration") / "cameras.toml"
 SUBJECT_NAME, START_POSE_NAME, SIGMA_NAME = "subject.toml", "start_pose.csv", "sigma.csv"
 THUMBNAIL_NAME, BODIES_NAME, RUNS_NAME = "thumbnail.jpg", "bodies", "runs"
+BESIDE = "beside"
+"""Folder of what is known of other subjects in view, a folder each: `subject.toml`, `start_pose.csv`, `truth.trc`."""
 
 
 class Session:
@@ -150,7 +153,7 @@ class Session:
         measures = subject or self.subject()
         wanted = name or (subject.body if subject else "") or self.manifest.body
         tree = load_body(wanted, self.body_folders)
-        return fit_subject(tree, measures) if measures else (tree, ())
+        return fit_subject(tree, measures, self.body_folders) if measures else (tree, ())
 
     @property
     def body_folders(self) -> tuple[Path, ...]:
@@ -258,7 +261,7 @@ class Session:
 def free_run_name(session: Session) -> str:
     """A name for the session's next run: run-1, run-2, …"""
     folder = session.path / RUNS_NAME
-    taken = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
+    taken: set[str] = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
     return free_name(f"run-{len(taken) + 1}", taken)
 
 

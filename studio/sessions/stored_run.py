@@ -1,9 +1,11 @@
 """A run on disk: its record, its results, and its status, computed from them."""
 
 import dataclasses
-from collections.abc import Sequence
+import html
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from studio.behaviour.model import BehaviourModel
 from studio.behaviour.model_file import read_model
@@ -14,6 +16,7 @@ from studio.capture.calibration_files import read_calibration
 from studio.errors import BodyError
 from studio.geometry.camera import Camera
 from studio.sessions.results_store import ResultsReader, is_being_written
+from studio.sessions.run_arrays import particles_dataset
 from studio.sessions.run_record import BEHAVIOUR_NAME, CAMERAS_NAME, RunRecord, read_run_record
 
 BODY_FOLDER = "body"
@@ -104,6 +107,36 @@ class StoredRun:
         if not self.record.behaviour:
             return None
         return read_model(self.folder / BEHAVIOUR_NAME).at_rate(self.record.fps)
+
+    def to_xarray(self, frames: Iterable[int] | None = None) -> Any:  # noqa: ANN401 - xarray.Dataset
+        """The particles as an `xarray.Dataset` with the dimensions frame, layer, particle and parameter
+        (`run_arrays.particles_dataset`); of all finished frames, or of some.
+
+        Raises StudioError where xarray is not installed, NotFoundError, RunError.
+        """
+        with self.results() as results:
+            chosen = list(results.frames() if frames is None else frames)
+            stored = ((results.layers(frame), results.result(frame)) for frame in chosen)
+            return particles_dataset(self.record, chosen, stored)
+
+    def as_html(self) -> str:
+        """The run as a small table, for notebooks."""
+        summary = self.summary(blobs=False)
+        rows = {
+            "run": f"{summary.session} / {summary.name}",
+            "status": f"{summary.status}, {summary.done} of {summary.last - summary.first} frames",
+            "tracker": f"{summary.tracker}, {summary.weighting}",
+            "body": summary.body,
+            "seed": str(summary.seed),
+            "made": f"{summary.created} by {self.record.software or 'an older studio'}",
+        }
+        lines = "".join(
+            f"<tr><th style='text-align:left'>{html.escape(name)}</th><td>{html.escape(value)}</td></tr>"
+            for name, value in rows.items()
+        )
+        return f"<table>{lines}</table>"
+
+    _repr_html_ = as_html
 
     def being_tracked(self) -> bool:
         """Whether some living process has the run open for tracking."""

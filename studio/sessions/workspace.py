@@ -14,18 +14,18 @@ from pathlib import Path
 import msgspec
 import platformdirs
 
-from studio.body.catalogue import load_body
+from studio.body.catalogue import body_file_text, body_path, load_body
 from studio.body.subject import DEFAULT_BODY
 from studio.capture.footage_source import FootageSource
 from studio.errors import NotFoundError, SessionError, StudioError
 from studio.sessions import atomic_files
-from studio.sessions.atomic_files import made_whole
+from studio.sessions.atomic_files import made_whole, write_text
 from studio.sessions.manifest import FILE_NAME, SessionManifest, now, read_manifest, write_manifest
 from studio.sessions.names import checked_name, free_name, inside, is_name
 from studio.sessions.results_reader import FILE_NAME as RESULTS_NAME
 from studio.sessions.run_record import FILE_NAME as RECORD_NAME
 from studio.sessions.run_record import read_run_record, write_run_record
-from studio.sessions.session import RUNS_NAME, THUMBNAIL_NAME, Session, described_anew
+from studio.sessions.session import BODIES_NAME, RUNS_NAME, THUMBNAIL_NAME, Session, described_anew
 from studio.sessions.stored_run import RunSummary, StoredRun
 
 VARIABLE = "STUDIO_WORKSPACE"
@@ -324,9 +324,13 @@ def begin_session(place: Path, title: str = "", body: str = "") -> Session:
             f"A title of {len(words)} characters cannot be shown.", f"Use 1 to {LONGEST_TITLE} characters."
         )
     name = load_body(body).name if body else DEFAULT_BODY
+    own_text = body_file_text(body) if body_path(body) else ""
     manifest = SessionManifest(name=place.name, title=words, created=now(), body=name, footage=NO_FOOTAGE)
     with made_whole(place) as folder:
         write_manifest(folder, manifest)
+        if own_text:
+            (folder / BODIES_NAME).mkdir()
+            write_text(folder / BODIES_NAME / f"{name}.toml", own_text)
     return Session(place)
 
 

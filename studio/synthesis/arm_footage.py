@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array, Bytes
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_frames, marker_points
 from studio.body.model import BodyModel, kinematic_tables
@@ -23,9 +24,6 @@ from studio.sessions.named_rows import poses_csv
 from studio.synthesis.clips import ClipWriter
 from studio.synthesis.noise_kernels import add_sensor_noise
 from studio.synthesis.recipe_file import Recipe
-
-Array = NDArray[np.float64]
-Bytes = NDArray[np.uint8]
 
 SWING_SHARE, SPEED_SHARE = 0.30, 0.5
 ARM_COLOUR, WALL_COLOUR = (196.0, 186.0, 178.0), (64.0, 62.0, 60.0)
@@ -68,7 +66,7 @@ def coverage(outlines: Array, width: int, height: int, samples: int) -> NDArray[
     rows = (np.arange(height * samples) + 0.5) * step - 0.5
     inside = np.zeros((height * samples, width * samples), dtype=bool)
     for corners in outlines:
-        sides = []
+        sides: list[Array] = []
         for one, other in zip(corners, np.roll(corners, -1, axis=0), strict=True):
             along = other - one
             sides.append(along[0] * (rows[:, None] - one[1]) - along[1] * (columns[None, :] - one[0]))
@@ -87,7 +85,7 @@ def filled(outlines: Array, width: int, height: int) -> Bytes:
 
 
 def render_arm(recipe: Recipe, camera: Camera, source: Path, progress: Progress) -> MarkerMotion:
-    """Write videos/ and masks/ of the recipe's body and truth/poses.csv; returns the markers' motion."""
+    """Write videos/ and masks/ of the recipe's body and true_poses.csv; returns the markers' motion."""
     body = load_body(recipe.body)
     poses = arm_motion(body, recipe.frames, recipe.fps, np.random.default_rng(recipe.seed))
     outlines = arm_outlines(body, poses, camera)
@@ -104,7 +102,7 @@ def render_arm(recipe: Recipe, camera: Camera, source: Path, progress: Progress)
             masks.add(filled(outlines[frame], *size))
             progress("rendering", frame + 1, recipe.frames)
     names = tuple(entry.name for entry in body.parameters)
-    write_text(source / "truth" / "poses.csv", poses_csv(names, np.arange(recipe.frames), poses))
+    write_text(source / "true_poses.csv", poses_csv(names, np.arange(recipe.frames), poses))
     markers = tuple(marker.name for marker in body.markers)
     times = np.arange(recipe.frames) / recipe.fps
     return MarkerMotion(markers, times, marker_points(body, poses), unit="m", rate=recipe.fps)

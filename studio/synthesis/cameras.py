@@ -6,11 +6,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
 from studio.geometry.projection import distorted
-
-Array = NDArray[np.float64]
 
 CORNERS = (
     (2720.0, 2330.0, 2480.0),
@@ -109,7 +108,7 @@ def _webcams(
     rng: np.random.Generator,
 ) -> tuple[Camera, ...]:
     """Cameras at the places; focal_share : focal length as a share of the picture's width, about."""
-    cameras = []
+    cameras: list[Camera] = []
     for index, place in enumerate(places):
         focal = focal_share * size[0] * float(1.0 + rng.normal(0.0, 0.01))
         middle = np.array([(size[0] - 1) / 2.0, (size[1] - 1) / 2.0]) + rng.normal(0.0, 0.008, 2) * size[0]

@@ -8,10 +8,10 @@ which only breathing remains.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
+from studio.arrays import Array
 from studio.body.person import SIDES, PersonMotion, Skeleton
 from studio.errors import StudioError
 from studio.synthesis.gait import (
@@ -28,7 +28,6 @@ from studio.synthesis.gait import (
     trunk,
 )
 
-Array = NDArray[np.float64]
 Options = dict[str, float]
 
 NEVER = 200_000.0

@@ -7,11 +7,9 @@ from types import TracebackType
 import av
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Bytes
 from studio.errors import FootageError
-
-Bytes = NDArray[np.uint8]
 
 KEYFRAME_EVERY = 50
 

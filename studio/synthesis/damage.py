@@ -5,15 +5,13 @@ from dataclasses import replace
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.person import PersonMotion, joint_points
 from studio.errors import StudioError
 from studio.geometry.camera import Camera
 from studio.geometry.rotations import rotation_from_vector
 from studio.synthesis.room import CHECKS, GRAIN, PLAIN, Block
-
-Array = NDArray[np.float64]
 
 FREE_MM = 260.0
 """mm: clearance between the joints' paths and an object in front of them."""
@@ -72,9 +70,15 @@ def clutter_in_front(
 
     Raises StudioError where the person leaves no room for them.
     """
-    rng, found = np.random.default_rng((seed, 9)), []
     points = np.stack(list(joint_points(motion).values()), axis=1)
-    way = motion.root[:, :2]
+    return clutter_before(count, cameras, points, motion.root[:, :2], seed)
+
+
+def clutter_before(
+    count: int, cameras: tuple[Camera, ...], points: Array, way: Array, seed: int
+) -> tuple[Block, ...]:
+    """The same for any body. points : (F, K, 3) that stay clear of the objects, mm. way : (F, 2) its middle's path."""
+    rng, found = np.random.default_rng((seed, 9)), list[Block]()
     for number in range(count):
         camera = cameras[number % len(cameras)]
         for _ in range(TRIES):

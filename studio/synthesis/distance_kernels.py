@@ -1,4 +1,6 @@
-"""The person as a signed distance field: swept spheres, blended within a group, folded where they are cloth.
+# pyright: standard
+"""The person as a signed distance field: swept spheres, blended within a group, folded where they are cloth. Pieces
+with an edge are truncated cones with flat ends, their edges rounded by so much (a robot's links).
 
 Distances (mm) are lower bounds of the true ones up to the folds' depth, so marching at SAFETY × distance never passes
 through. Smooth union: I. Quilez, "Smooth minimum" (quadratic polynomial). Piece columns: see `flesh.py`.
@@ -14,6 +16,7 @@ from studio.synthesis.flesh import (
     BOUND,
     BOUND_RADIUS,
     BULGE,
+    EDGE,
     FOLD,
     FOLD_PERIOD,
     FOLD_PHASE,
@@ -48,8 +51,24 @@ def local_point(px, py, pz, piece):
 
 
 @njit(cache=True, error_model="numpy", fastmath=True)
+def cone_distance(px, py, pz, piece):
+    """Signed distance from a world point to a truncated cone with rounded edges."""
+    x, y, z = local_point(px, py, pz, piece)
+    length, edge, sx, sy = piece[LENGTH], piece[EDGE], piece[SCALE_X], piece[SCALE_Y]
+    slope = (piece[RADIUS_END] - piece[RADIUS_START]) / length
+    radius = piece[RADIUS_START] + slope * min(max(z, 0.0), length)
+    across, side = x / sx, y / sy
+    outside = (math.sqrt(across * across + side * side) - radius) / math.sqrt(1.0 + slope * slope) + edge
+    beyond = abs(z - 0.5 * length) - 0.5 * length + edge
+    out, past = max(outside, 0.0), max(beyond, 0.0)
+    return (math.sqrt(out * out + past * past) + min(max(outside, beyond), 0.0) - edge) * min(sx, sy, 1.0)
+
+
+@njit(cache=True, error_model="numpy", fastmath=True)
 def piece_distance(px, py, pz, piece):
     """Signed distance from a world point to one piece."""
+    if piece[EDGE] > 0.0:
+        return cone_distance(px, py, pz, piece)
     x, y, z = local_point(px, py, pz, piece)
     length = piece[LENGTH]
     share = min(max(z / length, 0.0), 1.0) if length > 0.0 else 0.0

@@ -11,8 +11,8 @@ from typing import Any
 import msgspec
 import numpy as np
 import tomli_w
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.person import PersonMotion, joint_points
 from studio.geometry.projection import project
 from studio.synthesis.damage import Damage
@@ -33,8 +33,8 @@ from studio.synthesis.recorded_clips import Clip
 from studio.synthesis.room import Room
 from studio.synthesis.rooms import DRAWN, FLOOR_AND_WALLS, room_called
 from studio.synthesis.wardrobes import MATERIALS
+from studio.typed_decoding import is_table
 
-Array = NDArray[np.float64]
 Colour = tuple[float, float, float]
 WORN_LARGE = ("skin", "shirt", "trousers", "stripes")
 
@@ -73,7 +73,9 @@ class Stretch:
     start_s: float = 0.0
     jitter_s: float = 0.0
     bends: float = 0.0
-    options: Mapping[str, float | tuple[float, float]] = field(default_factory=dict)
+    options: Mapping[str, float | tuple[float, float]] = field(
+        default_factory=dict[str, float | tuple[float, float]]
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -357,7 +359,7 @@ def _clothes(rng: np.random.Generator) -> dict[str, Colour]:
     shirt, trousers = _colour(rng, 0.10, 0.75, 0.14), _colour(rng, 0.05, 0.45, 0.10)
     shoes, hair = _colour(rng, 0.05, 0.6, 0.05), rng.uniform(0.05, 0.5) * np.array([1.0, 0.75, 0.5])
     stripes = shirt if rng.random() < 0.5 else _colour(rng, 0.15, 0.75, 0.14)
-    found = {}
+    found: dict[str, Colour] = {}
     for name, colour in zip(MATERIALS, (skin, shirt, trousers, shoes, hair, stripes), strict=True):
         values = [round(float(value), 3) for value in np.clip(colour, 0.03, 0.9)]
         found[name] = (values[0], values[1], values[2])
@@ -370,7 +372,7 @@ def _colour(rng: np.random.Generator, low: float, high: float, spread: float) ->
 
 def _with_motion(recipe: Recipe, stretch: Stretch, rng: np.random.Generator) -> Recipe:
     """The recipe with its stretch of motion."""
-    options = {}
+    options: dict[str, Any] = {}
     for name, value in stretch.options.items():
         options[name] = round(float(rng.uniform(*value)), 3) if isinstance(value, tuple) else value
     start = round(stretch.start_s + float(rng.uniform(-1.0, 1.0)) * stretch.jitter_s, 3)
@@ -391,14 +393,14 @@ def _cameras(
     """`count` cameras along the walls around the person's path, each seeing the whole path."""
     room = room_called(recipe.room)
     inside = np.array(room.half) - OFF_WALL_MM
-    middle = 0.5 * (motion.root.min(axis=0) + motion.root.max(axis=0))
+    middle: Array = 0.5 * (motion.root.min(axis=0) + motion.root.max(axis=0))
     start = float(rng.uniform(0.0, 2.0 * np.pi))
-    found = []
+    found: list[Placed] = []
     for number in range(count):
         angle = start + 2.0 * np.pi * number / count + float(rng.uniform(-TURNED_ASIDE, TURNED_ASIDE))
         towards = np.array([np.cos(angle), np.sin(angle)])
         # From the middle of the path to the wall.
-        free = np.where(towards > 0.0, inside - middle[:2], inside + middle[:2]) / np.maximum(
+        free: Array = np.where(towards > 0.0, inside - middle[:2], inside + middle[:2]) / np.maximum(
             np.abs(towards), 1e-6
         )
         x, y = middle[:2] + float(free.min()) * towards
@@ -440,10 +442,10 @@ def _wide_enough(recipe: Recipe, motion: PersonMotion, camera: Placed) -> Placed
 
 def _unusual(entries: dict[str, Any], usual: Mapping[str, Any]) -> dict[str, Any]:
     """The entries that differ from the defaults."""
-    found = {}
+    found: dict[str, Any] = {}
     for name, value in entries.items():
         known = usual.get(name)
-        if isinstance(value, dict) and isinstance(known, dict) and known:
+        if is_table(value) and is_table(known) and known:
             value = _unusual(value, known)
             if not value:
                 continue

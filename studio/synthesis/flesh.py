@@ -6,24 +6,27 @@ and head, each arm, each leg) are blended; groups hardly are, so that an arm bes
 No piece is a truncated cone, and no number comes from a tracker's body file.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.person import SIDES, PersonMotion, Skeleton, joint_points
 
-Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Point = tuple[float, float, float]
 
 SKIN, SHIRT, TROUSERS, SHOE, HAIR = range(5)
 TRUNK, LEFT_ARM, RIGHT_ARM, LEFT_LEG, RIGHT_LEG = range(5)
+CLOTHS, GROUPS = 6, 5
+"""Rows of a person's wardrobe (the last one is the shirt's stripe), and groups of a person's pieces."""
 
 # Columns of the piece table that the kernels read.
 START, AXES, LENGTH, RADIUS_START, RADIUS_END, BULGE, SCALE_X, SCALE_Y = 0, 3, 12, 13, 14, 15, 16, 17
-FOLD, FOLD_PERIOD, FOLD_PHASE, BOUND, BOUND_RADIUS, COLUMNS = 18, 19, 20, 21, 24, 25
+FOLD, FOLD_PERIOD, FOLD_PHASE, BOUND, BOUND_RADIUS, EDGE, COLUMNS = 18, 19, 20, 21, 24, 25, 26
 
 REFERENCE_HEIGHT = 1760.0
 CHEST_FOLLOWS = 0.4
@@ -87,6 +90,13 @@ def piece_tables(motion: PersonMotion, pieces: tuple[Piece, ...]) -> tuple[Array
         widest = max(piece.radius) + piece.bulge + piece.fold
         table[:, BOUND_RADIUS] = 0.5 * length + widest * max(1.0, *piece.scale)
     return tables, np.array([(piece.material, piece.group) for piece in pieces])
+
+
+def tables_of_all(parts: Sequence[tuple[Array, IntArray]]) -> tuple[Array, IntArray]:
+    """`piece_tables` of several people as one: each has groups and clothes of its own, one person's after another's."""
+    tables, labels = zip(*parts, strict=True)
+    own = [label + np.array([CLOTHS * k, GROUPS * k]) for k, label in enumerate(labels)]
+    return np.concatenate(tables, axis=1), np.concatenate(own)
 
 
 def _upright_frame(axis: Array) -> Array:

@@ -9,14 +9,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from studio.arrays import Array
 from studio.body.person import Skeleton
 from studio.geometry.rotations import axis_turn
 from studio.synthesis.person import yaw_pitch_roll
 
-Array = NDArray[np.float64]
 Path = Callable[[Array], tuple[Array, Array]]
 Obstacle = Callable[[Array, Array, Array], Array]
 
@@ -184,8 +183,8 @@ def leg_to_ankle(hip: Array, ankle: Array, forward: Array, thigh: float, shin: f
 
 def _hanging_frame(down: Array, lateral: Array) -> Array:
     """(F, 3, 3) frames whose -z runs along `down` and whose y is `lateral`."""
-    z = -down / np.linalg.norm(down, axis=1, keepdims=True)
-    x = np.cross(lateral, z)
+    z: Array = -down / np.linalg.norm(down, axis=1, keepdims=True)
+    x: Array = np.cross(lateral, z)
     x /= np.linalg.norm(x, axis=1, keepdims=True)
     return np.stack([x, np.cross(z, x), z], axis=-1)
 

@@ -8,10 +8,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
+from studio.arrays import Array
 from studio.body.person import SIDES, PersonMotion, Skeleton, joint_points
 from studio.errors import StudioError
 from studio.geometry.rotations import axis_turn
@@ -34,8 +34,6 @@ from studio.synthesis.gait import (
     winding_path,
 )
 from studio.synthesis.room import GRAIN, Block
-
-Array = NDArray[np.float64]
 
 # A handstand: hands on the floor, kick up one leg after the other, hold with a sway, come down again.
 
@@ -290,6 +288,39 @@ def turning_walk(skeleton: Skeleton, times: Array, options: Options) -> PersonMo
     return _along(skeleton, times, gait, path, swing=0.33, elbow=0.45, lean=0.05)
 
 
+def pass_by(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
+    """A walk straight on: options start_x_mm, start_y_mm, heading_degrees, speed_mm_s, cadence, start_s (length of the
+    beginning that is left out).
+    """
+    speed = options.get("speed_mm_s", 1100.0)
+    gait = Gait(speed, options.get("cadence", 1.85), 0.60, 0.09 * skeleton.height, 35.0, 0.45)
+    start = (options.get("start_x_mm", -1100.0), options.get("start_y_mm", 0.0))
+    path = line_path(start, np.radians(options.get("heading_degrees", 0.0)))
+    times = times + options.get("start_s", 0.0)
+    return _along(skeleton, times, gait, path, swing=0.33, elbow=0.40, lean=0.05)
+
+
+def handshake(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
+    """Standing, the right hand given and shaken, then taken back: options at_x_mm, at_y_mm, heading_degrees, stance,
+    start_s, reach_s (how long the arm rises), hold_s, swing (of the shaken forearm, radians), phase (of the other arm's
+    sway).
+    """
+    start, reach = options.get("start_s", 0.2), options.get("reach_s", 0.5)
+    again = start + reach + options.get("hold_s", 0.7)
+    share = eased((times - start) / reach) - eased((times - again) / reach)
+    shake = options.get("swing", 0.12) * np.sin(2.0 * np.pi * 2.6 * (times - start)) * share**2
+    sway = 0.12 * np.sin(2.0 * np.pi * 0.5 * times + options.get("phase", 0.0))
+    held = _Carriage(
+        down=10.0 * share,
+        back=np.zeros_like(times),
+        lean=0.12 * share,
+        arm=(0.05 + sway, 0.05 + 0.75 * share),
+        out=0.20 - 0.06 * share,
+        bend=(0.30 + np.abs(sway), 0.30 + 0.45 * share + shake),
+    )
+    return _on_both_feet(skeleton, times, options, held)
+
+
 def stand(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
     """Standing still with the sway of a standing person: options heading_degrees, sway_mm."""
     count, sway = len(times), options.get("sway_mm", 6.0)
@@ -315,6 +346,8 @@ MOTIONS: dict[str, MotionMaker] = {
     "handstand": handstand,
     "circuit": circuit,
     "stand": stand,
+    "pass_by": pass_by,
+    "handshake": handshake,
     "crouch": crouch,
     "sit": sit,
 }

@@ -1,9 +1,11 @@
+# pyright: standard
 """Noise as a pure function of place and time: the same on any number of threads, in any order."""
 
 import math
 
 import numpy as np
 
+from studio.arrays import Bytes, Floats
 from studio.numba_in_threads import njit, prange
 
 # Odd multipliers of the 32-bit finaliser of MurmurHash3 (Appleby, public domain) and of a lattice.
@@ -39,7 +41,12 @@ def value_noise(x, y, z):
 
 
 @njit(cache=True, error_model="numpy", fastmath=True, parallel=True)
-def add_sensor_noise(picture, deviation, stream, out):
+def add_sensor_noise(
+    picture: Floats,
+    deviation: float,
+    stream: int,
+    out: Bytes,
+) -> None:
     """Gaussian noise by Box and Muller on hashed counters, then 8 bits.
 
     picture : (H, W, 3) float32, 0...255. deviation : grey levels at mid grey (shot noise: grows with

@@ -6,16 +6,14 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.catalogue import load_body
 from studio.body.person import SIDES, PersonMotion, Skeleton, marker_motion
 from studio.body.subject import Subject, subject_from_shape
 from studio.errors import BodyError
 from studio.geometry.rotations import axis_turn
 from studio.sessions.importers.bodytrack import read_numbers
-
-Array = NDArray[np.float64]
 
 # Segment lengths as shares of the body's height: Drillis & Contini (1966) as printed in Winter,
 # Biomechanics and Motor Control of Human Movement (2009), Fig. 4.1; trunk and head divide what lies above

@@ -1,5 +1,6 @@
 """A rendered person's footage as files: a video a camera, empty clips or plates, masks."""
 
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +14,7 @@ from studio.synthesis.clips import ClipWriter
 from studio.synthesis.damage import cameras_left, clutter_in_front
 from studio.synthesis.motions import stool
 from studio.synthesis.recipe_file import Picture, Recipe
-from studio.synthesis.renderer import Renderer
+from studio.synthesis.renderer import RenderedPerson, Renderer
 from studio.synthesis.room import Block
 from studio.synthesis.rooms import room_called
 from studio.synthesis.wardrobes import dressed
@@ -28,25 +29,39 @@ def render_person(
     cameras: tuple[Camera, ...],
     source: Path,
     progress: Progress = unheard,
+    beside: Sequence[RenderedPerson] = (),
 ) -> None:
     """Write videos/, and background/ and masks/ as the recipe includes them, into `source`; nothing for missing
-    cameras.
+    cameras. beside : who else is in the room; masks are of all.
     """
     cameras = cameras_left(cameras, recipe.damage.missing)
-    picture, renderer = recipe.picture, recipe_renderer(recipe, motion, cameras)
+    renderer = recipe_renderer(recipe, motion, cameras, beside)
+    write_footage(recipe, renderer, cameras, motion.frame_count, source, progress)
+
+
+def write_footage(
+    recipe: Recipe,
+    renderer: Renderer,
+    cameras: tuple[Camera, ...],
+    frame_count: int,
+    source: Path,
+    progress: Progress,
+) -> None:
+    """Write what a renderer shows as the files of `render_person`."""
+    picture = recipe.picture
     with ExitStack() as open_clips:
         footage = _writers(source / "videos", cameras, recipe.fps, picture.quality, open_clips)
         masks = (
             _writers(source / "masks", cameras, recipe.fps, 0.0, open_clips) if recipe.include.masks else []
         )
-        for frame in range(motion.frame_count):
+        for frame in range(frame_count):
             shadow = renderer.shadow(frame)
             for index in range(len(cameras)):
                 seen, mask = renderer.picture(index, frame, shadow)
                 footage[index].add(seen)
                 if masks:
                     masks[index].add(mask)
-            progress("rendering", frame + 1, motion.frame_count)
+            progress("rendering", frame + 1, frame_count)
     if recipe.include.background != "none":
         (source / "background").mkdir()
         for index, camera in enumerate(cameras):
@@ -55,7 +70,12 @@ def render_person(
             )
 
 
-def recipe_renderer(recipe: Recipe, motion: PersonMotion, cameras: tuple[Camera, ...]) -> Renderer:
+def recipe_renderer(
+    recipe: Recipe,
+    motion: PersonMotion,
+    cameras: tuple[Camera, ...],
+    beside: Sequence[RenderedPerson] = (),
+) -> Renderer:
     """The renderer of a recipe's room and person: the pictures of its footage, and their exact masks."""
     height = recipe.options.get("height_mm", STEPPED_OVER_HEIGHT) if recipe.motion == STEPPED_OVER else 0.0
     room = room_called(recipe.room, height)
@@ -71,6 +91,7 @@ def recipe_renderer(recipe: Recipe, motion: PersonMotion, cameras: tuple[Camera,
         girth=recipe.girth,
         wardrobe=dressed(recipe.wardrobe, recipe.colours),
         shutter=recipe.damage.shutter,
+        beside=beside,
     )
 
 

@@ -5,6 +5,7 @@ working folder. A recipe names a file in it as "data:lee-walk/CALIB".
 """
 
 import os
+import re
 from pathlib import Path
 
 from studio.errors import StudioError
@@ -33,3 +34,19 @@ def located(reference: str, recipe_folder: Path) -> Path:
     if not path.exists():
         raise StudioError(f"'{path}' does not exist.", hint)
     return path
+
+
+def real_footage(place: str) -> Path | None:
+    """A folder of the real data, by its place in it; None where it is not there."""
+    path = real_data_folder() / place
+    return path if path.is_dir() else None
+
+
+def missing_data(recipe: Path) -> str:
+    """Which file of the real data a recipe names that is not there, in words; "" where all are."""
+    for reference in re.findall(rf"[\"']({PREFIX}[^\"']+)[\"']", recipe.read_text(encoding="utf-8")):
+        try:
+            located(reference, recipe.parent)
+        except StudioError as problem:
+            return f"{problem.message} {problem.hint}"
+    return ""

@@ -1,5 +1,6 @@
 """Recipe files (TOML) of footage: their checked entries, and the bundled recipes."""
 
+import itertools
 import tomllib
 from collections.abc import Iterable, Mapping
 from operator import attrgetter
@@ -18,11 +19,11 @@ from studio.synthesis.person import Proportions
 from studio.synthesis.recorded_clips import Clip
 from studio.synthesis.rooms import ROOMS, is_room
 from studio.synthesis.wardrobes import MATERIALS, WARDROBES
-from studio.typed_decoding import decode_toml
+from studio.typed_decoding import decode_toml, is_table
 
 RECIPES = Path(__file__).parent / "recipe_files"
 SUFFIX = ".toml"
-RECORDED, JOINED = "recorded", "joined"
+RECORDED, JOINED, KEYS = "recorded", "joined", "keys"
 LIKE, LONGEST_CHAIN = "like", 5
 
 
@@ -63,7 +64,8 @@ class Include(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Contents of the session besides footage and calibration.
 
     background : "clip", "picture" or "none". start_pose_noise_mm : standard deviation of the markers' noise (each
-    coordinate) before the start pose is fitted.
+    coordinate) before the start pose is fitted; of a moving `body`, that of its lengths, `start_pose_noise_degrees`
+    that of its angles.
     """
 
     background: str = "clip"
@@ -72,6 +74,14 @@ class Include(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     subject: bool = True
     start_pose: bool = True
     start_pose_noise_mm: float = 2.0
+    start_pose_noise_degrees: float = 2.0
+
+
+class Key(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A pose of a body at a moment: parameter names to degrees or mm."""
+
+    at_s: float
+    pose: dict[str, float] = {}
 
 
 class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -80,7 +90,10 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     motion : "walk", "run", "box", "handstand", "stand", "circuit" and others (`motions.py`); or "arm", which shows
     `body` itself, seen by one camera, as in Deutscher & Reid 6.1; or "recorded", the motion of `motion_file` (.amc,
     .bvh, .npz; `skeleton_file` for an .amc whose ASF is not beside it); or "joined", several `clips` of such motion one
-    after the other (`joined_clips.py`). options : numbers of the motion. weighting : what runs of the session use by
+    after the other (`joined_clips.py`); or "keys", which moves `body` (a name, or a body, URDF or MJCF file) through
+    `keys` in the room (`body_footage.py`; option spread_degrees: the largest random change of a key's angles), rendered
+    `magnify` times as large, its cones with flat ends whose edges are rounded by `edge_mm`, or by 0 with wholly rounded
+    ones. options : numbers of the motion. weighting : what runs of the session use by
     default. An entry `like` in the file names another recipe, bundled or beside it, whose entries are the defaults of
     this one.
 
@@ -89,9 +102,11 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     and shoes; `subject_shape.toml` beside it has the file's dimensions alone. girth : factor on the usual girths of
     the flesh. proportions : of the bones, where they differ from the published ones. wardrobe : "striped" or "plain"
     clothes, which hardly stand out in the "office". colours : replacements for some clothes, RGB 0...1. room :
-    "office", "furnished", "hall", or "drawn-" and a number for a randomly furnished room. damage : faults of the
-    footage. sigma : a file whose first numbers are the session's σ0, one for each parameter of `body`, from frame
-    to frame at 60 Hz. Files are relative to the recipe's folder, or in the real data after "data:" (`real_data.py`).
+    "office", "furnished", "hall", "cell", or "drawn-" and a number for a randomly furnished room. damage : faults of
+    the footage. sigma : a file whose first numbers are the session's σ0, one for each parameter of `body`, from frame
+    to frame at 60 Hz. beside : recipes (bundled or beside this one) whose people are in the room, too, over the same
+    frames; their motion, build and clothes count, nothing else. Files are relative to the recipe's folder, or in the
+    real data after "data:" (`real_data.py`).
     """
 
     title: str
@@ -99,6 +114,9 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     motion_file: str = ""
     skeleton_file: str = ""
     clips: tuple[Clip, ...] = ()
+    keys: tuple[Key, ...] = ()
+    magnify: float = 1.0
+    edge_mm: float = 0.0
     frames: int
     fps: float = 60.0
     seed: int = 1
@@ -113,6 +131,7 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     sigma: str = ""
     weighting: str = ""
     options: dict[str, float] = {}
+    beside: tuple[str, ...] = ()
     cameras: Cameras = Cameras()
     picture: Picture = Picture()
     include: Include = Include()
@@ -131,6 +150,12 @@ def find_recipe(name_or_path: str | Path) -> Path:
         f"There is no recipe '{name_or_path}'.",
         f"Give a TOML file or one of {', '.join(recipe_names())}.",
     )
+
+
+def named_recipe(name: str, folder: Path) -> Path:
+    """The file of a recipe that another one in `folder` names: beside it, else bundled. Raises StudioError."""
+    own = folder / name
+    return own if own.is_file() else find_recipe(name)
 
 
 def recipe_names() -> tuple[str, ...]:
@@ -165,12 +190,11 @@ def _entries(path: Path, chain: int) -> dict[str, Any]:
         raise StudioError(
             f"Recipe '{path.name}': 'like' does not lead to a whole recipe.", "Correct the entry."
         )
-    beside = path.with_name(base)
-    whole = _entries(beside if beside.is_file() else find_recipe(base), chain - 1)
+    whole = _entries(named_recipe(base, path.parent), chain - 1)
     # Cameras are one choice of several: they are replaced as a whole.
     merged = {
         name: {**whole[name], **entry}
-        if isinstance(entry, dict) and isinstance(whole.get(name), dict) and name != "cameras"
+        if is_table(entry) and is_table(whole.get(name)) and name != "cameras"
         else entry
         for name, entry in own.items()
     }
@@ -201,6 +225,8 @@ RANGES: Mapping[str, tuple[float, float]] = {
     "fps": (1, 1000),
     "height_mm": (300, 3000),
     "girth": (0.5, 2),
+    "magnify": (0.05, 50),
+    "edge_mm": (0, 100),
     "damage.clutter": (0, 24),
     "damage.calibration_px": (0, 50),
     "damage.shutter": (0, 1),
@@ -240,6 +266,7 @@ def _problem(recipe: Recipe) -> str:
             not all(0.7 <= value <= 1.4 for value in msgspec.structs.astuple(recipe.proportions))
         ),
         "proportions belong to no shape file": bool(recipe.shape) and recipe.proportions != Proportions(),
+        f"nobody is beside motion '{recipe.motion}'": recipe.motion in ("arm", KEYS) and bool(recipe.beside),
         "damage is done to footage of a person, not to motion 'arm'": is_arm and recipe.damage != Damage(),
         "shape and sigma belong to a person, not to motion 'arm'": is_arm
         and bool(recipe.shape or recipe.sigma),
@@ -247,6 +274,12 @@ def _problem(recipe: Recipe) -> str:
         f"motion '{RECORDED}' and an entry motion_file belong together": (
             (recipe.motion == RECORDED) != bool(recipe.motion_file)
         ),
+        f"motion '{KEYS}' and [[keys]] belong together": (recipe.motion == KEYS) != bool(recipe.keys),
+        "keys are in the order of their moments": any(
+            not later.at_s > sooner.at_s for sooner, later in itertools.pairwise(recipe.keys)
+        ),
+        "shape, sigma and proportions belong to a person, not to motion 'keys'": recipe.motion == KEYS
+        and bool(recipe.shape or recipe.sigma or recipe.proportions != Proportions()),
         f"motion '{JOINED}' and [[clips]] belong together": (recipe.motion == JOINED) != bool(recipe.clips),
         "picture.empty_frames must be 1 or more": picture.empty_frames < 1,
         "[cameras] must hold one of rig, calibration, placed": (

@@ -19,10 +19,12 @@ from studio.motion_files.recorded_motion import RecordedMotion
 from studio.motion_files.trc import MarkerMotion, write_trc
 from studio.progress import Progress, unheard
 from studio.sessions.importers.bodytrack import RATE, read_numbers
-from studio.sessions.importers.importing import import_source
+from studio.sessions.importers.importing import ImportOptions, import_source
 from studio.sessions.manifest import read_manifest, write_manifest
 from studio.sessions.named_rows import write_pose, write_sigma
+from studio.sessions.session import BESIDE
 from studio.synthesis.arm_footage import render_arm
+from studio.synthesis.body_footage import TRUE_POSES, render_body
 from studio.synthesis.damage import misplaced
 from studio.synthesis.motions import make_motion
 from studio.synthesis.person import (
@@ -35,8 +37,19 @@ from studio.synthesis.person import (
 )
 from studio.synthesis.person_footage import render_person
 from studio.synthesis.real_data import located
-from studio.synthesis.recipe_file import JOINED, RECORDED, Recipe, find_recipe, read_recipe, recipe_cameras
+from studio.synthesis.recipe_file import (
+    JOINED,
+    KEYS,
+    RECORDED,
+    Recipe,
+    find_recipe,
+    named_recipe,
+    read_recipe,
+    recipe_cameras,
+)
 from studio.synthesis.recorded_clips import joined_person, recorded_person
+from studio.synthesis.renderer import RenderedPerson
+from studio.synthesis.wardrobes import dressed
 
 ARM = "arm"
 RECIPE_COPY = "recipe.toml"
@@ -49,9 +62,9 @@ def synthesize(
     """Render a recipe's footage and make a session of it; returns the session's folder.
 
     recipe : a TOML file or the name of a bundled recipe. into : the session folder to be made. progress : called
-    with (step, done, total). frames : only this many first frames of a person's
-    motion. The same recipe gives the same pictures on any number of threads. Raises
-    StudioError for an impossible recipe and the errors of `import_source`.
+    with (step, done, total). frames : only this many first frames of a moving person or body. The same
+    recipe gives the same pictures on any number of threads. Raises StudioError for an impossible recipe and the errors
+    of `import_source`.
     """
     path = find_recipe(recipe)
     parsed = read_recipe(path)
@@ -61,10 +74,12 @@ def synthesize(
         source = Path(folder) / into.name
         source.mkdir()
         render_source(parsed, path.parent, source, progress, frames)
-        import_source(source, into, fps=parsed.fps, progress=progress)
-        for other in (SUBJECT_OF_SHAPE, SUBJECT_OF_HEIGHT):
+        import_source(source, into, ImportOptions(fps=parsed.fps), progress=progress)
+        for other in (SUBJECT_OF_SHAPE, SUBJECT_OF_HEIGHT, TRUE_POSES):
             if (source / other).exists():
                 (into / other).write_bytes((source / other).read_bytes())
+        for number, (person, motion) in enumerate(people_beside(parsed, path.parent, frames), 1):
+            _write_beside(person, motion, into / BESIDE / str(number))
     manifest = read_manifest(into)
     changed = msgspec.structs.replace(
         manifest,
@@ -86,7 +101,7 @@ def person_of_recipe(
     """
     path = find_recipe(recipe)
     parsed = read_recipe(path)
-    if parsed.motion == ARM:
+    if parsed.motion in (ARM, KEYS):
         raise StudioError(f"Recipe '{path.name}' moves no person.", "Choose a recipe of a person.")
     changed = msgspec.structs.replace(
         parsed, options={**parsed.options, **(options or {})}, frames=frames or parsed.frames
@@ -111,6 +126,10 @@ def render_source(
         cameras = _cameras(recipe, recipe_folder, rng)
         truth = render_arm(recipe, cameras[0], source, progress)
         cameras, subject = cameras[:1], Subject(body=recipe.body)
+    elif recipe.motion == KEYS:
+        cameras, count = _cameras(recipe, recipe_folder, rng), min(frames or recipe.frames, recipe.frames)
+        truth, subject = render_body(recipe, recipe_folder, cameras, source, progress, count)
+        cameras = misplaced(cameras, recipe.damage.calibration_px, recipe.seed)
     else:
         skeleton, shape = recipe_person(recipe, recipe_folder, rng)
         cameras = _cameras(recipe, recipe_folder, rng)
@@ -124,7 +143,11 @@ def render_source(
             write_subject(Subject(body=recipe.body, height_mm=recipe.height_mm), source / SUBJECT_OF_HEIGHT)
         if recipe.sigma:
             _write_sigma(recipe, located(recipe.sigma, recipe_folder), source / SIGMA_NAME)
-        render_person(recipe, motion, cameras, source, progress)
+        beside = [
+            RenderedPerson(other, person.girth, dressed(person.wardrobe, person.colours))
+            for person, other in people_beside(recipe, recipe_folder, frames)
+        ]
+        render_person(recipe, motion, cameras, source, progress, beside)
         cameras = misplaced(cameras, recipe.damage.calibration_px, recipe.seed)
     (source / "calibration").mkdir()
     write_calibration(cameras, source / "calibration" / "rendered.toml")
@@ -133,8 +156,39 @@ def render_source(
         write_trc(source / "truth" / f"{recipe.motion}.trc", truth)
     if recipe.include.subject:
         write_subject(subject, source / "subject.toml")
-    if recipe.include.start_pose and recipe.motion != ARM:
+    if recipe.include.start_pose and recipe.motion not in (ARM, KEYS):
         _write_start_pose(recipe, subject, truth, rng, source / "start_pose.csv")
+
+
+def people_beside(
+    recipe: Recipe, recipe_folder: Path, frames: int | None = None
+) -> list[tuple[Recipe, PersonMotion]]:
+    """Who else is in a recipe's room: their recipes and motions. Raises StudioError, also where they do not move over
+    the same frames.
+    """
+    found: list[tuple[Recipe, PersonMotion]] = []
+    for name in recipe.beside:
+        path = named_recipe(name, recipe_folder)
+        person = read_recipe(path)
+        if person.motion in (ARM, KEYS) or (person.frames, person.fps) != (recipe.frames, recipe.fps):
+            raise StudioError(
+                f"Recipe '{path.name}' cannot be beside: it is not a person over {recipe.frames} frames at"
+                f" {recipe.fps:g} Hz.",
+                "Give both recipes the same frames and fps.",
+            )
+        skeleton, _ = recipe_person(person, path.parent, np.random.default_rng(person.seed))
+        found.append((person, first_frames(recipe_motion(person, path.parent, skeleton), frames)))
+    return found
+
+
+def _write_beside(person: Recipe, motion: PersonMotion, folder: Path) -> None:
+    """Truth, measures and start pose of somebody beside, as a session of him alone would have them."""
+    folder.mkdir(parents=True)
+    truth, subject = marker_motion(motion), person_subject(person, motion)
+    write_trc(folder / "truth.trc", truth)
+    write_subject(subject, folder / "subject.toml")
+    rng = np.random.default_rng((person.seed, 11))
+    _write_start_pose(person, subject, truth, rng, folder / "start_pose.csv")
 
 
 def recipe_motion(recipe: Recipe, recipe_folder: Path, skeleton: Skeleton) -> PersonMotion:

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
+from studio.arrays import Array
 from studio.body.mending import mended, with_hands_above_floor
 from studio.body.person import SIDES, PersonMotion, Skeleton, joint_points, sampled
 from studio.body.retargeting import above_floor, lowest_of_sole, on_skeleton
@@ -20,8 +20,6 @@ from studio.geometry.rotations import axis_turn
 from studio.motion_files.recorded_motion import RecordedMotion
 from studio.synthesis.gait import eased
 from studio.training.smooth_noise import smooth_noise, warped_times
-
-Array = NDArray[np.float64]
 
 # Another performance of a person's motion: the same movements in another tempo, every joint a little different, the
 # feet where they stood.
@@ -83,7 +81,7 @@ def from_local(motion: PersonMotion, local: dict[str, Array]) -> PersonMotion:
 
 def _changed(local: dict[str, Array], fps: float, size: float, rng: np.random.Generator) -> dict[str, Array]:
     """The local turns with slow changes of about `size` radians; joints that hardly move change less."""
-    found = {}
+    found: dict[str, Array] = {}
     for name, turn in local.items():
         slow = smooth_noise(rng, len(turn), 3, fps, TURN_PERIOD_S)
         noise = np.sqrt(1.0 - LASTING**2) * slow + LASTING * rng.standard_normal(3)
@@ -204,7 +202,7 @@ def _cycle(recorded: RecordedMotion, whole: PersonMotion, chosen: dict[str, floa
     _long_enough(recorded, times, chosen)
     cycle = sampled(whole, times, whole.fps)
     share = eased(np.linspace(0.0, 1.0, count))[:, None]
-    turns = {}
+    turns: dict[str, Array] = {}
     for name, turn in cycle.turns.items():
         missing = Rotation.from_matrix(turn[-1].T @ turn[0]).as_rotvec()
         turns[name] = turn @ Rotation.from_rotvec(share * missing).as_matrix()
@@ -364,7 +362,7 @@ def _blended(before: PersonMotion, after: PersonMotion, overlap: int) -> PersonM
     root[at : at + overlap, 2] = (1.0 - share) * heights[0] + share * heights[1]
     root[at + overlap :, :2] += root[at + overlap - 1, :2] - after.root[overlap - 1, :2]
     first, second = to_local(before), to_local(after)
-    turns = {}
+    turns: dict[str, Array] = {}
     for name, turn in first.items():
         both = turn[at:], second[name][:overlap]
         missing = Rotation.from_matrix(np.swapaxes(both[0], 1, 2) @ both[1]).as_rotvec()

@@ -1,30 +1,28 @@
-"""Pictures of the person in the room, with their exact masks.
+"""Pictures of the person in the room, or of several, with their exact masks.
 
 The room is traced once a camera; in each frame the person's shadow on the floor is computed once for all cameras and
 the person is traced inside a bounding window. A picture is then the room, darkened by the shadow, under the
 person, softened as by a lens, with sensor noise that depends only on seed, camera and frame.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array, Bytes, Floats
 from studio.body.person import PersonMotion, sampled
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project
 from studio.synthesis.cameras import pixel_rays
-from studio.synthesis.flesh import BOUND, BOUND_RADIUS, clothed_pieces, piece_tables
+from studio.synthesis.flesh import BOUND, BOUND_RADIUS, clothed_pieces, piece_tables, tables_of_all
 from studio.synthesis.noise_kernels import add_sensor_noise
 from studio.synthesis.room import Room, block_tables
 from studio.synthesis.room_kernels import trace_room
 from studio.synthesis.tracing_kernels import floor_shadow, trace_person
 from studio.synthesis.wardrobes import STRIPED
-
-Array = NDArray[np.float64]
-Floats = NDArray[np.float32]
-Bytes = NDArray[np.uint8]
 
 SHADOW_REACH, SHADOW_CELL = 2600.0, 26.0
 EXPOSURE, LENS_BLUR = 1.8, 0.55
@@ -45,6 +43,15 @@ class _View:
     shadow_place: Floats
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class RenderedPerson:
+    """Somebody in the room. girth, wardrobe : as `Renderer` takes them."""
+
+    motion: PersonMotion
+    girth: float
+    wardrobe: Array
+
+
 class Renderer:
     """Renders any frame of one motion for any camera; frames are independent of each other."""
 
@@ -60,13 +67,23 @@ class Renderer:
         girth: float = 1.0,
         wardrobe: Array = STRIPED,
         shutter: float = 0.0,
+        beside: Sequence[RenderedPerson] = (),
     ) -> None:
-        """shutter : exposure time, centred on the frame, as a share of the time from frame to frame."""
+        """shutter : exposure time, centred on the frame, as a share of the time from frame to frame. beside : others in
+        the same room, over as many frames; pictures and masks show all of them.
+        """
         self._room, self._noise, self._samples, self._seed = room, noise, samples, seed
-        self._wardrobe = wardrobe
+        people = [RenderedPerson(motion, girth, wardrobe), *beside]
+        self._wardrobe = np.concatenate([person.wardrobe for person in people])
         self._moments = MOMENTS if shutter > 0.0 else 1
-        tables, self._labels = piece_tables(
-            _moments(motion, shutter) if shutter > 0.0 else motion, clothed_pieces(motion.skeleton, girth)
+        tables, self._labels = tables_of_all(
+            [
+                piece_tables(
+                    _moments(person.motion, shutter) if shutter > 0.0 else person.motion,
+                    clothed_pieces(person.motion.skeleton, person.girth),
+                )
+                for person in people
+            ]
         )
         self._tables = tables.reshape(motion.frame_count, self._moments, *tables.shape[1:])
         self._views = tuple(_view(room, camera, samples) for camera in cameras)
@@ -141,6 +158,30 @@ class Renderer:
         stream = (self._seed * 1_000_003 + frame) * STREAMS_PER_FRAME + camera
         add_sensor_noise(exposed, self._noise, stream, out)
         return out
+
+
+class SurfaceRenderer(Renderer):
+    """Renders a surface of swept spheres that is nobody's: a robot, a hand."""
+
+    def __init__(
+        self,
+        room: Room,
+        cameras: tuple[Camera, ...],
+        tables: Array,
+        labels: NDArray[np.int64],
+        *,
+        noise: float,
+        samples: int,
+        seed: int,
+        wardrobe: Array = STRIPED,
+    ) -> None:
+        """tables, labels : (F, M, P, COLUMNS) and (P, 2) as `flesh.piece_tables` has them, at the M moments of each
+        frame's exposure.
+        """
+        self._room, self._noise, self._samples, self._seed = room, noise, samples, seed
+        self._wardrobe, self._moments = wardrobe, tables.shape[1]
+        self._tables, self._labels = tables, labels
+        self._views = tuple(_view(room, camera, samples) for camera in cameras)
 
 
 def _moments(motion: PersonMotion, shutter: float) -> PersonMotion:

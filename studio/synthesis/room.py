@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from studio.arrays import Array
+
 IntArray = NDArray[np.int64]
 
 PLAIN, PLANKS, GRAIN, BOOKS, CHECKS, POSTER, TILES, CARPET = range(8)

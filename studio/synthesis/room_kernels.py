@@ -1,9 +1,11 @@
+# pyright: standard
 """Rays through the empty room: light of the lamp, ambient light, distance."""
 
 import math
 
 import numpy as np
 
+from studio.arrays import Array, Floats, Indices
 from studio.numba_in_threads import njit, prange
 from studio.synthesis.noise_kernels import hashed, value_noise
 from studio.synthesis.room import BOOKS, CARPET, CHECKS, GRAIN, PLANKS, POSTER, TILES
@@ -139,7 +141,18 @@ def lamp_share(px, py, pz, lights, blocks, salt):
 
 
 @njit(cache=True, error_model="numpy", fastmath=True, parallel=True)
-def trace_room(origin, rays, samples, size, lights, blocks, patterns, key, ambient, depth):
+def trace_room(
+    origin: Array,
+    rays: Floats,
+    samples: int,
+    size: Array,
+    lights: Array,
+    blocks: Array,
+    patterns: Indices,
+    key: Array,
+    ambient: Array,
+    depth: Array,
+) -> None:
     """The empty room.
 
     size : (3,) half widths and height. Fills key and ambient light (h, w, 3) and depth (h, w).

@@ -1,4 +1,4 @@
-"""The rooms of footage by name: three furnished by hand, others at random."""
+"""The rooms of footage by name: four furnished by hand, others at random."""
 
 from dataclasses import replace
 
@@ -109,10 +109,48 @@ HALL = (
     Block((3900, 3400, 900), (260, 500, 900), PALE, GRAIN, (0.62, 0.60, 0.57)),
 )
 
+# A robot's cell: a concrete floor, a fence of posts and panels, cabinets, a conveyor with boxes, a pallet, a tool rack.
+
+CELL_LIGHTS = np.array([[600.0, -700.0, 3140.0], [330.0, 0.0, 0.0], [0.44, 0.44, 0.43], [0.50, 0.51, 0.53]])
+STEEL, SIGNAL, CARTON = (0.42, 0.44, 0.46), (0.72, 0.60, 0.10), (0.56, 0.44, 0.30)
+
+CELL = (
+    Block((0, 0, 3), (2795, 2795, 3), (0.46, 0.46, 0.45), CARPET, (0.40, 0.40, 0.40)),
+    Block((0, 0, 8), (520, 520, 8), (0.30, 0.31, 0.32), GRAIN, (0.26, 0.27, 0.28)),
+    # fence
+    *(Block((x, 2350, 1000), (30, 30, 1000), SIGNAL) for x in (-2300, -1150, 0, 1150, 2300)),
+    *(
+        Block((x, 2360, 1100), (560, 8, 850), STEEL, TILES, (0.34, 0.36, 0.38))
+        for x in (-1725, -575, 575, 1725)
+    ),
+    *(Block((-2350, y, 1000), (30, 30, 1000), SIGNAL) for y in (-1800, -600, 600, 1800)),
+    *(Block((-2360, y, 1100), (8, 580, 850), STEEL, TILES, (0.34, 0.36, 0.38)) for y in (-1200, 0, 1200)),
+    # cabinet and controller
+    Block((2450, 1500, 900), (250, 420, 900), (0.66, 0.66, 0.62), GRAIN, (0.60, 0.60, 0.57)),
+    Block((2190, 1500, 1250), (12, 160, 110), (0.10, 0.12, 0.16)),
+    Block((2400, 300, 450), (260, 350, 450), (0.24, 0.30, 0.40), GRAIN, (0.20, 0.25, 0.34)),
+    # conveyor with boxes
+    Block((300, -1500, 640), (1700, 260, 30), (0.16, 0.16, 0.17), GRAIN, (0.22, 0.22, 0.23)),
+    *(Block((x, -1500, 300), (40, 220, 300), STEEL) for x in (-1200, 300, 1800)),
+    Block((-700, -1500, 790), (170, 140, 120), CARTON, PLAIN),
+    Block((100, -1480, 760), (130, 150, 90), CARTON, GRAIN, (0.48, 0.37, 0.25), 0.3),
+    Block((900, -1520, 820), (160, 160, 150), (0.24, 0.36, 0.52), CHECKS, (0.70, 0.70, 0.68), 0.1),
+    # pallet
+    Block((-1500, 1100, 75), (500, 400, 75), (0.52, 0.40, 0.26), PLANKS, (0.40, 0.30, 0.20)),
+    Block((-1650, 1050, 350), (280, 280, 200), CARTON, GRAIN, (0.50, 0.39, 0.27)),
+    Block((-1250, 1200, 300), (160, 200, 150), (0.62, 0.52, 0.38), PLAIN),
+    Block((-1600, 1000, 680), (200, 180, 130), (0.30, 0.42, 0.32), CHECKS, (0.56, 0.54, 0.46), 0.4),
+    # tool rack, bin
+    Block((700, 2100, 900), (420, 110, 60), STEEL, GRAIN, (0.36, 0.38, 0.40)),
+    *(Block((400 + 200 * k, 2080, 1010), (50, 50, 60), (0.14, 0.14, 0.15)) for k in range(4)),
+    Block((1700, 900, 220), (220, 260, 220), (0.55, 0.16, 0.12), GRAIN, (0.48, 0.14, 0.10), 0.5),
+)
+
 ROOMS = {
     "furnished": Room((2900.0, 2600.0), 2900.0, FURNITURE, LIGHTS),
     "office": Room((2900.0, 2600.0), 2900.0, OFFICE, OFFICE_LIGHTS),
     "hall": Room((4300.0, 4300.0), 3400.0, HALL, HALL_LIGHTS),
+    "cell": Room((2800.0, 2800.0), 3200.0, CELL, CELL_LIGHTS),
 }
 
 # Randomly furnished rooms.
@@ -170,7 +208,7 @@ def drawn_room(seed: int) -> Room:
 
 def _walls(rng: np.random.Generator, half: tuple[float, float], height: float) -> list[Block]:
     """Panels over the walls, some of them patterned."""
-    found = []
+    found: list[Block] = []
     for axis in (0, 1):
         for sign in (-1.0, 1.0):
             colour = _colour(rng, 0.35, 0.78, 0.06)

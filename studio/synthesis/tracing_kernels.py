@@ -1,9 +1,11 @@
-"""Rays through the person's distance field: pictures, true coverage, and shadows on the floor."""
+# pyright: standard
+"""Rays through the distance field of a person or another body: pictures, true coverage, and shadows on the floor."""
 
 import math
 
 import numpy as np
 
+from studio.arrays import Array, Floats, Indices
 from studio.numba_in_threads import njit, prange
 from studio.synthesis.distance_kernels import (
     FAR,
@@ -17,7 +19,7 @@ from studio.synthesis.distance_kernels import (
     nearest_piece,
     no_pieces,
 )
-from studio.synthesis.flesh import HAIR, SHIRT, SHOE, TROUSERS
+from studio.synthesis.flesh import CLOTHS, HAIR, SHIRT, SHOE, TROUSERS
 from studio.synthesis.noise_kernels import value_noise
 
 SAFETY, TOUCH, STEPS = 0.85, 0.8, 72
@@ -33,18 +35,21 @@ SAME_SURFACE = 12.0
 def cloth_colour(material, x, y, z, wardrobe):
     """(red, green, blue) of a point in its piece's frame, so that the pattern moves with the limb.
 
-    wardrobe : (6, 3) skin, shirt, trousers, shoe, hair, and the shirt's stripe.
+    wardrobe : (6 P, 3) skin, shirt, trousers, shoe, hair, and the shirt's stripe, of each of P people. material : a
+    row of it.
     """
     grain = value_noise(x / 9.0, y / 9.0, z / 9.0) - 0.5
     patch = value_noise(x / 55.0 + 7.0, y / 55.0, z / 55.0) - 0.5
     r, g, b = wardrobe[material, 0], wardrobe[material, 1], wardrobe[material, 2]
+    stripes = material - material % CLOTHS + CLOTHS - 1
+    material %= CLOTHS
     tone = 1.0 + 0.10 * patch + 0.06 * grain
     if material == SHIRT:
         stripe = 0.5 + 0.5 * math.sin(2.0 * math.pi * z / 74.0)
         stripe = min(max((stripe - 0.72) / 0.10, 0.0), 1.0)
-        r += stripe * (wardrobe[5, 0] - r)
-        g += stripe * (wardrobe[5, 1] - g)
-        b += stripe * (wardrobe[5, 2] - b)
+        r += stripe * (wardrobe[stripes, 0] - r)
+        g += stripe * (wardrobe[stripes, 1] - g)
+        b += stripe * (wardrobe[stripes, 2] - b)
         tone = 1.0 + 0.12 * patch + 0.10 * grain
     elif material == TROUSERS:
         tone = 1.0 + 0.22 * patch + 0.16 * grain
@@ -176,7 +181,18 @@ def trace_pixel(
 
 
 @njit(cache=True, error_model="numpy", fastmath=True, parallel=True)
-def trace_person(origin, rays, samples, room_depth, pieces, labels, lights, wardrobe, light, coverage):
+def trace_person(
+    origin: Array,
+    rays: Floats,
+    samples: int,
+    room_depth: Floats,
+    pieces: Array,
+    labels: Indices,
+    lights: Array,
+    wardrobe: Array,
+    light: Floats,
+    coverage: Floats,
+) -> None:
     """The person as seen through a window of the picture, tile by tile.
 
     origin : (3,) camera centre. rays : (h * samples, w * samples, 3) unit directions. room_depth : (h, w)
@@ -213,7 +229,16 @@ def trace_person(origin, rays, samples, room_depth, pieces, labels, lights, ward
 
 
 @njit(cache=True, error_model="numpy", fastmath=True, parallel=True)
-def floor_shadow(left, near, cell, pieces, labels, lights, key, ambient):
+def floor_shadow(
+    left: float,
+    near: float,
+    cell: float,
+    pieces: Array,
+    labels: Indices,
+    lights: Array,
+    key: Floats,
+    ambient: Floats,
+) -> None:
     """Shares of the lamp's and of the ambient light that the person leaves on the floor.
 
     Cell (j, i) of the (n, n) outputs lies at x = left + i * cell, y = near + j * cell, mm; 1 = no shadow.

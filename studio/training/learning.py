@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.behaviour.model import BehaviourModel
 from studio.behaviour.model_learning import learn_model
 from studio.behaviour.settings import LearningSettings
@@ -17,8 +17,6 @@ from studio.progress import Progress
 from studio.sessions.workspace import Workspace
 from studio.training.oversampling import OversamplingSettings, oversampled
 from studio.training.sources import FPS, Recording, expand, read_source
-
-Array = NDArray[np.float64]
 
 TEST_SHARE = 0.2
 FEWEST_FOR_A_TEST = 20
@@ -55,7 +53,7 @@ def read_sources(
     names = [name for source in sources for name in expand(source)]
     if not names:
         raise StudioError("There is no recording to learn from.", "Name motion files or runs.")
-    found = []
+    found: list[Recording] = []
     for number, name in enumerate(names, start=1):
         words = f"{Path(name).name} ({number} of {len(names)})"
 
@@ -69,7 +67,7 @@ def read_sources(
 
 def parted(recordings: Sequence[Recording]) -> tuple[tuple[Recording, ...], tuple[Recording, ...]]:
     """Training and test: the last fifth of each recording is the test, where it is long enough."""
-    training, test = [], []
+    training, test = list[Recording](), list[Recording]()
     for recording in recordings:
         at = recording.frame_count - round(TEST_SHARE * recording.frame_count)
         if recording.frame_count < FEWEST_FOR_A_TEST:

@@ -1,3 +1,4 @@
+# pyright: standard
 """Points and directions on a body along poses, with their slopes by every parameter, in one pass over the tree.
 
 A turn by θ about the world axis a through o moves a point p by a × (p - o) dθ, a direction v by a × v dθ; a move
@@ -5,7 +6,9 @@ along a moves points by a. Summed over a joint's own steps and those of all join
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
+from studio.arrays import Array, Indices
 from studio.body.forward_kinematics import take_step
 from studio.body.model import MOVE
 from studio.numba_in_threads import KERNEL, njit
@@ -15,8 +18,19 @@ MOVES = MOVE
 
 @njit(**KERNEL)
 def place_points(
-    poses, parent, first_step, kind, axis, parameter, value, joints, offsets, is_point, places, slopes
-):
+    poses: Array,
+    parent: Indices,
+    first_step: Indices,
+    kind: Indices,
+    axis: Indices,
+    parameter: Indices,
+    value: Array,
+    joints: Indices,
+    offsets: Array,
+    is_point: NDArray[np.bool_],
+    places: Array,
+    slopes: Array,
+) -> None:
     """Fill places (N, P, 3) and slopes (N, D, P, 3) of poses (N, D).
 
     joints (P,), offsets (P, 3) : joint and position in its frame of each point or direction. is_point (P,).

@@ -8,12 +8,10 @@ import re
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.person import MARKERS
 from studio.errors import StudioError
-
-Array = NDArray[np.float64]
 
 SYNONYMS: dict[str, tuple[str, ...]] = {
     "Hip": ("hip", "midhip", "hips", "pelvis", "root"),

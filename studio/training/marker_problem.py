@@ -3,13 +3,13 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.inverse_kinematics import pose_from_markers
 from studio.body.model import BodyModel, Marker, kinematic_tables
 from studio.errors import StudioError
 from studio.training.marker_kernels import place_points
 from studio.training.targets import Targets, pointers_of
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
@@ -102,8 +102,8 @@ class MarkerProblem:
 
     def _stepped(self, pose: Array, before: Array, rows: Rows, damping: float) -> Array:
         normal, right = self._normal(pose[None], rows)
-        slope = right[0] + PULL**2 * (pose - before)
-        matrix = normal[0] + PULL**2 * np.eye(len(pose))
+        slope: Array = right[0] + PULL**2 * (pose - before)
+        matrix: Array = normal[0] + PULL**2 * np.eye(len(pose))
         held = ((pose <= self.lower) & (slope > 0.0)) | ((pose >= self.upper) & (slope < 0.0))
         matrix += np.diag(damping * np.diag(matrix) + np.where(held, HELD, 0.0))
         step = np.linalg.solve(matrix, np.where(held, 0.0, -slope))

@@ -10,11 +10,10 @@ shoulder that swings and spreads, with the twist at the elbow).
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.model import MOVE, TURN, BodyModel, Joint, Step
 
-Array = NDArray[np.float64]
 Triple = tuple[int, int, int]
 
 

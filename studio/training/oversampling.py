@@ -8,15 +8,13 @@ change slowly by a little.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from studio.arrays import Array
 from studio.body.model import BodyModel
 from studio.knobs import knob
 from studio.training.resampling import poses_at
 from studio.training.smooth_noise import smooth_noise, warped_times
-
-Array = NDArray[np.float64]
 
 TEMPO_PERIOD_S, ANGLE_PERIOD_S = 4.0, 3.0
 # The share of an angle's change that lasts through the whole performance, and of its spread that it grows with.
@@ -57,7 +55,7 @@ def oversampled(
     body: BodyModel, poses: Array, fps: float, settings: OversamplingSettings, rng: np.random.Generator
 ) -> list[Array]:
     """The training material of a recording (F, D): for every performance as many sequences as smoothings."""
-    found = []
+    found: list[Array] = []
     for number in range(settings.performances):
         shown = poses if number == 0 else performed(body, poses, fps, settings, rng)
         found += smoothed_copies(body, shown, fps, settings)
@@ -76,14 +74,14 @@ def performed(
     spread = np.minimum(shown.std(axis=0) / FULL_SPREAD, 1.0)
     size = np.radians(settings.angle_change) * (0.25 + 0.75 * spread)
     slow = smooth_noise(rng, frames, poses.shape[1], fps, ANGLE_PERIOD_S)
-    change = np.sqrt(1.0 - LASTING**2) * slow + LASTING * rng.standard_normal(poses.shape[1])
+    change: Array = np.sqrt(1.0 - LASTING**2) * slow + LASTING * rng.standard_normal(int(poses.shape[1]))
     angles = np.array([entry.kind == "angle" for entry in body.parameters])
     return _within(body, shown, shown + np.where(angles, size * change, 0.0))
 
 
 def smoothed_copies(body: BodyModel, poses: Array, fps: float, settings: OversamplingSettings) -> list[Array]:
     """Sequences of poses (F, D), one a smoothing: each smoothed more, and sampled a part of a frame later."""
-    found, count = [], settings.smoothings
+    found, count = list[Array](), settings.smoothings
     for number in range(count):
         width = settings.widest_smoothing * fps * number / max(count - 1, 1)
         smooth = gaussian_filter1d(poses, width, axis=0, mode="nearest") if width > 0.0 else poses

@@ -9,7 +9,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from studio.arrays import Array
+
 Costs = Callable[[Array], Array]
 
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.model import BodyModel
 from studio.progress import Progress
 from studio.training.marker_problem import MarkerProblem
@@ -21,8 +22,6 @@ from studio.training.other_spellings import on_branch
 from studio.training.path_splicing import spliced
 from studio.training.smooth_path import SmoothPath, Steadiness
 from studio.training.targets import Targets
-
-Array = NDArray[np.float64]
 
 STEADY = Steadiness(acceleration=90.0, speed=8.0, rest=1.5)
 """mm a radian a frame, at STEADY_FPS frames a second."""
@@ -50,7 +49,7 @@ def fit_poses(body: BodyModel, targets: Targets, fps: float, progress: Progress 
     enough markers of the body.
     """
     problem, steady = MarkerProblem(body, targets), STEADY.at_rate(fps / STEADY_FPS)
-    frames, paths, done = targets.frame_count, [], 0
+    frames, paths, done = targets.frame_count, list[Array](), 0
     refinements = sum(map(len, STRICTER)) + 2 * len(OTHERS)
     total = 2 * frames + PATH_STEPS * frames * 2 * refinements + LAST_STEPS * frames
     for backwards in (False, True):

@@ -1,12 +1,10 @@
 """Recordings at another frame rate: smooth curves through the recorded frames."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from studio.arrays import Array
 from studio.body.model import BodyModel
-
-Array = NDArray[np.float64]
 
 LONGEST_GAP_S = 0.25
 

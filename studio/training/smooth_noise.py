@@ -1,10 +1,9 @@
 """Slow random changes, as between two performances of the same movement."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-Array = NDArray[np.float64]
+from studio.arrays import Array
 
 REACH = 4.0  # standard deviations of the smoothing that count
 # Noise smoothed with a standard deviation of s swings about once in PERIODS * s.

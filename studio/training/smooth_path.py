@@ -9,9 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.tracking.banded_solving import solve_banded
-
-Array = NDArray[np.float64]
+from studio.arrays import Array
+from studio.trackers.banded_solving import solve_banded
 
 DAMPING, LARGEST_DAMPING, SETTLED = 1e-3, 1e4, 1e-5
 HELD, LEAST_PIVOT = 1e12, 1e-12

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.forward_kinematics import marker_points
 from studio.body.mending import mended
 from studio.body.model import BodyModel
@@ -33,8 +33,6 @@ from studio.training.marker_labels import person_markers
 from studio.training.pose_fitting import bad_frames, fit_poses
 from studio.training.resampling import frame_times, points_at, poses_at
 from studio.training.targets import Targets, marker_names, of_person, of_poses, skeleton_of_body
-
-Array = NDArray[np.float64]
 
 FPS = 30.0
 FEWEST_FRAMES = 10
@@ -227,7 +225,7 @@ def _leg(names: tuple[str, ...], points: Array) -> float:
 def _sized(body: BodyModel, targets: Targets) -> BodyModel:
     """The body in the size given by its markers' distances, medians over the frames."""
     at = {name: place for place, name in enumerate(targets.names)}
-    lengths = {}
+    lengths: dict[str, float] = {}
     for one, other in MEASURED:
         if one in at and other in at:
             apart = np.linalg.norm(targets.points[:, at[one]] - targets.points[:, at[other]], axis=1)

@@ -7,14 +7,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.forward_kinematics import joint_frames, marker_points
 from studio.body.model import BodyModel, kinematic_tables
 from studio.body.person import MARKERS, SIDES, PersonMotion, Skeleton, marker_motion
 from studio.errors import BodyError
-
-Array = NDArray[np.float64]
 
 HEAD = "head"
 TIPS = tuple(f"{side} {part}" for side in SIDES for part in ("hand", "foot"))
@@ -69,7 +67,7 @@ def marker_names(body: BodyModel) -> tuple[str, ...]:
 def pointers_of(body: BodyModel, *, movable: bool) -> tuple[Pointer, ...]:
     """The pointers of a body's head, hands and feet; `movable`: only of those with their own rotation parameter."""
     frames = joint_frames(body, body.neutral)[0]
-    shapes, found = kinematic_tables(body).limb_shape, []
+    shapes, found = kinematic_tables(body).limb_shape, list[Pointer]()
     for limb, shape in zip(body.drawn, shapes, strict=True):
         own = any(step.parameter >= 0 for step in body.joints[limb.joint].steps)
         if limb.name not in POINTING or (movable and not own):

@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from studio.arrays import Array
 from studio.body.forward_kinematics import joint_frames
 from studio.body.model import MOVE, BodyModel
+from studio.body.scale import scale_of
 from studio.volume.blob_model import cone_blobs
 from studio.volume.hull import Hull
 
-Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 MM_OF_ROTATION = 1000.0
@@ -102,7 +103,7 @@ def root_candidates(body: BodyModel, hull: Hull, pose: Array, *, upright: bool =
     root = next(index for index, joint in enumerate(body.joints) if joint.parent < 0)
     frame = joint_frames(body, pose)[0, root]
     turns = _headings(seen, own) if upright else _axis_turns(seen, own)
-    found = []
+    found: list[Array] = []
     for turn in turns:
         origin = turn @ (frame[:, 3] - own.mean) + seen.mean
         target = np.column_stack([turn @ frame[:, :3], origin])
@@ -114,7 +115,7 @@ def _headings(seen: Axes, own: Axes) -> list[Array]:
     """Turns about the vertical that align one's longer horizontal axis with the other's, or put it across."""
     between = seen.heading() - own.heading()
     quarters = (0, 2, 1, 3) if max(seen.roundness(), own.roundness()) > NEARLY_ROUND else (0, 2)
-    turns = []
+    turns: list[Array] = []
     for quarter in quarters:
         angle = between + quarter * 0.5 * np.pi
         cosine, sine = np.cos(angle), np.sin(angle)
@@ -133,8 +134,9 @@ def with_root_at(body: BodyModel, root: int, parameters: IntArray, pose: Array, 
     """The pose (D,) with the `parameters` of the root such that the frame of joint `root` comes nearest to
     `target` (3, 4), mm.
     """
-    scale = np.array([[MM_OF_ROTATION] * 3 + [1.0]] * 3)
-    angles = np.array([body.parameters[index].kind == "angle" for index in parameters])
+    length = MM_OF_ROTATION * scale_of(body)
+    scale = np.array([[length] * 3 + [1.0]] * 3)
+    angles = np.array([body.parameters[int(index)].kind == "angle" for index in parameters])
     made = np.array(pose, dtype=np.float64)
 
     def apart(values: Array) -> Array:
@@ -146,7 +148,7 @@ def with_root_at(body: BodyModel, root: int, parameters: IntArray, pose: Array, 
         # The first of the root's turns is the heading in every body here; others are found from any start.
         first = np.array(pose, dtype=np.float64)[parameters]
         first[np.flatnonzero(angles)[:1]] += 2.0 * np.pi * start / STARTS
-        fit = least_squares(apart, first, x_scale=np.where(angles, 1.0, MM_OF_ROTATION))
+        fit = least_squares(apart, first, x_scale=np.where(angles, 1.0, length))
         if fit.cost < least:
             best, least = fit.x, fit.cost
         if least < 1e-6:

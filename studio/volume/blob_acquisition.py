@@ -23,13 +23,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.forward_kinematics import limb_frames
 from studio.body.model import BodyModel, kinematic_tables
 from studio.volume.blob_fitting import LEAST_COLOUR_VARIANCE, Voxels, nearest_blobs
 from studio.volume.blob_model import SMALLEST_VARIANCE, BlobModel, cone_blobs, cone_moments
 from studio.volume.hull import Hull
 
-Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 BINS = 24

@@ -25,13 +25,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array, Floats
 from studio.body.model import BodyModel
 from studio.volume.blob_kernels import FACTORS, LOG_TWO_PI, assign, fill_factors, fit
 from studio.volume.blob_model import SMALLEST_VARIANCE, BlobMixture, BlobModel
 from studio.volume.hull import Hull
 
-Array = NDArray[np.float64]
-Floats = NDArray[np.float32]
 Labels = NDArray[np.int32]
 
 PRIOR_SHARE = 0.05
@@ -73,7 +72,7 @@ class Voxels:
 
     def no_labels(self) -> Labels:
         """An array for a label of each voxel."""
-        return np.empty(self.rows.shape[1], dtype=np.int32)
+        return np.empty(int(self.rows.shape[1]), dtype=np.int32)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,3 +1,4 @@
+# pyright: standard
 """The inner loops of blob fitting: assignment of voxels to blobs, sums by blob, update of the blobs.
 
 Voxels come as six rows (x, y, z from the hull's mean, then the three colours), so that a loop over voxels with the
@@ -8,7 +9,9 @@ voxels give the same bits every time.
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
+from studio.arrays import Array, Floats
 from studio.numba_in_threads import EXACT, KERNEL, njit
 
 # Columns of a blob's row in `factors`: mean, upper triangle of the root of its inverse covariance, colour, inverse
@@ -25,7 +28,12 @@ CHUNK = 512
 
 
 @njit(**EXACT)
-def assign(voxels, factors, labels, distances):
+def assign(
+    voxels: Floats,
+    factors: Floats,
+    labels: NDArray[np.int32],
+    distances: Floats,
+) -> None:
     """The nearest blob of each voxel: labels (K,) int32, and its squared Mahalanobis distance, distances (K,) float32.
 
     voxels : (6, K) float32. factors : (B, FACTORS) float32. Equal distances go to the first blob.
@@ -110,7 +118,10 @@ def precision_of(blob, inverse):
 
 
 @njit(**KERNEL)
-def fill_factors(state, factors):
+def fill_factors(
+    state: Array,
+    factors: Floats,
+) -> None:
     """The rows of `assign`, factors (B, FACTORS), of blobs (B, STATE): the root is Lᵀ of Σ⁻¹ = L Lᵀ (Cholesky)."""
     inverse = np.empty(6)
     for b in range(state.shape[0]):
@@ -210,7 +221,16 @@ def thicken(state, least):
 
 
 @njit(**KERNEL)
-def fit(voxels, volumes, extents, predicted, colours, rules, best, best_labels):
+def fit(
+    voxels: Floats,
+    volumes: Array,
+    extents: Array,
+    predicted: Array,
+    colours: Array,
+    rules: Array,
+    best: Array,
+    best_labels: NDArray[np.int32],
+) -> float:
     """K-means from the predicted blobs (B, STATE): writes the likeliest state to best (B, STATE), the voxels' nearest
     blobs to best_labels (K,); returns their likelihood.
 

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.forward_kinematics import limb_frames
 from studio.body.model import BodyModel, kinematic_tables
 
-Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 SMALLEST_VARIANCE = 25.0

@@ -6,6 +6,7 @@ import numpy as np
 
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
+from studio.body.scale import scale_of
 from studio.geometry.camera import Camera
 from studio.volume.alignment import root_parameters
 from studio.volume.tracking_space import Box, box_of
@@ -18,7 +19,7 @@ MARGIN = 1.1
 def space_of(body: BodyModel, cameras: Sequence[Camera]) -> Box:
     """The box in which the body's hull is carved. Raises CalibrationError where the cameras' views do not overlap."""
     if len(root_parameters(body)):
-        return box_of(cameras)
+        return box_of(cameras, scale=scale_of(body))
     lower = np.array([max(entry.lower, -np.pi) for entry in body.parameters])
     upper = np.array([min(entry.upper, np.pi) for entry in body.parameters])
     poses = lower + np.random.default_rng(0).random((TRIED, len(lower))) * (upper - lower)

@@ -8,10 +8,9 @@ second order in k fitted to them.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtri
 
-Array = NDArray[np.float64]
+from studio.arrays import Array
 
 COLOURS = 3
 

@@ -1,3 +1,4 @@
+# pyright: standard
 """Kernels of the visual hull: classification of voxels by pictures or masks (Caillette et al. 2007, Eq. 6).
 
 **Pixels.** A voxel needs scattered pixels, one of few in a cache line, each with nine numbers of background from
@@ -13,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array, Bytes
 from studio.geometry.camera_table import CameraTable
 from studio.numba_in_threads import EXACT, EXACT_INLINED, njit
 from studio.volume.hull_projection import (
@@ -184,7 +186,17 @@ def look_at_pixels(seen, view, rules, place):
 
 
 @njit(**EXACT)
-def judge(first, end, nodes, states, verdicts, corner, edge, seen, rules):
+def judge(
+    first: int,
+    end: int,
+    nodes: NDArray[np.int32],
+    states: NDArray[np.uint32],
+    verdicts: Bytes,
+    corner: Array,
+    edge: float,
+    seen: Sights,
+    rules: Rules,
+) -> None:
     """CARVED, KEPT or SPLIT for the voxels first to end - 1 of nodes (N, 3).
 
     verdicts : (N,) filled. states : (N, 3) bits of the views in which each is certainly foreground (masks only), bits

@@ -1,9 +1,13 @@
+# pyright: standard
 """From one depth of the hull's octree to the next, voxels' colours, and masks' summed areas."""
 
 import numpy as np
+from numpy.typing import NDArray
 
+from studio.arrays import Array, Bytes, Floats, Indices
+from studio.geometry.camera_table import CameraTable
 from studio.numba_in_threads import EXACT, KERNEL, njit
-from studio.volume.hull_kernels import KEPT, SPLIT, look_at_tile
+from studio.volume.hull_kernels import KEPT, SPLIT, Rules, Sights, look_at_tile
 from studio.volume.hull_projection import (
     BOUND_X,
     BOUND_Y,
@@ -17,7 +21,15 @@ from studio.volume.hull_projection import (
 
 
 @njit(**EXACT)
-def first_look(nodes, corner, edge, cameras, sampling, states, samples):
+def first_look(
+    nodes: NDArray[np.int32],
+    corner: Array,
+    edge: float,
+    cameras: CameraTable,
+    sampling: float,
+    states: NDArray[np.uint32],
+    samples: Indices,
+) -> None:
     """Initialise states without pictures: bits of the views that cannot see each voxel (N, 3) in states[:, 1], a view
     that sees all of it in states[:, 2]; its most samples in a view in samples.
     """
@@ -41,7 +53,10 @@ def first_look(nodes, corner, edge, cameras, sampling, states, samples):
 
 
 @njit(**KERNEL)
-def kept_nodes(nodes, verdicts):
+def kept_nodes(
+    nodes: NDArray[np.int32],
+    verdicts: Bytes,
+) -> NDArray[np.int32]:
     """(K, 3) the voxels kept at this depth."""
     out = np.empty((np.count_nonzero(verdicts == KEPT), 3), np.int32)
     count = 0
@@ -53,7 +68,12 @@ def kept_nodes(nodes, verdicts):
 
 
 @njit(**KERNEL)
-def children(nodes, states, verdicts, limits):
+def children(
+    nodes: NDArray[np.int32],
+    states: NDArray[np.uint32],
+    verdicts: Bytes,
+    limits: NDArray[np.int32],
+) -> tuple[NDArray[np.int32], NDArray[np.uint32]]:
     """The octants (M, 3) of the voxels that are split, and their states (M, 3), in the order of their parents.
 
     limits : (2, 3) least and greatest index in the children's grid that lies in the tracking space.
@@ -79,7 +99,10 @@ def children(nodes, states, verdicts, limits):
 
 
 @njit(**KERNEL)
-def summed_areas(mask, sums):
+def summed_areas(
+    mask: Bytes,
+    sums: NDArray[np.int32],
+) -> None:
     """How many pixels of a mask (H, W) lie above and left of each corner. sums : ((H + 1) (W + 1),) filled."""
     height, width = mask.shape
     row_length = width + 1
@@ -95,7 +118,16 @@ def summed_areas(mask, sums):
 
 
 @njit(**EXACT)
-def colour(first, end, centres, edges, seen, rules, views, means):
+def colour(
+    first: int,
+    end: int,
+    centres: Array,
+    edges: Array,
+    seen: Sights,
+    rules: Rules,
+    views: Floats,
+    means: Floats,
+) -> None:
     """Colours of the voxels first to end - 1. views : (K, V, 3), means : (K, 3), both filled.
 
     A voxel's colour in a view is the mean BGR of its samples that are not background, NaN where there are none; its

@@ -1,3 +1,4 @@
+# pyright: standard
 """Connected pieces of a hull: the body is one, ghosts (foreground in all views by chance) are others."""
 
 import dataclasses

@@ -1,3 +1,4 @@
+# pyright: standard
 """A voxel's projection into a picture, and samples spread over it.
 
 It is computed at the voxel's centre: with the derivative of the lens's projection there (distortion included) its three

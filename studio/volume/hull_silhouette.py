@@ -1,3 +1,4 @@
+# pyright: standard
 """A hull as a camera would see it: its silhouette."""
 
 import math

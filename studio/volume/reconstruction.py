@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array, Bytes
 from studio.errors import FootageError
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.yuv_background import YuvBackground
@@ -38,10 +39,8 @@ from studio.volume.hull import Hull
 from studio.volume.hull_settings import HullSettings
 from studio.volume.tracking_space import Box
 
-Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Nodes = NDArray[np.int32]
-Bytes = NDArray[np.uint8]
 
 FIRST_DEPTH = 4
 MOST_VIEWS = 32
@@ -222,7 +221,7 @@ def grid_limits(box: Box, depth: int) -> Nodes:
 def grid_within(box: Box, depth: int) -> Nodes:
     """(N, 3) all places of the grid of a depth whose voxels reach into the box."""
     low, high = grid_limits(box, depth)
-    ranges = [np.arange(first, last + 1) for first, last in zip(low, high, strict=True)]
+    ranges = [np.arange(int(first), int(last) + 1) for first, last in zip(low, high, strict=True)]
     return np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, 3).astype(np.int32)
 
 

@@ -23,12 +23,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array, Indices
 from studio.body.forward_kinematics import joint_frames
 from studio.body.model import BodyModel, kinematic_tables
 from studio.numba_in_threads import KERNEL, njit
 from studio.volume.blob_model import BlobMixture, BlobModel
-
-Array = NDArray[np.float64]
 
 DIMENSIONS = 3
 
@@ -110,7 +109,16 @@ class DivergenceOfPoses:
 
 
 @njit(**KERNEL)
-def _pose_divergences(frames, joint, offset, spread, share, means, precisions, found):
+def _pose_divergences(
+    frames: Array,
+    joint: Indices,
+    offset: Array,
+    spread: Array,
+    share: Array,
+    means: Array,
+    precisions: Array,
+    found: Array,
+) -> None:
     """Σ α ½ (tr(Σg⁻¹ Σf) + (μg - μf)ᵀ Σg⁻¹ (μg - μf)) of frames (N, F, 3, 4) into found (N,): the trace is
     Σ λ_k u_kᵀ Σg⁻¹ u_k over the bone's axes u_k.
     """

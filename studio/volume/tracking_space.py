@@ -4,14 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
-from studio.geometry.camera_table import picture_limit
-from studio.geometry.projection import project
-
-Array = NDArray[np.float64]
+from studio.geometry.sight import sees
 
 HEIGHT = 2300.0
 """mm: a tall person with raised arms."""
@@ -54,22 +51,31 @@ class Box:
 
 
 def box_of(
-    cameras: Sequence[Camera], *, floor: float = 0.0, height: float = HEIGHT, margin: float = 0.0
+    cameras: Sequence[Camera],
+    *,
+    floor: float = 0.0,
+    height: float | None = None,
+    margin: float = 0.0,
+    scale: float = 1.0,
 ) -> Box:
     """The space that all cameras see, else the most cameras with a common view.
 
-    floor : height of the floor, mm: the box begins there. height : of the space, mm. margin : mm added on
-    the four sides. A place counts as seen when knees, hips and head of a person standing there are in the picture.
+    floor : height of the floor, mm: the box begins there. height : of the space, mm; default: HEIGHT. margin : mm added
+    on the four sides. A place counts as seen when knees, hips and head of a person standing there are in the picture.
+    scale : of the body beside a person, by which the heights and sides are multiplied (`scale_of`).
     Raises CalibrationError where no two cameras (of several) see a common place.
     """
     if not cameras:
         raise CalibrationError("A tracking space needs at least one camera.", "Give a calibration.")
-    middle, reach = _surroundings(cameras, floor + 0.5 * height)
+    height = HEIGHT * scale if height is None else height
+    middle, reach = _surroundings(cameras, floor + 0.5 * height, scale)
     steps = np.linspace(-reach, reach, GRID)
-    x, y = np.meshgrid(middle[0] + steps, middle[1] + steps, indexing="ij")
+    x, y = np.meshgrid(float(middle[0]) + steps, float(middle[1]) + steps, indexing="ij")
     seeing = np.zeros(x.shape, dtype=np.int64)
     for camera in cameras:
-        places = np.stack([np.stack([x, y, np.full_like(x, floor + level)], axis=-1) for level in LEVELS])
+        places = np.stack(
+            [np.stack([x, y, np.full_like(x, floor + scale * level)], axis=-1) for level in LEVELS]
+        )
         seeing += sees(camera, places).all(axis=0)
     for least in range(len(cameras), min(len(cameras), 2) - 1, -1):
         watched = seeing >= least
@@ -78,30 +84,17 @@ def box_of(
     else:
         raise CalibrationError(
             "No two cameras see a common place on the floor.",
-            "Check the calibration's unit and its upward direction, or give the tracking space.",
+            "Check the calibration's unit and its upward direction, and that the session's body is that of the subject:"
+            " its size decides how high above the floor a place must be seen.",
         )
     lower = np.array([x[watched].min(), y[watched].min()])
     upper = np.array([x[watched].max(), y[watched].max()])
-    half = np.maximum(0.5 * (upper - lower) + margin, 0.5 * LEAST_SIDE)
+    half = np.maximum(0.5 * (upper - lower) + margin, 0.5 * LEAST_SIDE * scale)
     centre = 0.5 * (lower + upper)
     return Box(np.array([*(centre - half), floor]), np.array([*(centre + half), floor + height]))
 
 
-def sees(camera: Camera, points: Array) -> NDArray[np.bool_]:
-    """Which world points (..., 3) mm lie in the camera's picture.
-
-    Far outside the picture the distortion polynomial folds back into it; such points are not seen.
-    """
-    pixels, depth = project(camera, points)
-    ahead = np.where(depth > 0.0, depth, 1.0)
-    seen = points @ camera.rotation.T + camera.translation
-    radius = (seen[..., 0] ** 2 + seen[..., 1] ** 2) / ahead**2
-    size = np.array([camera.width, camera.height]) - 0.5
-    inside = ((pixels >= -0.5) & (pixels < size)).all(axis=-1)
-    return (depth > 0.0) & (radius <= picture_limit(camera)) & inside
-
-
-def _surroundings(cameras: Sequence[Camera], height: float) -> tuple[Array, float]:
+def _surroundings(cameras: Sequence[Camera], height: float, scale: float) -> tuple[Array, float]:
     """The point (2,) that the optical axes pass nearest to, and the search radius around it, mm."""
     axes = np.stack([camera.rotation[2] for camera in cameras])
     centres = np.stack([camera.centre for camera in cameras])
@@ -109,6 +102,8 @@ def _surroundings(cameras: Sequence[Camera], height: float) -> tuple[Array, floa
     # Parallel axes do not meet: a weak pull to the cameras' own middle at the space's height then decides.
     pull = 1e-3 * np.eye(3)
     at = np.array([*centres[:, :2].mean(axis=0), height])
-    middle = np.linalg.solve(across.sum(axis=0) + pull, np.einsum("vij,vj->i", across, centres) + pull @ at)
+    weights: Array = across.sum(axis=0) + pull
+    right: Array = np.einsum("vij,vj->i", across, centres) + pull @ at
+    middle = np.asarray(np.linalg.solve(weights, right), dtype=np.float64)
     distance = np.linalg.norm(centres[:, :2] - middle[:2], axis=1)
-    return middle[:2], float(np.clip(1.2 * distance.max(), 0.5 * LEAST_SIDE, MOST_SIDE))
+    return middle[:2], float(np.clip(1.2 * distance.max(), 0.5 * LEAST_SIDE * scale, MOST_SIDE))

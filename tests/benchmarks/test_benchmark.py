@@ -15,7 +15,7 @@ from studio.benchmarks.kernels import (
     run_benchmark,
 )
 from studio.body.catalogue import load_body
-from studio.weighting.edge_region import EdgeRegionSettings, EdgeRegionWeigher
+from studio.likelihood.edge_region import EdgeRegionSettings, EdgeRegionWeigher
 
 
 @pytest.fixture(scope="module")
@@ -30,12 +30,14 @@ def result():
 
 def test_the_report(result):
     edge_region = result["edge_region"]
-    assert list(edge_region) == [
+    assert list(edge_region)[:4] == [
         "evaluations_per_second",
         "samples",
         "load_limit_per_second",
         "fraction_of_load_limit",
     ]
+    assert ("two_threads" in edge_region) == (numba.get_num_threads() > 1)
+    assert result["fractions"]["bodytrack"] > 0.0
     assert edge_region["samples"] == 3200
     ratio = edge_region["evaluations_per_second"] / edge_region["load_limit_per_second"]
     assert edge_region["fraction_of_load_limit"] == pytest.approx(ratio, abs=0.001)

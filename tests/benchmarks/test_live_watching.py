@@ -9,15 +9,15 @@ from toy_session import make_session
 
 from studio.benchmarks.light_viewer import LightViewer
 from studio.benchmarks.live import run_live_benchmark, track_watched
+from studio.jobs.control import StudioControl
+from studio.jobs.events import nothing_open
+from studio.jobs.live_tracking import replay_live
 from studio.runs.live_replay import compare, prepare_replay
 from studio.runs.live_summary import LiveStanding
 from studio.scene.controller import LIVE_PICTURE_SECONDS, PICTURE_SECONDS, picture_pause
 from studio.scene.panel import search_html
 from studio.scene.scene_server import SceneServer
 from studio.sessions.workspace import Workspace
-from studio.worker.control import StudioControl
-from studio.worker.events import nothing_open
-from studio.worker.live_tracking import replay_live
 
 
 def test_a_light_viewer_connects() -> None:
@@ -38,6 +38,7 @@ def test_pictures_come_less_often_while_a_live_run_is_tracked() -> None:
     assert picture_pause(state) == PICTURE_SECONDS
     assert picture_pause(live) == LIVE_PICTURE_SECONDS > PICTURE_SECONDS
     assert picture_pause(dataclasses.replace(live, state="paused")) == PICTURE_SECONDS
+    assert picture_pause(dataclasses.replace(state, state="reannealing")) == LIVE_PICTURE_SECONDS
 
 
 def test_the_panel_shows_a_live_runs_rate() -> None:
@@ -51,7 +52,7 @@ def test_the_panel_shows_a_live_runs_rate() -> None:
 def test_a_live_run_with_the_scene_open() -> None:
     workspace = Workspace()
     session = make_session(workspace.place_for("toy"))
-    run = live_run(session, last=120, to_and_fro=True)
+    run = live_run(session, last=120, ping_pong=True)
     steps: list[str] = []
     found = track_watched(workspace, session, run, lambda step, done, total: steps.append(step))
     assert run.summary().status == "finished"

@@ -3,10 +3,10 @@
 import pytest
 
 from studio.benchmarks.reannealing import measure_reannealing
+from studio.jobs.control import StudioControl
 from studio.runs.new_run import prepare_run
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
-from studio.worker.control import StudioControl
 
 
 def test_every_answer_is_waited_for(session_on_disk: Session) -> None:

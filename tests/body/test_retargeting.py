@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from studio.body.person import SIDES, PersonMotion, joint_points
 from studio.body.retargeting import above_floor, lowest_of_sole, on_skeleton
 from studio.errors import StudioError
+from studio.geometry.rotations import axis_turn
 from studio.motion_files.reading import read_recording
 from studio.motion_files.recorded_motion import RecordedMotion, moved_skeleton
 from studio.synthesis.person import skeleton_of_height
@@ -39,6 +40,20 @@ def humanoid(frames: int, turned: dict[str, Rotation], height: float = 900.0) ->
         local[:, NAMES.index(name)] = turn.as_matrix()
     root = np.tile([0.0, 0.0, height], (frames, 1))
     return moved_skeleton(NAMES, PARENTS, offsets, local, root, fps=60.0, source="made up")
+
+
+def turned(recorded: RecordedMotion, heading: float, fps: float, source: str) -> RecordedMotion:
+    """The same movement, turned about the vertical."""
+    turn = axis_turn(2, np.array(heading))
+    return RecordedMotion(
+        recorded.names,
+        recorded.parents,
+        recorded.rest,
+        turn @ recorded.rotations,
+        recorded.positions @ turn.T,
+        fps,
+        source,
+    )
 
 
 def test_a_known_pose_is_reproduced() -> None:

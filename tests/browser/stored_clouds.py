@@ -18,8 +18,8 @@ def stored_clouds(window: StudioPage, frame: int) -> dict[int, np.ndarray]:
     body, count = run.body(), len(window.studio.get(f"{run_path(window)}/frames/{frame}")["layers"])
     clouds = {}
     for layer in range(count):
-        told = window.studio.get(f"{run_path(window)}/frames/{frame}/layers/{layer}/particles")
-        ends = limb_ends(body, np.array(told["poses"]))[:, list(extremities(body)), 1]
+        response = window.studio.get(f"{run_path(window)}/frames/{frame}/layers/{layer}/particles")
+        ends = limb_ends(body, np.array(response["poses"]))[:, list(extremities(body)), 1]
         clouds[layer] = ends.reshape(-1, 3) / 1000.0
     return clouds
 

@@ -4,13 +4,13 @@ import re
 from pathlib import Path
 
 from page_watch import PageWatch
-from playwright.sync_api import Browser, BrowserContext, FrameLocator, Locator, Page
+from playwright.sync_api import Browser, BrowserContext, FrameLocator, Locator, Page, expect
 from scene_wire import SceneWire
 from studio_server import StudioServer
 
 PATIENCE = 60_000
-DRAWN = """charts => charts.filter((chart) => chart.clientWidth).every((chart) =>
-  chart.dataset.drawn === `${document.documentElement.dataset.theme} ${chart.clientWidth}x${chart.clientHeight}`)"""
+DRAWN = """figures => figures.filter((figure) => figure.clientWidth).every((figure) =>
+  figure.dataset.drawn?.endsWith(` ${document.documentElement.dataset.theme} ${figure.clientWidth}`))"""
 READ = "async (name) => (await import('/assets/js/state.js')).get(name)"
 
 
@@ -101,12 +101,20 @@ class StudioPage:
         self.page.get_by_role("menuitem", name=entry, exact=True).click()
 
     def chart(self, name: str) -> str:
-        """A chart's picture as text, to see whether it changed."""
-        return self.page.locator(f"#{name} canvas").evaluate("canvas => canvas.toDataURL()")
+        """The picture of a panel's figure as text, to see whether it changed."""
+        drawn = self.page.locator(f"#panel-{name} .figure-chart canvas")
+        return drawn.evaluate_all("layers => layers.map((canvas) => canvas.toDataURL()).join()")
 
     def charts_drawn(self) -> bool:
-        """Whether every chart that is seen was drawn for its size and the theme."""
-        return self.page.locator(".chart").evaluate_all(DRAWN)
+        """Whether every figure that is seen was drawn for its size and the theme."""
+        return self.page.locator(".figure-body").evaluate_all(DRAWN)
+
+    def show_view(self, name: str) -> None:
+        """Show one of the views by its entry in the list."""
+        self.page.click("[data-panel=views]")
+        self.page.click(f".view-entry[data-key={name}]")
+        body = self.page.locator("#panel-views .figure-body")
+        expect(body).to_have_attribute("data-drawn", re.compile(rf"{name} "), timeout=PATIENCE)
 
     def shoot(self, path: Path, part: str = "") -> None:
         """Keep a picture of the page, or of a part of it."""

@@ -32,11 +32,11 @@ class StudioServer:
                 [str(script), command, "--port", "0"], env=environment, stdout=output, stderr=output
             )
         found = self._printed()
-        self.address, self.origin = found[0].removeprefix("Open "), found[1]
+        self.address, self.origin, self.token = found[0].removeprefix("Open "), found[1], found[2]
         # A connection each: one that is kept may be closed by the server just when it is used again.
         self._client = httpx.Client(
             base_url=self.origin,
-            headers={"authorization": f"Bearer {found[2]}"},
+            headers={"authorization": f"Bearer {self.token}"},
             timeout=PATIENCE,
             limits=httpx.Limits(max_keepalive_connections=0),
         )
@@ -100,6 +100,9 @@ class StudioServer:
     def stop(self) -> None:
         """Ctrl-C, and wait until all is closed; it must not have ended before by itself."""
         self._client.close()
+        log = self.workspace / ".studio" / "server.log"
+        if log.exists() and "Traceback" in (text := log.read_text()):
+            print(text[text.rindex("Traceback") :])  # for the report of a test that failed
         assert self.process.poll() is None, (
             f"the studio ended ({self.process.returncode}): {self._output.read_text()}"
         )

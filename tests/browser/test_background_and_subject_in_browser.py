@@ -79,10 +79,10 @@ def test_the_background_is_set_up_and_the_views_agree(
     page.get_by_role("button", name="Set up the background").click()
     page.get_by_role("button", name="Cancel").wait_for()
     expect(page.locator(".agree li")).to_have_count(4)
-    told = studio.get("/api/sessions/person/background")
-    assert told["source"] == "plate"
-    assert told["job"]["state"] == "done"
-    assert all(line["agreement"] > 0.8 for line in told["job"]["quality"]["cameras"])
+    response = studio.get("/api/sessions/person/background")
+    assert response["source"] == "plate"
+    assert response["job"]["state"] == "done"
+    assert all(line["agreement"] > 0.8 for line in response["job"]["quality"]["cameras"])
     all_masks_are_there(page)
     shoot(page, artefacts / "way-background-dark.png")
     page.locator("#theme").click()
@@ -161,9 +161,9 @@ def test_a_height_becomes_a_body_and_the_body_is_fitted(
     shoot(page, artefacts / "way-subject-fitted.png")
     save.click()
     expect(page.get_by_text("The old subject is kept")).to_be_visible()
-    told = studio.get("/api/sessions/person/subject")
-    assert told["fitted"]
+    response = studio.get("/api/sessions/person/subject")
+    assert response["fitted"]
     rows = page.locator(".sizes tr").filter(has_text="thigh")
-    assert f"{told['dimensions']['left_thigh_length']:.0f}" in rows.first.inner_text()
+    assert f"{response['dimensions']['left_thigh_length']:.0f}" in rows.first.inner_text()
     page.locator("#theme").click()
     shoot(page, artefacts / "way-subject-light.png")

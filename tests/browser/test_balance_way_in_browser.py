@@ -31,7 +31,7 @@ MASKED = "() => document.querySelectorAll('.masks .picture.waiting').length === 
 SIZES = (("light", 1280, 800), ("dark", 1920, 1080))
 
 
-class Way:
+class Workflow:
     """One window that goes the whole way, and how long its steps take."""
 
     def __init__(self, page: Page, studio: StudioServer, folder: Path) -> None:
@@ -87,7 +87,7 @@ def raw(real_data: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def way(browser: Browser, tmp_path_factory: pytest.TempPathFactory, artefacts: Path) -> Iterator[Way]:
+def way(browser: Browser, tmp_path_factory: pytest.TempPathFactory, artefacts: Path) -> Iterator[Workflow]:
     """A studio with an empty workspace that may read no folder, and a window on it; the scene is left blank."""
     studio = StudioServer("serve", tmp_path_factory.mktemp("balance") / "workspace")
     folder = artefacts / "balance-way"
@@ -100,13 +100,13 @@ def way(browser: Browser, tmp_path_factory: pytest.TempPathFactory, artefacts: P
     page.route("**/scene/**", lambda route: route.fulfill(body="", content_type="text/html"))
     page.goto(studio.address)
     page.goto(f"{studio.origin}/way?new")
-    yield Way(page, studio, folder)
+    yield Workflow(page, studio, folder)
     context.close()
     studio.stop()
     watch.check()
 
 
-def test_footage(way: Way, raw: Path) -> None:
+def test_footage(way: Workflow, raw: Path) -> None:
     """Four videos are uploaded; a name with a space is put right while it is typed."""
     page = way.page
     page.locator("dialog input[name=name]").press_sequentially("balance man")
@@ -121,7 +121,7 @@ def test_footage(way: Way, raw: Path) -> None:
     way.shoot("footage")
 
 
-def test_calibration(way: Way, raw: Path) -> None:
+def test_calibration(way: Workflow, raw: Path) -> None:
     """The file is read, shown and used; the page says that two cameras recorded another size."""
     page = way.page
     way.to("calibration")
@@ -136,7 +136,7 @@ def test_calibration(way: Way, raw: Path) -> None:
     way.shoot("calibration")
 
 
-def test_background(way: Way, raw: Path) -> None:
+def test_background(way: Workflow, raw: Path) -> None:
     """Pictures of the room, in which people stand, and the footage together."""
     page = way.page
     way.to("background")
@@ -151,7 +151,7 @@ def test_background(way: Way, raw: Path) -> None:
     way.shoot("background")
 
 
-def test_cameras_that_were_touched_are_turned(way: Way) -> None:
+def test_cameras_that_were_touched_are_turned(way: Workflow) -> None:
     """The published calibration misses by a dozen pixels; afterwards the views agree by 0.9 and more."""
     page = way.page
     asked = page.locator("section", has=page.get_by_role("heading", name="Do the cameras agree?"))
@@ -172,7 +172,7 @@ def test_cameras_that_were_touched_are_turned(way: Way) -> None:
     way.shoot("background.turned")
 
 
-def test_subject(way: Way) -> None:
+def test_subject(way: Workflow) -> None:
     """His height as a person would type it."""
     way.to("subject")
     height = way.page.get_by_label("Height in centimetres")
@@ -185,18 +185,18 @@ def test_subject(way: Way) -> None:
     way.shoot("subject")
 
 
-def test_start_pose(way: Way) -> None:
+def test_start_pose(way: Workflow) -> None:
     """Found automatically, with its confidence, and drawn over all views."""
     way.to("start-pose")
     way.press("Find it automatically")
     way.stands("start-pose", "done")
-    expect(way.page.locator(".start-pose-verdict")).to_contain_text("Found in frame 0, confidence")
+    expect(way.page.locator(".start-pose-verdict")).to_contain_text("Found in frame 0: confidence")
     expect(way.page.locator("figure.picture img[alt*='start pose']")).to_have_count(4)
     way.shoot("start-pose")
     way.press("Yes, track from here")
 
 
-def tracked(way: Way, frames: int, evaluations: int) -> None:
+def tracked(way: Workflow, frames: int, evaluations: int) -> None:
     """Track the first frames; the room is full of things."""
     page = way.page
     page.select_option("#step select[name=weighting]", WEIGHTING)
@@ -207,13 +207,13 @@ def tracked(way: Way, frames: int, evaluations: int) -> None:
     assert way.studio.get("/api/sessions/balance-man")["runs"][0]["done"] == frames
 
 
-def made_better(way: Way, verb: str, made: str) -> None:
+def made_better(way: Workflow, verb: str, made: str) -> None:
     way.press(verb)
     expect(way.page.locator(f"#step input[value={made}]")).to_be_checked()
     expect(way.page.locator("#step .step-progress")).to_have_count(0)
 
 
-def test_track_a_first_part(way: Way) -> None:
+def test_track_a_first_part(way: Workflow) -> None:
     """The first second, with the body of the guessed height, refined."""
     tracked(way, FIRST_PART, 2000)
     way.to("check")
@@ -223,7 +223,7 @@ def test_track_a_first_part(way: Way) -> None:
     way.shoot("check.first")
 
 
-def test_fit_the_subject(way: Way) -> None:
+def test_fit_the_subject(way: Workflow) -> None:
     """Lengths and radii from the first part's poses: he is some five centimetres shorter than was guessed."""
     way.to("subject")
     way.press("Fit the subject")
@@ -234,7 +234,7 @@ def test_fit_the_subject(way: Way) -> None:
     way.shoot("subject.fitted")
 
 
-def test_track(way: Way) -> None:
+def test_track(way: Workflow) -> None:
     """All of it, from a start pose of the body that was fitted."""
     way.to("start-pose")
     way.press("Find it automatically")
@@ -244,25 +244,25 @@ def test_track(way: Way) -> None:
     way.shoot("track")
 
 
-def test_check(way: Way) -> None:
+def test_check(way: Workflow) -> None:
     """Looked at, refined, smoothed: most of the model lies in the masks of every tenth frame, nobody turns round."""
     way.to("check")
     way.press("Check the motion")
     expect(way.page.locator(".share-strip button")).to_have_count(FRAMES // 10)
     made_better(way, "Refine on the silhouettes", "refined")
     made_better(way, "Smooth in time", "smoothed")
-    told = way.studio.get("/api/sessions/balance-man/runs/run-2/check?track=smoothed")["check"]
-    print({name: told[name] for name in ("inside_mean", "turned", "lost", "jitter_mm")})
-    shares = np.array(told["inside"], dtype=np.float64)
+    response = way.studio.get("/api/sessions/balance-man/runs/run-2/check?track=smoothed")["check"]
+    print({name: response[name] for name in ("inside_mean", "turned", "lost", "jitter_mm")})
+    shares = np.array(response["inside"], dtype=np.float64)
     print(np.round(shares, 3))
     assert float(shares.min()) >= 0.85
-    assert told["turned"] == []
-    assert told["lost"] == []
-    assert told["jitter_mm"] <= 5.0
+    assert response["turned"] == []
+    assert response["lost"] == []
+    assert response["jitter_mm"] <= 5.0
     way.shoot("check")
 
 
-def test_export(way: Way, tmp_path: Path) -> None:
+def test_export(way: Workflow, tmp_path: Path) -> None:
     """A BVH, which another reader opens: every frame, at 60 a second, a man's hips at a man's height."""
     page = way.page
     way.to("export")

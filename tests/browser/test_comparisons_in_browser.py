@@ -108,14 +108,14 @@ def test_it_is_watched_cancelled_and_goes_on(window: StudioPage, artefacts: Path
     shoot(window, artefacts, "comparison-running")
     page.get_by_role("button", name="Cancel", exact=True).click()
     page.locator(".card-box .badge", has_text="cancelled").wait_for()
-    told = window.studio.get("/api/comparisons/walk/long")["comparison"]
-    assert told["status"] == "cancelled"
-    assert 0 < told["done"] < told["total"] == 900
+    response = window.studio.get("/api/comparisons/walk/long")["comparison"]
+    assert response["status"] == "cancelled"
+    assert 0 < response["done"] < response["total"] == 900
     page.get_by_role("button", name="Resume", exact=True).click()
     page.locator(".card-box .badge", has_text="running").wait_for()
     page.get_by_role("button", name="Cancel", exact=True).click()
     page.locator(".card-box .badge", has_text="cancelled").wait_for()
-    assert window.studio.get("/api/comparisons/walk/long")["comparison"]["done"] >= told["done"]
+    assert window.studio.get("/api/comparisons/walk/long")["comparison"]["done"] >= response["done"]
 
 
 def test_a_small_one_is_shown_when_it_is_done(idle: StudioPage) -> None:
@@ -128,14 +128,14 @@ def test_a_small_one_is_shown_when_it_is_done(idle: StudioPage) -> None:
     form.get_by_role("button", name="Compare", exact=True).click()
     page.get_by_role("heading", name="annealed:mine, swarm, condensation on walk").wait_for()
     page.get_by_role("heading", name="Which is nearer").wait_for(timeout=120_000)
-    told = window.studio.get(FIRST)
-    assert told["comparison"]["status"] == "done"
-    assert told["settings"]["annealed:mine"]["survival"] == 0.4
+    response = window.studio.get(FIRST)
+    assert response["comparison"]["status"] == "done"
+    assert response["settings"]["annealed:mine"]["survival"] == 0.4
 
 
 def test_the_result_is_read_and_downloaded(window: StudioPage, artefacts: Path) -> None:
     page, result = window.page, window.studio.get(FIRST)["result"]
-    rows = page.locator(".figures tbody tr")
+    rows = page.locator(".figures:not(.trials) tbody tr")
     assert rows.count() == 3
     for at, tracker in enumerate(result["trackers"]):
         text = rows.nth(at).inner_text()
@@ -159,6 +159,66 @@ def test_the_result_is_read_and_downloaded(window: StudioPage, artefacts: Path) 
     with page.expect_download() as coming:
         page.get_by_role("link", name="CSV", exact=True).click()
     assert len(Path(coming.value.path()).read_text().splitlines()) == 1 + 3 * 2 * 10
+
+
+def test_a_trial_is_opened_as_a_run_at_its_worst_frame(window: StudioPage) -> None:
+    page, response = window.page, window.studio.get(FIRST)
+    lines = page.locator(".trials tbody tr")
+    assert lines.count() == len(response["trials"]) == 6
+    trial = response["trials"][3]
+    errors = response["result"]["per_frame"]["error_mm"][trial["tracker"]][1]
+    assert trial["worst_frame"] == errors.index(max(errors))
+    name = f"Track {trial['tracker']} with seed {trial['seed']} again"
+    # Its frame is asked for until it is tracked.
+    run = f"small-{trial['tracker'].replace(':', '-')}-{trial['seed']}"
+    window.watch.allow(404, f"/api/sessions/walk/runs/{run}/frames/{trial['worst_frame']}")
+    page.get_by_role("button", name=name).click()
+    page.wait_for_url("**/?*panel=why*")
+    frame = trial["worst_frame"]
+    window.until(f"get('frame') === {frame} && get('panel') === 'why' && get('detail')?.frame === {frame}")
+    window.studio.until(lambda state: state["state"] == "finished")
+    assert window.get("run") == run
+    stored = window.studio.get(f"/api/sessions/walk/runs/{run}/frames")["frames"][frame]
+    assert stored["error_mm"] == pytest.approx(max(errors), abs=2e-3)
+    # From then on the row is a link.
+    page.go_back()
+    link = lines.nth(3).get_by_role("link", name=f"frame {frame}", exact=True)
+    link.click()
+    page.wait_for_url("**/?*panel=why*")
+    window.until(f"get('run') === '{run}' && get('frame') === {frame} && get('panel') === 'why'")
+    page.go_back()
+    link.wait_for()
+
+
+def test_points_of_the_charts_lead_to_their_trials(window: StudioPage) -> None:
+    page, response = window.page, window.studio.get(FIRST)
+    other, stored = response["trials"][2:4]
+    assert (stored["run"] != "", other["run"]) == (True, "")
+    curves, bars = page.locator(".findings-canvas").all()
+    # A trial without a run, the middle one of three bars: nothing is tracked, the button that does it has the focus.
+    click_value(bars, 0, other["mean_mm"] / 2)
+    button = page.get_by_role("button", name=f"Track {other['tracker']} with seed {other['seed']} again")
+    until(page, lambda: button.evaluate("element => element === document.activeElement"))
+    assert window.studio.get(FIRST)["trials"][2]["run"] == ""
+    # The curve of a seed, at a frame.
+    errors = response["result"]["per_frame"]["error_mm"][stored["tracker"]][1]
+    click_value(curves, 7, errors[7])
+    page.wait_for_url("**/?*panel=why*")
+    window.until(f"get('run') === '{stored['run']}' && get('frame') === 7")
+    page.go_back()
+    page.locator(".trials").wait_for()
+
+
+def click_value(chart: Locator, x: float, y: float) -> None:
+    """Click on a chart where a value is drawn."""
+    chart.scroll_into_view_if_needed()
+    until(chart.page, lambda: chart.get_attribute("data-drawn"))
+    across, down = chart.evaluate(
+        """async (place, value) => (await import('/assets/vendor/echarts.esm.min.js'))
+          .getInstanceByDom(place).convertToPixel('grid', value)""",
+        [x, y],
+    )
+    chart.click(position={"x": across, "y": down})
 
 
 def test_again_asks_for_the_same(window: StudioPage) -> None:

@@ -36,8 +36,8 @@ def opened(browser: Browser, studio: StudioServer) -> StudioPage:
 def edited(window: StudioPage, wanted: Callable[[dict], bool]) -> None:
     """Wait until the editor of the window's scene is as wanted."""
     deadline = time.monotonic() + 30.0
-    while not wanted(told := window.studio.get("/api/scene/edit", window.name)):
-        assert time.monotonic() < deadline, told
+    while not wanted(response := window.studio.get("/api/scene/edit", window.name)):
+        assert time.monotonic() < deadline, response
         time.sleep(0.02)
 
 
@@ -46,10 +46,10 @@ def put_right(window: StudioPage, studio: StudioServer, run: str, frame: int) ->
     window.until(f"get('frame') === {frame}")
     window.page.locator("#correct").click()
     window.page.locator("#correcting").wait_for()
-    edited(window, lambda told: told["frame"] == frame)
+    edited(window, lambda response: response["frame"] == frame)
     wish = {"session": "toy", "run": run, "frame": frame, "pose": true_poses()[frame].tolist()}
     studio.post("/api/scene/edit", wish, window=window.name)
-    edited(window, lambda told: told["moved"])
+    edited(window, lambda response: response["moved"])
 
 
 def poses_of(studio: StudioServer, run: str) -> np.ndarray:
@@ -100,7 +100,7 @@ def test_leaving_the_correction_changes_nothing(browser: Browser, studio: Studio
     put_right(window, studio, "one", 0)
     window.page.get_by_role("button", name="Leave").click()
     window.page.locator("#correcting").wait_for(state="hidden")
-    edited(window, lambda told: not told["editing"])
+    edited(window, lambda response: not response["editing"])
     assert len(studio.get(RUN)["runs"]) == 1
     window.close()
 

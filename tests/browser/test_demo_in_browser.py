@@ -5,6 +5,7 @@ import io
 import json
 from collections.abc import Iterator
 from pathlib import Path
+from urllib.parse import unquote
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ RUN = "/api/sessions/walk/runs/run-1"
 FRAMES_BEFORE = 6
 # Seconds a layer while the search goes on: a frame a second, so that a page drawn in software can follow it.
 PACE = 0.1
-PANELS = ("variance", "survival", "cameras", "weights", "log")
+PANELS = ("why", "views", "cameras", "log")
 SIZES = ((1280, 800), (1920, 1080))
 
 
@@ -106,9 +107,10 @@ def test_the_survival_rate_is_moved_and_new_layers_are_drawn(paused: StudioPage)
     stored = paused.studio.get(f"{run_path(paused)}/frames/{frame}")
     clouds = stored_clouds(paused, frame)
     until(paused.page, lambda: drawn(paused, clouds))
-    paused.page.click("[data-panel=survival]")
-    until(paused.page, lambda: paused.page.locator("#chart-alpha canvas").count() == 1)
-    before = paused.chart("chart-alpha")
+    paused.show_view("schedule")
+    until(paused.page, lambda: paused.page.locator("#panel-views .figure-chart canvas").count() > 0)
+    until(paused.page, paused.charts_drawn)
+    before = paused.chart("views")
     slider = paused.slider("survival rate")
     value = float(slider.get_attribute("aria-valuenow") or "nan")
     slider.focus()
@@ -125,7 +127,7 @@ def test_the_survival_rate_is_moved_and_new_layers_are_drawn(paused: StudioPage)
 
     # The first cloud is the same, for only the knob differs; the others are new, and so are the charts.
     until(paused.page, lambda: differing(paused.wire.layers(), clouds) == set(clouds) - {0})
-    until(paused.page, lambda: paused.chart("chart-alpha") != before)
+    until(paused.page, lambda: paused.chart("views") != before)
 
     # The arrow key moved the slider and nothing else.
     assert view
@@ -151,7 +153,7 @@ def test_pictures_of_page_scene_and_charts_are_kept(paused: StudioPage, artefact
                     until(paused.page, lambda: loaded_views(paused) == 4)
                 until(paused.page, paused.charts_drawn)
                 paused.shoot(artefacts / f"charts-{panel}-{name}.png", "#panels")
-            paused.page.click("[data-panel=variance]")
+            paused.show_view("variance")
             until(paused.page, paused.charts_drawn)
             paused.scene.locator(f"html[data-mantine-color-scheme={theme}]").wait_for(state="attached")
             paused.shoot(artefacts / f"page-{name}.png")
@@ -160,12 +162,12 @@ def test_pictures_of_page_scene_and_charts_are_kept(paused: StudioPage, artefact
             assert paused.page.evaluate("document.documentElement.scrollWidth") == width
     paused.page.set_viewport_size({"width": 1280, "height": 800})
     paused.page.click("#theme")
-    paused.page.click("[data-panel=survival]")
+    paused.show_view("schedule")
     until(paused.page, paused.charts_drawn)
-    before = paused.chart("chart-beta")
+    before = paused.chart("views")
     paused.key("r")
     paused.until("get('whatIf')?.length === get('layerCount') && get('work').state === 'paused'")
-    until(paused.page, lambda: paused.chart("chart-beta") != before)
+    until(paused.page, lambda: paused.chart("views") != before)
     paused.shoot(artefacts / "page-re-annealed-dark-1280x800.png")
 
 
@@ -243,7 +245,8 @@ def test_camera_views_with_every_overlay(paused: StudioPage, artefacts: Path) ->
     until(
         page,
         lambda: all(
-            everything in str(image.get_attribute("src")) for image in page.locator(".view img").all()
+            everything in unquote(str(image.get_attribute("src")))
+            for image in page.locator(".view img").all()
         ),
     )
     page.locator(".view").nth(1).click()
@@ -262,19 +265,23 @@ def test_camera_views_with_every_overlay(paused: StudioPage, artefacts: Path) ->
 
 def test_variances_and_poses_come_as_csv(paused: StudioPage) -> None:
     page, frame = paused.page, paused.get("frame")
-    page.click("[data-panel=variance]")
+    paused.show_view("variance")
+    until(page, lambda: page.locator("#panel-views .figure-body").get_attribute("data-drawn"))
     with page.expect_download() as coming:
-        page.get_by_role("button", name="CSV", exact=True).click()
-    rows = list(csv.reader(io.StringIO(Path(coming.value.path()).read_text())))
+        page.locator("#panel-views").get_by_role("button", name="CSV", exact=True).click()
+    lines = Path(coming.value.path()).read_text().splitlines()
+    # The first table; each has its title in a line of its own.
+    ends = [at for at, line in enumerate(lines) if line.startswith("#")]
+    rows = list(csv.DictReader(lines[ends[1] + 1 : ends[2]]))
     stored = list(
-        csv.reader(io.StringIO(paused.studio.text(f"{run_path(paused)}/frames/{frame}/variance.csv")))
+        csv.DictReader(io.StringIO(paused.studio.text(f"{run_path(paused)}/frames/{frame}/variance.csv")))
     )
-    assert [row[:3] for row in rows] == [row[:3] for row in stored]
-    assert rows[0] == stored[0]
-    numbers = [[float(value) for value in row[3:]] for row in rows[1:]]
-    np.testing.assert_allclose(
-        numbers, [[float(value) for value in row[3:]] for row in stored[1:]], rtol=1e-8
-    )
+    moments = {"weighed": "weighed", "before": "before_diffusion", "after": "after_diffusion"}
+    assert len(rows) * len(moments) == len(stored) * (len(stored[0]) - 3)
+    for row in rows:
+        for key, moment in moments.items():
+            (line,) = [one for one in stored if (one["layer"], one["moment"]) == (row["layer"], moment)]
+            np.testing.assert_allclose(float(row[key]), float(line[row["parameter"]]), rtol=1e-8)
 
     page.locator(".run[aria-selected=true]").hover()
     with page.expect_download() as coming:
@@ -325,5 +332,5 @@ def test_tracking_on_uses_the_new_setting(paused: StudioPage) -> None:
     paused.page.click("#track-toggle")
     # The search may have been paused inside the next frame, whose first layers ran with the value before.
     paused.until(f"get('summary').frames.at(-1).frame > {last + 2}")
-    told = paused.studio.get(f"{run_path(paused)}/frames/{last + 2}")
-    assert {layer["alpha_wanted"] for layer in told["layers"]} == {in_use}
+    reply = paused.studio.get(f"{run_path(paused)}/frames/{last + 2}")
+    assert {layer["alpha_wanted"] for layer in reply["layers"]} == {in_use}

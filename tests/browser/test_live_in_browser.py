@@ -84,8 +84,8 @@ def test_what_a_browser_that_draws_in_software_costs(
     window.until("get('work')?.state === 'finished'")
     found = live_figures(summary_of(session.run("drawn")))
     artefacts.mkdir(parents=True, exist_ok=True)
-    told = {"cores": os.cpu_count(), "seconds": seconds, **found}
-    (artefacts / "live-with-chromium.json").write_text(json.dumps(told, indent=2))
+    response = {"cores": os.cpu_count(), "seconds": seconds, **found}
+    (artefacts / "live-with-chromium.json").write_text(json.dumps(response, indent=2))
     assert found["tracked"] > 0  # pyright: ignore[reportOperatorIssue]
     window.close()
     studio.stop()

@@ -157,7 +157,7 @@ def test_a_run_is_renamed_and_deleted(imported: StudioPage) -> None:
     page, studio = imported.page, imported.studio
     studio.post("/api/sessions/arm/runs", {"name": "spare", "last": 2})
     row = page.locator('.run[data-key="arm/spare"]')
-    assert row.locator(".figure").inner_text() == "0/2"
+    assert row.locator(".figure").inner_text() == "0 of 2"
     row.click()
     imported.until("get('run') === 'spare'")
     row.hover()

@@ -1,12 +1,13 @@
 """A swarm in the studio: knobs moved while it runs take effect as they say, and the page shows its sixty layers."""
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Locator
+from playwright.sync_api import Browser, Locator, expect
 from scene_wire import until
-from studio_page import StudioPage
+from studio_page import PATIENCE, StudioPage
 from studio_server import StudioServer
 
 pytestmark = pytest.mark.browser
@@ -123,19 +124,27 @@ def test_the_page_shows_sixty_layers(swarm: StudioPage, artefacts: Path) -> None
     assert swarm.get("layerCount") == FIRST_STAGE + SECOND_STAGE
     until(page, lambda: len(swarm.wire.layers()) == FIRST_STAGE + SECOND_STAGE)
     swarm.key("Shift+ArrowLeft")
-    page.locator("#layer-label", has_text="layer 60 / 60").wait_for()
+    page.locator("#layer-label", has_text="layer 60 of 60").wait_for()
     until(page, lambda: swarm.wire.layers().keys() == {59})
     swarm.key("Shift+ArrowRight")
     until(page, lambda: len(swarm.wire.layers()) == FIRST_STAGE + SECOND_STAGE)
-    page.get_by_role("tab", name="Fitness & spread").click()
-    until(page, swarm.charts_drawn)
     for theme in ("dark", "light"):
         if page.evaluate("document.documentElement.dataset.theme") != theme:
             page.click("#theme")
-        for panel in ("survival", "variance", "weights"):
-            page.click(f"[data-panel={panel}]")
-            until(page, swarm.charts_drawn)
-            swarm.shoot(artefacts / f"page-swarm-{panel}-{theme}-1280x800.png")
+        for view in (
+            "schedule",
+            "variance",
+            "genealogy",
+            "weights",
+            "clouds",
+            "coupling",
+            "survivors",
+            "modes",
+        ):
+            swarm.show_view(view)
+            body = page.locator("#panel-views .figure-body")
+            expect(body).to_have_attribute("data-drawn", re.compile(f"{view} {theme}"), timeout=PATIENCE)
+            swarm.shoot(artefacts / f"page-swarm-{view}-{theme}-1280x800.png")
     page.click("#theme")
 
 

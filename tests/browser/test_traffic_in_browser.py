@@ -57,7 +57,7 @@ def test_a_watched_run_asks_little_and_keeps_little(browser: Browser, studio: St
     asked = Counter(window.watch.requests[begun:])
     details = sum(count for path, count in asked.items() if path.startswith(f"GET {RUN}/frames/"))
     assert asked[f"GET {RUN}/frames"] <= seconds / SUMMARY_SECONDS + 3
-    assert details <= 3, "the layers come with the events"
+    assert details <= FRAMES / 10, "the layers come with the events, but where the page fell behind them"
     assert asked["POST /api/scene/show"] <= 3, "the scene follows by itself"
     assert asked["GET /api/sessions"] <= 3
     assert heap(window) - before < 8 * MEGABYTE

@@ -9,7 +9,7 @@ from playwright.sync_api import Page, expect
 from studio_page import StudioPage
 from studio_server import StudioServer
 
-from studio.web.samples import sample_folder
+from studio.runs.samples import sample_folder
 
 pytestmark = pytest.mark.browser
 
@@ -88,9 +88,9 @@ def test_from_raw_files_to_an_exported_motion(
     page.locator("#step button.primary", has_text="Check the motion").click()
     state_of(page, "check", "done")
     expect(page.locator(".share-strip button")).to_have_count(2)
-    told = studio.get("/api/sessions/mine/runs/run-1/check")["check"]
-    assert told["inside_mean"] > 0.8
-    assert told["turned"] == []
+    response = studio.get("/api/sessions/mine/runs/run-1/check")["check"]
+    assert response["inside_mean"] > 0.8
+    assert response["turned"] == []
     page.get_by_role("button", name="Smooth in time").click()
     expect(page.locator("input[value=smoothed]")).to_be_checked(timeout=PATIENCE)
     page.screenshot(path=artefacts / "way-check.png")

@@ -164,7 +164,7 @@ def test_the_arrows_are_the_timeline_s_wherever_the_focus_is(windows: dict[str, 
     frame, view = 0, window.wire.viewer
     places = [
         window.page.locator("#stage iframe"),
-        window.page.locator("[data-panel=survival]"),
+        window.page.locator("[data-panel=views]"),
         window.page.locator("#theme"),
         window.page.locator("#speed"),
         window.scene.get_by_role("tab", name="Show"),

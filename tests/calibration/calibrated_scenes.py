@@ -5,6 +5,7 @@ import numpy as np
 from board_footage import waved_boards
 from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.calibration.boards import Board, Sighting
 from studio.calibration.coverage import coverage_of
 from studio.calibration.intrinsics import Lens
@@ -12,8 +13,6 @@ from studio.geometry.camera import Camera
 from studio.geometry.projection import project
 from studio.geometry.rigid import transform
 from studio.synthesis.cameras import placed_camera
-
-Array = NDArray[np.float64]
 
 CHARUCO = Board("charuco", 7, 5, 100.0, 75.0)
 CHESS = Board("chessboard", 6, 5, 90.0)

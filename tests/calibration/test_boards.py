@@ -14,7 +14,7 @@ from studio.errors import CalibrationError
 )
 def test_text_and_back(text: str) -> None:
     board = board_from_text(text)
-    assert board_from_text(board.spelling) == board
+    assert board_from_text(board.text) == board
 
 
 @pytest.mark.parametrize(

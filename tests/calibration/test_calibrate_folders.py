@@ -62,7 +62,7 @@ def test_a_person_can_stop_it(footage: Path) -> None:
 
 def test_the_command_writes_calibration_report_and_pictures(footage: Path, tmp_path: Path) -> None:
     target = tmp_path / "rig.toml"
-    words = ["calibrate", str(footage), "--board", BOARD.spelling, "--to", str(target), "--json"]
+    words = ["calibrate", str(footage), "--board", BOARD.text, "--to", str(target), "--json"]
     result = CliRunner().invoke(main, words)
     assert result.exit_code == 0, result.output
     report = msgspec.json.decode(result.stdout)
@@ -98,7 +98,7 @@ def test_the_intrinsics_alone_give_lenses(footage: Path, tmp_path: Path) -> None
     result = CliRunner().invoke(
         main,
         [
-            "calibrate", str(footage), "--board", BOARD.spelling, "--intrinsics", str(footage / "intrinsics"),
+            "calibrate", str(footage), "--board", BOARD.text, "--intrinsics", str(footage / "intrinsics"),
             "--to", str(tmp_path / "rig.toml"),
         ],
     )  # fmt: skip
@@ -139,9 +139,9 @@ def test_a_mirrored_video_blocks(footage: Path, tmp_path: Path) -> None:
     ("words", "message"),
     [
         (["--board", "circles:4x4,3"], "cannot be understood"),
-        (["--board", BOARD.spelling, "--extrinsics", "nowhere"], "no folder"),
-        (["--board", BOARD.spelling, "--distance", "cam1"], "cannot be understood"),
-        (["--board", BOARD.spelling, "--extrinsics", "extrinsics", "--floor", "frame:x"], "is no number"),
+        (["--board", BOARD.text, "--extrinsics", "nowhere"], "no folder"),
+        (["--board", BOARD.text, "--distance", "cam1"], "cannot be understood"),
+        (["--board", BOARD.text, "--extrinsics", "extrinsics", "--floor", "frame:x"], "is no number"),
     ],
 )
 def test_refusals_have_remedies(footage: Path, words: list[str], message: str) -> None:

@@ -25,7 +25,7 @@ def takes(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_sessions_calibration_is_replaced_and_reported(takes: Path) -> None:
     session = session_of_takes(Workspace().place_for("fresh"), takes)
-    words = ["calibrate", "fresh", "--board", BOARD.spelling, "--extrinsics", str(takes / "extrinsics")]
+    words = ["calibrate", "fresh", "--board", BOARD.text, "--extrinsics", str(takes / "extrinsics")]
     words += ["--intrinsics", str(takes / "intrinsics")]
     found = studio.calibrate(
         session, BOARD, intrinsics=takes / "intrinsics", extrinsics=takes / "extrinsics", progress=False
@@ -45,7 +45,7 @@ def test_the_sessions_calibration_is_replaced_and_reported(takes: Path) -> None:
 
 def test_a_camera_that_is_not_there_is_no_offsets(takes: Path) -> None:
     session_of_takes(Workspace().place_for("fresh"), takes)
-    words = ["calibrate", "fresh", "--board", BOARD.spelling, "--offset", "cam9=2"]
+    words = ["calibrate", "fresh", "--board", BOARD.text, "--offset", "cam9=2"]
     refused = CliRunner().invoke(main, words)
     assert refused.exit_code == 2
     assert "There is no camera 'cam9'" in refused.output

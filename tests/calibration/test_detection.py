@@ -26,7 +26,7 @@ BOARDS = [
 ]
 
 
-@pytest.mark.parametrize("board", BOARDS, ids=lambda board: board.spelling)
+@pytest.mark.parametrize("board", BOARDS, ids=lambda board: board.text)
 def test_corners_to_a_fraction_of_a_pixel(board: Board) -> None:
     poses = close_boards(np.random.default_rng(2), board, CAMERA, 5)
     renderer, finder = BoardRenderer(board, [CAMERA]), BoardFinder(board)

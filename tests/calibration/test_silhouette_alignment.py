@@ -3,14 +3,13 @@
 import cv2
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.calibration.silhouette_alignment import aligned_cameras, turned
 from studio.calibration.silhouette_checks import silhouette_disagreement
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
 
-Array = NDArray[np.float64]
 SIZE = (1000, 1800)
 
 

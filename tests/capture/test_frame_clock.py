@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from studio.capture.footage import ToAndFro, folded
+from studio.capture.footage import PingPong, folded
 from studio.capture.frame_clock import PATIENCE_SECONDS, ReplayClock
 from studio.errors import NotFoundError
 from studio.sessions.session import Session
@@ -83,7 +83,7 @@ def test_forth_and_back_passes_every_frame_and_never_jumps() -> None:
 
 def test_footage_that_repeats_has_the_same_pictures(session_on_disk: Session) -> None:
     once = session_on_disk.footage()
-    again = ToAndFro(once.source, once.folder)
+    again = PingPong(once.source, once.folder)
     count = once.frame_count
     for frame in range(3 * count):
         expected = once.picture("front", folded(frame, count))

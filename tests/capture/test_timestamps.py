@@ -97,3 +97,11 @@ def test_a_first_picture_that_came_late_does_not_decide() -> None:
     late[0] += 0.020
     assert offsets_from_times({"cam1": even, "cam2": late}).offsets == {"cam1": 0, "cam2": 0}
     assert offsets_from_times({"cam1": even, "cam2": late + 1.0 / 30.0}).offsets == {"cam1": 1, "cam2": 0}
+
+
+def test_a_short_take_has_too_few_times_to_tell_rates_apart() -> None:
+    """Under a second of jittered times, three hundredths apart by their medians."""
+    even = np.arange(24) / 30.0
+    assert offsets_from_times({"cam1": even, "cam2": even * 1.03}).offsets == {"cam1": 0, "cam2": 0}
+    with pytest.raises(FootageError, match="different frame rates"):
+        offsets_from_times({"cam1": np.arange(90) / 30.0, "cam2": np.arange(90) / 28.5})

@@ -46,30 +46,30 @@ def motions(tmp_path: Path) -> Path:
 def test_learn_tells_numbers_and_models_lists(motions: Path, tmp_path: Path) -> None:
     result = run("learn", str(motions), "--into", "mine", *QUICK, *BY_NAME, "--memory", "3", "--json")
     assert result.exit_code == 0, result.stderr
-    told = json.loads(result.stdout)
-    assert {"frames", "clusters", "states", "entropy_train", "entropy_test"} <= set(told)
-    assert told["frames"] == 2 * (48 + 47)
-    assert (told["recorded_frames"], told["test_frames"], told["body"]) == (96, 24, "human25")
-    assert [entry["name"] for entry in told["sources"]] == ["one", "two"]
-    assert all(entry["rms_mm"] < 8.0 for entry in told["sources"])
-    assert Path(told["path"]) == workspace_root() / "models" / "mine.behaviour"
+    printed = json.loads(result.stdout)
+    assert {"frames", "clusters", "states", "entropy_train", "entropy_test"} <= set(printed)
+    assert printed["frames"] == 2 * (48 + 47)
+    assert (printed["recorded_frames"], printed["test_frames"], printed["body"]) == (96, 24, "human25")
+    assert [entry["name"] for entry in printed["sources"]] == ["one", "two"]
+    assert all(entry["rms_mm"] < 8.0 for entry in printed["sources"])
+    assert Path(printed["path"]) == workspace_root() / "models" / "mine.behaviour"
     listed = json.loads(run("models", "--json").stdout)["models"]
     assert [(entry["name"], entry["memory"], entry["clusters"]) for entry in listed] == [
-        ("mine", 3, told["clusters"])
+        ("mine", 3, printed["clusters"])
     ]
     assert "mine" in run("models").stdout
-    before = Path(told["path"]).read_bytes()
+    before = Path(printed["path"]).read_bytes()
     again = run("learn", str(motions), "--into", "mine", *QUICK)
     assert again.exit_code == 2
     assert "--force" in again.stderr
-    assert Path(told["path"]).read_bytes() == before
+    assert Path(printed["path"]).read_bytes() == before
     replaced = run(
         *("learn", str(motions / "one.c3d"), "--test", str(motions / "two.c3d"), str(motions / "one.c3d")),
         *("--into", "mine", "--force", *QUICK, "--json"),
     )
     assert replaced.exit_code == 0, replaced.stderr
-    told = json.loads(replaced.stdout)
-    assert (told["recorded_frames"], told["test_frames"]) == (60, 120)
+    printed = json.loads(replaced.stdout)
+    assert (printed["recorded_frames"], printed["test_frames"]) == (60, 120)
 
 
 def test_wrong_calls_are_refused_and_leave_nothing(motions: Path, tmp_path: Path) -> None:
@@ -119,8 +119,8 @@ def test_learn_takes_the_body_that_the_sessions_have(motions: Path) -> None:
     """Where most of the workspace's sessions have another body than a new one would, that is the model's."""
     for name, body in (("a", "human25"), ("b", "human31"), ("c", "human25")):
         begin_session(workspace_root() / name, body=body)
-    told = json.loads(run("learn", str(motions), "--into", "mine", *QUICK, "--json").stdout)
-    assert told["body"] == "human25"
+    printed = json.loads(run("learn", str(motions), "--into", "mine", *QUICK, "--json").stdout)
+    assert printed["body"] == "human25"
     shutil.rmtree(workspace_root() / "a")
     shutil.rmtree(workspace_root() / "c")
     assert Workspace().usual_body() == "human31"

@@ -26,9 +26,11 @@ def test_a_leap_is_told_and_kept(session_on_disk: Session) -> None:
     wrong[5:, 0] += 1.0
     kept(session_on_disk, "smoothed", wrong)
     kept(session_on_disk, "good", true_poses())
-    told = CliRunner().invoke(main, ["check", "toy", "one", "--every", "3", "--json"], catch_exceptions=False)
-    assert told.exit_code == 0, told.output
-    found = json.loads(told.stdout)
+    printed = CliRunner().invoke(
+        main, ["check", "toy", "one", "--every", "3", "--json"], catch_exceptions=False
+    )
+    assert printed.exit_code == 0, printed.output
+    found = json.loads(printed.stdout)
     assert (found["track"], found["good"]) == ("smoothed", False)
     assert [(jump["frame"], jump["limb"]) for jump in found["jumps"]] == [(5, "arm")]
     assert found["frames"] == list(range(0, FRAMES, 3))

@@ -12,19 +12,19 @@ import pytest
 from click.testing import CliRunner, Result
 from sample_walk import WALK, copy_of_walk
 
-from studio.cli.main import COMMANDS, main
+from studio.cli.main import COMMANDS, load, main, summary
 from studio.cli.output import progress_lines
+from studio.jobs.open_run import OpenRun
 from studio.runs.new_run import prepare_run
 from studio.runs.tracking_run import Stepped
 from studio.sessions.session import Session
-from studio.worker.open_run import OpenRun
 
 
 def run(*arguments: str) -> Result:
     return CliRunner().invoke(main, list(arguments), catch_exceptions=False)
 
 
-def told(*arguments: str) -> dict:
+def printed(*arguments: str) -> dict:
     result = run(*arguments, "--json")
     assert result.exit_code == 0, result.stderr
     return json.loads(result.stdout)
@@ -46,8 +46,15 @@ def test_every_command_has_help(name: str) -> None:
     assert "--json" in result.output
 
 
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_list_of_commands_says_what_each_ones_help_begins_with(name: str) -> None:
+    about = " ".join((load(name).help or "").split())
+    assert about.startswith(summary(name).removesuffix("."))
+    assert len(summary(name)) > 10
+
+
 def test_bodies_lists_parameters_and_limbs() -> None:
-    bodies = {entry["name"]: entry for entry in told("bodies")["bodies"]}
+    bodies = {entry["name"]: entry for entry in printed("bodies")["bodies"]}
     assert bodies["human31"]["parameters"] == 31
     assert bodies["human31"]["limbs"] == 10
     assert {"Hip", "Neck", "Head", "RWrist"} <= set(bodies["human31"]["markers"])
@@ -67,7 +74,7 @@ def test_track_writes_poses_in_the_bodys_order(session_on_disk: Session, tmp_pat
         "--seed",
         "7",
     )
-    first = told(*arguments, "--poses", str(poses))
+    first = printed(*arguments, "--poses", str(poses))
     assert first["frames"] == 2
     assert first["seed"] == 7
     assert first["evaluations_per_frame"] == 120
@@ -75,14 +82,14 @@ def test_track_writes_poses_in_the_bodys_order(session_on_disk: Session, tmp_pat
     body = session_on_disk.body()
     assert rows[0] == ["frame", *(parameter.name for parameter in body.parameters)]
     assert [row[0] for row in rows[1:]] == ["0", "1"]
-    told(*arguments, "--poses", str(tmp_path / "again.csv"))
+    printed(*arguments, "--poses", str(tmp_path / "again.csv"))
     assert (tmp_path / "again.csv").read_text() == poses.read_text()
-    listed = told("runs", session_on_disk.name)["runs"]
+    listed = printed("runs", session_on_disk.name)["runs"]
     assert [entry["done"] for entry in listed] == [2, 2]
 
 
 def test_condensation_prints_its_likelihood_scale(session_on_disk: Session) -> None:
-    answer = told(
+    answer = printed(
         "track", session_on_disk.name, "--tracker", "condensation", "--frames", "0:2", "--particles", "60"
     )
     assert answer["likelihood_scale"] > 0.0
@@ -136,7 +143,7 @@ def test_ctrl_c_keeps_the_run_and_writes_its_poses(
     assert (result.exit_code, result.stdout) == (130, "")
     assert "1 of 3 frames" in result.stderr
     assert len(poses.read_text().splitlines()) == 2
-    (listed,) = told("runs", session_on_disk.name)["runs"]
+    (listed,) = printed("runs", session_on_disk.name)["runs"]
     assert (listed["done"], listed["status"]) == (1, "cancelled")
 
 
@@ -149,13 +156,13 @@ def test_a_folder_that_cannot_be_written_to_is_no_fault_of_the_studio(
     monkeypatch.setattr(tempfile, "mkdtemp", read_only)
     monkeypatch.setattr(os, "mkdir", read_only)
     said = refused("track", session_on_disk.name, "--frames", "0:1")
-    assert "cannot be written (Permission denied)" in said
+    assert f"The folder '{session_on_disk.path / 'runs'}' cannot be written (Permission denied)." in said
 
 
 def test_evaluate_needs_a_truth(session_on_disk: Session) -> None:
-    run_name = told("track", session_on_disk.name, "--frames", "0:1", "--particles", "20", "--layers", "2")[
-        "run"
-    ]
+    run_name = printed(
+        "track", session_on_disk.name, "--frames", "0:1", "--particles", "20", "--layers", "2"
+    )["run"]
     assert "--truth" in refused("evaluate", session_on_disk.name, run_name)
 
 
@@ -169,7 +176,7 @@ def test_start_pose_file_is_taken(session_on_disk: Session, tmp_path: Path) -> N
         + ",".join(map(repr, pose.tolist()))
         + "\n"
     )
-    answer = told(
+    answer = printed(
         "track", session_on_disk.name, "--frames", "0:1", "--particles", "20", "--start-pose", str(path)
     )
     record = session_on_disk.run(answer["run"]).record
@@ -188,21 +195,21 @@ def test_import_refuses_a_folder_that_is_no_session_and_leaves_nothing(tmp_path:
 
 def test_evaluate_prints_numbers_with_their_alignment(tmp_path: Path) -> None:
     session = str(copy_of_walk(tmp_path / "walk").path)
-    tracked = told("track", session, "--frames", "0:3", "--particles", "100", "--layers", "5")
-    found = told("evaluate", session, tracked["run"])
+    tracked = printed("track", session, "--frames", "0:3", "--particles", "100", "--layers", "5")
+    found = printed("evaluate", session, tracked["run"])
     assert found["mean_mm"] < 40.0
     assert found["worst_mm"] >= found["mean_mm"]
     assert found["lost_frames"] == 0
     assert found["alignment"] == "none"
     assert len(found["per_frame_mm"]) == 3
     assert set(found["per_marker_mm"]) >= {"Head", "RWrist", "LAnkle"}
-    start = told("track", session, "--frames", "1:2", "--start-pose", str(WALK / "truth" / "walk.trc"))
+    start = printed("track", session, "--frames", "1:2", "--start-pose", str(WALK / "truth" / "walk.trc"))
     assert "markers of walk.trc" in start["start_pose"]
 
 
 def test_a_cancelled_run_is_resumed_with_the_result_of_an_unbroken_one(session_on_disk: Session) -> None:
     arguments = ("track", session_on_disk.name, "--particles", "30", "--layers", "3", "--frames", "0:4")
-    whole = told(*arguments, "--name", "whole")
+    whole = printed(*arguments, "--name", "whole")
     run_ = prepare_run(session_on_disk, last=4, knobs={"particles": 30, "layers": 3}, name="broken")
     opened = OpenRun(str(session_on_disk.path), str(run_.folder))
     for _ in range(8):
@@ -210,7 +217,7 @@ def test_a_cancelled_run_is_resumed_with_the_result_of_an_unbroken_one(session_o
     opened.tracking.mark_cancelled()
     opened.close()
     assert run_.summary().status == "cancelled"
-    assert told("track", session_on_disk.name, "--resume", "broken")["frames"] == 4
+    assert printed("track", session_on_disk.name, "--resume", "broken")["frames"] == 4
     poses = []
     for name in (whole["run"], "broken"):
         with session_on_disk.run(name).results() as results:

@@ -28,7 +28,7 @@ def run(*arguments: str) -> Result:
     return CliRunner().invoke(main, ["compare", *arguments], catch_exceptions=False)
 
 
-def told(*arguments: str) -> dict:
+def printed(*arguments: str) -> dict:
     result = run(*arguments, "--json")
     assert result.exit_code == 0, result.stderr
     return json.loads(result.stdout)
@@ -38,7 +38,7 @@ def test_the_document_is_as_agreed(walk: Session, tmp_path: Path) -> None:
     out = tmp_path / "found"
     changes = ("--set", "annealed:b.crossover=0", "--set", "diffusion_scale=0.8")
     three = ("walk", "--trackers", "annealed,annealed:b,condensation", "--seeds", "2", *SMALL, *changes)
-    found = told(*three, "--out", str(out))
+    found = printed(*three, "--out", str(out))
     assert [entry["tracker"] for entry in found["trackers"]] == ["annealed", "annealed:b", "condensation"]
     for entry in found["trackers"]:
         assert entry.keys() == FIELDS | {"seeds"}
@@ -112,3 +112,23 @@ def test_help_explains_labels() -> None:
     assert "--set annealed:few.layers=4" in text
     assert "annealed:eq13:" in text
     assert "partitions:" in text
+
+
+def swept(*arguments: str) -> Result:
+    return CliRunner().invoke(main, ["sweep", "walk", *arguments], catch_exceptions=False)
+
+
+def test_a_sweep_is_told_of_before_and_printed_after(walk: Session) -> None:
+    small = ("--seeds", "1", "--frames", "0:2", "--layers", "2", "--particles", "10", "--keep-shape")
+    done = swept("--vary", "survival=0.2,0.5", *small, "--processes", "1", "--json")
+    assert done.exit_code == 0, done.stderr
+    assert "2 runs of 2 frames, 80 evaluations; how long that takes is known once" in done.stderr
+    found = json.loads(done.stdout)
+    assert found["vary"] == {"survival": [0.2, 0.5]}
+    assert [row[2] for row in found["tables"][0]["rows"]] == ["sweep-1-p1-s0", "sweep-1-p2-s0"]
+    assert {run.name for run in walk.runs()} == {"sweep-1-p1-s0", "sweep-1-p2-s0"}
+    for words, said in (("survival=7", "cannot be '7'"), ("survival", "names no values")):
+        refused = swept("--vary", words, *small)
+        assert refused.exit_code == 2
+        assert said in refused.stderr
+    assert "Missing option '--vary'" in swept(*small).stderr

@@ -19,23 +19,28 @@ def pose(session_on_disk: Session, tmp_path: Path) -> str:
     file = tmp_path / "pose.csv"
     write_pose(file, tuple(entry.name for entry in session_on_disk.body().parameters), true_poses()[4])
     words = ["track", "toy", "--particles", "20", "--layers", "3", "--name", "one", "--start-pose", str(file)]
-    told = CliRunner().invoke(main, words)
-    assert told.exit_code == 0, told.output
+    printed = CliRunner().invoke(main, words)
+    assert printed.exit_code == 0, printed.output
     return str(file)
 
 
 def invoke(*words: str) -> dict[str, object]:
-    told = CliRunner().invoke(main, ["correct", "toy", "one", *words, "--json"])
-    assert told.exit_code == 0, told.output
-    return json.loads(told.stdout)
+    printed = CliRunner().invoke(main, ["correct", "toy", "one", *words, "--json"])
+    assert printed.exit_code == 0, printed.output
+    return json.loads(printed.stdout)
 
 
 def test_on_and_back(session_on_disk: Session, pose: str) -> None:
-    told = invoke("--at", "4", "--pose", pose, "--name", "on")
-    assert (told["run"], told["made_from"], told["corrected"], told["frames"]) == ("on", "one", 4, 4)
+    printed = invoke("--at", "4", "--pose", pose, "--name", "on")
+    assert (printed["run"], printed["made_from"], printed["corrected"], printed["frames"]) == (
+        "on",
+        "one",
+        4,
+        4,
+    )
     assert session_on_disk.run("on").summary().status == "finished"
-    told = invoke("--at", "4", "--from-track", "raw", "--back-to", "1", "--name", "back")
-    assert (told["frames"], told["back_to"]) == (4, 1)
+    printed = invoke("--at", "4", "--from-track", "raw", "--back-to", "1", "--name", "back")
+    assert (printed["frames"], printed["back_to"]) == (4, 1)
     record = session_on_disk.run("back").record
     with session_on_disk.run("one").results() as results:
         frames, poses = results.poses()
@@ -52,7 +57,7 @@ def test_on_and_back(session_on_disk: Session, pose: str) -> None:
     ],
 )
 def test_refusals(session_on_disk: Session, pose: str, words: list[str], cause: str) -> None:
-    told = CliRunner().invoke(main, ["correct", "toy", "one", *words])
-    assert told.exit_code == 2
-    assert cause in " ".join(told.stderr.split())
+    printed = CliRunner().invoke(main, ["correct", "toy", "one", *words])
+    assert printed.exit_code == 2
+    assert cause in " ".join(printed.stderr.split())
     assert len(session_on_disk.runs()) == 1

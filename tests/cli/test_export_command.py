@@ -41,12 +41,12 @@ def test_every_ending_is_written(run: str, tmp_path: Path, ending: str) -> None:
     place = tmp_path / f"arm.{ending}"
     done = export("--to", str(place), "--json")
     assert done.exit_code == 0, done.output
-    told = json.loads(done.stdout)
-    assert told["files"] == [str(place)]
-    assert told["format"] == ending
-    assert told["frames"] == (0 if ending in ("toml", "yml") else FRAMES)
-    assert told["bytes"] == place.stat().st_size > 0
-    assert "read" in told["checked"]
+    printed = json.loads(done.stdout)
+    assert printed["files"] == [str(place)]
+    assert printed["format"] == ending
+    assert printed["frames"] == (0 if ending in ("toml", "yml") else FRAMES)
+    assert printed["bytes"] == place.stat().st_size > 0
+    assert "read" in printed["checked"]
 
 
 def test_options_reach_the_file(run: str, tmp_path: Path) -> None:

@@ -54,7 +54,7 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "workspace"
 
 
-def told(*words: str) -> dict:
+def printed(*words: str) -> dict:
     result = CliRunner().invoke(main, [*words, "--json"])
     assert result.exit_code == 0, result.stderr
     return json.loads(result.stdout)
@@ -68,45 +68,48 @@ def refused(*words: str) -> str:
 
 
 def test_an_estimate_is_shown_then_applied(footage: Path, workspace: Path) -> None:
-    assert told("import", str(footage), "--into", "take")["layout"] == "folder in the studio's layout"
-    shown = told("synchronise", "take", "--within", "0.5")
+    assert printed("import", str(footage), "--into", "take")["layout"] == "folder in the studio's layout"
+    shown = printed("synchronise", "take", "--within", "0.5")
     assert shown["estimate"]["offsets"] == {"cam1": LATE, "cam2": 0}
     assert shown["estimate"]["sure"]
     assert shown["offsets"] == {"cam1": 0, "cam2": 0}
     text = CliRunner().invoke(main, ["synchronise", "take", "--within", "0.5"])
     assert "cam1: +6 frames, give or take" in text.stdout
     assert "Nothing was changed" in text.stderr
-    applied = told("synchronise", "take", "--within", "0.5", "--apply")
+    applied = printed("synchronise", "take", "--within", "0.5", "--apply")
     assert applied["offsets"] == {"cam1": LATE, "cam2": 0}
     assert applied["frames"] == FRAMES - LATE
     # Once in step, the estimate is of the files, so it says the same again.
-    assert told("synchronise", "take", "--within", "0.5")["estimate"]["offsets"] == {"cam1": LATE, "cam2": 0}
+    assert printed("synchronise", "take", "--within", "0.5")["estimate"]["offsets"] == {
+        "cam1": LATE,
+        "cam2": 0,
+    }
     source = Session(workspace / "take").manifest.footage
     assert [camera.offset for camera in source.cameras] == [LATE, 0]
 
 
 def test_offsets_and_turns_by_hand_and_back(footage: Path, workspace: Path) -> None:
-    told("import", str(footage), "--into", "take", "--offset", "cam1=6")
+    printed("import", str(footage), "--into", "take", "--offset", "cam1=6")
     session = Session(workspace / "take")
     upright = session.footage().picture("cam2", 3)
-    changed = told("synchronise", "take", "--offset", "cam2=2", "--rotate", "cam2=180")
+    changed = printed("synchronise", "take", "--offset", "cam2=2", "--rotate", "cam2=180")
     assert changed["offsets"] == {"cam1": 4, "cam2": 0}
     assert changed["rotations"] == {"cam1": 0, "cam2": 180}
     turned = Session(workspace / "take").footage().picture("cam2", 3)
     np.testing.assert_array_equal(turned, cv2.rotate(upright, cv2.ROTATE_180))
-    told("synchronise", "take", "--rotate", "cam2=0", "--offset", "cam1=6")
+    printed("synchronise", "take", "--rotate", "cam2=0", "--offset", "cam1=6")
     np.testing.assert_array_equal(Session(workspace / "take").footage().picture("cam2", 3), upright)
 
 
 def test_recorded_times(footage: Path, workspace: Path, tmp_path: Path) -> None:
-    told("import", str(footage), "--into", "take")
+    printed("import", str(footage), "--into", "take")
     rows = [f"{camera},{(late + k) / 60.0}" for camera, late in ((1, 0), (2, LATE)) for k in range(FRAMES)]
     path = tmp_path / "timestamps.csv"
     path.write_text("\n".join(["cam_id,frame_time", *rows]))
-    shown = told("synchronise", "take", "--timestamps", str(path))
+    shown = printed("synchronise", "take", "--timestamps", str(path))
     assert shown["recorded"]["offsets"] == {"cam1": LATE, "cam2": 0}
     assert shown["offsets"] == {"cam1": 0, "cam2": 0}
-    assert told("synchronise", "take", "--timestamps", str(path), "--apply")["offsets"] == {
+    assert printed("synchronise", "take", "--timestamps", str(path), "--apply")["offsets"] == {
         "cam1": LATE,
         "cam2": 0,
     }
@@ -122,7 +125,7 @@ def test_an_estimate_that_is_not_reliable_is_not_applied(tmp_path: Path, workspa
         write_pictures(source / "pictures" / f"cam{view + 1}", frames)
     (source / "calibration").mkdir()
     export_calibration(rig(2), source / "calibration" / "Calib.toml", "pose2sim")
-    told("import", str(source), "--into", "noise", "--fps", "60")
+    printed("import", str(source), "--into", "noise", "--fps", "60")
     assert "not reliable" in refused("synchronise", "noise", "--apply")
     assert Session(workspace / "noise").manifest.footage.cameras[0].offset == 0
 
@@ -134,7 +137,7 @@ def test_one_of_several_trials(footage: Path, workspace: Path, tmp_path: Path) -
     assert "2 trials: Trial_1, Trial_2" in said
     assert "--trial Trial_1" in said
     shutil.rmtree(tmp_path / "batch" / "Trial_1" / "calibration")
-    told("import", str(tmp_path / "batch"), "--into", "one", "--trial", "Trial_2")
+    printed("import", str(tmp_path / "batch"), "--into", "one", "--trial", "Trial_2")
     assert Session(workspace / "one").manifest.imported_from.endswith("Trial_2")
 
 
@@ -151,5 +154,5 @@ def test_one_of_several_trials(footage: Path, workspace: Path, tmp_path: Path) -
     ],
 )
 def test_refusals(footage: Path, workspace: Path, words: list[str], cause: str) -> None:
-    told("import", str(footage), "--into", "take", "--reference")
+    printed("import", str(footage), "--into", "take", "--reference")
     assert cause in refused("synchronise", "take", *words)

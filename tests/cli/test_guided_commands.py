@@ -71,13 +71,13 @@ def test_compare_with_a_model(started: Session) -> None:
     )  # fmt: skip
     result = run(*common)
     assert result.exit_code == 0, result.stderr
-    told = json.loads(result.stdout)
-    assert [entry["tracker"] for entry in told["trackers"]] == [
+    printed = json.loads(result.stdout)
+    assert [entry["tracker"] for entry in printed["trackers"]] == [
         "behaviour",
         "annealed:guided",
         "condensation",
     ]
-    assert (Path(told["folder"]) / BEHAVIOUR_NAME).read_bytes() == path.read_bytes()
+    assert (Path(printed["folder"]) / BEHAVIOUR_NAME).read_bytes() == path.read_bytes()
     path.unlink()
     refused = run(*common)
     assert refused.exit_code == 2

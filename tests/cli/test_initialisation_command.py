@@ -14,13 +14,13 @@ def test_a_start_pose_is_written_and_then_kept(session_on_disk: Session) -> None
     runner = CliRunner()
     first = runner.invoke(main, ["initialise", "toy", "--json"])
     assert first.exit_code == 0, first.output
-    told = json.loads(first.stdout)
-    assert (told["session"], told["frame"], told["body"]) == ("toy", 0, "planar_arm4")
-    assert told["confidence"] > 0.8
-    assert set(told["pose"]) == {entry.name for entry in session_on_disk.body().parameters}
+    printed = json.loads(first.stdout)
+    assert (printed["session"], printed["frame"], printed["body"]) == ("toy", 0, "planar_arm4")
+    assert printed["confidence"] > 0.8
+    assert set(printed["pose"]) == {entry.name for entry in session_on_disk.body().parameters}
     stored = session_on_disk.start_pose()
     assert stored is not None
-    assert stored.tolist() == pytest.approx(list(told["pose"].values()))
+    assert stored.tolist() == pytest.approx(list(printed["pose"].values()))
     second = runner.invoke(main, ["initialise", "toy", "--frame", "3", "--seed", "1"])
     assert second.exit_code == 0, second.output
     assert "start_pose-frame-3.csv" in second.stdout
@@ -39,14 +39,14 @@ def test_a_start_pose_is_written_and_then_kept(session_on_disk: Session) -> None
     ],
 )
 def test_refusals(session_on_disk: Session, words: list[str], cause: str) -> None:
-    told = CliRunner().invoke(main, ["initialise", "toy", *words])
-    assert told.exit_code == 2
-    assert cause in " ".join(told.stderr.split())
+    printed = CliRunner().invoke(main, ["initialise", "toy", *words])
+    assert printed.exit_code == 2
+    assert cause in " ".join(printed.stderr.split())
     assert not (session_on_disk.path / "start_pose.csv").exists()
 
 
 def test_track_tells_how_it_went(session_on_disk: Session) -> None:
     words = ["track", "toy", "--frames", ":2", "--particles", "30", "--layers", "3", "--json"]
-    told = json.loads(CliRunner().invoke(main, words).stdout)
-    assert told["frames_lost"] + told["frames_without_evidence"] + told["times_recovered"] <= 2
+    printed = json.loads(CliRunner().invoke(main, words).stdout)
+    assert printed["frames_lost"] + printed["frames_without_evidence"] + printed["times_recovered"] <= 2
     assert len(Workspace().session("toy").runs()) == 1

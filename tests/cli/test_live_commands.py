@@ -29,15 +29,15 @@ def started(session_on_disk: Session) -> Session:
 def test_a_live_run_and_its_replay(started: Session) -> None:
     result = run("live", "toy", *QUICK, "--seconds", "0.5", "--repeat", "--json", "--name", "now")
     assert result.exit_code == 0, result.stderr
-    told = json.loads(result.stdout)
-    assert told["run"] == "now"
-    assert told["frames"] + len(told["dropped"]) == 30
-    assert told["footage_frames_per_second"] == 60.0
-    latency = told["latency_ms"]
+    printed = json.loads(result.stdout)
+    assert printed["run"] == "now"
+    assert printed["frames"] + len(printed["dropped"]) == 30
+    assert printed["footage_frames_per_second"] == 60.0
+    latency = printed["latency_ms"]
     assert 0.0 < latency["median"] <= latency["p95"] <= latency["worst"]
-    assert started.run("now").record.to_and_fro
+    assert started.run("now").record.ping_pong
     again = json.loads(run("live", "toy", "--replay", "now", "--json").stdout)
-    assert (again["frames"], again["different"]) == (told["frames"], [])
+    assert (again["frames"], again["different"]) == (printed["frames"], [])
 
 
 def test_words_for_a_person(started: Session) -> None:

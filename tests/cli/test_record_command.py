@@ -35,12 +35,12 @@ def test_cameras_are_recorded_at_once(
         into = ("--into", str(tmp_path / "take"), "--calibration", str(walk.path))
         result = run("record", *cameras, "--seconds", "0.8", *into, "--json")
         assert result.exit_code == 0, result.stderr
-        told = json.loads(result.stdout)
-        assert set(told["cameras"]) == {"cam1", "cam2"}
-        assert told["frames"] >= 10
-        assert told["spread_ms"]["median"] <= told["spread_ms"]["worst"]
+        printed = json.loads(result.stdout)
+        assert set(printed["cameras"]) == {"cam1", "cam2"}
+        assert printed["frames"] >= 10
+        assert printed["spread_ms"]["median"] <= printed["spread_ms"]["worst"]
         made = Session(tmp_path / "take")
-        assert made.manifest.frame_count == told["frames"]
+        assert made.manifest.frame_count == printed["frames"]
         again = run("record", *cameras, *into)
         assert again.exit_code == 2
         assert "something at" in again.stderr
@@ -54,12 +54,12 @@ def test_live_cameras_are_tracked(walk: Session, pictures: dict[str, list[bytes]
         result = run("live", str(walk.path), *cameras, *quick, *place)
         refused = run("live", str(walk.path), *cameras, "--repeat")
     assert result.exit_code == 0, result.stderr
-    told = json.loads(result.stdout)
-    assert (told["session"], told["ended"], told["stopped"]) == ("take", "its time was over", [])
-    assert told["frames"] >= 1
-    assert told["frames"] + len(told["dropped"]) <= told["sets"]
-    again = json.loads(run("live", str(tmp_path / "take"), "--replay", told["run"], "--json").stdout)
-    assert (again["frames"], again["different"]) == (told["frames"], [])
+    printed = json.loads(result.stdout)
+    assert (printed["session"], printed["ended"], printed["stopped"]) == ("take", "its time was over", [])
+    assert printed["frames"] >= 1
+    assert printed["frames"] + len(printed["dropped"]) <= printed["sets"]
+    again = json.loads(run("live", str(tmp_path / "take"), "--replay", printed["run"], "--json").stdout)
+    assert (again["frames"], again["different"]) == (printed["frames"], [])
     assert refused.exit_code == 2
 
 

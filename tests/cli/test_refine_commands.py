@@ -25,8 +25,8 @@ def runner(session_on_disk: Session) -> CliRunner:
         "--name",
         "one",
     ]
-    told = runner.invoke(main, words)
-    assert told.exit_code == 0, told.output
+    printed = runner.invoke(main, words)
+    assert printed.exit_code == 0, printed.output
     return runner
 
 
@@ -38,10 +38,10 @@ def test_refine_then_smooth(runner: CliRunner) -> None:
     assert refined["made_by"]["refinement_steps"] == 5
     assert 0 <= refined["moved"] <= 8
     smoothed = runner.invoke(main, ["smooth", "toy", "one", "--smoothing-frequency", "4", "--json"])
-    told = json.loads(smoothed.stdout)
-    assert told["made_by"]["from"] == "refined"
-    assert told["jitter_after_mm"] <= told["jitter_before_mm"]
-    assert told["filled"] == []
+    printed = json.loads(smoothed.stdout)
+    assert printed["made_by"]["from"] == "refined"
+    assert printed["jitter_after_mm"] <= printed["jitter_before_mm"]
+    assert printed["filled"] == []
     again = runner.invoke(main, ["smooth", "toy", "one"])
     assert again.exit_code == 2
     assert "already" in again.stderr
@@ -58,9 +58,9 @@ def test_refine_then_smooth(runner: CliRunner) -> None:
     ],
 )
 def test_refusals(runner: CliRunner, words: list[str], cause: str) -> None:
-    told = runner.invoke(main, words)
-    assert told.exit_code == 2
-    assert cause in " ".join(told.stderr.split())
+    printed = runner.invoke(main, words)
+    assert printed.exit_code == 2
+    assert cause in " ".join(printed.stderr.split())
 
 
 def test_a_note_on_the_body_is_said_once_of_a_session_not_at_every_command(session_on_disk: Session) -> None:

@@ -54,11 +54,11 @@ def test_json_is_one_object_and_failures_have_an_exit_code(tmp_path: Path) -> No
         "all", "--quick", "--seeds", "1", "--processes", "1", "--out", str(tmp_path / "here"), "--json"
     )
     assert found.exit_code == 1
-    told = json.loads(found.stdout)
-    assert told["out"] == str(tmp_path / "here")
-    assert told["trials"] == {"measured": 2, "kept": 0, "failed": 2}
-    assert [document["verdict"] for document in told["experiments"]] == ["better", "failed"]
-    assert told["experiments"][0]["quick"] is True
+    printed = json.loads(found.stdout)
+    assert printed["out"] == str(tmp_path / "here")
+    assert printed["trials"] == {"measured": 2, "kept": 0, "failed": 2}
+    assert [document["verdict"] for document in printed["experiments"]] == ["better", "failed"]
+    assert printed["experiments"][0]["quick"] is True
 
 
 def test_wrong_calls_are_told_a_remedy(tmp_path: Path) -> None:

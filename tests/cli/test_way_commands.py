@@ -18,7 +18,7 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "workspace"
 
 
-def told(*words: str) -> dict:
+def printed(*words: str) -> dict:
     """The command's JSON."""
     result = studio(*words, "--json")
     assert result.exit_code == 0, result.stderr
@@ -31,28 +31,28 @@ def studio(*words: str) -> Result:
 
 
 def test_the_way_from_nothing_to_footage_with_a_calibration(workspace: Path, tmp_path: Path) -> None:
-    assert told("new", "mine", "--title", "My take")["next"] == "footage"
-    assert told("way", "mine")["next"] == "footage"
+    assert printed("new", "mine", "--title", "My take")["next"] == "footage"
+    assert printed("way", "mine")["next"] == "footage"
     made = make_session(tmp_path / "toy")
     for part in ("pictures", "calibration"):
         shutil.copytree(made.path / part, tmp_path / "raw" / part)
-    added = told("add-footage", "mine", str(tmp_path / "raw"), "--fps", "60")
+    added = printed("add-footage", "mine", str(tmp_path / "raw"), "--fps", "60")
     assert (added["cameras"], added["frames"], added["calibrated"]) == (["front"], FRAMES, True)
-    way = {step["step"]: step["state"] for step in told("way", "mine")["steps"]}
+    way = {step["step"]: step["state"] for step in printed("way", "mine")["steps"]}
     assert (way["footage"], way["calibration"], way["track"]) == ("done", "done", "ready")
     assert "✓ calibration" in studio("way", "mine").stdout
 
 
 @pytest.mark.parametrize("verb", ["track", "initialise", "background", "synchronise", "fit-subject"])
 def test_commands_say_what_an_empty_session_lacks(workspace: Path, verb: str) -> None:
-    told("new", "mine")
+    printed("new", "mine")
     result = studio(verb, "mine")
     assert result.exit_code == 2, result.output
     assert "no footage yet" in result.stderr
 
 
 def test_a_taken_name_is_refused(workspace: Path) -> None:
-    told("new", "mine")
+    printed("new", "mine")
     result = studio("new", "mine")
     assert result.exit_code == 2
     assert "already" in result.stderr

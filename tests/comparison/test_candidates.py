@@ -5,7 +5,7 @@ import pytest
 from studio.comparison.candidates import LINEUPS, VARIANTS, Candidate, Lineup, candidates, read_assignments
 from studio.errors import SettingsError, StudioError
 from studio.settings import changed_settings, default_settings
-from studio.tracking.catalogue import TRACKERS
+from studio.trackers.catalogue import TRACKERS
 
 
 def made(

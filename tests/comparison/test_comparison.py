@@ -11,7 +11,7 @@ from scipy import stats
 
 from studio.comparison.candidates import Lineup, read_assignments
 from studio.comparison.comparison_findings import document, findings, frames_csv, table_text
-from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.footage_cache import FootageCache
 from studio.comparison.plan import (
     Comparison,
     Plan,
@@ -63,13 +63,13 @@ def concluded() -> Comparison:
 
 def test_a_trial_tracks_the_session_with_its_own_seed() -> None:
     drawn = plan("annealed", seeds=(1,))
-    shelf = FootageShelf(Path("nowhere"))
+    cache = FootageCache(Path("nowhere"))
     try:
         (trial,) = trials(drawn)
-        found = measure_tracking(json.loads(json.dumps(dict(trial.arguments))), shelf)
-        again = measure_tracking(trial.arguments, shelf)
+        found = measure_tracking(json.loads(json.dumps(dict(trial.arguments))), cache)
+        again = measure_tracking(trial.arguments, cache)
     finally:
-        shelf.close()
+        cache.close()
     assert found["evaluations"] == 200
     assert found["mean_mm"] < 35.0
     assert found["lost_frames"] == 0
@@ -154,11 +154,11 @@ def test_one_weighting_for_all_by_default_the_sessions() -> None:
 @pytest.mark.timeout(3600)
 def test_the_improved_filter_keeps_every_limb_on_the_bundled_walk() -> None:
     drawn = plan_comparison(Session(WALK), Lineup(("improvements",), "", 2000), tuple(range(10)))
-    shelf = FootageShelf(Path("nowhere"))
+    cache = FootageCache(Path("nowhere"))
     try:
-        outcomes = [Outcome(trial, measure_tracking(trial.arguments, shelf)) for trial in trials(drawn)]
+        outcomes = [Outcome(trial, measure_tracking(trial.arguments, cache)) for trial in trials(drawn)]
     finally:
-        shelf.close()
+        cache.close()
     comparison = conclude(drawn, outcomes)
     folder = Path(os.environ.get("STUDIO_ARTEFACTS", ROOT / "artefacts"))
     folder.mkdir(parents=True, exist_ok=True)

@@ -7,7 +7,10 @@ import pytest
 from scipy import stats
 
 from studio.comparison.statistics import (
+    EQUAL_WITHIN,
+    ONE_SIDED,
     bootstrap_interval,
+    equal_to,
     firmness,
     number,
     overall,
@@ -66,20 +69,52 @@ def test_the_sign_test_is_scipys_without_ties() -> None:
 
 
 def test_the_verdict_follows_the_interval() -> None:
-    assert verdict_of(1.0, 2.0, None) == "answered"
-    assert verdict_of(1.0, 2.0, 2.0) == "reproduced"
-    assert verdict_of(1.0, 2.0, 3.0, "lower") == "better"
-    assert verdict_of(1.0, 2.0, 3.0, "higher") == "not reproduced"
-    assert verdict_of(1.0, 2.0, 0.5, "higher") == "better"
-    assert verdict_of(1.0, 2.0, 0.5) == "not reproduced"
-    assert verdict_of(math.nan, math.nan, 0.5, "lower") == "not reproduced"
+    wide, tested = (1.0, 2.0), (1.1, 1.9)
+    assert verdict_of(wide, tested, None) == "answered"
+    assert verdict_of(wide, tested, 3.0, "lower") == "better"
+    assert verdict_of(wide, tested, 3.0, "higher") == "not reproduced"
+    assert verdict_of(wide, tested, 0.5, "higher") == "better"
+    assert verdict_of(wide, tested, 0.5) == "not reproduced"
+    nothing = (math.nan, math.nan)
+    assert verdict_of(nothing, nothing, 0.5, "lower") == "not reproduced"
     with pytest.raises(ValueError, match="smaller"):
-        verdict_of(1.0, 2.0, 0.5, "smaller")
+        verdict_of(wide, tested, 0.5, "smaller")
+
+
+def test_equality_is_shown_within_a_margin_and_not_by_scatter() -> None:
+    """A wide interval around the paper's value shows nothing; a narrow one beside it is equal to it."""
+    assert EQUAL_WITHIN == 0.1
+    assert verdict_of((0.5, 1.6), (0.6, 1.5), 1.0) == "undecided"
+    assert verdict_of((1.02, 1.06), (1.03, 1.05), 1.0) == "reproduced"
+    assert verdict_of((1.02, 1.2), (1.03, 1.15), 1.0) == "not reproduced"
+    # The margin is a ratio, the same on both sides, and the 90 % interval is tested against it.
+    assert verdict_of((0.90, 1.12), (0.92, 1.09), 1.0) == "reproduced"
+    assert verdict_of((0.90, 1.12), (0.90, 1.09), 1.0) == "undecided"
+    # Where less is better only the worse margin counts.
+    assert verdict_of((0.5, 1.1), (0.6, 1.05), 1.0, "lower") == "reproduced"
+    assert verdict_of((0.5, 1.3), (0.6, 1.2), 1.0, "lower") == "undecided"
+    assert verdict_of((0.85, 1.6), (0.95, 1.5), 1.0, "higher") == "reproduced"
+    assert equal_to(-2.0) == (-2.2, pytest.approx(-2.0 / 1.1))
+
+
+def test_the_tested_interval_is_that_of_two_one_sided_tests() -> None:
+    values = np.random.default_rng(3).normal(1.0, 0.1, 30)
+    low, high = bootstrap_interval(values, level=ONE_SIDED)
+    t = stats.t.ppf(0.95, 29) * values.std(ddof=1) / np.sqrt(30)
+    assert low == pytest.approx(values.mean() - t, abs=0.01)
+    assert high == pytest.approx(values.mean() + t, abs=0.01)
+    margin = equal_to(1.0)
+    shown = (
+        stats.ttest_1samp(values, margin[0], alternative="greater").pvalue < 0.05
+        and stats.ttest_1samp(values, margin[1], alternative="less").pvalue < 0.05
+    )
+    assert number("n", values, paper=1.0).verdict == ("reproduced" if shown else "undecided")
+    assert number("n", values[:3], paper=1.0).verdict == "undecided"
 
 
 def test_a_number_counts_the_seeds_that_gave_one() -> None:
     found = number("mean error", [30.0, 40.0, 50.0, math.inf], "mm", paper=38.0, better="lower")
-    assert (found.ours, found.seeds, found.verdict) == (40.0, 3, "reproduced")
+    assert (found.ours, found.seeds, found.verdict) == (40.0, 3, "undecided")
     assert found.low < 38.0 < found.high
     assert number("none", [math.nan], paper=1.0).verdict == "not reproduced"
     assert number("worst", [1.0, 5.0], statistic=np.max).ours == 5.0
@@ -91,7 +126,8 @@ def test_the_whole_is_as_good_as_its_worst() -> None:
     assert overall([]) == "answered"
     assert overall(["answered", "better"]) == "better"
     assert overall(["reproduced", "better"]) == "reproduced"
-    assert overall(["reproduced", "not reproduced", "better"]) == "not reproduced"
+    assert overall(["reproduced", "undecided", "better"]) == "undecided"
+    assert overall(["reproduced", "not reproduced", "undecided"]) == "not reproduced"
 
 
 def test_few_seeds_are_reported() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.footage_cache import FootageCache
 from studio.comparison.tracked import Attempt, Changed, track
 from studio.errors import NotFoundError, SessionError
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
@@ -18,9 +18,9 @@ SMALL = {"layers": 3, "particles": 20}
 
 
 @pytest.fixture(scope="module")
-def shelf():
+def cache():
     """The bundled sessions."""
-    found = FootageShelf(SAMPLES)
+    found = FootageCache(SAMPLES)
     yield found
     found.close()
 
@@ -36,29 +36,29 @@ def same(one, other) -> bool:
     return {**asdict(one), "seconds": 0} == {**asdict(other), "seconds": 0}
 
 
-def test_an_attempt_is_measured_and_gives_the_same_again(shelf) -> None:
-    first = track(attempt(), shelf)
+def test_an_attempt_is_measured_and_gives_the_same_again(cache) -> None:
+    first = track(attempt(), cache)
     assert first.frames == [0, 1, 2, 3]
     assert first.evaluations == 60
     assert 0.0 < first.mean_mm < 150.0
     assert first.worst_mm == max(first.per_frame_mm)
-    assert same(first, track(attempt(), shelf))
-    assert not same(first, track(attempt(seed=4), shelf))
+    assert same(first, track(attempt(), cache))
+    assert not same(first, track(attempt(seed=4), cache))
 
 
-def test_attempts_and_results_survive_json(shelf) -> None:
+def test_attempts_and_results_survive_json(cache) -> None:
     kept = attempt(cameras=("cam1", "cam3"))
     assert Attempt.of_plain(json.loads(json.dumps(kept.plain()))) == kept
-    json.dumps(asdict(track(attempt(last=1), shelf)), allow_nan=False)
+    json.dumps(asdict(track(attempt(last=1), cache)), allow_nan=False)
 
 
-def test_a_later_first_frame_starts_near_the_truth_and_steps_skip_frames(shelf) -> None:
-    found = track(attempt(first=60, last=70, every=3, changes={"particles": 60}), shelf)
+def test_a_later_first_frame_starts_near_the_truth_and_steps_skip_frames(cache) -> None:
+    found = track(attempt(first=60, last=70, every=3, changes={"particles": 60}), cache)
     assert found.frames == [60, 63, 66, 69]
     assert found.per_frame_mm[0] < 40.0
 
 
-def test_damage_changes_the_trackers_input_and_nothing_stored(shelf) -> None:
+def test_damage_changes_the_trackers_input_and_nothing_stored(cache) -> None:
     def blind(evidence: FrameEvidence) -> FrameEvidence:
         views = [
             ViewEvidence(view.camera, view.picture, np.zeros_like(view.mask), np.zeros_like(view.edges))
@@ -66,16 +66,16 @@ def test_damage_changes_the_trackers_input_and_nothing_stored(shelf) -> None:
         ]
         return FrameEvidence(evidence.frame, tuple(views))
 
-    seen = track(attempt(), shelf)
-    assert not same(track(attempt(), shelf, spoilt=Changed(evidence=blind)), seen)
-    assert same(track(attempt(), shelf), seen)
+    seen = track(attempt(), cache)
+    assert not same(track(attempt(), cache, spoilt=Changed(evidence=blind)), seen)
+    assert same(track(attempt(), cache), seen)
 
 
-def test_layers_and_frames_are_reported(shelf) -> None:
+def test_layers_and_frames_are_reported(cache) -> None:
     layers, frames = [], []
     track(
         attempt(last=2),
-        shelf,
+        cache,
         on_layer=layers.append,
         on_frame=lambda done, total: frames.append((done, total)),
     )
@@ -83,25 +83,25 @@ def test_layers_and_frames_are_reported(shelf) -> None:
     assert [record.frame for record in layers] == [0] * 6 + [1] * 3
 
 
-def test_unknown_footage_and_camera_are_named(shelf) -> None:
+def test_unknown_footage_and_camera_are_named(cache) -> None:
     with pytest.raises(SessionError, match="no-such-walk"):
-        track(Attempt("no-such-walk", "annealed", "edge-region", 0), shelf)
+        track(Attempt("no-such-walk", "annealed", "edge-region", 0), cache)
     with pytest.raises(NotFoundError, match="cam9"):
-        track(attempt(cameras=("cam9",)), shelf)
+        track(attempt(cameras=("cam9",)), cache)
 
 
 def test_the_cache_drops_the_oldest_evidence_first() -> None:
-    shelf = FootageShelf(SAMPLES, most_bytes=4_000_000)
-    session = shelf.session("walk")
+    cache = FootageCache(SAMPLES, most_bytes=4_000_000)
+    session = cache.session("walk")
     cameras = session.cameras()
     try:
-        made = [shelf.evidence(session, cameras, frame, EvidenceSettings(), "proximity") for frame in (0, 1)]
-        assert shelf.evidence(session, cameras, 1, EvidenceSettings(), "proximity") is made[1]
-        again = shelf.evidence(session, cameras, 0, EvidenceSettings(), "proximity")
+        made = [cache.evidence(session, cameras, frame, EvidenceSettings(), "proximity") for frame in (0, 1)]
+        assert cache.evidence(session, cameras, 1, EvidenceSettings(), "proximity") is made[1]
+        again = cache.evidence(session, cameras, 0, EvidenceSettings(), "proximity")
         assert again is not made[0]
         for one, other in zip(again.views, made[0].views, strict=True):
             np.testing.assert_array_equal(one.mask, other.mask)
             np.testing.assert_array_equal(one.edges, other.edges)
             assert one.picture.size == 0
     finally:
-        shelf.close()
+        cache.close()

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from studio.comparison.footage_shelf import NO_PICTURE, FootageShelf
+from studio.comparison.footage_cache import NO_PICTURE, FootageCache
 from studio.comparison.tracked import Attempt, track
 from studio.evidence.settings import EvidenceSettings
 
@@ -13,11 +13,11 @@ CHANGES = {"layers": 5, "particles": 60, "hull_depth": 6}
 
 
 def test_the_walk_is_followed_by_blobs() -> None:
-    shelf = FootageShelf(SAMPLES)
+    cache = FootageCache(SAMPLES)
     fields = {"seed": 3, "last": 12, "body": "human25"}
-    found = track(Attempt("walk", "annealed", "blobs", changes=CHANGES, **fields), shelf)
-    again = track(Attempt("walk", "annealed", "blobs", changes=CHANGES, **fields), shelf)
-    shelf.close()
+    found = track(Attempt("walk", "annealed", "blobs", changes=CHANGES, **fields), cache)
+    again = track(Attempt("walk", "annealed", "blobs", changes=CHANGES, **fields), cache)
+    cache.close()
     assert found.per_frame_mm == again.per_frame_mm
     # Twelve frames of walking carry a body that is not followed some 170 mm away.
     assert found.mean_mm < 60.0
@@ -25,15 +25,15 @@ def test_the_walk_is_followed_by_blobs() -> None:
 
 
 def test_pictures_are_kept_only_for_weightings_that_read_them() -> None:
-    shelf = FootageShelf(SAMPLES)
-    session = shelf.session("walk")
+    cache = FootageCache(SAMPLES)
+    session = cache.session("walk")
     cameras = session.cameras()
     seen = [
-        shelf.evidence(session, cameras, 0, EvidenceSettings(), "none", pictures)
+        cache.evidence(session, cameras, 0, EvidenceSettings(), "none", pictures)
         for pictures in (False, True)
     ]
     assert seen[0].views[0].picture is NO_PICTURE
     assert seen[1].views[0].picture.shape == (480, 640, 3)
     np.testing.assert_array_equal(seen[0].views[0].mask, seen[1].views[0].mask)
-    assert shelf.evidence(session, cameras, 0, EvidenceSettings(), "none", True) is seen[1]
-    shelf.close()
+    assert cache.evidence(session, cameras, 0, EvidenceSettings(), "none", True) is seen[1]
+    cache.close()

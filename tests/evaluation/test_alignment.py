@@ -6,7 +6,8 @@ from scipy.optimize import least_squares
 from scipy.spatial import procrustes
 from scipy.spatial.transform import Rotation
 
-from studio.evaluation.errors import moved_to_root, similarity_aligned
+from studio.errors import TruthError
+from studio.evaluation.errors import RIGID, SIMILARITY, laid_on, moved_to_root, similarity_aligned
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 4])
@@ -60,3 +61,32 @@ def test_points_on_one_place_are_only_moved() -> None:
 def test_root_alignment_moves_and_does_not_turn() -> None:
     goal = np.random.default_rng(10).normal(0.0, 300.0, (5, 3))
     np.testing.assert_allclose(moved_to_root(goal + np.array([5.0, -7.0, 9.0]), goal, 2), goal)
+
+
+@pytest.mark.parametrize(("how", "scale"), [(RIGID, 1.0), (SIMILARITY, 1000.0)])
+def test_a_truth_of_another_world_is_laid_on_the_run_by_one_motion(how: str, scale: float) -> None:
+    rng = np.random.default_rng(11)
+    found = rng.normal(0.0, 300.0, (6, 5, 3))
+    turn = Rotation.random(random_state=11).as_matrix()
+    truth = (found @ turn.T + rng.normal(0.0, 500.0, 3)) / scale
+    seen = np.ones((6, 5), dtype=bool)
+    seen[2, 3] = False
+    truth[2, 3] = np.nan
+    laid, words = laid_on(truth, found, seen, how)
+    np.testing.assert_allclose(laid[seen], found[seen], atol=1e-6)
+    assert "6 frames" in words
+    assert "29 points" in words
+    assert ("scaled by 1000" in words) == (how == SIMILARITY)
+
+
+def test_a_rigid_motion_does_not_hide_a_wrong_size() -> None:
+    found = np.random.default_rng(12).normal(0.0, 300.0, (6, 5, 3))
+    laid, _ = laid_on(0.5 * found, found, np.ones((6, 5), dtype=bool), RIGID)
+    assert np.linalg.norm(laid - found, axis=2).mean() > 100.0
+
+
+def test_points_on_a_line_cannot_be_laid() -> None:
+    line = np.linspace(0.0, 1.0, 5)[None, :, None] * np.array([1.0, 2.0, 3.0])
+    for points in (line, line[:, :2]):
+        with pytest.raises(TruthError, match="line"):
+            laid_on(points, points, np.ones(points.shape[:2], dtype=bool), RIGID)

@@ -55,6 +55,29 @@ def test_stepped_distances_are_nearly_the_exact_ones() -> None:
     assert np.array_equal(stepped.border, exact.border)
 
 
+def test_where_a_mask_says_nothing_there_is_neither_distance_nor_border() -> None:
+    mask = disc()
+    hidden = np.zeros_like(mask)
+    hidden[:, 36:58] = 255
+    whole, found = distances_of(mask), distances_of(mask, hidden=hidden)
+    (left, top), (begin, first) = whole.corner, found.corner
+    assert begin + found.signed.shape[1] >= 58
+    assert not found.signed[:, 36 - begin : 58 - begin].any()
+    known = whole.signed[:, : 36 - left]
+    rows, columns = slice(top - first, top - first + len(known)), slice(left - begin, 36 - begin)
+    assert np.array_equal(found.signed[rows, columns], known)
+    assert len(found.border) > 30
+    assert found.border[:, 0].max() < 34
+    assert whole.border[:, 0].max() > 40
+
+
+def test_a_mask_that_is_known_everywhere_has_the_same_distances() -> None:
+    whole, found = distances_of(disc()), distances_of(disc(), hidden=np.zeros_like(disc()))
+    assert found.corner == whole.corner
+    assert np.array_equal(found.signed, whole.signed)
+    assert np.array_equal(found.border, whole.border)
+
+
 @pytest.mark.parametrize("exact", [True, False])
 def test_distances_do_not_depend_on_where_the_mask_lies(exact: bool) -> None:
     """OpenCV's own do, by 3e-5 pixels, and a descent amplifies that to millimetres: runs must be reproducible."""

@@ -88,16 +88,16 @@ def test_a_file_that_does_not_read_back_is_not_offered(arm, tmp_path: Path) -> N
 
 
 def test_cancelling_leaves_nothing(arm, tmp_path: Path) -> None:
-    told: list[str] = []
+    response: list[str] = []
 
     def stopped(step: str, _done: int, _total: int) -> None:
-        told.append(step)
-        if len(told) > 1:
+        response.append(step)
+        if len(response) > 1:
             raise WorkCancelledError("Stopped.")
 
     with pytest.raises(WorkCancelledError):
         export_run(*arm, FORMATS["csv"], {"track": MADE}, tmp_path / "arm.csv", progress=stopped)
-    assert told[0] == "writing"
+    assert response[0] == "writing"
     assert left_behind(tmp_path) == set()
 
 

@@ -1,5 +1,6 @@
 """What `pip install .` gives, outside the checkout: the command, pages, bodies and one sample session."""
 
+import hashlib
 import os
 import re
 import subprocess
@@ -36,15 +37,24 @@ def environment(installed: Path, workspace: Path) -> dict[str, str]:
 
 def test_bodies_travel(installed: Path, tmp_path: Path) -> None:
     code = "import studio, studio.cli.main as m; print(studio.__file__); m.main(['bodies'])"
-    told = subprocess.run(
+    listed = subprocess.run(
         [sys.executable, "-c", code],
         cwd=tmp_path,
         env=environment(installed, tmp_path),
         capture_output=True,
         text=True,
     )
-    assert str(installed) in told.stdout
-    assert "human31" in told.stdout
+    assert str(installed) in listed.stdout
+    assert "human31" in listed.stdout
+
+
+def test_the_network_travels_with_its_licence(installed: Path) -> None:
+    models = installed / "studio" / "evidence" / "models"
+    readme = (models / "README.md").read_text()
+    for network in models.glob("*.tflite"):
+        assert hashlib.sha256(network.read_bytes()).hexdigest() in readme
+        assert (models / f"{network.stem}-LICENSE").is_file()
+        assert f"{network.stem}-LICENSE" in readme
 
 
 def test_the_demo_serves_pages_and_sample(installed: Path, tmp_path: Path) -> None:

@@ -1,6 +1,5 @@
 """Every verb is declared once: Python, command line and HTTP take the same entries with the same defaults and help."""
 
-import importlib
 import inspect
 from typing import Any
 
@@ -9,10 +8,10 @@ import pytest
 from fastapi import FastAPI
 
 import studio
-from studio.cli.main import COMMANDS
+from studio.cli.main import load
 from studio.declaring import REQUIRED, Knobs, Operation, Parameter, declared
-from studio.web import app, guide_routes
-from studio.web.requests import MADE
+from studio.server import app, guide_routes
+from studio.server.requests import MADE
 
 NAMED = {
     "import_footage": "import",
@@ -33,8 +32,10 @@ OWN_WORDS = {
     "track": {"first", "last"},
     "background": {"source", "plates", "exclude", "exclude_unused"},
     "compare": {"trackers", "first", "last", "changes"},
+    "sweep": {"vary", "first", "last"},
+    "view": {"layer"},
 }
-"""Parameters that the terminal writes in another way: --frames A:B, --exclude CAMERA=…"""
+"""Parameters that the terminal writes in another way: --frames A:B, --exclude CAMERA=…, layers counted from 1."""
 VERBS = {
     name: declared(getattr(studio, name))
     for name in dir(studio)
@@ -43,8 +44,7 @@ VERBS = {
 
 
 def command_of(verb: str) -> click.Command:
-    module, name, _ = COMMANDS[NAMED.get(verb, verb.replace("_", "-"))]
-    return getattr(importlib.import_module(f"studio.cli.{module}"), name)
+    return load(NAMED.get(verb, verb.replace("_", "-")))
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +59,7 @@ def schemas() -> dict[str, Any]:
 def test_every_entry_has_a_help_and_every_verb_says_what_it_does(verb: str) -> None:
     assert VERBS[verb].about
     for entry in VERBS[verb].parameters.values():
-        assert entry.whose or entry.any_name or entry.help, f"{verb}: {entry.name}"
+        assert entry.target or entry.any_name or entry.help, f"{verb}: {entry.name}"
 
 
 @pytest.mark.parametrize("verb", [name for name in VERBS if name not in OF_ANOTHER])
@@ -70,8 +70,8 @@ def test_the_command_line_takes_what_python_takes(verb: str) -> None:
     for entry in VERBS[verb].parameters.values():
         if entry.terminal.left_out or entry.name in OWN_WORDS.get(verb, ()):
             continue
-        if entry.whose:
-            assert set(options) >= {"session", "run"} if entry.whose == "run" else {"session"}
+        if entry.target:
+            assert set(options) >= {"session", "run"} if entry.target == "run" else {"session"}
         elif knobs := entry.mark(Knobs):
             assert {one.name for one in knobs.listed()} <= set(options)
             assert ("changes" in options) == knobs.others
@@ -110,6 +110,8 @@ def test_no_body_names_a_file_of_this_machine(schemas: dict[str, Any]) -> None:
     free = {
         ("calibrate", "board"),
         ("new_session", "title"),
+        ("edit_body", "title"),
+        ("edit_body", "text"),
         ("new_run", "start_source"),
         *((verb, name) for verb in ("import_footage", "add_footage") for name in ("calibration", "trial")),
     }
@@ -142,7 +144,7 @@ def test_the_signature_that_an_editor_shows_is_the_declaration() -> None:
 
 
 def test_the_guide_lists_every_verb_with_its_entries() -> None:
-    page = guide_routes.verbs_page()
+    page = guide_routes.verbs_page()["content"]
     for name, verb in VERBS.items():
         assert f'id="{name}"' in page
         for entry in verb.parameters:

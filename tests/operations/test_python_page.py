@@ -40,9 +40,9 @@ def test_the_page_runs_from_top_to_bottom(
     assert studio.list_tracks("walk/first") == ("raw", "refined", "smoothed")
     assert [entry.name for entry in studio.list_runs("walk")] == ["first", "fixed"]
     assert len(read_bvh_file(tmp_path / "walk.bvh").turns) == 8
-    told = capsys.readouterr().out
-    assert "There is no session 'run'" in told
-    assert "Traceback" not in told
+    printed = capsys.readouterr().out
+    assert "There is no session 'run'" in printed
+    assert "Traceback" not in printed
 
 
 def test_the_page_names_every_verb() -> None:

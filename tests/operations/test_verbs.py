@@ -11,7 +11,7 @@ from toy_session import BODY, HEIGHT, WIDTH, true_poses
 
 import studio
 from studio.body.catalogue import load_body
-from studio.operations.progress import reporting as told
+from studio.operations.progress import reporting as shown_in
 from studio.sessions.session import Session
 
 FEW = {"particles": 20, "layers": 2}
@@ -162,7 +162,7 @@ def test_nobody_looks_at_a_bar_in_a_log_and_a_bar_can_be_asked_for(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     for wish, shown in ((None, False), (False, False), (True, True)):
-        with told(wish, "Rendering") as report:
+        with shown_in(wish, "Rendering") as report:
             report("frames", 1, 2)
         assert ("frames" in capsys.readouterr().err) == shown
 

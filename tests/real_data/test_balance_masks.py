@@ -9,7 +9,7 @@ from studio.runs.background_setup import set_up_background
 from studio.runs.mask_quality import USABLE, mask_quality
 from studio.runs.session_settings import session_settings
 from studio.sessions.background_files import set_backgrounds
-from studio.sessions.importers.importing import import_source
+from studio.sessions.importers.importing import ImportOptions, import_source
 from studio.sessions.session import Session
 
 FRAMES = (0, 30, 60, 99)
@@ -22,7 +22,7 @@ def test_masks_agree_in_all_four_views(real_data: Path, tmp_path: Path) -> None:
     first, as the guided way says: one of them was touched, which the masks cannot help.
     """
     folder = real_data / "pose2sim-balance"
-    session = import_source(folder, tmp_path / "balance", copy=False).session
+    session = import_source(folder, tmp_path / "balance", ImportOptions(copy=False)).session
     plates = {
         source.name: folder / "calibration" / "extrinsics" / f"{source.name.replace('_', '')}_ext.png"
         for source in session.manifest.footage.cameras

@@ -39,7 +39,7 @@ BEFORE_HIM = ("cam_01", "cam_02")
 
 
 @dataclass(frozen=True)
-class Way:
+class Workflow:
     """What the steps gave."""
 
     session: Session
@@ -50,7 +50,7 @@ class Way:
 
 
 @pytest.fixture(scope="module")
-def way(real_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Way:
+def way(real_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Workflow:
     folder = real_data / "pose2sim-balance"
     session = studio.import_footage(folder, tmp_path_factory.mktemp("way") / "balance", copy=False)
     plates = {
@@ -73,12 +73,12 @@ def way(real_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Way:
     studio.refine(run)
     studio.smooth(run)
     check = check_run(session, run, "smoothed")
-    way = Way(session, aligned, masks, run, check)
+    way = Workflow(session, aligned, masks, run, check)
     keep_overlays(way)
     return way
 
 
-def keep_overlays(way: Way) -> None:
+def keep_overlays(way: Workflow) -> None:
     """Every tenth frame, the four views side by side, with masks and outlines."""
     place = Path(os.environ.get("STUDIO_ARTEFACTS", ROOT / "artefacts")) / "balance"
     place.mkdir(parents=True, exist_ok=True)
@@ -96,7 +96,7 @@ def keep_overlays(way: Way) -> None:
         composer.close()
 
 
-def test_cameras_agree_after_alignment(way: Way) -> None:
+def test_cameras_agree_after_alignment(way: Workflow) -> None:
     """The published calibration misses by 14 px in a camera; turned by less than a degree, by no more than two."""
     print(way.aligned.before, way.aligned.after, way.aligned.turns)
     assert way.aligned.changed
@@ -105,12 +105,12 @@ def test_cameras_agree_after_alignment(way: Way) -> None:
     assert max(way.aligned.turns.values()) < 1.0
 
 
-def test_masks_are_usable_in_all_views(way: Way) -> None:
+def test_masks_are_usable_in_all_views(way: Workflow) -> None:
     print([(view.camera, round(view.agreement, 3)) for view in way.masks.views])
     assert all(view.agreement >= 0.9 for view in way.masks.views)
 
 
-def test_the_model_lies_in_the_masks(way: Way) -> None:
+def test_the_model_lies_in_the_masks(way: Workflow) -> None:
     """At least 85 % of the model's pixels, in every tenth frame, in each view."""
     shares = np.array(way.check.inside, dtype=np.float64)
     print(np.round(shares, 3))
@@ -118,7 +118,7 @@ def test_the_model_lies_in_the_masks(way: Way) -> None:
     assert float(shares.min()) >= 0.85
 
 
-def test_left_and_right_are_not_swapped(way: Way) -> None:
+def test_left_and_right_are_not_swapped(way: Workflow) -> None:
     """Cameras 1 and 2 see his face, 3 and 4 his back, all the time: his left is on the right of the first two."""
     track, body = studio.read_track(way.run, "smoothed"), way.run.body()
     names = [marker.name for marker in body.markers]
@@ -134,7 +134,7 @@ def test_left_and_right_are_not_swapped(way: Way) -> None:
     assert not way.check.lost
 
 
-def test_markers_move_smoothly(way: Way) -> None:
+def test_markers_move_smoothly(way: Workflow) -> None:
     """Second difference at 60 Hz: 5 mm at most, root mean square."""
     print(way.check.jitter_mm)
     assert way.run.record.fps == 60.0
@@ -142,7 +142,7 @@ def test_markers_move_smoothly(way: Way) -> None:
 
 
 @pytest.mark.filterwarnings("ignore:No analog data found")
-def test_exports_open_in_other_readers(way: Way, tmp_path: Path) -> None:
+def test_exports_open_in_other_readers(way: Workflow, tmp_path: Path) -> None:
     made = {
         ending: studio.export_run(way.run, tmp_path / f"man.{ending}", track="smoothed")
         for ending in ("bvh", "trc", "c3d", "glb")

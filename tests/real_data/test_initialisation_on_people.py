@@ -13,6 +13,8 @@ from studio.body.person import PersonMotion
 from studio.body.retargeting import on_skeleton
 from studio.capture.calibration_files import read_calibration
 from studio.evidence.frame_evidence import FrameEvidence
+from studio.likelihood.outlines import OutlineProjector
+from studio.likelihood.silhouette_areas import Silhouettes
 from studio.motion_files.reading import read_recording
 from studio.motion_files.trc import read_trc
 from studio.runs.initialising import WEIGHTING, initialise
@@ -23,8 +25,6 @@ from studio.settings import default_settings
 from studio.synthesis.person import with_hands_and_feet
 from studio.synthesis.recipe_file import Recipe, find_recipe, read_recipe
 from studio.synthesis.recipes import recipe_motion, recipe_person
-from studio.weighting.outlines import OutlineProjector
-from studio.weighting.silhouette_areas import Silhouettes
 
 pytestmark = pytest.mark.real_data
 

@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.footage_cache import FootageCache
 from studio.comparison.statistics import sign_test
 from studio.comparison.tracked import Attempt, Tracked, track
 from studio.reproduction.fleischmann import EQ13, EVALUATIONS, FILTER_3, SWARM, SWARM_3, TWIN, TWIN_20
-from studio.reproduction.tracking import Contender
+from studio.reproduction.tracking import Candidate
 from studio.settings import DEFAULT_WEIGHTING
 from studio.synthesis.recipes import synthesize
-from studio.tracking.catalogue import knobs_for_evaluations
+from studio.trackers.catalogue import knobs_for_evaluations
 
 pytestmark = [pytest.mark.slow, pytest.mark.real_data]
 
@@ -37,13 +37,13 @@ def footage(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureReq
     return folder
 
 
-def runs(footage: Path, contender: Contender, name: str = TWIN) -> list[Tracked]:
+def runs(footage: Path, contender: Candidate, name: str = TWIN) -> list[Tracked]:
     """A contender on the whole footage, every seed."""
-    shelf = FootageShelf(footage)
+    cache = FootageCache(footage)
     try:
-        return [track(contender.attempt(name, seed, EVALUATIONS), shelf) for seed in SEEDS]
+        return [track(contender.attempt(name, seed, EVALUATIONS), cache) for seed in SEEDS]
     finally:
-        shelf.close()
+        cache.close()
 
 
 def mean(found: list[Tracked]) -> float:
@@ -93,10 +93,10 @@ def test_soft_partitions_beat_hard_ones_and_at_20_frames_a_second_global_search(
 
 @pytest.mark.parametrize("tracker", ["swarm", "annealed"])
 def test_the_bundled_walk_with_defaults_and_1000_evaluations(tracker: str) -> None:
-    shelf = FootageShelf(SAMPLES)
+    cache = FootageCache(SAMPLES)
     changes = knobs_for_evaluations(tracker, EVALUATIONS)
     try:
-        found = [track(Attempt("walk", tracker, DEFAULT_WEIGHTING, seed, changes), shelf) for seed in SEEDS]
+        found = [track(Attempt("walk", tracker, DEFAULT_WEIGHTING, seed, changes), cache) for seed in SEEDS]
     finally:
-        shelf.close()
+        cache.close()
     assert mean(found) <= 40.0

@@ -1,6 +1,7 @@
 """Figures of Deutscher & Reid: measured on a few frames of the bundled walk, concluded from made-up outcomes."""
 
 import json
+import math
 from dataclasses import asdict
 from pathlib import Path
 
@@ -8,14 +9,14 @@ import numpy as np
 import pytest
 
 from studio.body.forward_kinematics import marker_points
-from studio.comparison.findings import VERDICTS, Findings
-from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.findings import VERDICTS, Findings, Number
+from studio.comparison.footage_cache import FootageCache
 from studio.comparison.kept_trials import plain
 from studio.comparison.tracked import Tracked
 from studio.comparison.trials import Outcome, Scale, Trial
 from studio.motion_files.trc import read_trc
 from studio.reproduction.catalogue import EXPERIMENTS
-from studio.reproduction.claims import share
+from studio.reproduction.claims import HIGHER, LOWER, beyond, share
 from studio.reproduction.deutscher_reid import (
     layers_of_a_body,
     localisation,
@@ -29,6 +30,7 @@ from studio.reproduction.deutscher_reid.tracked_people import (
     CONDENSATION,
     LARGE,
     ONE_LAYER,
+    THAT_TRACK,
     longest_loss,
     terminal_failure,
 )
@@ -48,9 +50,9 @@ FEW = {"layers": 3, "particles": 20}
 
 
 @pytest.fixture(scope="module")
-def shelf():
+def cache():
     """The bundled sessions."""
-    found = FootageShelf(SAMPLES)
+    found = FootageCache(SAMPLES)
     yield found
     found.close()
 
@@ -106,15 +108,37 @@ def test_success_is_every_frame_and_every_limb() -> None:
     assert not succeeded(run(30.0, lost=(7,)))
 
 
-def test_a_minority_of_the_seeds_reproduces_nothing() -> None:
+def test_a_statement_holds_in_significantly_more_than_half_of_the_seeds() -> None:
     assert share("all", [True] * 10).verdict == "reproduced"
     assert share("most", [True] * 9 + [False]).verdict == "reproduced"
-    # Three of ten: the interval reaches to 0.6. One of three: it reaches to 1.
-    assert share("few", [True] * 3 + [False] * 7).verdict == "not reproduced"
-    assert share("one", [True, False, False]).verdict == "not reproduced"
+    assert share("some", [True] * 8 + [False] * 2).verdict == "undecided"
+    assert share("few", [True] * 3 + [False] * 7).verdict == "undecided"
+    assert share("hardly any", [True] + [False] * 9).verdict == "not reproduced"
+    assert share("of five", [True] * 5).verdict == "reproduced"
+    # Four or fewer show nothing, whatever they say.
+    assert share("of four", [True] * 4).verdict == "undecided"
     assert share("fails", [False] * 9 + [True], 0.0).verdict == "reproduced"
     assert share("fails", [True] * 9 + [False], 0.0).verdict == "not reproduced"
     assert share("no claim", [True, False], None).verdict == "answered"
+    assert share("none", []).seeds == 0
+    exact = share("all", [True] * 10)
+    assert (exact.ours, exact.high) == (1.0, 1.0)
+    assert exact.low == pytest.approx(0.025 ** (1 / 10))
+
+
+def test_a_claim_of_more_or_less_is_shown_denied_or_undecided() -> None:
+    def found(low: float, high: float) -> Number:
+        return Number("n", (low + high) / 2.0, low, high, seeds=10)
+
+    assert beyond(found(0.5, 0.9), 1.0, LOWER).verdict == "reproduced"
+    assert beyond(found(0.5, 1.1), 1.0, LOWER).verdict == "undecided"
+    # Equal within the margin, or larger.
+    assert beyond(found(0.95, 1.05), 1.0, LOWER).verdict == "not reproduced"
+    assert beyond(found(1.2, 1.5), 1.0, LOWER).verdict == "not reproduced"
+    assert beyond(found(2.1, 3.0), 2.0, HIGHER).verdict == "reproduced"
+    assert beyond(found(1.0, 3.0), 2.0, HIGHER).verdict == "undecided"
+    assert beyond(found(1.0, 2.1), 2.0, HIGHER).verdict == "not reproduced"
+    assert beyond(found(math.nan, math.nan), 2.0, HIGHER).verdict == "not reproduced"
 
 
 @pytest.mark.parametrize("name", THREE_CAMERAS)
@@ -144,9 +168,19 @@ def test_fig_8_is_reproduced_where_condensation_fails_and_ten_layers_track() -> 
         return run(30.0, last_error=200.0) if group in failing else run(30.0)
 
     found = concluded("deutscher-fig-8", as_in_the_paper)
-    assert found.verdict == "reproduced"
     seconds = [entry for entry in found.numbers if "terminal failure" in entry.name]
     assert [entry.ours for entry in seconds] == [pytest.approx(0.5)] * 2
+    assert {entry.verdict for entry in found.numbers if THAT_TRACK in entry.name} == {
+        "reproduced",
+        "answered",
+    }
+    # It fails, but not after the paper's 1.2 s: the hardest claim decides.
+    assert found.verdict == "not reproduced"
+
+    def after(group: str, seed: int) -> Tracked:
+        return run(30.0, last_error=200.0, frames=144) if group in failing else run(30.0)
+
+    assert concluded("deutscher-fig-8", after).verdict == "reproduced"
     assert concluded("deutscher-fig-8", lambda group, seed: run(30.0)).verdict == "not reproduced"
     assert concluded("deutscher-fig-8", lambda group, seed: run(200.0)).verdict == "not reproduced"
 
@@ -172,19 +206,19 @@ def test_200_particles_are_judged_with_eq_13() -> None:
     assert too_few.verdict == "not reproduced"
 
 
-def test_the_fewest_particles_of_a_body_are_searched_on_footage(shelf) -> None:
+def test_the_fewest_particles_of_a_body_are_searched_on_footage(cache) -> None:
     trial = particles_needed.body_trials(Scale((1,), quick=True), {"Eq. 13": {"survival": 0.5, "layers": 2}})[
         0
     ]
     arguments = {**json.loads(json.dumps(trial.arguments)), "footage": "walk", "last": 8, "sizes": [1, 60]}
-    found = json.loads(json.dumps(particles_needed.measure_body(arguments, shelf)))
-    assert found == particles_needed.measure_body(arguments, shelf)
+    found = json.loads(json.dumps(particles_needed.measure_body(arguments, cache)))
+    assert found == particles_needed.measure_body(arguments, cache)
     assert Fewest(**found).particles in (1, 60, 3600)
     assert {row[0] for row in found["tried"]} <= {1, 60}
 
 
-def test_true_poses_lie_on_the_true_markers(shelf) -> None:
-    session = shelf.session("walk")
+def test_true_poses_lie_on_the_true_markers(cache) -> None:
+    session = cache.session("walk")
     body = session.body()
     frames = [0, 7, 100]
     poses = true_poses(session, body, frames)
@@ -196,26 +230,26 @@ def test_true_poses_lie_on_the_true_markers(shelf) -> None:
     assert distances.mean() < 15.0
 
 
-def test_fig_3_measures_clouds_that_draw_together(shelf) -> None:
+def test_fig_3_measures_clouds_that_draw_together(cache) -> None:
     trial = layers_of_a_body.trials_fig_3(Scale((0,), quick=True))[0]
     arguments = on_the_walk(trial)
     arguments["changes"] |= {"layers": 10, "particles": 60}
-    measured = plain(layers_of_a_body.measure_fig_3(arguments, shelf))
+    measured = plain(layers_of_a_body.measure_fig_3(arguments, cache))
     assert len(measured["spreads"]) == 10
     assert measured["spreads"][-1] < 0.7 * measured["spreads"][0]
     assert 0.0 <= measured["covered"] <= 1.0
     found = layers_of_a_body.FIG_3.conclude([Outcome(trial, measured)])
     assert len(found.charts[0].series) == len(layers_of_a_body.DRAWN_LAYERS)
     never = {**measured, "covered": 0.0}
-    assert layers_of_a_body.FIG_3.conclude([Outcome(trial, never)]).verdict == "not reproduced"
+    assert layers_of_a_body.FIG_3.conclude([Outcome(trial, never)] * 5).verdict == "not reproduced"
     growing = {**measured, "covered": 1.0, "spreads": measured["spreads"][::-1]}
-    assert layers_of_a_body.FIG_3.conclude([Outcome(trial, growing)]).verdict == "not reproduced"
+    assert layers_of_a_body.FIG_3.conclude([Outcome(trial, growing)] * 5).verdict == "not reproduced"
     falling = {**measured, "covered": 1.0, "spreads": sorted(measured["spreads"], reverse=True)}
-    assert layers_of_a_body.FIG_3.conclude([Outcome(trial, falling)]).verdict == "reproduced"
+    assert layers_of_a_body.FIG_3.conclude([Outcome(trial, falling)] * 5).verdict == "reproduced"
 
 
-def test_the_pelvis_is_where_its_marker_is(shelf) -> None:
-    session = shelf.session("walk")
+def test_the_pelvis_is_where_its_marker_is(cache) -> None:
+    session = cache.session("walk")
     frames = [0, 9, 60]
     places = layers_of_a_body.true_places(session, frames)
     body = session.body()
@@ -232,9 +266,9 @@ def test_a_cloud_covers_points_within_three_deviations() -> None:
     assert not layers_of_a_body.covers(cloud, np.array([0.0, 5.0]))
 
 
-def test_fig_7_measures_a_weight_that_is_largest_near_the_true_knee(shelf) -> None:
+def test_fig_7_measures_a_weight_that_is_largest_near_the_true_knee(cache) -> None:
     trial = weight_of_a_knee.trials(Scale((0,), quick=True))[0]
-    measured = plain(weight_of_a_knee.measure({**trial.arguments, "footage": "walk", "frame": 5}, shelf))
+    measured = plain(weight_of_a_knee.measure({**trial.arguments, "footage": "walk", "frame": 5}, cache))
     angles = np.array(measured["angles"])
     assert set(measured["log_weights"]) == {"edges", "region", "both"}
     logs = {name: np.array(values) for name, values in measured["log_weights"].items()}
@@ -286,16 +320,16 @@ def test_fig_16_requires_a_gain_on_branches_and_no_harm_on_a_chain() -> None:
 def test_fig_16_measures_every_share(tmp_path) -> None:
     trial = localisation.trials_fig_16(Scale((0,), quick=True))[-1]
     arguments = json.loads(json.dumps({**trial.arguments, "pictures": [3], "shares": [0.0, 1.0]}))
-    found = localisation.measure_fig_16(arguments, FootageShelf(tmp_path))["ssd"]
+    found = localisation.measure_fig_16(arguments, FootageCache(tmp_path))["ssd"]
     assert len(found) == 2
     assert all(0.0 < value < 0.1 for value in found)
 
 
-def test_figs_19_and_20_follow_the_tree(shelf) -> None:
+def test_figs_19_and_20_follow_the_tree(cache) -> None:
     trial = layers_of_a_body.trials(Scale((0,), quick=True))[0]
     arguments = on_the_walk(trial)
     arguments["changes"] |= {"layers": 5, "particles": 40}
-    measured = plain(layers_of_a_body.measure(arguments, shelf))
+    measured = plain(layers_of_a_body.measure(arguments, cache))
     assert np.array(measured["shares"]).shape == (5, 31)
     assert measured["shares"][0] == pytest.approx([1.0] * 31)
     assert len(measured["scatter"]) == 5
@@ -305,29 +339,29 @@ def test_figs_19_and_20_follow_the_tree(shelf) -> None:
         shares = np.ones((5, 31))
         shares[1:] = np.array(order)[rank] + 0.01 * np.arange(31) / 31
         outcome = Outcome(trial, {**measured, "shares": shares.tolist()})
-        assert layers_of_a_body.FIG_19.conclude([outcome] * 3).verdict == verdict
+        assert layers_of_a_body.FIG_19.conclude([outcome] * 5).verdict == verdict
     # hips, shoulders, knees, elbows, ankles, wrists
     for ends, verdict in (([1, 1, 2, 2, 3, 3], "reproduced"), ([1, 1, 3, 3, 2, 2], "not reproduced")):
         scatter = [[10.0] * 6] + [[float(value) for value in ends]] * 4
         outcome = Outcome(trial, {**measured, "scatter": scatter})
-        assert layers_of_a_body.FIG_20.conclude([outcome] * 3).verdict == verdict
+        assert layers_of_a_body.FIG_20.conclude([outcome] * 5).verdict == verdict
 
 
-def test_processors_are_compared_in_turn(shelf) -> None:
+def test_processors_are_compared_in_turn(cache) -> None:
     trial = processors.trials(Scale((0,), quick=True))[0]
-    measured = plain(processors.measure({**trial.arguments, "footage": "walk", "rounds": 1}, shelf))
+    measured = plain(processors.measure({**trial.arguments, "footage": "walk", "rounds": 1}, cache))
     assert measured["threads"][0] == 1
     assert len(measured["frame"]) == len(measured["weighing"]) == len(measured["threads"])
     assert min(measured["frame"]) > min(measured["weighing"]) > 0.0
 
-    def made(each: float) -> Findings:
+    def made(each: float, frame: float = 0.8) -> Findings:
         return processors.EXPERIMENT.conclude(
             [
                 Outcome(
                     trial,
                     {
                         "threads": [1, 2],
-                        "frame": [100.0, 90.0],
+                        "frame": [100.0, 50.0 / frame * (0.99 + 0.01 * k)],
                         "weighing": [10.0, 5.0 / each * (0.99 + 0.01 * k)],
                     },
                 )
@@ -336,15 +370,17 @@ def test_processors_are_compared_in_turn(shelf) -> None:
         )
 
     assert made(0.8).verdict == "reproduced"
-    assert made(0.95).verdict == "better"
+    assert made(0.95, 0.95).verdict == "better"
     assert made(0.6).verdict == "not reproduced"
+    # The claim is on the processing time: whole frames count, too.
+    assert made(0.95, 0.55).verdict == "not reproduced"
     one = [Outcome(trial, {"threads": [1], "frame": [9.0], "weighing": [1.0]})]
     assert processors.EXPERIMENT.conclude(one).verdict == "answered"
 
 
 @pytest.mark.slow
 def test_the_arms_figures_hold_over_ten_seeds(tmp_path) -> None:
-    shelf = FootageShelf(tmp_path)
+    cache = FootageCache(tmp_path)
     for name in (
         "deutscher-fig-12",
         "deutscher-fig-13",
@@ -354,7 +390,7 @@ def test_the_arms_figures_hold_over_ten_seeds(tmp_path) -> None:
     ):
         experiment = EXPERIMENTS[name]
         outcomes = [
-            Outcome(trial, plain(experiment.measure(trial.arguments, shelf)))
+            Outcome(trial, plain(experiment.measure(trial.arguments, cache)))
             for trial in experiment.trials(SEEDS)
         ]
         assert experiment.conclude(outcomes).verdict == "reproduced", name

@@ -2,9 +2,11 @@
 
 import base64
 import csv
+import dataclasses
 import json
 import math
 import re
+import subprocess
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -24,8 +26,10 @@ from studio.reproduction.findings_files import (
     write_findings,
     write_overview,
 )
+from studio.reproduction.provenance import CHANGED, commit
 from studio.reproduction.report_document import report_html
 
+ROOT = Path(__file__).resolve().parents[2]
 SOFTWARE, DATE = "0.1.0+12345678", "2025-01-02T03:04:05+00:00"
 
 
@@ -71,13 +75,16 @@ def test_the_report_is_self_contained(document: dict) -> None:
     assert page.addresses == []
     assert json.loads(page.scripts["application/json"][0]) == results
     assert "<b>1</b>" not in text
-    named = re.findall(r'(?:from |url\()"([^"]{0,40})', text)
-    assert len(named) == 3
-    assert all(address.startswith("data:") for address in named)
-    modules = re.findall(r'from "data:text/javascript;base64,([^"]+)"', "".join(page.scripts["module"]))
-    inner = [base64.b64decode(module).decode() for module in modules]
-    assert "drawFindings" in inner[1]
-    assert not re.search(r'from "\./', inner[1])
+    named = re.findall(r'url\("([^"]{0,40})', text)
+    assert len(named) == 1
+    assert named[0].startswith("data:")
+    modules = json.loads(page.scripts["importmap"][0])["imports"]
+    assert {"vendor/echarts.esm.min.js", "js/findings.js", "js/findings_charts.js"} <= set(modules)
+    inner = {name: base64.b64decode(address.partition(",")[2]).decode() for name, address in modules.items()}
+    assert "drawFindings" in inner["js/findings.js"]
+    for source in inner.values():
+        assert set(re.findall(r'^import [^"]*"([^"]+)"', source, re.MULTILINE)) <= set(modules)
+    assert set(re.findall(r'from "([^"]+)"', page.scripts["module"][0])) <= set(modules)
     assert "--verdict" in text
     assert "--series-0" in text
 
@@ -137,6 +144,33 @@ def test_documents_are_json_for_any_measurement(tmp_path: Path) -> None:
     assert written["charts"][0]["series"][0]["y"] == [None, None]
     assert written["settings"] == {"s": [1, None]}
     assert (written["numbers"][0]["ours"], written["numbers"][0]["high"]) == (None, None)
+
+
+def test_a_summary_cites_the_commits_that_measured(tmp_path: Path) -> None:
+    """Numbers can be traced to code: the commit of each outcome stands in the summary, and it is one that exists."""
+    made = dataclasses.replace(making(), commits=("0123456789ab",))
+    document = as_document(toy("toy", tmp_path), Findings("answered", ""), made)
+    assert "12 seeds, commit 0123456789ab |" in summary_markdown(
+        {"software": SOFTWARE, "date": DATE, "experiments": [document]}
+    )
+    cited = commit().removesuffix(CHANGED)
+    if cited:
+        assert commit_exists(cited)
+
+
+def test_the_guides_page_cites_commits_that_exist() -> None:
+    """Every commit on the page is in this repository's history; rows without one are older than commits are kept."""
+    page = (ROOT / "web_assets" / "guide" / "reproduction.md").read_text(encoding="utf-8")
+    if not commit():
+        pytest.skip("No checkout: commits cannot be looked up.")
+    missing = [name for name in re.findall(r"commit ([0-9a-f]{7,40})", page) if not commit_exists(name)]
+    assert missing == []
+
+
+def commit_exists(name: str) -> bool:
+    """Whether this repository has a commit."""
+    asked = ["git", "-C", str(ROOT), "cat-file", "-e", f"{name}^{{commit}}"]
+    return subprocess.run(asked, check=False, capture_output=True).returncode == 0
 
 
 def test_verdicts_state_their_basis(tmp_path: Path) -> None:

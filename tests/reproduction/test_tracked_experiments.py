@@ -24,12 +24,15 @@ TRACKED = (
     "fleischmann-partitions",
     "fleischmann-constraints",
     "fleischmann-best-figure",
+    "deutscher-carried",
+    "deutscher-crossover-share",
     "robustness-mask-damage",
     "robustness-background-clutter",
     "robustness-calibration-error",
     "robustness-fewer-cameras",
     "robustness-fewer-frames",
     "generalisation",
+    "evaluations",
 )
 SCALE = Scale(seeds=(0, 1, 2))
 

@@ -1,5 +1,6 @@
 """Backgrounds of a session: files, exclusions, knobs that new runs begin with, plates cleaned by the other views."""
 
+import json
 from pathlib import Path
 
 import cv2
@@ -22,8 +23,9 @@ from studio.sessions.background_files import (
     read_evidence,
     set_backgrounds,
     set_exclusion,
+    write_evidence,
 )
-from studio.sessions.importers.importing import import_source
+from studio.sessions.importers.importing import ImportOptions, import_source
 from studio.sessions.session import Session
 from studio.synthesis.cameras import placed_camera
 
@@ -68,7 +70,7 @@ def post(camera: Camera, frame: int) -> tuple[int, int, int]:
 @pytest.fixture
 def session(source: Path, tmp_path: Path) -> Session:
     """The post as a session."""
-    return import_source(source, tmp_path / "post", fps=30.0).session
+    return import_source(source, tmp_path / "post", ImportOptions(fps=30.0)).session
 
 
 def plates(folder: Path, change: bool) -> dict[str, Path]:
@@ -141,11 +143,27 @@ def test_a_run_begins_with_the_sessions_knobs(session: Session) -> None:
     assert other.record.settings["mask_threshold"] == 5.0
 
 
+def test_how_masks_are_made_is_read_from_older_files(session: Session) -> None:
+    """Version 1 knew no masks of the studio's own."""
+    path = session.path / "evidence.json"
+    path.write_text(
+        '{"schema": 1, "knobs": {"mask_threshold": 5.0}, "given": {"cam0": "background/cam0.png"}}'
+    )
+    found = read_evidence(session)
+    assert (found.knobs, found.given, found.given_masks) == (
+        {"mask_threshold": 5.0},
+        {"cam0": "background/cam0.png"},
+        {},
+    )
+    write_evidence(session, found)
+    assert json.loads(path.read_text())["schema"] == 2
+
+
 def test_sources_that_are_not_there_are_refused(session: Session) -> None:
     with pytest.raises(FootageError, match="no plate"):
         set_up_background(session, "plate")
     with pytest.raises(FootageError, match="no background source"):
-        set_up_background(session, "guess")
+        set_up_background(session, "guess")  # pyright: ignore[reportArgumentType]
     with pytest.raises(SettingsError):
         set_up_background(session, "median", knobs={"mask_threshold": -1.0})
     assert read_evidence(session).knobs == {}

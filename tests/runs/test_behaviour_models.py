@@ -13,7 +13,7 @@ from tracked_runs import opened, poses_of
 from studio.behaviour.model_file import read_model, write_model
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
-from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.footage_cache import FootageCache
 from studio.comparison.tracked import Attempt, track
 from studio.errors import BehaviourError, NotFoundError, SettingsError, StudioError
 from studio.motion_files.trc import MarkerMotion, write_trc
@@ -28,7 +28,7 @@ from studio.sessions.run_record import BEHAVIOUR_NAME
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.settings import changed_settings, default_settings
-from studio.tracking.guided_particles import STATES
+from studio.trackers.guided_particles import STATES
 
 GUIDED = {
     "behaviour": {"particles": 60},
@@ -177,7 +177,7 @@ LEARNING = {"online_learning": True, "learning_interval": 10}
 @pytest.fixture
 def long_session(models: Path, monkeypatch: pytest.MonkeyPatch) -> Session:
     """A session of two lessons, in which short stretches count."""
-    monkeypatch.setattr("studio.tracking.online_learning.SHORTEST_S", 0.03)
+    monkeypatch.setattr("studio.trackers.online_learning.SHORTEST_S", 0.03)
     return make_session(models.parent.parent / "long", 24)
 
 
@@ -235,11 +235,11 @@ def test_experiments_track_with_a_model(long_session: Session) -> None:
     attempt = Attempt(
         str(long_session.path), "behaviour", "edge-region", 4, {**changes, "refine_frames": True}
     )
-    shelf = FootageShelf(long_session.path.parent)
+    cache = FootageCache(long_session.path.parent)
     with pytest.raises(SettingsError, match="no behaviour model"):
-        track(attempt, shelf)
-    found = track(dataclasses.replace(attempt, behaviour="swings"), shelf)
-    shelf.close()
+        track(attempt, cache)
+    found = track(dataclasses.replace(attempt, behaviour="swings"), cache)
+    cache.close()
     run = made(long_session, "behaviour", **LEARNING)
     poses = tracked(long_session, run)
     own = marker_points(body, poses)

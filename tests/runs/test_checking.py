@@ -11,13 +11,13 @@ from studio.runs.checking import check_run, kept_check, sudden_turns
 from studio.runs.new_run import prepare_run
 from studio.runs.refining import SMOOTHED
 from studio.runs.tracks import Track, best_track, write_track
-from studio.runs.way import way_of
-from studio.runs.way_results import check_step
+from studio.runs.workflow import workflow_of
+from studio.runs.workflow_results import check_step
 
 
 def step(session, name):
     """A step's status."""
-    return next(one for one in way_of(session).steps if one.step == name)
+    return next(one for one in workflow_of(session).steps if one.step == name)
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from studio.runs.new_run import prepare_run
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.tracking.tracker import LOST, TRACKED
+from studio.trackers.tracker import LOST, TRACKED
 
 QUICK = {"particles": 60, "layers": 4, "start_repeats": 2}
 QUICK_FIRST_LAYERS = 2

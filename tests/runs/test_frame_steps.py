@@ -6,7 +6,7 @@ import pytest
 from studio.body.catalogue import load_body
 from studio.runs.frame_steps import LONGEST_SECONDS, carried_over, space_over, steps_between
 from studio.runs.search_space import default_sigma, search_space
-from studio.tracking.tracker import Carried
+from studio.trackers.tracker import FilterState
 
 
 def test_steps_are_the_frames_that_passed_up_to_a_quarter_second() -> None:
@@ -30,7 +30,7 @@ def test_noise_over_three_frames_is_that_of_footage_at_a_third_of_the_rate() -> 
 def test_the_last_movement_goes_on_at_its_own_speed(steps: int, before: int) -> None:
     speed = np.array([1.0, -2.0])
     last = np.array([10.0, 20.0])
-    carried = Carried(None, last, last - before * speed)
+    carried = FilterState(None, last, last - before * speed)
     onwards = carried_over(carried, steps, before)
     assert onwards.estimate is not None
     assert onwards.previous_estimate is not None
@@ -38,5 +38,5 @@ def test_the_last_movement_goes_on_at_its_own_speed(steps: int, before: int) -> 
 
 
 def test_without_a_movement_nothing_is_stretched() -> None:
-    carried = Carried(None, np.zeros(2))
+    carried = FilterState(None, np.zeros(2))
     assert carried_over(carried, 3, 1) is carried

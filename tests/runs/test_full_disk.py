@@ -1,5 +1,8 @@
 """A disk that fills, at whichever statement, leaves a run that goes on bit for bit once there is room."""
 
+import contextlib
+import sqlite3
+import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
@@ -19,6 +22,7 @@ from studio.runs.run_footage import footage_of
 from studio.runs.storing_behind import StoringBehind
 from studio.runs.tracking_run import TrackingRun
 from studio.sessions.results_codec import particle_arrays
+from studio.sessions.results_store import FILE_NAME
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.settings import changed_settings
@@ -111,6 +115,40 @@ def test_a_run_that_stays_open_goes_on_when_there_is_room(session_on_disk: Sessi
         assert content(run) == wanted, f"statement {number}"
 
 
+@pytest.mark.parametrize("way", WAYS)
+def test_a_frame_that_fails_to_be_stored_behind_the_search_is_tracked_again(
+    session_on_disk: Session, way: str
+) -> None:
+    wanted, statements = whole_run(session_on_disk)
+    for number in range(0, statements, 7):
+        run = new_run(session_on_disk, f"{way.replace(' ', '-')}-{number}")
+        with ThreadPoolExecutor(1) as storing, opened(session_on_disk, run, storing) as tracking:
+            fault = break_at(tracking._writer, number, way)
+            with pytest.raises(SessionError, match="disk full"):
+                track(tracking)
+            assert not tracking.finished
+            fault.mend()
+            # The failure may come after the next frame's new settings, which would hold for this one, too.
+            tracking.settings_source = tracking.latest_settings
+            tracking.mark_going_on()
+            track(tracking)
+            assert content(run) == wanted, f"statement {number}: all is stored once it is finished"
+        assert content(run) == wanted, f"statement {number}"
+
+
+def test_the_store_is_behind_the_search_and_readers_of_the_run_wait_for_it(session_on_disk: Session) -> None:
+    run, held = new_run(session_on_disk, "behind"), threading.Event()
+    with ThreadPoolExecutor(1) as storing, opened(session_on_disk, run, storing) as tracking:
+        storing.submit(held.wait)
+        while tracking.next_frame == 0:
+            tracking.step_layer()
+        tracking.step_layer()
+        with run.results() as results:
+            assert results.frames() == [], "the next frame is searched before this one is stored"
+        threading.Timer(0.05, held.set).start()
+        assert tracking._reader.frames() == [0]
+
+
 @pytest.mark.parametrize("way", [BEFORE, ROLLED_BACK, STUCK])
 def test_a_frame_that_cannot_be_saved_halfway_leaves_what_was_saved_before(
     session_on_disk: Session, way: str
@@ -172,12 +210,22 @@ def test_an_answer_that_cannot_be_kept_changes_nothing(session_on_disk: Session,
     assert poses_of(run)[-1].tobytes() == again.result().estimate.pose.tobytes()
 
 
+def in_small_pages(run: StoredRun) -> None:
+    """Put the run's store, in which nothing is tracked yet, into pages of 1 KiB: it grows at more places."""
+    with contextlib.closing(sqlite3.connect(run.folder / FILE_NAME)) as connection:
+        connection.execute("PRAGMA journal_mode = DELETE")
+        connection.execute("PRAGMA page_size = 1024")
+        connection.execute("VACUUM")
+        assert connection.execute("PRAGMA page_size").fetchone() == (1024,)
+
+
 def test_a_store_that_may_not_grow_is_a_full_disk(session_on_disk: Session) -> None:
     """SQLite's own error, wherever in a frame the pages run out."""
     wanted, _ = whole_run(session_on_disk)
     pages, refused = 0, ["not tried yet"]
     while refused:
         run = new_run(session_on_disk, f"pages-{pages}")
+        in_small_pages(run)
         with refusals() as refused, opened(session_on_disk, run) as tracking:
             connection = tracking._writer._connection
             here = connection.execute("PRAGMA page_count").fetchone()[0]
@@ -188,7 +236,7 @@ def test_a_store_that_may_not_grow_is_a_full_disk(session_on_disk: Session) -> N
             track(again)
         assert content(run) == wanted, f"{pages} pages"
         pages += 1
-    assert pages > 2
+    assert pages > 12
 
 
 def test_a_finished_search_that_an_older_studio_saved_is_searched_again(session_on_disk: Session) -> None:

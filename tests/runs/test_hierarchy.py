@@ -7,8 +7,9 @@ from studio.body.catalogue import list_bodies, load_body
 from studio.body.model import BodyModel
 from studio.runs.hierarchy import hierarchy_of
 from studio.runs.search_space import default_sigma, search_space
-from studio.tracking import partitions
-from studio.tracking.swarm_settings import PARTITIONS, SwarmSettings
+from studio.synthesis.recipe_file import RECIPES
+from studio.trackers import partitions
+from studio.trackers.swarm_settings import PARTITIONS, SwarmSettings
 
 
 def named(name: str, chosen: np.ndarray) -> set[str]:
@@ -63,6 +64,12 @@ def test_other_bodies_are_cut_at_knees_and_elbows(name: str, subspaces: int) -> 
 def test_kinds_of_limbs(name: str, kinds: tuple[int, ...]) -> None:
     pair = hierarchy_of(load_body(name)).pair
     assert sorted(int((pair == number).sum()) for number in range(pair.max() + 1)) == sorted(kinds)
+
+
+def test_what_moves_a_tree_on_a_fixed_base_is_its_root() -> None:
+    """A robot's first axis stands on a base that is bolted down."""
+    body = load_body(str(RECIPES / "robot_arm.urdf"))
+    assert hierarchy_of(body).depth.tolist() == [0, 1, 1, 2, 2, 2]
 
 
 @pytest.mark.parametrize("name", list_bodies())

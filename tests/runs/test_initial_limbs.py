@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 from drawn_people import drawn_evidence, ring_of_cameras
+from moving_bodies import standing
 
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
 from studio.runs.initial_limbs import limbs_put_right
-from studio.tracking.loss_detection import Onlooker
+from studio.trackers.loss_detection import Onlooker
 
 CAMERAS = ring_of_cameras(4, 480, 360)
 
@@ -21,12 +22,7 @@ def body() -> BodyModel:
 @pytest.fixture(scope="module")
 def stretched(body: BodyModel) -> np.ndarray:
     """Standing, the right arm stretched aside."""
-    names = [entry.name for entry in body.parameters]
-    pose = body.neutral.copy()
-    pose[names.index("pelvis_z")] = 950.0
-    pose[names.index("right_shoulder_rx")] = 1.3
-    pose[names.index("left_hip_ry")] += 0.2
-    return pose
+    return standing(body, right_shoulder_rx=1.0, left_hip_ry=0.2)
 
 
 def off(body: BodyModel, pose: np.ndarray, truth: np.ndarray, marker: str) -> float:

@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from drawn_people import drawn_evidence, ring_of_cameras
-from numpy.typing import NDArray
 from random_people import people_session, random_moments
 
 from studio.body.catalogue import load_body
@@ -29,10 +28,9 @@ from studio.settings import default_settings
 from studio.synthesis.motions import make_motion
 from studio.synthesis.person import marker_lengths, skeleton_of_height
 from studio.synthesis.recipe_file import Picture, Recipe
-from studio.tracking.initialisation import QUICK
-from studio.tracking.start_candidates import facing
+from studio.trackers.initialisation import QUICK
+from studio.trackers.start_candidates import facing
 
-Array = NDArray[np.float64]
 SETTINGS = default_settings("annealed", "edge-region-silhouette")
 
 
@@ -82,7 +80,7 @@ def test_people_in_random_moments_and_headings_are_found(people: Session) -> Non
 
 def test_a_run_without_start_pose_finds_one(people: Session) -> None:
     steps: list[tuple[str, int, int]] = []
-    run = prepare_run(people, first=1, last=2, progress=lambda *told: steps.append(told))
+    run = prepare_run(people, first=1, last=2, progress=lambda *reported: steps.append(reported))
     assert run.record.start_pose is not None
     assert run.record.start_source.startswith("found in frame 1, confidence ")
     assert steps[-1][0] == "checking each limb"

@@ -14,7 +14,7 @@ from studio.runs.run_footage import footage_of
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.settings import changed_settings
-from studio.tracking.recovery_settings import INITIALISE, SPREAD
+from studio.trackers.recovery_settings import INITIALISE, SPREAD
 
 FRAME = 1.0 / FPS
 
@@ -135,7 +135,7 @@ def test_a_cancelled_run_stays_and_can_be_resumed(session_on_disk: Session) -> N
 
 
 def test_forth_and_back_goes_on_behind_the_end(session_on_disk: Session) -> None:
-    run = live_run(session_on_disk, last=20, to_and_fro=True)
+    run = live_run(session_on_disk, last=20, ping_pong=True)
     with driving(session_on_disk, run) as drive:
         drive.to_end(0.5 * FRAME)
     with run.results() as results:
@@ -157,7 +157,7 @@ def test_what_cannot_be_done_live_is_refused(session_on_disk: Session) -> None:
     with pytest.raises(RunError, match="cannot train"):
         prepare_run(session_on_disk, **live_request(knobs={"online_learning": True}))
     with pytest.raises(RunError, match="Only a live run"):
-        prepare_run(session_on_disk, to_and_fro=True)
+        prepare_run(session_on_disk, ping_pong=True)
     with pytest.raises(RunError, match="do not lie"):
         prepare_run(session_on_disk, **live_request(last=9))
     plain = prepare_run(session_on_disk, name="plain")

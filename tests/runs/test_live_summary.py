@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from studio.runs.live_summary import LiveMeter, LiveStanding, LiveSummary, in_words, rate_of
+from studio.runs.set_following import SetNumbers
 from studio.runs.storing_behind import StoringBehind
-from studio.runs.take_following import SetNumbers
-from studio.sessions.takes import LIVE, SETS_NAME
+from studio.sessions.live_recordings import LIVE, SETS_NAME
 
 
 def test_the_meter_counts_what_came_and_was_not_tracked() -> None:

@@ -97,9 +97,9 @@ def test_a_run_begins_in_the_frame_of_the_start_pose(session_on_disk: Session) -
     run = prepare_run(session, name="usual")
     assert (run.record.first, run.record.last) == (3, FRAMES)
     assert np.allclose(run.record.start_pose or (), true_poses()[3])
-    told = prepare_run(session, name="named", first=1, last=2)
-    assert (told.record.first, told.record.last) == (1, 2)
-    assert "begins in frame 1, the session's start pose is of frame 3" in told.record.notes[-1]
+    made = prepare_run(session, name="named", first=1, last=2)
+    assert (made.record.first, made.record.last) == (1, 2)
+    assert "begins in frame 1, the session's start pose is of frame 3" in made.record.notes[-1]
     given = prepare_run(session, name="given", start_pose=true_poses()[0])
     assert given.record.first == 0
     keep_start_pose(session, body, true_poses()[0])

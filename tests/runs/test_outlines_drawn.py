@@ -14,11 +14,11 @@ from studio.body.forward_kinematics import limb_frames
 from studio.body.model import BodyModel, Limb
 from studio.evidence.frame_evidence import ViewEvidence
 from studio.geometry.camera import Camera
+from studio.likelihood.catalogue import WEIGHTINGS
+from studio.likelihood.overlay import overlay_points
 from studio.runs.colour_tokens import colour_tokens
 from studio.runs.overlay_drawing import ViewMarks, draw_view
 from studio.sessions.session import Session
-from studio.weighting.catalogue import WEIGHTINGS
-from studio.weighting.overlay import overlay_points
 
 TOLERANCE_PX = 2.0
 STATIONS, DIRECTIONS = 25, 180

@@ -9,11 +9,18 @@ from studio.body.forward_kinematics import limb_ends, limb_frames
 from studio.errors import StudioError
 from studio.evidence.frame_evidence import ViewEvidence
 from studio.geometry.camera import Camera
+from studio.likelihood.catalogue import WEIGHTINGS
+from studio.likelihood.overlay import overlay_points
 from studio.runs.colour_tokens import colour_tokens, parse_tokens, tokens_file
 from studio.runs.marker_lines import marker_links, marker_sides
-from studio.runs.overlay_drawing import ViewMarks, draw_view, encode_jpeg, projected_silhouette, upright
-from studio.weighting.catalogue import WEIGHTINGS
-from studio.weighting.overlay import overlay_points
+from studio.runs.overlay_drawing import (
+    ViewMarks,
+    draw_view,
+    encode_jpeg,
+    projected_silhouette,
+    sample_costs,
+    upright,
+)
 
 HEIGHT, WIDTH = 240, 320
 
@@ -189,3 +196,37 @@ def test_shoulders_hang_on_the_neck_of_every_human_body() -> None:
         names = [marker.name for marker in body.markers]
         assert ("Neck", "RShoulder") in {(names[a], names[b]) for a, b in marker_links(body, names)}, name
     assert limb_ends(load_body("human25"), load_body("human25").neutral).shape == (1, 14, 2, 3)
+
+
+def test_bodies_beside_one_another_have_their_own_colours() -> None:
+    contours = [square(left, 80.0, 40.0) for left in (40.0, 140.0, 240.0)]
+    several = marks(
+        contours[0], own="series-0", beside=(((contours[1],), "series-1"), ((contours[2],), "series-2"))
+    )
+    tokens = colour_tokens()
+    outlined = draw_view(evidence(), several, ("outline",), tokens)
+    filled = draw_view(evidence(), several, ("filled",), tokens)
+    for at, contour in enumerate(contours):
+        colour = np.array(tokens[f"series-{at}"][::-1])
+        column, row = (int(number) for number in contour[0])
+        assert np.abs(outlined[row + 20, column].astype(int) - colour).max() <= 30
+        assert (outlined[row + 20, column + 20] == 90).all(), "an outline leaves its inside free"
+        mixed = 0.45 * colour + 0.55 * 90
+        assert np.abs(filled[row + 20, column + 20] - mixed).max() <= 1.5
+    assert (filled[20, 20] == 90).all()
+
+
+def test_samples_are_coloured_by_what_they_cost() -> None:
+    mask = np.zeros((HEIGHT, WIDTH), dtype=np.uint8)
+    mask[:, :100] = 255
+    mask[:, 100:200] = 128
+    points = np.array([[50.0, 60.0], [150.0, 60.0], [250.0, 60.0], [np.nan, 60.0]])
+    costs = sample_costs(points, mask)
+    np.testing.assert_allclose(costs, [0.0, (1.0 - 128 / 255) ** 2, 1.0, 1.0])
+    none = np.zeros((0, 2))
+    drawn = draw_view(evidence(mask), ViewMarks((), (), none, points), ("cost",), colour_tokens())
+    for (column, row), level in zip(points[:3].astype(int), (0, 2, 9), strict=True):
+        assert tuple(drawn[row, column][::-1]) == colour_tokens().layer(level, 10)
+    # Without a map of the evidence there is nothing to read.
+    bare = ViewEvidence("side", evidence().picture, np.zeros((0, 0), np.uint8), np.zeros((0, 0), np.uint8))
+    assert (draw_view(bare, ViewMarks((), (), points, points), ("cost",), colour_tokens()) == 90).all()

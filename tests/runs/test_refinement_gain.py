@@ -6,15 +6,15 @@ import pytest
 from studio.body.inverse_kinematics import pose_from_markers
 from studio.body.model import BodyModel
 from studio.evaluation.errors import evaluate, rows_of_frames
+from studio.jobs.batch import track_to_end
 from studio.motion_files.trc import MarkerMotion, read_trc
 from studio.runs.new_run import prepare_run
 from studio.runs.refining import refine_run, smooth_run
+from studio.runs.samples import install_sample
 from studio.runs.tracks import Track, read_track, write_track
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
-from studio.web.samples import install_sample
-from studio.worker.batch import track_to_end
 
 FRAMES, EVERY = 90, 6
 SEEDS = (0, 1, 2)
@@ -26,9 +26,9 @@ def walk(tmp_path_factory: pytest.TempPathFactory) -> Session:
 
 
 def tracked(session: Session, seed: int) -> StoredRun:
-    """A run of 1000 evaluations a frame."""
-    changes = {"particles": 100, "layers": 10}
-    run = prepare_run(session, seed=seed, last=FRAMES, knobs=changes)
+    """A run of 1000 evaluations a frame, its frames not yet refined."""
+    changes = {"particles": 100, "layers": 10, "refine_frames": False}
+    run = prepare_run(session, seed=seed, last=FRAMES, knobs=changes, fit_shape=False)
     track_to_end(session, run, lambda _step, _done, _total: None)
     return run
 

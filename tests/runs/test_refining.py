@@ -14,9 +14,9 @@ from studio.runs.refining import jitter, refine_run, smooth_run
 from studio.runs.tracks import Track, read_track, track_names, write_track
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.tracking.refinement import RefinementSettings
-from studio.tracking.smoothing import SmoothingSettings
-from studio.tracking.tracker import LOST
+from studio.trackers.refinement import RefinementSettings
+from studio.trackers.smoothing import SmoothingSettings
+from studio.trackers.tracker import LOST
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ from studio.runs.reannealing import Reannealing
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.synthesis.recipes import synthesize
-from studio.tracking.tracker import LIMB_LOST, LOST, NO_EVIDENCE, RECOVERED, TRACKED, FrameResult
+from studio.trackers.tracker import LIMB_LOST, LOST, NO_EVIDENCE, RECOVERED, TRACKED, FrameResult
 from studio.training.sources import read_source
 
 STEP, FPS = 3, 20.0

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from drawn_people import drawn_evidence, ring_of_cameras
+from moving_bodies import standing
 
 from studio.body.catalogue import load_body
 from studio.body.dimensions import with_dimensions
@@ -16,7 +17,7 @@ from studio.runs import shape_on_the_way
 from studio.runs.new_run import prepare_run
 from studio.runs.search_space import default_sigma
 from studio.runs.shape_on_the_way import FOLDER, shaped_body
-from studio.runs.way_results import run_changes
+from studio.runs.workflow_results import run_changes
 from studio.sessions.session import Session
 
 WALK = Path(__file__).parents[2] / "sample_sessions" / "walk"
@@ -37,10 +38,7 @@ def test_thicker_limbs_are_found_and_bones_are_kept() -> None:
     radii = [name for name, kind in kinds.items() if kind == "radius" and ("arm" in name or "shin" in name)]
     stout = with_dimensions(body, {name: 1.3 * body.dimensions[name] for name in radii})
     names = [entry.name for entry in body.parameters]
-    pose = body.neutral.copy()
-    pose[names.index("pelvis_z")] = 950.0
-    pose[names.index("left_shoulder_rx")] += 0.6
-    pose[names.index("right_shoulder_rx")] -= 0.6
+    pose = standing(body, left_shoulder_rx=0.6, right_shoulder_rx=-0.6)
 
     def posture(frame: int) -> np.ndarray:
         moved = pose.copy()
@@ -78,6 +76,17 @@ def test_a_run_begins_with_the_shape_says_so_and_fits_it_once(
     assert plain.dimensions == dict(own)
     assert (first.subject_dimensions, plain.subject_dimensions) == (dict(own), {})
     assert run_changes(walk, walk.run(first.name)) == []
+
+
+def test_the_shape_that_comes_with_the_walk_is_the_one_that_is_fitted(
+    walk: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fitted = prepare_run(walk, last=20).record
+    shutil.copytree(WALK, tmp_path / "bundled" / "walk", ignore=shutil.ignore_patterns("runs"))
+    monkeypatch.setattr(shape_on_the_way, "shaped_body", lambda *_, **__: pytest.fail("fitted again"))
+    bundled = prepare_run(Session(tmp_path / "bundled" / "walk"), last=20).record
+    assert bundled.dimensions == pytest.approx(fitted.dimensions, abs=1.0)
+    assert bundled.start_pose == pytest.approx(fitted.start_pose, abs=5.0)
 
 
 def test_few_frames_or_one_camera_give_no_shape(walk: Session, session_on_disk: Session) -> None:

@@ -9,16 +9,16 @@ from planted_sides import EXCHANGED, LAST, planted, stored, true_poses
 from sample_walk import copy_of_walk
 
 from studio.body.forward_kinematics import marker_points
+from studio.jobs.batch import track_to_end
+from studio.jobs.open_live_run import opened
+from studio.jobs.open_run import OpenRun
+from studio.jobs.side_looking import SideLooking
 from studio.runs.problem_source import ProblemSource
 from studio.runs.refining import smooth_run
 from studio.runs.sides import notes_of, put_sides_right
 from studio.runs.tracks import best_track, read_track, track_names
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.worker.batch import track_to_end
-from studio.worker.open_live_run import opened
-from studio.worker.open_run import OpenRun
-from studio.worker.side_looking import SideLooking
 
 WORDS = ("frames 12 to 27: left and right leg exchanged",)
 

@@ -14,11 +14,11 @@ from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
 from studio.runs.mask_quality import mask_quality, measure_masks
 from studio.runs.new_run import prepare_run
+from studio.runs.samples import sample_folder
 from studio.runs.session_settings import session_settings
 from studio.runs.silhouette_doubts import silhouette_doubts
-from studio.runs.way import way_of
+from studio.runs.workflow import workflow_of
 from studio.sessions.session import CAMERAS_PATH, Session
-from studio.web.samples import sample_folder
 
 FRAMES = (5, 20, 35, 50)
 HEIGHT = 1750.0
@@ -121,7 +121,7 @@ def test_a_session_whose_footage_contradicts_its_cameras_is_not_tracked(walk: Se
     assert len(spoilt.runs()) == 2
     (note,) = prepare_run(spoilt, last=2, fit_shape=False, despite_findings=True).record.notes
     assert note.startswith("Tracked despite: ")
-    step = next(step for step in way_of(spoilt).steps if step.step == "calibration")
+    step = next(step for step in workflow_of(spoilt).steps if step.step == "calibration")
     assert (step.state, "contradicts" in step.why) == ("stale", True)
 
     write_calibration(sound, walk.path / CAMERAS_PATH)

@@ -13,7 +13,7 @@ from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.settings import RunSettings, changed_settings
-from studio.tracking.tracker import LayerRecord
+from studio.trackers.tracker import LayerRecord
 
 QUICK = {"particles": 40, "layers": 4, "start_repeats": 2}
 

@@ -1,7 +1,10 @@
 """Tracks of a run are kept beside what the search found, and come back as they were written."""
 
 import dataclasses
+import errno
+import os
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -22,7 +25,7 @@ from studio.runs.tracks import (
 )
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.stored_run import StoredRun
-from studio.tracking.tracker import LOST, TRACKED
+from studio.trackers.tracker import LOST, TRACKED
 
 
 @pytest.fixture
@@ -115,6 +118,14 @@ def test_arrays_that_do_not_fit_are_refused(run: StoredRun) -> None:
         with pytest.raises(SessionError, match="does not fit"):
             write_track(run, track)
     assert track_names(run) == ("raw",)
+
+
+def test_a_track_that_the_disk_refuses_is_named(run: StoredRun) -> None:
+    with (
+        mock.patch.object(os, "mkdir", side_effect=PermissionError(errno.EACCES, "Permission denied")),
+        pytest.raises(SessionError, match=r"The track .* cannot be written"),
+    ):
+        write_track(run, track_of("smoothed"))
 
 
 def test_missing_and_damaged_tracks_are_named(run: StoredRun) -> None:

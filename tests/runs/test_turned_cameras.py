@@ -10,8 +10,8 @@ from studio.errors import CalibrationError, NotFoundError
 from studio.runs.aligning import SessionAlignment, align_cameras
 from studio.runs.new_run import prepare_run
 from studio.runs.turned_cameras import remember_alignment, turn_back, turn_cameras, turned_from
-from studio.runs.way import way_of
-from studio.runs.way_step import StepStatus
+from studio.runs.workflow import workflow_of
+from studio.runs.workflow_step import StepStatus
 from studio.sessions.calibration_changes import restore_calibration, stale_runs
 from studio.sessions.session import CAMERAS_PATH, Session
 
@@ -30,7 +30,7 @@ def aligned(session: Session) -> SessionAlignment:
 
 def calibration_step(session: Session) -> StepStatus:
     """Step Calibration of the guided way."""
-    return next(step for step in way_of(session).steps if step.step == "calibration")
+    return next(step for step in workflow_of(session).steps if step.step == "calibration")
 
 
 def apart(session: Session) -> float:

@@ -86,12 +86,12 @@ def test_a_damaged_frame_is_a_gap_everywhere_until_it_is_tracked_again(
     change(run, "UPDATE layers SET blob = X'00' || blob WHERE frame = 2 AND layer = 1")
     change(run, "UPDATE frames SET log_weight = log_weight + 1 WHERE frame = 3")
     with run.results() as results:
-        with pytest.raises(DamagedError, match=r"Frame 2 of run 'a' is damaged on the disk \(layer 1\)"):
+        with pytest.raises(DamagedError, match=r"Frame 2 of run 'a' is damaged on the disk \(layer 2\)"):
             results.layers(2)
         assert (
             results.frames() == results.timeline().frames.tolist() == results.poses()[0].tolist() == [0, 1, 4]
         )
-        assert results.damaged() == {2: "layer 1", 3: "its numbers"}
+        assert results.damaged() == {2: "layer 2", 3: "its numbers"}
     summary = run.summary()
     assert (summary.damaged, summary.done, summary.status, summary.tracked_to) == (
         (2, 3),

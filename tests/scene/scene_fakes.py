@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import viser
 
+from studio.jobs.commands import Command
+from studio.jobs.events import Acknowledged, Event, StateChanged
+from studio.jobs.watchers import Subscription, Watchers
 from studio.scene.model import Model
-from studio.worker.commands import Command
-from studio.worker.events import Acknowledged, Event, StateChanged
-from studio.worker.watchers import Subscription, Watchers
 
 
 class FakeControl:

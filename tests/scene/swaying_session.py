@@ -13,7 +13,7 @@ from studio.geometry.camera import Camera
 from studio.motion_files.trc import MarkerMotion, write_trc
 from studio.sessions.manifest import SessionManifest, now, write_manifest
 from studio.sessions.session import Session
-from studio.tracking.tracker import Carried, Estimate, FrameResult, LayerRecord, ParticleSet
+from studio.trackers.tracker import Estimate, FilterState, FrameResult, LayerRecord, ParticleSet
 
 FRAMES, LAYERS, PARTICLES = 6, 4, 30
 WIDTH, HEIGHT, FPS = 320, 240, 60.0
@@ -76,7 +76,7 @@ def frame_result(body: BodyModel, frame: int, shift: float = 0.0) -> FrameResult
     pose = swaying_pose(body, frame)
     pose[4] += shift
     last = cloud_record(body, frame, LAYERS - 1)
-    carried = Carried(ParticleSet(last.poses, last.log_weights))
+    carried = FilterState(ParticleSet(last.poses, last.log_weights))
     return FrameResult(frame, Estimate(pose, pose, pose, -1.0), LAYERS, LAYERS * PARTICLES, 1, 4.0, carried)
 
 

@@ -10,11 +10,11 @@ from swaying_session import FPS, LAYERS, cloud_record, frame_result, swaying_pos
 from studio.body.dragging import Dragger
 from studio.body.mirroring import Mirror
 from studio.body.model import BodyModel
+from studio.jobs.events import Event, FrameFinished, LayerFinished, SettingsApplied, StateChanged
 from studio.scene import model as scene
 from studio.scene.model import LiveSearch, Model, Playback, Selection, ViewOptions
 from studio.scene.pose_edit import edit_of
 from studio.settings import changed_settings, default_settings
-from studio.worker.events import Event, FrameFinished, LayerFinished, SettingsApplied, StateChanged
 
 FRAMES = tuple(range(5))
 NOTHING = StateChanged("", "", "idle", 0, 0, 0, 0, 0, math.nan, math.nan)

@@ -4,6 +4,7 @@ import asyncio
 import dataclasses
 import math
 import threading
+import time
 from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any, cast
@@ -14,10 +15,11 @@ from swaying_session import FPS, swaying_pose
 
 from studio.body.dragging import Dragger
 from studio.body.model import BodyModel
+from studio.jobs.events import StateChanged
 from studio.knobs import Value, knobs_of
 from studio.runs.colour_tokens import colour_tokens
 from studio.scene import model as scene
-from studio.scene.controls import Control
+from studio.scene.controls import Control, take_out
 from studio.scene.guarded_server import GuardedServer
 from studio.scene.model import Knobs, Model
 from studio.scene.opened_run import Moment
@@ -27,9 +29,8 @@ from studio.scene.pose_panel import PosePanel
 from studio.scene.settings_panel import NO_PRESET, SettingsPanel, knob_value, since_in_words, slider_range
 from studio.scene.show_panel import ShowPanel, legend_html
 from studio.settings import all_knobs, changed_settings, default_settings, values
-from studio.tracking.catalogue import TRACKERS, presets
-from studio.tracking.settings import AnnealedSettings
-from studio.worker.events import StateChanged
+from studio.trackers.catalogue import TRACKERS, presets
+from studio.trackers.settings import AnnealedSettings
 
 DEFAULTS = values(default_settings())
 STATE = StateChanged("walk", "run 7", "tracking", 128, 3, 0, 450, 128, 41.234, 8.2)
@@ -118,6 +119,30 @@ def test_a_value_shown_just_then_does_not_take_a_persons_change_away(
     settle_viser(server)
     assert [values for _, values in posted.waiting] == [(True,)]
     assert handle.value is True
+
+
+def test_nothing_is_written_to_an_input_that_is_being_taken_out(
+    server: GuardedServer, posted: Posted, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The browser knows it no longer once its folder is gone."""
+    folder = server.gui.add_folder("a")
+    with folder:
+        control = Control(server.gui.add_checkbox("b", False), posted.post, lambda model, value: model)
+    wire, sent = control.handle._impl.gui_api._websock_interface, list[str]()
+    queue = wire.queue_message
+
+    def slowly(message: object) -> None:
+        sent.append(type(message).__name__)
+        queue(message)
+        if sent == ["GuiRemoveMessage"]:
+            control.show(True)
+            time.sleep(0.3)
+
+    monkeypatch.setattr(wire, "queue_message", slowly)
+    take_out(folder)
+    settle_viser(server)
+    assert "GuiRemoveMessage" in sent
+    assert "GuiUpdateMessage" not in sent
 
 
 def test_a_change_that_fails_frees_its_control(server: GuardedServer, posted: Posted) -> None:
@@ -292,6 +317,9 @@ def test_the_runs_status_in_words(posted: Posted) -> None:
     lost = dataclasses.replace(STATE, state="lost", message="It died.", hint="Resume.")
     assert "It died." in search_html(lost)
     assert "No run" in search_html(dataclasses.replace(STATE, session="", run=""))
+    assert f"frame {STATE.frame} ·" in search_html(STATE)
+    finished = dataclasses.replace(STATE, state="finished", frame=STATE.last, done=STATE.last - STATE.first)
+    assert "frame " not in search_html(finished), "there is no frame after the last"
     other = dataclasses.replace(posted.model, search=dataclasses.replace(STATE, run="run 8"))
     assert "stored · 128 of 450 frames" in status_html(other)
     assert clock(3725) == "1:02:05"

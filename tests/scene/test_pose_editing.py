@@ -51,7 +51,7 @@ def pose_is(stage: SceneServer, wanted: np.ndarray) -> bool:
 def begin(stage: SceneServer) -> None:
     """Edit the start pose, and wait until the balls are there."""
     by_hand(tab_of(stage).editing.handle, True)
-    until(lambda: stage.shown.editing and handles_of(stage).balls[0].visible)
+    until(lambda: stage.shown.editing and all(ball.visible for ball in handles_of(stage).balls))
 
 
 def test_a_slider_moves_the_body_and_saving_keeps_it(

@@ -19,11 +19,11 @@ from scene_fakes import FakeControl
 from swaying_session import cloud_record
 
 from studio.body.model import BodyModel
+from studio.jobs.commands import ChangeSettings
+from studio.jobs.events import LayerFinished, SettingsApplied
 from studio.scene.scene_server import SceneServer
-from studio.tracking.settings import AnnealedSettings
-from studio.web.scene_relay import router
-from studio.worker.commands import ChangeSettings
-from studio.worker.events import LayerFinished, SettingsApplied
+from studio.server.scene_relay import router
+from studio.trackers.settings import AnnealedSettings
 
 pytestmark = pytest.mark.browser
 
@@ -43,7 +43,7 @@ def address(stage: SceneServer) -> Iterator[str]:
     """Where the scene is served, by the web application's relay without its access guard."""
     app = FastAPI()
     app.include_router(router)
-    app.state.doors = SimpleNamespace(scenes=SimpleNamespace(scene=lambda window: stage))
+    app.state.studio = SimpleNamespace(scenes=SimpleNamespace(scene=lambda window, bare=False: stage))
     listening = socket.socket()
     listening.bind(("127.0.0.1", 0))
     listening.listen()

@@ -15,9 +15,14 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
+from studio.body.catalogue import load_body
+from studio.body.editing import edited
 from studio.body.forward_kinematics import limb_ends, limb_frames
 from studio.body.model import BodyModel, extremities
 from studio.errors import SettingsError, StudioError
+from studio.jobs import commands
+from studio.jobs.events import FrameFinished, LayerFinished, SettingsApplied
+from studio.runs.start_pose_file import keep_start_pose
 from studio.scene.controller import Due
 from studio.scene.model import Model, Selection
 from studio.scene.panel import Panel
@@ -25,8 +30,6 @@ from studio.scene.scene_server import SceneServer
 from studio.scene.scene_views import SceneViews
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.workspace import Workspace
-from studio.worker import commands
-from studio.worker.events import FrameFinished, LayerFinished, SettingsApplied
 
 
 def views(stage: SceneServer) -> SceneViews:
@@ -78,6 +81,23 @@ def test_the_pictures_are_hung_with_outlines(stage: SceneServer) -> None:
     assert colourful.sum() > 100, "the limbs' outlines are the only saturated colours"
     stage.set_options(overlays=())
     until(lambda: np.abs(np.diff(hung["cam1"].picture.image.astype(int), axis=2)).max() < 60)
+
+
+def test_through_a_camera_the_body_is_the_outline_in_the_picture(stage: SceneServer) -> None:
+    open_run(stage)
+    hung = views(stage).cameras.views
+    until(lambda: all(view.picture.visible for view in hung.values()))
+    stage.set_options(overlays=())
+    until(lambda: np.abs(np.diff(hung["cam1"].picture.image.astype(int), axis=2)).max() < 60)
+    assert views(stage).body.handles[0].visible
+    stage.look_through("cam1")
+    until(lambda: not any(limb.visible for limb in views(stage).body.handles))
+    until(lambda: np.abs(np.diff(hung["cam1"].picture.image.astype(int), axis=2)).max() > 60)
+    assert np.abs(np.diff(hung["cam2"].picture.image.astype(int), axis=2)).max() < 60, (
+        "the others stay as chosen"
+    )
+    stage.look_through(None)
+    until(lambda: views(stage).body.handles[0].visible)
 
 
 def test_layers_in_the_making_are_drawn_at_once(
@@ -347,13 +367,28 @@ def test_posts_keep_their_order_and_what_goes_wrong_ends_nothing(stage: SceneSer
 def test_a_drawing_waits_until_its_pause_is_over_and_longer_while_a_live_run_is_tracked() -> None:
     drawing = Due(0.5)
     assert not drawing.is_due(10.0)
-    drawing.is_wanted = True
+    drawing.want(10.0)
     assert drawing.is_due(10.0)
     drawing.done(10.0)
-    drawing.is_wanted = True
+    drawing.want(10.1)
     assert not drawing.is_due(10.4)
     assert drawing.waits(10.4) == pytest.approx(0.1)
     assert drawing.is_due(10.5)
+
+
+def test_pictures_wait_for_the_end_of_a_burst_of_changes_but_no_longer_than_their_pause() -> None:
+    pictures = Due(0.5, calm=0.1)
+    for at in (10.0, 10.08, 10.16):
+        pictures.want(at)
+        assert not pictures.is_due(at)
+    assert not pictures.is_due(10.25)
+    assert pictures.waits(10.2) == pytest.approx(0.06)
+    assert pictures.is_due(10.27)
+    pictures.done(10.27)
+    for number in range(9):
+        pictures.want(11.0 + 0.06 * number)
+    assert not pictures.is_due(11.49)
+    assert pictures.is_due(11.5), "changes that do not end"
 
 
 def test_frames_that_were_not_heard_of_are_known_with_the_next(
@@ -367,3 +402,44 @@ def test_frames_that_were_not_heard_of_are_known_with_the_next(
         writer.write_frame(frame_result(human, FRAMES - 1), layers)
     control.emit(FrameFinished("swaying", "run-1", frame_result(human, FRAMES - 1)))
     until(lambda: stage._controller.model.frames == tuple(range(FRAMES)))
+
+
+def trial_stands_at(stage: SceneServer, body: BodyModel, pose: np.ndarray) -> bool:
+    drawn = stage._controller._trial
+    if drawn is None:
+        return False
+    places = limb_frames(body, pose)[0, :, :, 3] / 1000.0
+    handles = drawn._view.handles
+    return len(handles) == len(places) and np.allclose(
+        [handle.position for handle in handles], places, atol=1e-9
+    )
+
+
+def test_a_body_that_is_being_made_stands_alone_and_in_place_of_a_sessions_own(
+    stage: SceneServer, human: BodyModel, workspace: Workspace
+) -> None:
+    mouse = load_body("mouse")
+    stage.try_body("", mouse)
+    until(lambda: trial_stands_at(stage, mouse, mouse.neutral))
+    until(lambda: "Mouse" in panel(stage).status.content)
+    until(lambda: not panel(stage).tabs.visible)  # knobs and poses are not of this body
+
+    # With a session it stands in the session's start pose, with the session's pictures behind it.
+    thick = edited(human, sizes={"left thigh.radius_start": 200.0}).body
+    start = swaying_pose(human, 1)
+    keep_start_pose(workspace.session("swaying"), human, start)
+    stage.try_body("swaying", thick)
+    until(lambda: trial_stands_at(stage, thick, start))
+    until(lambda: not any(limb.visible for limb in views(stage).body.handles))
+    hung = views(stage).cameras.views["cam1"].picture
+    until(lambda: hung.visible)
+    before = np.array(hung.image)
+    stage.try_body("swaying", human)
+    until(lambda: not np.array_equal(hung.image, before))
+    stage.look_through("cam1")
+    until(lambda: not any(limb.visible for limb in stage._controller._trial._view.handles))  # pyright: ignore[reportOptionalMemberAccess]
+
+    stage.show_run("swaying", "run-1")
+    stage.look_through(None)
+    until(lambda: stage._controller.views is not None and views(stage).body.handles[0].visible)
+    until(lambda: stage._controller._trial is None and panel(stage).tabs.visible)

@@ -11,6 +11,7 @@ from tracked_runs import finish
 
 from studio.body.model import BodyModel
 from studio.errors import StudioError
+from studio.likelihood.blobs import BlobProblem
 from studio.runs.colour_tokens import colour_tokens
 from studio.runs.new_run import prepare_run
 from studio.runs.problem_source import ProblemSource
@@ -24,7 +25,6 @@ from studio.sessions.stored_run import StoredRun
 from studio.volume.blob_model import BlobMixture, cone_blobs
 from studio.volume.hull import Hull
 from studio.volume.tracking_space import Box
-from studio.weighting.blobs import BlobProblem
 
 TOKENS = colour_tokens(True)
 PATIENCE = 60.0

@@ -8,9 +8,11 @@ import pytest
 from toy_session import FRAMES, make_session
 
 from studio.errors import CalibrationError, FootageError, SessionError, WorkCancelledError
-from studio.runs.way import way_of
+from studio.evidence.strokes import Stroke
+from studio.runs.workflow import workflow_of
 from studio.sessions.importers.importing import ImportOptions, add_footage
 from studio.sessions.session import Session
+from studio.sessions.stroke_files import OUTDATED, write_strokes
 from studio.sessions.workspace import begin_session
 
 
@@ -52,7 +54,7 @@ def test_an_empty_session_takes_bare_footage(empty, raw):
     footage = added.session.footage()
     assert footage.picture("front", 3).shape == (120, 160, 3)
     footage.close()
-    way = way_of(added.session)
+    way = workflow_of(added.session)
     assert way.steps[0].state == "done"
     assert way.next == "calibration"
     with pytest.raises(SessionError, match="no calibration yet"):
@@ -70,7 +72,12 @@ def test_footage_is_replaced_and_old_files_are_gone(empty, raw, tmp_path):
     first = add_footage(empty, raw, ImportOptions(fps=60.0)).session
     for path in sorted((raw / "pictures" / "front").iterdir())[5:]:
         path.unlink()
-    second = add_footage(first, raw, ImportOptions(fps=60.0)).session
+    write_strokes(
+        first, [Stroke(camera="front", frame=0, kind="inside", width=3.0, points=((5.0, 5.0), (9.0, 5.0)))]
+    )
+    added = add_footage(first, raw, ImportOptions(fps=60.0))
+    assert OUTDATED in added.notes
+    second = added.session
     source = second.manifest.footage
     assert source.frame_count == 5
     assert source.cameras[0].path == "take-2/pictures/front"
@@ -87,7 +94,7 @@ def test_another_camera_joins_at_the_same_rate_only(empty, raw, tmp_path):
     assert [camera.name for camera in Session(session.path).manifest.footage.cameras] == ["front"]
     joined = add_footage(session, other, ImportOptions(fps=60.0)).session
     assert [camera.name for camera in joined.manifest.footage.cameras] == ["front", "side"]
-    alone = add_footage(joined, other, ImportOptions(fps=60.0, replaced=True)).session
+    alone = add_footage(joined, other, ImportOptions(fps=60.0, replace=True)).session
     assert [camera.name for camera in alone.manifest.footage.cameras] == ["side"]
 
 

@@ -69,22 +69,31 @@ def refuse(*_: object, **__: object) -> None:
 
 
 @pytest.mark.parametrize(
-    ("step", "do"),
+    ("step", "do", "place"),
     [
-        ("mkdir", lambda folder: atomic_files.new_folder_beside(folder / "new" / "run")),
-        ("rename", lambda folder: atomic_files.move_into_place(folder / "kept", folder / "run")),
-        ("replace", lambda folder: atomic_files.write_text(folder / "a.json", "new")),
-        ("unlink", lambda folder: atomic_files.write_text(folder / "a.json" / "b", "new")),
+        ("mkdir", lambda folder: atomic_files.new_folder_beside(folder / "new" / "run"), "folder '{}/new'"),
+        (
+            "rename",
+            lambda folder: atomic_files.move_into_place(folder / "kept", folder / "run"),
+            "folder '{}/run'",
+        ),
+        ("replace", lambda folder: atomic_files.write_text(folder / "a.json", "new"), "file '{}/a.json'"),
+        (
+            "unlink",
+            lambda folder: atomic_files.write_text(folder / "a.json" / "b", "new"),
+            "file '{}/a.json/b'",
+        ),
     ],
 )
 def test_what_the_disk_refuses_is_said_in_words(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str, do: Callable[[Path], object]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str, do: Callable[[Path], object], place: str
 ) -> None:
     (tmp_path / "kept").mkdir()
     (tmp_path / "a.json").write_text("old")
     monkeypatch.setattr(os, step, refuse)
-    with pytest.raises(SessionError, match="cannot be written") as caught:
+    with pytest.raises(SessionError) as caught:
         do(tmp_path)
+    assert caught.value.message.startswith(f"The {place.format(tmp_path)} cannot be written (")
     assert caught.value.hint
     assert (tmp_path / "a.json").read_text() == "old"
 

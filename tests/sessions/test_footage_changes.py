@@ -13,7 +13,7 @@ from toy_footage import number_of
 from studio.errors import FootageError
 from studio.runs.new_run import prepare_run
 from studio.sessions.footage_changes import change_footage, stale_runs
-from studio.sessions.importers.importing import import_source
+from studio.sessions.importers.importing import ImportOptions, import_source
 from studio.sessions.run_record import write_run_record
 from studio.sessions.session import Session
 
@@ -80,7 +80,7 @@ def test_masks_that_would_not_suffice_are_refused(session: Session) -> None:
 
 def test_manifests_from_before_offsets_are_read(tmp_path: Path) -> None:
     path = (
-        import_source(pose2sim(tmp_path / "source"), tmp_path / "take", fps=60.0).session.path
+        import_source(pose2sim(tmp_path / "source"), tmp_path / "take", ImportOptions(fps=60.0)).session.path
         / "session.json"
     )
     text = path.read_text()

@@ -9,7 +9,7 @@ from sources import video_source
 from toy_footage import number_of, numbered_frame, write_video
 
 from studio.errors import CalibrationError, FootageError, StudioError
-from studio.sessions.importers.importing import import_source
+from studio.sessions.importers.importing import ImportOptions, import_source
 
 
 def timed(folder: Path, offsets: dict[int, int], rates: tuple[float, float] = (60.0, 60.0)) -> Path:
@@ -48,7 +48,9 @@ def test_offsets_and_turns_by_hand(tmp_path: Path) -> None:
     write_video(source / "videos" / "cam02.mp4", lying, fps=60)
     with pytest.raises(CalibrationError, match="one is upright"):
         import_source(source, tmp_path / "made")
-    report = import_source(source, tmp_path / "made", offsets={"cam_1": 4}, rotations={"cam02": 90})
+    report = import_source(
+        source, tmp_path / "made", ImportOptions(offsets={"cam_1": 4}, rotations={"cam02": 90})
+    )
     footage = report.session.footage()
     assert footage.frame_count == 16
     for frame in (0, 15):
@@ -72,5 +74,5 @@ def test_impossible_requests(
 ) -> None:
     source = video_source(tmp_path / "source")
     with pytest.raises(StudioError, match=message):
-        import_source(source, tmp_path / "made", offsets=offsets, rotations=rotations)
+        import_source(source, tmp_path / "made", ImportOptions(offsets=offsets, rotations=rotations))
     assert not (tmp_path / "made").exists()

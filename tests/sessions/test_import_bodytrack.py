@@ -10,7 +10,7 @@ from sources import everything_below
 
 from studio.body.forward_kinematics import limb_ends
 from studio.errors import BodyError
-from studio.sessions.importers.importing import import_source
+from studio.sessions.importers.importing import ImportOptions, import_source
 
 PERSON_TOP = 1705.0
 
@@ -95,7 +95,7 @@ def test_another_rate_and_missing_parts(lee: Path, tmp_path: Path) -> None:
         (tmp_path / "source" / name).unlink()
     for index in range(1, 5):
         shutil.rmtree(tmp_path / "source" / f"FG{index}")
-    session = import_source(tmp_path / "source", tmp_path / "made", fps=20.0).session
+    session = import_source(tmp_path / "source", tmp_path / "made", ImportOptions(fps=20.0)).session
     assert session.manifest.fps == 20.0
     assert session.start_pose() is None
     assert session.sigma() is None

@@ -12,7 +12,7 @@ from toy_footage import rig
 from studio.capture.calibration_files import export_calibration
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
-from studio.sessions.importers.importing import import_source
+from studio.sessions.importers.importing import ImportOptions, import_source
 
 CAMERAS = rig(2, "cam_")
 
@@ -49,7 +49,7 @@ def test_what_makes_results_wrong_blocks(
         import_source(source, tmp_path / "made")
     assert "--despite-findings" in caught.value.hint
     assert not (tmp_path / "made").exists()
-    report = import_source(source, tmp_path / "made", despite_findings=True)
+    report = import_source(source, tmp_path / "made", ImportOptions(despite_findings=True))
     assert any("axis points up" in line or "floor" in line or "metres" in line for line in report.warnings)
 
 
@@ -79,8 +79,8 @@ def test_the_remedies_work(tmp_path: Path, up: str, axes: np.ndarray) -> None:
     )
     path.write_text(path.read_text() + "\n[metadata.board]\nsquare_length_mm = 30.0\n")
     with pytest.raises(CalibrationError):
-        import_source(source, tmp_path / "made", up=up)
-    report = import_source(source, tmp_path / "made", up=up, unit="m")
+        import_source(source, tmp_path / "made", ImportOptions(up=up))
+    report = import_source(source, tmp_path / "made", ImportOptions(up=up, unit="m"))
     assert report.warnings == ()
     assert any("as requested" in note for note in report.notes)
     for found, wanted in zip(report.session.cameras(), CAMERAS, strict=True):
@@ -93,7 +93,7 @@ def test_the_remedies_work(tmp_path: Path, up: str, axes: np.ndarray) -> None:
 @pytest.mark.parametrize(("words", "message"), [({"unit": "inch"}, "no unit"), ({"up": "w"}, "no axis")])
 def test_units_and_axes_that_are_none(tmp_path: Path, words: dict[str, str], message: str) -> None:
     with pytest.raises(CalibrationError, match=message):
-        import_source(video_source(tmp_path / "source"), tmp_path / "made", **words)
+        import_source(video_source(tmp_path / "source"), tmp_path / "made", ImportOptions(**words))
 
 
 def test_what_is_only_doubtful_warns(tmp_path: Path) -> None:

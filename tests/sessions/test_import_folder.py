@@ -12,7 +12,7 @@ from toy_footage import number_of, numbered_frame, rig, write_pictures, write_vi
 from studio.errors import CalibrationError, FootageError, SessionError, WorkCancelledError
 from studio.motion_files.trc import read_trc
 from studio.sessions.archives import ArchiveError
-from studio.sessions.importers.importing import import_source
+from studio.sessions.importers.importing import ImportOptions, import_source
 
 
 def test_videos_become_a_session(tmp_path: Path) -> None:
@@ -70,7 +70,7 @@ def test_a_camera_without_background_or_masks_is_named(tmp_path: Path) -> None:
 
 def test_footage_can_be_referred_to(tmp_path: Path) -> None:
     source = full_source(tmp_path / "source")
-    session = import_source(source, tmp_path / "made", copy=False).session
+    session = import_source(source, tmp_path / "made", ImportOptions(copy=False)).session
     assert not (session.path / "videos").exists()
     assert Path(session.manifest.footage.cameras[0].path) == source / "videos" / "cam01.mp4"
     assert number_of(session.footage().picture("cam_2", 11)) == 11
@@ -86,7 +86,7 @@ def test_folders_of_pictures_need_a_frame_rate(tmp_path: Path, parent: str) -> N
     with pytest.raises(FootageError, match="The frame rate of the footage is unknown") as caught:
         import_source(source, tmp_path / "made")
     assert "--fps" in caught.value.hint
-    session = import_source(source, tmp_path / "made", fps=25.0).session
+    session = import_source(source, tmp_path / "made", ImportOptions(fps=25.0)).session
     assert session.manifest.fps == 25.0
     assert number_of(session.footage().picture("cam_1", 4)) == 4
     assert len(list((session.path / "pictures" / "cam_1").iterdir())) == 5
@@ -111,10 +111,10 @@ def test_several_calibrations_need_a_choice(tmp_path: Path) -> None:
     assert "Calib.toml, Other.toml" in caught.value.message
     assert "--calibration" in caught.value.hint
     for number, choice in enumerate(("Other.toml", other, str(other))):
-        report = import_source(source, tmp_path / f"made{number}", calibration=choice)
+        report = import_source(source, tmp_path / f"made{number}", ImportOptions(calibration=choice))
         assert report.session.manifest.calibration_source == "Other.toml"
     with pytest.raises(CalibrationError, match=r"no calibration 'None\.toml'"):
-        import_source(source, tmp_path / "made", calibration="None.toml")
+        import_source(source, tmp_path / "made", ImportOptions(calibration="None.toml"))
 
 
 def test_a_calibrated_camera_without_footage_is_left_out_with_a_warning(tmp_path: Path) -> None:
@@ -166,7 +166,7 @@ def test_frame_rates_must_agree_unless_one_is_given(tmp_path: Path) -> None:
     write_video(source / "videos" / "cam02.mp4", [numbered_frame(k) for k in range(FRAMES)], fps=30)
     with pytest.raises(FootageError, match="frame rates differ"):
         import_source(source, tmp_path / "made")
-    report = import_source(source, tmp_path / "made", fps=60.0)
+    report = import_source(source, tmp_path / "made", ImportOptions(fps=60.0))
     assert report.session.manifest.fps == 60.0
     assert "as requested" in report.warnings[0]
 
@@ -177,7 +177,7 @@ def test_a_variable_frame_rate_is_refused_unless_one_is_given(tmp_path: Path) ->
     write_video(source / "videos" / "cam02.mp4", frames, fps=60, pts=[*range(6), *range(10, 16)])
     with pytest.raises(FootageError, match="variable frame rate"):
         import_source(source, tmp_path / "made")
-    assert import_source(source, tmp_path / "made", fps=60.0).warnings
+    assert import_source(source, tmp_path / "made", ImportOptions(fps=60.0)).warnings
 
 
 def test_missing_pictures_are_reported(tmp_path: Path) -> None:
@@ -186,11 +186,11 @@ def test_missing_pictures_are_reported(tmp_path: Path) -> None:
     for index in (1, 2):
         write_pictures(source / f"cam{index}", [numbered_frame(number) for number in range(8)])
         (source / f"cam{index}" / "frame0005.png").unlink()
-    report = import_source(source, tmp_path / "made", fps=30.0)
+    report = import_source(source, tmp_path / "made", ImportOptions(fps=30.0))
     assert "numbered 5 are missing" in report.warnings[0]
     cv2.imwrite(str(source / "cam1" / "frame0005.png"), numbered_frame(5))
     with pytest.raises(FootageError, match="lacks the pictures numbered 5"):
-        import_source(source, tmp_path / "other", fps=30.0)
+        import_source(source, tmp_path / "other", ImportOptions(fps=30.0))
 
 
 def test_nothing_that_is_there_is_touched(tmp_path: Path) -> None:
@@ -218,7 +218,7 @@ def test_a_cancelled_import_leaves_nothing(tmp_path: Path, step: str) -> None:
 @pytest.mark.parametrize("fps", [0.0, -5.0, float("nan"), 1e9])
 def test_an_absurd_frame_rate(tmp_path: Path, fps: float) -> None:
     with pytest.raises(FootageError, match="no frame rate"):
-        import_source(tmp_path, tmp_path / "made", fps=fps)
+        import_source(tmp_path, tmp_path / "made", ImportOptions(fps=fps))
 
 
 @pytest.mark.real_data
@@ -260,7 +260,7 @@ def test_an_archive_cannot_stay_where_it_is_and_a_broken_one_leaves_nothing(tmp_
     packed = tmp_path / "take.tar.gz"
     packed.write_bytes(b"no tar")
     with pytest.raises(FootageError, match=r"'take\.tar\.gz' cannot be used in place"):
-        import_source(packed, tmp_path / "sessions" / "made", copy=False)
+        import_source(packed, tmp_path / "sessions" / "made", ImportOptions(copy=False))
     with pytest.raises(ArchiveError, match=r"take\.tar\.gz"):
         import_source(packed, tmp_path / "sessions" / "made")
     assert not list((tmp_path / "sessions").iterdir())

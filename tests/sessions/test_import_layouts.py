@@ -22,7 +22,7 @@ from sources import video_source, write_pose2sim
 from toy_footage import number_of
 
 from studio.errors import CalibrationError, FootageError
-from studio.sessions.importers.importing import import_source
+from studio.sessions.importers.importing import ImportOptions, import_source
 
 
 @pytest.mark.parametrize(
@@ -39,7 +39,7 @@ from studio.sessions.importers.importing import import_source
 )
 def test_a_layout_is_recognised_and_read(tmp_path: Path, write: Callable[[Path], Path], title: str) -> None:
     source = write(tmp_path / "source")
-    report = import_source(source, tmp_path / "made", fps=60.0)
+    report = import_source(source, tmp_path / "made", ImportOptions(fps=60.0))
     assert report.layout == title
     assert any(f"Taken for a {title}" in note for note in report.notes)
     session = report.session
@@ -109,8 +109,8 @@ def test_several_trials_are_named_and_one_is_chosen(
         import_source(source, tmp_path / "made")
     assert "--trial" in caught.value.hint
     with pytest.raises(FootageError, match="There is no trial 'dance'"):
-        import_source(source, tmp_path / "made", trial="dance")
-    session = import_source(source, tmp_path / "made", trial=wanted).session
+        import_source(source, tmp_path / "made", ImportOptions(trial="dance"))
+    session = import_source(source, tmp_path / "made", ImportOptions(trial=wanted)).session
     assert number_of(session.footage().picture("cam_1", 3)) == first + 3
     assert len(session.cameras()) == 2
 
@@ -121,7 +121,7 @@ def test_a_trial_alone_says_where_its_calibration_may_be(tmp_path: Path) -> None
         import_source(source, tmp_path / "made")
     assert "import the folder above with --trial" in caught.value.hint
     with pytest.raises(FootageError, match="holds none named 'x'"):
-        import_source(video_source(tmp_path / "one"), tmp_path / "made", trial="x")
+        import_source(video_source(tmp_path / "one"), tmp_path / "made", ImportOptions(trial="x"))
 
 
 def test_nothing_above_the_source_is_read(tmp_path: Path) -> None:
@@ -143,7 +143,7 @@ def test_an_opencap_pickle_is_named_as_the_reason(tmp_path: Path) -> None:
 
 def test_originals_of_several_files_are_kept_byte_for_byte(tmp_path: Path) -> None:
     source = easymocap(tmp_path / "source")
-    session = import_source(source, tmp_path / "made", fps=30.0).session
+    session = import_source(source, tmp_path / "made", ImportOptions(fps=30.0)).session
     for name in ("intri.yml", "extri.yml"):
         assert (session.path / "calibration" / "original" / name).read_bytes() == (source / name).read_bytes()
     again = import_source(session.path, tmp_path / "again").session
@@ -156,10 +156,12 @@ def test_originals_of_several_files_are_kept_byte_for_byte(tmp_path: Path) -> No
 def test_the_balancing_man_is_a_folder_whose_toml_goes_before_the_qualisys_file(
     real_data: Path, tmp_path: Path
 ) -> None:
-    report = import_source(real_data / "pose2sim-balance", tmp_path / "made", copy=False)
+    report = import_source(real_data / "pose2sim-balance", tmp_path / "made", ImportOptions(copy=False))
     assert "Calib_qualisys.toml" in report.notes[1] + "".join(report.notes)
     other = import_source(
-        real_data / "pose2sim-balance", tmp_path / "other", copy=False, calibration="Calib.qca.txt"
+        real_data / "pose2sim-balance",
+        tmp_path / "other",
+        ImportOptions(copy=False, calibration="Calib.qca.txt"),
     )
     kept = (other.session.path / "calibration" / "original.qca.txt").read_bytes()
     assert kept == (real_data / "pose2sim-balance" / "calibration" / "Calib.qca.txt").read_bytes()

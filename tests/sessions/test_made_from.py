@@ -8,7 +8,7 @@ from toy_session import make_session, true_poses
 
 from studio.capture.calibration_files import read_calibration, write_calibration
 from studio.runs.new_run import prepare_run
-from studio.runs.way import way_of
+from studio.runs.workflow import workflow_of
 from studio.sessions import made_from
 from studio.sessions.named_rows import write_pose
 from studio.sessions.results_store import ResultsWriter
@@ -26,7 +26,7 @@ def session(tmp_path) -> Session:
 
 def step(session: Session, name: str):
     """A step's status."""
-    return next(one for one in way_of(session).steps if one.step == name)
+    return next(one for one in workflow_of(session).steps if one.step == name)
 
 
 def move_cameras(session: Session) -> Session:

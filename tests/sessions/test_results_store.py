@@ -6,6 +6,7 @@ import sqlite3
 import subprocess
 import sys
 import textwrap
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from studio.errors import NotFoundError, RunError, SessionError
 from studio.sessions.results_codec import kept_rows, particles_from
 from studio.sessions.results_reader import FILE_NAME
 from studio.sessions.results_store import ResultsReader, ResultsWriter, is_being_written
-from studio.tracking.tracker import LayerRecord
+from studio.trackers.tracker import LayerRecord
 
 ARRAYS = (
     "variance_weighed",
@@ -171,6 +172,19 @@ def test_settings_and_their_end(tmp_path: Path) -> None:
         assert reader.ended() == ""
         writer.mark_ended("cancelled")
         assert reader.ended() == "cancelled"
+
+
+@pytest.mark.parametrize("text", ["{", "3", "[]", '{"survival"', b"\xff"])
+def test_settings_that_no_checksum_guards_and_that_are_damaged_are_named(
+    tmp_path: Path, text: str | bytes
+) -> None:
+    with ResultsWriter(tmp_path) as writer:
+        writer.write_settings(1, 0, 0, {"survival": 0.5})
+    with closing(sqlite3.connect(tmp_path / "results.sqlite")) as store, store:
+        store.execute('UPDATE settings SET "values" = ?', (text,))
+        store.execute("DELETE FROM checksums")
+    with ResultsReader(tmp_path) as reader, pytest.raises(SessionError, match="Version 1 of the settings"):
+        reader.settings_history()
 
 
 def test_later_frames_can_be_dropped(tmp_path: Path) -> None:

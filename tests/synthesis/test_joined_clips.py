@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_retargeting import humanoid
+from test_retargeting import humanoid, turned
 
 from studio.body.person import joint_points, marker_motion
 from studio.errors import StudioError
@@ -27,16 +27,7 @@ def gliding(frames: int, speed: float, heading: float, swing: float) -> Recorded
     for part in ("upper_arm", "lower_arm", "hand"):
         recorded.rotations[:, recorded.index(f"left_{part}")] = axis_turn(1, np.full(frames, swing))
     recorded.positions[:, :, 0] += speed * np.arange(frames)[:, None] / FPS
-    turn = axis_turn(2, np.array(heading))
-    return RecordedMotion(
-        recorded.names,
-        recorded.parents,
-        recorded.rest,
-        turn @ recorded.rotations,
-        recorded.positions @ turn.T,
-        FPS,
-        f"at {heading:g}",
-    )
+    return turned(recorded, heading, FPS, f"at {heading:g}")
 
 
 SLOW, FAST = gliding(121, 400.0, 0.4, -0.3), gliding(121, 1200.0, -2.0, -0.9)

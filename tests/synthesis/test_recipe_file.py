@@ -13,7 +13,7 @@ from studio.synthesis.recipe_file import find_recipe, read_recipe, recipe_camera
 @pytest.mark.parametrize("name", recipe_names())
 def test_bundled_recipes_are_sound(name: str) -> None:
     recipe = read_recipe(find_recipe(name))
-    assert recipe.motion in {*MOTIONS, "arm", "recorded", "joined"}
+    assert recipe.motion in {*MOTIONS, "arm", "recorded", "joined", "keys"}
     if not recipe.cameras.calibration:
         cameras = recipe_cameras(recipe, np.random.default_rng(recipe.seed))
         assert len(cameras) == (len(recipe.cameras.placed) or {"corners": 4, "five": 5}[recipe.cameras.rig])

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_retargeting import humanoid
+from test_retargeting import humanoid, turned
 
 from studio.body.person import PersonMotion, joint_points, sampled
 from studio.body.retargeting import on_skeleton
@@ -29,16 +29,7 @@ def straight(frames: int = 121, speed: float = 2000.0, heading: float = 0.7) -> 
         for joint in joints:
             recorded.rotations[:, joint] = swing
     recorded.positions[:, :, 0] += speed * times[:, None]
-    turn = axis_turn(2, heading)
-    return RecordedMotion(
-        recorded.names,
-        recorded.parents,
-        recorded.rest,
-        turn @ recorded.rotations,
-        recorded.positions @ turn.T,
-        FPS,
-        "made up",
-    )
+    return turned(recorded, heading, FPS, "made up")
 
 
 def test_recorded_frames_are_reproduced_and_smooth_in_between() -> None:

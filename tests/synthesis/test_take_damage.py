@@ -11,7 +11,7 @@ import pytest
 import tomli_w
 
 from studio.body.person import PersonMotion, joint_points
-from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.footage_cache import FootageCache
 from studio.comparison.tracked import Attempt, track
 from studio.errors import StudioError
 from studio.geometry.camera import Camera
@@ -184,7 +184,7 @@ def test_a_damaged_take_can_be_tracked_from_the_height_alone(tmp_path: Path) -> 
         colours={part: [0.8, 0.05, 0.05] for part in ("shirt", "stripes", "trousers")},
         picture={"width": 320, "height": 240, "samples": 1, "empty_frames": 6},
     )
-    shelf = FootageShelf(tmp_path)
+    shelf = FootageCache(tmp_path)
     try:
         attempt = Attempt(
             str(session.path),

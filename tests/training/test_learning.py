@@ -14,7 +14,7 @@ from studio.knobs import changed
 from studio.sessions.names import NameRefused
 from studio.sessions.workspace import Workspace
 from studio.training.learning import learn, parted
-from studio.training.model_shelf import keep_model, list_models, place_for_model
+from studio.training.model_repository import keep_model, list_models, place_for_model
 from studio.training.oversampling import OversamplingSettings
 from studio.training.sources import Recording
 

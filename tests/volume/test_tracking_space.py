@@ -7,7 +7,8 @@ import pytest
 from posed_cones import ring
 
 from studio.errors import CalibrationError
-from studio.volume.tracking_space import Box, box_of, sees
+from studio.geometry.sight import sees
+from studio.volume.tracking_space import Box, box_of
 
 
 def test_the_box_stands_on_the_floor_in_the_common_view() -> None:

@@ -15,8 +15,13 @@ export async function accepted(answer) {
   throw fault(message, hint, { status: answer.status });
 }
 
+/** Whether this browser may only look: what changes something is refused, and the page does not offer it. */
+export const readOnly = document.documentElement.dataset.access === "view";
+const LOOKING = ["/api/scene/show", "/api/scene/view"];
+
 /** @param {RequestInit} [options] */
 async function call(method, path, body, options = {}) {
+  if (readOnly && method !== "GET" && !LOOKING.includes(path)) throw fault("This address is for looking: it changes nothing.", "Ask whoever started the studio for the other address that it printed.");
   /** @type {RequestInit} */
   const request = { method, headers: { "x-studio-window": windowName, ...(body === undefined ? {} : { "content-type": "application/json" }) }, ...options };
   if (body !== undefined) request.body = JSON.stringify(body);
@@ -45,3 +50,7 @@ export const putBytes = (path, bytes) => call("PUT", path, undefined, { body: by
 export const sessionPath = (session) => `/api/sessions/${encodeURIComponent(session)}`;
 /** @returns {`/api/sessions/${string}/runs/${string}`} */
 export const runPath = (session, run) => `/api/sessions/${encodeURIComponent(session)}/runs/${encodeURIComponent(run)}`;
+/** A view's numbers of a whole run. @returns {`/api/sessions/${string}/runs/${string}/views/${string}`} */
+export const runView = (session, run, view, query = "") => `${runPath(session, run)}/views/${view}${query && `?${query}`}`;
+/** A view's numbers of a frame. @returns {`/api/sessions/${string}/runs/${string}/frames/${string}/views/${string}`} */
+export const frameView = (session, run, frame, view, query = "") => `${runPath(session, run)}/frames/${frame}/views/${view}${query && `?${query}`}`;

@@ -3,6 +3,7 @@
 import { post } from "./api.js";
 import { bar, button, card, element, failure, field, files, fill, hint, lead, NAME, number, optional, pageHead, select, sends, table } from "./elements.js";
 import { isGoing, progressOf } from "./jobs.js";
+import { studioPath } from "./sessions.js";
 import { uploadFiles } from "./uploading.js";
 
 /** @type {[string, string][]} */
@@ -23,7 +24,7 @@ const knobGroups = (knobs) => [...Map.groupBy(knobs, (knob) => knob.group)].map(
 function runRows(sessions) {
   const rows = sessions.flatMap((session) => session.runs.filter((run) => run.done > 1).map((run) => {
     const source = `${session.name}/${run.name}`;
-    return [session.name, run.name, `${run.done} frames`, select(USES, "", { ariaLabel: `What ${source} is for`, dataset: { source } })];
+    return [session.name, element("a", { href: studioPath(session.name, run.name) }, run.name), `${run.done} frames`, select(USES, "", { ariaLabel: `What ${source} is for`, dataset: { source } })];
   }));
   if (!rows.length) return hint("No run has any frames yet.");
   return element("div", { className: "scrolls low-list" }, table(["session", "run", "", "use"], rows));

@@ -16,9 +16,10 @@ function redrawAll() { for (const view of views) if (view.canvas.isConnected) vi
 
 /** A canvas that shows one body; all of them are turned together by dragging, and by the arrow keys. */
 export class BodyDrawing {
-  /** shapes: {side, radius_start, radius_end} of every limb. points: all ends that are ever shown, for the scale. */
-  constructor(canvas, shapes, points) {
+  /** shapes: {side, radius_start, radius_end} of every limb. points: all ends that are ever shown, for the scale. lines: [from, to, colour] that stand behind. */
+  constructor(canvas, shapes, points, lines = []) {
     this.canvas = canvas;
+    this.lines = lines;
     this.shapes = shapes;
     this.reach = reachOf(points);
     this.limbs = null;
@@ -75,6 +76,7 @@ export class BodyDrawing {
       const [x, y, depth] = seen(point, this.reach.middle);
       return [width / 2 + scale * x, height / 2 - scale * y, depth];
     };
+    for (const [from, to, colour] of this.lines) drawLine(pen, place(from), place(to), token(colour));
     const limbs = this.limbs.map((ends, index) => ({ ...this.shapes[index], ends: ends.map(place) }));
     limbs.sort((one, two) => one.ends[0][2] + one.ends[1][2] - two.ends[0][2] - two.ends[1][2]);
     for (const limb of limbs) drawLimb(pen, limb, scale, this.reach.radius);
@@ -117,6 +119,15 @@ function drawLimb(pen, { side, ends: [near, far], radius_start, radius_end }, sc
   pen.arc(far[0], far[1], two, along - Math.PI / 2, along + Math.PI / 2);
   pen.closePath();
   pen.fill();
+  pen.stroke();
+}
+
+function drawLine(pen, from, to, colour) {
+  pen.strokeStyle = colour;
+  pen.lineWidth = 1;
+  pen.beginPath();
+  pen.moveTo(from[0], from[1]);
+  pen.lineTo(to[0], to[1]);
   pen.stroke();
 }
 

@@ -1,9 +1,10 @@
 // A calibration drawn: the cameras from above, findings, residuals.
 
-import { element, shape } from "./elements.js";
+import { dotted, element, shape } from "./elements.js";
 import { seriesColour, token } from "./theme.js";
 
 const PERSON_MM = 250;
+const ROOM_MM = 1500;       // cameras that stand closer together look at something smaller than a person
 const STEPS = [100, 250, 500, 1000, 2000, 5000, 10000, 20000, 50000];
 const ARROW = 16;
 const side = (across) => (Math.abs(across) < 0.4 ? "middle" : across < 0 ? "start" : "end");
@@ -11,7 +12,7 @@ const side = (across) => (Math.abs(across) < 0.4 ? "middle" : across < 0 ? "star
 /** A number with digits after the point; "–" for none. */
 export const plainNumbers = (value, digits = 1) => (value === null || value === undefined ? "–" : value.toFixed(digits));
 
-/** The cameras seen from above: where they look, how high they stand, the axes, a person for scale. */
+/** The cameras seen from above: where they look, how high they stand, the axes, a person for scale where there is room for one. */
 export function rigFromAbove(rig) {
   const [width, height, margin] = [620, 320, 46];
   const across = rig.cameras.map((camera) => camera.position[0]).concat(0);
@@ -42,13 +43,14 @@ export function rigFromAbove(rig) {
       shape("text", { x: x - ux * 10, y: y - uy * ARROW, "text-anchor": side(ux), class: "name" }, camera.name),
       shape("text", { x: x - ux * 10, y: y - uy * ARROW + 12, "text-anchor": side(ux), class: "quiet" }, `${(camera.position[2] / 1000).toFixed(2)} m high`)];
   });
-  const person = [shape("ellipse", { cx: ox, cy: oy, rx: Math.max(PERSON_MM * scale, 2), ry: Math.max(0.55 * PERSON_MM * scale, 1.2), class: "person" }, shape("title", {}, "A person for scale: shoulders 0.5 m wide")),
+  const isRoom = Math.max(right - left, high - low) >= ROOM_MM;
+  const person = !isRoom ? [] : [shape("ellipse", { cx: ox, cy: oy, rx: Math.max(PERSON_MM * scale, 2), ry: Math.max(0.55 * PERSON_MM * scale, 1.2), class: "person" }, shape("title", {}, "A person for scale: shoulders 0.5 m wide")),
     shape("circle", { cx: ox, cy: oy, r: Math.max(0.36 * PERSON_MM * scale, 1), class: "person" })];
   const bar = [shape("line", { x1: 14, x2: 14 + step * scale, y1: height - 12, y2: height - 12, class: "bar" }), shape("text", { x: 14, y: height - 18, class: "quiet" }, step >= 1000 ? `${step / 1000} m` : `${step} mm`)];
   const drawn = shape("svg", { viewBox: `0 0 ${width} ${height}`, class: "rig", role: "img", "aria-label": `${rig.cameras.length} cameras from above` },
     ...lines, ...person, ...axis(30, 0, "X", "x"), ...axis(0, -30, "Y", "y"), ...cameras, ...bar);
   return element("figure", { className: "picture rig-picture" }, drawn, element("figcaption", {}, element("b", {}, "From above"),
-    `${rig.floor ? `Floor: ${rig.floor}. ` : ""}The shape at the origin is a person's shoulders and head.`));
+    dotted(rig.floor && `Floor: ${rig.floor}`, isRoom && "the shape at the origin is a person's shoulders and head")));
 }
 
 /** The findings on a calibration, blocking ones first, each with its remedy. @param {{ findings?: any[] }} what */

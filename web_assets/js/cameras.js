@@ -1,51 +1,138 @@
 // The camera views side by side: picture under outlines, mask, edge map, sample points; a click enlarges one.
 
-import { fetchJson, post, runPath, sessionPath } from "./api.js";
+import { fetchJson, runPath, sessionPath } from "./api.js";
 import { openPicture } from "./dialogs.js";
-import { byId, check, element, fill, showPicture } from "./elements.js";
+import { button, byId, check, element, fill, showPicture } from "./elements.js";
 import { onEvent } from "./live.js";
 import { complain } from "./messages.js";
-import { get, watch } from "./state.js";
+import { comparedRuns } from "./selection.js";
+import { get, set, watch } from "./state.js";
+import { seriesColour } from "./theme.js";
 
 const panel = byId("panel-cameras");
-const LAYERS = [["outline", "outlines"], ["truth", "truth"], ["mask", "mask"], ["edges", "edge map"], ["samples", "sample points"], ["particles", "particles"]];
+/** @type {[string, string, string][]} */
+const LAYERS = [
+  ["outline", "outlines", "Bodies as outlines"], ["filled", "filled", "Bodies filled"], ["truth", "truth", "The reference as a stick figure"],
+  ["mask", "mask", "Red: only observed; blue: only the body; yellow: both"], ["edges", "edge map", "How strong an edge the search sees in each pixel"],
+  ["samples", "sample points", "The points that the likelihood reads"], ["cost", "cost", "The points that the likelihood reads, from cool (fits) to warm (costs most): (1 − p)² of edge map and mask"],
+  ["particles", "particles", "The particles of the frame's layers"],
+];
 const shown = new Set(JSON.parse(localStorage.getItem("overlays") ?? '["outline"]'));
 let cameras = [];
+let large = null;  // the camera whose picture is enlarged
 let age = 0;  // rises when a frame got another answer, so that its pictures are requested again
 
 /** A view's address: of the run's frame, or, before there is a run, the session's first picture. */
 function source(camera, height) {
   const place = get("run") ? `${runPath(get("session"), get("run"))}/frames/${get("frame")}` : `${sessionPath(get("session"))}/frames/0`;
-  return `${place}/views/${encodeURIComponent(camera.name)}.jpg?show=${[...shown].join(",")}&height=${height}${get("run") && get("track") !== "raw" ? `&track=${encodeURIComponent(get("track"))}` : ""}${age ? `&age=${age}` : ""}`;
+  const query = new URLSearchParams({ show: [...shown].join(","), height: String(height) });
+  if (get("run")) {
+    const outcome = get("outcome")?.frame === get("frame") ? get("outcome") : null;
+    if (get("track") !== "raw") query.set("track", get("track"));
+    if (outcome) query.set("beside", outcome.result.pose.map((value) => Number(value.toPrecision(7))).join(","));
+    if (comparedHere().some(Boolean)) query.set("compared", comparedHere().join(","));
+  }
+  if (age) query.set("age", String(age));
+  return `${place}/views/${encodeURIComponent(camera.name)}.jpg?${query}`;
 }
+
+/** The compared runs that the same cameras saw, those of this session; "" in the places of the others. @returns {string[]} */
+const comparedHere = () => comparedRuns().map((name) => (name.startsWith(`${get("session")}/`) ? name.split("/")[1] : ""));
 
 function refresh() {
   if (panel.hidden || !get("session") || (get("run") && get("frame") === null)) return;
-  for (const view of panel.querySelectorAll(".view")) showPicture(view.querySelector("img"), source(cameras[Number(view.dataset.at)], 400));
+  if (large && byId("dialog").open) showPicture(byId("dialog").querySelector("img"), source(large, LARGE_HEIGHT));
+  for (const view of panel.querySelectorAll(".view")) showPicture(view.querySelector("img"), source(cameras[Number(view.dataset.at)], isLarge ? LARGE_HEIGHT : 400));
+}
+
+const LARGE_HEIGHT = 1080;
+const MOST_ZOOM = 12;
+/** How all views are zoomed together: the share of a picture that stays in its place. */
+let zoom = { scale: 1, x: 0.5, y: 0.5 };
+const within = (share) => Math.max(0, Math.min(1, share));
+
+function showZoom() {
+  for (const view of /** @type {NodeListOf<HTMLElement>} */ (panel.querySelectorAll(".view"))) {
+    const image = view.querySelector("img");
+    image.style.transformOrigin = `${100 * zoom.x}% ${100 * zoom.y}%`;
+    image.style.transform = zoom.scale === 1 ? "" : `scale(${zoom.scale})`;
+    view.classList.toggle("chosen", cameras[Number(view.dataset.at)]?.name === get("camera"));
+  }
+}
+
+/** The wheel zooms all views about the place under the pointer; a zoomed view is dragged, and all move with it. */
+function takeWheel(event) {
+  const view = event.target.closest?.(".view");
+  if (!view) return;
+  event.preventDefault();
+  const box = view.getBoundingClientRect();
+  const scale = Math.max(1, Math.min(MOST_ZOOM, zoom.scale * Math.exp(-event.deltaY / 400)));
+  zoom = zoom.scale === 1 ? { scale, x: within((event.clientX - box.left) / box.width), y: within((event.clientY - box.top) / box.height) } : { ...zoom, scale };
+  if (scale > 1 && event.deltaY < 0) ask(true);
+  showZoom();
+}
+
+/** Larger pictures for a zoomed view. */
+function ask(large) {
+  if (isLarge === large) return;
+  isLarge = large;
+  refresh();
+}
+
+function takeDrag(begin) {
+  const view = begin.target.closest?.(".view");
+  if (!view || zoom.scale === 1) return;
+  const box = view.getBoundingClientRect();
+  const from = { ...zoom };
+  const move = (event) => {
+    const by = [event.clientX - begin.clientX, event.clientY - begin.clientY];
+    if (Math.hypot(...by) > 3) isDragged = true;
+    zoom = { ...from, x: within(from.x - by[0] / (box.width * (zoom.scale - 1))), y: within(from.y - by[1] / (box.height * (zoom.scale - 1))) };
+    showZoom();
+  };
+  const end = () => { removeEventListener("pointermove", move); removeEventListener("pointerup", end); setTimeout(() => { isDragged = false; }); };
+  addEventListener("pointermove", move);
+  addEventListener("pointerup", end);
+}
+let isDragged = false;
+let isLarge = false;
+
+/** One picture as large as the window allows; it follows the timeline, whose keys go on working. */
+function enlarge(camera) {
+  large = camera;
+  openPicture(camera.name, source(camera, LARGE_HEIGHT));
+  byId("dialog").addEventListener("close", () => { large = null; }, { once: true });
+}
+
+/** Which colour is whose, where several bodies are drawn. */
+function runColours() {
+  const names = comparedHere();
+  return names.some(Boolean) && element("span", { className: "run-colours" }, [get("run"), ...names].map((name, at) => name && element("span", {}, element("i", { className: "swatch", style: `background: ${seriesColour(at)}` }), name)));
 }
 
 function build() {
-  fill(panel, cameras.map((camera, at) => element("button", { className: "view", title: "Enlarge", dataset: { at }, onclick: () => openPicture(camera.name, source(camera, 1080)) },
+  fill(panel, cameras.map((camera, at) => element("button", { className: "view", title: "Click: enlarge. Wheel: zoom all views; drag: move them", draggable: false, dataset: { at }, onclick: () => { if (!isDragged) enlarge(camera); } },
     element("img", { alt: `View of ${camera.name}` }), element("span", { className: "caption" }, `${at + 1} ${camera.name}`),
     camera.quarter_turns > 0 && element("span", { className: "turn" }, `↻ ${camera.quarter_turns * 90}°`))));
+  showZoom();
   refresh();
 }
 
 /** Look through camera number `at` in the scene; null for the free view. */
 export function lookThrough(at) {
   if (at !== null && !cameras[at]) return;
-  post("/api/scene/view", { look_through: at === null ? "" : cameras[at].name }).catch(complain);
+  set({ through: at === null ? null : cameras[at].name });
 }
 
 /** The check boxes that stand in the tab line while this panel is open. */
 export function cameraTools() {
-  return LAYERS.map(([name, label]) => check(label, {
+  return [runColours(), button("Whole pictures", () => { zoom = { scale: 1, x: 0.5, y: 0.5 }; ask(false); showZoom(); }, "quiet small", { title: "No longer zoomed" }), ...LAYERS.map(([name, label, title]) => check(label, {
     checked: shown.has(name), onchange: ({ target }) => {
       if (target.checked) shown.add(name); else shown.delete(name);
       localStorage.setItem("overlays", JSON.stringify([...shown]));
       refresh();
     },
-  }));
+  }, title))];
 }
 
 /** Wire the views to the state. */
@@ -57,10 +144,13 @@ export function startCameras() {
     }
     build();
   });
-  watch(["frame", "run", "summary", "track"], refresh);
+  watch(["frame", "run", "summary", "track", "outcome", "compared"], refresh);
   onEvent("frame", (event, here) => {
     const seen = get("summary")?.frames.at(-1)?.frame ?? -1;
     if (here && !event.reannealed && event.frame <= seen) { age += 1; refresh(); }
   });
+  watch(["camera"], showZoom);
+  panel.addEventListener("wheel", takeWheel, { passive: false });
+  panel.addEventListener("pointerdown", takeDrag);
   document.addEventListener("panel", refresh);
 }

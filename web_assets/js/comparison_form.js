@@ -64,12 +64,12 @@ function candidates({ entrants, weightings, lineups }, changed) {
   return { list, more, lineUp, fill: replace, count: () => rows.length, read: () => rows.map((row) => row.read()) };
 }
 
-/** Show the form in `content`. initial: what it is filled with, as the API takes it. started: called with the line of what was begun. */
-export function showForm(content, { sessions, choices, bodies, initial, started }) {
+/** Show the form in `content`. initial: what it is filled with, as the API takes it. started: called with the line of what was begun. instead: what leads to the other form. */
+export function showForm(content, { sessions, choices, bodies, initial, started, instead }) {
   const able = sessions.filter((one) => one.has_truth && !one.problem);
   if (!able.length) {
     return fill(content, nothing("No session with a truth",
-      element("p", {}, "Trackers are compared by their distance from true markers. Import a session with truth/*.trc, open the bundled walk in the studio, or render footage:"), element("code", {}, "studio synthesize walk")));
+      element("p", {}, "Trackers are compared by their distance from true markers. Import a session with truth/*.trc, open the bundled walk in the studio, or render footage:"), element("code", {}, "studio synthesize walk"), instead));
   }
   const chosen = able.find((one) => one.name === initial.session) ?? able[0];
   const sum = element("span", { className: "hint" });
@@ -119,5 +119,5 @@ export function showForm(content, { sessions, choices, bodies, initial, started 
   rows.fill(initial.trackers ?? USUAL.filter((name) => known.has(name)).map((name) => ({ name })));
   takeSession();
   fill(content, element("div", { className: "column" },
-    pageHead("Compare trackers", "Same evidence, likelihood, start and seeds, and as many poses evaluated in every frame: only the search differs. Errors are measured against the session's truth."), form));
+    pageHead("Compare trackers", "Same evidence, likelihood, start and seeds, and as many poses evaluated in every frame: only the search differs. Errors are measured against the session's truth.", instead), form));
 }

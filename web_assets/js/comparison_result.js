@@ -1,9 +1,11 @@
 // One comparison: its progress, or its result: table, error curves, sign tests, settings.
 
 import * as echarts from "../vendor/echarts.esm.min.js";
-import { bar, button, card, dotted, duration, element, fill, hint, lead, pageHead, spring, table } from "./elements.js";
+import { bar, button, card, dotted, duration, element, fill, hint, lead, optional, pageHead, spring, table } from "./elements.js";
 import { drawChart } from "./findings_charts.js";
 import { GOING } from "./jobs.js";
+import { studioPath } from "./sessions.js";
+import { showSweep } from "./sweep_result.js";
 import { seriesColour } from "./theme.js";
 
 /** @import { Schemas } from "./api_types" */
@@ -30,12 +32,23 @@ const swatch = (names, name) => element("i", { className: "swatch", style: `back
 export const badge = (status) => element("span", { className: `badge ${BADGES[status] ?? "calm"}` }, status);
 
 /** How many poses and seeds a comparison takes. */
-export const sizeWords = (line) => dotted(`${line.trackers.length} trackers`, `${line.evaluations} poses`, seedWords(line.seeds));
+export const sizeWords = (line) => (isSweep(line) ? dotted(Object.entries(line.vary).map(([name, values]) => `${name} × ${values.length}`).join(", "), seedWords(line.seeds)) : comparedWords(line));
+/** Whether it is a sweep of knobs. */
+export const isSweep = (line) => Object.keys(line.vary ?? {}).length > 0;
+const comparedWords = (line) => dotted(`${line.trackers.length} trackers`, `${line.evaluations} poses`, seedWords(line.seeds));
 
-/** Show a comparison in `content`. actions: {cancel, resume, again, remove}. @param {Schemas["ComparisonDetail"]} detail */
+/** Show a comparison in `content`. actions: {cancel, resume, again, remove, look, show}. @param {Schemas["ComparisonDetail"]} detail */
 export function showComparison(content, detail, actions) {
   clearComparison();
-  fill(content, element("div", { className: "column findings" }, head(detail, actions), detail.result ? results(detail.result) : progressBox(detail.comparison, actions), settingsBox(detail)));
+  if (isSweep(detail.comparison)) {
+    const place = element("div", { className: "column findings sweep" });
+    fill(content, place);
+    const shown = optional();
+    if (detail.result) showSweep(shown, detail);
+    fill(place, head(detail, actions), detail.result ? [...shown.children] : progressBox(detail.comparison, actions));
+    return;
+  }
+  fill(content, element("div", { className: "column findings" }, head(detail, actions), detail.result ? results(detail, actions) : progressBox(detail.comparison, actions), settingsBox(detail)));
 }
 
 /** What of a running comparison changes from second to second. */
@@ -52,15 +65,15 @@ export const shareOf = (line) => line.done / Math.max(1, line.total);
 function head({ comparison: line, fps }, actions) {
   const path = `/api/comparisons/${encodeURIComponent(line.session)}/${encodeURIComponent(line.name)}`;
   const download = (words, file) => line.status === "done" && element("a", { className: "download", href: `${path}/${file}`, download: "" }, words);
-  return pageHead(`${line.trackers.join(", ")} on ${line.session}`,
-    dotted(line.name, `${line.evaluations} evaluations a frame`, `${seedWords(line.seeds)} each`, `frames ${line.first} to ${line.last - 1} at ${fps} per second`, line.created.slice(0, 16).replace("T", " ")),
+  return pageHead(`${isSweep(line) ? `Sweep of ${Object.keys(line.vary).join(", ")}` : line.trackers.join(", ")} on ${line.session}`,
+    dotted(line.name, isSweep(line) ? `${line.total} runs` : `${line.evaluations} evaluations a frame`, `${seedWords(line.seeds)} each`, `frames ${line.first} to ${line.last - 1} at ${fps} per second`, line.created.slice(0, 16).replace("T", " ")),
     element("div", { className: "group" }, download("JSON", "result.json"), download("CSV", "frames.csv"), button("Again…", actions.again), !isGoing(line) && button("Delete…", actions.remove, "quiet")));
 }
 
 function progressWords(line) {
   if (line.status === "cancelling") return "Cancelling; finished trials stay.";
   const left = line.seconds_left === null ? (line.done ? "" : ", the first ones read the footage") : `, about ${duration(line.seconds_left)} left`;
-  return dotted(`${line.done} of ${line.total} trials${left}`, line.step && `last: ${line.step}`);
+  return dotted(`${line.done} of ${line.total} ${isSweep(line) ? "runs" : "trials"}${left}`, line.step && `last: ${line.step}`);
 }
 
 function progressBox(line, actions) {
@@ -74,15 +87,30 @@ function progressBox(line, actions) {
   bar(shareOf(line), "long-progress"), !going && hint(`${line.done} of ${line.total} trials are done.`));
 }
 
-function results(result) {
+function results({ result, trials }, actions) {
   const [curves, seeds] = result.findings.charts;
   const nearer = card("Which is nearer", signTests(result));
-  return [card("", element("div", { className: "scrolls" }, figures(result))), card("", drawn(curves)), element("section", { className: "pair" }, nearer, card("", drawn(seeds)))];
+  const several = result.seeds.length > 1;
+  const overFrames = (name, at) => actions.show(trials.find((trial) => name === (several ? `${trial.tracker}, seed ${trial.seed}` : trial.tracker)), result.per_frame.frames[at]);
+  const overSeeds = (name, at) => actions.show(trials.find((trial) => name === trial.tracker && trial.seed === result.seeds[at]));
+  return [card("", element("div", { className: "scrolls" }, figures(result))), card("", drawn(curves, overFrames)), element("section", { className: "pair" }, nearer, card("", drawn(seeds, overSeeds))), trialsCard(trials, actions)];
 }
 
-function drawn(chart) {
+/** Every trial, with its worst frame: the run of it, which is tracked again with the same settings and seed where it is not stored. */
+function trialsCard(trials, { session, look }) {
+  const names = [...new Set(trials.map((trial) => trial.tracker))];
+  const frameOf = (trial) => (trial.run
+    ? element("a", { href: studioPath(session, trial.run, { frame: trial.worst_frame, panel: "why" }) }, `frame ${trial.worst_frame}`)
+    : button(`Track again, show frame ${trial.worst_frame}`, () => look(trial), "quiet small", { dataset: { trial: `${trial.tracker} ${trial.seed}` }, ariaLabel: `Track ${trial.tracker} with seed ${trial.seed} again and show frame ${trial.worst_frame}` }));
+  return card("Trials", hint("A trial keeps its errors only. Tracked again as a run of the session, with the same settings and seed, it can be looked into. A click on a curve or a bar above leads to its trial."),
+    element("div", { className: "scrolls" }, table(["Tracker", "Seed", "Mean error", "Worst frame", "Frames with a limb lost", "Look into its worst frame"], trials.map((trial) => [
+      element("td", {}, swatch(names, trial.tracker), trial.tracker), trial.seed, `${millimetres(trial.mean_mm)} mm`, `${millimetres(trial.worst_mm)} mm`, trial.lost_frames, element("td", { className: "look" }, frameOf(trial)),
+    ]), "figures trials")));
+}
+
+function drawn(chart, choose) {
   const figure = element("figure", {});
-  disposals.push(drawChart(figure, chart, echarts));
+  disposals.push(drawChart(figure, chart, echarts, choose));
   return figure;
 }
 

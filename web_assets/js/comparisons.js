@@ -2,10 +2,12 @@
 
 import { fetchJson, post, remove } from "./api.js";
 import { showForm } from "./comparison_form.js";
-import { badge, clearComparison, isGoing, shareOf, showComparison, sizeWords, updateProgress } from "./comparison_result.js";
+import { badge, clearComparison, isGoing, isSweep, shareOf, showComparison, sizeWords, updateProgress } from "./comparison_result.js";
 import { openForm } from "./dialogs.js";
-import { bar, byId, element, fill } from "./elements.js";
+import { bar, button, byId, element, fill } from "./elements.js";
 import { complain } from "./messages.js";
+import { studioPath } from "./sessions.js";
+import { showSweepForm } from "./sweep_form.js";
 import { onTheme, startTheme } from "./theme.js";
 
 /** @import { Schemas } from "./api_types" */
@@ -22,7 +24,7 @@ let open = null;       // {session, name} of the shown one, null while the form 
 let detail = null;
 /** @type {Schemas["ComparisonChoices"]} */
 let choices = null;
-let bodies = [];
+let [bodies, trackers, weightings] = [[], [], []];
 let timer = 0;
 
 /** @returns {`/api/comparisons/${string}/${string}`} */
@@ -36,7 +38,7 @@ async function refresh() {
 }
 
 function entryOf(line) {
-  const mark = line.status === "done" && line.best ? element("span", { className: "mark", title: line.best }, `${line.best_mm.toFixed(1)} mm`) : element("span", { className: "mark" }, badge(line.status));
+  const mark = line.status === "done" && line.best ? element("span", { className: "mark", title: line.best }, line.best_mm === null ? "done" : `${line.best_mm.toFixed(1)} mm`) : element("span", { className: "mark" }, badge(line.status));
   const row = element("button", { type: "button", className: "entry", title: line.trackers.join(", "), dataset: { key: `${line.session}/${line.name}` }, onclick: () => openComparison(line).catch(complain) },
     element("span", { className: "name" }, line.name), mark, element("span", { className: "facts" }, sizeWords(line)), isGoing(line) && bar(shareOf(line)));
   if (same(line, open)) row.ariaCurrent = "true";
@@ -61,8 +63,22 @@ async function openComparison({ session, name }) {
 function show() {
   showComparison(content, detail, {
     cancel: () => act(() => post(`${pathOf(open)}/cancel`)), resume: () => act(() => post(`${pathOf(open)}/resume`)),
-    again: () => openNew(initialLike(detail)), remove: () => removeForm(detail.comparison),
+    again: () => (isSweep(detail.comparison) ? openNewSweep(sweepLike(detail)) : openNew(initialLike(detail))), remove: () => removeForm(detail.comparison), session: open.session, look, show: showTrial,
   });
+}
+
+/** Open the run of a trial at its worst frame. @param {Schemas["TrialLine"]} trial */
+async function look(trial) {
+  try {
+    const { session, run } = await post(`${pathOf(open)}/trials`, { tracker: trial.tracker, seed: trial.seed });
+    location.href = studioPath(session, run, { frame: trial.worst_frame, panel: "why" });
+  } catch (error) { complain(error); }
+}
+
+/** Go to the run of a trial; where there is none, to the button that makes it. @param {Schemas["TrialLine"]} trial */
+function showTrial(trial, frame = trial.worst_frame) {
+  if (trial.run) location.href = studioPath(open.session, trial.run, { frame, panel: "why" });
+  else content.querySelector(`[data-trial="${CSS.escape(`${trial.tracker} ${trial.seed}`)}"]`).focus();
 }
 
 async function act(doing) {
@@ -75,9 +91,10 @@ async function act(doing) {
 
 function removeForm(line) {
   openForm({
-    heading: `Delete ${line.name}?`, action: "Delete", danger: true, rows: [], intro: "It goes to the trash of the studio, where it can be restored.",
-    send: async () => {
-      await remove(pathOf(line));
+    heading: `Delete ${line.name}?`, action: "Delete", danger: true, intro: "It goes to the trash of the studio, where it can be restored.",
+    rows: isSweep(line) ? [[{ name: "runs", kind: "check", label: "its runs, too" }]] : [],
+    send: async (values) => {
+      await remove(`${pathOf(line)}${values.runs ? "?runs=true" : ""}`);
       open = null;
       await refresh();
       if (lines.length) await openComparison(lines.find((one) => one.session === line.session) ?? lines[0]);
@@ -101,13 +118,34 @@ function initialLike({ comparison: line, settings, body }) {
   return { session: line.session, trackers, evaluations: line.evaluations, seeds: line.seeds, weighting: common, body, first: line.first, last: line.last, layers };
 }
 
-function openNew(initial) {
+/** What the form has to be filled with to sweep the same again. @param {Schemas["ComparisonDetail"]} detail */
+function sweepLike({ comparison: line, settings, body, behaviour, fit_shape }) {
+  const [{ weighting, ...knobs }] = Object.values(settings);
+  const fixed = Object.entries(knobs).filter(([name]) => !(name in line.vary)).map(([name, value]) => `${name}=${value}`).join(", ");
+  const vary = Object.fromEntries(Object.entries(line.vary).map(([name, values]) => [name, values.join(", ")]));
+  return { session: line.session, tracker: line.tracker, weighting, vary, fixed, seeds: line.seeds, first: line.first, last: line.last, body, behaviour, fit_shape };
+}
+
+/** Take away what is shown, for a form. */
+function clearForForm(kind, initial, title) {
   clearTimeout(timer);
   clearComparison();
   open = detail = null;
-  address({ new: "", ...(initial.session ? { session: initial.session } : {}) });
-  document.title = "New comparison · Capture studio";
-  showForm(content, { sessions, choices, bodies, initial, started: (line) => { refresh().then(() => openComparison(line)).catch(complain); } });
+  address({ new: kind, ...(initial.session ? { session: initial.session } : {}) });
+  document.title = `${title} · Capture studio`;
+}
+
+const started = (line) => { refresh().then(() => openComparison(line)).catch(complain); };
+
+function openNew(initial) {
+  clearForForm("", initial, "New comparison");
+  showForm(content, { sessions, choices, bodies, initial, started, instead: button("Sweep knobs instead…", () => openNewSweep({ session: initial.session })) });
+  drawList();
+}
+
+function openNewSweep(initial) {
+  clearForForm("sweep", initial, "New sweep");
+  showSweepForm(content, { sessions, trackers, weightings, initial, started, instead: button("Compare trackers instead…", () => openNew({ session: initial.session })) }).catch(complain);
   drawList();
 }
 
@@ -132,12 +170,13 @@ async function start() {
   byId("new").onclick = () => openNew({ session: open?.session });
   try {
     const [listed, known, made] = await Promise.all([fetchJson("/api/sessions"), fetchJson("/api/choices"), fetchJson("/api/comparisons/choices")]);
-    [sessions, bodies, choices] = [listed.sessions, known.bodies, made];
+    [sessions, bodies, trackers, weightings, choices] = [listed.sessions, known.bodies, known.trackers, known.weightings, made];
     await refresh();
     const query = new URLSearchParams(location.search);
     const wanted = lines.find((line) => line.session === query.get("session") && line.name === query.get("name"));
     const newest = lines.find((line) => line.session === query.get("session")) ?? lines[0];
-    if (query.has("new") || !newest) openNew({ session: query.get("session") ?? undefined });
+    if (query.get("new") === "sweep") openNewSweep({ session: query.get("session") ?? undefined });
+    else if (query.has("new") || !newest) openNew({ session: query.get("session") ?? undefined });
     else await openComparison(wanted ?? newest);
   } catch (error) { complain(error); }
 }

@@ -7,12 +7,14 @@ import { paced } from "./pacing.js";
 import { dressScene } from "./scene_window.js";
 import { isWatched } from "./header.js";
 import { refreshSessions } from "./sessions.js";
+import { goTo } from "./selection.js";
 import { get, set, watch } from "./state.js";
 
 const SUMMARY_MILLISECONDS = 1500;
 const DETAIL_MILLISECONDS = 80;
 const SCENE_MILLISECONDS = 33;
 const SESSIONS_MILLISECONDS = 800;
+const MOVED_MILLISECONDS = 250;
 // A frame that takes longer than this is shown layer by layer while it is searched, quicker ones when they are done;
 // a search that is slowed to be watched is shown layer by layer always.
 const PATIENCE_MILLISECONDS = 700;
@@ -24,6 +26,7 @@ let arrived = [];      // lines of frames that finished since the summary was la
 let layers = [];       // of the frame that is being searched
 let drawnAt = 0;       // when live layers were last shown
 let scene = {};        // what the scene last showed
+let isAnew = true;     // whether the page was loaded since: a frame that was annealed again before is not shown on it
 
 /** The run's frames; those that finish while the answer is on its way are kept. */
 async function loadSummary() {
@@ -37,8 +40,10 @@ async function loadSummary() {
     const last = summary.frames.at(-1)?.frame ?? -1;
     summary.frames.push(...arrived.filter((line) => line.frame > last));
     const newest = summary.frames.at(-1)?.frame ?? null;
-    const frame = get("frame") === null || (get("follow") && searching()) ? newest : get("frame");
-    set({ summary, frame });
+    set({ summary, frame: get("frame") === null || (get("follow") && searching()) ? newest : get("frame") });
+    // An address may name a frame that is not tracked.
+    const known = summary.frames.some((line) => line.frame === get("frame")) || get("detail")?.frame === get("frame");
+    if (summary.frames.length && !known && !searching()) goTo(get("frame"));
   } catch (error) { complain(error); }
 }
 
@@ -53,6 +58,18 @@ async function loadRun() {
   } catch (error) { complain(error); }
 }
 
+/** The knobs that were moved in this run, wherever that was, and that no stored frame uses. */
+async function loadMoved() {
+  const [session, run] = [get("session"), get("run")];
+  if (!run) return set({ moved: null });
+  try {
+    const { moved, values, knobs } = await fetchJson(`${runPath(session, run)}/settings`);
+    if (!isShown(session, run)) return;
+    const named = knobs.filter((knob) => knob.name in moved);
+    set({ moved: named.map(({ name, label, unit }) => ({ label: unit ? `${label} (${unit})` : label, before: values[name], after: moved[name] })) });
+  } catch (error) { complain(error); }
+}
+
 /** The shown frame's layers, unless they came with the events. */
 async function loadDetail() {
   const [session, run, frame] = [get("session"), get("run"), get("frame")];
@@ -64,27 +81,37 @@ async function loadDetail() {
   } catch (error) { if (error.status !== 404) complain(error); }
 }
 
+/** What the page shows, as the scene takes it. */
+const shownNow = (frame) => ({
+  session: get("session"), run: get("run"), frame, layer: get("layer"), follow: get("follow"), limb: get("limb"), parameter: get("parameter"),
+  particle: get("particle"), camera: get("camera"), look_through: get("through"), eye: get("eye"),
+});
+
+/** The six numbers of a place in the scene, from the text that the address holds. */
+const eyeOf = (text) => text?.split(",").map(Number) ?? null;
+
 /** Move the scene to what the page shows. While a search is followed the scene follows it by itself. */
 async function showInScene() {
-  const [session, run, layer] = [get("session"), get("run"), get("layer")];
-  if (!session) return;
-  const follow = get("follow") && searching();
-  const frame = follow ? null : get("frame");
-  const shown = { session, run, layer, frame, follow: get("follow") };
+  if (!get("session")) return;
+  const shown = shownNow(get("follow") && searching() ? null : get("frame"));
   if (Object.keys(shown).every((name) => shown[name] === scene[name])) return;
   scene = shown;
-  await post("/api/scene/show", shown).catch(complain);
+  const discard = isAnew;
+  isAnew = false;
+  await post("/api/scene/show", { ...shown, eye: eyeOf(shown.eye), discard }).catch(complain);
 }
 
 /** The scene's own controls moved, or it plays: follow them, without sending the change back. */
 function takeScene(event) {
   if (!isShown(event.session, event.run)) return;
-  if (event.follow && get("follow") && searching()) return;
+  const chosen = { limb: event.limb, parameter: event.parameter, camera: event.camera, through: event.look_through, eye: event.eye?.join(",") ?? null };
+  Object.assign(scene, chosen, { look_through: event.look_through });
+  if (event.follow && get("follow") && searching()) return set(chosen);
   const stored = get("summary")?.frames.some((line) => line.frame === event.frame);
   /** @type {Record<string, any>} */
-  const changes = { layer: event.layer, follow: event.follow, ...(stored ? { frame: event.frame } : {}) };
-  scene = { session: event.session, run: event.run, layer: event.layer, frame: stored ? event.frame : scene.frame, follow: event.follow };
+  const changes = { ...chosen, layer: event.layer, particle: event.particle, follow: event.follow, ...(stored ? { frame: event.frame } : {}) };
   if (stored && event.frame !== get("frame") && get("whatIf")) changes.whatIf = null;
+  scene = { ...scene, session: event.session, run: event.run, layer: event.layer, particle: event.particle, frame: stored ? event.frame : scene.frame, follow: event.follow };
   set(changes);
 }
 
@@ -131,7 +158,7 @@ function takeRest(work) {
   if (inside && get("follow") && !get("whatIf")) showLive(work.frame, false);
 }
 
-/** How many layers a frame takes with these settings, null where one says so itself (studio/tracking/partitions.py). */
+/** How many layers a frame takes with these settings, null where one says so itself (studio/trackers/partitions.py). */
 function layersOf(values) {
   if (values.layers) return values.layers;
   if (!values.stage1_iterations) return null;
@@ -146,12 +173,13 @@ export function startData() {
   const summaryLater = paced(loadSummary, SUMMARY_MILLISECONDS);
   const detailLater = paced(loadDetail, DETAIL_MILLISECONDS);
   const sceneLater = paced(showInScene, SCENE_MILLISECONDS);
+  const movedLater = paced(loadMoved, MOVED_MILLISECONDS);
   const sessionsLater = paced(refreshSessions, SESSIONS_MILLISECONDS);
-  watch(["session", "run"], () => { loadRun(); loadSummary(); });
+  watch(["session", "run"], () => { loadRun(); loadSummary(); movedLater(); });
   let shownTrack = get("track");
   watch(["track"], () => { if (get("track") !== shownTrack) { shownTrack = get("track"); if (get("summary")) loadSummary(); } });
   watch(["session", "run", "frame"], detailLater);
-  watch(["session", "run", "frame", "layer", "follow"], sceneLater);
+  watch(["session", "run", "frame", "layer", "follow", "limb", "parameter", "particle", "camera", "through", "eye"], sceneLater);
   onEvent("frame", (event, here) => {
     if (!here || event.reannealed) return;
     takeFrame(event);
@@ -159,7 +187,7 @@ export function startData() {
     summaryLater();
   });
   onEvent("layer", (event, here) => { if (here) takeLayer(event); });
-  onEvent("settings", (event, here) => { if (here) set({ settings: event, layerCount: layersOf(event.values) }); });
+  onEvent("settings", (event, here) => { if (here) { set({ settings: event, layerCount: layersOf(event.values) }); movedLater(); } });
   onEvent("state", (event, here) => {
     if (here && !searching()) { takeRest(event); summaryLater(); sceneLater(); }
     if (event.state !== "tracking") sessionsLater();
@@ -168,7 +196,7 @@ export function startData() {
   onEvent("scene", takeScene);
   let before = false;
   watch(["connected"], () => {
-    if (get("connected") && before) { scene = {}; dressScene(); sceneLater(); sessionsLater(); summaryLater(); }
+    if (get("connected") && before) { scene = {}; dressScene(); sceneLater(); sessionsLater(); summaryLater(); movedLater(); }
     before ||= get("connected");
   });
 }

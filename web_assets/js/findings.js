@@ -5,7 +5,7 @@ import { duration, element, shape } from "./elements.js";
 import { drawChart } from "./findings_charts.js";
 import { figures } from "./findings_options.js";
 
-const SIGNS = { reproduced: "✓", better: "▲", "not reproduced": "✕", answered: "●", failed: "!" };
+const SIGNS = { reproduced: "✓", better: "▲", undecided: "?", "not reproduced": "✕", answered: "●", failed: "!" };
 const FOLDED_ROWS = 14;
 const WIDE_COLUMNS = 9;
 
@@ -130,7 +130,7 @@ function numbers(experiment) {
     element("td", { className: "number" }, figures(number).paper),
     element("td", { className: "picture" }, whisker(number)),
     element("td", { className: "number" }, String(number.seeds)),
-    element("td", {}, number.paper === null && number.verdict === "answered" ? "" : badge(number.verdict, number.firm)),
+    element("td", {}, number.verdict === "answered" ? "" : badge(number.verdict, number.firm)),
   ));
   return element("div", { className: "findings-scroll" }, element("table", { className: "findings-numbers" },
     element("thead", {}, head(["number", "ours", "95 % interval", "paper", "", "seeds", "verdict"], [1, 2, 3, 5])), element("tbody", {}, ...rows)));

@@ -55,7 +55,7 @@ export function legendEntries(chart) {
 }
 
 /** The legend entry that shows and hides a series: a thin one goes with the thick one of its group. */
-function legendName(chart, series) {
+export function legendName(chart, series) {
   if (!series.thin) return series.name;
   return chart.series.find((other) => !other.thin && !other.dashed && groupOf(other) === groupOf(series))?.name ?? groupOf(series);
 }

@@ -32,7 +32,7 @@ function stateLine(work) {
   const parts = [WORDS[work.state] ?? work.state];
   if (work.live) return liveLine(work, parts[0]);
   if (work.state === "tracking" && work.frames_per_second) parts[0] += ` ${work.frames_per_second.toPrecision(2)} fps`;
-  if (["tracking", "paused", "reannealing", "lost"].includes(work.state)) parts.push(`frame ${work.frame}/${work.last - 1}`);
+  if (["tracking", "paused", "reannealing", "lost"].includes(work.state)) parts.push(`${work.done} of ${work.last - work.first} frames`);
   if (work.state === "paused" && work.layer > 0) parts.push(`layer ${work.layer}`);
   if (work.state === "tracking" && work.seconds_left !== null) parts.push(`ETA ${clock(work.seconds_left)}`);
   return parts.join(" · ");

@@ -6,8 +6,10 @@ import { byId } from "./elements.js";
 import { reanneal } from "./header.js";
 import { togglePlay, toggleLoop } from "./playback.js";
 import { enterScene } from "./scene_frame.js";
+import { goTo, stepLayer } from "./selection.js";
 import { get } from "./state.js";
-import { goTo, goToMark, stepLayer } from "./timeline.js";
+import { goToMark } from "./timeline.js";
+import { stepParameter, stepView, toggleTable } from "./views.js";
 
 /** @type {[string, string, (event: KeyboardEvent) => boolean, (event: KeyboardEvent) => void][]} */
 const KEYS = [
@@ -18,14 +20,18 @@ const KEYS = [
   ["Shift →", "next layer", (event) => event.key === "ArrowRight" && event.shiftKey, () => stepLayer(1)],
   ["Home", "first frame", (event) => event.key === "Home", () => goTo(-Infinity)],
   ["End", "last frame", (event) => event.key === "End", () => goTo(Infinity)],
-  ["n", "next mark: lost, a limb lost, no evidence, recovered, corrected", (event) => event.key === "n", () => goToMark(1)],
+  ["n", "next mark of the timeline: search lost, a limb off, limb lost (truth), no evidence, found again, corrected", (event) => event.key === "n", () => goToMark(1)],
   ["p", "mark before", (event) => event.key === "p", () => goToMark(-1)],
   ["1 – 9", "look through a camera", (event) => /^[1-9]$/.test(event.key), (event) => lookThrough(Number(event.key) - 1)],
   ["0", "free view", (event) => event.key === "0", () => lookThrough(null)],
+  ["v", "next view; Shift v the one before", (event) => event.key.toLowerCase() === "v", (event) => stepView(event.shiftKey ? -1 : 1)],
+  ["[ ]", "parameter before, next parameter", (event) => event.key === "[" || event.key === "]", (event) => stepParameter(event.key === "]" ? 1 : -1)],
+  ["t", "the view's numbers as a table, or its drawing", (event) => event.key === "t", toggleTable],
   ["r", "anneal this frame again", (event) => event.key === "r", reanneal],
   ["c", "correct this frame by hand", (event) => event.key === "c", () => byId("correct").click()],
   ["l", "loop", (event) => event.key === "l", toggleLoop],
   ["s", "into the scene's panel; Escape leads back", (event) => event.key === "s", () => enterScene()],
+  ["Ctrl K", "find a view, a panel, a command", () => false, () => {}],
   ["?", "this list", (event) => event.key === "?", () => showKeys()],
 ];
 
@@ -34,7 +40,7 @@ function showKeys() {
 }
 
 // What needs all keys for itself, and what needs the arrows only up and down or not at all.
-const TYPING = "input:not([type=checkbox]), textarea, dialog, [role=slider]:not(#track), [role=menu], [role=tab]";
+const TYPING = "input:not([type=checkbox]), textarea, dialog:not(.large-view), [role=slider]:not(#track), [role=menu], [role=tab]";
 const CHOOSING = "select, input[type=checkbox]";
 
 /** Do what a key says; typing in a field and holding control are left alone. */
@@ -48,6 +54,10 @@ export function takeKey(event) {
   event.preventDefault();
   found[3](event);
 }
+
+/** What single keys do, for the command palette: the key, its words, and what it does. @returns {[string, string, () => void][]} */
+export const commands = () => KEYS.filter(([key]) => key.length === 1 && !/[?sv]/.test(key) || ["Space", "Home", "End"].includes(key))
+  .map(([key, words, , act]) => [key, words, () => act(new KeyboardEvent("keydown", { key: key === "Space" ? " " : key }))]);
 
 /** Listen on the page. */
 export function startKeys() {

@@ -1,8 +1,8 @@
 // Playing what is stored: play, pause, speed, loop, first, last.
 
 import { byId } from "./elements.js";
+import { goTo } from "./selection.js";
 import { get, set, watch } from "./state.js";
-import { goTo } from "./timeline.js";
 
 const button = byId("play");
 const loop = byId("loop");

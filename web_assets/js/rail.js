@@ -2,12 +2,13 @@
 
 import { fetchJson, patch, post, remove, runPath, sessionPath } from "./api.js";
 import { figure } from "./chart_looks.js";
+import { compareForm } from "./comparing.js";
 import { openForm, openMenu } from "./dialogs.js";
 import { button, byId, element, fill, NAME } from "./elements.js";
 import { importForm } from "./importing.js";
 import { complain, say } from "./messages.js";
 import { newRunForm } from "./new_run.js";
-import { lacks, openSession, refreshSessions, setupPath } from "./sessions.js";
+import { lacks, openSession, refreshSessions, setupPath, studioPath } from "./sessions.js";
 import { startPoseForm } from "./start_pose.js";
 import { get, watch } from "./state.js";
 import { showPanel } from "./tabs.js";
@@ -77,6 +78,7 @@ function sessionMenu(opener, entry) {
     ["Guided set-up", () => go(setupPath(entry))],
     ...(entry.next_step ? [] : [["New run…", () => newRunForm(entry)], ["Find the start pose…", () => startPoseForm(entry)]]),
     ...(entry.has_truth ? [["Compare trackers…", () => go(comparisonsPath(entry))]] : []),
+    ...(entry.next_step ? [] : [["Sweep knobs…", () => go(`/comparisons?${new URLSearchParams({ new: "sweep", session: entry.name })}`)]]),
     ["Rename…", () => renameForm("session", path, entry.name, open, (name) => { if (open) openSession(name, run); })],
     ["Duplicate", () => duplicate(entry)],
     ["Delete…", () => deleteForm("session", path, entry.name, open, () => { say(`${entry.name} is in the trash.`); if (open) openSession(get("sessions")?.[0]?.name ?? null); })],
@@ -90,7 +92,9 @@ function runMenu(opener, entry, run) {
     ["Refine…", () => makeTrackForm(entry.name, run.name, "refine")],
     ["Smooth…", () => makeTrackForm(entry.name, run.name, "smooth")],
     ["Export…", () => { openSession(entry.name, run.name); showPanel("export"); }],
+    ["Share as one page", () => go(`${path}/shared.html`)],
     ["Poses as CSV", () => go(`${path}/poses.csv`)],
+    ["Compare with…", () => compareForm(entry.name, run.name)],
     ["New run like this…", () => newRunForm(entry, run)],
     ["Rename…", () => renameForm("run", path, run.name, open, (name) => openSession(entry.name, name))],
     ["Delete…", () => deleteForm("run", path, run.name, open, () => { if (open) openSession(entry.name); })],
@@ -107,13 +111,38 @@ function line(key, className, properties, open, menu, ...children) {
 
 const lineWords = (name, facts) => element("div", {}, element("div", { className: "name" }, name), element("div", { className: "facts" }, facts));
 
+/** How much of a run is tracked, in words that are the same everywhere. */
+const countWords = (done, all) => `${done} of ${all}`;
+
 function runRow(entry, run) {
   const measured = run.mean_mm != null;
-  const figures = element("div", { className: "figure" },
-    measured ? [figure(run.mean_mm), " ", element("small", {}, "mm")] : element("small", { className: "done" }, `${run.done}/${run.last - run.first}`),
-    run.damaged?.length > 0 && [" ", element("small", { className: "damaged", title: `Frames ${run.damaged.join(", ")} are damaged on the disk: resume the run to track them again.` }, `${run.damaged.length} damaged`)]);
+  const all = run.last - run.first;
+  const partial = run.done < all;
+  const count = partial && element("small", { className: "done", title: `${countWords(run.done, all)} frames are tracked${measured ? ": the mean is of these only" : ""}.` }, countWords(run.done, all));
+  const figures = element("div", { className: "figure" }, measured ? [figure(run.mean_mm), " ", element("small", {}, partial ? "mm, partial " : "mm"), count] : partial ? count : element("small", { className: "done" }, countWords(run.done, all)),
+    run.damaged?.length > 0 && [" ", element("a", { className: "damaged", href: studioPath(entry.name, run.name, { frame: run.damaged[0] }), onclick: (event) => event.stopPropagation(), title: `Frames ${run.damaged.join(", ")} are damaged on the disk: resume the run to track them again.` }, `${run.damaged.length} damaged`)]);
   return line(`${entry.name}/${run.name}`, "run", { ariaSelected: String(entry.name === get("session") && run.name === get("run")) },
     () => openSession(entry.name, run.name), (more) => runMenu(more, entry, run), lineWords(run.name, run.describe ?? run.tracker), figures);
+}
+
+/** Runs of a sweep, as SWEEP-pPOINT-sSEED. */
+const SWEPT = /^(.+)-p\d+-s\d+(-\d+)?$/;
+/** @type {Set<string>} */
+const unfolded = new Set();
+
+/** The rows of a session's runs; those of a sweep are folded under one line. */
+function runRows(entry) {
+  const groups = Map.groupBy(entry.runs, (run) => SWEPT.exec(run.name)?.[1] ?? run);
+  return [...groups].flatMap(([sweep, runs]) => {
+    if (typeof sweep !== "string") return runs.map((run) => runRow(entry, run));
+    const key = `${entry.name}/${sweep}`;
+    const isOpen = unfolded.has(key) || (entry.name === get("session") && runs.some((run) => run.name === get("run")));
+    const fold = () => { if (unfolded.has(key)) unfolded.delete(key); else unfolded.add(key); draw(); };
+    const all = element("a", { className: "sweep-result", href: `/comparisons?${new URLSearchParams({ session: entry.name, name: sweep })}`, onclick: (event) => event.stopPropagation() }, "result");
+    const head = element("div", { className: "run swept", role: "treeitem", tabIndex: 0, ariaExpanded: String(isOpen), dataset: { key }, onclick: fold }, lineWords(`${isOpen ? "▾" : "▸"} ${sweep}`, `sweep · ${counted(runs.length, "run")}`), all);
+    head.onkeydown = (event) => { if (event.key === "Enter" && event.target === head) fold(); };
+    return [head, ...(isOpen ? [...runs].sort((a, b) => a.name.localeCompare(b.name, "en", { numeric: true })).map((run) => runRow(entry, run)) : [])];
+  });
 }
 
 function sessionBlock(entry) {
@@ -127,7 +156,7 @@ function sessionBlock(entry) {
   const next = entry.next_step ? button("Continue in the guided set-up", () => go(setupPath(entry)), "new-run quiet small") : button("+ New run", () => newRunForm(entry), "new-run quiet small");
   const compare = entry.has_truth && element("a", { className: "compare", href: comparisonsPath(entry) }, entry.comparisons ? counted(entry.comparisons, "comparison") : "Compare trackers");
   return element("div", { className: isOpen ? "session open" : "session" }, head,
-    element("div", { className: "runs", role: "group" }, entry.runs.map((run) => runRow(entry, run)), element("div", { className: "last-line" }, next, compare)));
+    element("div", { className: "runs", role: "group" }, runRows(entry), element("div", { className: "last-line", role: "treeitem", tabIndex: -1, ariaLabel: entry.next_step ? "Next step" : "New run" }, next, compare)));
 }
 
 function draw() {
@@ -144,7 +173,7 @@ function drawProgress() {
   const work = get("work");
   if (!work?.run) return;
   const count = list.querySelector(`[data-key="${CSS.escape(`${work.session}/${work.run}`)}"] .done`);
-  if (count) count.textContent = `${work.done}/${work.last - work.first}`;
+  if (count) count.textContent = countWords(work.done, work.last - work.first);
 }
 
 /** Up and down go from line to line. */

@@ -2,6 +2,7 @@
 
 import { fetchJson } from "./api.js";
 import { complain } from "./messages.js";
+import { nothingChosen } from "./selection.js";
 import { get, set } from "./state.js";
 
 /** Ask the server for the list again. */
@@ -13,12 +14,20 @@ export async function refreshSessions() {
   } catch (error) { complain(error); }
 }
 
-/** Open a session and one of its runs: the newest unless said, none where `run` is null. */
-export function openSession(session, run = undefined) {
+/**
+ * Open a session and one of its runs: the newest unless said, none where `run` is null. `shown`: what of it is shown and chosen,
+ * by the state's names.
+ * @param {string | null} session @param {string | null} [run] @param {Record<string, any>} [shown]
+ */
+export function openSession(session, run = undefined, shown = {}) {
   const newest = get("sessions")?.find((one) => one.name === session)?.runs[0]?.name ?? null;
   const chosen = run === undefined ? newest : run;
   if (session === get("session") && chosen === get("run")) return;
-  set({ session, run: chosen, track: "raw", summary: null, detail: null, parameters: null, layerCount: null, settings: null, whatIf: null, frame: null, layer: null, follow: true });
+  const frame = shown.frame ?? null;
+  set({
+    session, run: chosen, track: "raw", summary: null, detail: null, parameters: null, layerCount: null, settings: null, moved: null, whatIf: null, compared: null, through: null, eye: null,
+    ...nothingChosen(), ...shown, frame, follow: frame === null,
+  });
   document.body.classList.remove("rail-open");
 }
 
@@ -26,7 +35,10 @@ export function openSession(session, run = undefined) {
 export const sessionWords = ({ name, title }) => (title && title !== name ? `${name} · ${title}` : name);
 /** The guided set-up of a session, at its next step. */
 export const setupPath = (entry) => `/way?session=${encodeURIComponent(entry.name)}`;
-/** The studio's own window on a session, or on one of its runs. */
-export const studioPath = (session, run = "") => `/?${new URLSearchParams({ session, ...(run ? { run } : {}) })}`;
+/**
+ * The studio's own window on a session, or on one of its runs; `more`: what is shown of it, such as {frame: 12}.
+ * @param {string} session @param {string} [run] @param {Record<string, string | number>} [more]
+ */
+export const studioPath = (session, run = "", more = {}) => `/?${new URLSearchParams(Object.entries({ session, ...(run ? { run } : {}), ...more }).map(([name, value]) => [name, String(value)]))}`;
 /** What a session that cannot be tracked yet says of itself. */
 export const lacks = (entry) => ({ footage: "no footage yet", calibration: "not calibrated yet" })[entry.next_step] ?? "";

@@ -20,7 +20,7 @@ import { startTheme } from "./theme.js";
  * @property {string} session
  * @property {Schemas["SessionDetail"]} detail the session as it was when the step was mounted (no cameras before the calibration)
  * @property {HTMLElement} aside the empty element at the right, for pictures (class "pictures" with `picture`s in it, if it fits)
- * @property {Schemas["WayAnswer"]["steps"][number]} step this step as the server sees it now
+ * @property {Schemas["Workflow"]["steps"][number]} step this step as the server sees it now
  * @property {() => Promise<any>} refresh load the steps again, after something was made
  * @property {(step: string) => Promise<void>} go show another step
  * @property {(shown?: object) => Promise<void>} scene show the 3-D scene in `aside` instead, moved to what is to be shown
@@ -30,7 +30,7 @@ import { startTheme } from "./theme.js";
 const STEPS = {
   footage: { name: "Footage", lead: "One video, or one folder of pictures, per camera, all of the same recording." },
   calibration: { name: "Calibration", lead: "Positions and lenses of the cameras, and whether they are right." },
-  background: { name: "Background", lead: "The person's mask in each picture, and how far the views agree." },
+  background: { name: "Background", lead: "The subject's mask in each picture, and how far the views agree." },
   subject: { name: "Subject", lead: "The tracked body and its measures." },
   "start-pose": { name: "Start pose", lead: "The person's pose in the frame where tracking begins." },
   track: { name: "Track", lead: "The motion, frame by frame." },
@@ -57,7 +57,7 @@ const moduleOf = (name) => import(`./setup_${name.replaceAll("-", "_")}.js`);
 function drawStepper() {
   fill(stepper, element("ol", {}, steps.map((one) => {
     const title = `${STEPS[one.step].name}: ${STATES[one.state]}${one.optional ? " (optional)" : ""}`;
-    const row = element("button", { type: "button", title, ariaLabel: [title, one.words, one.why].filter(Boolean).join(". "), dataset: { key: one.step, step: one.step, state: one.state }, onclick: () => go(one.step) },
+    const row = element("button", { type: "button", title, ariaLabel: [title, one.words, one.why].filter(Boolean).join(". "), dataset: { key: one.step, step: one.step, state: one.state, ...(one.state === "done" && one.why ? { doubt: "" } : {}) }, onclick: () => go(one.step) },
       element("i", { className: "step-dot" }), element("span", { className: "name" }, STEPS[one.step].name),
       one.words && element("span", { className: "words" }, one.words), one.why && element("span", { className: "why" }, one.why));
     if (one.step === shown) row.ariaCurrent = "step";
@@ -151,13 +151,16 @@ async function drawSessions() {
   return sessions.map((one) => one.name);
 }
 
-/** The form of a session that begins empty. */
-function beginForm() {
+/** The form of a session that begins empty. The body is asked for first of all: its size is that of the space in which it is sought. */
+async function beginForm() {
+  const { bodies, default_body: usual } = await fetchJson("/api/choices").catch(() => ({ bodies: [], default_body: "" }));
+  const choices = bodies.map((one) => ({ value: one.name, label: one.label }));
   openForm({
     heading: "New session", action: "Create", intro: "It starts empty; footage and calibration come next. A name has letters, digits, - and _.",
-    rows: [[{ name: "name", label: "Name", ...NAME, oninput: ({ target }) => { target.value = target.value.replace(/\s/g, "-"); } }]],
+    rows: [[{ name: "name", label: "Name", ...NAME, oninput: ({ target }) => { target.value = target.value.replace(/\s/g, "-"); } }],
+      ...(choices.length ? [[{ name: "body", label: "Who or what is tracked", choices, value: usual, hint: "The nearest one will do; it can be changed in step Subject." }]] : [])],
     send: async (values) => {
-      const made = await post("/api/sessions", { name: values.name });
+      const made = await post("/api/sessions", { name: values.name, ...(values.body ? { body: values.body } : {}) });
       closeDialog();
       session = made.name;
       await drawSessions();

@@ -8,7 +8,8 @@ import { uploadFiles } from "./uploading.js";
 import { alignmentBox } from "./setup_alignment.js";
 import { brush } from "./setup_brush.js";
 import { maskPictures } from "./setup_masks.js";
-import { qualityList } from "./setup_quality.js";
+import { qualityList, sourceTable } from "./setup_quality.js";
+import { paintStrokes } from "./setup_strokes.js";
 
 /** @import { Schemas } from "./api_types" */
 
@@ -20,8 +21,24 @@ const SOURCES = {
   plate: ["Picture", "A picture of the empty room from each camera, unchanged."],
   clip: ["Clip", "A short video of the empty room from each camera, unchanged."],
   median: ["Median", "The median of the footage. Good if the person moves about."],
+  person: ["Person", "A network finds the person and cuts him out, frame by frame: no picture of the empty room, and he may stay in place. People only; the one whom most cameras see."],
+  strokes: ["Strokes", "Anything: you paint a few lines inside and outside the subject in one picture of each camera; they are carried through all frames, and corrected by more strokes in any frame."],
+  threshold: ["Brightness and colour", "For a subject that is lit so that these alone tell it from all else: a white mouse on dark litter, a glove of one colour."],
+  masks: ["Given masks", "The masks that came with the footage, unchanged."],
+  subject: ["One of several", "Of those in view you choose one; the others are cut out of the masks in use. For several at once: studio subjects, studio together."],
+  best: ["Best of all", "Each of these that is possible is tried, which takes as long as all of them together; then each camera gets the one under which the views agree and the masks' borders lie on edges of the picture."],
 };
-const MISSING = { plate: "Give a picture for every camera below.", clip: "Give a clip for every camera below." };
+const MISSING = {
+  plate: "Give a picture for every camera below.",
+  clip: "Give a clip for every camera below.",
+  person: "Calibrate the cameras first: they must agree on who is seen.",
+  masks: "No masks came with the footage.",
+  best: "Calibrate the cameras first: by their agreement the sources are compared.",
+  subject: "Calibrate the cameras first: where somebody stands is seen by two of them.",
+};
+/** Sources that have no knobs to tune. */
+const AS_THEY_ARE = ["person", "strokes", "masks", "subject"];
+const THRESHOLDS = ["mask_darkest", "mask_brightest", "mask_hue", "mask_hue_reach", "mask_saturation"];
 const FIRST = ["mask_threshold", "mask_gain_fit", "mask_shadow_test", "mask_shadow_darkest", "mask_shadow_colour", "mask_opening", "mask_closing", "mask_keep_components"];
 
 /** @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
@@ -29,13 +46,19 @@ export function mount(place, setup) {
   const here = sessionPath(setup.session);
   /** @type {Schemas["BackgroundAnswer"]} */
   let background = null;
-  /** @type {Schemas["BackgroundWish"]["source"]} */
+  /** @type {Schemas["BackgroundRequest"]["source"]} */
   let source = null;
   let tune = true;
   let unused = false;    // whether what the person never comes near is excluded
   /** @type {Record<string, string | number | boolean>} */
   let changed = {};      // knobs that are tried
   let quality = null;
+  /** @type {Schemas["CameraStrokes"][]} */
+  let strokes = [];
+  /** @type {Schemas["SubjectsAnswer"] | null} */
+  let seen = null;       // who is in view in the first frame
+  /** @type {[number, number] | null} */
+  let subjectAt = null;  // where the one stands who was chosen
   let failed = null;
   let gone = false;
   let timer = 0;
@@ -53,25 +76,96 @@ export function mount(place, setup) {
     pictures.show();
     setup.refresh().catch(complain);
   });
-  const pictures = maskPictures(setup, paint);
+  const pictures = maskPictures(setup, paint, paintLines);
 
   async function load() {
     background = await fetchJson(`${here}/background`);
-    if (!source && background.source !== "masks") source = background.cameras.length >= 3 && Object.keys(background.own).length === 0 ? "combined" : background.source;
+    strokes = (await fetchJson(`${here}/strokes`)).cameras;
+    if (!source) source = Object.keys(background.own).length || background.source === "masks" ? background.source : recommended();
+  }
+
+  /** Where nothing was set yet: without any picture of the empty room, somebody who stays in place has no background. */
+  function recommended() {
+    // What somebody began to paint is what is wanted, also after the page was left; the network knows people only.
+    const hasNone = !background.cameras.some((camera) => camera.given);
+    if (strokes.some((camera) => camera.strokes.length) || (hasNone && !setup.detail.body.by_height)) return "strokes";
+    if (hasNone && background.possible.includes("person")) return "person";
+    return background.cameras.length >= 3 ? "combined" : background.source;
   }
 
   // What backgrounds are made of.
 
   function sourceChoices() {
     const rows = Object.entries(SOURCES).map(([key, [label, words]]) => {
-      const name = /** @type {Schemas["BackgroundWish"]["source"]} */ (key);
-      const possible = background.possible.includes(name);
-      const used = background.source === name && Object.keys(background.own).length > 0;
+      const name = /** @type {Schemas["BackgroundRequest"]["source"]} */ (key);
+      // Strokes are painted once they are chosen.
+      const possible = name === "strokes" || background.possible.includes(name);
+      const used = background.source === name && (name === "masks" || Object.keys(background.own).length > 0);
       return element("label", { className: "choice" },
-        element("input", { type: "radio", name: "background-source", value: name, checked: name === source, disabled: !possible, onchange: () => { source = name; drawMake(); } }),
+        element("input", { type: "radio", name: "background-source", value: name, checked: name === source, disabled: !possible, onchange: () => choose(name) }),
         element("span", {}, element("b", {}, label), used && element("span", { className: "badge good" }, "in use"), element("span", { className: "hint" }, possible ? words : MISSING[name])));
     });
-    return element("fieldset", { className: "choices" }, element("legend", {}, "Source of the backgrounds"), rows);
+    return element("fieldset", { className: "choices" }, element("legend", {}, "Source of the masks"), rows);
+  }
+
+  function choose(name) {
+    source = name;
+    // Thresholds are cheap to show: the pictures follow their knobs at once.
+    if (name === "threshold" && background.settings.background_model !== "threshold") changed = { ...changed, background_model: "threshold" };
+    else if (name !== "threshold" && changed.background_model === "threshold") delete changed.background_model;
+    pictures.preview(changed);
+    drawKnobs();
+    drawMake();
+    if (name === "subject") lookForSubjects();
+  }
+
+  async function lookForSubjects() {
+    seen = subjectAt = null;
+    try { seen = await fetchJson(`${here}/subjects`); } catch (error) { failed = error; }
+    if (!gone) drawMake();
+  }
+
+  /** Who is in view in the first frame, to be clicked on the picture in which most of them are seen, or in the list. */
+  function subjectList() {
+    if (!seen) return hint("Looking who is in view in the first frame…");
+    if (!seen.subjects.length) return notice("Nobody is seen in the first frame: look at the masks of all cameras.");
+    const marks = (camera) => seen.subjects.filter((one) => one.points[camera]).length;
+    const { name } = background.cameras.reduce((best, one) => (marks(one.name) > marks(best.name) ? one : best));
+    const words = (one) => `at ${one.at.map((value) => value.toFixed(2)).join(", ")} m`;
+    const pick = (one) => { subjectAt = one.at; drawMake(); };
+    const chosen = (one) => subjectAt !== null && one.at[0] === subjectAt[0] && one.at[1] === subjectAt[1];
+    const dots = seen.subjects.map((one, at) => one.points[name] && element("button", {
+      type: "button", className: "subject-dot", ariaPressed: String(chosen(one)), ariaLabel: `Follow subject ${at + 1}, ${words(one)}`,
+      style: `left: ${100 * one.points[name][0]}%; top: ${100 * one.points[name][1]}%`, onclick: () => pick(one),
+    }, String(at + 1)));
+    const rows = seen.subjects.map((one, at) => element("li", {}, element("span", {}, `${at + 1}`), element("span", { className: "hint" }, `${words(one)}, ${one.height.toFixed(2)} m high`),
+      button(chosen(one) ? "Followed" : "Follow", () => pick(one), "quiet small", { ariaLabel: `Follow ${at + 1}` })));
+    return element("section", { className: "plates" }, hint("Click whom the masks shall be of."),
+      element("div", { className: "subject-picture" }, element("img", { src: `${here}/footage/${encodeURIComponent(name)}/0.jpg?height=420`, alt: `First frame of ${name}` }), dots),
+      element("ul", { className: "plate-list" }, rows));
+  }
+
+  function strokeList() {
+    const rows = strokes.map(({ camera, strokes: painted, ready, made }) => {
+      const frames = new Set(painted.map((one) => one.frame)).size;
+      const words = !painted.length ? "nothing painted yet" : !ready ? "nothing inside yet" : `${painted.length} ${painted.length > 1 ? "strokes" : "stroke"} in ${frames} ${frames > 1 ? "frames" : "frame"}${made ? ", masks made" : ""}`;
+      return element("li", {}, element("span", {}, camera), element("span", { className: "hint" }, words), button("Paint…", () => paintLines(camera), "quiet small", { ariaLabel: `Paint on ${camera}` }));
+    });
+    return element("section", { className: "plates" }, hint("Paint in a frame in which the camera sees the subject well: a line or two through each of its parts and colours, one around it. More strokes in a later frame correct what follows."), element("ul", { className: "plate-list" }, rows));
+  }
+
+  /** Paint strokes on a camera's picture. */
+  function paintLines(camera) {
+    const lens = setup.detail.cameras.find((one) => one.name === camera);
+    paintStrokes(setup, lens, pictures.frame, background.frame_count, async (saved, frame) => {
+      pictures.go(frame);
+      if (saved) {
+        source = "strokes";
+        await load().catch(complain);
+        drawMake();
+      }
+      pictures.show();
+    }).catch(complain);
   }
 
   function plates() {
@@ -95,21 +189,22 @@ export function mount(place, setup) {
       const upload = await uploadFiles(chosen, (text) => { words.textContent = text; });
       words.textContent = "Reading them…";
       background = await post(`${here}/backgrounds`, { upload, files: named });
+      if (source === "person") source = recommended();
       failed = null;
       pictures.preview(changed);
     } catch (error) { failed = error; }
     drawMake();
-    make.querySelector("details").open = true;
+    make.querySelector("details")?.setAttribute("open", "");
   }
 
   function drawMake() {
     const running = isGoing(background.job);
     fill(make, background.source === "masks" && notice("Masks came with the footage and are used unchanged. Set up a background only if they are not good."),
-      sourceChoices(), plates(),
-      check("tune the knobs for the best agreement of the views", { checked: tune, onchange: ({ target }) => { tune = target.checked; } }, "Knobs that you set below stay fixed."),
+      sourceChoices(), source === "strokes" ? strokeList() : source === "subject" ? subjectList() : plates(),
+      !AS_THEY_ARE.includes(source) && check("tune the knobs for the best agreement of the views", { checked: tune, onchange: ({ target }) => { tune = target.checked; } }, "Knobs that you set below stay fixed."),
       source === "combined" && check("exclude regions that the person never comes near", { checked: unused, onchange: ({ target }) => { unused = target.checked; } }, "A bystander, a monitor, a window: motion there is not the person."),
-      !running && actions(button("Set up the background", setUp, "primary", { disabled: !source })), going, failure(failed),
-      (background.job?.notes ?? []).map((note) => hint(note)));
+      !running && actions(button("Set up the background", setUp, "primary", { disabled: !source || !background.possible.includes(source) || (source === "subject" && !subjectAt) })), going, failure(failed),
+      background.job?.choice && sourceTable(background.job.choice), (background.job?.notes ?? []).map((note) => hint(note)));
     if (running) drawGoing();
     else fill(going);
   }
@@ -121,7 +216,7 @@ export function mount(place, setup) {
   async function setUp() {
     failed = null;
     try {
-      background.job = await post(`${here}/background`, { source, knobs: changed, tune, exclude_unused: unused && source === "combined" });
+      background.job = await post(`${here}/background`, { source, knobs: changed, tune, exclude_unused: unused && source === "combined", subject_at: source === "subject" ? subjectAt : null });
     } catch (error) { failed = error; }
     drawMake();
     follow();
@@ -158,7 +253,7 @@ export function mount(place, setup) {
       try { quality = await post(`${here}/masks/quality`); setup.refresh().catch(complain); } catch (error) { complain(error); }
       drawQuality();
     }, "small", { hidden: background.cameras.length < 2 });
-    fill(agreement, element("div", { className: "head-line" }, element("h2", {}, "Agreement of the views"), measure), qualityList(quality, paint, background.measured));
+    fill(agreement, element("div", { className: "head-line" }, element("h2", {}, "Agreement of the views"), measure), qualityList(quality, paint, background.measured, background.source));
     pictures.rate(quality);
   }
 
@@ -203,9 +298,10 @@ export function mount(place, setup) {
 
   function drawKnobs() {
     const named = (name) => background.knobs.find((knob) => knob.name === name);
-    const rest = background.knobs.filter((knob) => knob.name.startsWith("mask_") && !FIRST.includes(knob.name));
+    const first = source === "threshold" ? [...THRESHOLDS, ...FIRST.slice(-3)] : FIRST;
+    const rest = background.knobs.filter((knob) => knob.name.startsWith("mask_") && !first.includes(knob.name));
     offerKeeping();
-    fill(knobs, element("summary", {}, "Fine adjustment"), hint("The pictures follow; nothing is stored before you press Keep."), FIRST.map((name) => knobRow(named(name))),
+    fill(knobs, element("summary", {}, "Fine adjustment"), hint("The pictures follow; nothing is stored before you press Keep."), first.map((name) => knobRow(named(name))),
       element("details", {}, element("summary", {}, "More"), rest.map(knobRow)), actions(keep, reset));
   }
 

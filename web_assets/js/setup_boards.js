@@ -3,7 +3,7 @@
 import { fault, fetchJson, sessionPath } from "./api.js";
 import { actions, button, check, element, field, files, fill, hint, number, select, text } from "./elements.js";
 
-const DICTIONARIES = ["DICT_4X4_50", "DICT_4X4_100", "DICT_4X4_250", "DICT_5X5_50", "DICT_5X5_100", "DICT_5X5_250", "DICT_6X6_100", "DICT_6X6_250", "DICT_7X7_250", "DICT_ARUCO_ORIGINAL"];
+const DICTIONARIES = [...[4, 5, 6, 7].flatMap((bits) => [50, 100, 250, 1000].map((count) => `DICT_${bits}X${bits}_${count}`)), "DICT_ARUCO_ORIGINAL", "DICT_ARUCO_MIP_36H12", "DICT_APRILTAG_16H5", "DICT_APRILTAG_25H9", "DICT_APRILTAG_36H10", "DICT_APRILTAG_36H11"];
 /** @type {[string, string][]} */
 const KINDS = [["charuco", "ChArUco"], ["chessboard", "Chessboard"]];
 const REMEMBERED = "calibration-board";

@@ -53,6 +53,8 @@ export function mount(place, setup) {
       showsBoard = true;
     } catch (error) { failed = error; }
     draw();
+    // The form above it may be longer than the window.
+    place.querySelector(".proposal .step-actions")?.scrollIntoView({ block: "nearest" });
   }
 
   const uploaded = (input) => uploadFiles(input.files, (words, share) => drawProgress(progress, { words, share })).finally(() => drawProgress(progress, null));
@@ -80,6 +82,8 @@ export function mount(place, setup) {
 
   async function solve(request) {
     failed = proposal = null;
+    // What is entered stays: a file field that is drawn anew is empty.
+    for (const old of place.querySelectorAll(":scope > .wrong, :scope > .proposal")) old.remove();
     try {
       const begun = await post(`${here}/solve`, await request());
       job = begun.identifier;
@@ -186,7 +190,7 @@ export function mount(place, setup) {
   function draw() {
     if (gone || !view) return;
     const tabs = element("div", { className: "group", role: "tablist" }, Object.entries(TABS).map(([name, words]) => button(words, () => { tab = name; failed = null; draw(); }, "toggle",
-      { role: "tab", ariaSelected: String(tab === name), ariaPressed: String(tab === name) })));
+      { role: "tab", ariaSelected: String(tab === name) })));
     const rig = shown();
     fill(place, tabs, { file: fileForm, boards, used: usedForm }[tab](), progress, failure(failed), proposal && proposalBox(), rig && (proposal || rig.findings.length || !setup.step?.why) && findingList(rig));
     if (!stopClicking) drawAside();

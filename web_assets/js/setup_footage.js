@@ -53,7 +53,7 @@ export function mount(place, setup) {
 
   function drawPictures() {
     const { cameras, frame_count: count } = footage;
-    if (!cameras.length) return fill(setup.aside, element("div", { className: "aside-empty" }, element("p", {}, "The pictures of your cameras will be here."), hint("Two cameras at least, better four: around the person, each seeing head and feet all the time.")));
+    if (!cameras.length) return fill(setup.aside, element("div", { className: "aside-empty" }, element("p", {}, "The pictures of your cameras will be here."), hint("Two cameras at least, better four: around the subject, each seeing all of it all the time.")));
     const images = cameras.map((camera) => element("img", { src: pictureOf(camera), alt: `Camera ${camera.name}`, onerror: ({ target }) => { target.alt = `The footage of ${camera.name} cannot be read.`; } }));
     const figures = cameras.map((camera, at) => element("figure", { className: "picture", dataset: { camera: camera.name } }, images[at], element("figcaption", {},
       element("div", { className: "step-actions" }, element("b", {}, camera.name), spring(),

@@ -6,8 +6,8 @@ import { button, check, element, fill, percent, spring } from "./elements.js";
 const HEIGHT = 420;
 const SPREAD = 5;
 
-/** Pictures in `setup.aside`; `paint(camera)` opens the brush. @param {import("./setup.js").Setup} setup */
-export function maskPictures(setup, paint) {
+/** Pictures in `setup.aside`; `paint(camera)` opens the brush, `strokes(camera)` that for strokes. @param {import("./setup.js").Setup} setup */
+export function maskPictures(setup, paint, strokes) {
   const here = sessionPath(setup.session);
   const state = { frame: 0, settings: {}, quality: null, views: [], age: 0, bare: false };
   const bar = element("div", { className: "mask-bar" });
@@ -50,7 +50,7 @@ export function maskPictures(setup, paint) {
     const line = state.quality?.cameras.find((one) => one.camera === view.camera.name);
     fill(view.caption, element("div", { className: "head-line" }, element("b", {}, view.camera.name),
       line && element("span", { className: `badge ${line.usable ? "good" : "bad"}` }, line.agreement === null ? "empty" : percent(line.agreement)),
-      view.camera.excluded && element("span", { className: "hint" }, "regions excluded"), spring(), view.brush));
+      view.camera.excluded && element("span", { className: "hint" }, "regions excluded"), spring(), view.strokes, view.brush));
   }
 
   function begin({ frame_count: count, cameras }) {
@@ -67,6 +67,7 @@ export function maskPictures(setup, paint) {
     state.views = cameras.map((camera) => {
       const view = {
         camera, image: element("img", { alt: `Mask of ${camera.name}` }), caption: element("figcaption"), box: null,
+        strokes: button("Strokes…", () => strokes(camera.name), "small", { ariaLabel: `Paint strokes of ${camera.name}` }),
         brush: button("Exclude…", () => paint(camera.name), "small", { ariaLabel: `Exclude regions of ${camera.name}` }),
       };
       view.box = element("figure", { className: "picture" }, view.image, view.caption);
@@ -86,6 +87,7 @@ export function maskPictures(setup, paint) {
   return {
     begin, show,
     get frame() { return state.frame; },
+    go(frame) { state.frame = frame; const slider = bar.querySelector("input"); if (slider) { slider.value = String(frame); bar.querySelector("output").textContent = `frame ${frame}`; } },
     preview(settings) { state.settings = { ...settings }; state.age += 1; draw(); },
     rate(quality) {
       state.quality = quality;

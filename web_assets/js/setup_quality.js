@@ -3,6 +3,8 @@
 import { findingList } from "./calibration_drawing.js";
 import { button, element, hint, notice, percent } from "./elements.js";
 
+/** @import { Schemas } from "./api_types" */
+
 const USABLE = 0.9;
 
 function agreementBar(line) {
@@ -14,21 +16,40 @@ function agreementBar(line) {
 }
 
 /** What is said of a quality (`GET S/masks/quality`), null where it was not measured since the studio was opened (then what
- * is known in words, `measured`, is said); `paint(camera)` opens the brush. */
-export function qualityList(quality, paint, measured = "") {
+ * is known in words, `measured`, is said); `paint(camera)` opens the brush; `source` : of the masks. */
+export function qualityList(quality, paint, measured = "", source = "") {
   if (!quality && measured) return [hint(`When it was last measured, ${measured}. Measure again to see every camera.`)];
   if (!quality) return [hint("Not measured yet. No ground truth is needed: the masks of all views must agree in the visual hull.")];
   const rows = quality.cameras.map((line) => element("li", {}, element("span", {}, line.camera), agreementBar(line), element("span", { className: "figure" }, percent(line.agreement)), line.note && hint(line.note)));
   const worst = quality.cameras.find((line) => line.camera === quality.worst);
   const doubts = quality.doubts.length > 0 && element("div", {}, notice("The silhouettes contradict the calibration:"), findingList({ findings: quality.doubts }));
   const verdict = worst
-    ? element("div", { className: "notice" }, element("p", {}, remedy(worst)), button(`Exclude regions of ${worst.camera}…`, () => paint(worst.camera), "small"))
+    ? element("div", { className: "notice" }, element("p", {}, remedy(worst, source)), button(`Exclude regions of ${worst.camera}…`, () => paint(worst.camera), "small"))
     : !doubts && hint(`Every view agrees with the others; ${quality.frames.length} frames were compared.`);
   return [element("ul", { className: "agree" }, rows), verdict, doubts];
 }
 
-function remedy(line) {
+/** How the sources compare (job `choice`): agreement and edges by camera, the used ones marked. @param {Schemas["SourceChoiceAnswer"]} choice */
+export function sourceTable(choice) {
+  const cameras = Object.keys(choice.by_camera);
+  const row = (line, name) => element("tr", {}, element("th", { scope: "row" }, name),
+    cameras.map((camera) => element("td", { className: choice.by_camera[camera] === line.source ? "figure used" : "figure", title: `Agreement of the views ${percent(line.agreements[camera])}, edge along the border ${percent(line.borders[camera])}` }, `${percent(line.agreements[camera])} · ${percent(line.borders[camera])}`)), element("td", { className: "figure", title: line.note }, percent(line.worst)));
+  const mixed = new Set(Object.values(choice.by_camera)).size > 1;
+  return element("table", { className: "plain source-table" }, element("caption", {}, "Agreement of the views · edge along the masks' border, by source; the used ones stand out. The score is the least product of the two"),
+    element("thead", {}, element("tr", {}, ["Source", ...cameras, "Score"].map((words) => element("th", { scope: "col" }, words)))),
+    element("tbody", {}, choice.tried.map((line) => row(line, line.source)), mixed && row(choice.mixed, "together")));
+}
+
+/** Sources whose masks have no knobs, and what puts them right. */
+const BY_HAND = {
+  strokes: "Paint strokes in the first frame in which its mask is wrong.",
+  person: "Paint strokes, or give a picture of its empty room.",
+  best: "Paint strokes for it, and try again.",
+};
+
+function remedy(line, source) {
   const first = `Check ${line.camera} first.`;
+  if (BY_HAND[source]) return `${first} ${BY_HAND[source]}`;
   if (line.agreement === null) return `${first} Its mask is empty: lower “mask threshold”, or give a picture of its empty room.`;
   if (line.denied > 0.05) return `${first} Its mask has holes that carve the person in all views: lower “mask threshold”, or switch “shadow test” off.`;
   if (line.covered !== null && line.covered < USABLE) return `${first} It holds something that no other view has: a bystander, a reflection, a shadow. Exclude the region, or raise “mask threshold”.`;

@@ -5,7 +5,7 @@ import { fault, fetchJson, post, put, remove, sessionPath } from "./api.js";
 import { actions, button, drawProgress, element, failure, field, fill, hint, notice, number, percent, picture } from "./elements.js";
 import { followJob, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
-import { isUnsure } from "./start_pose.js";
+import { foundWords, isUnsure } from "./start_pose.js";
 
 const PICTURE_HEIGHT = 360;
 const REDRAW_MILLISECONDS = 250;
@@ -124,7 +124,7 @@ export function mount(place, setup) {
 
   /** How sure the pose is, in words. */
   function verdict() {
-    const words = [found && `Found in frame ${found.frame}, confidence ${percent(found.confidence)}.`, better && (better.gain > 0 && better.overlap !== null
+    const words = [found && `Found in frame ${found.frame}: ${foundWords(found)}.`, better && (better.gain > 0 && better.overlap !== null
       ? `Improved: overlap with the masks ${percent(better.overlap_before)} → ${percent(better.overlap)}.` : "The search found no better pose near it.")];
     const unsure = found && isUnsure(found);
     return element("div", { className: "start-pose-verdict" }, element("p", { className: unsure ? "notice" : "" }, words.filter(Boolean).join(" ") || `The session has a start pose, of frame ${pose.frame}.`),

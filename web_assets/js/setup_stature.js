@@ -1,4 +1,5 @@
-// A person's body as it stands, from the front, with the lengths of its limbs: what a height or a fit makes of it.
+// A body as it stands, with the lengths of its limbs: what a height or a fit makes of it. People are seen from the front, animals
+// and whatever else is longer than high from the side; all are drawn as large as a person.
 
 import { element, fill, shape } from "./elements.js";
 
@@ -6,6 +7,7 @@ const COLOURS = { left: "var(--limb-left)", right: "var(--limb-right)", middle: 
 const MARGIN = 90;
 const LABEL_ROOM = 620;
 const LINE = 88;
+const PERSON = 1700;
 const BULGE = 0.4;        // of a radius: how far a limb's end is rounded, so that cones look like limbs
 
 /** A tapered limb seen from the front, as a path. flat: mm, y to the right of the picture, z down. */
@@ -31,15 +33,33 @@ function spread(wanted) {
 
 const length = (limb) => Math.hypot(...limb.end.map((value, axis) => value - limb.start[axis]));
 
+const spanOf = (limbs, axis) => {
+  const all = limbs.flatMap((limb) => [limb.start[axis], limb.end[axis]]);
+  return Math.max(...all) - Math.min(...all);
+};
+/** A length in words: metres of a person, millimetres of a mouse. */
+const longWords = (mm) => (mm < 500 ? `${Math.round(mm)} mm` : `${(mm / 1000).toFixed(2)} m`);
+
+/** Limbs turned to be seen from where they are longest, in sizes of a person: what the drawing has for a limb of `true` mm. */
+function turned(limbs, isLong, scale) {
+  const turn = ([x, y, z]) => (isLong ? [-y, x, z] : [x, y, z]).map((value) => value / scale);
+  return limbs.map((limb) => ({ ...limb, start: turn(limb.start), end: turn(limb.end), radii: limb.radii.map((radius) => radius / scale), long: length(limb) }));
+}
+
 /** Draw limbs in `place`; `before`: those drawn dashed beside them, and by how much their lengths differ. */
-export function drawStature(place, limbs, before, words) {
+export function drawStature(place, given, givenBefore, words) {
+  const tall = spanOf(given, 2);
+  const isLong = spanOf(given, 0) > 1.2 * Math.max(tall, spanOf(given, 1));
+  const longest = Math.max(tall, spanOf(given, 0), spanOf(given, 1)) || PERSON;
+  const scale = longest < PERSON / 2 || longest > 2 * PERSON ? longest / PERSON : 1;
+  const [limbs, before] = [turned(given, isLong, scale), turned(givenBefore, isLong, scale)];
   const drawn = limbs.filter((limb) => length(limb) > 1);
   const all = [...drawn, ...before];
   const xs = all.flatMap((limb) => [limb.start[1], limb.end[1]].flatMap((y) => [y - limb.radii[0], y + limb.radii[0]]));
   const top = Math.max(...all.flatMap((limb) => [limb.start[2], limb.end[2]]));
   const low = Math.min(0, ...all.flatMap((limb) => [limb.start[2], limb.end[2]]));
   const [left, right] = [Math.min(...xs) - MARGIN, Math.max(...xs) + MARGIN];
-  const svg = shape("svg", { "aria-label": drawn.map((limb) => `${limb.name} ${Math.round(length(limb))} mm`).join(", "), viewBox: `${left - LABEL_ROOM * 0.35} ${-top - MARGIN} ${right - left + LABEL_ROOM * 1.35} ${top - low + 2 * MARGIN}`, role: "img" });
+  const svg = shape("svg", { "aria-label": drawn.map((limb) => `${limb.name} ${Math.round(limb.long)} mm`).join(", "), viewBox: `${left - LABEL_ROOM * 0.35} ${-top - MARGIN} ${right - left + LABEL_ROOM * 1.35} ${top - low + 2 * MARGIN}`, role: "img" });
   svg.append(shape("line", { class: "floor", x1: left - 100, x2: right + 60, y1: -low, y2: -low }));
   const far = [...drawn].sort((one, other) => Math.min(one.start[0], one.end[0]) - Math.min(other.start[0], other.end[0]));
   for (const limb of far) svg.append(shape("path", { class: "bone", d: outline(limb), fill: COLOURS[limb.side] ?? COLOURS.middle, stroke: "var(--scene-background)", "stroke-width": 4 }));
@@ -50,12 +70,11 @@ export function drawStature(place, limbs, before, words) {
     const middle = [(limb.start[1] + limb.end[1]) / 2, -(limb.start[2] + limb.end[2]) / 2];
     const y = places[index];
     const earlier = before.find((one) => one.name === limb.name);
-    const change = earlier ? Math.round(length(limb) - length(earlier)) : 0;
+    const change = earlier ? Math.round(limb.long - earlier.long) : 0;
     svg.append(shape("polyline", { class: "leader", fill: "none", points: `${middle[0]},${middle[1]} ${right - 30},${y} ${right},${y}` }),
-      shape("text", { x: right + 14, y: y + 9 }, `${Math.round(length(limb))} mm${change ? `  (${change > 0 ? "+" : "−"}${Math.abs(change)})` : ""}`),
+      shape("text", { x: right + 14, y: y + 9 }, `${Math.round(limb.long)} mm${change ? `  (${change > 0 ? "+" : "−"}${Math.abs(change)})` : ""}`),
       shape("text", { class: "name", x: right + 14, y: y + 40 }, limb.name.replace(/^left /, "")));
   });
-  const height = Math.round(top - low);
-  svg.append(shape("line", { class: "leader", x1: left - 40, x2: left - 40, y1: -low, y2: -top }), shape("text", { x: left - 54, y: -(top + low) / 2, "text-anchor": "end" }, `${(height / 1000).toFixed(2)} m`));
+  svg.append(shape("line", { class: "leader", x1: left - 40, x2: left - 40, y1: -low, y2: -top }), shape("text", { x: left - 54, y: -(top + low) / 2, "text-anchor": "end" }, longWords(scale * (top - low))));
   fill(place, element("figure", { className: before.length ? "stature compared" : "stature" }, svg, element("figcaption", {}, words)));
 }

@@ -23,7 +23,7 @@ export function mount(place, setup) {
   const here = sessionPath(setup.session);
   /** @type {Schemas["SubjectAnswer"]} */
   let subject = null;
-  /** @type {{ name: string, label: string }[]} */
+  /** @type {{ name: string, label: string, by_height?: boolean }[]} */
   let bodies = [];
   let body = "";
   let height = null;     // mm, null while it is unknown
@@ -40,6 +40,8 @@ export function mount(place, setup) {
   place.append(who, fitting);
 
   const changed = () => body !== subject.body || height !== subject.height_mm;
+  /** Whether the body is as large as its file says: an animal, a machine, a body of one's own. */
+  const isSized = () => bodies.find((one) => one.name === body)?.by_height === false;
 
   // Who it is.
 
@@ -56,17 +58,18 @@ export function mount(place, setup) {
       typed.dispatchEvent(new Event("input"));
     };
     slider.oninput = () => { take(Number(slider.value)); typed.value = String(height / 10); };
-    fill(who, field("Body", select(bodies.map((one) => [one.name, one.label]), body, { onchange: ({ target }) => { body = target.value; look(); drawFit(); } })),
-      field("Height (cm)", element("div", { className: "height-row" }, typed, slider)),
-      hint(`Every length follows from the height by published proportions. ${subject.fitted ? "A new height replaces the fitted measures." : "A guess within 3 cm will do; the fit finds the rest."}`),
-      actions(saveHeight), failure(failed));
+    saveHeight.textContent = isSized() || (!height && body !== subject.body) ? "Take this body" : "Set the height";
+    fill(who, field("Body", select(bodies.map((one) => [one.name, one.label]), body, { onchange: ({ target }) => { body = target.value; if (isSized()) height = null; drawWho(); look(); drawFit(); } })),
+      !isSized() && field("Height (cm)", element("div", { className: "height-row" }, typed, slider)),
+      hint(isSized() ? "As large as its file says: the run fits radii and ends to the first frames, a fit below finds the lengths too." : `Every length follows from the height by published proportions. ${subject.fitted ? "A new height replaces the fitted measures." : "A guess within 3 cm will do; the fit finds the rest."}`),
+      actions(saveHeight, element("a", { href: `/bodies?${new URLSearchParams({ session: setup.session, body })}` }, "Change it, or make one of your own")), failure(failed));
   }
 
   const saveHeight = button("Set the height", async () => {
     failed = null;
     try {
-      if (!height) throw fault("The height is not known yet.", "Type it, or move the slider.");
-      await put(`${here}/subject`, { height_mm: height, body });
+      if (!height && !isSized() && body === subject.body) throw fault("The height is not known yet.", "Type it, or move the slider.");
+      await put(`${here}/subject`, { ...(height ? { height_mm: height } : {}), body });
       await load();
       fit = null;
       setup.refresh().catch(complain);
@@ -86,7 +89,7 @@ export function mount(place, setup) {
     }, PREVIEW_MILLISECONDS);
   }
 
-  const note = (shown) => (shown !== subject ? "Preview." : shown.fitted ? "Fitted to the footage." : shown.saved ? "By published proportions." : "Average size: no measures of the person yet.");
+  const note = (shown) => (shown !== subject ? "Preview." : shown.fitted ? "Fitted to the footage." : isSized() ? "As its file says." : shown.saved ? "By published proportions." : "Average size: no measures of the person yet.");
 
   // The fit.
 
@@ -99,7 +102,7 @@ export function mount(place, setup) {
     /** @type {[string, string][]} */
     const runs = setup.detail.runs.filter((run) => run.done).map((run) => [run.name, `of ${run.name}`]);
     fill(fitting, element("h2", {}, "Fit the subject to the footage"),
-      hint(isReady ? "Lengths and radii are found together with the poses of a few frames, on the silhouettes. Frames without a pose are searched first, which takes longest." : "Set the height first: it is the one measure that the pictures alone cannot give."),
+      hint(isReady ? "Lengths and radii are found together with the poses of a few frames, on the silhouettes. Frames without a pose are searched first, which takes longest." : isSized() ? "Take the body first." : "Set the height first: it is the one measure that the pictures alone cannot give."),
       element("div", { className: "step-row" },
         field("How many frames", number(options.count, { min: 1, max: 24, step: 1, onchange: ({ target }) => { options.count = Number(target.value) || 5; } })),
         field("or these frames", text({ value: options.frames, placeholder: "chosen for variety", pattern: "[0-9, ]*", onchange: ({ target }) => { options.frames = target.value; } }))),
@@ -177,7 +180,7 @@ export function mount(place, setup) {
     [body, height] = [subject.body, subject.height_mm];
   }
 
-  Promise.all([fetchJson("/api/choices"), load()]).then(([choices]) => {
+  Promise.all([fetchJson(`/api/choices?session=${encodeURIComponent(setup.session)}`), load()]).then(([choices]) => {
     if (gone) return;
     bodies = choices.bodies;
     if (!bodies.some((one) => one.name === body)) bodies.push({ name: body, label: body });

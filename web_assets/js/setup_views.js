@@ -5,6 +5,7 @@ import { openPicture } from "./dialogs.js";
 import { check, element, fill, picture, showPicture, spring } from "./elements.js";
 import { complain } from "./messages.js";
 import { loadScene } from "./scene_window.js";
+import { studioPath } from "./sessions.js";
 
 const HEIGHT = 420;
 const LARGE = 1080;
@@ -16,7 +17,8 @@ export function viewWall(setup) {
   const label = element("output", {});
   const slot = element("div", { className: "wall-tools" });
   const wantsScene = check("3-D scene", { onchange: draw });
-  const bar = element("div", { className: "pictures-bar" }, slot, label, spring(), wantsScene);
+  const open = element("a", { className: "link-button", title: "This run and frame in the studio, where its search can be looked into" }, "Open in the studio");
+  const bar = element("div", { className: "pictures-bar" }, slot, label, spring(), open, wantsScene);
   const views = setup.detail.cameras.map(({ name }) => {
     const image = element("img", { alt: `View of ${name}`, onclick: () => openPicture(name, address(name, LARGE)) });
     const note = element("span", {});
@@ -30,6 +32,7 @@ export function viewWall(setup) {
     if (!shown || stopped) return;
     const { run, frame, track } = shown;
     label.textContent = `frame ${frame}`;
+    open.href = studioPath(setup.session, run, { frame, panel: "why", ...(track ? { track } : {}) });
     if (!bar.isConnected) fill(setup.aside, bar);
     if (wantsScene.querySelector("input").checked) {
       wall.remove();

@@ -19,10 +19,13 @@ export async function findStartPose(session, request, report) {
 /** Whether a pose that was found may be wrong. */
 export const isUnsure = (found) => found.confidence < UNSURE;
 
+/** How sure a pose is, and how much of the masks it covers: two numbers that say different things. */
+export const foundWords = (found) => `confidence ${percent(found.confidence)} that it is right${found.overlap == null ? "" : `, it agrees with ${percent(found.overlap)} of the masks`}`;
+
 /** Say what was found, as a warning where it may be wrong. */
 export function sayFound(found) {
   const unsure = isUnsure(found);
-  say(`Start pose found in frame ${found.frame} (confidence ${percent(found.confidence)}), kept in ${found.file}.`, {
+  say(`Start pose found in frame ${found.frame}: ${foundWords(found)}; kept in ${found.file}.`, {
     kind: unsure ? "warning" : "info",
     remedy: [unsure ? "Check it in the scene before you track: it may face the other way." : "", found.note].filter(Boolean).join(" "),
   });

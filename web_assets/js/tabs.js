@@ -1,18 +1,10 @@
 // The tabs under the timeline: one panel at a time, each with its tools; all of it can be folded away.
 
 import { cameraTools } from "./cameras.js";
-import { button, byId, download, fill } from "./elements.js";
-import { get } from "./state.js";
-import { varianceCsv } from "./variance.js";
+import { byId, fill } from "./elements.js";
+import { get, set, watch } from "./state.js";
 
-function toolsOf(panel) {
-  if (panel === "cameras") return cameraTools();
-  if (panel !== "variance") return [];
-  return [button("CSV", () => {
-    const detail = get("detail");
-    if (detail) download(`${get("session")}-${get("run")}-frame${detail.frame}-variance.csv`, new Blob([varianceCsv(detail, get("whatIf") ?? detail.layers)], { type: "text/csv" }));
-  }, "quiet small", { title: "This frame's variances as CSV" })];
-}
+const toolsOf = (panel) => (panel === "cameras" ? cameraTools() : []);
 
 function fold(folded) {
   const folder = byId("panels-fold");
@@ -24,27 +16,47 @@ function fold(folded) {
 
 /** Show a panel, from elsewhere on the page. */
 export function showPanel(name) {
-  /** @type {HTMLElement} */ (document.querySelector(`[role=tab][data-panel="${name}"]`))?.click();
+  fold(false);
+  set({ panel: name });
+}
+
+const LEAST_PANELS = 160, STEP = 24;
+
+/** The height of the panels, dragged or by the arrow keys; remembered. */
+function startEdge() {
+  const edge = byId("panels-edge");
+  const most = () => innerHeight - 260;
+  const apply = (height) => {
+    const kept = Math.round(Math.max(LEAST_PANELS, Math.min(most(), height)));
+    document.documentElement.style.setProperty("--panels-height", `${kept}px`);
+    localStorage.setItem("panels-height", String(kept));
+    Object.assign(edge, { ariaValueMin: String(LEAST_PANELS), ariaValueMax: String(most()), ariaValueNow: String(kept) });
+  };
+  const remembered = Number(localStorage.getItem("panels-height"));
+  if (remembered) apply(remembered);
+  else Object.assign(edge, { ariaValueMin: String(LEAST_PANELS), ariaValueMax: String(most()), ariaValueNow: String(byId("panels").clientHeight) });
+  edge.onpointerdown = (event) => {
+    edge.setPointerCapture(event.pointerId);
+    edge.onpointermove = (moved) => apply(innerHeight - moved.clientY);
+  };
+  edge.onpointerup = edge.onpointercancel = () => { edge.onpointermove = null; };
+  edge.ondblclick = () => { localStorage.removeItem("panels-height"); document.documentElement.style.removeProperty("--panels-height"); };
+  edge.onkeydown = (event) => {
+    const by = { ArrowUp: STEP, ArrowDown: -STEP }[event.key];
+    if (!by) return;
+    event.preventDefault();
+    apply(byId("panels").clientHeight + by);
+  };
 }
 
 /** Wire tabs, tools and the fold. */
 export function startTabs() {
   /** @type {HTMLElement[]} */
   const tabs = [...document.querySelectorAll(/** @type {"button"} */ ("[role=tab]"))];
-  const choose = (tab) => {
-    for (const one of tabs) {
-      one.ariaSelected = String(one === tab);
-      one.tabIndex = one === tab ? 0 : -1;
-      byId(`panel-${one.dataset.panel}`).hidden = one !== tab;
-    }
-    localStorage.setItem("panel", tab.dataset.panel);
-    fill(byId("tab-tools"), toolsOf(tab.dataset.panel));
-    document.dispatchEvent(new Event("panel"));
-  };
+  const named = (name) => tabs.find((tab) => tab.dataset.panel === name);
   for (const tab of tabs) {
     tab.onclick = (event) => {
-      fold(false);
-      choose(tab);
+      showPanel(tab.dataset.panel);
       // After a click the timeline's keys go on; from the keyboard the arrows go from tab to tab.
       if (event.detail) tab.blur();
     };
@@ -54,10 +66,22 @@ export function startTabs() {
       event.stopPropagation();
       const next = tabs[(tabs.indexOf(tab) + by + tabs.length) % tabs.length];
       next.focus();
-      choose(next);
+      set({ panel: next.dataset.panel });
     };
   }
-  choose(tabs.find((tab) => tab.dataset.panel === localStorage.getItem("panel")) ?? tabs[0]);
+  watch(["panel"], () => {
+    const chosen = named(get("panel"));
+    if (!chosen) return set({ panel: (named(localStorage.getItem("panel")) ?? tabs[0]).dataset.panel });
+    for (const one of tabs) {
+      one.ariaSelected = String(one === chosen);
+      one.tabIndex = one === chosen ? 0 : -1;
+      byId(`panel-${one.dataset.panel}`).hidden = one !== chosen;
+    }
+    localStorage.setItem("panel", chosen.dataset.panel);
+    fill(byId("tab-tools"), toolsOf(chosen.dataset.panel));
+    document.dispatchEvent(new Event("panel"));
+  });
+  startEdge();
   fold(localStorage.getItem("panels-folded") === "yes");
   byId("panels-fold").onclick = () => fold(!document.body.classList.contains("panels-folded"));
 }

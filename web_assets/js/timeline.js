@@ -1,23 +1,27 @@
 // The timeline: what is tracked, weight and error over the frames, lost spans, settings changes, the cursor.
 
+import { figure } from "./chart_looks.js";
 import { drawSoon } from "./pacing.js";
 import { byId, dotted, element, fill } from "./elements.js";
 import { say } from "./messages.js";
-import { get, set, watch } from "./state.js";
+import { goTo, layersShown, range, stepLayer } from "./selection.js";
+import { get, watch } from "./state.js";
 import { onTheme, token } from "./theme.js";
 
 const track = byId("track");
 const canvas = byId("track-canvas");
 const label = byId("frame-label");
 const PADDING = 6;
-// How a frame went, its colour, and what is said of it; frames that were simply tracked carry no mark.
+// What the search says of a frame: its name here, its colour, and what is said of it; frames that were simply tracked carry no mark.
 const STATES = {
-  lost: ["bad", "the tracker lost the body here and searches for it"],
-  "limb lost": ["warn", "a limb is off: it is off the silhouettes"],
-  damaged: ["bad", "damaged on the disk: resume the run to track it again"],
-  "no evidence": ["text-quiet", "nothing to be seen: the pose is held"],
-  recovered: ["good", "found again"],
+  lost: ["search lost", "bad", "the tracker lost the body here and searches for it"],
+  "limb lost": ["search: a limb off", "warn", "a limb is off the silhouettes, says the tracker"],
+  damaged: ["damaged", "bad", "damaged on the disk: resume the run to track it again"],
+  "no evidence": ["no evidence", "text-quiet", "nothing to be seen: the pose is held"],
+  recovered: ["found again", "good", "found again"],
 };
+// What the truth says of it.
+const TRUE_LOSS = ["limb lost (truth)", "truth", "by the truth a limb is off by more than 150 mm"];
 const BAND = 5;
 
 /** The finished frames, and those that are damaged on the disk as frames of that state. */
@@ -26,24 +30,10 @@ function known(summary) {
   return damaged.length ? [...summary.frames, ...damaged].sort((one, other) => one.frame - other.frame) : summary?.frames ?? [];
 }
 
-/** First and last frame (half open) of the run that is open. */
-export function range() {
-  const summary = get("summary");
-  return summary ? [summary.first, summary.last] : [0, 1];
-}
-
-/** Show a frame that has a result: the nearest one. */
-export function goTo(frame) {
-  const frames = get("summary")?.frames;
-  if (!frames?.length) return;
-  const nearest = Math.max(frames[0].frame, Math.min(frames[frames.length - 1].frame, Math.round(frame)));
-  set({ frame: nearest, follow: nearest === frames[frames.length - 1].frame && get("work")?.state === "tracking", whatIf: null });
-}
-
-/** Where the marks of the run begin: frames of which something is to be said that is not said of the one before. */
+/** Where the marks that are drawn begin: frames of which something is to be said that is not said of the one before. */
 export function marks(frames) {
   const corrected = get("summary")?.corrected;
-  return frames.filter((entry, at) => entry.frame === corrected || (STATES[entry.tracking] && frames[at - 1]?.tracking !== entry.tracking)).map((entry) => entry.frame);
+  return frames.filter((entry, at) => entry.frame === corrected || (STATES[entry.tracking] && frames[at - 1]?.tracking !== entry.tracking) || (entry.lost && !frames[at - 1]?.lost)).map((entry) => entry.frame);
 }
 
 /** Show the next mark, or (by < 0) the one before. */
@@ -52,7 +42,7 @@ export function goToMark(by) {
   const found = marks(known(summary));
   const at = get("frame") ?? -Infinity;
   const next = by > 0 ? found.find((frame) => frame > at) : found.findLast((frame) => frame < at);
-  if (next === undefined) return say(found.length ? `No mark ${by > 0 ? "after" : "before"} this frame.` : "The tracker was never lost: the timeline has no marks.");
+  if (next === undefined) return say(found.length ? `No mark ${by > 0 ? "after" : "before"} this frame.` : "The timeline has no marks: neither the search nor the truth says that anything was lost.");
   goTo(next);
 }
 
@@ -90,8 +80,7 @@ function drawTimeline() {
     pen.fillStyle = token("accent-soft");
     pen.fillRect(start - 2, 0, position(frames[frames.length - 1].frame, width) - start + 4, height);
   }
-  pen.fillStyle = token("bad");
-  for (const entry of frames) if (entry.lost) pen.fillRect(position(entry.frame, width) - 1, height - 4, 3, 4);
+  markTruth(pen, frames, width, height);
   markStates(pen, frames, width);
   curve(pen, frames, "log_weight", token("text-quiet"), width, height, false);
   curve(pen, frames, "error_mm", token("layer-7"), width, height, true);
@@ -122,14 +111,25 @@ function markCorrection(pen, summary, width, height) {
 
 const isCorrected = (summary) => summary?.corrected !== null && summary?.corrected !== undefined;
 
+/** The width of a frame's mark, pixels. */
+function stepOf(width) {
+  const [first, last] = range();
+  return Math.max(3, (width - 2 * PADDING) / Math.max(1, last - first - 1) + 0.5);
+}
+
+/** A band along the bottom: where by the truth a limb is lost. */
+function markTruth(pen, frames, width, height) {
+  pen.fillStyle = token(TRUE_LOSS[1]);
+  for (const entry of frames) if (entry.lost) pen.fillRect(position(entry.frame, width) - stepOf(width) / 2, height - BAND + 1, stepOf(width), BAND - 1);
+}
+
 /** A band along the top: where the tracker was lost, saw nothing, or found the body again. */
 function markStates(pen, frames, width) {
-  const [first, last] = range();
-  const step = Math.max(3, (width - 2 * PADDING) / Math.max(1, last - first - 1) + 0.5);
+  const step = stepOf(width);
   for (const entry of frames) {
     const state = STATES[entry.tracking];
     if (!state) continue;
-    pen.fillStyle = token(state[0]);
+    pen.fillStyle = token(state[1]);
     pen.fillRect(position(entry.frame, width) - step / 2, 0, step, BAND);
   }
 }
@@ -138,7 +138,7 @@ function markStates(pen, frames, width) {
 function legend(frames) {
   const measured = frames.some((entry) => entry.error_mm !== null && entry.error_mm !== undefined);
   const states = Object.keys(STATES).filter((name) => frames.some((entry) => entry.tracking === name));
-  return [["weight", "text-quiet"], ...(isCorrected(get("summary")) ? [["corrected", "accent"]] : []), ...(measured ? [["error", "layer-7"]] : []), ...states.map((name) => [name, STATES[name][0]])];
+  return [["weight", "text-quiet"], ...(isCorrected(get("summary")) ? [["corrected", "accent"]] : []), ...(measured ? [["error", "layer-7"]] : []), ...states.map((name) => STATES[name]), ...(frames.some((entry) => entry.lost) ? [TRUE_LOSS] : [])];
 }
 
 /** What curves and bands are, at the free end of the line. */
@@ -158,14 +158,23 @@ function explain(pen, frames) {
   }
 }
 
+/** Both measures of a frame in words; "" where there is nothing to say. */
+function standing(entry) {
+  const lost = entry?.lost ? `${TRUE_LOSS[0]}${entry.lost_limbs?.length ? `: ${entry.lost_limbs.join(", ")}` : ""}` : "";
+  return dotted(STATES[entry?.tracking]?.[0] ?? "", lost);
+}
+
 function showFrame() {
   const summary = get("summary");
   const frame = get("frame");
   if (!summary || frame === null) return fill(label, "–");
   const entry = summary.frames.find((one) => one.frame === frame);
-  const state = STATES[entry?.tracking] ? entry.tracking : "";
-  const measured = entry?.error_mm != null ? `${entry.error_mm.toPrecision(3)} mm` : "";
-  fill(label, `${frame} `, element("small", {}, dotted(`/ ${summary.last - 1}`, measured, state)));
+  const state = standing(entry);
+  const [before, after] = [entry?.error_mm, get("outcome")?.frame === frame ? get("outcome").after?.error_mm : undefined];
+  const measured = before == null ? "" : after == null ? `${figure(before)} mm` : `${figure(before)} → ${figure(after)} mm`;
+  const name = STATES[entry?.tracking]?.[0] ?? (entry?.lost ? TRUE_LOSS[0] : "");
+  fill(label, element("span", {}, element("b", {}, `frame ${frame}`), element("small", {}, ` of ${summary.first} to ${summary.last - 1}`)), element("small", {}, dotted(measured, name)));
+  label.title = dotted(`frame ${frame} of ${summary.first} to ${summary.last - 1}, ${summary.frames.length} of ${summary.last - summary.first} frames tracked`, state);
   Object.assign(track, { ariaValueMin: summary.first, ariaValueMax: summary.last - 1, ariaValueNow: frame, ariaValueText: state ? `frame ${frame}, ${state}` : `frame ${frame}` });
 }
 
@@ -181,7 +190,8 @@ function wordsOf(frame) {
   const entry = known(summary).find((one) => one.frame === frame);
   const state = STATES[entry?.tracking];
   if (isCorrected(summary) && frame === summary.corrected) return `frame ${frame}: corrected by hand in ${summary.made_from}, tracked ${summary.backwards_to === null ? "on" : `backwards to ${summary.backwards_to}`} from it`;
-  return state ? `frame ${frame}: ${entry.tracking} – ${state[1]}${entry.part ? ` (${entry.part})` : ""}` : "";
+  const parts = [state && `${state[0]} – ${state[2]}${entry.part ? ` (${entry.part})` : ""}`, entry?.lost && `${TRUE_LOSS[0]} – ${TRUE_LOSS[2]}${entry.lost_limbs?.length ? `: ${entry.lost_limbs.join(", ")}` : ""}`].filter(Boolean);
+  return parts.length ? `frame ${frame}: ${parts.join("; ")}` : "";
 }
 
 /** Wire the timeline. */
@@ -194,21 +204,12 @@ export function startTimeline() {
   new ResizeObserver(drawTimeline).observe(track);
   onTheme(drawTimeline);
   document.fonts.ready.then(drawTimeline);
-  watch(["summary", "frame"], () => { drawSoon(drawTimeline); showFrame(); });
+  watch(["summary", "frame", "outcome"], () => { drawSoon(drawTimeline); showFrame(); });
+  watch(["detail"], () => { label.title = (get("detail")?.notes ?? []).join(" "); label.classList.toggle("noted", label.title !== ""); });
   const layerLabel = byId("layer-label");
   watch(["layer", "detail", "whatIf"], () => {
-    const count = (get("whatIf") ?? get("detail")?.layers)?.length ?? 0;
-    layerLabel.textContent = get("layer") === null ? "all layers" : `layer ${get("layer") + 1} / ${count}`;
+    layerLabel.textContent = get("layer") === null ? "all layers" : `layer ${get("layer") + 1} of ${layersShown()}`;
   });
   byId("layer-back").onclick = () => stepLayer(-1);
   byId("layer-on").onclick = () => stepLayer(1);
-}
-
-/** Show the layer before or after; past either end all layers are shown together. */
-export function stepLayer(by) {
-  const count = (get("whatIf") ?? get("detail")?.layers)?.length ?? 0;
-  if (!count) return;
-  const at = get("layer");
-  const next = at === null ? (by > 0 ? 0 : count - 1) : at + by;
-  set({ layer: next < 0 || next >= count ? null : next });
 }

@@ -9,7 +9,8 @@ export interface Chart {
   dispatchAction(action: object): void;
   resize(size?: { width: number | "auto" }): void;
   getWidth(): number;
+  renderToSVGString(): string;
   isDisposed(): boolean;
   dispose(): void;
 }
-export function init(element: HTMLElement, theme: null, options: { renderer: "canvas" | "svg" }): Chart;
+export function init(element: HTMLElement | null, theme: null, options: { renderer: "canvas" | "svg"; ssr?: boolean; width?: number; height?: number }): Chart;

@@ -11,13 +11,13 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from studio.arrays import Array
 from studio.behaviour.model import BehaviourModel
 from studio.body.catalogue import load_body
 from studio.comparison.findings import Series, Table
-from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.footage_cache import FootageCache
 from studio.comparison.statistics import number
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.reproduction.caillette.setting import (
@@ -32,8 +32,6 @@ from studio.reproduction.caillette.training_set import POINTING, Training, learn
 from studio.reproduction.claims import share
 from studio.reproduction.drawing import heat_chart, line_chart
 from studio.reproduction.experiment import Experiment, Part, each_seed
-
-Array = NDArray[np.float64]
 
 PAPER_CLUSTERS, PAPER_POINTING = 122.0, 5.0
 PAPER_STATES: Mapping[int, float] = {10: 948.0, 30: 2890.0}
@@ -68,10 +66,10 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
 
 
 @kept_as("caillette.clusters_and_states.measure")
-def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
+def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
     """Clusters; of the dance states and entropies (nats a frame) for every memory and ε."""
     trained_on = Training.of_plain(arguments["training"])
-    lesson = learnt(shelf, trained_on)
+    lesson = learnt(cache, trained_on)
     model = lesson.model
     found: dict[str, Any] = {
         "clusters": model.clusters,
@@ -84,13 +82,13 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
     body = load_body(trained_on.body)
     tests = (TEST, TEST_2)[: len(trained_on.sources)]
     poses = {
-        TRAIN: [recorded(shelf, name, body).poses for name in trained_on.sources],
-        TEST_SET: [recorded(shelf, name, body).poses for name in tests],
-        NEVER: [recorded(shelf, UNSEEN, body).poses],
+        TRAIN: [recorded(cache, name, body).poses for name in trained_on.sources],
+        TEST_SET: [recorded(cache, name, body).poses for name in tests],
+        NEVER: [recorded(cache, UNSEEN, body).poses],
     }
-    found["inside"] = {name: _inside(model, own) for name, own in poses.items()}
+    found["inside"] = {name: frames_inside(model, own) for name, own in poses.items()}
     labels = {name: [model.labels(one) for one in poses[name]] for name in (TEST_SET, NEVER)}
-    cells = []
+    cells: list[dict[str, Any]] = []
     for epsilon in EPSILONS:
         for memory in MEMORIES:
             settings = dataclasses.replace(trained_on, memory=memory, epsilon=epsilon).settings()
@@ -101,7 +99,7 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
     return {**found, "cells": cells}
 
 
-def _inside(model: BehaviourModel, recordings: Sequence[Array]) -> float:
+def frames_inside(model: BehaviourModel, recordings: Sequence[Array]) -> float:
     """Share of the frames that lie within the 99 % ellipsoid of some cluster, where clusters are found."""
     mixture = model.mixture
     points = np.concatenate([model.reduction.reduced(model.space.features(poses)) for poses in recordings])

@@ -1,5 +1,7 @@
 """A tracker on the dance, with or without a behaviour model: the trial of most of these experiments."""
 
+import copy
+import dataclasses
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -8,24 +10,27 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.behaviour.feature_space import feature_space
 from studio.behaviour.model import BehaviourModel
-from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.footage_cache import FootageCache
 from studio.comparison.trials import Trial, kept_as
 from studio.errors import SettingsError
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.likelihood.blobs import BlobProblem
+from studio.likelihood.catalogue import WEIGHTINGS
+from studio.likelihood.problem import Expectant, FrameLikelihood, SelfJudging
 from studio.reproduction.caillette.training_set import Training, learnt
 from studio.reproduction.caillette.true_motion import TrueMotion, joint_errors, true_motion
-from studio.reproduction.tracking import Contender
+from studio.reproduction.tracking import Candidate
 from studio.runs.behaviour_models import fitting
 from studio.runs.following import Following
 from studio.runs.search_space import search_space, session_sigma
 from studio.sessions.session import Session
 from studio.settings import RunSettings, changed_settings, default_settings
-from studio.tracking.tracker import LayerRecord, start_of
-from studio.weighting.catalogue import WEIGHTINGS
-from studio.weighting.problem import Expectant, FrameProblem
-
-Array = NDArray[np.float64]
+from studio.trackers.guided_particles import spread_over_clusters
+from studio.trackers.loss_detection import Onlooker
+from studio.trackers.tracker import FilterState, FrameResult, LayerRecord, start_of
 
 # The frames that trials weigh, prepared once for all trials of a process that use the same ones.
 # Two ways: as in a run, where blobs are fitted from where the tracker expects the body; and with blobs that are
@@ -37,7 +42,7 @@ Array = NDArray[np.float64]
 class Known:
     """A frame with given expected poses, which a search does not change."""
 
-    informed: FrameProblem
+    informed: FrameLikelihood
 
     def weigh(self, poses: Array, stage: int = 0) -> Array:
         """(N, D) poses to (N,) log-weights."""
@@ -53,14 +58,14 @@ class Known:
 
 
 def problems(
-    shelf: FootageShelf, session: Session, settings: RunSettings, last: int
-) -> Callable[[int], FrameProblem]:
+    cache: FootageCache, session: Session, settings: RunSettings, last: int
+) -> Callable[[int], FrameLikelihood]:
     """Frame number to problem, for the first `last` frames. Those of hulls are kept, as carving takes longest."""
     weighting, cameras = WEIGHTINGS[settings.weighting_name], session.cameras()
     weigher = weighting.prepare(session.body(), cameras, settings.weighting)
 
-    def made(frame: int) -> FrameProblem:
-        seen = shelf.evidence(
+    def made(frame: int) -> FrameLikelihood:
+        seen = cache.evidence(
             session, cameras, frame, settings.evidence, weighting.edge_kind, weighting.reads_pictures
         )
         return weigher.problem(seen)
@@ -68,22 +73,22 @@ def problems(
     if weighting.edge_kind != "hull":
         return made
     key = ("hulls", session.path, settings.weighting, settings.evidence, last)
-    kept = shelf.prepared(key, lambda: [made(frame) for frame in range(last)])
+    kept = cache.prepared(key, lambda: [made(frame) for frame in range(last)])
     return lambda frame: kept[frame]
 
 
 def known_problems(
-    shelf: FootageShelf, session: Session, settings: RunSettings, true_poses: Array
-) -> Callable[[int], FrameProblem]:
+    cache: FootageCache, session: Session, settings: RunSettings, true_poses: Array
+) -> Callable[[int], FrameLikelihood]:
     """Frame number to problem, each given the true pose (F, D) as the expected one. Raises SettingsError for a
     weighting that does not use expected poses.
     """
     last = len(true_poses)
 
-    def informed() -> Sequence[FrameProblem]:
+    def informed() -> Sequence[FrameLikelihood]:
         memory: Mapping[str, Array] = {}
-        found = []
-        of_frame = problems(shelf, session, settings, last)
+        found: list[FrameLikelihood] = []
+        of_frame = problems(cache, session, settings, last)
         for frame, pose in enumerate(true_poses):
             problem = of_frame(frame)
             if not isinstance(problem, Expectant):
@@ -97,7 +102,7 @@ def known_problems(
         return found
 
     key = ("known", session.path, settings.weighting, settings.evidence, last)
-    kept = shelf.prepared(key, informed)
+    kept = cache.prepared(key, informed)
     return lambda frame: kept[frame]
 
 
@@ -107,7 +112,7 @@ class Follow:
 
     footage : a recipe's name. last : frames from the first, which begins at the true pose. changes : knobs by flat
     name. from_truth : blobs are fitted from the true pose in every frame. training : of the behaviour
-    model, None without one.
+    model, None without one. recovers : by the paper's own recovery (`Recovering`).
     """
 
     footage: str
@@ -115,19 +120,21 @@ class Follow:
     weighting: str
     seed: int
     last: int
-    changes: Mapping[str, Any] = field(default_factory=dict)
+    changes: Mapping[str, Any] = field(default_factory=dict[str, Any])
     from_truth: bool = False
     training: Training | None = None
+    recovers: bool = False
 
     def plain(self) -> dict[str, Any]:
-        """As a trial's arguments."""
-        return asdict(self)
+        """As a trial's arguments; `recovers` is left out where it is not, so that stored outcomes stay valid."""
+        return {name: value for name, value in asdict(self).items() if value or name != "recovers"}
 
     @classmethod
     def of_plain(cls, arguments: Mapping[str, Any]) -> "Follow":
         """From a trial's arguments, as read from JSON."""
         training = arguments.get("training")
-        return cls(**{**arguments, "training": Training.of_plain(training) if training else None})
+        words: dict[str, Any] = {**arguments, "training": Training.of_plain(training) if training else None}
+        return cls(**words)
 
     def settings(self) -> RunSettings:
         """All knobs of the run. Raises SettingsError."""
@@ -138,7 +145,8 @@ class Follow:
 class Followed:
     """The errors of a run. Of each frame: angle_deg, limb_deg, position_mm : RMS over joint angles, limbs' directions
     and markers; lost : a marker is off by more than 150 mm; free : share of the particles that no model moved, empty
-    where none guides them. mean_mm : mean marker error. evaluations : of a frame. milliseconds : of a frame's search.
+    where none guides them; resets : the automaton was reset, empty where there is no recovery. mean_mm : mean marker
+    error. evaluations : of a frame. milliseconds : of a frame's search.
     """
 
     angle_deg: list[float]
@@ -149,6 +157,7 @@ class Followed:
     mean_mm: float
     evaluations: int
     milliseconds: float
+    resets: list[bool] = field(default_factory=list[bool])
 
     @property
     def angle_rms(self) -> float:
@@ -171,19 +180,84 @@ class Followed:
         return float(np.mean(self.lost))
 
 
+CLUSTERS, FITTED_AGAIN = 20, 32
+"""Most clusters expected, and most poses that blobs are fitted from, where the tracker is lost: the knobs' largest."""
+
+
+@dataclass(eq=False)
+class Recovering(Following):
+    """Following with the recovery of section 6.3. resets : of each frame.
+
+    Where the best mixture of blobs gives the voxels a poor likelihood the states of all particles are reset, which
+    spreads them over the clusters, and the frame's blobs are fitted from the clusters before it is searched again: from
+    the CLUSTERS that hold most of the spread particles (the paper: from all). Roots stay, with noise of σ0.
+    """
+
+    resets: list[bool] = field(default_factory=list[bool])
+
+    def step(self, frame: int, problem: FrameLikelihood, seen: FrameEvidence | None = None) -> FrameResult:
+        """Search a frame; again from all clusters where its blobs fit poorly."""
+        before = self.carried
+        result = super().step(frame, problem, seen)
+        root = before.estimate
+        lost = root is not None and self._is_lost(problem, before, result)
+        self.resets.append(lost)
+        if not lost or root is None or self.space.behaviour is None:
+            return result
+        for kept in (self.poses, self.log_weights, self.memories, self.overlaps):
+            kept.pop()
+        tracker = self.settings.tracker
+        rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((self.seed, frame, RESET_KEY))))
+        sigma = self.space.sigma * tracker.diffusion_scale
+        spread = spread_over_clusters(rng, self.space, tracker.particles, root, sigma)
+        self.carried = dataclasses.replace(before, particles=spread)
+        usual = self.settings
+        every = {"expected_support": 0.0, "expected_most": CLUSTERS, "blob_starts": FITTED_AGAIN}
+        self.settings = changed_settings(usual, every)
+        try:
+            return super().step(frame, _fitted_from_many(problem), seen)
+        finally:
+            self.settings = usual
+
+    def _is_lost(self, problem: FrameLikelihood, before: FilterState, result: FrameResult) -> bool:
+        """Whether blobs fitted from where the body was found give the voxels a poor likelihood."""
+        if not isinstance(problem, Expectant):
+            return False
+        fitted = problem.expecting(result.estimate.pose[None], before.memory)
+        return isinstance(fitted, SelfJudging) and fitted.lost_evidence
+
+
+RESET_KEY = 0x5EED
+
+
+def _fitted_from_many(problem: FrameLikelihood) -> FrameLikelihood:
+    """A frame whose blobs are fitted from FITTED_AGAIN expected poses."""
+    if not isinstance(problem, BlobProblem):
+        return problem
+    weigher = copy.copy(problem.weigher)
+    weigher.settings = dataclasses.replace(weigher.settings, blob_starts=FITTED_AGAIN)
+    return BlobProblem(weigher, problem.hull)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class Way:
-    """The poses (F, D) of a run, and its frames' records. model : the behaviour model at its end, if any."""
+class Workflow:
+    """The poses (F, D) of a run, and its frames' records.
+
+    model : the behaviour model at its end, if any. resets : as in `Followed`. overlaps : of each frame's pose with the
+    masks, NaN without online learning.
+    """
 
     poses: Array
     free: list[float]
     evaluations: int
     seconds: float
     model: BehaviourModel | None
+    resets: list[bool]
+    overlaps: list[float]
 
 
 def follow_trial(
-    contender: Contender,
+    contender: Candidate,
     group: str,
     footage: str,
     seed: int,
@@ -197,23 +271,23 @@ def follow_trial(
 
 
 @kept_as("caillette.following.measure")
-def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
+def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
     """Track and compare; the fields of `Followed`."""
     wanted = Follow.of_plain(arguments)
-    model = learnt(shelf, wanted.training).model if wanted.training else None
-    session = shelf.session(wanted.footage)
-    truth = true_motion(shelf, session, wanted.last)
-    return asdict(followed(session, truth, way_of(shelf, session, truth, wanted, model)))
+    model = learnt(cache, wanted.training).model if wanted.training else None
+    session = cache.session(wanted.footage)
+    truth = true_motion(cache, session, wanted.last)
+    return asdict(followed(session, truth, workflow_of(cache, session, truth, wanted, model)))
 
 
-def way_of(
-    shelf: FootageShelf, session: Session, truth: TrueMotion, wanted: Follow, model: BehaviourModel | None
-) -> Way:
+def workflow_of(
+    cache: FootageCache, session: Session, truth: TrueMotion, wanted: Follow, model: BehaviourModel | None
+) -> Workflow:
     """The run that tracks the footage from the true pose of its first frame."""
     settings, body, fps = wanted.settings(), session.body(), session.manifest.fps
-    problem_of = problems(shelf, session, settings, wanted.last)
+    problem_of = problems(cache, session, settings, wanted.last)
     if wanted.from_truth:
-        problem_of = known_problems(shelf, session, settings, truth.poses)
+        problem_of = known_problems(cache, session, settings, truth.poses)
     free: list[float] = []
 
     def note(record: LayerRecord) -> None:
@@ -221,12 +295,13 @@ def way_of(
             free.append(float(record.model_free_share))
 
     fitted = None if model is None else fitting(model, body, fps)
-    following = Following(
+    following = (Recovering if wanted.recovers else Following)(
         settings,
         search_space(body, session_sigma(session, body, fps), fitted),
         start_of(tuple(float(value) for value in truth.poses[0])),
         wanted.seed,
         on_layer=note,
+        overlap_of=_overlap_of(cache, session, settings),
     )
     seconds, evaluations = 0.0, 0
     for frame in range(wanted.last):
@@ -234,10 +309,30 @@ def way_of(
         began = time.perf_counter()
         evaluations = following.step(frame, problem).evaluations
         seconds += time.perf_counter() - began if frame else 0.0
-    return Way(np.array(following.poses), free, evaluations, seconds, following.model)
+    resets = following.resets if isinstance(following, Recovering) else []
+    return Workflow(
+        np.array(following.poses), free, evaluations, seconds, following.model, resets, following.overlaps
+    )
 
 
-def followed(session: Session, truth: TrueMotion, way: Way) -> Followed:
+MASKS = "edge-region-silhouette"
+"""The likelihood whose masks tell how well a pose agrees: hulls are carved without any."""
+
+
+def _overlap_of(
+    cache: FootageCache, session: Session, settings: RunSettings
+) -> Callable[[int, Array], float]:
+    """A frame's number and a pose (D,) to the overlap of their silhouettes (f_s)."""
+    cameras, kind = session.cameras(), WEIGHTINGS[MASKS].edge_kind
+    onlooker = Onlooker(session.body(), cameras)
+
+    def overlap(frame: int, pose: Array) -> float:
+        return onlooker.sight(cache.evidence(session, cameras, frame, settings.evidence, kind), pose).overlap
+
+    return overlap
+
+
+def followed(session: Session, truth: TrueMotion, way: Workflow) -> Followed:
     """The errors of a run."""
     body = session.body()
     found = joint_errors(body, feature_space(body, session.manifest.fps).columns, way.poses, truth)
@@ -250,6 +345,7 @@ def followed(session: Session, truth: TrueMotion, way: Way) -> Followed:
         round(float(found.mean_mm.mean()), 4),
         way.evaluations,
         round(1000.0 * way.seconds / max(1, len(way.poses) - 1), 3),
+        way.resets,
     )
 
 

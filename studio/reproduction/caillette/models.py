@@ -16,10 +16,12 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from studio.behaviour.model import BehaviourModel
 from studio.body.catalogue import load_body
 from studio.comparison.findings import Series, Table
-from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.footage_cache import FootageCache
 from studio.comparison.statistics import number
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.reproduction.caillette.comparing import (
@@ -32,7 +34,7 @@ from studio.reproduction.caillette.comparing import (
     ratio,
     summary_table,
 )
-from studio.reproduction.caillette.following import Follow, Followed, follow_trial, followed, way_of
+from studio.reproduction.caillette.following import Follow, Followed, follow_trial, followed, workflow_of
 from studio.reproduction.caillette.following import measure as measure_following
 from studio.reproduction.caillette.setting import (
     BLOBS,
@@ -52,6 +54,8 @@ from studio.reproduction.caillette.true_motion import true_motion
 from studio.reproduction.claims import LOWER
 from studio.reproduction.drawing import line_chart, seed_range
 from studio.reproduction.experiment import Experiment, Part, each_seed
+from studio.runs.behaviour_models import fitting
+from studio.trackers.online_learning import updated_model
 
 
 def _training_of(outcomes: Sequence[Outcome]) -> str:
@@ -73,7 +77,7 @@ def _group(memory: int) -> str:
 def _memory_trials(scale: Scale) -> tuple[Trial, ...]:
     """Every memory with every seed, and each automaton's entropy of the test performance."""
     last = last_frame(TEST, scale.quick, FRAMES)
-    found = []
+    found: list[Trial] = []
     for memory in MEMORIES:
         model, name = training_with(memory, scale.quick), _group(memory)
         found += [
@@ -84,15 +88,16 @@ def _memory_trials(scale: Scale) -> tuple[Trial, ...]:
 
 
 @kept_as("caillette.fig_13.measure")
-def measure_memory(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
+def measure_memory(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
     """Track, or (where the arguments are a training set) measure the automaton."""
     if "entropy_of" not in arguments:
-        return measure_following(arguments, shelf)
+        return measure_following(arguments, cache)
     wanted = {name: value for name, value in arguments.items() if name not in ("entropy_of", "last")}
-    model = learnt(shelf, Training.of_plain(wanted)).model
-    labels = model.labels(recorded(shelf, arguments["entropy_of"], load_body(model.space.body)).poses)
+    model = learnt(cache, Training.of_plain(wanted)).model
+    labels = model.labels(recorded(cache, arguments["entropy_of"], load_body(model.space.body)).poses)
+    stays: NDArray[np.bool_] = labels[1:] == labels[:-1]
     return {
-        "stays": float(np.mean(labels[1:] == labels[:-1])),
+        "stays": float(np.mean(stays)),
         "states": model.states,
         "train": model.making.entropy_train,
         "test": model.automaton.entropy([labels]),
@@ -155,7 +160,17 @@ FIG_13 = Experiment(
 # Online learning.
 
 PARTICLES, INTERVAL = 1000, 30
-PLAIN, FIRST, SECOND = "not learning", "first pass, learning", "second pass, with what the first learnt"
+PLAIN = "not learning"
+UNGATED, GATED = "all that the run finds well tracked", "what agrees with the pictures"
+FIRST, SECOND = "first pass, learning {}", "second pass, taught {}"
+TRUTH = "the true poses"
+GATES = {UNGATED: {"learning_overlap": 0.0}, GATED: {}}
+"""What a first pass learns: all frames that are well tracked beside the rest of it, or those that agree."""
+PASSES = (
+    PLAIN,
+    *(words.format(gate) for gate in GATES for words in (FIRST, SECOND)),
+    SECOND.format(TRUTH),
+)
 
 
 def _online_trials(scale: Scale) -> tuple[Trial, ...]:
@@ -171,38 +186,62 @@ def _online_trials(scale: Scale) -> tuple[Trial, ...]:
 
 
 @kept_as("caillette.online_learning.measure")
-def measure_online(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
-    """The passes, each the fields of `Followed`; clusters and states before and after."""
+def measure_online(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
+    """The passes, each the fields of `Followed`; clusters and states before, and after each way of teaching; the share
+    of frames that agree with the pictures.
+    """
     wanted = Follow.of_plain(arguments)
     assert wanted.training is not None
-    learning = dataclasses.replace(wanted, changes={**wanted.changes, "online_learning": True})
-    model = learnt(shelf, wanted.training).model
-    session = shelf.session(wanted.footage)
-    truth = true_motion(shelf, session, wanted.last)
-    plain = way_of(shelf, session, truth, wanted, model)
-    first = way_of(shelf, session, truth, learning, model)
-    assert first.model is not None
-    second = way_of(shelf, session, truth, wanted, first.model)
-    passes = {PLAIN: plain, FIRST: first, SECOND: second}
+    model = learnt(cache, wanted.training).model
+    session = cache.session(wanted.footage)
+    truth = true_motion(cache, session, wanted.last)
+    passes = {PLAIN: workflow_of(cache, session, truth, wanted, model)}
+    taught: dict[str, BehaviourModel] = {}
+    for gate, knobs in GATES.items():
+        changes = {**wanted.changes, "online_learning": True, **knobs}
+        learning = dataclasses.replace(wanted, changes=changes)
+        first = passes[FIRST.format(gate)] = workflow_of(cache, session, truth, learning, model)
+        assert first.model is not None
+        taught[gate] = first.model
+    fitted = fitting(model, session.body(), session.manifest.fps)
+    rng, every = np.random.default_rng(wanted.seed), np.ones(len(truth.poses), dtype=bool)
+    taught[TRUTH] = updated_model(fitted, fitted, truth.poses, every, rng)
+    for gate, known in taught.items():
+        passes[SECOND.format(gate)] = workflow_of(cache, session, truth, wanted, known)
+    least = wanted.settings().tracker.learning_overlap
+    agreeing = [overlap >= least for overlap in passes[FIRST.format(GATED)].overlaps]
     return {
-        "passes": {name: asdict(followed(session, truth, way)) for name, way in passes.items()},
-        "clusters": [model.clusters, first.model.clusters],
-        "states": [model.states, first.model.states],
+        "passes": {name: asdict(followed(session, truth, passes[name])) for name in PASSES},
+        "clusters": {PLAIN: model.clusters, **{gate: known.clusters for gate, known in taught.items()}},
+        "states": {PLAIN: model.states, **{gate: known.states for gate, known in taught.items()}},
+        "agreeing": float(np.mean(agreeing)),
     }
 
 
 def _online(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     found = [outcome.measured for outcome in outcomes]
-    groups = {name: [Followed(**one["passes"][name]) for one in found] for name in (PLAIN, FIRST, SECOND)}
+    groups = {name: [Followed(**one["passes"][name]) for one in found] for name in PASSES}
     plain = groups[PLAIN]
-    yield ratio("second pass over one that learnt nothing", groups[SECOND], plain, LOWER)
-    yield ratio("the same, joint angle", groups[SECOND], plain, of=angle)
-    yield ratio("the same, joint position", groups[SECOND], plain, of=position)
-    yield ratio("learning while tracking over not learning", groups[FIRST], plain)
+    for gate in (GATED, UNGATED, TRUTH):
+        second = groups[SECOND.format(gate)]
+        claim = LOWER if gate == GATED else ""
+        yield ratio(f"second pass, taught {gate}, over one that learnt nothing", second, plain, claim)
+        yield ratio(f"the same ({gate}), joint angle", second, plain, of=angle)
+        yield ratio(f"the same ({gate}), joint position", second, plain, of=position)
+    for gate in GATES:
+        name = f"learning {gate} while tracking, over not learning"
+        yield ratio(name, groups[FIRST.format(gate)], plain)
     yield from errors("limb direction, RMS", groups)
+    yield from errors("joint position, RMS", groups, position, "mm")
+    yield number("frames that agree with the pictures", [100.0 * one["agreeing"] for one in found], "%")
     for what in ("clusters", "states"):
-        yield number(f"{what} learnt", [one[what][1] - one[what][0] for one in found])
-    yield f"A lesson every {INTERVAL} frames. What is learnt is what was tracked, its errors included."
+        for gate in (*GATES, TRUTH):
+            yield number(f"{what} learnt from {gate}", [one[what][gate] - one[what][PLAIN] for one in found])
+    yield (
+        f"A lesson every {INTERVAL} frames, of what was tracked, its errors included: a frame is learnt where it is "
+        "well tracked beside the rest of the run and, by default, where its silhouettes agree with the masks. Taught "
+        "the true poses is the upper bound: all of them at once, before the pass."
+    )
     yield summary_table("Passes over the clip", groups)
     yield curves("RMS limb direction error", groups)
     yield {"footage": UNSEEN, "particles": PARTICLES, "memory": MEMORY, "training": _training_of(outcomes)}

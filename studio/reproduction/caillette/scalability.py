@@ -12,7 +12,7 @@ import numpy as np
 
 from studio.behaviour.prediction import propagate, start_states
 from studio.comparison.findings import Series, Table
-from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.footage_cache import FootageCache
 from studio.comparison.statistics import number
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.reproduction.caillette.setting import EXERCISE, EXERCISE_2, SOURCE
@@ -24,7 +24,7 @@ from studio.reproduction.experiment import Experiment, Part
 CLASSES = (EXERCISE, EXERCISE_2, "walk-with-turns", "run", "jumps", "handstand")
 """Recipes, whose motion is used without rendering."""
 FRAMES, QUICK_FRAMES, QUICK_CLASSES = 150, 60, 3
-MOST_SEEDS = 2
+MOST_SEEDS = 5
 PARTICLES, ROUNDS = 1000, 12
 UNAFFECTED = 2.0
 """Greatest time of prediction with all classes, relative to one class."""
@@ -45,17 +45,17 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
 
 
 @kept_as("caillette.scalability.measure")
-def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
+def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
     """Sizes of the model, seconds to learn clusters and automaton, milliseconds to predict 1000 particles."""
     training = Training.of_plain(arguments["training"])
-    lesson = lesson_of(shelf, training)
+    lesson = lesson_of(cache, training)
     model = lesson.model
     began = time.perf_counter()
     model.with_automaton(training.settings())
     automaton = time.perf_counter() - began
     rng = np.random.default_rng(training.seed)
     now = start_states(rng, model, PARTICLES)
-    spent = []
+    spent: list[float] = []
     for _ in range(ROUNDS + 1):
         began = time.perf_counter()
         now = propagate(rng, model, now.states, now.values, now.velocities, 0.3)

@@ -7,10 +7,11 @@ Footage: two exercises of real modern dance, performed again by a rendered perso
 
 import dataclasses
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from studio.reproduction.caillette.training_set import Training
-from studio.reproduction.tracking import Contender
+from studio.reproduction.tracking import Candidate
 from studio.synthesis.recipe_file import find_recipe, read_recipe
 
 SOURCE = "Caillette, Galata & Howard 2007"
@@ -33,23 +34,56 @@ QUICK_TRAINING = Training((EXERCISE,))
 SIGMA: Mapping[str, Any] = {"diffusion_scale": 2.0}
 # As in the paper: no particle is moved without the model, and the best particle is the pose.
 AS_PAPER: Mapping[str, Any] = {"model_free_share": 0.0, "model_free_grows": False, "estimate": "mode"}
+# The rest of the paper as printed: transitions by Eq. 3 alone, the root moved by noise (whose width is not printed: as
+# wide as that of the trackers without a model), and weights as the likelihood gives them, normalised.
+AS_PRINTED: Mapping[str, Any] = {
+    **AS_PAPER,
+    "automaton_share": 0.0,
+    "root_prediction": "noise",
+    "selection": "weights",
+    **SIGMA,
+}
+LEARNT_AS_PRINTED: Mapping[str, Any] = {"back_off": 0.0}
+"""Only labels that were seen after a history are possible."""
 GUIDED = "behaviour"
 # The annealing of the paper's time: planned noise (Eq. 13 of Deutscher & Reid), half surviving, no crossover.
 PLANNED: Mapping[str, Any] = {"adaptive_diffusion": False, "crossover": 0.0, "survival": 0.5}
 
-CONDENSATION = Contender("Condensation, 5000", "condensation", BLOBS, {"particles": 5000, **SIGMA})
-ANNEALED = Contender(
+CONDENSATION = Candidate("Condensation, 5000", "condensation", BLOBS, {"particles": 5000, **SIGMA})
+ANNEALED = Candidate(
     "annealed, 5 × 1000", "annealed", BLOBS, {"layers": 5, "particles": 1000, **PLANNED, **SIGMA}
 )
-IMPROVED = Contender(
+IMPROVED = Candidate(
     "annealed, improved, 5 × 1000", "annealed", BLOBS, {"layers": 5, "particles": 1000, **SIGMA}
 )
 
 
-def guided(particles: int, name: str = "", **changes: Any) -> Contender:  # noqa: ANN401 - knobs
-    """The paper's tracker with some number of particles. changes : further knobs."""
+@dataclass(frozen=True, slots=True)
+class Learner(Candidate):
+    """A tracker that a behaviour model guides. learning : knobs that its model is learnt with, beside the usual."""
+
+    learning: Mapping[str, Any] = field(default_factory=dict[str, Any])
+
+
+def guided(particles: int, name: str = "", **changes: Any) -> Learner:  # noqa: ANN401 - knobs
+    """The studio's tracker on the paper's ground, with some number of particles. changes : further knobs.
+
+    It is not the printed one: most particles change cluster by the automaton alone, the root moves as it did in
+    training, survivors are drawn so that a share of 0.4 survives, and histories back off to shorter ones.
+    """
     words = name or f"guided, {particles}"
-    return Contender(words, GUIDED, BLOBS, {"particles": particles, **AS_PAPER, **changes})
+    return Learner(words, GUIDED, BLOBS, {"particles": particles, **AS_PAPER, **changes})
+
+
+def printed(
+    particles: int,
+    name: str = "",
+    learning: Mapping[str, Any] = LEARNT_AS_PRINTED,
+    **changes: Any,  # noqa: ANN401
+) -> Learner:
+    """The paper's tracker as it is printed, with some number of particles. changes, learning : what is not."""
+    words = name or f"printed, {particles}"
+    return Learner(words, GUIDED, BLOBS, {"particles": particles, **AS_PRINTED, **changes}, learning)
 
 
 def last_frame(footage: str, quick: bool, most: int | None = None) -> int:
@@ -63,9 +97,19 @@ def training(quick: bool) -> Training:
     return QUICK_TRAINING if quick else BOTH
 
 
-def training_with(memory: int, quick: bool) -> Training:
-    """The training set, for an automaton with a memory."""
-    return dataclasses.replace(training(quick), memory=memory)
+NOTHING: Mapping[str, Any] = {}
+
+
+def training_with(memory: int, quick: bool, learning: Mapping[str, Any] = NOTHING) -> Training:
+    """The training set, for an automaton with a memory. learning : further knobs of learning."""
+    return dataclasses.replace(training(quick), memory=memory, clusters=dict(learning))
+
+
+def training_for(contender: Candidate, memory: int, quick: bool) -> Training | None:
+    """The training set of a contender's model, None where none guides it."""
+    if contender.tracker != GUIDED and "prediction" not in contender.changes:
+        return None
+    return training_with(memory, quick, contender.learning if isinstance(contender, Learner) else NOTHING)
 
 
 def training_words(quick: bool) -> str:

@@ -9,15 +9,18 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.behaviour.model import BehaviourModel
 from studio.benchmarks.hulls import TABLE_1
 from studio.benchmarks.timing import quickest
-from studio.comparison.findings import Series, Table
-from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.findings import Plain, Series, Table
+from studio.comparison.footage_cache import FootageCache
 from studio.comparison.statistics import number
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.likelihood.blobs import BlobProblem, BlobWeigher
+from studio.likelihood.catalogue import WEIGHTINGS
 from studio.numba_in_threads import numba
 from studio.reproduction.caillette.following import Known
 from studio.reproduction.caillette.setting import (
@@ -32,24 +35,20 @@ from studio.reproduction.caillette.setting import (
 )
 from studio.reproduction.caillette.training_set import Training, learnt
 from studio.reproduction.caillette.true_motion import true_motion
-from studio.reproduction.claims import share
+from studio.reproduction.claims import beside, share
 from studio.reproduction.drawing import bar_chart, places
-from studio.reproduction.experiment import Experiment, Part, verdict_on
+from studio.reproduction.experiment import Experiment, Part
 from studio.runs.behaviour_models import fitting
 from studio.runs.search_space import search_space, session_sigma
 from studio.sessions.session import Session
 from studio.settings import changed_settings, default_settings
-from studio.tracking.catalogue import TRACKERS
-from studio.tracking.frame_loop import search_frame
-from studio.tracking.tracker import Carried, FrameResult, start_of
+from studio.trackers.catalogue import TRACKERS
+from studio.trackers.frame_loop import search_frame
+from studio.trackers.tracker import FilterState, FrameResult, start_of
 from studio.volume.blob_fitting import fit_blobs
 from studio.volume.hull import Hull
 from studio.volume.reconstruction import Reconstructor
 from studio.volume.tracking_space import box_of
-from studio.weighting.blobs import BlobProblem, BlobWeigher
-from studio.weighting.catalogue import WEIGHTINGS
-
-Array = NDArray[np.float64]
 
 ROUNDS = 3
 DEPTHS, VIEWS, PARTICLES = (6, 7, 8), (3, 4, 5), (500, 1000)
@@ -91,16 +90,16 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
 
 
 @kept_as("caillette.table_1.measure")
-def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
+def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
     """Milliseconds by part, as in LABELS; voxels by depth with five views."""
-    session, last = shelf.session(arguments["footage"]), int(arguments["last"])
-    truth = true_motion(shelf, session, last).poses
-    model = learnt(shelf, Training.of_plain(arguments["training"])).model
+    session, last = cache.session(arguments["footage"]), int(arguments["last"])
+    truth = true_motion(cache, session, last).poses
+    model = learnt(cache, Training.of_plain(arguments["training"])).model
     found: dict[str, Any] = {"threads": int(numba.get_num_threads())}
     hulls: list[Hull] = []
     for depth in DEPTHS:
         for views in VIEWS:
-            found[f"hull {depth} {views}"], hulls = carving(shelf, session, last, depth, views)
+            found[f"hull {depth} {views}"], hulls = carving(cache, session, last, depth, views)
         found[f"voxels {depth}"] = float(np.mean([len(hull.centres) for hull in hulls]))
         found[f"fit {depth}"] = blob_fitting(session, hulls, truth)
         if depth == DEPTHS[1]:
@@ -111,15 +110,15 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
 
 
 def carving(
-    shelf: FootageShelf, session: Session, last: int, depth: int, views: int
+    cache: FootageCache, session: Session, last: int, depth: int, views: int
 ) -> tuple[float, list[Hull]]:
     """Milliseconds of a hull, and the hulls of the first frames. Pictures are read and decoded before."""
     settings = changed_settings(default_settings(GUIDED, BLOBS), {"hull_depth": depth})
     weighting, cameras = WEIGHTINGS[BLOBS], session.cameras()
     reconstructor = Reconstructor(cameras[:views], box_of(cameras), settings.weighting)
-    fewer = []
+    fewer: list[FrameEvidence] = []
     for frame in range(last):
-        seen = shelf.evidence(
+        seen = cache.evidence(
             session, cameras, frame, settings.evidence, weighting.edge_kind, weighting.reads_pictures
         )
         fewer.append(dataclasses.replace(seen, views=seen.views[:views]))
@@ -160,7 +159,7 @@ def searching(
     settings = changed_settings(default_settings(contender.tracker, BLOBS), contender.changes).tracker
     weigher = _weigher(session)
 
-    def search(informed: Known, before: Carried, frame: int) -> FrameResult:
+    def search(informed: Known, before: FilterState, frame: int) -> FrameResult:
         return search_frame(
             TRACKERS[contender.tracker],
             informed,
@@ -171,7 +170,7 @@ def searching(
             settings_source=lambda: (1, settings),
         )
 
-    carried, frames = start_of(tuple(float(value) for value in truth[0])), []
+    carried, frames = start_of(tuple(float(value) for value in truth[0])), list[Callable[[], FrameResult]]()
     for frame, (hull, pose) in enumerate(zip(hulls, truth, strict=True)):
         informed = Known(BlobProblem(weigher, hull).expecting(pose[None], {}))
         if frame:
@@ -193,7 +192,7 @@ def _weigher(session: Session) -> BlobWeigher:
 
 
 def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
-    """The table beside the paper's; the verdict is on the paper's claims, which do not depend on the machine."""
+    """The table beside the paper's; the claims are what the paper says of it, which does not depend on the machine."""
     runs, large = (
         [outcome.measured for outcome in outcomes if outcome.trial.arguments["footage"] == footage]
         for footage in (TEST, TEST_640)
@@ -221,12 +220,12 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
         ("fitting, depth 8 over 7", "fit 8", "fit 7"),
         ("1000 particles over 500", "particles 1000", "particles 500"),
     ):
-        yield number(name, of[above] / of[below], "×", PAPER[above] / PAPER[below])
+        yield beside(number(name, of[above] / of[below], "×", PAPER[above] / PAPER[below]))
     for name, label in LABELS.items():
-        yield number(label, of[name], "ms", PAPER[name], "lower")
+        yield beside(number(label, of[name], "ms", PAPER[name], "lower"))
     yield (
         f"On {int(np.mean([run['threads'] for run in runs]))} threads of this machine. Our fit is from one prediction; "
-        "a run fits from several. Reading and decoding pictures is not in the times. The verdict is on what the paper "
+        "a run fits from several. Reading and decoding pictures is not in the times. The claims are what the paper "
         "says of its table: depth matters, views hardly, particles count in proportion, 30 frames a second."
     )
     yield _table("320 × 240 pictures", runs)
@@ -250,7 +249,7 @@ def _table(title: str, runs: Sequence[Mapping[str, Any]]) -> Table:
     def pair(name: str) -> str:
         return f"{mean(name):.1f} / {PAPER[name]:g}"
 
-    rows = []
+    rows: list[tuple[Plain, ...]] = []
     for depth in DEPTHS:
         carved = (pair(f"hull {depth} {views}") for views in VIEWS)
         searched = (pair(f"particles {count}") if depth == DEPTHS[1] else "" for count in PARTICLES)
@@ -259,8 +258,6 @@ def _table(title: str, runs: Sequence[Mapping[str, Any]]) -> Table:
     heads = ("", "3 views", "4 views", "5 views", "blob fitting", "500 particles", "1000 particles", "voxels")
     return Table(f"Milliseconds, ours / paper: {title}", heads, tuple(rows))
 
-
-CLAIMED = ("deeper takes longer", "at every depth", "twice the particles", "within a 30th of a second")
 
 EXPERIMENT = Experiment(
     name="caillette-table-1",
@@ -271,7 +268,6 @@ EXPERIMENT = Experiment(
     trials=trials,
     measure=measure,
     shown=shown,
-    verdict=verdict_on(*CLAIMED),
     footage=(TEST, TEST_640),
     alone=True,
 )

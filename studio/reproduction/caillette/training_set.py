@@ -17,15 +17,15 @@ from typing import Any
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.behaviour.model import BehaviourModel
 from studio.behaviour.model_file import read_model, write_model
 from studio.behaviour.settings import LearningSettings
 from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
 from studio.body.person import first_frames, sampled
-from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.footage_cache import FootageCache
 from studio.comparison.kept_trials import code_digest, plain
 from studio.comparison.trials import Plain
 from studio.sessions.atomic_files import discard, move_into_place, new_folder_beside
@@ -51,12 +51,12 @@ WAIT_SECONDS = 0.2
 
 
 def made_once(
-    shelf: FootageShelf, kind: str, making: Mapping[str, Plain], make: Callable[[Path], None]
+    cache: FootageCache, kind: str, making: Mapping[str, Plain], make: Callable[[Path], None]
 ) -> Path:
     """The folder of some data, made by `make(folder)` if missing. making : all that it depends on."""
     known = json.dumps({"making": plain(making), "code": code_digest(ROOMS)}, sort_keys=True)
     name = f"{kind}-{hashlib.sha256(known.encode()).hexdigest()[:16]}"
-    place = shelf.folder / LEARNT / name
+    place = cache.folder / LEARNT / name
     if place.is_dir():
         return place
     place.parent.mkdir(parents=True, exist_ok=True)
@@ -85,8 +85,6 @@ def _waited_for(place: Path) -> ProcessLock | None:
             return None
 
 
-Array = NDArray[np.float64]
-
 USUAL_MEMORY, USUAL_EPSILON = 10, 0.05
 POINTING = "pointing"
 MODEL, NUMBERS, POSES = "model.behaviour", "learnt.json", "poses.npy"
@@ -110,7 +108,7 @@ class Training:
     seed: int = 0
     body: str = "human25"
     tested: tuple[str, ...] = ()
-    clusters: Mapping[str, Any] = field(default_factory=dict)
+    clusters: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     def plain(self) -> dict[str, Any]:
         """As a trial's arguments."""
@@ -119,8 +117,9 @@ class Training:
     @classmethod
     def of_plain(cls, arguments: Mapping[str, Any]) -> "Training":
         """From a trial's arguments, as they come back from JSON."""
-        words = {name: tuple(arguments[name]) for name in ("sources", "tested")}
-        return cls(**{**arguments, **words})
+        words: dict[str, Any] = {**arguments}
+        words |= {name: tuple(arguments[name]) for name in ("sources", "tested")}
+        return cls(**words)
 
     def settings(self) -> LearningSettings:
         """The knobs of learning."""
@@ -141,7 +140,7 @@ class Lesson:
 
 
 def recorded(
-    shelf: FootageShelf, source: str, body: BodyModel, frames: int = 0, performance: int = 0
+    cache: FootageCache, source: str, body: BodyModel, frames: int = 0, performance: int = 0
 ) -> Recording:
     """A source's motion on the body, fitted once. frames : at 30 Hz from the first, 0 for all. performance : which, 0
     for the original.
@@ -165,7 +164,7 @@ def recorded(
         np.save(folder / POSES, fitted_person(shown, body, source).poses)
 
     making = {"recipe": msgspec.to_builtins(recipe), "body": body.name, "frames": frames, "fps": FPS}
-    found = Recording(source, FPS, np.load(made_once(shelf, "motion", making, make) / POSES))
+    found = Recording(source, FPS, np.load(made_once(cache, "motion", making, make) / POSES))
     return found if own else _performed(found, body, performance)
 
 
@@ -178,21 +177,26 @@ def _performed(recording: Recording, body: BodyModel, performance: int) -> Recor
     return dataclasses.replace(recording, poses=poses)
 
 
-def learnt(shelf: FootageShelf, training: Training) -> Lesson:
-    """The model of a training set, learnt once. Models that differ in memory or ε alone have the same
+def learnt(cache: FootageCache, training: Training) -> Lesson:
+    """The model of a training set, learnt once. Models that differ in knobs of the automaton alone have the same
     clusters.
     """
-    return _read(_learnt_folder(shelf, training))
+    return _read(_learnt_folder(cache, training))
 
 
-def model_file(shelf: FootageShelf, training: Training) -> Path:
+def model_file(cache: FootageCache, training: Training) -> Path:
     """The file of a training set's model."""
-    return _learnt_folder(shelf, training) / MODEL
+    return _learnt_folder(cache, training) / MODEL
 
 
-def _learnt_folder(shelf: FootageShelf, training: Training) -> Path:
-    clusters = dataclasses.replace(training, memory=USUAL_MEMORY, epsilon=USUAL_EPSILON)
-    first = made_once(shelf, "model", _making(clusters), lambda folder: _learn(shelf, clusters, folder))
+# Knobs of the automaton among the knobs of learning: models that differ in these alone have the same clusters.
+OF_THE_AUTOMATON = ("least_probability", "smoothing", "back_off")
+
+
+def _learnt_folder(cache: FootageCache, training: Training) -> Path:
+    usual = {name: value for name, value in training.clusters.items() if name not in OF_THE_AUTOMATON}
+    clusters = dataclasses.replace(training, memory=USUAL_MEMORY, epsilon=USUAL_EPSILON, clusters=usual)
+    first = made_once(cache, "model", _making(clusters), lambda folder: _learn(cache, clusters, folder))
     if clusters == training:
         return first
 
@@ -202,18 +206,18 @@ def _learnt_folder(shelf: FootageShelf, training: Training) -> Path:
         model = base.model.with_automaton(training.settings())
         _write(folder, Lesson(model, base.frames, time.perf_counter() - began))
 
-    return made_once(shelf, "model", _making(training), make)
+    return made_once(cache, "model", _making(training), make)
 
 
-def lesson_of(shelf: FootageShelf, training: Training) -> Lesson:
+def lesson_of(cache: FootageCache, training: Training) -> Lesson:
     """The model of a training set, learnt now: to measure how long it takes."""
     body = load_body(training.body)
     recordings = [
-        recorded(shelf, source, body, training.frames, _number(training, performance))
+        recorded(cache, source, body, training.frames, _number(training, performance))
         for source in training.sources
         for performance in range(training.performances)
     ]
-    tested = [recorded(shelf, source, body, training.frames) for source in training.tested]
+    tested = [recorded(cache, source, body, training.frames) for source in training.tested]
     began = time.perf_counter()
     model, figures = learn(
         recordings, body, training.settings(), training.material(), tested, seed=training.seed
@@ -226,8 +230,8 @@ def _number(training: Training, performance: int) -> int:
     return performance + training.performances * training.seed if performance else 0
 
 
-def _learn(shelf: FootageShelf, training: Training, folder: Path) -> None:
-    _write(folder, lesson_of(shelf, training))
+def _learn(cache: FootageCache, training: Training, folder: Path) -> None:
+    _write(folder, lesson_of(cache, training))
 
 
 def _making(training: Training) -> dict[str, Any]:

@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import read_archive
+from studio.arrays import Array, read_archive
 from studio.body.forward_kinematics import limb_frames, marker_points
 from studio.body.model import BodyModel
 from studio.body.person import first_frames, marker_motion
-from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.footage_cache import FootageCache
 from studio.errors import TruthError
 from studio.motion_files.trc import MarkerMotion, read_trc
 from studio.reproduction.caillette.training_set import made_once
@@ -23,8 +23,6 @@ from studio.sessions.session import Session
 from studio.synthesis.recipe_file import read_recipe
 from studio.synthesis.recipes import RECIPE_COPY, recipe_motion, recipe_person
 from studio.training.sources import fitted_person
-
-Array = NDArray[np.float64]
 
 FILE = "truth.npz"
 SAME_MM = 0.1
@@ -57,7 +55,7 @@ class JointErrors:
     lost: NDArray[np.bool_]
 
 
-def true_motion(shelf: FootageShelf, session: Session, last: int) -> TrueMotion:
+def true_motion(cache: FootageCache, session: Session, last: int) -> TrueMotion:
     """The true motion of the first `last` frames of a recipe's session, for the body that its runs track.
 
     Raises TruthError for a session without recipe, and for footage rendered by another version.
@@ -83,7 +81,7 @@ def true_motion(shelf: FootageShelf, session: Session, last: int) -> TrueMotion:
         )
 
     making = {"recipe": recipe_path.read_text(encoding="utf-8"), "body": body.name, "last": last}
-    kept = read_archive(made_once(shelf, "truth", making, make) / FILE)
+    kept = read_archive(made_once(cache, "truth", making, make) / FILE)
     return TrueMotion(kept["poses"], kept["points"], kept["markers"])
 
 

@@ -10,19 +10,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel, kinematic_tables
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.geometry.camera import Camera
+from studio.likelihood.catalogue import WEIGHTINGS
 from studio.runs.search_space import search_space
 from studio.synthesis.arm_footage import arm_outlines, filled
-from studio.tracking.catalogue import TRACKERS
-from studio.tracking.frame_loop import search_frame
-from studio.tracking.tracker import Carried, FrameProblem, FrameResult, LayerRecord, SearchSpace
-from studio.weighting.catalogue import WEIGHTINGS
-
-Array = NDArray[np.float64]
+from studio.trackers.catalogue import TRACKERS
+from studio.trackers.frame_loop import search_frame
+from studio.trackers.tracker import FilterState, FrameLikelihood, FrameResult, LayerRecord, SearchSpace
 
 PICTURE = (160, 120)
 FOCAL_PIXELS = 400.0
@@ -42,7 +41,7 @@ class TemplateArm:
     space: SearchSpace
     weigher: Any
 
-    def observed(self, pose: Array) -> FrameProblem:
+    def observed(self, pose: Array) -> FrameLikelihood:
         """The silhouette of pose (D,), as a function of poses."""
         mask = silhouette(self.body, self.camera, pose)
         picture = np.repeat(mask[:, :, None], 3, axis=2)
@@ -109,7 +108,7 @@ def localise(scene: TemplateArm, seed: int, **changes: Any) -> tuple[FrameResult
     result = search_frame(
         tracker,
         scene.observed(truth),
-        Carried(None),
+        FilterState(None),
         scene.space,
         seed=seed,
         frame=0,

@@ -9,11 +9,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.forward_kinematics import marker_points
 from studio.comparison.findings import Chart, Table
-from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.footage_cache import FootageCache
 from studio.comparison.statistics import number
 from studio.comparison.tracked import Attempt, track
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
@@ -34,19 +34,18 @@ from studio.reproduction.drawing import layer_table, line, line_chart, places, s
 from studio.reproduction.experiment import Experiment, Part, each_seed, measured
 from studio.runs.hierarchy import hierarchy_of
 from studio.sessions.session import Session
-from studio.tracking.tracker import LayerRecord
+from studio.trackers.tracker import LayerRecord
 
-Array = NDArray[np.float64]
 SETTINGS: Mapping[str, Any] = {"footage": CIRCLE, "body": BODY, "weighting": WEIGHTING}
 
 
 def _tracked_layers(
-    arguments: Mapping[str, Any], shelf: FootageShelf
+    arguments: Mapping[str, Any], cache: FootageCache
 ) -> tuple[Attempt, list[int], list[list[LayerRecord]], float]:
     """The attempt, its frames, every frame's layers, and the mean error, mm."""
     attempt = Attempt.of_plain(arguments)
     records: list[LayerRecord] = []
-    found = track(attempt, shelf, on_layer=records.append)
+    found = track(attempt, cache, on_layer=records.append)
     return (
         attempt,
         found.frames,
@@ -80,25 +79,26 @@ def trials_fig_3(scale: Scale) -> tuple[Trial, ...]:
 
 
 @kept_as("deutscher_reid.fig_3.measure")
-def measure_fig_3(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
+def measure_fig_3(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
     """The spread per layer (mm, of x and y together), whether the first cloud covers the true movement, how far the
     last one's middle is from the true place, means over the frames but the first; and the clouds of the middle frame.
     """
-    attempt, frames, layers, _ = _tracked_layers(arguments, shelf)
-    session = shelf.session(attempt.footage)
+    attempt, frames, layers, _ = _tracked_layers(arguments, cache)
+    session = cache.session(attempt.footage)
     names = [entry.name for entry in session.body(attempt.body or None).parameters]
     columns = [names.index(name) for name in PLACES]
     truth = true_places(session, frames)
-    spreads, covered, distances, clouds = [], [], [], []
+    spreads, covered, distances, clouds = list[list[float]](), list[bool](), list[float](), list[Any]()
     last = layers[0][-1].mean[columns]
     for row in range(1, len(frames)):
-        found = [record.poses[:, columns] for record in layers[row]]
+        found: list[Array] = [record.poses[:, columns] for record in layers[row]]
+        place: Array = truth[row]
         spreads.append([np.sqrt(cloud.var(axis=0).sum()) for cloud in found])
         covered.append(covers(found[0], last + truth[row] - truth[row - 1]))
         last = layers[row][-1].mean[columns]
-        distances.append(np.linalg.norm(last - truth[row]))
+        distances.append(float(np.linalg.norm(last - truth[row])))
         if row == len(frames) // 2:
-            clouds = [np.round(found[layer] - truth[row], 2).tolist() for layer in DRAWN_LAYERS]
+            clouds = [np.round(found[layer] - place, 2).tolist() for layer in DRAWN_LAYERS]
     return {
         "spreads": np.mean(spreads, axis=0).tolist(),
         "covered": float(np.mean(covered)),
@@ -120,7 +120,7 @@ def true_places(session: Session, frames: Sequence[int]) -> Array:
 
 def covers(cloud: Array, place: Array) -> bool:
     """Whether a place (2,) lies within COVERED standard deviations of a cloud (N, 2)."""
-    away = place - cloud.mean(axis=0)
+    away: Array = place - cloud.mean(axis=0)
     return bool(away @ np.linalg.solve(np.cov(cloud.T), away) <= COVERED**2)
 
 
@@ -182,15 +182,15 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
 
 
 @kept_as("deutscher_reid.figs_19_and_20.measure")
-def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
+def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
     """Shares of the first cloud's variance per layer and parameter, and the scatter of PARTS (mm) per layer, means
     over the frames but the first, which is searched several times.
     """
-    attempt, _, frames, mean_mm = _tracked_layers(arguments, shelf)
-    body = shelf.session(attempt.footage).body(attempt.body or None)
+    attempt, _, frames, mean_mm = _tracked_layers(arguments, cache)
+    body = cache.session(attempt.footage).body(attempt.body or None)
     names = [marker.name for marker in body.markers]
     columns = [[names.index(name) for name in part] for part in PARTS.values()]
-    shares, scatter = [], []
+    shares, scatter = list[list[Array]](), list[list[list[float]]]()
     for layers in frames[1:]:
         shares.append([record.variance_weighed / layers[0].variance_weighed for record in layers])
         clouds = [marker_points(body, record.poses) for record in layers]
@@ -223,7 +223,7 @@ def fig_19(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     rows = (
         (
             label,
-            RANKS[rank[index]],
+            RANKS[int(rank[index])],
             round(float(rates[:, index].mean()), 3),
             f"{shares[:, -1, index].mean():.2g}",
         )

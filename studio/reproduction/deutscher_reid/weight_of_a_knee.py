@@ -8,17 +8,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
+from studio.arrays import Array
 from studio.body.inverse_kinematics import known_markers, pose_from_markers
 from studio.body.model import BodyModel
 from studio.comparison.findings import Chart, Series, Table
-from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.footage_cache import FootageCache
 from studio.comparison.statistics import number
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.errors import TruthError
 from studio.evaluation.errors import rows_of_frames
+from studio.likelihood.catalogue import WEIGHTINGS
 from studio.motion_files.trc import read_trc
 from studio.reproduction.claims import share
 from studio.reproduction.deutscher_reid.setting import (
@@ -33,9 +34,6 @@ from studio.reproduction.drawing import floats, line, line_chart
 from studio.reproduction.experiment import Experiment, Part
 from studio.sessions.session import Session
 from studio.settings import changed_settings, default_settings
-from studio.weighting.catalogue import WEIGHTINGS
-
-Array = NDArray[np.float64]
 
 # Beginning of the parameter's name, in every body of the catalogue.
 KNEE = "right_knee"
@@ -63,9 +61,9 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
 
 
 @kept_as("deutscher_reid.fig_7.measure")
-def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
+def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
     """Angles (degrees), the true one, and log w of each of TERMS at every angle."""
-    session, frame = shelf.session(arguments["footage"]), int(arguments["frame"])
+    session, frame = cache.session(arguments["footage"]), int(arguments["frame"])
     body, cameras = session.body(), session.cameras()
     pose = true_poses(session, body, [frame])[0]
     column = next(index for index, entry in enumerate(body.parameters) if entry.name.startswith(KNEE))
@@ -75,7 +73,7 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
     poses[:, column] = angles
     settings = default_settings("annealed", WEIGHTING)
     weighting = WEIGHTINGS[WEIGHTING]
-    seen = shelf.evidence(session, cameras, frame, settings.evidence, weighting.edge_kind)
+    seen = cache.evidence(session, cameras, frame, settings.evidence, weighting.edge_kind)
     curves = {}
     for name, knobs in TERMS.items():
         weigher = weighting.prepare(body, cameras, changed_settings(settings, knobs).weighting)
@@ -101,7 +99,7 @@ def true_poses(session: Session, body: BodyModel, frames: list[int]) -> Array:
         raise TruthError(f"The truth has no row for frame {missing[0]}.", "Take frames that it has.")
     kept, names = known_markers(body, truth.names)
     own = session.start_pose(body) if body.name == session.manifest.body else None
-    pose, found = body.neutral if own is None else own, []
+    pose, found = body.neutral if own is None else own, list[Array]()
     # From the start onwards, so that large changes of heading are followed.
     for frame in range(max(frames) + 1):
         if frame in rows and (frame in frames or frame % 4 == 0):

@@ -11,15 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from studio.comparison.findings import Table
-from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.findings import Plain, Table
+from studio.comparison.footage_cache import FootageCache
 from studio.comparison.statistics import number
 from studio.comparison.tracked import Attempt, Tracked, track
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.reproduction.caillette.training_set import Training, model_file
 from studio.reproduction.drawing import heat_chart
 from studio.reproduction.experiment import Experiment, Part, each_seed
-from studio.reproduction.tracking import Contender, Runs, by_group, lost_percent, named_percent
+from studio.reproduction.tracking import Candidate, Runs, by_group, lost_percent, named_percent
 from studio.runs.shape_on_the_way import FIRST_FRAMES
 from studio.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING
 from studio.synthesis.drawn_recipes import CHOOSING, HALVES, KINDS, clip_name
@@ -52,9 +52,9 @@ class Entry:
     behaviour model.
     """
 
-    contender: Contender
+    contender: Candidate
     kinds: tuple[str, ...] = ()
-    fields: Mapping[str, Any] = field(default_factory=dict)
+    fields: Mapping[str, Any] = field(default_factory=dict[str, Any])
     training: Training | None = None
 
     @property
@@ -63,9 +63,9 @@ class Entry:
         return self.contender.name
 
 
-def _usual(name: str, tracker: str = DEFAULT_TRACKER, weighting: str = "") -> Contender:
+def _usual(name: str, tracker: str = DEFAULT_TRACKER, weighting: str = "") -> Candidate:
     """A tracker with the studio's defaults, "" for the usual weighting."""
-    return Contender(name, tracker, weighting or DEFAULT_WEIGHTING, REFINED)
+    return Candidate(name, tracker, weighting or DEFAULT_WEIGHTING, REFINED)
 
 
 ENTRIES = (
@@ -75,8 +75,8 @@ ENTRIES = (
         for weighting in (PAPERS_TERMS, THREE_TERMS)
         if weighting != DEFAULT_WEIGHTING
     ),
-    Entry(Contender("annealed, three terms, search alone", "annealed", THREE_TERMS, SEARCH_ALONE)),
-    Entry(Contender("annealed, as the paper", "annealed", PAPERS_TERMS, {**PAPER, **SEARCH_ALONE})),
+    Entry(Candidate("annealed, three terms, search alone", "annealed", THREE_TERMS, SEARCH_ALONE)),
+    Entry(Candidate("annealed, as the paper", "annealed", PAPERS_TERMS, {**PAPER, **SEARCH_ALONE})),
     Entry(_usual("swarm", "swarm"), fields=AS_A_RUN),
     Entry(_usual("condensation", "condensation"), fields=AS_A_RUN),
     Entry(_usual("behaviour", "behaviour"), kinds=WALKS, fields=AS_A_RUN, training=TRAINING),
@@ -129,12 +129,12 @@ def _arguments(entry: Entry, clip: str, last: int, seed: int) -> dict[str, Any]:
 
 
 @kept_as("open_questions.generalisation.measure")
-def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
+def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
     """Track a clip; the fields of `Tracked`."""
     plain = dict(arguments["attempt"])
     if "training" in arguments:
-        plain["behaviour"] = str(model_file(shelf, Training.of_plain(arguments["training"])))
-    return asdict(track(Attempt.of_plain(plain), shelf))
+        plain["behaviour"] = str(model_file(cache, Training.of_plain(arguments["training"])))
+    return asdict(track(Attempt.of_plain(plain), cache))
 
 
 def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
@@ -181,7 +181,7 @@ def _half(half: str, found: Mapping[str, Mapping[str, Runs]]) -> Iterator[Part]:
     }
     best = min(means, key=means.__getitem__)
     yield f"{called}: {best} is the nearest, {means[best]:.1f} mm on average over {len(kinds)} clips."
-    short, long = [], []
+    short, long = list[tuple[Plain, ...]](), list[tuple[Plain, ...]]()
     for kind in kinds:
         on_clip = {name: clips.get(kind, ()) for name, clips in found.items()}
         cells = (

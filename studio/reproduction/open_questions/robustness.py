@@ -11,11 +11,11 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
+from studio.arrays import Array, Bytes
 from studio.comparison.findings import Table
-from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.footage_cache import FootageCache
 from studio.comparison.tracked import Attempt, Changed, track
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
@@ -23,11 +23,8 @@ from studio.geometry.camera import Camera
 from studio.reproduction.drawing import heat_chart
 from studio.reproduction.experiment import Experiment, Part, each_seed
 from studio.reproduction.fleischmann import EQ13, EVALUATIONS, IMPROVED, SWARM, TWIN
-from studio.reproduction.tracking import Contender, by_group
+from studio.reproduction.tracking import Candidate, by_group
 from studio.synthesis.damage import misplaced
-
-Array = NDArray[np.float64]
-Bytes = NDArray[np.uint8]
 
 # Kinds of damage to a tracker's input, each of a degree, the same for the same seed.
 # Masks and edge maps are damaged in memory, the calibration in the cameras: the session itself is not changed.
@@ -138,7 +135,8 @@ def clutter_edges(shape: tuple[int, ...], degree: float, rng: np.random.Generato
     soft = gaussian_filter(lines, CLUTTER_BLUR)
     # A single line keeps its full height, as in the evidence's own proximity maps.
     ridge = 1.0 / (CLUTTER_BLUR * np.sqrt(2.0 * np.pi))
-    return np.round(255.0 * np.minimum(1.0, soft / ridge)).astype(np.uint8)
+    height_of: Array = soft / ridge
+    return np.round(255.0 * np.minimum(1.0, height_of)).astype(np.uint8)
 
 
 def calibration_error(degree: float, seed: int) -> Changed:
@@ -175,7 +173,7 @@ CONTENDERS = (
     EQ13,
     replace(SWARM, name="swarm, all terms", weighting=ALL_TERMS),
     SWARM,
-    Contender("Condensation", "condensation", SWARM.weighting, SWARM.changes),
+    Candidate("Condensation", "condensation", SWARM.weighting, SWARM.changes),
 )
 
 
@@ -253,7 +251,7 @@ def _trials(question: Question, scale: Scale) -> tuple[Trial, ...]:
     """Every contender at every degree with every seed."""
     last = QUICK_FRAMES if scale.quick else FRAMES
 
-    def arguments(contender: Contender, degree: float, seed: int) -> dict[str, Any]:
+    def arguments(contender: Candidate, degree: float, seed: int) -> dict[str, Any]:
         wanted = {"last": last, **question.fields(degree)}
         attempt = contender.attempt(question.footage, seed, EVALUATIONS, **wanted)
         damaged = degree if question.damage != "none" else 0.0
@@ -272,11 +270,11 @@ def _trials(question: Question, scale: Scale) -> tuple[Trial, ...]:
 
 
 @kept_as("open_questions.robustness.measure")
-def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
+def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
     """Track the damaged footage; the fields of `Tracked`."""
     attempt = Attempt.of_plain(arguments["attempt"])
     spoilt = DAMAGES[arguments["damage"]](float(arguments["degree"]), attempt.seed)
-    return asdict(track(attempt, shelf, spoilt=spoilt))
+    return asdict(track(attempt, cache, spoilt=spoilt))
 
 
 def _shown(question: Question, outcomes: Sequence[Outcome]) -> Iterator[Part]:
@@ -291,7 +289,7 @@ def _shown(question: Question, outcomes: Sequence[Outcome]) -> Iterator[Part]:
             100.0 * float(np.mean([run.lost_frames / len(run.frames) for run in cell])) for cell in cells
         ]
     pairs = {name: list(zip(errors[name], losses[name], strict=True)) for name in errors}
-    stood = []
+    stood: list[str] = []
     for name, cells in pairs.items():
         stands = [error <= STANDS_MM and loss <= STANDS_LOST for error, loss in cells]
         count = [*stands, False].index(False)

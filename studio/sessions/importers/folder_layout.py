@@ -4,7 +4,9 @@
     SOURCE/masks/                  videos or one folder of pictures a camera
     SOURCE/background/             a picture or an empty clip a camera
     SOURCE/calibration/            one calibration that can be read (or SOURCE/*calibration*.toml)
-    SOURCE/truth/*.trc, subject.toml, start_pose.csv, sigma.csv, bodies/*.toml, timestamps.csv
+    SOURCE/truth/*.trc, subject.toml, start_pose.csv, sigma.csv, bodies/*.toml (*.urdf, *.xml), timestamps.csv
+    SOURCE/truth/*.csv             named points in the world of the calibration, or of another one of these cameras that
+                                   lies beside them
 
 Everything but footage and calibration may be missing. A session's own folder has this layout as well.
 
@@ -24,6 +26,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from studio.body.catalogue import body_files
 from studio.capture.calibration_easymocap import is_easymocap
 from studio.capture.calibration_files import PICKLES, find_calibrations
 from studio.capture.naming import listed, natural_key
@@ -31,6 +34,7 @@ from studio.capture.pictures import is_picture, list_pictures
 from studio.capture.timestamps import TIMESTAMP_NAMES
 from studio.capture.video import VIDEO_SUFFIXES
 from studio.errors import CalibrationError, FootageError
+from studio.motion_files.truth_files import READERS
 from studio.sessions.importers.plan import SourcePlan
 from studio.sessions.manifest import FILE_NAME, read_manifest
 
@@ -241,8 +245,8 @@ def plan_folder(
         footage=footage,
         masks=next((found for name in MASK_FOLDERS if (found := entries(folder / name))), ()),
         backgrounds=_backgrounds(folder / "background") or _backgrounds(folder / "backgrounds"),
-        truth=tuple(sorted((folder / "truth").glob("*.[tT][rR][cC]"))),
-        bodies=tuple(sorted((folder / "bodies").glob("*.toml"))),
+        truth=_truths(folder / "truth"),
+        bodies=body_files(folder / "bodies"),
         fps=session.fps if session else None,
         subject_file=_file(folder / "subject.toml"),
         start_pose_file=_file(folder / "start_pose.csv"),
@@ -257,12 +261,18 @@ def plan_folder(
     )
 
 
-def choose_calibration(source: Path, wish: Path | str | None) -> Path:
+def _truths(folder: Path) -> tuple[Path, ...]:
+    """Files of a true motion."""
+    found = folder.iterdir() if folder.is_dir() else ()
+    return tuple(sorted(path for path in found if path.suffix.lower() in READERS and path.is_file()))
+
+
+def choose_calibration(source: Path, choice: Path | str | None) -> Path:
     """The calibration to take from a source: the requested one, or the only readable one.
 
-    wish : a path, or a file's name in the source's calibration folder. Raises CalibrationError.
+    choice : a path, or a file's name in the source's calibration folder. Raises CalibrationError.
     """
-    return _calibration(source, (*calibration_folders(source), source), wish)
+    return _calibration(source, (*calibration_folders(source), source), choice)
 
 
 def _chosen(source: Path, trial: str | None) -> tuple[Layout, tuple[Path, ...]]:
@@ -300,14 +310,14 @@ def _one_of(source: Path, names: tuple[str, ...], trial: str | None) -> str:
     raise FootageError(f"There is no trial '{trial}'; {there}.", "Choose one of them with --trial NAME.")
 
 
-def _calibration(source: Path, places: tuple[Path, ...], wish: Path | str | None) -> Path:
+def _calibration(source: Path, places: tuple[Path, ...], choice: Path | str | None) -> Path:
     """The requested calibration, or the only one in the first place that has any. Raises CalibrationError."""
-    if wish is not None:
-        for path in (Path(wish), *(place / wish for place in places)):
+    if choice is not None:
+        for path in (Path(choice), *(place / choice for place in places)):
             if path.exists():
                 return path
         there = listed(path.name for place in places for path in find_calibrations(place))
-        raise CalibrationError(f"There is no calibration '{wish}'.", f"Found in '{source.name}': {there}.")
+        raise CalibrationError(f"There is no calibration '{choice}'.", f"Found in '{source.name}': {there}.")
     for place in places:
         found = find_calibrations(place)
         if len(found) == 1:

@@ -4,11 +4,13 @@ import datetime
 import math
 import shutil
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated, Literal
 
 import msgspec
 import numpy as np
+from pydantic import Field
 
 from studio.calibration.checks import blocking, check_calibration
 from studio.capture.calibration_files import Calibration, read_calibration
@@ -16,11 +18,18 @@ from studio.capture.footage_source import CameraSource, FootageSource
 from studio.capture.naming import CameraMatch, listed
 from studio.capture.pictures import check_picture, list_pictures
 from studio.capture.video import probe_video
+from studio.declaring import Terminal, Web
 from studio.errors import CalibrationError, FootageError, SessionError
 from studio.geometry.camera import Camera
 from studio.progress import Progress, unheard
 from studio.sessions.archives import FOOTAGE_PARTS, folder_of, is_archive
 from studio.sessions.atomic_files import discard, made_whole, new_folder_beside, taken
+from studio.sessions.background_files import (
+    MASKS_GONE,
+    forget_unused_masks,
+    has_made_masks,
+    without_made_masks,
+)
 from studio.sessions.file_checksums import note_files
 from studio.sessions.importers.bodytrack import is_bodytrack, plan_bodytrack
 from studio.sessions.importers.folder_layout import plan_folder
@@ -34,6 +43,7 @@ from studio.sessions.importers.measuring import (
 )
 from studio.sessions.importers.plan import SourcePlan
 from studio.sessions.importers.writing import (
+    carried_truth,
     check_person,
     check_room,
     write_calibrations,
@@ -45,34 +55,83 @@ from studio.sessions.made_from import adopt
 from studio.sessions.manifest import SessionManifest
 from studio.sessions.names import free_name
 from studio.sessions.session import CAMERAS_PATH, THUMBNAIL_NAME, Session, described_anew
+from studio.sessions.stroke_files import OUTDATED, STROKES_NAME
 
 FASTEST = 10_000.0
 OWN_PARTS = ("videos", "pictures", "masks", "background")
 PERSON_PARTS = ("calibration", "subject.toml", "start_pose.csv", "sigma.csv", "truth", "bodies")
 
 
+Place = Annotated[str | None, Field(max_length=4096)]
+Turn = Literal[0, 90, 180, 270]
+Offsets = Annotated[
+    Mapping[str, int] | None,
+    Field(
+        max_length=64,
+        description="By camera: the frame of its footage that was taken with frame 0 of the others.",
+    ),
+    Terminal("--offset", "CAMERA=FRAMES"),
+]
+Rotations = Annotated[
+    Mapping[str, int] | None,
+    Field(
+        max_length=64,
+        description="By camera: degrees clockwise (0, 90, 180 or 270) by which its pictures are turned.",
+    ),
+    Terminal("--rotate", "CAMERA=DEGREES"),
+    Web(kind=dict[str, Turn]),
+]
+
+Unit = Annotated[
+    Literal["", "mm", "m"],
+    Field(
+        description="The calibration's unit, where it is taken wrongly; default: what the file says or its size."
+    ),
+]
+Up = Annotated[
+    Literal["x", "y", "z", "-x", "-y", "-z"],
+    Field(description="The axis of the calibration's world that points up."),
+]
+
+
 @dataclass(frozen=True, slots=True)
 class ImportOptions:
-    """Options of an import.
-
-    calibration : the one to take, of several. fps : frame rate, before any other. copy : False refers to
-    the footage where it lies. trial : which one of several. offsets : by camera (or its footage's name), the file's
-    frame that was taken with the others' frame 0; rotations : degrees clockwise by which its pictures are turned; both
-    override the source's own. unit, up : of the calibration, as in `read_calibration`. despite_findings : import
-    a calibration that would make results wrong (z not up, a wrong unit, …), with a warning. replaced : where footage is
-    added, remove all cameras that the source does not name.
+    """How footage is read into a session. Offsets and rotations, by camera or its footage's name, override the source's
+    own.
     """
 
-    calibration: Path | str | None = None
-    fps: float | None = None
-    copy: bool = True
-    trial: str | None = None
-    offsets: Mapping[str, int] = field(default_factory=dict)
-    rotations: Mapping[str, int] = field(default_factory=dict)
-    unit: str = ""
-    up: str = "z"
-    despite_findings: bool = False
-    replaced: bool = False
+    calibration: Annotated[
+        str | Path | None,
+        Field(description="Which calibration to take, where there are several."),
+        Terminal(kind=Path),
+        Web(kind=Place),
+    ] = None
+    fps: Annotated[
+        float | None,
+        Field(gt=0, le=10_000, description="Frames per second, where the footage does not say (pictures)."),
+    ] = None
+    trial: Annotated[
+        str | None,
+        Field(description="Which trial, where a folder holds several."),
+        Terminal(metavar="NAME"),
+        Web(kind=Place),
+    ] = None
+    offsets: Offsets = None
+    rotations: Rotations = None
+    unit: Unit = ""
+    up: Up = "z"
+    replace: Annotated[bool, Field(description="Forget all cameras that the source does not name.")] = False
+    despite_findings: Annotated[
+        bool,
+        Field(
+            description="Take a calibration that would make results wrong (z not up, a wrong unit), with a warning."
+        ),
+    ] = False
+    copy: Annotated[
+        bool,
+        Field(description="Copy the footage, or refer to it where it lies."),
+        Terminal("--copy/--reference"),
+    ] = True
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,29 +149,15 @@ class ImportReport:
 
 
 def import_source(
-    source: Path,
-    into: Path,
-    *,
-    calibration: Path | str | None = None,
-    fps: float | None = None,
-    copy: bool = True,
-    trial: str | None = None,
-    offsets: Mapping[str, int] | None = None,
-    rotations: Mapping[str, int] | None = None,
-    unit: str = "",
-    up: str = "z",
-    despite_findings: bool = False,
-    progress: Progress = unheard,
+    source: Path, into: Path, options: ImportOptions | None = None, *, progress: Progress = unheard
 ) -> ImportReport:
     """Make a session at `into` from a source folder, or an archive of one; see `known_layouts`,
-    `folder_layout` and `bodytrack` for the layouts, `ImportOptions` for the options.
+    `folder_layout` and `bodytrack` for the layouts.
 
     All is checked before anything is written; whatever fails, nothing is left and nothing that was stored is touched.
     Raises StudioError.
     """
-    options = ImportOptions(
-        calibration, fps, copy, trial, offsets or {}, rotations or {}, unit, up, despite_findings
-    )
+    options = options or ImportOptions()
     _check_request(source, options)
     if into.exists():
         raise taken(into)
@@ -120,14 +165,24 @@ def import_source(
         with folder_of(source.resolve(), FOOTAGE_PARTS, into) as opened:
             plan = _plan(opened, options)
             assert plan.calibration is not None
-            read = read_calibration(plan.calibration, unit, up)
+            read = read_calibration(plan.calibration, options.unit, options.up)
             person = check_person(plan)
-            if copy:
+            if options.copy:
                 check_room(plan, into)
-            measured = _checked_rig(measure_source(plan, read, fps, progress), options)
+            measured = _checked_rig(measure_source(plan, read, options.fps, progress), options)
+            truths, notes = carried_truth(plan, read, measured.fps, options.unit)
             with made_whole(into) as folder:
                 manifest = write_session(
-                    folder, into.name, plan, read, measured, person, copy=copy, progress=progress
+                    folder,
+                    into.name,
+                    plan,
+                    read,
+                    measured,
+                    person,
+                    truths=truths,
+                    notes=notes,
+                    copy=options.copy,
+                    progress=progress,
                 )
                 progress("finishing", 1, 1)
                 note_files(folder)
@@ -151,11 +206,11 @@ def add_footage(
     over where it has one (and subject, start pose and truth, where the session has none). An existing camera
     gets the new footage. All is read before anything changes; on failure the session is unchanged. Raises StudioError.
     """
-    asked = options or ImportOptions()
-    _check_request(source, asked)
+    options = options or ImportOptions()
+    _check_request(source, options)
     session.check_idle()
     with folder_of(source.resolve(), FOOTAGE_PARTS, session.path / "take") as folder:
-        return _added(session, folder, asked, progress)
+        return _added(session, folder, options, progress)
 
 
 def _added(session: Session, source: Path, options: ImportOptions, report: Progress) -> ImportReport:
@@ -168,18 +223,19 @@ def _added(session: Session, source: Path, options: ImportOptions, report: Progr
         check_room(plan, session.path)
     read = _cameras_of(session, plan, options)
     measured = measure_source(plan, read, options.fps, report)
+    truths, carried_notes = carried_truth(plan, read, measured.fps, options.unit)
     if takes_over:
         measured = _checked_rig(measured, options)
     staged = new_folder_beside(session.path / "take")
     try:
         footage = write_footage(staged, measured, options.copy, report)
-        stay = _cameras_that_stay(session, footage, plan, options.replaced)
+        stay = _cameras_that_stay(session, footage, plan, options.replace)
         if takes_over:
             write_calibrations(staged, read, measured)
-            write_person(staged, plan, person)
+            write_person(staged, plan, person, truths)
         report("finishing", 1, 1)
         adopt(session)
-        placed = _moved_in(session, staged, footage, stay)
+        placed = _moved_in(session, staged, footage, without_made_masks(session, stay))
     except OSError as problem:
         raise SessionError(
             f"The footage could not be added to '{session.name}': {problem}.",
@@ -190,7 +246,11 @@ def _added(session: Session, source: Path, options: ImportOptions, report: Progr
     manifest = _described(session, plan, read, measured, placed, person.body if takes_over else "")
     changed = described_anew(session, manifest)
     _forget_old(changed, session.manifest.footage)
-    notes = (*plan.notes, *measured.notes, *(person.notes if takes_over else ()))
+    forget_unused_masks(changed)
+    gone = (MASKS_GONE,) if any(map(has_made_masks, session.manifest.footage.cameras)) else ()
+    if session.has_footage and (session.path / STROKES_NAME).exists():
+        gone = (*gone, OUTDATED)
+    notes = (*plan.notes, *measured.notes, *(person.notes if takes_over else ()), *carried_notes, *gone)
     return ImportReport(changed, manifest.matching, notes, measured.warnings, plan.layout, takes_over)
 
 
@@ -217,8 +277,8 @@ def _plan(source: Path, options: ImportOptions, *, bare: bool = False) -> Source
         plan = plan_folder(source, options.calibration, options.trial, bare=bare)
     return replace(
         plan,
-        offsets={**plan.offsets, **options.offsets},
-        rotations={**plan.rotations, **options.rotations},
+        offsets={**plan.offsets, **(options.offsets or {})},
+        rotations={**plan.rotations, **(options.rotations or {})},
     )
 
 

@@ -41,8 +41,8 @@ class SourcePlan:
     notes: tuple[str, ...] = ()
     layout: str = ""
     timestamps: Path | None = None
-    offsets: Mapping[str, int] = field(default_factory=dict)
-    rotations: Mapping[str, int] = field(default_factory=dict)
+    offsets: Mapping[str, int] = field(default_factory=dict[str, int])
+    rotations: Mapping[str, int] = field(default_factory=dict[str, int])
 
     def without_person(self) -> "SourcePlan":
         """The footage alone: start pose and truth belong to a calibration."""

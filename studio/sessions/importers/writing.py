@@ -1,18 +1,27 @@
 """A measured source written as a session: into a hidden folder beside its place, then renamed into it."""
 
 import shutil
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from studio.body.catalogue import load_body
+from studio.body.catalogue import body_file_text, load_body
 from studio.body.subject import DEFAULT_BODY, fit_subject, read_subject, write_subject
-from studio.capture.calibration_files import Calibration, write_calibration
+from studio.calibration.carried_points import carried
+from studio.capture.calibration_files import (
+    Calibration,
+    find_calibrations,
+    read_calibration,
+    write_calibration,
+)
 from studio.capture.calibration_toml import is_canonical
 from studio.capture.footage_source import CameraSource, FootageSource
 from studio.capture.pictures import list_pictures
 from studio.errors import SessionError
-from studio.motion_files.trc import read_trc
+from studio.motion_files.trc import MarkerMotion, read_trc, write_trc
+from studio.motion_files.truth_files import ANY_WORLD, read_truth
 from studio.progress import Progress
+from studio.sessions.atomic_files import write_text
 from studio.sessions.importers.measuring import MeasuredSource
 from studio.sessions.importers.plan import SourcePlan
 from studio.sessions.manifest import SessionManifest, now, write_manifest
@@ -48,8 +57,36 @@ def check_person(plan: SourcePlan) -> CheckedPerson:
     if plan.sigma_file is not None:
         read_sigma(plan.sigma_file, names, 1.0)
     for path in plan.truth:
-        read_trc(path)
+        # Others are read by `carried_truth`, before anything is written: their times need the footage's rate.
+        if path.suffix.lower() not in ANY_WORLD:
+            read_trc(path)
     return CheckedPerson(body.name, names, notes)
+
+
+def carried_truth(
+    plan: SourcePlan, calibration: Calibration, fps: float, unit: str
+) -> tuple[Mapping[str, MarkerMotion], tuple[str, ...]]:
+    """The truths that are in a world of their own, by their files' names, in the session's world; and a note on each.
+
+    That world is of a calibration beside them (truth/*.toml and the like), else of the source's calibration as its file
+    has it. unit : of that one, as requested. Raises TruthError, CalibrationError.
+    """
+    found: dict[str, MarkerMotion] = {}
+    notes: list[str] = []
+    for path in plan.truth:
+        if path.suffix.lower() not in ANY_WORLD or plan.calibration is None:
+            continue
+        beside = find_calibrations(path.parent)
+        place = beside[0] if beside else plan.calibration
+        own = read_calibration(place) if beside else read_calibration(place, unit)
+        motion = read_truth(path, fps)
+        positions, missed = carried(motion.positions, own.cameras, calibration.cameras)
+        found[path.stem] = replace(motion, positions=positions, unit="mm")
+        notes.append(
+            f"The points of '{path.name}' were taken from the world of '{place.name}' into the session's by where the"
+            f" cameras see them ({missed:.1f} px off in the median)."
+        )
+    return found, tuple(notes)
 
 
 def check_room(plan: SourcePlan, into: Path) -> None:
@@ -74,13 +111,15 @@ def write_session(
     measured: MeasuredSource,
     person: CheckedPerson,
     *,
+    truths: Mapping[str, MarkerMotion],
+    notes: tuple[str, ...],
     copy: bool,
     progress: Progress,
 ) -> SessionManifest:
-    """Fill `folder` with a session named `name`; the manifest comes last."""
+    """Fill `folder` with a session named `name`; the manifest comes last. truths, notes : of `carried_truth`."""
     footage = write_footage(folder, measured, copy, progress)
     write_calibrations(folder, calibration, measured)
-    write_person(folder, plan, person)
+    write_person(folder, plan, person, truths)
     crops = [entry.crop.words(entry.camera.name) for entry in measured.cameras if entry.crop is not None]
     manifest = SessionManifest(
         name=name,
@@ -93,7 +132,14 @@ def write_session(
         calibration_source=calibration.label,
         imported_from=str(plan.source),
         assumptions=(calibration.unit_note, *crops),
-        notes=(calibration.unit_note, *calibration.notes, *plan.notes, *measured.notes, *person.notes),
+        notes=(
+            calibration.unit_note,
+            *calibration.notes,
+            *plan.notes,
+            *measured.notes,
+            *person.notes,
+            *notes,
+        ),
         layout=plan.layout,
         warnings=measured.warnings,
         matching=measured.matching,
@@ -181,8 +227,10 @@ def write_calibrations(folder: Path, calibration: Calibration, measured: Measure
     write_calibration(tuple(entry.camera for entry in measured.cameras), place / "cameras.toml", crops)
 
 
-def write_person(folder: Path, plan: SourcePlan, person: CheckedPerson) -> None:
-    """Subject, start pose, σ, truth and bodies."""
+def write_person(
+    folder: Path, plan: SourcePlan, person: CheckedPerson, truths: Mapping[str, MarkerMotion]
+) -> None:
+    """Subject, start pose, σ, truth and bodies. truths : of `carried_truth`."""
     if plan.subject is not None:
         write_subject(plan.subject, folder / "subject.toml")
     if plan.start_pose is not None:
@@ -196,8 +244,21 @@ def write_person(folder: Path, plan: SourcePlan, person: CheckedPerson) -> None:
     ):
         if path is not None and not (folder / name).exists():
             shutil.copyfile(path, folder / name)
-    for files, place in ((plan.truth, folder / "truth"), (plan.bodies, folder / "bodies")):
-        if files:
-            place.mkdir()
-        for path in files:
-            shutil.copyfile(path, place / (f"{path.stem}.trc" if place.name == "truth" else path.name))
+    _write_truths(folder / "truth", plan, truths)
+    if plan.bodies:
+        (folder / "bodies").mkdir()
+    for path in plan.bodies:
+        # A robot's file becomes a body file: its meshes stay where they are, and no session needs its reader.
+        write_text(folder / "bodies" / f"{path.stem}.toml", body_file_text(str(path)))
+
+
+def _write_truths(place: Path, plan: SourcePlan, truths: Mapping[str, MarkerMotion]) -> None:
+    """All true motions as TRC."""
+    kept = [path for path in plan.truth if path.suffix.lower() not in ANY_WORLD]
+    if kept or truths:
+        place.mkdir()
+    for path in kept:
+        shutil.copyfile(path, place / f"{path.stem}.trc")
+    for stem, motion in truths.items():
+        taken = {path.stem for path in place.iterdir()}
+        write_trc(place / f"{free_name(stem, taken)}.trc", motion)

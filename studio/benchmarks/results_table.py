@@ -1,0 +1,176 @@
+"""The benchmark as a table: a row a figure, beside what is aimed at, with a bar; and the history of earlier ones.
+
+Figures depend on the machine, which is printed with them. A ratio to a limit that was measured in the same run depends
+on it less.
+"""
+
+import json
+import os
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from studio.numba_in_threads import numba
+from studio.sessions.workspace import workspace_root
+from studio.typed_decoding import is_table
+
+BAR = 20
+"""Characters of a full bar: the aim is reached."""
+HISTORY = "bench-history.jsonl"
+LESS, MORE = "less", "more"
+
+
+@dataclass(frozen=True, slots=True)
+class Measure:
+    """A row: its words, where its figure stands in the document (keys), and the aim. better : LESS or MORE. limit :
+    where the ratio to a measured limit stands.
+    """
+
+    name: str
+    figure: tuple[str, ...]
+    unit: str
+    aim: float
+    better: str = MORE
+    limit: tuple[str, ...] = ()
+    scale: float = 1.0
+
+
+MEASURES = (
+    Measure(
+        "edge + region, of bare row-major loads",
+        ("edge_region", "fraction_of_load_limit"),
+        "",
+        0.85,
+        limit=("edge_region", "fraction_of_load_limit"),
+    ),
+    Measure("edge + region, two threads over one", ("edge_region", "two_threads"), "×", 1.85),
+    Measure(
+        "edge + region + silhouette, half resolution",
+        ("others_evaluations_per_second", "edge_region_silhouette_half"),
+        "M/s",
+        0.35,
+        scale=1e-6,
+    ),
+    Measure(
+        "the benchmark's own weighting",
+        ("others_evaluations_per_second", "bodytrack"),
+        "M/s",
+        0.57,
+        limit=("fractions", "bodytrack"),
+        scale=1e-6,
+    ),
+    Measure("a whole frame, default tracker", ("frames", "default", "ms"), "ms", 25.0, LESS),
+    Measure("of it refinement, one thread", ("frames", "default", "refinement_ms"), "ms", 5.0, LESS),
+    Measure("a whole frame of the benchmark's", ("frames", "bodytrack", "ms"), "ms", 7.5, LESS),
+    Measure("live, scene open, 30 Hz", ("live", "scene_open", "frames_per_second"), "/s", 30.0),
+    Measure("live frames dropped", ("live", "scene_open", "dropped_share"), "%", 0.1, LESS, scale=100.0),
+    Measure("a live frame on one core", ("live", "frame_ms"), "ms", 12.0, LESS),
+    Measure("slider to new cloud, server", ("reannealing", "median_ms"), "ms", 20.0, LESS),
+)
+
+
+def rows_of(document: Mapping[str, Any]) -> list[dict[str, object]]:
+    """A row for each of the MEASURES that the document holds. reached : 1 where the aim is, less below it. of_limit :
+    the ratio to the limit measured in the same run, None where there is none.
+    """
+    found: list[dict[str, object]] = []
+    for measure in MEASURES:
+        figure = _at(document, measure.figure)
+        if figure is None:
+            continue
+        value, limit = measure.scale * figure, _at(document, measure.limit) if measure.limit else None
+        ratio = value / measure.aim if measure.better == MORE else measure.aim / max(value, 1e-9)
+        if measure.better == LESS and value <= measure.aim:
+            ratio = 1.0
+        found.append(
+            {
+                "name": measure.name,
+                "value": round(value, 3),
+                "unit": measure.unit,
+                "better": measure.better,
+                "aim": measure.aim,
+                "reached": round(min(ratio, 1.0), 3),
+                "of_limit": limit,
+            }
+        )
+    return found
+
+
+def in_lines(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The rows for a person, with a bar that is full where the aim is reached."""
+    lines = [f"{'':46}{'now':>10}{'aim':>13}{'of limit':>10}"]
+    for row in rows:
+        full = round(BAR * row["reached"])
+        aim = f"{'≤' if row['better'] == LESS else '≥'} {row['aim']:g} {row['unit']}".strip()
+        limit = "" if row["of_limit"] is None else f"{row['of_limit']:.2f}"
+        value = f"{row['value']:.3g} {row['unit']}".strip()
+        lines.append(f"{row['name']:46}{value:>10}{aim:>13}{limit:>10}  {'█' * full}{'░' * (BAR - full)}")
+    return lines
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """Where figures were measured. load : processes that wanted a core in the last minute when it began."""
+
+    processor: str
+    cores: int
+    threads: int
+    system: str
+    python: str
+    numba: str
+    load: float
+
+
+def this_machine() -> Machine:
+    """The machine that this runs on."""
+    return Machine(
+        _processor(),
+        os.cpu_count() or 1,
+        int(numba.get_num_threads()),
+        f"{platform.system()} {platform.machine()}",
+        platform.python_version(),
+        str(numba.__version__),
+        round(os.getloadavg()[0], 1) if hasattr(os, "getloadavg") else -1.0,
+    )
+
+
+def remember(machine: Machine, rows: Sequence[Mapping[str, object]], place: Path | None = None) -> Path:
+    """Append the rows to the history, a JSON line a run; returns its file, by default beside the workspace."""
+    place = place or history_file()
+    place.parent.mkdir(parents=True, exist_ok=True)
+    entry = {
+        "when": datetime.now(UTC).isoformat(timespec="seconds"),
+        "machine": asdict(machine),
+        "rows": rows,
+    }
+    with place.open("a", encoding="utf-8") as file:
+        file.write(json.dumps(entry) + "\n")
+    return place
+
+
+def history_file() -> Path:
+    """Where earlier results stand."""
+    return workspace_root().parent / HISTORY
+
+
+def _processor() -> str:
+    """The processor's name; Linux says it in a file only."""
+    try:
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()
+
+
+def _at(document: Mapping[str, Any], keys: Sequence[str]) -> float | None:
+    found: Any = document
+    for key in keys:
+        if not is_table(found) or key not in found:
+            return None
+        found = found[key]
+    return float(found)

@@ -1,0 +1,114 @@
+"""What shows the inside of runs: `view`, `why`, `seeds`, `compare-runs`."""
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import click
+from rich.console import Console
+from rich.table import Table as Drawn
+
+from studio.cli.deriving import Call, command_of
+from studio.inspection.comparing import RunsCompared
+from studio.inspection.tables import Cell, Table, Viewed
+from studio.operations.inspecting import compare_runs, inspected, seeds, view, why, worst_frame
+from studio.sessions.atomic_files import write_bytes
+
+MOST_ROWS = 40
+CSV = click.option(
+    "--csv", "file", type=click.Path(path_type=Path), metavar="FILE", help="Write the tables to a CSV file."
+)
+
+LAYER = click.option(
+    "--layer",
+    type=click.IntRange(1),
+    help="The layer, counted from 1 as in the tables; default: the last one. --json has its index, from 0.",
+)
+
+
+@command_of(view, LAYER, CSV, without=("layer",))
+def view_command(call: Call, layer: int | None, file: Path | None) -> dict[str, object]:
+    shown: Viewed = call(**({} if layer is None else {"layer": layer - 1}))
+    caption = inspected(call.given["run"]).caption(call.given.get("frame"))
+    return _answer(shown.tables, shown.notes, caption, file)
+
+
+@command_of(why)
+def why_command(call: Call) -> dict[str, object]:
+    opened = inspected(call.given["run"])
+    frame = call.given.get("frame")
+    frame = worst_frame(opened) if frame is None else frame
+    shown: Viewed = call(frame=frame)
+    lines = [opened.caption(frame), *(f"- {finding.words}" for finding in shown.findings)]
+    lines += [f"May help: {remedy.title}. {remedy.words}{_set(remedy.settings)}" for remedy in shown.remedies]
+    return {
+        "frame": frame,
+        "findings": list(shown.findings),
+        "remedies": list(shown.remedies),
+        "notes": list(shown.notes),
+        "text": "\n".join([*lines, *shown.notes]),
+    }
+
+
+def _set(settings: Mapping[str, object]) -> str:
+    """Settings as options of a command."""
+    pairs = [f"--set {name}={value}" for name, value in settings.items()]
+    return f" ({' '.join(pairs)})" if pairs else ""
+
+
+@command_of(seeds)
+def seeds_command(call: Call) -> dict[str, object]:
+    shown: Viewed = call()
+    kept = [table for table in shown.tables if table.name in ("limbs", "seeds")]
+    caption = inspected(call.given["run"]).caption(call.given["frame"])
+    return _answer(kept, shown.notes, caption, None)
+
+
+@command_of(compare_runs, CSV)
+def compare_runs_command(call: Call, file: Path | None) -> dict[str, object]:
+    found: RunsCompared = call()
+    return _answer(found.tables, (), f"Runs {', '.join(found.runs)}.", file)
+
+
+def _answer(
+    tables: Sequence[Table], notes: Sequence[str], caption: str, file: Path | None
+) -> dict[str, object]:
+    if file is not None:
+        write_bytes(file, as_csv(tables, caption).encode())
+    shown = [_drawn(table) for table in tables if table.rows] if file is None else [f"{file}"]
+    return {
+        "caption": caption,
+        "notes": list(notes),
+        "tables": {table.name: table.records() for table in tables},
+        "text": "\n".join([caption, *notes, *shown]),
+    }
+
+
+def as_csv(tables: Sequence[Table], caption: str) -> str:
+    """The tables one after the other: caption and titles as comments, units in the head."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    text.write(f"# {caption}\n")
+    for table in tables:
+        text.write(f"# {table.name}: {table.title}\n")
+        writer.writerow(f"{one.key} [{one.unit}]" if one.unit else one.key for one in table.columns)
+        writer.writerows(["" if cell is None else cell for cell in row] for row in table.for_readers())
+    return text.getvalue()
+
+
+def _drawn(table: Table) -> str:
+    """A table for a terminal, its first rows."""
+    drawn = Drawn(title=table.title, title_justify="left")
+    for column in table.columns:
+        drawn.add_column(f"{column.label} ({column.unit})" if column.unit else column.label)
+    for row in table.for_readers()[:MOST_ROWS]:
+        drawn.add_row(*(_word(cell) for cell in row))
+    out = io.StringIO()
+    Console(file=out, width=160, highlight=False).print(drawn)
+    left = len(table.rows) - MOST_ROWS
+    return out.getvalue() + (f"… {left} rows more: --json or --csv FILE has them all.\n" if left > 0 else "")
+
+
+def _word(cell: Cell) -> str:
+    return "" if cell is None else f"{cell:.4g}" if isinstance(cell, float) else str(cell)

@@ -1,0 +1,170 @@
+"""What a view of a run answers: tables of exact numbers, which the page draws, reads aloud and writes as CSV."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from html import escape
+from typing import Any
+
+Cell = bool | int | float | str | None
+"""NaN and infinities are None in an answer."""
+Row = Sequence[Cell]
+
+
+SHOWN_ROWS = 40
+"""In a notebook."""
+
+
+LAYER = "layer"
+"""Key of the columns that hold a layer's index, from 0 as in the arrays of Python and in addresses."""
+
+
+def _word(cell: Cell) -> str:
+    return "" if cell is None else f"{cell:.4g}" if isinstance(cell, float) else str(cell)
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A column of a table. key : its name in files. unit : "mm", "rad", "nats", …, "" for a number without one;
+    of a column whose rows differ, "" as well: then the table has a column "unit".
+    """
+
+    key: str
+    label: str
+    unit: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class TableKind:
+    """A table that a view has. of_run : it belongs to the run, not to one frame. each : what further columns there is
+    one of: "parameter" or "" for none.
+    """
+
+    name: str
+    title: str
+    columns: tuple[Column, ...]
+    of_run: bool = False
+    each: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table with its rows, each as long as its columns."""
+
+    name: str
+    title: str
+    columns: tuple[Column, ...]
+    rows: Sequence[Row]
+
+    def column(self, key: str) -> list[Cell]:
+        """The cells of a column. Raises ValueError for a key that is none."""
+        place = [entry.key for entry in self.columns].index(key)
+        return [row[place] for row in self.rows]
+
+    def for_readers(self) -> list[list[Cell]]:
+        """The rows as people read them: layers, whose numbers are indices here, are counted from 1."""
+        layers = {at for at, entry in enumerate(self.columns) if entry.key == LAYER}
+        return [
+            [cell + 1 if at in layers and isinstance(cell, int) else cell for at, cell in enumerate(row)]
+            for row in self.rows
+        ]
+
+    def as_html(self) -> str:
+        """The table, its first rows."""
+        head = "".join(
+            f"<th>{escape(one.label)}{f' ({one.unit})' if one.unit else ''}</th>" for one in self.columns
+        )
+        body = "".join(
+            f"<tr>{''.join(f'<td>{escape(_word(cell))}</td>' for cell in row)}</tr>"
+            for row in self.for_readers()[:SHOWN_ROWS]
+        )
+        left = len(self.rows) - SHOWN_ROWS
+        more = f"<caption>{left} rows more</caption>" if left > 0 else ""
+        return f"<h4>{escape(self.title)}</h4><table>{more}<tr>{head}</tr>{body}</table>"
+
+    _repr_html_ = as_html
+
+    def records(self) -> list[dict[str, Cell]]:
+        """The rows by key."""
+        return [dict(zip((entry.key for entry in self.columns), row, strict=True)) for row in self.rows]
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """What is selected on the page; each view uses a part of it. "" and None: nothing.
+
+    second : another parameter (landscape of two). towards : what a line through pose space ends at, see `landscape`.
+    """
+
+    layer: int | None = None
+    parameter: str = ""
+    limb: str = ""
+    particle: int | None = None
+    camera: str = ""
+    track: str = ""
+    second: str = ""
+    towards: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Remedy:
+    """Something that may help. title : for a button. words : why. settings : knobs to change, by name. action : what
+    else to do, as a machine reads it ("start pose", "calibrate", "masks", "correct sides"), "" where the knobs are all.
+    """
+
+    title: str
+    words: str
+    settings: Mapping[str, bool | int | float | str] = field(default_factory=dict[str, Any])
+    action: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that was found about a frame. kind : see `why`. words : a sentence. numbers : what it rests on.
+    is_cause : it is the main cause. layer : its index. frame : to look at, where that is another one.
+    """
+
+    kind: str
+    words: str
+    limb: str = ""
+    layer: int | None = None
+    camera: str = ""
+    term: str = ""
+    numbers: Mapping[str, float] = field(default_factory=dict[str, float])
+    is_cause: bool = False
+    frame: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Viewed:
+    """A view's content. notes : what a reader has to know of the numbers. findings, remedies : of `why` only."""
+
+    tables: tuple[Table, ...]
+    notes: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
+    remedies: tuple[Remedy, ...] = ()
+
+    def table(self, name: str) -> Table:
+        """A table by its name. Raises ValueError."""
+        return self.tables[[entry.name for entry in self.tables].index(name)]
+
+    def _repr_html_(self) -> str:
+        """What was found, as a notebook shows it."""
+        words = [entry.words for entry in self.findings] + [
+            f"May help: {entry.title}." for entry in self.remedies
+        ]
+        lines = "".join(f"<p>{escape(line)}</p>" for line in (*self.notes, *words))
+        return lines + "".join(table.as_html() for table in self.tables)
+
+
+Rows = Mapping[str, Sequence[Row]]
+"""Rows by table."""
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What a view's function found: rows by table, and what is told beside them."""
+
+    rows: Rows
+    notes: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
+    remedies: tuple[Remedy, ...] = ()

@@ -1,0 +1,650 @@
+"""Why a frame failed, in words made of measurements.
+
+What is asked, in this order; the first that holds is the cause:
+
+1. Is any limb in the wrong place? In mm from the reference pose: the truth, else what a refinement or later track made
+   of the frame, else a refinement made now.
+2. Does one camera contradict the others at the reference pose (`camera_checks`)? Where a shift of the outlines mends
+   it, its calibration is wrong, else its masks are.
+3. Is the pose the reference with sides exchanged?
+4. When did it begin? The frame after the last one in which the limb was right; from there on:
+   was the limb wrong from the run's beginning (start pose)? Did it move, in a frame, by more than MOTION deviations of
+   the first set (noise)? Did so few particles carry the weight (effective number, Deutscher & Reid 2005, Eq. 11) that a
+   layer's choice is luck: with a usual survival rate they would not be as few (survival), or would (particles)?
+5. Does the likelihood prefer the wrong pose, both settled nearby? Then which camera and term (`blame`)?
+6. Else the stretch is tracked again with more particles and with more noise, and what helps names the cause.
+
+Stretches are always tracked again with the remedy, and what became of the limb is told. What these rules cannot tell
+apart: a survival rate that is too low and too few particles where both are so; a camera that is moved and one whose
+masks are shifted; limbs exchanged by the likelihood and by a search that got lost where both limbs meet; with fewer
+than three cameras, any fault of one.
+"""
+
+import threading
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from studio.arrays import Array
+from studio.errors import StudioError
+from studio.inspection.blame import ReferencePose, judged_pose, reference_pose
+from studio.inspection.camera_checks import CameraFault, fault_of, view_fits
+from studio.inspection.likelihoods import FrameEvaluation, evaluation_of
+from studio.inspection.modes import exchanged_in
+from studio.inspection.reading import InspectedFrame, no_value
+from studio.inspection.reference import body_points, by_limb, true_points
+from studio.inspection.refined_reference import refined_pose
+from studio.inspection.retracking import Change, Retracking, more_evaluations
+from studio.inspection.schedule import effective_number
+from studio.inspection.tables import Finding, Found, Remedy, Row, Selection
+from studio.knobs import Value, knobs_of
+from studio.likelihood.catalogue import WEIGHTINGS
+from studio.runs.tracks import RAW
+from studio.settings import RunSettings
+from studio.trackers.tracker import LIMB_LOST_SHARE
+
+WRONG_MM, RIGHT_MM, NEAR_MM = 80.0, 45.0, 60.0
+"""Mean distance of a limb's points from the reference: from here on it is wrong; below this it was right; nearer than
+this a particle was near.
+"""
+MOTION = 3.0
+"""Deviations of the first set that a limb moves in a frame when the motion is beyond the noise. Well tracked limbs of
+fast runs have up to 2.3."""
+FEW, USUAL_SURVIVAL, LOW_SURVIVAL = 6.0, 0.3, 0.1
+"""Effective number below which a choice is luck; the survival rate that a remedy sets; one that counts as low."""
+TIMES_PARTICLES, TIMES_NOISE = 8.0, 3.0
+HELPS = 0.75
+"""Share of the error that is left at most where a change helped."""
+LONGEST, LONGEST_AGO = 8, 64
+"""Frames that are tracked again, and that are looked back over, at most."""
+SEEDS = (101, 202)
+SETTLING, DRAWN, KEPT_WITHIN_MM = (1.0, 0.5, 0.25), 96, 40.0
+TELLS = 0.25
+"""Share of a weighting's usual spread (`LossLimit`) by which two log-weights must differ for one to be preferred."""
+KEPT = 64
+REFINED_NOW = "a refinement on the silhouettes"
+
+
+@dataclass(frozen=True, slots=True)
+class Preference:
+    """Which of two settled poses the likelihood prefers. nats : log-weight of the pose less that of the reference.
+    tells : what has to be exceeded. camera, term : that speak most for the pose. share : nats of these.
+    """
+
+    nats: float
+    tells: float
+    camera: str
+    term: str
+    share: float
+
+    @property
+    def is_for_the_pose(self) -> bool:
+        """Whether the wrong pose weighs more."""
+        return self.nats > self.tells
+
+    @property
+    def is_for_the_reference(self) -> bool:
+        """Whether the right pose weighs more."""
+        return self.nats < -self.tells
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """A stretch tracked again. what : in words. left : mean error of the wrong limbs at its end, mm."""
+
+    what: str
+    settings: Mapping[str, Value]
+    left: float
+
+
+class Case:
+    """A frame and what is measured of it."""
+
+    def __init__(self, frame: InspectedFrame, track: str) -> None:
+        self.frame, self.run, self.track = frame, frame.of, track
+        self.evaluation: FrameEvaluation = evaluation_of(frame)
+        self._made: dict[int, Array] = {}
+        self.pose = judged_pose(frame, track)
+        self.reference = self._reference()
+        self.errors = self.all_errors(self.pose)
+        self.wrong = [limb for limb, mm in self.errors.items() if mm > WRONG_MM]
+
+    def _reference(self) -> ReferencePose:
+        found = reference_pose(self.frame, self.track)
+        if found.kind != "best particle":
+            return found
+        return ReferencePose(REFINED_NOW, self._refined_now(self.frame.number))
+
+    def _refined_now(self, number: int) -> Array:
+        """(D,) a frame's pose, refined on its silhouettes."""
+        if number not in self._made:
+            frame = self.run.frame(number)
+            evidence, pose = evaluation_of(frame).evidence, judged_pose(frame, self.track)
+            self._made[number] = refined_pose(self.run, evidence, number, pose, self._made.get(number + 1))
+        return self._made[number]
+
+    def all_errors(self, pose: Array) -> dict[str, float]:
+        """mm by limb from the reference of this frame: its own markers where it is the truth."""
+        points = true_points(self.run, self.frame.number) if self.reference.kind == "truth" else None
+        goal = body_points(self.run.body, self.reference.pose[None])[0] if points is None else points
+        away = by_limb(
+            self.run.body, np.linalg.norm(body_points(self.run.body, pose[None])[0] - goal, axis=1)
+        )
+        return {limb: float(mm) for limb, mm in away.items() if np.isfinite(mm)}
+
+    def error(self, pose: Array, limbs: Sequence[str]) -> float:
+        """Mean error of some limbs, mm."""
+        found = self.all_errors(pose)
+        return float(np.mean([found[limb] for limb in limbs]))
+
+    @cached_property
+    def settings(self) -> RunSettings:
+        """The frame's."""
+        return self.frame.settings
+
+    @cached_property
+    def camera_fault(self) -> CameraFault | None:
+        """The camera that contradicts the others at the reference pose."""
+        return fault_of(
+            view_fits(self.run.body, self.run.run.cameras(), self.evaluation.evidence, self.reference.pose)
+        )
+
+    @cached_property
+    def exchanged(self) -> str:
+        """What is exchanged against the reference, "" for nothing: in this frame, or in two others of the stretch, as
+        exchanged limbs that meet differ little.
+        """
+        if not self.wrong:
+            return ""
+        here = exchanged_in(self.run.body, self.reference.pose, self.pose)
+        began = self.stretch[0]
+        others = sorted({began, (began + self.frame.number) // 2} - {self.frame.number})
+        if here or len(others) < 2:
+            return here
+        found = {self._exchanged_in_frame(number) for number in others}
+        return found.pop() if len(found) == 1 else ""
+
+    def _exchanged_in_frame(self, number: int) -> str:
+        """The same of another frame, in which the run's own pose is judged."""
+        frame = self.run.frame(number)
+        found = reference_pose(frame, self.track)
+        pose = self._refined_now(number) if self.reference.kind == REFINED_NOW else found.pose
+        return exchanged_in(self.run.body, pose, judged_pose(frame, self.track))
+
+    @cached_property
+    def stretch(self) -> tuple[int, int]:
+        """First frame of the failure, and of what is tracked again; the same unless it began long ago."""
+        began, tracked = self.frame.number, set(self.run.frames())
+        earliest = self.frame.number - (LONGEST if self.reference.kind == REFINED_NOW else LONGEST_AGO)
+        for number in range(self.frame.number - 1, max(earliest, self.run.run.record.first) - 1, -1):
+            place = self._place(number) if number in tracked else None
+            if place is None:
+                break
+            away = np.linalg.norm(body_points(self.run.body, self._judged(number)[None])[0] - place, axis=1)
+            errors = by_limb(self.run.body, away)
+            if max(float(errors[limb]) for limb in self.wrong) <= RIGHT_MM:
+                break
+            began = number
+        return began, max(began, self.frame.number - LONGEST + 1)
+
+    def _judged(self, number: int) -> Array:
+        """(D,) the pose that is asked about, of another frame."""
+        return judged_pose(self.run.frame(number), self.track)
+
+    @cached_property
+    def motion(self) -> tuple[float, float, float, int]:
+        """How far a wrong limb moved in a frame: in deviations of the first set, mm, those deviations in mm, and the
+        frame. Where it began, or the median over the stretch if that is more; (0, 0, 0, -1) where it cannot be known.
+        """
+        found: list[tuple[float, float, float, int]] = []
+        began, first = self.stretch
+        for number in sorted({began, *range(first, self.frame.number + 1)}):
+            if number <= self.run.run.record.first:
+                continue
+            before, now = self._place(number - 1), self._place(number)
+            if before is None or now is None:
+                continue
+            points = body_points(self.run.body, self.run.frame(number).layers[0].poses)
+            spread = np.sqrt(np.mean(np.sum((points - points.mean(axis=0)) ** 2, axis=2), axis=0))
+            moved = by_limb(self.run.body, np.linalg.norm(now - before, axis=1))
+            reach = by_limb(self.run.body, spread)
+            moves = [
+                (float(moved[limb] / reach[limb]), float(moved[limb]), float(reach[limb]), number)
+                for limb in self.wrong
+                if reach[limb] > 0.0
+            ]
+            found += [max(moves)] if moves else []
+        if not found:
+            return 0.0, 0.0, 0.0, -1
+        usual = sorted(found)[(len(found) - 1) // 2]
+        return max(usual, *(one for one in found if one[3] == began), usual)
+
+    def _place(self, number: int) -> Array | None:
+        """(M, 3) where the body was in a frame, None where that is not known."""
+        if self.reference.kind == "truth":
+            return true_points(self.run, number)
+        try:
+            if self.reference.kind == REFINED_NOW:
+                pose = self._refined_now(number)
+            else:
+                pose = self.run.frame(number).estimate(
+                    "" if self.reference.kind == "refined" else self.reference.kind
+                )
+        except StudioError:
+            return None
+        return body_points(self.run.body, pose[None])[0]
+
+    @cached_property
+    def effective(self) -> float:
+        """Median effective number over the layers of the stretch, inf for trackers without weights."""
+        found: list[float] = []
+        for number in range(self.stretch[1], self.frame.number + 1):
+            frame = self.run.frame(number)
+            if frame.is_weighted:
+                found += [effective_number(frame.log_weights(layer)) for layer in range(len(frame.layers))]
+        return float(np.median(found)) if found else float("inf")
+
+    @cached_property
+    def preference(self) -> Preference:
+        """Which of pose and reference the likelihood prefers, both settled nearby."""
+        ours, theirs = (self._settled(pose) for pose in (self.pose, self.reference.pose))
+        shares = self.evaluation.shares(np.stack([ours, theirs]))
+        off = shares.values[0] - shares.values[1]
+        view, term = np.unravel_index(int(np.argmax(off)), off.shape)
+        usual = WEIGHTINGS[self.settings.weighting_name].loss.spread
+        return Preference(
+            float(off.sum()), TELLS * usual, shares.cameras[view], shares.terms[term], float(off[view, term])
+        )
+
+    def _settled(self, pose: Array) -> Array:
+        """The best of poses drawn about a pose, none of whose limbs goes farther than KEPT_WITHIN_MM."""
+        rng, sigma = np.random.default_rng(0), np.array(self.run.run.record.sigma)
+        goal, best = body_points(self.run.body, pose[None])[0], pose
+        weight = float(self.evaluation.log_weights(best[None])[0])
+        for scale in SETTLING:
+            drawn = best + scale * sigma * rng.standard_normal((DRAWN, len(pose)))
+            away = np.linalg.norm(body_points(self.run.body, drawn) - goal, axis=2)
+            near = np.stack(list(by_limb(self.run.body, away).values())).max(axis=0) <= KEPT_WITHIN_MM
+            drawn = drawn[near & self.run.priors.hold(drawn)]
+            if not len(drawn):
+                continue
+            values = self.evaluation.log_weights(drawn)
+            if values.max() > weight:
+                best, weight = drawn[int(np.argmax(values))], float(values.max())
+        return best
+
+    @cached_property
+    def clouds(self) -> list[Row]:
+        """The rows of table "nearest"."""
+        goal = body_points(self.run.body, self.reference.pose[None])[0]
+        table: list[Row] = []
+        for layer, record in enumerate(self.frame.layers):
+            points = body_points(self.run.body, record.poses)
+            away = by_limb(self.run.body, np.linalg.norm(points - goal, axis=2))
+            spread = by_limb(
+                self.run.body, np.sqrt(np.mean(np.sum((points - points.mean(axis=0)) ** 2, axis=2), axis=0))
+            )
+            table += [
+                (
+                    layer,
+                    limb,
+                    no_value(float(mm.min())),
+                    no_value(float(np.median(mm))),
+                    no_value(float(spread[limb])),
+                    bool(mm.min() <= NEAR_MM),
+                )
+                for limb, mm in away.items()
+            ]
+        return table
+
+    def layer_left(self, limb: str) -> tuple[int | None, float]:
+        """The first layer without a particle near the reference's limb after which none came near again, and the
+        nearest distance in any layer, mm. None where the last layer has one.
+        """
+        own = [(int(str(row[0])), float(str(row[2])), bool(row[5])) for row in self.clouds if row[1] == limb]
+        nearest = min(mm for _, mm, _ in own)
+        if own[-1][2]:
+            return None, nearest
+        last_near = max((layer for layer, _, near in own if near), default=-1)
+        return last_near + 1, nearest
+
+    def trials(self, wanted: Sequence[tuple[str, Mapping[str, Value]]]) -> list[Trial]:
+        """The stretch tracked again with other seeds and each of these changes."""
+        again = Retracking(self.run, self.stretch[1], self.frame.number)
+        return [
+            Trial(
+                what,
+                settings,
+                float(
+                    np.mean(
+                        [self.error(again.poses(Change(settings, seed))[-1], self.wrong) for seed in SEEDS]
+                    )
+                ),
+            )
+            for what, settings in wanted
+        ]
+
+
+def more_noise(settings: RunSettings) -> dict[str, Value]:
+    """The knob of the noise, some times as large; {} where the tracker has none."""
+    limits = {entry.name: entry for entry in knobs_of(settings.tracker)}
+    if "diffusion_scale" not in limits:
+        return {}
+    wanted, high = TIMES_NOISE * settings.tracker.diffusion_scale, limits["diffusion_scale"].high
+    return {"diffusion_scale": wanted if high is None else min(wanted, float(high))}
+
+
+def usual_survival(settings: RunSettings) -> dict[str, Value]:
+    """The usual survival rate in all layers; {} where the tracker has none."""
+    names = {entry.name for entry in knobs_of(settings.tracker)}
+    if "survival" not in names:
+        return {}
+    return {"survival": USUAL_SURVIVAL} | (
+        {"survival_per_layer": ""} if "survival_per_layer" in names else {}
+    )
+
+
+def rows(frame: InspectedFrame, selection: Selection) -> Found:
+    """The tables, findings and remedies of view `why`; kept for the frames that were asked for last."""
+    track = selection.track if selection.track != RAW else ""
+    stamp = None if frame.result is None else (frame.result.milliseconds, frame.result.estimate.log_weight)
+    key = (frame.of.run.folder, frame.number, track, stamp)
+    with _lock:
+        if key in _known:
+            _known.move_to_end(key)
+            return _known[key]
+    found = _explained(Case(frame, track))
+    with _lock:
+        _known[key] = found
+        while len(_known) > KEPT:
+            _known.popitem(last=False)
+    return found
+
+
+_lock = threading.Lock()
+_known: OrderedDict[tuple[object, ...], Found] = OrderedDict()
+
+
+def _explained(case: Case) -> Found:
+    findings, remedies = [_verdict(case)], list[Remedy]()
+    fault = case.camera_fault
+    if fault is not None:
+        _add_camera(case, fault, findings, remedies)
+    if case.wrong:
+        limb = max(case.wrong, key=lambda name: case.errors[name])
+        _add_search(case, limb, findings, remedies, cause_known=fault is not None)
+    table: list[Row] = [(one.kind, one.words, one.limb, one.layer, one.camera, one.term) for one in findings]
+    return Found(
+        {"findings": table, "nearest": case.clouds},
+        (f"The pose is compared with: {case.reference.kind}.",),
+        tuple(findings),
+        tuple(remedies),
+    )
+
+
+def _verdict(case: Case) -> Finding:
+    """What is wrong with the frame."""
+    numbers = dict(case.errors)
+    result = case.frame.result
+    if not case.wrong:
+        limb = max(case.errors, key=lambda name: case.errors[name])
+        words = f"The frame fits: no limb is farther than {case.errors[limb]:.0f} mm from {_of(case.reference.kind)}."
+        return Finding("fits", words, limb, numbers=numbers)
+    named = sorted(case.wrong, key=lambda name: -case.errors[name])
+    parts = [f"the {limb} by {case.errors[limb]:.0f} mm" for limb in named]
+    words = f"Off from {_of(case.reference.kind)}: {_listed(parts)}."
+    lost = (
+        []
+        if result is None
+        else [limb for limb, share in result.disagreement.items() if share > LIMB_LOST_SHARE]
+    )
+    if lost:
+        words += f" The silhouettes contradict the {_listed(lost)} too."
+    words += _mended(case)
+    return Finding("wrong limb", words, named[0], numbers=numbers)
+
+
+def _mended(case: Case) -> str:
+    """That the refinement after the search put it right, where it did; "" else."""
+    result = case.frame.result
+    if case.track or case.reference.kind == "refined" or result is None or result.estimate.searched is None:
+        return ""
+    worst = max(case.all_errors(result.estimate.pose).values())
+    return (
+        f" The refinement after the search put it right (at most {worst:.0f} mm)."
+        if worst <= WRONG_MM
+        else ""
+    )
+
+
+def _add_camera(case: Case, fault: CameraFault, findings: list[Finding], remedies: list[Remedy]) -> None:
+    fit, name = fault.fit, fault.fit.camera
+    numbers = {"overlap": fit.overlap, "usual": fault.usual, "shifted": fit.best, "shift_px": fit.distance}
+    seen = (
+        f"At {_of(case.reference.kind)} body and silhouette overlap by {fit.overlap:.0%} in camera {name}, by"
+        f" {fault.usual:.0%} in the others"
+    )
+    if fault.kind == "calibration":
+        words = (
+            f"The calibration of camera {name} is wrong. {seen}; a shift of {fit.distance:.0f} px brings it to"
+            f" {fit.best:.0%}: the camera shows the body's shape in another place."
+        )
+        remedies.append(
+            Remedy(f"Calibrate camera {name}", "Calibrate it again, or align the cameras by their silhouettes.", {},
+                   "calibrate")
+        )  # fmt: skip
+    else:
+        words = (
+            f"The masks of camera {name} are bad. {seen}, and no shift mends that ({fit.best:.0%} at best):"
+            f" {fit.covered:.0%} of the mask is body, {fit.inside:.0%} of the body is in the mask."
+        )
+        remedies.append(
+            Remedy(f"Look at the masks of camera {name}", "Choose another background or other masks for it.", {},
+                   "masks")
+        )  # fmt: skip
+    findings.append(Finding(fault.kind, words, camera=name, numbers=numbers, is_cause=True))
+
+
+def _add_search(
+    case: Case, limb: str, findings: list[Finding], remedies: list[Remedy], *, cause_known: bool
+) -> None:
+    """Where and why the search lost the limb."""
+    # Refining frames on bad evidence takes long, and tells nothing.
+    known = case.reference.kind != REFINED_NOW or not cause_known
+    began = case.stretch[0] if known else case.frame.number
+    if began < case.frame.number:
+        words = f"It began in frame {began}: look there first."
+        findings.append(Finding("began", words, limb, numbers={"frame": began}, frame=began))
+    cause = None if cause_known else _cause(case, limb, remedies)
+    if cause is not None:
+        findings.append(cause)
+    findings += [_layer_finding(case, limb), _preference_finding(case)]
+    if cause is None or cause.kind not in TRIED:
+        return
+    remedy = remedies[-1]
+    before = case.error(case.pose, case.wrong)
+    trials = case.trials([("the same settings and other seeds", {}), (remedy.title, remedy.settings)])
+    for trial in trials:
+        words = (
+            f"Tracked again from frame {case.stretch[1]} with {_lowered(trial.what)}: {before:.0f} mm become"
+            f" {trial.left:.0f} mm."
+        )
+        findings.append(Finding("trial", words, limb, numbers={"before": before, "after": trial.left}))
+
+
+TRIED = ("noise", "survival", "particles")
+"""Causes with a remedy of knobs, which is tried."""
+
+
+def _cause(case: Case, limb: str, remedies: list[Remedy]) -> Finding | None:
+    """The main cause, by the rules in the order of the module's docstring."""
+    if case.exchanged:
+        remedies.append(
+            Remedy(
+                "Correct the sides", "Put left and right as they were over all frames.", {}, "correct sides"
+            )
+        )
+        words = f"{case.exchanged.capitalize()}: the pose is the right one with its sides changed."
+        if case.stretch[0] <= case.run.run.record.first:
+            words += " It was so from the run's first frame on: look at the start pose."
+            remedies.append(
+                Remedy("Set the start pose", "Begin with the sides as they are.", {}, "start pose")
+            )
+        return Finding("exchange", words, limb, is_cause=True)
+    began, settings = case.stretch[0], case.settings
+    record = case.run.run.record
+    deviations, moved, reach, number = case.motion
+    # A handful of particles shows little of how far their noise reaches.
+    beyond = MOTION if case.effective >= FEW else 2.0 * MOTION
+    if deviations > beyond and more_noise(settings):
+        remedies.append(
+            Remedy(f"{TIMES_NOISE:g} times the noise", "The first set reaches as far as the motion then.",
+                   more_noise(settings))
+        )  # fmt: skip
+        words = (
+            f"The motion is beyond the noise: the {limb} moved {moved:.0f} mm into frame {number}, {deviations:.1f}"
+            f" times the first set's deviation of {reach:.0f} mm."
+        )
+        return Finding("noise", words, limb, numbers={"moved": moved, "reach": reach}, is_cause=True)
+    if began <= record.first and case.frame.number - began < LONGEST:
+        remedies.append(Remedy("Set the start pose", "Begin the run where the body is.", {}, "start pose"))
+        words = f"The start pose was wrong: the {limb} was off from the run's first frame on."
+        return Finding("start", words, limb, is_cause=True)
+    if case.effective < FEW:
+        return _few(case, limb, remedies)
+    preference = case.preference
+    if preference.is_for_the_pose:
+        remedies.append(_against(case, preference))
+        words = (
+            f"The likelihood prefers the wrong pose by {preference.nats:.3f} nats, most of all in camera"
+            f" {preference.camera} by its {preference.term} term ({preference.share:+.3f})."
+        )
+        return Finding(
+            "likelihood", words, limb, camera=preference.camera, term=preference.term,
+            numbers={"nats": preference.nats, "share": preference.share}, is_cause=True,
+        )  # fmt: skip
+    return _by_trial(case, limb, remedies)
+
+
+def _few(case: Case, limb: str, remedies: list[Remedy]) -> Finding:
+    """Too few particles carry the weight: by the survival rate, or because there are few."""
+    settings, count = case.settings, max(case.frame.size(0), 1)
+    wanted = case.frame.layers[0].alpha_wanted
+    numbers = {"effective": case.effective, "particles": count, "survival": wanted}
+    if np.isfinite(wanted) and wanted < LOW_SURVIVAL and USUAL_SURVIVAL * count >= FEW:
+        remedies.append(
+            Remedy(f"A survival rate of {USUAL_SURVIVAL:g}", "More particles survive each layer, at no cost.",
+                   usual_survival(settings))
+        )  # fmt: skip
+        words = (
+            f"The survival rate is too low: {wanted:g} of {count} particles lets {case.effective:.1f} of them carry a"
+            " layer's weight, and the cloud collapses on the first good place."
+        )
+        return Finding("survival", words, limb, numbers=numbers, is_cause=True)
+    remedies.append(_more_particles(settings))
+    words = (
+        f"There are too few particles: of {count} a layer {case.effective:.1f} carry the weight, too few to look"
+        " everywhere."
+    )
+    return Finding("particles", words, limb, numbers=numbers, is_cause=True)
+
+
+def _by_trial(case: Case, limb: str, remedies: list[Remedy]) -> Finding | None:
+    """The cause as what helps: more particles, or more noise; None where neither does."""
+    more, noise, before = (
+        _more_particles(case.settings),
+        more_noise(case.settings),
+        case.error(case.pose, case.wrong),
+    )
+    wanted = [(more.title, more.settings)]
+    if noise:
+        wanted.append((f"{TIMES_NOISE:g} times the noise", noise))
+    best = min(case.trials(wanted), key=lambda trial: trial.left)
+    if best.left > HELPS * before:
+        words = (
+            f"The cause is not found: neither {_lowered(more.title)} nor more noise brings the {limb} back"
+            f" ({before:.0f} mm stay {best.left:.0f} mm)."
+        )
+        return Finding("unknown", words, limb, numbers={"before": before, "after": best.left}, is_cause=True)
+    if best.what == more.title:
+        remedies.append(more)
+        words = "There are too few particles for this frame: the likelihood does not prefer the pose that was found."
+        return Finding("particles", words, limb, is_cause=True)
+    remedies.append(Remedy(best.what, "The first set reaches farther then.", best.settings))
+    return Finding(
+        "noise", f"The search looked too near: the {limb} is found with more noise.", limb, is_cause=True
+    )
+
+
+def _more_particles(settings: RunSettings) -> Remedy:
+    title = f"{TIMES_PARTICLES:g} times the particles"
+    return Remedy(title, "The search looks in more places.", more_evaluations(settings, TIMES_PARTICLES))
+
+
+def _against(case: Case, preference: Preference) -> Remedy:
+    """Half the weight for the term that speaks for the wrong pose, where that term has a knob; else to look there."""
+    knob = f"{preference.term}_weight"
+    now = getattr(case.settings.weighting, knob, None)
+    if isinstance(now, float) and now > 0.0:
+        return Remedy(
+            f"Half the weight of the {preference.term} term",
+            "It speaks for the wrong pose.",
+            {knob: 0.5 * now},
+        )
+    return Remedy(
+        f"Look at camera {preference.camera}", "Its evidence speaks for the wrong pose.", {}, "look"
+    )
+
+
+def _layer_finding(case: Case, limb: str) -> Finding:
+    """Where the reference left the cloud."""
+    layer, nearest = case.layer_left(limb)
+    numbers = {"nearest": nearest}
+    if layer is None:
+        words = f"Particles were near the {limb}'s right place to the last layer (the nearest {nearest:.0f} mm away)."
+        return Finding("near to the end", words, limb, numbers=numbers)
+    if layer == 0:
+        words = (
+            f"The search never looked there: no particle of any layer came within {NEAR_MM:.0f} mm of the {limb}'s"
+            f" right place (the nearest {nearest:.0f} mm)."
+        )
+        return Finding("never near", words, limb, 0, numbers=numbers)
+    words = (
+        f"The {limb}'s right place left the cloud at layer {layer + 1}: until then a particle was within"
+        f" {NEAR_MM:.0f} mm of it."
+    )
+    return Finding("left the cloud", words, limb, layer, numbers=numbers)
+
+
+def _preference_finding(case: Case) -> Finding:
+    found = case.preference
+    numbers = {"nats": found.nats, "share": found.share}
+    if found.is_for_the_pose:
+        words = (
+            f"The likelihood prefers the wrong pose, by {found.nats:.3f} nats; camera {found.camera}'s"
+            f" {found.term} term most."
+        )
+    elif found.is_for_the_reference:
+        words = f"The likelihood prefers the right pose, by {-found.nats:.3f} nats: the search missed it."
+    else:
+        words = f"The likelihood hardly tells the two poses apart ({found.nats:+.3f} nats)."
+    return Finding("preference", words, camera=found.camera, term=found.term, numbers=numbers)
+
+
+def _of(kind: str) -> str:
+    """A reference in a sentence."""
+    usual = kind if kind.startswith(("a ", "best ")) else f"track '{kind}'"
+    return {"truth": "the truth", "refined": "its refinement", "best particle": "the best particle"}.get(
+        kind, usual
+    )
+
+
+def _listed(parts: Sequence[str]) -> str:
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+
+def _lowered(text: str) -> str:
+    return text[:1].lower() + text[1:]

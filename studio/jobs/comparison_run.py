@@ -1,0 +1,153 @@
+"""A comparison worked at until all of its trials are done: outcomes are kept one by one, those that are there are not
+measured again.
+"""
+
+from collections.abc import Callable, Generator
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from studio.comparison.kept_comparison import KeptComparison, trial_key
+from studio.comparison.kept_trials import KeptOutcome, measured_by, plain
+from studio.comparison.plan import Comparison, Plan, conclude, trials
+from studio.comparison.sweep import Sweep, conclude_sweep, run_name, sweep_trials
+from studio.comparison.tracked import measure_tracking
+from studio.comparison.trials import Outcome, Trial, TrialJob
+from studio.errors import RunError
+from studio.jobs.swept_runs import measure_run
+from studio.jobs.trials import TrialResult, run_jobs
+from studio.progress import Progress
+from studio.sessions.manifest import now
+from studio.sessions.session import Session
+
+
+@dataclass(frozen=True, slots=True)
+class _Work:
+    """A comparison's trials under their keys, in order."""
+
+    plan: Plan
+    trials: dict[str, Trial]
+
+    @staticmethod
+    def of(plan: Plan) -> "_Work":
+        made = sweep_trials(plan) if plan.vary else trials(plan)
+        return _Work(plan, {trial_key(trial): trial for trial in made})
+
+
+def run_comparison(
+    kept: KeptComparison,
+    session: Session,
+    report: Progress,
+    *,
+    processes: int | None = None,
+    executor: Executor | None = None,
+    checkpoint: Callable[[], None] = lambda: None,
+) -> Comparison:
+    """Do what is still to be done of a comparison and write its result.
+
+    processes, executor, checkpoint : see `trials.run_jobs`. What ends it leaves the finished trials. Raises RunError
+    where another process works at it or a trial fails.
+    """
+    with _held(kept):
+        plan, outcomes = _measured(kept, session, report, processes, executor, checkpoint)
+        comparison = conclude(plan, outcomes)
+        kept.finish(comparison)
+    return comparison
+
+
+def run_sweep(
+    kept: KeptComparison,
+    session: Session,
+    report: Progress,
+    *,
+    processes: int | None = None,
+    executor: Executor | None = None,
+    checkpoint: Callable[[], None] = lambda: None,
+) -> Sweep:
+    """The same of a sweep, whose trials are runs of the session; one that was broken off goes on from its frames."""
+    with _held(kept):
+        plan, outcomes = _measured(kept, session, report, processes, executor, checkpoint)
+        sweep = conclude_sweep(plan, outcomes)
+        kept.finish(sweep)
+    return sweep
+
+
+def done_before(kept: KeptComparison, plan: Plan) -> int:
+    """How many of a comparison's trials are there."""
+    return len(_outcomes(kept, _Work.of(plan)))
+
+
+@contextmanager
+def _held(kept: KeptComparison) -> Generator[None]:
+    """While it is worked at. Raises RunError where another process does."""
+    lock = kept.lock()
+    if lock is None:
+        raise RunError(
+            f"Another process works at comparison '{kept.name}'.", "Wait for it, or start a new one."
+        )
+    try:
+        kept.end("")
+        yield
+    finally:
+        lock.free()
+
+
+def _measured(
+    kept: KeptComparison,
+    session: Session,
+    report: Progress,
+    processes: int | None,
+    executor: Executor | None,
+    checkpoint: Callable[[], None],
+) -> tuple[Plan, list[Outcome]]:
+    """The outcomes of all trials, in their order; those that are not there yet are measured."""
+    work = _Work.of(kept.plan(session))
+    found = _outcomes(kept, work)
+    jobs = [_job(kept, work, key) for key in work.trials if key not in found]
+    report("", len(found), len(work.trials))
+
+    def on_result(job: TrialJob, result: TrialResult) -> None:
+        if result.measured is None:
+            raise RunError(
+                f"{job.label} could not be tracked: {result.failure}",
+                "Change what it says and try again.",
+            )
+        outcome = KeptOutcome(
+            result.measured, "", result.seconds, measured_by(), now(), job.label, job.arguments
+        )
+        kept.kept_trials.write(job.key, outcome)
+        found[job.key] = Outcome(work.trials[job.key], result.measured)
+        report(job.label, len(found), len(work.trials))
+
+    footage = Path(work.plan.footage).parent
+    run_jobs(jobs, footage, on_result, processes, executor=executor, checkpoint=checkpoint)
+    return work.plan, [found[key] for key in work.trials]
+
+
+def _job(kept: KeptComparison, work: _Work, key: str) -> TrialJob:
+    trial, plan = work.trials[key], work.plan
+    arguments = plain(trial.arguments)
+    if plan.vary:
+        arguments["run"] = run_name(kept.name, plan, list(work.trials).index(key))
+        arguments["note"] = kept.note_of(trial.label)
+    return TrialJob(
+        key=key,
+        experiment="comparison",
+        label=trial.label,
+        arguments=arguments,
+        measure=measure_run if plan.vary else measure_tracking,
+        footage=(plan.footage,),
+        frames=None,
+        alone=False,
+    )
+
+
+def _outcomes(kept: KeptComparison, work: _Work) -> dict[str, Outcome]:
+    """The outcomes that this version of the studio measured."""
+    found: dict[str, Outcome] = {}
+    for key, trial in work.trials.items():
+        outcome = kept.kept_trials.read(key)
+        if outcome is not None and outcome.measured is not None and outcome.software == measured_by():
+            found[key] = Outcome(trial, outcome.measured)
+    return found

@@ -1,0 +1,104 @@
+"""A live run in hand: the pipeline that makes its frames ready, and the thread that stores its results."""
+
+import gc
+from collections.abc import Callable
+from pathlib import Path
+
+from studio.capture.frame_clock import LiveSource, ReplayClock
+from studio.jobs.live_pipeline import LivePipeline
+from studio.jobs.open_run import OpenRun
+from studio.runs.live_problems import LiveProblems
+from studio.runs.live_run import LiveRun
+from studio.runs.problem_source import ProblemSource
+from studio.runs.set_following import SetFollower
+from studio.runs.tracking_run import Stepped, TrackingRun
+from studio.sessions.live_recordings import is_being_recorded
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+
+PATIENCE_SECONDS = 0.05
+"""How long a search waits for a frame before commands are looked at."""
+
+# The source of a run's sets, for the rate, last frame and cameras of its record.
+MakeSource = Callable[[StoredRun, int], LiveSource]
+
+
+class OpenLiveRun(OpenRun):
+    """One live run, opened for tracking. Its clock runs from one `step_layer` to `rest`.
+
+    make_source : of its sets, for (run, number of cameras); by default those of a recording in progress, else its
+    footage is replayed at its own rate.
+    """
+
+    makes_ahead = False
+
+    def __init__(self, session_folder: str, run_folder: str, make_source: MakeSource | None = None) -> None:
+        self._make_source = make_source or source_of
+        self._pipeline: LivePipeline | None = None
+        super().__init__(session_folder, run_folder)
+
+    @property
+    def warmed_as(self) -> str:
+        """Each live run by itself: it has no time for backgrounds and files either."""
+        return str(self.stored.folder)
+
+    def warm_up(self) -> None:
+        """Learn the backgrounds, compile and load everything, so that the first frames do not wait for it."""
+        self.live.rehearse()
+        # What is there by now stays; a collection that walks through all of it would cost a frame or two.
+        gc.collect()
+        gc.freeze()
+
+    def step_layer(self) -> Stepped | None:
+        """Do the next layer of the frame at hand, else of the newest that is ready; None where none is."""
+        if self.live.between_frames and not self._take():
+            return None
+        return self.live.step_layer()
+
+    def rest(self) -> None:
+        """Let no pictures come."""
+        pipeline, self._pipeline = self._pipeline, None
+        if pipeline is not None:
+            pipeline.stop()
+
+    def close(self) -> None:
+        """Save the search where it stands and release files, pictures and threads."""
+        self.rest()
+        try:
+            super().close()
+        finally:
+            gc.unfreeze()
+
+    def _take(self) -> bool:
+        """Make the newest frame the one at hand; the run is over where none will come."""
+        if self._pipeline is None:
+            source = self._make_source(self.stored, len(self.live_problems.cameras))
+            self._pipeline = LivePipeline(
+                source, lambda arrival: self.live_problems.ready(arrival, self.mailbox.latest()[1])
+            )
+            self._pipeline.start(self.live.next_frame)
+        ready = self._pipeline.take(PATIENCE_SECONDS)
+        if ready is not None:
+            self.live.take(ready)
+        elif self._pipeline.over:
+            self.live.end()
+        return ready is not None
+
+    def _tracking_run(self, problems: ProblemSource) -> TrackingRun:
+        self.live_problems = LiveProblems(problems)
+        self.live = LiveRun(self.stored, self.live_problems, self._storing)
+        return self.live
+
+
+def source_of(run: StoredRun, cameras: int) -> LiveSource:
+    """The sets of a run: live cameras' where its session is a recording in progress, else its footage's."""
+    session = run.folder.parents[1]
+    if is_being_recorded(session):
+        return SetFollower(session)
+    return ReplayClock(run.record.fps, run.record.last, cameras)
+
+
+def opened(session_folder: str, run_folder: str) -> OpenRun:
+    """A run in hand, live or not. Raises StudioError."""
+    run = Session(Path(session_folder)).run(Path(run_folder).name)
+    return (OpenLiveRun if run.record.live else OpenRun)(session_folder, run_folder)

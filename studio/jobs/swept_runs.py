@@ -1,0 +1,66 @@
+"""The trial of a sweep: a run of the session, tracked to its end and measured."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+from studio.comparison.footage_cache import FootageCache
+from studio.comparison.sweep import measured_run
+from studio.comparison.trials import kept_as
+from studio.jobs.batch import track_to_end
+from studio.progress import unheard
+from studio.runs.new_run import prepare_run
+from studio.runs.session_settings import session_settings
+from studio.sessions.names import free_name
+from studio.sessions.run_record import RunRecord
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+from studio.settings import values
+
+
+@kept_as("swept_runs.measure_run")
+def measure_run(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
+    """Track a run and measure it; the fields of `Swept`. One of the same name that was begun so is gone on with."""
+    session = cache.session(arguments["footage"])
+    run = _begun(session, arguments) or _new(session, arguments)
+    if run.summary(blobs=False).done < run.record.frame_count:
+        track_to_end(session, run, unheard)
+    return asdict(measured_run(session, run))
+
+
+def _begun(session: Session, arguments: Mapping[str, Any]) -> StoredRun | None:
+    """The run that an earlier attempt at this trial left, None without one. Its record has the trial's note, if any."""
+    wanted = session_settings(session, arguments["tracker"], arguments["weighting"], arguments["changes"])
+    for run in session.runs():
+        # A name that was taken has a number behind it.
+        if not run.name.startswith(arguments["run"]) or not _is_of(run.record, arguments):
+            continue
+        if "note" in arguments and arguments["note"] not in run.record.notes:
+            continue
+        if dict(run.record.settings) == dict(values(wanted)) and not run.being_tracked():
+            return run
+    return None
+
+
+def _is_of(record: RunRecord, arguments: Mapping[str, Any]) -> bool:
+    names = ("tracker", "weighting", "seed", "first", "last", *(["body"] if arguments["body"] else []))
+    return all(getattr(record, name) == arguments[name] for name in names)
+
+
+def _new(session: Session, arguments: Mapping[str, Any]) -> StoredRun:
+    taken = {run.name for run in session.runs()}
+    return prepare_run(
+        session,
+        tracker=arguments["tracker"],
+        weighting=arguments["weighting"],
+        body=arguments["body"],
+        behaviour=arguments.get("behaviour", ""),
+        first=arguments["first"],
+        last=arguments["last"],
+        seed=arguments["seed"],
+        knobs=arguments["changes"],
+        fit_shape=arguments["fit_shape"],
+        despite_findings=arguments.get("despite_findings", False),
+        note=arguments.get("note", ""),
+        name=free_name(arguments["run"], taken),
+    )

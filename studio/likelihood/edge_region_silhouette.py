@@ -1,0 +1,102 @@
+"""Three terms, each 0...1 in every view: edges and region of Deutscher & Reid, bidirectional silhouette of
+Fleischmann et al.
+
+    f     = mean over views of  a (1 - Σe) + b (1 - Σr) + c f_s
+    log w = - Σ over cameras of (a Σe + b Σr + c (1 - f_s))  =  cameras · (f - a - b - c)
+
+Σe and Σr are those of `edge_region` (Eq. 14 and 15 of Deutscher & Reid 2005), f_s that of `edge_silhouette`
+(Fleischmann et al. 2012, section 2.2); the log-weight is Eq. 16 and 17 with a third term. The region compares inside
+the model only, f_s in both directions; together, 1 : 1 : 1, they lost the fewest limbs in the prototypes. In the first
+stage of a search only the trunk's edges count, the other two terms use the whole body.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from studio.arrays import Array
+from studio.body.model import BodyModel
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.geometry.camera import Camera
+from studio.knobs import next_frame_knob
+from studio.likelihood.edge_region import EdgeRegionProblem, EdgeRegionSettings, EdgeRegionWeigher
+from studio.likelihood.problem import TRUNK_FIRST, WHOLE_BODY, PreparedProblem, Shares
+from studio.likelihood.silhouette_areas import Silhouettes, resolution_knob, silhouettes_of
+from studio.likelihood.visible_edges import body_edges
+
+
+@dataclass(frozen=True, slots=True)
+class EdgeRegionSilhouetteSettings(EdgeRegionSettings):
+    """The knobs of the edge and region weighting, and the silhouette's. All take effect with the next frame."""
+
+    title: ClassVar[str] = "Edge, region and silhouette"
+
+    silhouette_weight: float = next_frame_knob(
+        1.0, 0.0, 5.0, 0.05, help="Weight of the bidirectional silhouette term."
+    )
+    silhouette_resolution: str = resolution_knob()
+
+
+class EdgeRegionSilhouetteWeigher:
+    """Makes the problem of any frame; immutable."""
+
+    def __init__(
+        self, body: BodyModel, cameras: tuple[Camera, ...], settings: EdgeRegionSilhouetteSettings
+    ) -> None:
+        self.settings, self.cameras = settings, cameras
+        self.edge_region = EdgeRegionWeigher(body, cameras, settings)
+        self.trunk = np.unique(body_edges(body).trunk[:, 0])
+
+    def problem(self, evidence: FrameEvidence) -> "EdgeRegionSilhouetteProblem":
+        """One frame as a function of poses. Raises FootageError where views do not fit the cameras."""
+        edge_region = self.edge_region.problem(evidence)
+        silhouettes = silhouettes_of(evidence, self.settings.silhouette_resolution)
+        return EdgeRegionSilhouetteProblem(self, edge_region, silhouettes)
+
+
+class EdgeRegionSilhouetteProblem(PreparedProblem):
+    """One frame as a function of poses."""
+
+    def __init__(
+        self, weigher: EdgeRegionSilhouetteWeigher, edge_region: EdgeRegionProblem, silhouettes: Silhouettes
+    ) -> None:
+        self.weigher, self.edge_region, self.silhouettes = weigher, edge_region, silhouettes
+        self.priors = edge_region.priors
+
+    def terms(self, poses: Array, stage: int = WHOLE_BODY) -> tuple[Array, Array, Array]:
+        """1 - Σe, 1 - Σr and f_s, each (N, V), of poses (N, D).
+
+        Raises BodyError for poses that are no finite (N, D).
+        """
+        outlines = self.weigher.edge_region.projector.blocks(poses)
+        hidden = self.edge_region.hidden(outlines)
+        edge, region = self.edge_region.terms_of(outlines, hidden, len(poses))
+        trunk = self.weigher.trunk
+        if stage == TRUNK_FIRST and len(trunk) < outlines.shape[2]:
+            parts = np.ascontiguousarray(outlines[:, :, trunk]), np.ascontiguousarray(hidden[:, :, trunk])
+            edge = self.edge_region.terms_of(*parts, len(poses))[0]
+        return 1.0 - edge, 1.0 - region, self.silhouettes.areas(outlines, len(poses)).fitness()
+
+    def shares(self, poses: Array) -> Shares:
+        """-a Σe, -b Σr and -c (1 - f_s) of every camera."""
+        settings, names = self.weigher.settings, tuple(camera.name for camera in self.weigher.cameras)
+        factors = settings.edge_weight, settings.region_weight, settings.silhouette_weight
+        values = [factor * (term - 1.0) for factor, term in zip(factors, self.terms(poses), strict=True)]
+        return Shares(names, ("edge", "region", "silhouette"), np.stack(values, axis=2))
+
+    def fitness(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
+        """(N,) f of poses (N, D), between 0 and the sum of the weights."""
+        settings = self.weigher.settings
+        edge, region, silhouette = (term.mean(axis=1) for term in self.terms(poses, stage))
+        return (
+            settings.edge_weight * edge
+            + settings.region_weight * region
+            + settings.silhouette_weight * silhouette
+        )
+
+    def weigh(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
+        """(N,) log-weights of poses (N, D). Raises BodyError for poses that are no finite (N, D)."""
+        settings = self.weigher.settings
+        best = settings.edge_weight + settings.region_weight + settings.silhouette_weight
+        return len(self.weigher.cameras) * (self.fitness(poses, stage) - best)

@@ -1,0 +1,179 @@
+"""Overlay of a weighting's outlines and sample points on the pictures, the same ones that the kernels
+read.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.arrays import Array
+from studio.body.forward_kinematics import limb_frames
+from studio.body.model import BodyModel, kinematic_tables
+from studio.geometry.camera import Camera
+from studio.geometry.projection import project
+from studio.likelihood.bodytrack import BodytrackSettings
+from studio.likelihood.bodytrack_kernels import EDGE_STEP, INSIDE_STEP, LEAST
+from studio.likelihood.edge_region import EdgeRegionSettings
+from studio.likelihood.edge_region_kernels import CHUNK, FIRST_STRIP, SECOND_STRIP, THIRD_STRIP
+from studio.likelihood.edge_silhouette import EdgeSilhouetteSettings
+from studio.likelihood.outlines import OutlineProjector
+from studio.likelihood.visible_edges import body_edges, hidden_samples, limb_sides
+
+IntArray = NDArray[np.int64]
+
+STRIPS = (float(FIRST_STRIP), float(SECOND_STRIP), float(THIRD_STRIP))
+CAP_POINTS = 13
+"""Points on the half ellipse that closes an end."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ViewOverlay:
+    """One camera's view of one pose, pixels. L drawn limbs.
+
+    camera : its name. limbs : L names. outlines : (L, 4, 2) corners A0, A1, B1, B0, NaN for a limb that is
+    not seen. contours : L closed polylines (K, 2), sides and the half ellipses at both ends; (0, 2) for a
+    limb that is not seen. edge_samples, region_samples : (K, 2) points inside the picture that the weighting
+    reads, before they are rounded to the nearest pixel; none for the template, which reads all pixels."""
+
+    camera: str
+    limbs: tuple[str, ...]
+    outlines: Array
+    contours: tuple[Array, ...]
+    edge_samples: Array
+    region_samples: Array
+
+
+def overlay_points(
+    body: BodyModel,
+    cameras: tuple[Camera, ...],
+    pose: Array,
+    settings: Any,  # noqa: ANN401 - any weighting's settings
+) -> tuple[ViewOverlay, ...]:
+    """The overlay on each camera's picture for a pose (D,). Raises BodyError for a pose that does not fit.
+
+    settings : of the weighting in use; sample points are those of its kernels.
+    """
+    pose = np.asarray(pose, dtype=np.float64)
+    projector = OutlineProjector.of_body(body, cameras)
+    corners, seen = projector.corners(pose[None])
+    lines, visible = _edges_read(body, projector, pose, settings)
+    names = tuple(limb.name for limb in body.drawn)
+    found: list[ViewOverlay] = []
+    for view, (camera, outlines, state) in enumerate(zip(cameras, corners[0], seen[0], strict=True)):
+        edge, region = sample_points(outlines[state >= 0], settings)
+        if lines is not None:
+            edge = _on_lines(outlines, lines, visible[view] & (state[lines[:, 0], None] >= 0))
+        contours = _contours(body, camera, pose, outlines)
+        found.append(
+            ViewOverlay(
+                camera.name, names, outlines, contours, _inside(camera, edge), _inside(camera, region)
+            )
+        )
+    return tuple(found)
+
+
+def _edges_read(
+    body: BodyModel,
+    projector: OutlineProjector,
+    pose: Array,
+    settings: Any,  # noqa: ANN401
+) -> tuple[IntArray | None, NDArray[np.bool_]]:
+    """Edges (K, 3) as in `visible_edges` and (V, K, samples) which of their samples are visible, where the weighting
+    uses them; else None.
+    """
+    if isinstance(settings, EdgeSilhouetteSettings):
+        lines = body_edges(body).whole
+    elif isinstance(settings, EdgeRegionSettings) and settings.occlusion_aware:
+        lines = limb_sides(projector.limb_count)
+    else:
+        return None, np.zeros(0, dtype=np.bool_)
+    samples = settings.edge_chunks * CHUNK
+    hidden = hidden_samples(projector.blocks(pose[None]), lines, samples)
+    bits = hidden[0, ..., 0, None] >> np.arange(samples, dtype=np.uint64)
+    return lines, (bits & np.uint64(1)) == 0
+
+
+def _on_lines(outlines: Array, lines: IntArray, chosen: NDArray[np.bool_]) -> Array:
+    """(P, 2) the samples of edges (K, 3) of outlines (L, 4, 2) that are `chosen` (K, samples)."""
+    begin, end = outlines[lines[:, 0], lines[:, 1]], outlines[lines[:, 0], lines[:, 2]]
+    points = begin[:, None] + _middles(chosen.shape[1])[:, None] * (end - begin)[:, None]
+    return points[chosen]
+
+
+def sample_points(outlines: Array, settings: Any) -> tuple[Array, Array]:  # noqa: ANN401
+    """Edge and region sample points, each (K, 2) pixels, of the outlines (L, 4, 2) of limbs that are seen."""
+    edge: list[Array] = [np.zeros((0, 2))]
+    region: list[Array] = [np.zeros((0, 2))]
+    for outline in outlines:
+        if isinstance(settings, EdgeRegionSettings):
+            along = _middles(settings.edge_chunks * CHUNK)
+            edge += [_grid(outline, along, np.array([side])) for side in (0.0, 1.0)]
+            along = _middles(settings.region_chunks * CHUNK)
+            region.append(_grid(outline, along, np.array(STRIPS)))
+        elif isinstance(settings, BodytrackSettings):
+            for side, (start, end) in ((0.0, (0, 1)), (1.0, (3, 2))):
+                count = _intervals(outline[end] - outline[start], float(EDGE_STEP))
+                edge.append(_grid(outline, np.linspace(0.0, 1.0, count + 1), np.array([side])))
+            rows = _intervals(outline[1] - outline[0], float(INSIDE_STEP))
+            width = 0.5 * (outline[3] + outline[2] - outline[0] - outline[1])
+            columns = _intervals(width, float(INSIDE_STEP))
+            region.append(_grid(outline, np.linspace(0.0, 1.0, rows + 1), np.arange(columns) / columns))
+    return np.concatenate(edge), np.concatenate(region)
+
+
+def _grid(outline: Array, along: Array, across: Array) -> Array:
+    """(K, 2) points at fractions along and across an outline (4, 2): A0, A1, B1, B0."""
+    side_a = outline[0] + along[:, None] * (outline[1] - outline[0])
+    side_b = outline[3] + along[:, None] * (outline[2] - outline[3])
+    return (side_a + across[:, None, None] * (side_b - side_a)).reshape(-1, 2)
+
+
+def _middles(count: int) -> Array:
+    """The middles of `count` equal parts of a line from 0 to 1."""
+    return (np.arange(count) + 0.5) / count
+
+
+def _intervals(line: Array, step: float) -> int:
+    """Number of intervals into which the benchmark divides a line."""
+    return max(LEAST, int(np.hypot(line[0], line[1]) / step + 0.5))
+
+
+def _inside(camera: Camera, points: Array) -> Array:
+    """The points whose nearest pixel exists."""
+    low = (points >= -0.5).all(axis=1)
+    return points[low & (points < np.array([camera.width, camera.height]) - 0.5).all(axis=1)]
+
+
+def _contours(body: BodyModel, camera: Camera, pose: Array, outlines: Array) -> tuple[Array, ...]:
+    """Closed polylines around each limb: side A, far end, side B, near end."""
+    frames = limb_frames(body, pose[None])[0]
+    shapes = kinematic_tables(body).limb_shape
+    found: list[Array] = []
+    for frame, shape, outline in zip(frames, shapes, outlines, strict=True):
+        if not np.isfinite(outline).all():
+            found.append(np.zeros((0, 2)))
+            continue
+        far = _cap(camera, frame, shape, at_end=True, start=outline[1], away=outline[1] - outline[0])
+        near = _cap(camera, frame, shape, at_end=False, start=outline[3], away=outline[0] - outline[1])
+        found.append(np.concatenate([outline[:1], far, near, outline[:1]]))
+    return tuple(found)
+
+
+def _cap(camera: Camera, frame: Array, shape: Array, *, at_end: bool, start: Array, away: Array) -> Array:
+    """(CAP_POINTS, 2) the half of an end's ellipse that bulges away from the limb, from one side to the
+    other.
+    """
+    length, radius = (shape[0], shape[2]) if at_end else (0.0, shape[1])
+    turns = np.linspace(0.0, 2.0 * np.pi, 2 * CAP_POINTS - 1)
+    centre = frame[:, :2].T @ (camera.centre - frame[:, 3]) / shape[3:5]
+    first = np.arctan2(-centre[0], centre[1])
+    circle = radius * np.stack([np.cos(first + turns), np.sin(first + turns)], axis=1) * shape[3:5]
+    ring = np.column_stack([circle, np.full(len(turns), length)])
+    pixels, _ = project(camera, ring @ frame[:, :3].T + frame[:, 3])
+    one, other = pixels[:CAP_POINTS], pixels[CAP_POINTS - 1 :][::-1]
+    middle = CAP_POINTS // 2
+    half = one if one[middle] @ away >= other[middle] @ away else other
+    begins_at_start = np.sum((half[0] - start) ** 2) <= np.sum((half[-1] - start) ** 2)
+    return half if begins_at_start else half[::-1]

@@ -1,0 +1,182 @@
+"""CSV files of named points over time, in whatever world they were measured.
+
+Either a row a point, or a row a frame (as anipose writes them):
+
+    frame,point,x_mm,y_mm,z_mm            frame,Nose_x,Nose_y,Nose_z,Tail_x,Tail_y,Tail_z
+    0,Nose,95.3,7.9,546.0                 0,95.3,7.9,546.0,143.2,47.7,503.6
+
+Separated by commas, semicolons or tabs. Other columns are ignored. Instead of frames there may be a column of seconds
+(`time`). The unit stands behind x, y and z (`x_mm`, `x_cm`, `x_m`, in rows of frames `Nose_x_mm`); without one it is
+mm. A point that is missing has no row, or blank cells.
+"""
+
+import csv
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from studio.errors import TruthError
+from studio.foreign_files import foreign_file
+from studio.motion_files.trc import MM_PER_UNIT, MarkerMotion, check_reach
+
+FRAME = ("frame", "frames", "frame_number", "fnum", "frame_index")
+TIME = ("time", "time_s", "seconds")
+POINT = ("point", "name", "marker", "label", "bodypart", "keypoint", "node")
+MISSING = ("", "nan", "na", "none", "null")
+SEPARATORS = (",", ";", "\t")
+LAST_FRAME = 500_000
+MOST_NUMBERS = 50_000_000
+"""Frames × points at most: what a misread number of a frame would ask for fills the memory."""
+SHAPE = "Give a header such as frame,point,x_mm,y_mm,z_mm, or frame,Nose_x,Nose_y,Nose_z."
+
+
+@dataclass(frozen=True, slots=True)
+class _Columns:
+    """Where things stand. place : of frame or time. timed : whether that is a time. point : of the name, -1 in a file
+    with a row a frame. axes : name ("" with a row a point) → columns of x, y, z. unit : "" where none is named.
+    """
+
+    place: int
+    timed: bool
+    point: int
+    axes: Mapping[str, tuple[int, int, int]]
+    unit: str
+
+
+def read_points(path: Path, fps: float) -> MarkerMotion:
+    """The points of a CSV file in its own world, a row for every frame from 0 to its last one, NaN where missing.
+
+    fps : frames per second, for files with times and for the times of the others. `unit` of the result is "" where the
+    file names none. Raises TruthError naming file, line and column.
+    """
+    with foreign_file(path, TruthError, "a CSV file of points", SHAPE):
+        text = path.read_text(encoding="utf-8-sig")
+        lines = text.splitlines()
+        first = next((line for line in lines if line.strip()), "")
+        separator = max(SEPARATORS, key=first.count)
+        return _motion(path, csv.reader(lines, delimiter=separator, strict=True), fps)
+
+
+def _motion(path: Path, rows: Iterable[list[str]], fps: float) -> MarkerMotion:
+    columns: _Columns | None = None
+    found: dict[tuple[int, str], tuple[float, float, float]] = {}
+    names: dict[str, None] = {}
+    width = 0
+    for number, row in enumerate(rows, 1):
+        cells = [cell.strip() for cell in row]
+        if not any(cells):
+            continue
+        if columns is None:
+            columns, width = _columns(path, cells), len(cells)
+            continue
+        if len(cells) != width:
+            raise TruthError(
+                f"'{path.name}' line {number} has {len(cells)} columns, the header {width}.",
+                "Write numbers with a point, one cell each, and leave missing ones blank.",
+            )
+        frame = _frame(path, number, cells[columns.place], columns.timed, fps)
+        for name, axes in columns.axes.items():
+            point = name if columns.point < 0 else cells[columns.point]
+            if not point:
+                raise TruthError(f"'{path.name}' line {number} names no point.", "Name each row's point.")
+            if (frame, point) in found:
+                raise TruthError(
+                    f"'{path.name}' line {number} gives point '{point}' of frame {frame} a second time.",
+                    "Keep one row of a point in a frame.",
+                )
+            names.setdefault(point)
+            found[frame, point] = _place(path, number, point, [cells[at] for at in axes])
+    if columns is None or not found:
+        raise TruthError(f"'{path.name}' has no rows of points.", SHAPE)
+    return _filled(path, found, tuple(names), columns.unit, fps)
+
+
+def _filled(
+    path: Path,
+    found: Mapping[tuple[int, str], tuple[float, float, float]],
+    names: tuple[str, ...],
+    unit: str,
+    fps: float,
+) -> MarkerMotion:
+    count = 1 + max(frame for frame, _ in found)
+    if count * len(names) > MOST_NUMBERS:
+        raise TruthError(
+            f"'{path.name}' has {len(names)} points and {count} frames.",
+            "Check the columns of frame and point: these are too many to hold.",
+        )
+    at = {name: index for index, name in enumerate(names)}
+    positions = np.full((count, len(names), 3), np.nan)
+    for (frame, name), place in found.items():
+        positions[frame, at[name]] = place
+    motion = MarkerMotion(names, np.arange(count) / fps, positions * MM_PER_UNIT[unit or "mm"], unit, fps)
+    check_reach(path, motion, TruthError)
+    return motion
+
+
+def _columns(path: Path, header: Sequence[str]) -> _Columns:
+    names = [cell.lower() for cell in header]
+    twice = sorted({name for name in names if name and names.count(name) > 1})
+    if twice:
+        raise TruthError(f"'{path.name}' has two columns '{twice[0]}'.", "Give each column its own name.")
+    place = next((names.index(name) for name in (*FRAME, *TIME) if name in names), -1)
+    if place < 0:
+        raise TruthError(f"'{path.name}' has no column of frames or times.", SHAPE)
+    point = next((names.index(name) for name in POINT if name in names), -1)
+    found: dict[str, dict[str, tuple[int, str]]] = {}
+    for column, name in enumerate(header):
+        parts = name.split("_")
+        unit = parts.pop().lower() if len(parts) > 1 and parts[-1].lower() in MM_PER_UNIT else ""
+        axis, owner = parts[-1].lower(), "_".join(parts[:-1])
+        if axis in ("x", "y", "z") and (not owner if point >= 0 else owner):
+            found.setdefault(owner, {})[axis] = column, unit
+    if not found:
+        raise TruthError(f"'{path.name}' has no columns of coordinates.", SHAPE)
+    for owner, axes in found.items():
+        if len(axes) != 3:
+            lacking = ", ".join(axis for axis in "xyz" if axis not in axes)
+            of_point = f" of point '{owner}'" if owner else ""
+            raise TruthError(f"'{path.name}' has no column {lacking}{of_point}.", SHAPE)
+    units = {unit for axes in found.values() for _, unit in axes.values()}
+    if len(units) > 1:
+        raise TruthError(
+            f"'{path.name}' has coordinates in {', '.join(sorted(unit or 'no unit' for unit in units))}.",
+            "Give all coordinates in one unit.",
+        )
+    places = {owner: (axes["x"][0], axes["y"][0], axes["z"][0]) for owner, axes in found.items()}
+    return _Columns(place, names[place] in TIME, point, places, units.pop())
+
+
+def _frame(path: Path, number: int, text: str, timed: bool, fps: float) -> int:
+    value = _number(text)
+    at = round(value * fps) if timed and math.isfinite(value) else value
+    if not (math.isfinite(at) and at == int(at) and 0 <= at <= LAST_FRAME):
+        kind = "time (seconds from the first frame on)" if timed else "frame (a whole number from 0 on)"
+        raise TruthError(
+            f"'{path.name}' line {number}: '{text}' is no {kind}.",
+            f"Number the frames as the footage has them, up to {LAST_FRAME}.",
+        )
+    return int(at)
+
+
+def _place(path: Path, number: int, point: str, cells: Sequence[str]) -> tuple[float, float, float]:
+    missing = [cell.lower() in MISSING for cell in cells]
+    if all(missing):
+        return math.nan, math.nan, math.nan
+    values = [_number(cell) for cell in cells]
+    for axis, value, cell in zip("xyz", values, cells, strict=True):
+        if not math.isfinite(value):
+            raise TruthError(
+                f"'{path.name}' line {number}: {axis} of point '{point}' is '{cell}', not a number.",
+                "Leave all three cells of a missing point blank.",
+            )
+    return values[0], values[1], values[2]
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan

@@ -1,0 +1,126 @@
+"""The guide's course: short runs of the bundled walk, which its pages lead to."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from studio.comparison.tracked import Attempt
+from studio.comparison.trials import TrialJob
+from studio.declaring import operation
+from studio.errors import RunError
+from studio.jobs.swept_runs import measure_run
+from studio.jobs.trials import TrialResult, run_jobs
+from studio.operations.behaviours import learn
+from studio.operations.progress import Reporting, reporting
+from studio.progress import Progress
+from studio.runs.behaviour_models import SUFFIX, models_folder
+from studio.runs.samples import install_sample
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+from studio.sessions.workspace import Workspace
+from studio.settings import DEFAULT_WEIGHTING
+from studio.trackers.recovery_settings import OFF
+
+SAMPLE, MODEL, FRAMES = "walk", "course-walk", 40
+"""The session, the behaviour model and the number of frames of its runs."""
+Checkpoint = Callable[[], None]
+SEARCH_ALONE: Mapping[str, object] = {"refine_frames": False, "recovery": OFF}
+
+
+@dataclass(frozen=True, slots=True)
+class CourseRun:
+    """A run of the course. knobs : beside those of SEARCH_ALONE, so that what is seen is the search's own."""
+
+    name: str
+    words: str
+    tracker: str = "annealed"
+    knobs: Mapping[str, object] = field(default_factory=dict[str, object])
+    behaviour: str = ""
+
+
+RUNS = (
+    CourseRun("course-one-layer", "one layer of 1000 particles", knobs={"layers": 1, "particles": 1000}),
+    CourseRun("course-annealed", "ten layers of 100 particles", knobs={"layers": 10, "particles": 100}),
+    CourseRun("course-swarm", "a swarm that searches the root first", tracker="swarm"),
+    CourseRun(
+        "course-behaviour", "particles that know how people walk", tracker="behaviour", behaviour=MODEL
+    ),
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Course:
+    """The course's runs, all of them tracked."""
+
+    session: Session
+    runs: tuple[StoredRun, ...]
+
+
+@operation
+def course(*, progress: Reporting = None) -> Course:
+    """Make the runs that the guide's course speaks of: the bundled walk, tracked by each kind of search.
+
+    Runs that are there already stay; one that was broken off is gone on with.
+
+    Raises StudioError.
+    """
+    with reporting(progress, "course") as report:
+        return make_course(Workspace(), report)
+
+
+def make_course(
+    workspace: Workspace,
+    report: Progress,
+    *,
+    processes: int | None = None,
+    checkpoint: Checkpoint = lambda: None,
+) -> Course:
+    """The course's runs in a workspace. processes, checkpoint : see `trials.run_jobs`. Raises StudioError."""
+    session = install_sample(workspace, SAMPLE)
+    missing = [one for one in RUNS if not finished(session, one)]
+    model = models_folder(workspace.root) / f"{MODEL}{SUFFIX}"
+    if any(one.behaviour for one in missing) and not model.exists():
+        model.parent.mkdir(exist_ok=True)
+        # The motion of the sample's own recipe: as good as a prediction can be.
+        learn([SAMPLE], str(model), body=session.manifest.body, progress=report)
+    done = 0
+
+    def on_result(job: TrialJob, result: TrialResult) -> None:
+        nonlocal done
+        if result.measured is None:
+            raise RunError(f"{job.label} could not be tracked: {result.failure}", "Try again.")
+        done += 1
+        report(job.label, done, len(missing))
+
+    report("tracking", 0, len(missing))
+    jobs = [_job(session, one, model) for one in missing]
+    run_jobs(jobs, session.path.parent, on_result, processes, checkpoint=checkpoint)
+    return Course(session, tuple(session.run(one.name) for one in RUNS))
+
+
+def finished(session: Session, run: CourseRun) -> bool:
+    """Whether a run of the course is there, whole."""
+    known = {one.name: one for one in session.runs()}
+    return run.name in known and known[run.name].summary(blobs=False).status == "finished"
+
+
+def _job(session: Session, run: CourseRun, model: Path) -> TrialJob:
+    attempt = Attempt(
+        str(session.path.absolute()),
+        run.tracker,
+        session.manifest.weighting or DEFAULT_WEIGHTING,
+        seed=0,
+        changes={**SEARCH_ALONE, **run.knobs},
+        last=FRAMES,
+        behaviour=str(model) if run.behaviour else "",
+    )
+    return TrialJob(
+        key=run.name,
+        experiment="course",
+        label=run.words,
+        arguments={**attempt.plain(), "fit_shape": True, "run": run.name},
+        measure=measure_run,
+        footage=(attempt.footage,),
+        frames=None,
+        alone=False,
+    )

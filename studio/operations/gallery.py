@@ -1,0 +1,225 @@
+"""The gallery: sessions that can be opened or made, one entry of a table each."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from studio.declaring import Terminal, Web, operation
+from studio.errors import NotFoundError, SessionError
+from studio.footage_recipes import missing_data, real_footage, synthesize
+from studio.operations.progress import Reporting, reporting
+from studio.progress import Progress
+from studio.runs.samples import install_sample
+from studio.sessions.atomic_files import discard
+from studio.sessions.importers.importing import add_footage
+from studio.sessions.manifest import FILE_NAME
+from studio.sessions.session import Session
+from studio.sessions.workspace import Workspace, begin_session
+
+CardKind = Literal["sample", "recipe", "elsewhere"]
+
+
+@dataclass(frozen=True, slots=True)
+class Card:
+    """A session of the gallery. name : of the session that it becomes, and of the sample or recipe unless `recipe` says
+    another. kind : "sample" travels with the studio; "recipe" is rendered; "elsewhere": its footage cannot be shipped.
+
+    data : where footage or motion that is not shipped comes from. footage : where a copy of it lies in the folder of
+    the real data, from which it is imported. commands : that make the session of it. guide : the page of the guide that
+    tells how.
+    """
+
+    name: str
+    title: str
+    words: str
+    kind: CardKind = "recipe"
+    recipe: str = ""
+    data: str = ""
+    footage: str = ""
+    commands: tuple[str, ...] = ()
+    guide: str = ""
+
+
+CMU = (
+    "Recorded motion of the CMU Graphics Lab Motion Capture Database, in cmu-motion/ of the folder that"
+    " STUDIO_REAL_DATA names."
+)
+CARDS = (
+    Card(
+        "walk",
+        "A walk in a circle",
+        "Four cameras, a cluttered room, exact truth: the session of the demo.",
+        "sample",
+    ),
+    Card(
+        "planar_arm",
+        "A planar arm",
+        "Four links, one camera, exact masks: small enough to watch every particle.",
+        "sample",
+    ),
+    Card("branched_arms", "Branched arms", "Two arms from one root: what crossover is for.", "sample"),
+    Card(
+        "handstand",
+        "A handstand",
+        "Hands on the floor, a kick-up, a handstand held with a sway. Four cameras.",
+    ),
+    Card("box", "Stepping over a box", "Straight across the room and over a box that hides the feet."),
+    Card("walk-with-turns", "Walking with turns", "Some of them rapid and on the spot; three cameras."),
+    Card("eight-cameras", "Eight cameras", "The same room seen from eight sides."),
+    Card(
+        "twin",
+        "Twin of the Lee walk",
+        "Cameras and lengths of the Lee walk with a rendered person, so that the truth is exact.",
+        recipe="lee-walk-twin",
+        data="sequenceB_4 of PARSEC's bodytrack (Apache-2.0), in lee-walk/ of the folder that STUDIO_REAL_DATA names.",
+    ),
+    Card("dance", "Modern dance", "Leaps and turns of a dancer, seen by four cameras.", data=CMU),
+    Card("jumps", "Jumps with turns", "Recorded jumps, seen by four cameras.", data=CMU),
+    Card(
+        "pair-crossing",
+        "Two people, crossing",
+        "Each tracked as a body of its own, the masks shared between them; the truth of both.",
+    ),
+    Card("pair-handshake", "Two people, a handshake", "The same pair, hand in hand for a moment."),
+    Card(
+        "robot-arm",
+        "A robot arm in its cell",
+        "Six joints, read from a URDF, among things that look alike. Needs the extra 'robots'.",
+    ),
+    Card("hand-grasp", "A hand", "A body of 25 parameters whose fingers hide one another."),
+    Card(
+        "mouse",
+        "A mouse in its cage",
+        "Four uncalibrated cameras, no picture of the empty cage, 120 frames: a body that no network knows.",
+        "elsewhere",
+        data="github.com/talmolab/sleap-anipose, tests/data/minimal_session (GPL-3): videos, board pictures, points.",
+        footage="mouse/videos",
+        commands=(
+            "studio calibrate board --board charuco:8x11,24,18.75,DICT_4X4_1000 --intrinsics board --extrinsics board"
+            " --floor frame:0 --to take/calibration/cameras.toml",
+            "studio import take --into mouse",
+            "studio subject mouse --body mouse",
+            "studio background mouse --source strokes --strokes strokes.json --no-tune --quality",
+            "studio initialise mouse",
+        ),
+        guide="/guide/animal",
+    ),
+    Card(
+        "balance",
+        "A man on a beam",
+        "Four cameras in a gym, calibrated, with pictures of the empty room: real footage from start to end.",
+        "elsewhere",
+        data="The demonstration of Pose2Sim (github.com/perfanalytics/pose2sim, Pose2Sim/Demo_SinglePerson, BSD-3).",
+        footage="pose2sim-balance",
+        commands=(
+            "studio import pose2sim-balance --into balance",
+            "studio background balance --source combined --plates pose2sim-balance/calibration/extrinsics"
+            " --exclude unused",
+            "studio subject balance --height 1800",
+            "studio initialise balance",
+        ),
+        guide="/guide",
+    ),
+)
+"""A card more is an entry more here; a recipe needs its name only."""
+
+
+@dataclass(frozen=True, slots=True)
+class CardStanding:
+    """A card in a workspace. there : whether a session of its name is there. missing : why it cannot be made here, ""
+    where it can.
+    """
+
+    card: Card
+    there: bool
+    missing: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Gallery:
+    """What the gallery has. made : the session of the card that was asked for."""
+
+    cards: tuple[CardStanding, ...]
+    made: Session | None = None
+
+
+@operation
+def gallery(
+    make: Annotated[
+        str, Field(description="Card whose session is opened or made."), Terminal(metavar="CARD")
+    ] = "",
+    *,
+    into: Annotated[
+        str | Path | None,
+        Field(description="Name or path of the session; default: the card's."),
+        Terminal(metavar="SESSION", kind=str),
+        Web(left_out=True),
+    ] = None,
+    frames: Annotated[int | None, Field(ge=1, description="Render only so many frames.")] = None,
+    progress: Reporting = None,
+) -> Gallery:
+    """List the sessions of the gallery, and make one: bundled samples are copied, rendered clips rendered with their
+    exact truth.
+
+    What is there already stays. Footage that cannot be shipped says where it comes from and by which commands; where
+    the folder that STUDIO_REAL_DATA names has a copy, it is imported.
+
+    Raises NotFoundError for an unknown card, SessionError for one whose footage is not there.
+    """
+    workspace = Workspace()
+    made = None
+    if make:
+        with reporting(progress, make) as report:
+            place = workspace.place_for(into or make) if into else workspace.root / make
+            made = make_card(card_of(make), place, frames, report)
+    return Gallery(tuple(standing_of(card, workspace) for card in CARDS), made)
+
+
+def card_of(name: str) -> Card:
+    """A card by its name. Raises NotFoundError."""
+    found = next((card for card in CARDS if card.name == name), None)
+    if found is None:
+        known = ", ".join(card.name for card in CARDS)
+        raise NotFoundError(f"The gallery has no card '{name[:64]}'.", f"It has {known}.")
+    return found
+
+
+def standing_of(card: Card, workspace: Workspace) -> CardStanding:
+    """A card as it stands in a workspace."""
+    there = (workspace.root / card.name / FILE_NAME).is_file()
+    if card.kind == "recipe":
+        return CardStanding(card, there, missing_data(card.recipe or card.name))
+    if card.kind == "elsewhere" and real_footage(card.footage) is None:
+        return CardStanding(
+            card, there, f"There is no '{card.footage}' in the folder that STUDIO_REAL_DATA names."
+        )
+    return CardStanding(card, there)
+
+
+def make_card(card: Card, place: Path, frames: int | None, progress: Progress) -> Session:
+    """The session of a card at a place; one that is there is opened. Raises StudioError; then nothing was made."""
+    if (place / FILE_NAME).is_file():
+        return Session(place)
+    if card.kind == "elsewhere":
+        return _imported(card, place, progress)
+    if card.kind == "sample":
+        return install_sample(Workspace(place.parent), card.name, place.name)
+    return Session(synthesize(card.recipe or card.name, place, progress, frames))
+
+
+def _imported(card: Card, place: Path, progress: Progress) -> Session:
+    """The session of footage that is not shipped, with the calibration that lies beside it, if any."""
+    source = real_footage(card.footage)
+    if source is None:
+        raise SessionError(
+            f"The footage of '{card.name}' cannot be shipped.",
+            f"It comes from {card.data} Put it at '{card.footage}' into the folder that STUDIO_REAL_DATA names.",
+        )
+    session = begin_session(place, card.title)
+    try:
+        return add_footage(session, source, progress=progress).session
+    except BaseException:
+        discard(place)
+        raise

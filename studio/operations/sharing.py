@@ -1,0 +1,53 @@
+"""A run given to others: one page that opens without the studio."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field
+
+from studio.declaring import Terminal, operation
+from studio.inspection.shared_page import shared_page
+from studio.operations.inspecting import inspected, worst_frame
+from studio.operations.opening import RunName
+from studio.operations.progress import Reporting, reporting
+from studio.sessions.atomic_files import write_text, writing
+
+
+@dataclass(frozen=True, slots=True)
+class Shared:
+    """A page that was written. frame : that it looks into. size : bytes."""
+
+    path: Path
+    frame: int
+    size: int
+
+
+@operation
+def share(
+    run: RunName,
+    to: Annotated[
+        str | Path, Field(description="The page to write, FILE.html."), Terminal("--to", "FILE", kind=Path)
+    ],
+    *,
+    frame: Annotated[
+        int | None, Field(ge=0, description="The frame that is looked into; default: the run's worst one.")
+    ] = None,
+    track: Annotated[
+        str, Field(description="Whose poses are drawn and measured; default: what the search found.")
+    ] = "",
+    progress: Reporting = None,
+) -> Shared:
+    """Write a run as one self-contained page: settings, the views of its search, the body moving in 3-D.
+
+    It opens from any folder without the studio and asks no other machine for anything; a few MB at most.
+
+    Raises RunError for a run without frames, NotFoundError for a frame or track that is none.
+    """
+    opened, place = inspected(run), Path(to)
+    chosen = worst_frame(opened) if frame is None else frame
+    with reporting(progress, f"{opened.session.name} / {opened.run.name}: page") as report:
+        text = shared_page(opened, chosen, track=track, progress=report)
+    with writing("The page", place):
+        write_text(place, text)
+    return Shared(place, chosen, len(text.encode("utf-8")))

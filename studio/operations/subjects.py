@@ -1,0 +1,108 @@
+"""Several subjects in view: who there is, a session for each, all of them tracked at once."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field
+
+from studio.declaring import Terminal, Web, operation
+from studio.errors import SessionError
+from studio.operations.opening import SessionName, open_session
+from studio.operations.progress import Reporting, reporting, say
+from studio.runs.subject_masks import SeenSubject, seen_subjects
+from studio.runs.subject_sessions import make_subject_sessions
+from studio.runs.together import BodiesTogether, track_together
+from studio.sessions.names import free_name
+from studio.sessions.session import Session
+from studio.sessions.workspace import Workspace
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Subjects:
+    """seen : who is in view in the first frame, the largest first. sessions : that were made, one for each place.
+    notes : for the user.
+    """
+
+    seen: tuple[SeenSubject, ...]
+    sessions: tuple[Session, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+@operation
+def subjects(
+    session: SessionName,
+    *,
+    at: Annotated[
+        Sequence[tuple[float, float]],
+        Field(
+            max_length=16,
+            description="Where somebody stands in the first frame who is to have a session: x and y on the floor in"
+            " metres. Without any, who is in view is listed.",
+        ),
+        Terminal(metavar="X,Y"),
+    ] = (),
+    into: Annotated[
+        Sequence[str],
+        Field(max_length=16, description="Name of the new session, for each place; default: numbered."),
+    ] = (),
+    progress: Reporting = None,
+) -> Subjects:
+    """Who is in view, and a session for each of those asked for: the same footage, masks of that subject alone.
+
+    The masks in use are cut by the pieces of their visual hull, followed over time. Give each session its subject's
+    measures, then let `together` share the masks by bodies, which parts those who touch.
+
+    Raises FootageError where nobody stands at a place; then nothing is made.
+    """
+    opened = open_session(session)
+    if not at:
+        with reporting(progress, f"{opened.name}: who is in view") as report:
+            report("carving the hull", 0, 1)
+            return Subjects(seen_subjects(opened))
+    if into and len(into) != len(at):
+        raise SessionError(
+            f"{len(into)} names were given for {len(at)} places.", "Give one --into for each --at."
+        )
+    places = [Workspace().place_for(name) for name in into] or _numbered(opened, len(at))
+    if len(set(places)) < len(places):
+        raise SessionError("Two new sessions have the same name.", "Give each --into another one.")
+    with reporting(progress, f"{opened.name}: subjects") as report:
+        made, notes = make_subject_sessions(opened, at, places, report)
+    say(progress, notes)
+    return Subjects((), made, notes)
+
+
+@operation
+def together(
+    session: SessionName,
+    beside: Annotated[
+        Sequence[str],
+        Field(min_length=1, max_length=15, description="Sessions of the others in view."),
+        Terminal("--beside", metavar="SESSION"),
+        Web(kind=list[str]),
+    ],
+    *,
+    progress: Reporting = None,
+) -> BodiesTogether:
+    """Track several bodies at once, each in its own session, and share the masks by who explains which pixel.
+
+    Each session (as `subjects` makes them) is left with masks of its own subject, in which runs are tracked as always.
+
+    Raises RunError for sessions that do not belong together; then nothing is changed.
+    """
+    opened = [open_session(session), *(open_session(name) for name in beside)]
+    with reporting(progress, f"{opened[0].name} and {len(opened) - 1} more") as report:
+        return track_together(opened, report)
+
+
+def _numbered(session: Session, count: int) -> list[Path]:
+    """Folders beside a session's, named after it."""
+    taken = {path.name for path in session.path.parent.iterdir()}
+    found: list[Path] = []
+    for _ in range(count):
+        name = free_name(f"{session.name}-{len(found) + 1}", taken)
+        taken.add(name)
+        found.append(session.path.with_name(name))
+    return found

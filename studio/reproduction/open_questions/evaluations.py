@@ -1,0 +1,129 @@
+"""Who is best where: error against the number of poses that a tracker weighs in a frame, from 100 to 100 000.
+
+Every tracker with the studio's defaults, searching alone (refined frames hide what the search found) and with the same
+likelihood, on three clips of the half that defaults are chosen by. The behaviour tracker, which needs a model, takes
+part where its model, learnt from walks, fits.
+"""
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from studio.comparison.findings import Chart, Plain, Series, Table
+from studio.comparison.statistics import number
+from studio.comparison.tracked import Tracked
+from studio.comparison.trials import Outcome, Scale, Trial
+from studio.reproduction.drawing import intervals
+from studio.reproduction.experiment import Experiment, Part, each_seed
+from studio.reproduction.open_questions.generalisation import TRAINING, measure
+from studio.reproduction.tracking import Candidate, by_group, lost_percent, mean_errors
+from studio.trackers.catalogue import TRACKERS
+
+CLIPS = {"walk": "walk", "turns": "choosing-turns", "kick": "choosing-kick"}
+WALKS = ("walk", "turns")
+COUNTS = (100, 300, 1000, 3000, 10_000, 30_000, 100_000)
+QUICK_COUNTS = (100, 1000, 10_000)
+FRAMES, QUICK_FRAMES = 60, 30
+SEEDS = 5
+LAYERS = 10
+WEIGHTING = "edge-region-silhouette"
+GUIDED = "guided by behaviour"
+CONTENDERS = (
+    Candidate("annealed, improved", "annealed", WEIGHTING),
+    Candidate("annealed, Eq. 13", "annealed", WEIGHTING, {"adaptive_diffusion": False, "crossover": 0.0}),
+    Candidate("swarm", "swarm", WEIGHTING),
+    Candidate("Condensation", "condensation", WEIGHTING),
+    Candidate(GUIDED, "behaviour", WEIGHTING),
+)
+
+
+def _label(name: str, clip: str, count: int) -> str:
+    return f"{name}, {clip}, {count}"
+
+
+def _with(one: Candidate, clip: str) -> bool:
+    """Whether a contender tracks a clip."""
+    return one.name != GUIDED or clip in WALKS
+
+
+def trials(scale: Scale) -> tuple[Trial, ...]:
+    """Every tracker with every number of evaluations, clip by clip so that a clip's evidence is computed once."""
+    last = QUICK_FRAMES if scale.quick else FRAMES
+    found: list[Trial] = []
+    for clip, footage in CLIPS.items():
+        for one in (one for one in CONTENDERS if _with(one, clip)):
+            for count in QUICK_COUNTS if scale.quick else COUNTS:
+                arguments = partial(_arguments, one, footage, count, last)
+                found += each_seed(_label(one.name, clip, count), scale.seeds[:SEEDS], arguments)
+    return tuple(found)
+
+
+def _arguments(one: Candidate, footage: str, count: int, last: int, seed: int) -> dict[str, Any]:
+    # A swarm needs two members in every iteration: 120 evaluations instead of 100.
+    enough = max(count, TRACKERS[one.tracker].least_evaluations(LAYERS))
+    attempt = {"attempt": one.attempt(footage, seed, enough, last=last).plain()}
+    return attempt | ({"training": TRAINING.plain()} if one.name == GUIDED else {})
+
+
+def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
+    """A chart a clip, error over evaluations; who is nearest with how many; the table of all."""
+    groups = by_group(outcomes)
+    counts = sorted({int(name.rpartition(" ")[2]) for name in groups})
+
+    def runs_of(name: str, clip: str, count: int) -> list[Tracked]:
+        return groups[_label(name, clip, count)]
+
+    rows: list[tuple[Plain, ...]] = []
+    for clip in CLIPS:
+        here = [one.name for one in CONTENDERS if _with(one, clip)]
+        for name in here:
+            for count in (counts[0], counts[-1]):
+                label = f"mean error, {name}, {clip}, {count} evaluations"
+                yield number(label, mean_errors(runs_of(name, clip, count)), "mm")
+            cells = [
+                f"{np.mean(mean_errors(runs_of(name, clip, count))):.1f} / "
+                f"{np.mean([lost_percent(run) for run in runs_of(name, clip, count)]):.0f}"
+                for count in counts
+            ]
+            rows.append((clip, name, *cells))
+        best = [
+            min(here, key=lambda name, count=count: float(np.mean(mean_errors(runs_of(name, clip, count)))))
+            for count in counts
+        ]
+        yield (
+            f"On the {clip} the nearest: "
+            + ", ".join(f"{name} with {count}" for count, name in zip(counts, best, strict=True))
+            + "."
+        )
+        places = tuple(map(float, counts))
+        series: list[Series] = [
+            intervals(name, places, [mean_errors(runs_of(name, clip, count)) for count in counts], group=name)
+            for name in here
+        ]
+        axes = ("evaluations a frame", "mean error (mm)")
+        title = f"Error over evaluations, {clip} (bars: 95 % intervals over seeds)"
+        yield Chart(title, "lines", *axes, tuple(series), log_x=True, log_y=True)
+    heads = ("clip", "tracker", *(f"{count} evaluations" for count in counts))
+    yield Table("Mean error (mm) / frames with a limb lost (%)", heads, tuple(rows))
+    yield {
+        "clips": ", ".join(CLIPS.values()),
+        "weighting": WEIGHTING,
+        "layers": LAYERS,
+        "behaviour learnt from": ", ".join(TRAINING.sources),
+        "frames": len(groups[next(iter(groups))][0].frames),
+    }
+
+
+EXPERIMENT = Experiment(
+    name="evaluations",
+    title="Error against evaluations, for every tracker",
+    source="an open question",
+    claim="Which tracker is best with how many evaluations a frame, from 100 to 100 000?",
+    trials=trials,
+    measure=measure,
+    shown=shown,
+    footage=tuple(CLIPS.values()),
+    long="30 000 and 100 000 evaluations take hours with five seeds; --quick ends at 10 000.",
+)

@@ -1,0 +1,337 @@
+"""Comparing trackers and sweeping knobs: start in the background, look, cancel, go on, throw away, download.
+
+A comparison lies in its session's folder and is measured by processes of its own, one comparison at a time; how far
+it is comes as `comparison` events and in every list.
+"""
+
+from functools import lru_cache
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Query, Response
+from pydantic import Field
+
+from studio.comparison.candidates import LINEUPS, VARIANTS, WEIGHTING
+from studio.comparison.folders import (
+    kept_comparison,
+    kept_comparisons,
+    new_comparison,
+    place_of,
+    runs_of,
+    throw_away,
+)
+from studio.comparison.kept_comparison import FRAMES_NAME, RESULT_NAME, KeptComparison
+from studio.comparison.plan import Plan
+from studio.comparison.sweep import expected, plan_sweep
+from studio.comparison.trial_runs import run_of_trial, trial_lines
+from studio.errors import NotFoundError, RunError, StudioError, WorkCancelledError
+from studio.jobs import commands
+from studio.jobs.comparison_run import done_before, run_comparison, run_sweep
+from studio.jobs.job_runner import Job
+from studio.jobs.process_executor import cores
+from studio.likelihood.catalogue import WEIGHTINGS
+from studio.operations.comparing import MOST_TRACKERS, compare, kept_sweep, planned, sweep
+from studio.server.app_state import App, AppState, release
+from studio.server.comparison_schemas import (
+    ComparisonChoices,
+    ComparisonDetail,
+    ComparisonLine,
+    ComparisonList,
+    ComparisonState,
+    EntrantChoice,
+    EntrantRequest,
+    LineupChoice,
+    SweepExpected,
+    TrialLine,
+    TrialRequest,
+    TrialRun,
+)
+from studio.server.error_responses import log
+from studio.server.job_kinds import COMPARISON
+from studio.server.requests import Arguments, body_of
+from studio.server.schemas import RunName, TrashEntry, Value
+from studio.server.session_routes import OpenSession, trash_entry
+from studio.sessions.session import Session
+from studio.trackers.catalogue import TRACKERS
+
+router = APIRouter(prefix="/api/comparisons", tags=["comparisons"])
+
+WHO: dict[str, Any] = {
+    "session": (RunName, ...),
+    "trackers": (Annotated[list[EntrantRequest], Field(min_length=1, max_length=MOST_TRACKERS)], ...),
+    "settings": (
+        dict[str, Value],
+        Field(dict[str, Value](), description="Knobs of all trackers that have them."),
+    ),
+}
+ONE = "/{session}/{comparison}"
+
+
+def comparison_of(session: OpenSession, comparison: str) -> KeptComparison:
+    """The comparison that an address names, as a dependency. Raises NameRefused, NotFoundError."""
+    return kept_comparison(session, comparison)
+
+
+Kept = Annotated[KeptComparison, Depends(comparison_of)]
+
+
+@router.get("/choices")
+def choices() -> ComparisonChoices:
+    """Who can be compared: trackers, labels that bring their knobs, line-ups of several."""
+    entrants = [
+        EntrantChoice(
+            name=name,
+            tracker=tracker.name,
+            help=entry.help if entry else tracker.label,
+            sized_by=[knob for names in tracker.size_knobs for knob in names],
+            changes=dict(entry.changes) if entry else {},
+        )
+        for name, entry in {**dict.fromkeys(TRACKERS), **VARIANTS}.items()
+        for tracker in (TRACKERS[name.partition(":")[0]],)
+    ]
+    return ComparisonChoices(
+        entrants=entrants,
+        lineups=[LineupChoice(name=name, trackers=list(members)) for name, members in LINEUPS.items()],
+        weightings=list(WEIGHTINGS),
+    )
+
+
+@router.get("")
+def comparisons(app: App, session: str | None = None) -> ComparisonList:
+    """The comparisons of a session, or of all."""
+    names = [session] if session else [entry.name for entry in app.workspace.sessions() if not entry.problem]
+    found: list[ComparisonLine] = []
+    for name in names:
+        opened = app.workspace.session(name)
+        found += [line for kept in kept_comparisons(opened) if (line := _line_or_none(app, opened, kept))]
+    return ComparisonList(comparisons=found)
+
+
+@router.post("", status_code=202)
+def begin(
+    arguments: Annotated[Arguments, body_of(compare, "ComparisonRequest", **WHO)], app: App
+) -> ComparisonLine:
+    """Begin a comparison. 409 while another one runs; 422 for a session without a truth or for wrong knobs."""
+    session = app.workspace.session(arguments.more["session"])
+    plan = _plan(session, arguments)
+    app.jobs.check_free(COMPARISON)
+    kept = new_comparison(place_of(session, arguments.get("name", "")), plan)
+    return _start(app, session, kept)
+
+
+@router.post("/sweeps", status_code=202)
+def begin_sweep(
+    arguments: Annotated[Arguments, body_of(sweep, "SweepRequest", session=(RunName, ...))], app: App
+) -> ComparisonLine:
+    """Begin a sweep: runs of the session for every combination of some knobs' values. 409 while a comparison runs."""
+    session = app.workspace.session(arguments.more["session"])
+    plan = _sweep_plan(session, arguments)
+    app.jobs.check_free(COMPARISON)
+    return _start(app, session, kept_sweep(session, plan, arguments.get("name", "")))
+
+
+@router.post("/sweeps/expected")
+def expected_of_sweep(
+    arguments: Annotated[Arguments, body_of(sweep, "ExpectedRequest", session=(RunName, ...))], app: App
+) -> SweepExpected:
+    """How many runs a sweep has and about how long they take; 422 for what cannot be swept."""
+    session = app.workspace.session(arguments.more["session"])
+    found = expected(session, _sweep_plan(session, arguments), _processes(), cores())
+    return SweepExpected(
+        runs=found.runs,
+        frames=found.frames,
+        evaluations=found.evaluations,
+        seconds=found.seconds,
+        judged_by=found.judged_by,
+    )
+
+
+@router.get(ONE)
+def detail(session: OpenSession, kept: Kept, app: App) -> ComparisonDetail:
+    """Everything about one comparison."""
+    plan = kept.plan(session)
+    return ComparisonDetail(
+        comparison=_line(app, session, kept),
+        body=plan.body,
+        behaviour=plan.behaviour,
+        fps=plan.fps,
+        settings={
+            candidate.name: {WEIGHTING: candidate.weighting, **candidate.changes}
+            for candidate in plan.entrants
+        },
+        fit_shape=plan.fit_shape,
+        result=kept.result(),
+        trials=[TrialLine.of(line) for line in trial_lines(session, kept)],
+    )
+
+
+@router.post(ONE + "/trials")
+def open_trial(session: OpenSession, kept: Kept, request: TrialRequest, app: App) -> TrialRun:
+    """The run of a trial, to be looked into; where there is none it is made with the trial's settings and seed, and
+    tracked. Its poses are the trial's.
+    """
+    before = {run.name for run in session.runs()}
+    run = run_of_trial(session, kept, request.tracker, request.seed)
+    if run.name not in before:
+        app.events.session_changed(session.name)
+        app.control.request(commands.Start(**commands.about(run.folder)))
+    return TrialRun(session=session.name, run=run.name, is_new=run.name not in before)
+
+
+@router.post(ONE + "/cancel", status_code=202)
+def cancel(session: OpenSession, kept: Kept, app: App) -> ComparisonLine:
+    """Stop it; what is measured stays, and it can go on."""
+    app.jobs.cancel(COMPARISON, f"{session.name}/{kept.name}")
+    return _line(app, session, kept)
+
+
+@router.post(ONE + "/resume", status_code=202)
+def resume(session: OpenSession, kept: Kept, app: App) -> ComparisonLine:
+    """Go on with what is not finished. 409 while any comparison runs."""
+    if kept.status() == "done":
+        return _line(app, session, kept)
+    return _start(app, session, kept)
+
+
+@router.delete(ONE)
+def delete(
+    session: OpenSession,
+    kept: Kept,
+    app: App,
+    runs: Annotated[bool, Query(description="Of a sweep: its runs, too.")] = False,
+) -> TrashEntry:
+    """Move it to the trash. 409 while it runs, or one of the runs that shall go is being tracked."""
+    own = [*runs_of(session, kept).values()] if runs and kept.plan().vary else []
+    if tracked := [run.name for run in own if run.being_tracked()]:
+        raise RunError(f"Run '{tracked[0]}' of the sweep is being tracked.", "Cancel it first.")
+    place = throw_away(app.workspace, session, kept)
+    for run in own:
+        release(app, session.name, run.name)
+        app.workspace.trash_run(session.name, run.name)
+    app.events.session_changed(session.name)
+    return trash_entry(place)
+
+
+@router.get(ONE + "/result.json", response_class=Response)
+def result_json(session: OpenSession, kept: Kept) -> Response:
+    """The whole result as a file."""
+    return _file(session, kept, RESULT_NAME, "application/json", "json")
+
+
+@router.get(ONE + "/frames.csv", response_class=Response)
+def frames_as_csv(session: OpenSession, kept: Kept) -> Response:
+    """A row a tracker, seed and frame: its error in mm and the limbs lost."""
+    return _file(session, kept, FRAMES_NAME, "text/csv; charset=utf-8", "csv")
+
+
+def _plan(session: Session, arguments: Arguments) -> Plan:
+    """The request, checked. Raises StudioError for what cannot be compared."""
+    shared, entrants = arguments.more["settings"], arguments.more["trackers"]
+    changes: dict[str, dict[str, Any]] = {"": shared} if shared else {}
+    for candidate in entrants:
+        own = dict(candidate.settings) | ({WEIGHTING: candidate.weighting} if candidate.weighting else {})
+        if own:
+            changes[candidate.name] = own
+    return planned(session, [candidate.name for candidate in entrants], changes=changes, **arguments)
+
+
+def _sweep_plan(session: Session, arguments: Arguments) -> Plan:
+    """The request, checked. Raises StudioError for what cannot be swept."""
+    given = {name: value for name, value in arguments.items() if name not in ("name", "seeds")}
+    return plan_sweep(session, seeds=range(arguments["seeds"]), **given)
+
+
+def _processes() -> int:
+    """One core stays free for the studio itself, which is being looked at meanwhile."""
+    return max(1, cores() - 1)
+
+
+def _start(app: AppState, session: Session, kept: KeptComparison) -> ComparisonLine:
+    is_sweep = bool(kept.plan().vary)
+
+    def work(job: Job) -> dict[str, object]:
+        def report(step: str, done: int, total: int) -> None:
+            job.report(step, done, total)
+            if is_sweep:
+                app.events.session_changed(session.name)
+
+        try:
+            work_at = run_sweep if is_sweep else run_comparison
+            work_at(kept, session, report, processes=_processes(), checkpoint=job.check)
+        except WorkCancelledError:
+            if not job.closing:
+                kept.end("cancelled")
+            raise
+        except Exception as error:
+            words = str(error) if isinstance(error, StudioError) else f"{type(error).__name__}: {error}"
+            kept.end("failed", words)
+            raise
+        return {}
+
+    app.jobs.begin(COMPARISON, ComparisonState(session=session.name, name=kept.name), work)
+    app.events.session_changed(session.name)
+    return _line(app, session, kept)
+
+
+def _line_or_none(app: AppState, session: Session, kept: KeptComparison) -> ComparisonLine | None:
+    """A line; None for a folder that cannot be read, which its own address reports."""
+    try:
+        return _line(app, session, kept)
+    except StudioError as error:
+        log.warning("comparison '%s' is left out of the list: %s", kept.folder, error)
+        return None
+
+
+def _line(app: AppState, session: Session, kept: KeptComparison) -> ComparisonLine:
+    record, plan = kept.record(), kept.plan(session)
+    job = app.jobs.known(COMPARISON, f"{session.name}/{kept.name}")
+    going = job if job is not None and job.state.is_going else None
+    status = going.state.value if going else kept.status()
+    total = len(plan.seeds) * len(plan.entrants)
+    if status == "done":
+        done = total
+    else:
+        done = going.done if going and going.total else done_before(kept, plan)
+    line = ComparisonLine(
+        session=session.name,
+        name=kept.name,
+        created=record.created,
+        status=status,  # pyright: ignore[reportArgumentType]
+        trackers=[candidate.name for candidate in plan.entrants],
+        tracker=plan.entrants[0].tracker if plan.vary else "",
+        evaluations=plan.evaluations,
+        seeds=len(plan.seeds),
+        first=plan.first,
+        last=plan.last,
+        done=done,
+        total=total,
+        problem=record.problem,
+        vary={name: list(chosen) for name, chosen in plan.vary.items()},
+    )
+    if going:
+        return line.model_copy(update={"step": going.step, "seconds_left": going.seconds_left})
+    return _with_best(line, kept) if status == "done" else line
+
+
+def _with_best(line: ComparisonLine, kept: KeptComparison) -> ComparisonLine:
+    path = kept.folder / RESULT_NAME
+    tracker, mean_mm = _best_of(kept, path.stat().st_mtime_ns)
+    return line.model_copy(update={"best": tracker, "best_mm": mean_mm})
+
+
+@lru_cache(maxsize=512)
+def _best_of(kept: KeptComparison, _written: int) -> tuple[str, float | None]:
+    """The tracker (or a sweep's point) with the smallest mean error of a result that was written at a moment."""
+    result = kept.result() or {}
+    if swept := result.get("best"):
+        return swept["point"], swept["mean"] if swept["measure"] == "error" else None
+    trackers = result.get("trackers", [])
+    best = min(trackers, key=lambda entry: entry["mean_mm"], default=None)
+    return ("", None) if best is None else (best["tracker"], best["mean_mm"])
+
+
+def _file(session: Session, kept: KeptComparison, name: str, kind: str, ending: str) -> Response:
+    path = kept.folder / name
+    if not path.is_file():
+        raise NotFoundError(f"Comparison '{kept.name}' is not finished.", "Wait for it, or let it go on.")
+    headers = {"content-disposition": f'attachment; filename="{session.name}-{kept.name}.{ending}"'}
+    return Response(path.read_bytes(), media_type=kind, headers=headers)

@@ -1,0 +1,52 @@
+"""The guide's course: which of its runs are there, and making them in the background."""
+
+from fastapi import APIRouter
+
+from studio.errors import StudioError
+from studio.jobs.job_runner import Job
+from studio.jobs.process_executor import cores
+from studio.operations.course import RUNS, SAMPLE, finished, make_course
+from studio.server.app_state import App
+from studio.server.course_schemas import CourseRunLine, CourseState, CourseView
+from studio.server.job_kinds import COURSE
+
+router = APIRouter(prefix="/api/course", tags=["course"])
+
+
+@router.get("")
+def course_runs(app: App) -> CourseView:
+    """The course's runs, and whether they are there."""
+    try:
+        session = app.workspace.session(SAMPLE)
+    except StudioError:
+        session = None
+    return CourseView(
+        session=SAMPLE,
+        runs=[
+            CourseRunLine(
+                name=one.name, words=one.words, there=session is not None and finished(session, one)
+            )
+            for one in RUNS
+        ],
+        job=app.jobs.known(COURSE, SAMPLE),
+    )
+
+
+@router.post("", status_code=202)
+def begin_course(app: App) -> CourseState:
+    """Make what is missing of them. 409 while that is going on."""
+
+    def work(job: Job) -> dict[str, object]:
+        # One core stays free for the studio itself.
+        processes = max(1, cores() - 1)
+        make_course(app.workspace, job.report_or_stop, processes=processes, checkpoint=job.check)
+        return {}
+
+    return app.jobs.begin(COURSE, CourseState(session=SAMPLE), work)
+
+
+@router.delete("", status_code=202)
+def cancel_course(app: App) -> CourseState:
+    """Stop it; what is tracked stays. 404 where nothing was begun."""
+    app.jobs.cancel(COURSE, SAMPLE)
+    return app.jobs.state(COURSE, SAMPLE)

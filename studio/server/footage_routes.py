@@ -1,0 +1,133 @@
+"""A session's footage: offsets and turns by hand, and their estimate in the background (`synchrony` events).
+
+An estimate is only shown; `PATCH …/footage` with its offsets applies it.
+"""
+
+import asyncio
+import tempfile
+from pathlib import Path
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request, Response
+
+from studio.capture.timestamps import TIMESTAMP_NAMES
+from studio.jobs.job_runner import Job
+from studio.operations.footage import synchronise
+from studio.runs.footage_pictures import bare_picture
+from studio.runs.overlay_drawing import encode_jpeg
+from studio.server.app_state import App, release
+from studio.server.footage_schemas import (
+    FootageCamera,
+    FootageState,
+    SynchronyState,
+    TimedAnswer,
+)
+from studio.server.job_kinds import SYNCHRONY
+from studio.server.requests import Arguments, body_of
+from studio.server.session_routes import OpenSession
+from studio.sessions.footage_changes import change_footage, recorded_offsets, stale_runs, synchrony_of
+from studio.sessions.session import Session
+
+router = APIRouter(prefix="/api", tags=["footage"])
+
+
+@router.get("/sessions/{session}/footage")
+def footage(session: OpenSession) -> FootageState:
+    """Offsets and turns of a session's cameras, and the runs that were made before they were changed."""
+    return _state(session, [])
+
+
+@router.patch("/sessions/{session}/footage")
+def change(
+    session: OpenSession,
+    arguments: Annotated[Arguments, body_of(synchronise, "FootageRequest", only=("offsets", "rotations"))],
+    app: App,
+) -> FootageState:
+    """Change offsets and turns; says what that makes stale. Refused while a run of the session is being tracked."""
+    release(app, session.name)
+    changed = change_footage(session, **arguments)
+    app.events.session_changed(session.name)
+    return _state(changed.session, list(changed.notes))
+
+
+@router.get("/sessions/{session}/footage/{camera}/{frame}.jpg", response_class=Response)
+def footage_picture(
+    session: OpenSession,
+    camera: str,
+    frame: int,
+    height: Annotated[int | None, Query(ge=16, le=4320, description="Empty: as stored.")] = None,
+) -> Response:
+    """A camera's picture with its offset and turn, as it is before any calibration (JPEG)."""
+    picture = bare_picture(session, camera, frame, height)
+    return Response(encode_jpeg(picture), media_type="image/jpeg", headers={"cache-control": "no-store"})
+
+
+@router.post("/sessions/{session}/footage/times")
+async def times(session: OpenSession, request: Request) -> TimedAnswer:
+    """Offsets by a recorder's times, the raw body of a `timestamps.csv`; nothing is changed."""
+    content = await request.body()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / TIMESTAMP_NAMES[0]
+        path.write_bytes(content)
+        found = await asyncio.to_thread(recorded_offsets, session, path)
+    return TimedAnswer(offsets=found.offsets, apart=found.apart, notes=list(found.notes))
+
+
+@router.post("/sessions/{session}/synchrony", status_code=202)
+async def begin_synchrony(
+    session: OpenSession,
+    app: App,
+    arguments: Annotated[Arguments, body_of(synchronise, "SynchronyRequest", only=("within",))],
+) -> SynchronyState:
+    """Begin to estimate the offsets from what moves in the pictures. Ask for its state, or wait for `synchrony`
+    events.
+    """
+    known = app.jobs.known(SYNCHRONY, session.name)
+    if known is not None and known.state.is_going:
+        return known
+
+    def work(job: Job) -> dict[str, object]:
+        found = synchrony_of(session, job.report_or_stop, arguments["within"])
+        return {
+            "offsets": found.offsets,
+            "confidence": found.confidence,
+            "spread": found.within,
+            "sure": found.sure,
+            "notes": list(found.notes),
+            "pairs": list(found.pairs),
+        }
+
+    return app.jobs.begin(SYNCHRONY, SynchronyState(session=session.name, step="reading"), work)
+
+
+@router.get("/sessions/{session}/synchrony")
+def synchrony(session: OpenSession, app: App) -> SynchronyState | None:
+    """How the estimate stands and what it found; null where it was not begun."""
+    return app.jobs.known(SYNCHRONY, session.name)
+
+
+@router.delete("/sessions/{session}/synchrony", status_code=202)
+def cancel_synchrony(session: OpenSession, app: App) -> SynchronyState | None:
+    """Stop an estimate."""
+    app.jobs.cancel(SYNCHRONY, session.name)
+    return synchrony(session, app)
+
+
+def _state(session: Session, notes: list[str]) -> FootageState:
+    source = session.manifest.footage
+    return FootageState(
+        session=session.name,
+        layout=session.manifest.layout,
+        fps=source.fps,
+        frame_count=source.frame_count,
+        cameras=[
+            FootageCamera.of(
+                camera,
+                has_masks=bool(camera.masks),
+                has_background=bool(camera.background),
+            )
+            for camera in source.cameras
+        ],
+        stale_runs=list(stale_runs(session)),
+        notes=notes,
+    )

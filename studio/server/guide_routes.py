@@ -1,0 +1,176 @@
+"""`/guide`: the packaged text, with a table of every knob made from the declarations; beside it pages of examples."""
+
+import html
+import itertools
+from functools import cache
+
+from fastapi import APIRouter
+from markdown_it import MarkdownIt
+from starlette.responses import HTMLResponse
+
+import studio
+from studio.behaviour.settings import LearningSettings
+from studio.declaring import REQUIRED, Knobs, Operation, Parameter, declared
+from studio.errors import NotFoundError
+from studio.evidence.settings import EvidenceSettings
+from studio.knobs import Knob, allowed, knobs_of
+from studio.likelihood.catalogue import WEIGHTINGS
+from studio.runs.self_contained import assets_folder
+from studio.server.pages import NAME, html_page
+from studio.settings import RecordingSettings
+from studio.trackers.catalogue import TRACKERS
+from studio.trackers.frame_refinement import FrameRefinementSettings
+from studio.trackers.recovery_settings import RecoverySettings
+from studio.training.oversampling import OversamplingSettings
+
+router = APIRouter(tags=["page"], include_in_schema=False)
+
+PLACE_OF_KNOBS = "{{knobs}}"
+# The summary.md of a full `studio reproduce all`, as it was written.
+PLACE_OF_SUMMARY, SUMMARY = "{{reproduction}}", "reproduction.md"
+VERBS_WORDS = (
+    "What a person lets the studio do: each is a function of <code>studio</code>, most are a command, and the page asks"
+    " for them over HTTP. A keyword, an option and an entry of a body are one declaration."
+)
+VERB_COLUMNS = ("Keyword", "What it means", "Default", "Option", "HTTP")
+TEXTS = {
+    "": ("guide.md", "Guide"),
+    "course": ("course.md", "Course"),
+    "particle": ("particle.md", "What a particle is"),
+    "layer": ("layer.md", "Why one layer fails"),
+    "annealing": ("annealing.md", "What annealing changes"),
+    "partitions": ("partitions.md", "What partitions and behaviour add"),
+    "python": ("python.md", "Python"),
+    "adding": ("adding.md", "Adding your own"),
+    "animal": ("animal.md", "Your own animal in an hour"),
+    "commands": ("commands.md", "Commands"),
+    "figures": ("figures.md", "How well, how fast"),
+}
+"""The packaged texts and their titles, by the addresses below /guide."""
+COURSE = ("course", "particle", "layer", "annealing", "partitions")
+"""Those of the course, in their order."""
+VERBS = "verbs"
+COLUMNS = ("Name", "What it does", "Range", "Default", "Unit", "Takes effect")
+
+
+@router.get("/guide")
+@router.get("/guide/{page}")
+def guide(page: str = "") -> HTMLResponse:
+    """The guide, and what it refers to: examples for Python, all verbs, how to add one's own, figures."""
+    if page == VERBS:
+        return html_page("guide.html", "/guide", verbs_page())
+    if page not in TEXTS:
+        raise NotFoundError(f"The guide has no page '{page[:40]}'.", "Begin at /guide.")
+    return html_page("guide.html", "/guide", rendered(*TEXTS[page], in_course=page in COURSE))
+
+
+@cache
+def rendered(name: str, title: str, in_course: bool = False) -> dict[str, str]:
+    """What is a page's own, made once. name : of its text among the guide's. in_course : its contents are the course's
+    pages.
+    """
+    markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
+    folder = assets_folder() / "guide"
+    text = (folder / name).read_text(encoding="utf-8")
+    if PLACE_OF_SUMMARY in text:
+        text = text.replace(PLACE_OF_SUMMARY, (folder / SUMMARY).read_text(encoding="utf-8"))
+    tokens = markdown.parse(text)
+    contents: list[str] = [] if name == "guide.md" else ['<a href="/guide">Guide</a>']
+    if in_course:
+        contents += [_course_link(page, name) for page in COURSE]
+    for opening, inline in itertools.pairwise(tokens):
+        if opening.type == "heading_open" and opening.tag == "h2":
+            anchor = anchor_of(inline.content)
+            opening.attrSet("id", anchor)
+            if not in_course:
+                contents.append(f'<a href="#{anchor}">{html.escape(inline.content)}</a>')
+    # Lines within a table's cell are the one thing that the text cannot say without HTML.
+    content = markdown.renderer.render(tokens, markdown.options, {}).replace("&lt;br&gt;", "<br>")
+    if PLACE_OF_KNOBS in text:
+        content = content.replace(f"<p>{PLACE_OF_KNOBS}</p>", all_knob_tables())
+    return {"title": f"{title} · {NAME}", "contents": "".join(contents), "content": content}
+
+
+def _course_link(page: str, shown: str) -> str:
+    """A page of the course among the contents of one of them."""
+    file, title = TEXTS[page]
+    here = ' aria-current="page"' if file == shown else ""
+    return f'<a href="/guide/{page}"{here}>{html.escape(title)}</a>'
+
+
+@cache
+def verbs_page() -> dict[str, str]:
+    """The page on what each verb does and takes, in Python, on the command line and over HTTP."""
+    found = {name: getattr(studio, name) for name in dir(studio) if name != "StudioError"}
+    contents = ['<a href="/guide">Guide</a>', '<a href="/guide/python">Examples</a>']
+    contents += [f'<a href="#{name}">{name}</a>' for name in found]
+    parts = [_verb(name, declared(function)) for name, function in found.items()]
+    content = "\n".join(["<h1>Verbs</h1>", f"<p>{VERBS_WORDS}</p>", *parts])
+    return {"title": f"Verbs · {NAME}", "contents": "".join(contents), "content": content}
+
+
+def _verb(name: str, verb: Operation) -> str:
+    """One verb: what it does, and a table of what it takes."""
+    words = "".join(f"<p>{html.escape(part)}</p>" for part in verb.about.split("\n\n"))
+    head = "".join(f"<th>{column}</th>" for column in VERB_COLUMNS)
+    rows = "\n".join(
+        f"<tr>{''.join(f'<td>{cell}</td>' for cell in _entry(entry))}</tr>"
+        for entry in verb.parameters.values()
+    )
+    table = f'<div class="wide"><table><thead><tr>{head}</tr></thead>\n<tbody>{rows}</tbody></table></div>'
+    return f'<h2 id="{name}"><code>studio.{name}</code></h2>\n{words}\n{table if rows else ""}'
+
+
+def _entry(entry: Parameter) -> tuple[str, ...]:
+    """A row: the keyword, what it means, its default, its option, and its entry of a body."""
+    default = "" if entry.default in (REQUIRED, None, "", ()) else str(entry.default)
+    option = "" if entry.terminal.left_out or entry.mark(Knobs) else entry.option
+    body = "" if entry.web.left_out else entry.web.name or entry.name
+    meaning = "SESSION/RUN" if entry.target == "run" else "Name or folder." if entry.target else entry.help
+    if knobs := entry.mark(Knobs):
+        meaning = f"{meaning} {', '.join(knob.name for knob in knobs.listed())}".strip()
+    code = [f"<code>{html.escape(word)}</code>" if word else "" for word in (default, option, body)]
+    return f"<code>{entry.name}</code>", html.escape(meaning), *code
+
+
+def anchor_of(heading: str) -> str:
+    """A heading as the name of its place in the page."""
+    words = "".join(letter if letter.isalnum() else " " for letter in heading.lower())
+    return "-".join(words.split())
+
+
+def settings_groups() -> dict[str, type]:
+    """Every settings class there is, by the words that head its table."""
+    groups: dict[str, type] = {f"Tracker: {name}": entry.settings_type for name, entry in TRACKERS.items()}
+    groups |= {f"Weighting: {name}": entry.settings_type for name, entry in WEIGHTINGS.items()}
+    groups |= {"Evidence": EvidenceSettings, "Refinement of each frame": FrameRefinementSettings}
+    groups |= {"Recovery": RecoverySettings, "Recording": RecordingSettings}
+    return groups | {entry.title: entry for entry in (LearningSettings, OversamplingSettings)}
+
+
+def all_knob_tables() -> str:
+    """A table for each tracker, each weighting, the evidence, the recording and the learning of behaviour."""
+    return "\n".join(knob_table(title, knobs_of(settings)) for title, settings in settings_groups().items())
+
+
+def knob_table(title: str, knobs: tuple[Knob, ...]) -> str:
+    """One table of declarations."""
+    head = "".join(f"<th>{name}</th>" for name in COLUMNS)
+    rows = "\n".join(f"<tr>{_row(entry)}</tr>" for entry in knobs)
+    return (
+        f'<h3 id="{anchor_of(title)}">{html.escape(title)}</h3>\n<div class="wide"><table class="knobs">'
+        f"<thead><tr>{head}</tr></thead>\n<tbody>{rows}</tbody></table></div>"
+    )
+
+
+def _row(entry: Knob) -> str:
+    default = str(entry.default).lower() if entry.kind is bool else f"{entry.default}" or "empty"
+    cells = (
+        f"<strong>{html.escape(entry.label)}</strong><br><code>{html.escape(entry.name)}</code>",
+        html.escape(entry.help),
+        html.escape(allowed(entry)),
+        html.escape(default),
+        html.escape(entry.unit),
+        html.escape(entry.takes_effect),
+    )
+    return "".join(f"<td>{cell}</td>" for cell in cells)

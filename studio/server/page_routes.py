@@ -1,0 +1,71 @@
+"""The page around the scene: `index.html`, its styles and modules, and what a browser wants remembered."""
+
+import mimetypes
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+from fastapi import APIRouter, Depends
+from starlette.responses import Response
+
+from studio.errors import StudioError
+from studio.server.app_state import AppState, app_state
+from studio.server.pages import NAME, html_page
+from studio.sessions.atomic_files import write_bytes
+from studio.typed_decoding import decode_json
+
+router = APIRouter(tags=["page"])
+
+PREFERENCES_FILE = "preferences.json"
+PREFERENCES_LIMIT = 16_384
+
+# Windows machines may have other words for these in their registry, and browsers refuse modules of another
+# type.
+mimetypes.add_type("text/javascript", ".js")
+mimetypes.add_type("text/css", ".css")
+mimetypes.add_type("image/svg+xml", ".svg")
+mimetypes.add_type("font/woff2", ".woff2")
+
+
+class PreferencesError(StudioError):
+    """View preferences that cannot be kept."""
+
+    status, code = 422, "preferences"
+
+
+@router.get("/", include_in_schema=False)
+def page() -> Response:
+    """The studio's page."""
+    return html_page("index.html", "/", {"title": NAME})
+
+
+@router.get("/api/preferences")
+def preferences(app: Annotated[AppState, Depends(app_state)]) -> dict[str, object]:
+    """What the page keeps (theme, speed, folded panels): a free object, `{}` at first."""
+    return read_preferences(app.state_folder / PREFERENCES_FILE)
+
+
+@router.patch("/api/preferences")
+def change_preferences(
+    changes: dict[str, object], app: Annotated[AppState, Depends(app_state)]
+) -> dict[str, object]:
+    """Set some entries (null removes one) and return all of them; at most 16 KB in all."""
+    path = app.state_folder / PREFERENCES_FILE
+    merged = read_preferences(path) | changes
+    kept = {name: value for name, value in merged.items() if value is not None}
+    content = msgspec.json.encode(kept)
+    if len(content) > PREFERENCES_LIMIT:
+        raise PreferencesError(
+            f"The view preferences take {len(content)} bytes.", f"Keep them under {PREFERENCES_LIMIT}."
+        )
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_bytes(path, content)
+    return kept
+
+
+def read_preferences(path: Path) -> dict[str, object]:
+    """The stored object; a missing or damaged file counts as empty, for nothing depends on it."""
+    try:
+        return decode_json(path.read_bytes(), dict[str, object])
+    except (OSError, msgspec.DecodeError):
+        return {}

@@ -1,0 +1,144 @@
+"""What the 3-D scene shows: the page's timeline, layer buttons and camera keys arrive here."""
+
+from typing import Annotated
+
+import numpy as np
+from fastapi import APIRouter
+from pydantic import Field
+
+from studio.body.reader import parse_body
+from studio.errors import SettingsError
+from studio.geometry.reach import within_reach
+from studio.operations.own_bodies import MOST_TEXT
+from studio.server.app_state import App, AppState, Scene, Shown
+from studio.server.schemas import Request, RunName
+
+router = APIRouter(prefix="/api/scene", tags=["scene"])
+
+CHOSEN = ("limb", "parameter", "particle", "camera")
+
+
+ChosenName = Annotated[str | None, Field(max_length=128)]
+
+
+class GhostBody(Request):
+    """A body beside the answer. colour: the name of a colour token. pose: radians and mm."""
+
+    colour: str = Field("ghost", pattern="^(ghost|accent|before|after|truth|series-[0-7]|layer-[0-9])$")
+    pose: list[float] = Field(max_length=512)
+
+
+class SceneRequest(Request):
+    """What is to be shown; what is left out stays as it is.
+
+    With `session` the whole moment is named: `run` left out shows the session alone, `layer` left out
+    all layers. follow: whether each frame is shown as it is tracked. look_through: a camera's name, null
+    or "" for the free view. options: what is drawn, by the names of the scene's own view options (body,
+    truth, particles, trails, cameras, pictures, overlays …). playing, speed (1 is real time), loop: of stored frames.
+    limb, parameter, particle (a row of the layer's cloud), camera: what else is chosen, null for none. eye: from where
+    the scene is looked at and what is looked at, metres; null: the usual place. ghosts: bodies beside the answer, until
+    another frame is shown. body: the file of a body that is being made, shown in place of the session's own, or without
+    a session alone.
+    """
+
+    session: RunName | None = None
+    run: RunName | None = None
+    frame: int | None = Field(None, ge=0)
+    layer: int | None = Field(None, ge=0)
+    follow: bool | None = None
+    limb: ChosenName = None
+    parameter: ChosenName = None
+    particle: int | None = Field(None, ge=0)
+    camera: ChosenName = None
+    look_through: ChosenName = None
+    eye: list[float] | None = Field(None, min_length=6, max_length=6)
+    discard: bool = Field(False, description="Forget the frame that was annealed again.")
+    ghosts: list[GhostBody] | None = Field(None, max_length=12)
+    dark: bool | None = None
+    playing: bool | None = None
+    speed: float | None = Field(None, gt=0.0, le=10.0)
+    loop: bool | None = None
+    body: str | None = Field(None, max_length=MOST_TEXT)
+    options: dict[str, bool | int | float | str | list[str] | None] = Field(default_factory=dict)
+
+
+@router.post("/show", status_code=204)
+def show(request: SceneRequest, app: App, scene: Scene) -> None:
+    """Show a moment of a run (or a session without one) in the asking window's scene. Names are checked before
+    anything changes.
+    """
+    given = request.model_fields_set
+    if request.body is not None:
+        body = parse_body(request.body, "body", "body.toml")
+        session_name = app.workspace.session(request.session).name if request.session else ""
+        scene.try_body(session_name, body)
+    elif request.session is not None:
+        session = app.workspace.session(request.session)
+        run = session.run(request.run).name if request.run else ""
+        scene.show_run(session.name, run, request.frame, request.layer)
+    else:
+        if request.frame is not None:
+            scene.show_frame(request.frame)
+        if "layer" in given:
+            scene.show_layer(request.layer)
+    if request.follow is not None:
+        scene.follow(request.follow)
+    if request.discard:
+        scene.discard_what_if()
+    chosen = {name: getattr(request, name) for name in CHOSEN if name in given}
+    if chosen:
+        scene.select(**chosen)
+    if "look_through" in given:
+        scene.look_through(request.look_through or None)
+    if "eye" in given:
+        if request.eye is not None and not within_reach(np.array(request.eye)):
+            raise SettingsError(
+                "Nobody can look at the scene from there.", "Give six finite numbers in metres."
+            )
+        scene.look_from(request.eye)
+    if request.ghosts is not None:
+        for ghost in request.ghosts:
+            if not within_reach(np.array(ghost.pose)):
+                raise SettingsError("A pose beside the answer is not finite.", "Give radians and mm.")
+        scene.show_ghosts([(ghost.colour, ghost.pose) for ghost in request.ghosts])
+    options = {
+        name: tuple(value) if isinstance(value, list) else value for name, value in request.options.items()
+    }
+    if request.dark is not None:
+        options["dark"] = request.dark
+    if options:
+        scene.set_options(**options)
+    if {"playing", "speed", "loop"} & given:
+        scene.play(request.playing, speed=request.speed, loop=request.loop)
+
+
+@router.post("/view", status_code=204)
+def view(request: SceneRequest, app: App, scene: Scene) -> None:
+    """The same under a name that says what it is for: the theme, the camera looked through."""
+    show(request, app, scene)
+
+
+def report_moves(app: AppState) -> None:
+    """From now on, report the moves that a scene's own controls make to its window (`scene` events)."""
+
+    def moved(window: str, shown: Shown) -> None:
+        app.events.publish(
+            {
+                "type": "scene",
+                "session": shown.session,
+                "run": shown.run,
+                "frame": shown.frame,
+                "layer": shown.layer,
+                "limb": shown.limb,
+                "parameter": shown.parameter,
+                "particle": shown.particle,
+                "camera": shown.camera,
+                "look_through": shown.look_through,
+                "eye": shown.eye,
+                "follow": shown.follow,
+                "editing": shown.editing,
+            },
+            window,
+        )
+
+    app.scenes.watch(moved)

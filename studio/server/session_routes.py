@@ -1,0 +1,150 @@
+"""Sessions: list, look, rename, duplicate, throw away, bring back."""
+
+from pathlib import Path
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Response
+
+from studio.comparison.folders import bring_back
+from studio.comparison.kept_comparison import RECORD_NAME as COMPARISON_FILE_NAME
+from studio.comparison.kept_comparison import KeptComparison
+from studio.errors import NotFoundError, StudioError
+from studio.server.app_state import App, AppState, release
+from studio.server.schemas import (
+    NewName,
+    Restored,
+    SessionChange,
+    SessionDetail,
+    SessionList,
+    TrashChoice,
+    TrashEntry,
+    TrashList,
+)
+from studio.server.session_views import session_detail, session_line
+from studio.sessions.manifest import FILE_NAME, read_manifest
+from studio.sessions.names import inside
+from studio.sessions.run_record import FILE_NAME as RUN_FILE_NAME
+from studio.sessions.run_record import read_run_record
+from studio.sessions.session import Session
+from studio.sessions.workspace import TRASH_NAME, SessionSummary
+from studio.training.model_repository import bring_back_model, thrown_model
+
+router = APIRouter(prefix="/api", tags=["sessions"])
+
+
+def session_of(session: str, app: App) -> Session:
+    """The session that an address names, as a dependency. Raises NameRefused, NotFoundError."""
+    return app.workspace.session(session)
+
+
+OpenSession = Annotated[Session, Depends(session_of)]
+
+
+@router.get("/sessions")
+def sessions(app: App) -> SessionList:
+    """All sessions by name with their runs, newest first; those that cannot be opened say why."""
+    summaries = app.workspace.sessions()
+    return SessionList(sessions=[session_line(entry, _opened(app, entry)) for entry in summaries])
+
+
+@router.get("/sessions/{session}")
+def session_detail_of(session: OpenSession) -> SessionDetail:
+    """Cameras, body, subject, how footage and calibration were matched, warnings, runs."""
+    return session_detail(session)
+
+
+@router.get("/sessions/{session}/thumbnail.jpg", response_class=Response)
+def thumbnail(session: OpenSession) -> Response:
+    """A small picture of the session (JPEG)."""
+    path = session.thumbnail()
+    if path is None:
+        raise NotFoundError(f"Session '{session.name}' has no picture to show.", "Check its footage.")
+    return Response(path.read_bytes(), media_type="image/jpeg", headers={"cache-control": "no-cache"})
+
+
+@router.patch("/sessions/{session}")
+def change_session(session: OpenSession, change: SessionChange, app: App) -> NewName:
+    """Change a session's title or name. Refused while a run of it is being tracked."""
+    name = session.name
+    if change.title is not None:
+        app.workspace.retitle(name, change.title)
+    if change.name is not None and change.name != name:
+        release(app, name)
+        name = app.workspace.rename(name, change.name).name
+    return _changed(app, name)
+
+
+@router.post("/sessions/{session}/duplicate", status_code=201)
+def duplicate(session: OpenSession, app: App, request: NewName | None = None) -> NewName:
+    """A copy with its runs, under the given name or a free one."""
+    return _changed(app, app.workspace.duplicate(session.name, request.name if request else None).name)
+
+
+@router.delete("/sessions/{session}")
+def delete(session: OpenSession, app: App) -> TrashEntry:
+    """Move a session to the trash. Refused while a run of it is being tracked."""
+    release(app, session.name)
+    place = app.workspace.trash(session.name)
+    _changed(app, session.name)
+    return trash_entry(place)
+
+
+@router.get("/trash")
+def trash(app: App) -> TrashList:
+    """What lies in the trash, oldest first."""
+    folder = app.workspace.root / TRASH_NAME
+    return TrashList(entries=[trash_entry(folder / name) for name in app.workspace.trashed()])
+
+
+@router.post("/trash/restore")
+def restore(choice: TrashChoice, app: App) -> Restored:
+    """Bring a session, a model, or a run or comparison into its session, back under its own name or one like it."""
+    if (inside(app.workspace.root / TRASH_NAME, choice.entry) / RUN_FILE_NAME).is_file():
+        run = app.workspace.restore_run(choice.entry)
+        session = run.folder.parent.parent.name
+        _changed(app, session)
+        return Restored(name=session, run=run.name)
+    if (inside(app.workspace.root / TRASH_NAME, choice.entry) / COMPARISON_FILE_NAME).is_file():
+        owner, kept = bring_back(app.workspace, choice.entry)
+        _changed(app, owner.name)
+        return Restored(name=owner.name, comparison=kept.name)
+    if thrown_model(inside(app.workspace.root / TRASH_NAME, choice.entry)):
+        model = bring_back_model(app.workspace, choice.entry).stem
+        app.events.session_changed("")
+        return Restored(name="", model=model)
+    session = app.workspace.restore(choice.entry).name
+    _changed(app, session)
+    return Restored(name=session)
+
+
+def trash_entry(place: Path) -> TrashEntry:
+    """What lies at a place in the trash, by its own record."""
+    try:
+        if (place / FILE_NAME).is_file():
+            return TrashEntry(id=place.name, name=read_manifest(place).name, kind="session")
+        if (place / RUN_FILE_NAME).is_file():
+            record = read_run_record(place)
+            return TrashEntry(id=place.name, name=f"{record.session} / {record.name}", kind="run")
+        if (place / COMPARISON_FILE_NAME).is_file():
+            arguments = KeptComparison(place).record()
+            return TrashEntry(
+                id=place.name, name=f"{arguments.plan.session} / {arguments.name}", kind="comparison"
+            )
+        if model := thrown_model(place):
+            return TrashEntry(id=place.name, name=model, kind="model")
+    except StudioError:
+        pass
+    return TrashEntry(id=place.name, name=place.name, kind="other", restorable=False)
+
+
+def _changed(app: AppState, name: str) -> NewName:
+    """Tell all watchers that the list of sessions is another one."""
+    app.events.session_changed(name)
+    return NewName(name=name)
+
+
+def _opened(app: AppState, entry: SessionSummary) -> Session | None:
+    try:
+        return None if entry.problem else app.workspace.session(entry.name)
+    except StudioError:
+        return None

@@ -1,0 +1,182 @@
+"""The person in front of the cameras: by height, and fitted to the footage in the background (`subject` events)."""
+
+import asyncio
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Response
+from pydantic import Field
+
+from studio.body.forward_kinematics import limb_ends
+from studio.body.model import BodyModel
+from studio.body.subject import SHORTEST_MM, TALLEST_MM, Subject
+from studio.errors import BodyError, NotFoundError
+from studio.jobs.job_runner import Job
+from studio.operations.person import fit_subject
+from studio.operations.person import subject as write_subject
+from studio.progress import unheard
+from studio.runs.overlay_drawing import encode_jpeg
+from studio.runs.overlay_pictures import compose_view, forget_composers
+from studio.runs.subject_choice import body_of_choice, keep_fitted
+from studio.runs.subject_fitting import FittedSubject
+from studio.server.app_state import App, AppState
+from studio.server.job_kinds import SUBJECT
+from studio.server.job_routes import add_job_routes
+from studio.server.picture_routes import Height
+from studio.server.requests import Arguments, body_of
+from studio.server.session_routes import OpenSession
+from studio.server.subject_schemas import (
+    FitSubjectState,
+    LimbDrawing,
+    SubjectAnswer,
+)
+from studio.sessions.made_from import origin_of
+from studio.sessions.session import SUBJECT_NAME, Session
+
+router = APIRouter(prefix="/api", tags=["subject"])
+
+
+@router.get("/sessions/{session}/subject")
+def subject(
+    session: OpenSession,
+    height_mm: Annotated[float | None, Query(description="As if the person were so tall.")] = None,
+    body: Annotated[str, Query(max_length=64, description="As if it were this kinematic tree.")] = "",
+) -> SubjectAnswer:
+    """The session's person: every dimension of the body as a run would have it, and its limbs as it stands upright;
+    with a height or body as a preview, nothing is written.
+    """
+    known = session.subject()
+    if height_mm is None and not body:
+        tree, notes = session.body_with_notes()
+    else:
+        known = Subject(body=body or session.manifest.body, height_mm=height_mm)
+        tree, notes = body_of_choice(session, known)
+    return SubjectAnswer(
+        body=tree.name,
+        height_mm=known.height_mm if known else None,
+        dimensions=dict(tree.dimensions),
+        notes=list(notes),
+        source=tree.definition.source if tree.definition else "",
+        limbs=limb_drawings(tree),
+        saved=(session.path / SUBJECT_NAME).exists(),
+        fitted=origin_of(session, "subject") is not None,
+    )
+
+
+@router.put("/sessions/{session}/subject")
+def set_subject(
+    session: OpenSession,
+    arguments: Annotated[
+        Arguments,
+        body_of(
+            write_subject,
+            "SubjectRequest",
+            without=("height_mm",),
+            height_mm=(
+                float | None,
+                Field(
+                    None,
+                    ge=SHORTEST_MM,
+                    le=TALLEST_MM,
+                    description="Left out: a body alone, in its file's size.",
+                ),
+            ),
+        ),
+    ],
+    app: App,
+) -> SubjectAnswer:
+    """Write down a height (and measured lengths); everything else follows by published proportions. A body that is
+    named becomes the session's; without a height, as with animals, in its file's size.
+    """
+    if arguments.more["height_mm"] is None and not (arguments.get("body") or arguments.get("lengths_mm")):
+        raise BodyError("Neither a height nor a body is given.", "Give one of them.")
+    write_subject(session, **arguments, **arguments.more, progress=unheard)
+    forget_composers()
+    app.events.session_changed(session.name)
+    return subject(Session(session.path))
+
+
+@router.post("/sessions/{session}/fit-subject", status_code=202)
+async def begin_fit(
+    session: OpenSession, arguments: Annotated[Arguments, body_of(fit_subject, "FitSubjectRequest")], app: App
+) -> FitSubjectState:
+    """Begin to fit lengths and radii. Ask for its state, or wait for `subject` events."""
+    await asyncio.to_thread(session.body, arguments.get("body"))
+
+    def work(job: Job) -> dict[str, object]:
+        found = fit_subject(session, **arguments, progress=job.report_or_stop)
+        forget_composers()
+        job.found = found
+        return {"file": found.file.name if found.file else "", **_answer(found)}
+
+    return app.jobs.begin(SUBJECT, FitSubjectState(session=session.name), work)
+
+
+add_job_routes(router, "/subject-fits/{identifier}", SUBJECT)
+
+
+@router.post("/subject-fits/{identifier}/keep")
+def keep_fit(identifier: str, app: App) -> FitSubjectState:
+    """Keep what a fit found as the session's subject; the old one stays beside it."""
+    found = _found(identifier, app)
+    state = app.jobs.state(SUBJECT, identifier)
+    place = keep_fitted(app.workspace.session(state.session), found)
+    forget_composers()
+    state = app.jobs.change(SUBJECT, identifier, file=place.name)
+    app.events.session_changed(state.session)
+    return state
+
+
+@router.get("/subject-fits/{identifier}/frames/{frame}/views/{camera}.jpg", response_class=Response)
+def fitted_picture(identifier: str, frame: int, camera: str, app: App, height: Height = None) -> Response:
+    """The found body over what a camera saw, in a frame that was looked at."""
+    found = _found(identifier, app)
+    if frame not in found.frames:
+        listed = ", ".join(map(str, found.frames))
+        raise NotFoundError(f"Frame {frame} was not looked at in this fit.", f"These were: {listed}.")
+    session = app.workspace.session(app.jobs.state(SUBJECT, identifier).session)
+    pose = found.poses[found.frames.index(frame)]
+    picture = compose_view(
+        session, None, frame, camera, ("outline", "mask"), pose, height=height, body=found.body
+    )
+    return Response(encode_jpeg(picture), media_type="image/jpeg", headers={"cache-control": "no-store"})
+
+
+def _found(identifier: str, app: AppState) -> FittedSubject:
+    """What a fit found. Raises NotFoundError."""
+    found = app.jobs.found(SUBJECT, identifier)
+    if not isinstance(found, FittedSubject):
+        state = app.jobs.state(SUBJECT, identifier).state
+        raise NotFoundError(f"This fit found no subject: it is {state}.", "Begin a new one.")
+    return found
+
+
+def limb_drawings(body: BodyModel) -> list[LimbDrawing]:
+    """The drawn limbs of a body as it stands upright."""
+    entries = {limb.name: limb for limb in body.definition.limbs} if body.definition else {}
+    ends = limb_ends(body, body.neutral)[0]
+    found: list[LimbDrawing] = []
+    for limb, (start, end) in zip(body.drawn, ends, strict=True):
+        length = entries[limb.name].length if limb.name in entries else ""
+        found.append(
+            LimbDrawing(
+                name=limb.name,
+                side=limb.side,
+                start=start.tolist(),
+                end=end.tolist(),
+                radii=(limb.radius_start, limb.radius_end),
+                dimension=length.lstrip("-") if isinstance(length, str) else "",
+            )
+        )
+    return found
+
+
+def _answer(found: FittedSubject) -> dict[str, object]:
+    return {
+        "body": found.body.name,
+        "frames": list(found.frames),
+        "poses_from": found.poses_from,
+        "sizes": list(found.sizes),
+        "overlap_before": found.overlap_before.tolist(),
+        "overlap": found.overlap.tolist(),
+        "limbs": limb_drawings(found.body),
+    }

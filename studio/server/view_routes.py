@@ -1,0 +1,143 @@
+"""Views of a run's search: the registry, a frame's tables, a run's tables."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Query, Response
+
+from studio.errors import RunError
+from studio.inspection.catalogue import VIEWS, view_named
+from studio.inspection.comparing import compare_stored
+from studio.inspection.reading import InspectedRun
+from studio.inspection.shared_page import shared_page
+from studio.inspection.tables import Selection, Viewed
+from studio.inspection.views import look, look_over
+from studio.jobs.job_runner import Job
+from studio.operations.inspecting import seeds, worst_frame
+from studio.server.app_state import App
+from studio.server.job_kinds import SEEDS
+from studio.server.job_routes import add_job_routes
+from studio.server.requests import Arguments, body_of
+from studio.server.run_routes import RUN, OpenRun
+from studio.server.session_routes import OpenSession
+from studio.server.view_schemas import (
+    FindingView,
+    RemedyView,
+    RunsComparedView,
+    SeedsState,
+    TableView,
+    ViewAnswer,
+    ViewLine,
+    ViewList,
+)
+
+router = APIRouter(prefix="/api", tags=["views"])
+
+Name = Annotated[str, Query(max_length=64)]
+
+
+def selection_of(
+    layer: Annotated[int | None, Query(ge=0, description="Default: the last one.")] = None,
+    parameter: Name = "",
+    limb: Name = "",
+    particle: Annotated[int | None, Query(ge=0)] = None,
+    camera: Name = "",
+    track: Annotated[str, Query(max_length=64, description="Whose pose; default: raw.")] = "",
+    second: Annotated[str, Query(max_length=64, description="Another parameter, for a plane.")] = "",
+    towards: Annotated[
+        str,
+        Query(max_length=64, description="End of a line: truth, mean, mode, searched, particle or a track."),
+    ] = "",
+) -> Selection:
+    """What is selected on the page, as a dependency of routes."""
+    return Selection(layer, parameter, limb, particle, camera, track, second, towards)
+
+
+Selected = Annotated[Selection, Depends(selection_of)]
+
+
+@router.get("/views")
+def views() -> ViewList:
+    """All views: what each answers, what of the selection it uses, and its tables."""
+    return ViewList(views=[ViewLine.model_validate(view) for view in VIEWS.values()])
+
+
+@router.get(RUN + "/frames/{frame}/views/{view}")
+def frame_view(session: OpenSession, run: OpenRun, frame: int, view: str, selection: Selected) -> ViewAnswer:
+    """A view's tables of a frame. Before a job has ended the tables of `seeds` are empty."""
+    inspected = InspectedRun(session, run)
+    return _answer(inspected, view, look(inspected, frame, view, selection), frame)
+
+
+@router.get(RUN + "/views/{view}")
+def run_view(session: OpenSession, run: OpenRun, view: str, selection: Selected) -> ViewAnswer:
+    """A view's tables of the whole run; none for a view that shows single frames only."""
+    inspected = InspectedRun(session, run)
+    return _answer(inspected, view, look_over(inspected, view, selection), None)
+
+
+@router.get(RUN + "/shared.html", response_class=Response)
+def shared(
+    session: OpenSession,
+    run: OpenRun,
+    frame: Annotated[int | None, Query(ge=0, description="Default: the run's worst one.")] = None,
+    track: Name = "",
+) -> Response:
+    """The run as one page that opens without the studio."""
+    opened = InspectedRun(session, run)
+    text = shared_page(opened, worst_frame(opened) if frame is None else frame, track=track)
+    headers = {"content-disposition": f'attachment; filename="{session.name}-{run.name}.html"'}
+    return Response(text, media_type="text/html; charset=utf-8", headers=headers)
+
+
+@router.post(RUN + "/frames/{frame}/seeds", status_code=202)
+def begin_seeds(
+    session: OpenSession,
+    run: OpenRun,
+    frame: int,
+    arguments: Annotated[Arguments, body_of(seeds, "SeedsRequest", without=("frame",))],
+    app: App,
+) -> SeedsState:
+    """Begin to search a frame with other seeds. Ask for its state, or wait for `seeds` events."""
+    InspectedRun(session, run).frame(frame)
+
+    def work(job: Job) -> dict[str, object]:
+        seeds(run, frame, **arguments, progress=job.report_or_stop)
+        return {}
+
+    return app.jobs.begin(SEEDS, SeedsState(session=session.name, run=run.name, frame=frame), work)
+
+
+add_job_routes(router, "/seeds/{identifier}", SEEDS)
+
+
+@router.get("/compared-runs")
+def compared_runs(
+    app: App,
+    run: Annotated[list[str], Query(max_length=6, description="Two to six runs, as SESSION/RUN.")],
+) -> RunsComparedView:
+    """Stored runs side by side: curves over frames, settings that differ, the worst frame of each."""
+    opened: list[InspectedRun] = []
+    for entry in run:
+        owner, slash, name = entry.partition("/")
+        if not slash:
+            raise RunError(f"'{entry[:80]}' names no run.", "Write SESSION/RUN, such as walk/run-1.")
+        session = app.workspace.session(owner)
+        opened.append(InspectedRun(session, session.run(name)))
+    return RunsComparedView.model_validate(compare_stored(opened))
+
+
+def _answer(run: InspectedRun, name: str, viewed: Viewed, frame: int | None) -> ViewAnswer:
+    view = view_named(name)
+    return ViewAnswer(
+        view=name,
+        title=view.title,
+        question=view.question,
+        caption=run.caption(frame),
+        session=run.session.name,
+        run=run.run.name,
+        frame=frame,
+        notes=list(viewed.notes),
+        tables=[TableView.model_validate(table) for table in viewed.tables],
+        findings=[FindingView.model_validate(finding) for finding in viewed.findings],
+        remedies=[RemedyView.model_validate(remedy) for remedy in viewed.remedies],
+    )

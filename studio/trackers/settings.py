@@ -1,0 +1,197 @@
+"""The knobs of the particle filters; sliders, options, checks and the guide are made from these declarations."""
+
+from dataclasses import dataclass
+
+from studio.errors import SettingsError
+from studio.knobs import knob, next_frame_knob
+from studio.trackers import shared_knobs
+from studio.trackers.tracker import Preset, Value, Variant
+
+
+@dataclass(frozen=True, slots=True)
+class AnnealedSettings:
+    """Knobs of the annealed particle filter (Deutscher & Reid 2005, sections 3 and 6)."""
+
+    title = "Annealed particle filter"
+
+    # The paper has 0.5. On the Lee walk's benchmark score and on the bundled walk 0.3 did best (0.2871 against
+    # 0.2885 for 0.5, and 28.5 against 30.0 mm over three seeds), with no limb lost.
+    survival: float = knob(
+        0.3, 0.02, 0.98, 0.01, label="survival rate",
+        help="α: share of the particles that survive a layer (Eq. 12); lower is faster and misses more.",
+    )  # fmt: skip
+    layers: int = next_frame_knob(10, 1, 60, 1, help="M: annealing layers in a frame.")
+    particles: int = next_frame_knob(100, 1, 20000, 10, help="N: particles in every layer.")
+    crossover: float = knob(
+        0.5, 0.0, 1.0, 0.05, label="crossover share",
+        help="Share of the particles that are made from two parents (Eq. 19).",
+    )  # fmt: skip
+    crossover_by: str = knob(
+        "limbs", choices=("limbs", "parameters"), label="crossover by",
+        help="Where two parents may be cut: between whole limbs, or between any two parameters (Eq. 19).",
+    )  # fmt: skip
+    adaptive_diffusion: bool = knob(
+        True, help="Noise in proportion to what is still uncertain (Eq. 18) instead of a fixed plan (Eq. 13)."
+    )
+    diffusion_form: str = knob(
+        "shrink", choices=("shrink", "paper"), label="adaptive form",
+        help="Survivors shrink towards their mean so that the cloud never grows, or only get noise (Eq. 18).",
+    )  # fmt: skip
+    diffusion_fraction: float = knob(
+        0.4, 0.02, 1.0, 0.02, label="adaptive noise",
+        help="h: noise as a share of the sample's standard deviation, for the form 'shrink'.",
+    )  # fmt: skip
+    diffusion_constant: float = knob(
+        0.1, 0.001, 2.0, 0.01, label="constant of Eq. 18",
+        help="P as a multiple of the sample's covariance, for the form 'paper'; much makes the cloud grow.",
+    )  # fmt: skip
+    diffusion_covariance: str = knob(
+        "diagonal", choices=("diagonal", "full"), label="covariance",
+        help="Whether adaptive noise follows each parameter on its own or all of them together.",
+    )  # fmt: skip
+    diffusion_scale: float = shared_knobs.diffusion_scale()
+    diffusion_decay: str = knob(
+        "variance", choices=("variance", "deviation", "printed"), label="decay of Eq. 13",
+        help="Without adaptive diffusion: what the survival rates of the layers so far multiply, σ0² or σ0; or, as the "
+        "product is printed, σ0² by the next layer's rate too.",
+    )  # fmt: skip
+    survival_per_layer: str = knob(
+        "", label="survival of each layer",
+        help="Rates of the layers in turn, like 0.6, 0.5, 0.4 (the last holds on); empty: one rate for all.",
+    )  # fmt: skip
+    carry: str = next_frame_knob(
+        "weighted", choices=("weighted", "resampled", "mode"), label="carried over",
+        help="Start of the next frame: every particle (Eq. 9), survivors by weight, or the best one.",
+    )  # fmt: skip
+    dynamics: str = shared_knobs.dynamics()
+    prediction: str = shared_knobs.prediction()
+    attenuation: float = shared_knobs.attenuation(0.3)
+    entering: str = shared_knobs.entering()
+    root_prediction: str = shared_knobs.root_prediction()
+    global_scale: float = shared_knobs.global_scale(1.0)
+    automaton_share: float = shared_knobs.automaton_share()
+    model_free_share: float = shared_knobs.model_free_share(0.2)
+    model_free_grows: bool = shared_knobs.model_free_grows()
+    estimate: str = shared_knobs.estimate()
+    constraints: str = shared_knobs.constraints("clamp")
+    limbs_apart: bool = shared_knobs.limbs_apart(False)
+    resampling: str = shared_knobs.resampling()
+    online_learning: bool = shared_knobs.online_learning()
+    learning_overlap: float = shared_knobs.learning_overlap()
+    learning_interval: int = shared_knobs.learning_interval()
+    start_repeats: int = shared_knobs.start_repeats()
+
+    def __post_init__(self) -> None:
+        """Raise SettingsError unless `survival_per_layer` is empty or a list of rates in range."""
+        layer_survivals(self, 1)
+
+
+@dataclass(frozen=True, slots=True)
+class CondensationSettings:
+    """Knobs of Condensation, the baseline (Isard & Blake 1996)."""
+
+    title = "Condensation"
+
+    particles: int = next_frame_knob(2000, 1, 200000, 100, help="N: particles, each weighed once.")
+    scale_survival: float = knob(
+        0.1, 0.05, 0.2, 0.01, label="survival aimed at",
+        help="Share of the particles that survive while the first frames choose the likelihood's scale.",
+    )  # fmt: skip
+    scale_frames: int = next_frame_knob(
+        5, 1, 100, 1, label="frames for the scale",
+        help="How many weighings choose the likelihood's scale (their geometric mean), which then stays.",
+    )  # fmt: skip
+    diffusion_scale: float = shared_knobs.diffusion_scale()
+    dynamics: str = shared_knobs.dynamics()
+    estimate: str = shared_knobs.estimate()
+    constraints: str = shared_knobs.constraints("clamp")
+    limbs_apart: bool = shared_knobs.limbs_apart(False)
+    resampling: str = shared_knobs.resampling()
+    start_repeats: int = shared_knobs.start_repeats()
+
+
+def layer_survivals(settings: AnnealedSettings, layers: int) -> tuple[float, ...]:
+    """Target α of each of the frame's layers, in the order they run.
+
+    A list shorter than the frame repeats its last rate. Raises SettingsError for text that is no list of numbers,
+    or for a rate outside 0.02 … 0.98.
+    """
+    words = [word for word in settings.survival_per_layer.replace(",", " ").split() if word]
+    if not words:
+        return (settings.survival,) * layers
+    try:
+        rates = [float(word) for word in words]
+    except ValueError:
+        rates = [float("nan")]
+    if not all(0.02 <= rate <= 0.98 for rate in rates):
+        raise SettingsError(
+            f"Setting 'survival_per_layer' cannot be '{settings.survival_per_layer}'.",
+            "Write one rate from 0.02 to 0.98 for each layer, separated by commas, or nothing.",
+        )
+    return tuple(rates[min(index, len(rates) - 1)] for index in range(layers))
+
+
+# The improved filter is the tracker's own default.
+_IMPROVED: dict[str, Value] = {
+    name: getattr(AnnealedSettings(), name)
+    for name in (
+        *("survival", "adaptive_diffusion", "diffusion_form"),
+        *("diffusion_fraction", "crossover", "crossover_by"),
+    )
+}
+_AS_THE_PAPER: dict[str, Value] = {
+    "adaptive_diffusion": True,
+    "diffusion_form": "paper",
+    "crossover": 0.5,
+    "crossover_by": "parameters",
+    "survival": 0.5,
+}
+_TEN_BY_200: dict[str, Value] = {"layers": 10, "particles": 200, "refine_frames": False}
+
+PRESETS = (
+    Preset(
+        "the studio's own",
+        "The improved filter, 10 × 100, and each frame refined on its silhouettes.",
+        _IMPROVED | {"layers": 10, "particles": 100, "refine_frames": True},
+    ),
+    Preset(
+        "improved filter",
+        "Adaptive diffusion with shrinkage and crossover by limbs, 10 × 200, nothing refined.",
+        _IMPROVED | _TEN_BY_200,
+    ),
+    Preset(
+        "paper, Eq. 13",
+        "The annealed filter without its improvements: a fixed plan of noise, no crossover, 10 × 200.",
+        {"adaptive_diffusion": False, "diffusion_decay": "variance", "crossover": 0.0, "survival": 0.5}
+        | _TEN_BY_200,
+    ),
+    Preset(
+        "paper, Eq. 18 and 19",
+        "Adaptive diffusion without shrinkage and crossover by parameters, as the paper writes them.",
+        _AS_THE_PAPER | _TEN_BY_200,
+    ),
+    Preset("fast preview", "A quarter of the work: 5 × 50.", _IMPROVED | {"layers": 5, "particles": 50}),
+    Preset(
+        "careful",
+        "Six times the work, in more layers: 15 × 400.",
+        _IMPROVED | {"layers": 15, "particles": 400},
+    ),
+)
+
+GUIDED = Variant(
+    "first sets predicted by a behaviour model (Caillette et al.), a fifth of the particles without it",
+    {"prediction": shared_knobs.BEHAVIOUR},
+)
+VARIANTS = {
+    "improved": Variant(
+        "adaptive diffusion with shrinkage (Eq. 18) and crossover by limbs (Eq. 19)",
+        {"adaptive_diffusion": True, "diffusion_form": "shrink", "crossover": 0.5, "crossover_by": "limbs"},
+    ),
+    "eq13": Variant(
+        "the planned noise of Eq. 13 alone, no crossover", {"adaptive_diffusion": False, "crossover": 0.0}
+    ),
+    "paper": Variant(
+        "Eq. 18 and 19 as Deutscher & Reid write them, half of the particles surviving", _AS_THE_PAPER
+    ),
+    "guided": GUIDED,
+}

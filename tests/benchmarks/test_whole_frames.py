@@ -1,0 +1,75 @@
+"""Whole frames are measured with every stage of them; the table says how far each figure is from its aim."""
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from studio.benchmarks.results_table import in_lines, remember, rows_of, this_machine
+from studio.benchmarks.whole_frames import BODYTRACK, DEFAULT, measure_frames
+from studio.cli.bench_commands import bench_command
+from studio.progress import unheard
+
+
+def stages(figures: dict[str, object]) -> set[tuple[str, str]]:
+    rows = figures["stages"]
+    assert isinstance(rows, list)
+    return {(row["thread"], row["stage"]) for row in rows}
+
+
+def test_a_whole_frame_has_all_its_stages() -> None:
+    figures = measure_frames(DEFAULT, unheard, frames=2).figures()
+    assert (figures["frames"], figures["evaluations"]) == (2, 1000)
+    main = {"search", "refine", "conclude", "wait for the frame"}
+    assert {("MainThread", stage) for stage in main} <= stages(figures)
+    assert {("view", "decode"), ("view", "mask"), ("view", "edges")} <= stages(figures)
+    assert {("next-frame", "prepare"), ("next-frame", "distances"), ("storing", "store")} <= stages(figures)
+    assert 0.0 < figures["quickest_ms"] <= figures["ms"]
+    assert figures["refinement_ms"] > 0.0
+
+
+def test_the_trace_and_the_history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("STUDIO_WORKSPACE", str(tmp_path / "workspace"))
+    monkeypatch.setattr("studio.cli.bench_commands.measure_frames", lambda kind, report: _short(kind))
+    options = ["--workload", BODYTRACK, "--trace", str(tmp_path / "trace.json"), "--json"]
+    answer = CliRunner().invoke(bench_command, options, catch_exceptions=False)
+    document = json.loads(answer.stdout)
+    frame = document["frames"][BODYTRACK]
+    assert frame["evaluations"] == 5000
+    assert not any(stage == "refine" for _, stage in stages(frame))
+    assert [row["name"] for row in document["rows"]] == ["a whole frame of the benchmark's"]
+    names = {
+        event["name"] for event in json.loads((tmp_path / "trace.json").read_text("utf-8"))["traceEvents"]
+    }
+    assert {"decode", "prepare", "search", "conclude", "store"} <= names
+    entry = json.loads(Path(document["history"]).read_text("utf-8"))
+    assert entry["rows"] == document["rows"]
+    assert entry["machine"]["cores"] >= 1
+
+
+def _short(kind: str):
+    return measure_frames(kind, unheard, frames=2)
+
+
+def test_bars_are_full_where_the_aim_is_reached() -> None:
+    document = {
+        "edge_region": {"fraction_of_load_limit": 0.425},
+        "frames": {"default": {"ms": 20.0, "refinement_ms": 10.0}},
+    }
+    rows = {row["name"]: row for row in rows_of(document)}
+    assert [row["reached"] for row in rows.values()] == [0.5, 1.0, 0.5]
+    kernel, frame, refinement = in_lines(list(rows.values()))[1:]
+    assert kernel.endswith("█" * 10 + "░" * 10)
+    assert " 0.42 " in kernel
+    assert frame.endswith("█" * 20)
+    assert "≤ 25 ms" in frame
+    assert refinement.endswith("█" * 10 + "░" * 10)
+
+
+def test_the_history_grows(tmp_path: Path) -> None:
+    place = tmp_path / "there" / "history.jsonl"
+    for reached in (0.5, 0.75):
+        remember(this_machine(), [{"name": "a", "reached": reached}], place)
+    entries = [json.loads(line) for line in place.read_text("utf-8").splitlines()]
+    assert [entry["rows"][0]["reached"] for entry in entries] == [0.5, 0.75]

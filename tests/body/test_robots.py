@@ -1,0 +1,376 @@
+"""Robots as bodies, against MuJoCo's own kinematics and a chain of matrices made of the URDF's text."""
+
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import studio.body.robots as robots
+import studio.synthesis
+from studio.body.catalogue import body_file_text, list_bodies, load_body
+from studio.body.forward_kinematics import limb_ends, marker_points
+from studio.body.model import BodyModel
+from studio.body.reader import parse_body
+from studio.body.robots import THIN, fitted_cone
+from studio.errors import BodyError
+
+ARM = Path(studio.synthesis.__file__).parent / "recipe_files" / "robot_arm.urdf"
+
+GRIPPER = """<robot name="gripper">
+<link name="world_link"/>
+<link name="base-link"><collision><origin xyz="0 0 0.05" rpy="0.2 0.1 0"/>
+  <geometry><cylinder radius="0.04" length="0.1"/></geometry></collision></link>
+<link name="lift"/>
+<link name="left_finger"><visual><geometry><mesh filename="package://nowhere/finger.dae"/></geometry></visual></link>
+<link name="right_finger"><visual><origin xyz="0 0 0.05"/><geometry><sphere radius="0.02"/></geometry></visual></link>
+<link name="tip"/>
+<joint name="weld" type="fixed"><parent link="world_link"/><child link="base-link"/>
+  <origin xyz="0.1 -0.2 0.3" rpy="0.4 -0.3 1.2"/></joint>
+<joint name="rise" type="prismatic"><parent link="base-link"/><child link="lift"/><origin xyz="0 0 0.1" rpy="0.3 0 0"/>
+  <axis xyz="0.6 0 0.8"/><limit lower="-0.05" upper="0.3" velocity="0.25" effort="1"/></joint>
+<joint name="turn" type="continuous"><parent link="lift"/><child link="left_finger"/>
+  <origin xyz="0.05 0.02 0.2" rpy="0 1.5707963267948966 0.7"/><axis xyz="1 -2 2"/></joint>
+<joint name="follow" type="revolute"><parent link="lift"/><child link="right_finger"/><origin xyz="-0.05 0 0.2"/>
+  <axis xyz="-1 0 0"/><limit lower="-3" upper="3" velocity="1" effort="1"/>
+  <mimic joint="turn" multiplier="-1" offset="0.25"/></joint>
+<joint name="end" type="fixed"><parent link="left_finger"/><child link="tip"/><origin xyz="0 0 0.1"/></joint>
+</robot>"""
+
+WALKER = """<mujoco model="walker">
+<compiler angle="degree" eulerseq="zyx"/>
+<default><geom contype="1"/><default class="shin"><geom type="capsule" size="0.03"/></default></default>
+<asset><mesh name="foot" vertex="0 0 0
+  0.2 0 0  0 0.08 0  0.2 0.08 0  0 0 0.05  0.1 0 0.05  0 0.08 0.05  0.1 0.08 0.05"/></asset>
+<worldbody>
+  <geom type="plane" size="1 1 1"/>
+  <body name="table"><geom type="box" size="1 1 0.1"/></body>
+  <body name="cup" pos="0 0 1"><freejoint/><geom type="sphere" size="0.1"/></body>
+  <body name="trunk" pos="0.1 0.2 0.9" euler="10 20 30">
+    <freejoint name="root"/>
+    <geom type="ellipsoid" size="0.1 0.3 0.2"/>
+    <body name="thigh" pos="0.1 0 -0.1" quat="0.5 0.5 0.5 0.5">
+      <joint name="hip_x" axis="1 0 0" range="-40 60" pos="0.01 0.02 0.03"/>
+      <joint name="hip_y" axis="0 -1 0" range="-90 30"/>
+      <joint name="stretch" type="slide" axis="0 1 1" range="0 0.1" ref="0.02"/>
+      <geom type="cylinder" fromto="0 0 0 0.1 0.1 -0.4" size="0.05"/>
+      <site name="scar" pos="0.01 0.02 -0.2"/>
+      <body name="shin" pos="0 0 -0.4" euler="0 90 0">
+        <joint name="knee" axis="1 1 1" range="-120 5" ref="15"/>
+        <geom class="shin" fromto="0 0 0 0 0 -0.4"/>
+        <body pos="0 0 -0.4">
+          <joint name="ankle" type="ball" range="0 60" pos="0 0 0.02"/>
+          <geom type="mesh" mesh="foot"/>
+        </body>
+      </body>
+    </body>
+    <body name="arm" pos="-0.1 0 0.2">
+      <joint name="swing" axis="0 1 0" limited="false"/>
+      <geom type="box" size="0.02 0.2 0.03" euler="0 0 45"/>
+    </body>
+  </body>
+</worldbody>
+<equality><joint joint1="swing" joint2="knee" polycoef="0.1 -1 0 0 0"/></equality>
+</mujoco>"""
+
+
+def written(folder: Path, name: str, text: str) -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def random_poses(body: BodyModel, count: int, seed: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    low = [entry.lower if np.isfinite(entry.lower) else -2.0 for entry in body.parameters]
+    high = [entry.upper if np.isfinite(entry.upper) else 2.0 for entry in body.parameters]
+    # So that the middle one of three turns is no quarter turn, at which they are not unique.
+    return rng.uniform(0.9 * np.array(low), 0.9 * np.array(high), (count, len(low)))
+
+
+def places(text: str, body: BodyModel, poses: np.ndarray, links: dict[str, str]) -> np.ndarray:
+    """(N, K, 3) mm: the origins of links as MuJoCo has them. links : marker to MuJoCo's name."""
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    index = {entry.name: place for place, entry in enumerate(body.parameters)}
+    found = []
+    for pose in poses:
+        for number in range(model.njnt):
+            joint = model.joint(number)
+            at, name = int(model.jnt_qposadr[number]), joint.name.replace("-", "_")
+            kind = int(model.jnt_type[number])
+            if kind in (0, 1) and name and f"{name}_yaw" in index:
+                data.qpos[at : at + 3] = 1e-3 * pose[[index[f"{name}_{axis}"] for axis in "xyz"]]
+                turns = pose[[index[f"{name}_{word}"] for word in ("yaw", "pitch", "roll")]]
+                data.qpos[at + 3 : at + 7] = np.roll(Rotation.from_euler("ZYX", turns).as_quat(), 1)
+            elif kind == 1:
+                turns = pose[[index[f"{name}_turn_{axis}"] for axis in "zyx"]]
+                data.qpos[at : at + 4] = np.roll(Rotation.from_euler("ZYX", turns).as_quat(), 1)
+            elif name in index:
+                data.qpos[at] = pose[index[name]] * (1e-3 if kind == 2 else 1.0)
+        for number in range(model.neq):
+            one, two = (int(model.eq_obj1id[number]), int(model.eq_obj2id[number]))
+            first, second = int(model.jnt_qposadr[one]), int(model.jnt_qposadr[two])
+            moved = data.qpos[second] - model.qpos0[second]
+            data.qpos[first] = (
+                model.qpos0[first] + model.eq_data[number][0] + model.eq_data[number][1] * moved
+            )
+        mujoco.mj_kinematics(model, data)
+        seen = [data.site(name[1:]) if name[0] == "@" else data.body(name) for name in links.values()]
+        found.append(np.array([one.xpos for one in seen]))
+    return 1e3 * np.array(found)
+
+
+def markers(body: BodyModel, poses: np.ndarray, names: list[str]) -> np.ndarray:
+    order = [marker.name for marker in body.markers]
+    return marker_points(body, poses)[:, [order.index(name) for name in names]]
+
+
+def with_masses(urdf: str) -> str:
+    """The URDF as MuJoCo itself reads it: links with masses, nothing fused, no meshes."""
+    root = ElementTree.fromstring(urdf)
+    settings = ElementTree.SubElement(root, "mujoco")
+    ElementTree.SubElement(settings, "compiler", fusestatic="false", boundmass="1", boundinertia="1")
+    for link in root.findall("link"):
+        for part in link.findall("visual"):
+            link.remove(part)
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def test_an_arm_out_of_a_urdf_is_where_mujoco_puts_it() -> None:
+    body = load_body(str(ARM))
+    assert [entry.name for entry in body.parameters] == [f"axis_{number}" for number in range(1, 7)]
+    assert body.parameters[1].lower == pytest.approx(-1.6)
+    assert body.parameters[1].max_step == pytest.approx(2.2, rel=1e-4)
+    assert {entry.limb for entry in body.parameters} == {"column"}
+    poses = random_poses(body, 20, seed=1)
+    links = {
+        name: name for name in ("base", "column", "upper_arm", "elbow", "forearm", "wrist", "flange", "tool")
+    }
+    truth = places(with_masses(ARM.read_text()), body, poses, links)
+    np.testing.assert_allclose(markers(body, poses, list(links)), truth, atol=1e-5)
+
+
+def test_a_urdf_is_where_its_own_matrices_put_it(tmp_path: Path) -> None:
+    path = written(tmp_path, "gripper.urdf", GRIPPER)
+    body = load_body(str(path))
+    assert [entry.name for entry in body.parameters] == ["rise", "turn"]
+    rise, turn = body.parameters
+    assert (rise.kind, rise.lower, rise.upper, rise.max_step) == ("length", -50.0, 300.0, 250.0)
+    assert not np.isfinite(turn.lower)
+    poses = random_poses(body, 20, seed=2)
+    joints = {joint.get("name"): joint for joint in ElementTree.fromstring(GRIPPER).findall("joint")}
+
+    def motion(name: str, value: float) -> np.ndarray:
+        joint, matrix, moved = joints[name], np.eye(4), np.eye(4)
+        origin = joint.find("origin")
+        matrix[:3, 3] = [float(word) for word in origin.get("xyz").split()]
+        matrix[:3, :3] = Rotation.from_euler(
+            "xyz", [float(w) for w in origin.get("rpy", "0 0 0").split()]
+        ).as_matrix()
+        if joint.get("type") != "fixed":
+            axis = np.array([float(word) for word in joint.find("axis").get("xyz").split()])
+            axis /= np.linalg.norm(axis)
+            if joint.get("type") == "prismatic":
+                moved[:3, 3] = value * axis
+            else:
+                moved[:3, :3] = Rotation.from_rotvec(value * axis).as_matrix()
+        return matrix @ moved
+
+    for pose in poses:
+        lift = motion("weld", 0.0) @ motion("rise", 1e-3 * pose[0])
+        left = lift @ motion("turn", pose[1])
+        right = lift @ motion("follow", 0.25 - pose[1])
+        tip = left @ motion("end", 0.0)
+        wanted = 1e3 * np.array([one[:3, 3] for one in (motion("weld", 0.0), lift, left, right, tip)])
+        names = ["base_link", "lift", "left_finger", "right_finger", "tip"]
+        np.testing.assert_allclose(markers(body, pose[None], names)[0], wanted, atol=1e-5)
+        # The sphere's cone has its middle 50 mm along the finger's z.
+        ends = limb_ends(body, pose[None])[0]
+        ball = [limb.name for limb in body.drawn].index("right_finger")
+        np.testing.assert_allclose(
+            ends[ball].mean(axis=0), 1e3 * (right @ [0.0, 0.0, 0.05, 1.0])[:3], atol=1e-5
+        )
+
+
+def test_links_without_geometry_get_the_stated_radius(tmp_path: Path) -> None:
+    body = load_body(str(written(tmp_path, "gripper.urdf", GRIPPER)))
+    lift = [limb for limb in body.limbs if limb.name.startswith("lift")]
+    assert [limb.length for limb in lift] == pytest.approx(
+        [np.hypot(np.hypot(50, 20), 200), np.hypot(50, 200)]
+    )
+    for limb in lift:
+        assert limb.radius_start == pytest.approx(THIN * limb.length, abs=1e-3)
+    source = body.definition.source
+    assert "nowhere/finger.dae" in source
+    assert "without geometry" in source
+    # What was guessed can be fitted, what the file says cannot.
+    assert "lift_1_radius_start" in body.dimensions
+    assert not any(name.startswith("base") for name in body.dimensions)
+
+
+def test_an_mjcf_is_where_mujoco_puts_it(tmp_path: Path) -> None:
+    body = load_body(str(written(tmp_path, "walker.xml", WALKER)))
+    names = [entry.name for entry in body.parameters]
+    assert names == [
+        *(f"root_{word}" for word in ("x", "y", "z", "yaw", "pitch", "roll")),
+        "hip_x", "hip_y", "stretch", "knee", "ankle_turn_z", "ankle_turn_y", "ankle_turn_x",
+    ]  # fmt: skip
+    assert {entry.limb for entry in body.parameters} == {"trunk", "thigh"}
+    assert "table" in body.definition.source
+    assert "cup" in body.definition.source
+    poses = random_poses(body, 20, seed=3)
+    links = {name: name for name in ("trunk", "thigh", "shin", "arm")} | {"scar": "@scar"}
+    truth = places(WALKER, body, poses, links)
+    np.testing.assert_allclose(markers(body, poses, list(links)), truth, atol=1e-5)
+    knee = body.parameters[names.index("knee")]
+    assert (np.degrees(knee.lower), np.degrees(knee.upper)) == pytest.approx((-120.0, 5.0))
+
+
+def test_shapes_have_the_sizes_of_the_geometry(tmp_path: Path) -> None:
+    body = load_body(str(written(tmp_path, "walker.xml", WALKER)))
+    limbs = {limb.name: limb for limb in body.limbs}
+    assert limbs["thigh"].length == pytest.approx(1e3 * np.sqrt(0.1**2 + 0.1**2 + 0.4**2))
+    assert limbs["thigh"].radius_start == pytest.approx(50.0)
+    assert limbs["shin"].length == pytest.approx(400.0 + 4.0 * 30.0 / 3.0)
+
+    def volume(limb) -> float:
+        area = np.pi * limb.scale_x * limb.scale_y
+        mean = (limb.radius_start**2 + limb.radius_start * limb.radius_end + limb.radius_end**2) / 3.0
+        return area * mean * limb.length
+
+    assert limbs["trunk"].length == pytest.approx(600.0)
+    assert volume(limbs["trunk"]) == pytest.approx(4.0 / 3.0 * np.pi * 100.0 * 300.0 * 200.0, rel=1e-4)
+    assert limbs["arm"].length == pytest.approx(400.0)
+    assert volume(limbs["arm"]) == pytest.approx(40.0 * 400.0 * 60.0, rel=1e-4)
+
+
+def test_a_meshs_cone_is_that_of_a_cone() -> None:
+    angle = np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
+    ring = np.stack([0.6 * np.cos(angle), np.sin(angle)], axis=1)
+    low = np.column_stack([np.full(60, -100.0), 40.0 * ring])
+    high = np.column_stack([np.full(60, 200.0), 20.0 * ring])
+    part = fitted_cone(np.vstack([low, high]))
+    assert part is not None
+    np.testing.assert_allclose(part.start, [-100.0, 0.0, 0.0], atol=2.0)
+    np.testing.assert_allclose(part.turn[:, 2], [1.0, 0.0, 0.0])
+    assert part.length == pytest.approx(300.0)
+    wide = [radius * scale for radius in part.radii for scale in sorted(part.scales)]
+    assert wide == pytest.approx([24.0, 40.0, 12.0, 20.0], rel=0.06)
+
+
+def test_a_mesh_beside_the_file_is_found(tmp_path: Path) -> None:
+    (tmp_path / "robot" / "meshes").mkdir(parents=True)
+    (tmp_path / "robot" / "urdf").mkdir()
+    corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 4)]
+    faces = ["1 3 7 5", "2 6 8 4", "1 5 6 2", "3 4 8 7", "1 2 4 3", "5 7 8 6"]
+    lines = [f"v {x} {y} {z}" for x, y, z in corners] + [f"f {face}" for face in faces]
+    (tmp_path / "robot" / "meshes" / "part.obj").write_text("\n".join(lines))
+    mesh = '<mesh filename="package://robot/meshes/part.obj" scale="0.1 0.1 0.1"/>'
+    text = GRIPPER.replace('<sphere radius="0.02"/>', mesh)
+    body = load_body(str(written(tmp_path / "robot" / "urdf", "gripper.urdf", text)))
+    limb = next(limb for limb in body.limbs if limb.name == "right_finger")
+    assert limb.length == pytest.approx(400.0, rel=1e-3)
+    assert limb.radius_start == pytest.approx(100.0 / np.sqrt(np.pi), rel=0.05)
+    ends = limb_ends(body, np.array([[0.0, 0.25]]))[0]
+    place = [one.name for one in body.drawn].index("right_finger")
+    joint = markers(body, np.array([[0.0, 0.25]]), ["right_finger"])[0, 0]
+    middle = np.linalg.norm(ends[place].mean(axis=0) - joint)
+    assert middle == pytest.approx(np.linalg.norm([50.0, 50.0, 250.0]), abs=3.0)
+
+
+def test_it_can_be_saved_as_a_body_file(tmp_path: Path) -> None:
+    path = written(tmp_path, "walker.xml", WALKER)
+    body = load_body(str(path))
+    again = parse_body(body_file_text(str(path)), "walker", "walker.toml")
+    assert again.definition == body.definition
+    poses = random_poses(body, 3, seed=4)
+    np.testing.assert_array_equal(limb_ends(again, poses), limb_ends(body, poses))
+
+
+def test_a_robot_in_a_folder_of_bodies_has_its_name(tmp_path: Path) -> None:
+    written(tmp_path, "walker.xml", WALKER)
+    assert "walker" in list_bodies((tmp_path,))
+    assert load_body("walker", (tmp_path,)).name == "walker"
+    written(tmp_path, "walker.toml", body_file_text(str(ARM)))
+    assert len(load_body("walker", (tmp_path,)).parameters) == 6
+
+
+def test_a_urdf_may_float_in_its_root(tmp_path: Path) -> None:
+    text = GRIPPER.replace('name="weld" type="fixed"', 'name="sway" type="floating"')
+    body = load_body(str(written(tmp_path, "floating.urdf", text)))
+    names = [entry.name for entry in body.parameters]
+    assert names[:6] == [f"sway_{word}" for word in ("x", "y", "z", "yaw", "pitch", "roll")]
+    assert body.definition.joints[0].type == "free"
+    pose = np.array([10.0, 20.0, 30.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    np.testing.assert_allclose(markers(body, pose[None], ["base_link"])[0, 0], pose[:3], atol=1e-9)
+    planar = GRIPPER.replace('name="weld" type="fixed"', 'name="cart" type="planar"')
+    cart = load_body(str(written(tmp_path, "planar.urdf", planar)))
+    assert [entry.kind for entry in cart.parameters][:3] == ["length", "length", "angle"]
+
+
+LOOP = WALKER.replace("<equality>", '<equality><connect body1="shin" body2="arm" anchor="0 0 0"/>')
+STILL = """<robot name="r"><link name="a"/><link name="b"/>
+<joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint></robot>"""
+MILLIMETRES = GRIPPER.replace('<origin xyz="-0.05 0 0.2"/>', '<origin xyz="-50 0 200"/>')
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("loop.xml", LOOP, "closes a chain"),
+        ("still.urdf", STILL, "no joint that moves"),
+        ("large.urdf", MILLIMETRES, "length of 206 m"),
+        ("odd.urdf", "<robot", "cannot be read"),
+        ("odd.xml", "<scene/>", "holds <scene>"),
+        ("two.urdf", GRIPPER.replace('<child link="tip"/>', '<child link="lift"/>'), "cannot be read"),
+        ("nan.urdf", GRIPPER.replace('xyz="0.1 -0.2 0.3"', 'xyz="nan -0.2 0.3"'), "cannot be read|finite"),
+        ("words.urdf", GRIPPER.replace('lower="-0.05"', 'lower="low"'), "cannot be read"),
+        ("empty.xml", "", "cannot be read"),
+        ("inside.urdf", GRIPPER.replace("continuous", "floating"), "floating joint 'turn' inside"),
+    ],
+)
+def test_what_is_no_body_is_refused_in_words(tmp_path: Path, name: str, text: str, words: str) -> None:
+    with pytest.raises(BodyError, match=words) as refused:
+        load_body(str(written(tmp_path, name, text)))
+    assert name in refused.value.message
+    assert refused.value.hint
+
+
+def test_a_joint_that_follows_otherwise_moves_by_itself(tmp_path: Path) -> None:
+    body = load_body(str(written(tmp_path, "g.urdf", GRIPPER.replace('multiplier="-1"', 'multiplier="0.5"'))))
+    assert [entry.name for entry in body.parameters] == ["rise", "turn", "follow"]
+    assert "'follow' follows 'turn'" in body.definition.source
+
+
+def test_without_its_extra_the_error_names_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(robots.importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(BodyError, match="MuJoCo") as refused:
+        load_body(str(written(tmp_path, "g.urdf", GRIPPER)))
+    assert "capture-studio[robots]" in refused.value.hint
+
+
+def test_mujoco_never_enters_this_process(tmp_path: Path) -> None:
+    path = written(tmp_path, "g.urdf", GRIPPER)
+    code = (
+        "import sys; from studio.body.catalogue import load_body; "
+        f"load_body({str(path)!r}); assert 'mujoco' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_reading_leaves_no_file_where_the_studio_was_started(tmp_path: Path) -> None:
+    """MuJoCo appends its warnings to a file in the working directory unless they are taken from it."""
+    path = written(tmp_path, "nan.urdf", GRIPPER.replace('xyz="0.1 -0.2 0.3"', 'xyz="nan -0.2 0.3"'))
+    started = tmp_path / "started"
+    started.mkdir()
+    code = f"from studio.body.catalogue import load_body; load_body({str(path)!r})"
+    ended = subprocess.run(
+        [sys.executable, "-c", code], cwd=started, capture_output=True, text=True, check=False
+    )
+    assert "BodyError" in ended.stderr
+    assert not list(started.iterdir())

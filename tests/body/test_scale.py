@@ -1,0 +1,104 @@
+"""The size of a body beside a person: a person an eighth as large, seen by cameras an eighth as far, is a person."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from studio.body.catalogue import list_bodies, load_body
+from studio.body.dimensions import with_dimensions
+from studio.body.model import BodyModel
+from studio.body.scale import scale_of
+from studio.calibration.silhouette_checks import stature_findings
+from studio.calibration.standing import Posture
+from studio.evaluation.errors import lost_mm
+from studio.evidence.distance_maps import silhouette_distances
+from studio.geometry.camera import Camera
+from studio.runs.initialising import hull_of
+from studio.runs.jumps import jumps_of
+from studio.runs.search_space import default_sigma, search_space
+from studio.runs.tracks import Track
+from studio.trackers.agreement import Agreement
+from studio.trackers.initialisation import first_noise
+from studio.trackers.refinement import RefinementSettings, Refiner
+from studio.volume.body_space import space_of
+from tests.drawn_people import drawn_evidence, ring_of_cameras
+
+EIGHTH = 0.125
+PERSON = load_body("human31")
+CAMERAS = ring_of_cameras(4)
+LENGTHS = np.array([entry.kind == "length" for entry in PERSON.parameters])
+
+
+def shrunk(body: BodyModel, factor: float = EIGHTH) -> BodyModel:
+    assert body.definition is not None
+    entries = body.definition.dimensions
+    lengths = {key: factor * value for key, value in body.dimensions.items() if entries[key].ratio is None}
+    return with_dimensions(body, lengths)
+
+
+def nearer(camera: Camera) -> Camera:
+    return dataclasses.replace(camera, translation=EIGHTH * camera.translation)
+
+
+def smaller(poses: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.where(LENGTHS, EIGHTH * poses, poses)
+
+
+SMALL, NEAR = shrunk(PERSON), tuple(map(nearer, CAMERAS))
+
+
+@pytest.mark.parametrize("name", [name for name in list_bodies() if name not in ("mouse", "hand25")])
+def test_bodies_of_about_a_persons_size_keep_what_was_measured_on_people(name: str) -> None:
+    assert scale_of(load_body(name)) == 1.0
+
+
+def test_a_mouse_and_a_small_person_are_an_eighth() -> None:
+    assert scale_of(load_body("mouse")) == scale_of(SMALL) == EIGHTH
+    assert scale_of(shrunk(load_body("mouse"), 8.0)) == 1.0
+    assert lost_mm(SMALL) == EIGHTH * lost_mm(PERSON)
+
+
+def test_a_small_person_is_refined_and_judged_like_a_large_one() -> None:
+    true = PERSON.neutral
+    evidence = drawn_evidence(PERSON, true, CAMERAS)
+    silhouettes = silhouette_distances(evidence)
+    start = true + np.where(LENGTHS, 25.0, 0.06) * np.random.default_rng(1).standard_normal(len(true))
+    found: list[tuple[NDArray[np.float64], dict[str, float]]] = []
+    for body, cameras, pose in ((PERSON, CAMERAS, start), (SMALL, NEAR, smaller(start))):
+        refined = Refiner(body, cameras, RefinementSettings()).refine(pose, silhouettes).pose
+        found.append((refined, Agreement(body, cameras).of(pose, silhouettes).shares()))
+    np.testing.assert_allclose(found[1][0], smaller(found[0][0]), atol=1e-3)
+    assert found[1][1] == pytest.approx(found[0][1], abs=1e-3)
+    assert max(found[0][1].values()) > 0.01
+
+
+def test_a_small_person_is_sought_in_a_small_space() -> None:
+    large, small = space_of(PERSON, CAMERAS), space_of(SMALL, NEAR)
+    np.testing.assert_allclose(small.lower, EIGHTH * large.lower)
+    np.testing.assert_allclose(small.upper, EIGHTH * large.upper)
+    alone = hull_of(PERSON, CAMERAS[:1], drawn_evidence(PERSON, None, CAMERAS[:1]))[1]
+    near = hull_of(SMALL, NEAR[:1], drawn_evidence(SMALL, None, NEAR[:1]))[1]
+    np.testing.assert_allclose(near.upper, EIGHTH * alone.upper)
+    one, other = (search_space(body, default_sigma(body, 30.0)) for body in (PERSON, SMALL))
+    place = [name.startswith("pelvis_") for name in one.names] & LENGTHS
+    np.testing.assert_allclose(first_noise(other)[place], EIGHTH * first_noise(one)[place])
+
+
+def test_a_leap_of_a_small_person_is_a_leap() -> None:
+    noise = np.random.default_rng(3).normal(0.0, 0.001, (80, len(PERSON.parameters)))
+    poses = np.where(LENGTHS, 0.0, noise) + PERSON.neutral
+    poses[40:, LENGTHS] += 60.0
+    tracks = [
+        Track("raw", np.arange(80), own, np.ones(80), ("tracked",) * 80) for own in (poses, smaller(poses))
+    ]
+    large, small = jumps_of(PERSON, tracks[0]), jumps_of(SMALL, tracks[1])
+    assert [jump.frame for jump in large] == [40]
+    assert [jump.frame for jump in small] == [40]
+
+
+def test_silhouettes_of_a_mouse_are_no_wrong_unit() -> None:
+    seen = [Posture(60.0, 170.0, 0.2, 0.9, 0.3, 0.5, 0.1, 0.4, 0.0)] * 5
+    assert not stature_findings(seen, scale=scale_of(load_body("mouse")))
+    assert stature_findings(seen)

@@ -1,0 +1,155 @@
+"""No page, in no state, has a fault that the accessibility checker (axe) calls serious or critical, light or dark."""
+
+from collections.abc import Iterator
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Browser
+from scene_wire import until
+from studio_page import StudioPage
+from studio_server import StudioServer
+
+pytestmark = pytest.mark.browser
+
+RUN = "/api/sessions/walk/runs/seen"
+FRAMES = 4
+SETTINGS = {"layers": 3, "particles": 40, "recovery": "off"}
+GRAVE = ("serious", "critical")
+OPTIONS = {"resultTypes": ["violations"]}
+# The scene's page is viser's.
+WITHOUT = [["#scene"], ["iframe"]]
+PANELS = ("why", "views", "compare", "cameras", "log", "export")
+STEPS = ("footage", "calibration", "background", "subject", "start-pose", "track", "check", "export")
+PAGES = {
+    "/recording": ".bar",
+    "/comparisons?session=walk&name=small": ".trials",
+    "/comparisons?new&session=walk": ".compare-form",
+    "/behaviours": "#content",
+    "/bodies": ".parts",
+    "/bodies?session=walk&body=mouse": ".parts",
+    "/gallery": ".gallery-card",
+    "/reports": ".nothing",
+    "/guide": "main",
+    "/guide/verbs": "main",
+}
+SET = "async (changes) => (await import('/assets/js/state.js')).set(changes)"
+
+
+@pytest.fixture(scope="module")
+def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudioServer]:
+    """`studio serve` with the sample, a run of it and a comparison."""
+    made = StudioServer("serve", tmp_path_factory.mktemp("axe") / "workspace")
+    made.post("/api/samples", {"name": "walk"})
+    made.post("/api/sessions/walk/runs", {"name": "seen", "last": FRAMES, "settings": SETTINGS})
+    made.post(f"{RUN}/start")
+    made.until(lambda state: state["state"] == "finished")
+    made.post(
+        "/api/comparisons",
+        {
+            "session": "walk",
+            "name": "small",
+            "trackers": [{"name": "annealed"}, {"name": "condensation"}],
+            "evaluations": 60,
+            "layers": 3,
+            "seeds": 2,
+            "last": 3,
+        },
+    )
+    yield made
+    made.stop()
+
+
+@pytest.fixture(scope="module", params=["dark", "light"])
+def window(browser: Browser, studio: StudioServer, request: pytest.FixtureRequest) -> Iterator[StudioPage]:
+    """A window in one of the themes."""
+    opened = StudioPage(browser, studio, with_scene=False)
+    opened.watch.allow(404, "/api/sessions/walk/thumbnail.jpg")
+    if opened.page.evaluate("document.documentElement.dataset.theme") != request.param:
+        opened.page.click("#theme")
+    yield opened
+    opened.close()
+
+
+def check(window: StudioPage, *where: str) -> None:
+    """The checker finds nothing grave on the page as it is; rule, weight and place of what it finds."""
+    # A state is there once what is going on has ended.
+    window.page.wait_for_timeout(300)
+    found = Axe().run(window.page, context={"exclude": WITHOUT}, options=OPTIONS).response["violations"]
+    grave = [
+        f"{rule['id']} ({rule['impact']}) {node['target']}: {node['html'][:160]}"
+        for rule in found
+        if rule["impact"] in GRAVE
+        for node in rule["nodes"]
+    ]
+    assert not grave, "\n".join([" ".join(where), *grave])
+
+
+def test_the_checker_sees_a_fault(window: StudioPage) -> None:
+    window.page.evaluate("document.body.insertAdjacentHTML('beforeend', '<button id=bare></button>')")
+    with pytest.raises(AssertionError, match="button-name"):
+        check(window)
+    window.page.evaluate("document.getElementById('bare').remove()")
+
+
+def test_every_panel_view_and_dialog_of_the_studio(window: StudioPage, studio: StudioServer) -> None:
+    page = window.page
+    page.goto(f"{studio.origin}/?session=walk&run=seen&frame=2")
+    window.until(f"get('summary')?.frames.length === {FRAMES} && get('detail')?.frame === 2")
+    for panel in PANELS:
+        page.click(f"[data-panel={panel}]")
+        until(page, lambda: not page.locator("[aria-busy=true]").count())
+        check(window, "panel", panel)
+    names = [one["name"] for one in studio.get("/api/views")["views"] if one["name"] != "why"]
+    for name in [*names, "frames"]:
+        page.evaluate(SET, {"panel": "views", "view": name, "layer": 1, "parameter": "pelvis_rz"})
+        until(page, lambda: not page.locator("[aria-busy=true]").count())
+        check(window, "view", name)
+    window.key("t")
+    page.locator("#panel-views table").first.wait_for()
+    check(window, "a view as a table")
+    window.key("t")
+    studio.post(f"{RUN}/settings?frame=2", {"survival": 0.55}, method="PATCH")
+    page.locator("#what-if .outcome").wait_for()
+    check(window, "a frame annealed again")
+    page.get_by_role("button", name="Put back", exact=True).click()
+    page.locator("#what-if").wait_for(state="hidden")
+
+    dialog = page.locator("dialog[open]")
+    row = page.locator('.run[data-key="walk/seen"]')
+    for words, act in (
+        ("palette", lambda: page.keyboard.press("Control+k")),
+        ("keys", lambda: window.key("?")),
+        ("new run", lambda: page.locator(".session.open .new-run").click()),
+        ("compare with", lambda: window.choose(row.locator(".more"), "Compare with…")),
+        ("refine", lambda: window.choose(row.locator(".more"), "Refine…")),
+        ("import", lambda: page.click("#import-open")),
+    ):
+        row.hover()
+        act()
+        dialog.wait_for()
+        check(window, words)
+        page.keyboard.press("Escape")
+        dialog.wait_for(state="hidden")
+    row.hover()
+    row.locator(".more").click()
+    check(window, "menu")
+    page.keyboard.press("Escape")
+
+
+def test_every_step_of_the_guided_set_up(window: StudioPage, studio: StudioServer) -> None:
+    for step in STEPS:
+        window.page.goto(f"{studio.origin}/way?session=walk&step={step}")
+        window.page.locator(f"#stepper [data-step={step}][aria-current=step]").wait_for()
+        check(window, "step", step)
+    window.page.goto(f"{studio.origin}/way?new")
+    window.page.locator("form").first.wait_for()
+    check(window, "a new session")
+
+
+def test_every_other_page(window: StudioPage, studio: StudioServer) -> None:
+    done = "/api/comparisons/walk/small"
+    until(window.page, lambda: studio.get(done)["comparison"]["status"] == "done", 120.0)
+    for address, part in PAGES.items():
+        window.page.goto(f"{studio.origin}{address}")
+        window.page.locator(part).first.wait_for()
+        check(window, address)

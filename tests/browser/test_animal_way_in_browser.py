@@ -1,0 +1,246 @@
+"""A mouse, from its raw videos and pictures of a board to a CSV of points, in the browser only (the guide's animal).
+
+The first frames of four videos, pictures of a board, and a person's clicks and strokes; no file is written by hand and
+no command typed. Pictures of every step are kept in STUDIO_ARTEFACTS/animal-way.
+"""
+
+import csv
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import pytest
+from page_watch import PageWatch
+from playwright.sync_api import Browser, Page, expect
+from studio_server import StudioServer
+
+from studio.synthesis.clips import ClipWriter
+
+pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.real_data, pytest.mark.timeout(3600)]
+
+PATIENCE, LONGEST_STEP = 60_000, 900_000
+"""Milliseconds: until the page answers; until a step's work is done."""
+FRAMES = 10
+SIZE = (1280, 1024)
+"""Pixels, width and height."""
+TURNED: tuple[Callable[[float, float], tuple[float, float]], ...] = (
+    lambda x, y: (x, y),
+    lambda x, y: (SIZE[1] - 1 - y, x),
+    lambda x, y: (SIZE[0] - 1 - x, SIZE[1] - 1 - y),
+    lambda x, y: (y, SIZE[0] - 1 - x),
+)
+"""Where a pixel lies after quarter turns clockwise."""
+CAMERAS = ("back", "mid", "side", "top")
+STROKES = Path(__file__).resolve().parents[1] / "real_data" / "mouse_way_strokes.json"
+LOADED = "() => [...document.querySelectorAll('figure.picture img')].every((one) => one.naturalWidth > 0)"
+SIZES = (("light", 1280, 800), ("dark", 1920, 1080))
+APART_MM = {("Nose", "TTI"): (60.0, 130.0), ("Shoulder_left", "Shoulder_right"): (15.0, 40.0)}
+"""Distances of a grown mouse's points (by the footage's proofread points: 85 and 27 mm)."""
+
+
+class Way:
+    """One window that goes the whole way."""
+
+    def __init__(self, page: Page, studio: StudioServer, folder: Path) -> None:
+        self.page, self.studio, self.folder, self.shots = page, studio, folder, 0
+
+    def shoot(self, name: str) -> None:
+        """Keep the step as it looks, in both themes and sizes; nothing is cut off."""
+        self.shots += 1
+        for theme, width, height in SIZES:
+            self.page.set_viewport_size({"width": width, "height": height})
+            self.page.evaluate("theme => { document.documentElement.dataset.theme = theme; }", theme)
+            self.page.wait_for_function(LOADED)
+            self.page.screenshot(path=self.folder / f"{self.shots:02d}-{name}-{theme}.png")
+            assert self.page.evaluate("document.documentElement.scrollWidth <= innerWidth"), name
+
+    def to(self, step: str) -> None:
+        entry = self.page.locator(f"#stepper [data-step={step}]")
+        entry.click()
+        expect(entry).to_have_attribute("aria-current", "step")
+
+    def stands(self, step: str, state: str) -> None:
+        expect(self.page.locator(f"#stepper [data-step={step}]")).to_have_attribute("data-state", state)
+
+    def press(self, name: str) -> None:
+        self.page.locator("#step").get_by_role("button", name=name, exact=True).click()
+
+
+@pytest.fixture(scope="module")
+def raw(real_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What was recorded: the board's pictures, and the first frames of the videos."""
+    mouse = real_data / "mouse"
+    if not mouse.is_dir():
+        pytest.skip("the mouse's footage is not here")
+    folder = tmp_path_factory.mktemp("raw")
+    (folder / "videos").mkdir()
+    (folder / "board").symlink_to(mouse / "board")
+    for name in CAMERAS:
+        with (
+            av.open(str(mouse / "videos" / f"{name}.mp4")) as video,
+            ClipWriter(folder / "videos" / f"{name}.mp4", SIZE, 30.0, 12) as clip,
+        ):
+            for _, frame in zip(range(FRAMES), video.decode(video=0), strict=False):
+                clip.add(frame.to_ndarray(format="bgr24"))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def way(browser: Browser, tmp_path_factory: pytest.TempPathFactory, artefacts: Path) -> Iterator[Way]:
+    """A studio with an empty workspace that may read no folder, and a window on it; the scene is left blank."""
+    studio = StudioServer("serve", tmp_path_factory.mktemp("animal") / "workspace")
+    folder = artefacts / "animal-way"
+    folder.mkdir(parents=True, exist_ok=True)
+    context = browser.new_context(viewport={"width": 1280, "height": 800}, accept_downloads=True)
+    context.set_default_timeout(PATIENCE)
+    expect.set_options(timeout=LONGEST_STEP)
+    page = context.new_page()
+    watch = PageWatch(page, studio.origin)
+    page.route("**/scene/**", lambda route: route.fulfill(body="", content_type="text/html"))
+    page.goto(studio.address)
+    page.goto(f"{studio.origin}/way?new")
+    yield Way(page, studio, folder)
+    context.close()
+    studio.stop()
+    watch.check()
+
+
+def test_footage(way: Way, raw: Path) -> None:
+    page = way.page
+    page.locator("dialog input[name=name]").fill("mouse")
+    page.get_by_role("combobox", name="Who or what is tracked").select_option("mouse")
+    page.click("dialog button.primary")
+    way.stands("footage", "ready")
+    page.set_input_files("input[name=files]", sorted((raw / "videos").glob("*.mp4")))
+    way.press("Add footage")
+    way.stands("footage", "done")
+    way.shoot("footage")
+
+
+def test_calibration_from_pictures_of_a_board(way: Way, raw: Path) -> None:
+    """One folder of pictures a camera gives lenses, places and, by its first picture, the floor."""
+    page = way.page
+    way.to("calibration")
+    page.get_by_role("tab", name="From a board").click()
+    for label, value in (("Columns", "8"), ("Rows", "11"), ("Square mm", "24"), ("Marker mm", "18.75")):
+        page.get_by_label(label, exact=True).fill(value)
+    page.get_by_role("combobox", name="Markers", exact=True).select_option("DICT_4X4_1000")
+    page.get_by_label("Upload a folder").set_input_files((raw / "board").resolve())
+    page.get_by_label("Board on the floor in frame").fill("0")
+    way.press("Calibrate")
+    expect(page.locator(".proposal")).to_contain_text("ChArUco board 8x11")
+    way.shoot("calibration-proposed")
+    way.press("Use this calibration")
+    way.stands("calibration", "done")
+    way.shoot("calibration")
+
+
+def paint(page: Page, stroke: dict[str, Any], turns: int) -> None:
+    """A stroke with the mouse, as wide as it was drawn, on a picture that is shown after so many quarter turns."""
+    size = page.get_by_label("Size of the brush")
+    size.fill(str(stroke["width"]))
+    page.get_by_role("button", name=stroke["kind"].title(), exact=True).click()
+    canvas = page.locator(".strokes-canvas")
+    canvas.scroll_into_view_if_needed()
+    box = canvas.bounding_box()
+    assert box is not None
+    scale = box["width"] / SIZE[turns % 2]
+    upright = [TURNED[turns](x, y) for x, y in stroke["points"]]
+    places = [(box["x"] + scale * (x + 0.5), box["y"] + scale * (y + 0.5)) for x, y in upright]
+    page.mouse.move(*places[0])
+    page.mouse.down()
+    for place in places[1:]:
+        page.mouse.move(*place, steps=4)
+    page.mouse.up()
+
+
+def test_masks_from_strokes(way: Way) -> None:
+    page = way.page
+    strokes = json.loads(STROKES.read_text())["strokes"]
+    turns = {one["name"]: one["quarter_turns"] for one in way.studio.get("/api/sessions/mouse")["cameras"]}
+    way.to("background")
+    page.set_viewport_size({"width": 1920, "height": 1080})
+    page.get_by_role("radio", name="Strokes Anything").check()
+    for name in CAMERAS:
+        page.get_by_role("button", name=f"Paint on {name}").click()
+        page.locator(".strokes-canvas").wait_for()
+        for stroke in strokes:
+            if stroke["camera"] == name:
+                paint(page, stroke, turns[name])
+        page.get_by_role("button", name="Keep", exact=True).first.click()
+        page.locator(".masks .picture").first.wait_for()
+    way.press("Set up the background")
+    shown = page.locator("ul.agree .figure")
+    expect(shown).to_have_count(4)
+    shares = [float(text.removesuffix("%")) / 100.0 for text in shown.all_inner_texts()]
+    print("agreement:", shares)
+    assert min(shares) >= 0.8
+    way.shoot("masks")
+
+
+def test_the_body_is_made_of_the_shipped_mouse(way: Way) -> None:
+    """The shipped mouse is chosen, changed on the page of bodies, and saved as this session's own."""
+    page = way.page
+    way.to("subject")
+    page.get_by_role("combobox", name="Body", exact=True).select_option("mouse")
+    way.press("Take this body")
+    way.stands("subject", "done")
+    way.shoot("subject")
+    page.get_by_role("link", name="Change it, or make one of your own").click()
+    expect(page.get_by_role("heading", level=1)).to_have_text("mouse")
+    ear = page.get_by_label("left ear, length", exact=True)
+    ear.fill("9")
+    ear.press("Tab")
+    expect(page.get_by_label("right ear, length", exact=True)).to_have_value("9")
+    way.shoot("body")
+    page.get_by_role("button", name="Save…").click()
+    page.get_by_label("Name", exact=True).fill("my-mouse")
+    page.get_by_role("button", name="Save", exact=True).click()
+    page.get_by_role("link", name="Go on in the guided set-up").click()
+    way.stands("subject", "done")
+    assert way.studio.get("/api/sessions/mouse")["body"]["name"] == "my-mouse"
+
+
+def test_start_pose(way: Way) -> None:
+    way.to("start-pose")
+    way.press("Find it automatically")
+    way.stands("start-pose", "done")
+    expect(way.page.locator("figure.picture img[alt*='start pose']")).to_have_count(4)
+    way.shoot("start-pose")
+    way.press("Yes, track from here")
+
+
+def test_track_and_check(way: Way) -> None:
+    page = way.page
+    page.locator("#step form button.primary").click()
+    way.stands("track", "done")
+    way.shoot("track")
+    way.to("check")
+    way.press("Check the motion")
+    expect(page.locator(".share-strip button").first).to_be_visible()
+    way.shoot("check")
+
+
+def test_a_csv_of_points_comes_out(way: Way, tmp_path: Path) -> None:
+    page = way.page
+    way.to("export")
+    page.locator(".export .format", has_text=".csv").click()
+    page.locator(".export-actions button.primary").click()
+    way.stands("export", "done")
+    way.shoot("export")
+    with page.expect_download() as waiting:
+        page.locator(".export-files a").first.click()
+    file = tmp_path / waiting.value.suggested_filename
+    waiting.value.save_as(file)
+    with file.open(newline="") as opened:
+        rows = list(csv.DictReader(line for line in opened if not line.startswith("#")))
+    assert len(rows) == FRAMES
+    for (one, other), (least, most) in APART_MM.items():
+        for row in rows:
+            points = np.array(
+                [[float(row[f"{name} {axis} [mm]"]) for axis in "xyz"] for name in (one, other)]
+            )
+            assert least < float(np.linalg.norm(points[0] - points[1])) < most

@@ -1,0 +1,629 @@
+"""The views of a run's search as a person uses them: drawn is what the store has, and one selection moves them all."""
+
+import csv
+import io
+import math
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, expect
+from scene_wire import until
+from studio_page import PATIENCE, StudioPage
+from studio_server import StudioServer
+
+from studio.sessions.workspace import Workspace
+from studio.trackers.tracker import LayerRecord
+
+pytestmark = pytest.mark.browser
+
+RUN = "/api/sessions/walk/runs/seen"
+FRAMES, LAYERS, PARTICLES = 10, 5, 60
+FRAME = 6
+SETTINGS = {"layers": LAYERS, "particles": PARTICLES, "survival": 0.3, "recovery": "off"}
+FIGURE = "#panel-views .figure-chart"
+OPTION = """async (place) => {
+  const echarts = await import('/assets/vendor/echarts.esm.min.js');
+  return echarts.getInstanceByDom(document.querySelector(place))?.getOption().series.map((series) => ({
+    type: series.type, name: series.name, data: JSON.parse(JSON.stringify(series.data ?? [])) })) ?? []; }"""
+SET = "async (changes) => (await import('/assets/js/state.js')).set(changes)"
+PLACE = """async ([place, column, row, plot]) => {
+  const echarts = await import('/assets/vendor/echarts.esm.min.js');
+  const chart = echarts.getInstanceByDom(document.querySelector(place));
+  return chart.convertToPixel({ gridIndex: plot }, [column, row]); }"""
+FOCUS = """(at) => {
+  const all = [...document.querySelectorAll("a[href], button, select, input, [tabindex='0']")];
+  const stops = all.filter((stop) => stop.checkVisibility() && !stop.disabled && !stop.closest("dialog"));
+  const stop = stops[at];
+  if (!stop) return null;
+  if (stop.matches("input:not([type=checkbox]), textarea, [role=tab], [role=slider]:not(#track)")) return "";
+  stop.focus();
+  return document.activeElement === stop ? stop.outerHTML.slice(0, 120) : ""; }"""
+READ_FRAME = "async () => (await import('/assets/js/state.js')).get('frame')"
+HELD = (
+    *("session", "run", "frame", "layer", "limb", "parameter", "particle", "camera", "through", "eye"),
+    *("panel", "view", "over", "second", "towards"),
+)
+
+
+@pytest.fixture(scope="module")
+def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudioServer]:
+    """`studio serve` with the sample, tracked over some frames."""
+    made = StudioServer("serve", tmp_path_factory.mktemp("views") / "workspace")
+    made.post("/api/samples", {"name": "walk"})
+    made.post("/api/sessions/walk/runs", {"name": "seen", "last": FRAMES, "settings": SETTINGS})
+    made.post(f"{RUN}/start")
+    made.until(lambda state: state["state"] == "finished")
+    yield made
+    made.stop()
+
+
+def layers_of(studio: StudioServer) -> list[LayerRecord]:
+    """The stored layers of the frame that is looked at."""
+    with Workspace(studio.workspace).session("walk").run("seen").results() as results:
+        return results.layers(FRAME)
+
+
+def show(window: StudioPage, view: str, **changes: object) -> list[dict]:
+    """Show a view of the frame; what is drawn of it, series by series."""
+    named = {"layer": None, "parameter": None, "limb": None, "particle": None, "over": None, "towards": None}
+    window.until(f"get('run') === 'seen' && get('summary')?.frames.length === {FRAMES} && get('parameters')")
+    window.page.evaluate(SET, {"panel": "views", "view": view, "frame": FRAME} | named | changes)
+    of_run = changes.get("over") == "run" or view in ("coverage", "frames")
+    name = f"walk-seen-{'' if of_run else f'frame{FRAME}-'}{view}"
+    body = window.page.locator("#panel-views .figure-body")
+    until(window.page, lambda: str(body.get_attribute("data-drawn")).startswith(f"{name} dark"))
+    window.page.wait_for_timeout(400)
+    until(
+        window.page,
+        lambda: window.page.locator("#panel-views .figure").get_attribute("aria-busy") != "true",
+    )
+    return window.page.evaluate(OPTION, FIGURE)
+
+
+def rows_of(studio: StudioServer, view: str, table: str, query: str = "", *, run: bool = False) -> list[dict]:
+    """A table of a view's answer, rows by key."""
+    answer = studio.get(f"{RUN}/{'' if run else f'frames/{FRAME}/'}views/{view}{query}")
+    found = next(one for one in answer["tables"] if one["name"] == table)
+    keys = [column["key"] for column in found["columns"]]
+    return [dict(zip(keys, row, strict=True)) for row in found["rows"]]
+
+
+def test_variance_and_schedule_are_drawn_as_stored(window: StudioPage, studio: StudioServer) -> None:
+    layers = layers_of(studio)
+    first, second = [one for one in show(window, "variance") if one["type"] == "heatmap"]
+    weighed = layers[0].variance_weighed
+    for series, moment in ((first, "variance_resampled"), (second, "variance_diffused")):
+        assert len(series["data"]) == LAYERS * len(weighed)
+        for layer, parameter, value in series["data"]:
+            share = getattr(layers[layer], moment)[parameter] / weighed[parameter]
+            assert value == pytest.approx(math.log10(share), abs=1e-9)
+
+    lines = {one["name"]: one["data"] for one in show(window, "schedule") if one["type"] == "line"}
+    assert "reached" in lines
+    series = [one["data"] for one in show(window, "schedule") if one["type"] == "line"]
+    wanted = [
+        [layer.alpha_wanted for layer in layers],
+        [layer.alpha_reached for layer in layers],
+        [layer.beta for layer in layers],
+    ]
+    for numbers in wanted:
+        assert any(
+            len(data) == LAYERS and np.allclose([float(value) for value in data], numbers) for data in series
+        ), numbers
+    drawn = show(window, "schedule", over="run")
+    betas = [row["beta_last"] for row in rows_of(studio, "schedule", "frames", run=True)]
+    assert betas[FRAME] == pytest.approx(layers[-1].beta)
+    assert betas in [one["data"] for one in drawn]
+
+
+def test_particles_and_their_parents_are_drawn_as_stored(window: StudioPage, studio: StudioServer) -> None:
+    layers = layers_of(studio)
+    drawn = show(window, "genealogy")
+    points = next(one for one in drawn if one["type"] == "scatter")["data"]
+    assert len(points) == sum(len(layer.poses) for layer in layers) == LAYERS * PARTICLES
+    survivors = [row for row in rows_of(studio, "genealogy", "particles") if row["survives"] and row["layer"]]
+    ribbons = [one["data"] for one in drawn if one["type"] == "lines"]
+    assert len(survivors) in [len(data) for data in ribbons]
+
+    weights = np.exp(layers[2].beta * (layers[2].log_weights - layers[2].log_weights.max()))
+    weights = np.sort(weights / weights.sum())[::-1]
+    (curve,) = [one for one in show(window, "weights", layer=2) if one["name"] == "weight"]
+    found = [point["value"][1] for point in curve["data"]]
+    assert found == pytest.approx(weights[weights > 0].tolist(), rel=1e-6)
+    assert [point["value"][0] for point in curve["data"]] == list(range(1, len(found) + 1))
+
+    lines = [one["data"] for one in show(window, "survivors", layer=2) if one["type"] == "parallel"]
+    assert sum(len(data) for data in lines) == PARTICLES
+    alive = [row for row in rows_of(studio, "survivors", "particles", "?layer=2") if row["survives"]]
+    assert len(lines[1]) == len(alive) < PARTICLES
+    assert {line["row"]["particle"] for line in lines[1]} == {row["particle"] for row in alive}
+
+
+def test_clouds_couplings_and_modes_are_drawn_as_stored(window: StudioPage, studio: StudioServer) -> None:
+    layers = layers_of(studio)
+    names = list(Workspace(studio.workspace).session("walk").run("seen").record.parameters)
+    at = next(place for place, one in enumerate(names) if "knee" in one)
+    name = names[at]
+    drawn = show(window, "clouds", parameter=name)
+    ridges = [one for one in drawn if one["type"] == "custom" and one["name"] in ("drawn", "1", str(LAYERS))]
+    assert len(ridges) == 3
+    bars = next(one for one in drawn if one["name"] == "first cloud")["data"]
+    own = next(bar["own"] for bar in bars if bar["own"]["parameter"] == name)
+    assert own["mean"] == pytest.approx(float(layers[0].poses[:, at].mean()), abs=1e-9)
+
+    (matrix,) = [one for one in show(window, "coupling", layer=1) if one["type"] == "heatmap"]
+    rows = rows_of(studio, "coupling", "matrix", "?layer=1")
+    assert len(matrix["data"]) == len(names) ** 2
+    assert {round(cell[2], 9) for cell in matrix["data"] if cell[2] != "-"} >= {
+        round(row["correlation"], 9) for row in rows if row["correlation"] is not None
+    }
+    masses = {(row["layer"], row["mode"]): row["mass"] for row in rows_of(studio, "modes", "layers")}
+    for series in show(window, "modes"):
+        for bar in series["data"] if str(series["name"]).startswith("mode ") else []:
+            mode = int(series["name"].removeprefix("mode "))
+            assert bar["value"] == pytest.approx(masses.get((bar["layer"], mode), 0.0))
+
+
+def test_landscape_and_blame_are_what_the_likelihood_says(window: StudioPage, studio: StudioServer) -> None:
+    name = "pelvis_rz"
+    rows = rows_of(studio, "landscape", "slice", f"?parameter={name}")
+    curve = next(one for one in show(window, "landscape", parameter=name) if one["name"] == "log weight")
+    turn = 180.0 / math.pi if rows[0]["unit"] == "rad" else 1.0
+    assert [point[0] for point in curve["data"]] == pytest.approx([row["at"] * turn for row in rows])
+    assert [point[1] for point in curve["data"]] == pytest.approx([row["log_weight"] for row in rows])
+
+    (heat,) = [one for one in show(window, "blame") if one["type"] == "heatmap"]
+    wanted = [row["difference"] for row in rows_of(studio, "blame", "matrix")]
+    assert [cell[2] for cell in heat["data"]] == pytest.approx(wanted)
+
+
+def test_the_run_is_drawn_as_measured(window: StudioPage, studio: StudioServer) -> None:
+    lines = [one["data"] for one in show(window, "frames") if one["type"] == "line"]
+    summary = studio.get(f"{RUN}/frames")["frames"]
+    for key in ("error_mm", "log_weight", "milliseconds"):
+        assert [line[key] for line in summary] in lines
+    points = [one["data"] for one in show(window, "coverage") if one["type"] == "scatter"]
+    rows = rows_of(studio, "coverage", "frames", run=True)
+    assert sum(map(len, points)) == sum((row["spread"] or 0) > 0 and (row["error"] or 0) > 0 for row in rows)
+
+
+def test_a_click_in_one_view_is_followed_by_all(window: StudioPage, studio: StudioServer) -> None:
+    show(window, "variance")
+    page = window.page
+    x, y = page.evaluate(PLACE, [FIGURE, 3, 2, 0])
+    page.locator(FIGURE).click(position={"x": x, "y": y})
+    window.until("get('layer') === 3 && get('parameter') === get('parameters')[2].name")
+    page.locator("#layer-label", has_text=f"layer 4 of {LAYERS}").wait_for()
+    label = window.page.evaluate(
+        "async () => (await import('/assets/js/state.js')).get('parameters')[2].label"
+    )
+    record = layers_of(studio)[3]
+    readout = page.locator("#panel-views .readout")
+    readout.get_by_text(f"{label}, layer 4 of {LAYERS}").wait_for()
+    shown = float(f"{record.variance_resampled[2]:.3g}")
+    assert str(shown) in readout.inner_text() or f"{record.variance_resampled[2]:.1e}".split("e")[0] in (
+        readout.inner_text()
+    )
+    until(page, lambda: "layer=3" in page.url and "parameter=" in page.url)
+    # The next view shows the same layer and parameter.
+    window.key("v")
+    window.until("get('view') === 'schedule' && get('layer') === 3")
+    readout.get_by_text(f"Layer 4 of {LAYERS}: β").wait_for()
+    window.key("Shift+V")
+    window.until("get('view') === 'variance'")
+
+
+def test_every_view_is_used_by_the_keyboard(window: StudioPage, studio: StudioServer) -> None:
+    page = window.page
+    show(window, "variance")
+    names = [one["name"] for one in studio.get("/api/views")["views"] if one["name"] != "why"] + ["frames"]
+    for name in [*names[1:], names[0]]:
+        window.key("v")
+        window.until(f"get('view') === '{name}'")
+    window.key("]")
+    window.until("get('parameter') === get('parameters')[0].name")
+    window.key("[")
+    window.until("get('parameter') === get('parameters').at(-1).name")
+    window.key("t")
+    table = page.locator("#panel-views .figure-words table").first
+    expect(table.locator("caption")).to_have_text(
+        "Variance of every parameter in every layer", timeout=PATIENCE
+    )
+    assert table.locator("thead th[scope=col]").count() == 7
+    row = rows_of(studio, "variance", "layers")[0]
+    cells = table.locator("tbody tr").first.locator("td").all_inner_texts()
+    assert cells[0] == row["parameter"]
+    assert float(cells[4]) == pytest.approx(row["weighed"], rel=1e-8)
+    window.key("t")
+    table.wait_for(state="detached")
+    # By a few letters of its name.
+    page.keyboard.press("Control+k")
+    dialog = page.locator("dialog.palette[open]")
+    dialog.get_by_role("combobox").fill("genea")
+    dialog.locator("[aria-selected=true]", has_text="Genealogy").wait_for()
+    page.keyboard.press("Enter")
+    window.until("get('view') === 'genealogy'")
+    dialog.wait_for(state="detached")
+    page.keyboard.press("Control+k")
+    page.keyboard.press("Escape")
+    dialog.wait_for(state="detached")
+    # The list of views is one stop; its arrows go from view to view, those to the sides stay the timeline's.
+    page.locator(".view-entry[aria-current=true]").focus()
+    page.keyboard.press("ArrowDown")
+    window.until("get('view') === 'weights'")
+    page.keyboard.press("ArrowRight")
+    window.until(f"get('frame') === {FRAME + 1}")
+
+
+@pytest.mark.parametrize("panel", ["why", "views", "compare", "cameras", "log", "export"])
+def test_the_arrows_move_the_timeline_from_every_stop_of_the_keyboard(window: StudioPage, panel: str) -> None:
+    """Fields that are typed in, sliders and the list of tabs keep them."""
+    page = window.page
+    page.bring_to_front()
+    show(window, "variance")
+    if panel == "views":
+        window.key("t")
+    page.click(f"[data-panel={panel}]")
+    window.until(f"get('panel') === '{panel}' && get('frame') === {FRAME}")
+    page.wait_for_timeout(500)
+    stops, at, frame = [], 0, FRAME
+    while True:
+        stop = page.evaluate(FOCUS, at)
+        at += 1
+        if stop is None:
+            break
+        if not stop:
+            continue
+        # There and back, so that the run does not end.
+        key, frame = ("ArrowRight", FRAME + 1) if frame == FRAME else ("ArrowLeft", FRAME)
+        page.keyboard.press(key)
+        moved = page.evaluate(READ_FRAME)
+        assert moved == frame, (stop, key)
+        stops.append(stop)
+    assert len(stops) > 20, stops
+    if panel == "views":
+        window.key("t")
+
+
+def test_a_row_of_a_table_leads_to_what_it_speaks_of(window: StudioPage, studio: StudioServer) -> None:
+    page = window.page
+    show(window, "schedule", over="run")
+    window.key("t")
+    table = page.locator("#panel-views .figure-words table").first
+    link = table.get_by_role("link", name="3", exact=True).first
+    assert "frame=3" in str(link.get_attribute("href"))
+    link.click()
+    window.until("get('frame') === 3 && get('view') === 'schedule'")
+    show(window, "variance")
+    window.key("t")
+    row = table.locator("tbody tr").nth(7)
+    wanted = rows_of(studio, "variance", "layers")[7]
+    link = row.get_by_role("link")
+    assert f"parameter={wanted['parameter']}" in str(link.get_attribute("href"))
+    link.click()
+    window.until(f"get('layer') === {wanted['layer']} && get('parameter') === '{wanted['parameter']}'")
+    # Opened in another window it shows the same.
+    with window.context.expect_page() as coming:
+        link.click(modifiers=["ControlOrMeta"])
+    opened = coming.value
+    until(opened, lambda: f"layer={wanted['layer']}" in opened.url)
+    opened.close()
+    window.key("t")
+
+
+def test_a_view_is_taken_along_with_its_caption(window: StudioPage, studio: StudioServer) -> None:
+    page = window.page
+    show(window, "schedule")
+    answer = studio.get(f"{RUN}/frames/{FRAME}/views/schedule")
+    assert f"frame {FRAME}" in answer["caption"]
+    with page.expect_download() as coming:
+        page.locator("#panel-views").get_by_role("button", name="CSV", exact=True).click()
+    assert coming.value.suggested_filename == f"walk-seen-frame{FRAME}-schedule.csv"
+    text = Path(coming.value.path()).read_text()
+    assert answer["caption"] in text.splitlines()[0]
+    lines = [line for line in text.splitlines() if not line.startswith("#")]
+    written = list(csv.DictReader(io.StringIO("\n".join(lines))))
+    for row, wanted in zip(written, answer["tables"][0]["rows"], strict=True):
+        keys = [column["key"] for column in answer["tables"][0]["columns"]]
+        assert float(row["beta"]) == pytest.approx(wanted[keys.index("beta")])
+    with page.expect_download() as coming:
+        page.locator("#panel-views").get_by_role("button", name="SVG", exact=True).click()
+    drawing = ElementTree.parse(coming.value.path()).getroot()
+    words = "".join(drawing.itertext())
+    assert "Did annealing proceed as asked?" in words
+    assert answer["caption"] in words
+    assert drawing.findall(".//{http://www.w3.org/2000/svg}path")
+    assert window.page.evaluate("document.documentElement.dataset.theme") == "dark"
+
+    page.evaluate("window.print = () => { document.title = document.title + '!'; }")
+    page.locator("#panel-views").get_by_role("button", name="PDF", exact=True).click()
+    until(page, lambda: page.title() == f"walk-seen-frame{FRAME}-schedule!")
+    printed = page.pdf(prefer_css_page_size=True)
+    assert printed.startswith(b"%PDF")
+    assert printed.count(b"/Type /Page\n") in (0, 1)
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert page.locator("#paper").count() == 0
+
+
+@pytest.mark.parametrize(
+    "state",
+    [
+        {"panel": "why"},
+        {"panel": "cameras", "camera": "cam2", "through": "cam3", "frame": 2},
+        {"panel": "views", "view": "variance", "layer": 2, "parameter": "pelvis_rz"},
+        {"panel": "views", "view": "variance", "over": "run", "parameter": "pelvis_rx", "frame": 8},
+        {"panel": "views", "view": "genealogy", "layer": 1, "particle": 17},
+        {"panel": "views", "view": "landscape", "parameter": "pelvis_rz", "second": "pelvis_rx"},
+        {"panel": "views", "view": "landscape", "towards": "truth"},
+        {"panel": "views", "view": "blame", "limb": "left arm", "camera": "cam2"},
+        {"panel": "export", "eye": "1.5,2,1.2,0,0,1"},
+    ],
+    ids=lambda state: "-".join(map(str, state.values())),
+)
+def test_a_copied_address_restores_every_state(
+    browser: Browser, window: StudioPage, studio: StudioServer, state: dict[str, object]
+) -> None:
+    nothing = dict.fromkeys(HELD[3:])
+    window.page.bring_to_front()
+    window.page.evaluate(SET, {"frame": FRAME} | nothing | state)
+    window.page.wait_for_timeout(600)
+    wanted = {name: window.get(name) for name in HELD}
+    assert {name: wanted[name] for name in state} == state
+    query = window.page.url.split("?")[1]
+    fresh = StudioPage(browser, studio, open_at=f"{studio.address}&{query}", with_scene=False)
+    fresh.until(f"get('summary')?.frames.length === {FRAMES} && get('detail')?.frame === get('frame')")
+    fresh.page.wait_for_timeout(400)
+    assert {name: fresh.get(name) for name in HELD} == wanted
+    assert fresh.page.url.split("?")[1] == query
+    fresh.page.reload()
+    fresh.until("get('detail')?.frame === get('frame')")
+    assert {name: fresh.get(name) for name in HELD} == wanted
+    fresh.close()
+
+
+def test_back_and_forward_lead_through_the_states(window: StudioPage) -> None:
+    window.page.bring_to_front()
+    show(window, "variance", layer=1)
+    window.page.wait_for_timeout(500)
+    for panel in ("cameras", "log"):
+        window.page.click(f"[data-panel={panel}]")
+        window.until(f"get('panel') === '{panel}'")
+        window.page.wait_for_timeout(500)
+    window.key("ArrowRight")
+    until(window.page, lambda: f"frame={FRAME + 1}" in window.page.url)
+    window.page.go_back()
+    window.until("get('panel') === 'cameras'")
+    window.page.go_back()
+    window.until(f"get('panel') === 'views' && get('view') === 'variance' && get('frame') === {FRAME}")
+    assert window.get("layer") == 1
+    window.page.go_forward()
+    window.page.go_forward()
+    window.until(f"get('panel') === 'log' && get('frame') === {FRAME + 1}")
+    tab = window.page.locator("#tabs [aria-selected=true]")
+    assert tab.inner_text() == "Log"
+
+
+def test_a_what_if_says_what_it_changes_and_is_discarded(window: StudioPage, studio: StudioServer) -> None:
+    page = window.page
+    page.bring_to_front()
+    show(window, "schedule")
+    studio.post(f"{RUN}/settings?frame={FRAME}", {"survival": 0.55}, method="PATCH")
+    bar = page.locator("#what-if .outcome")
+    bar.wait_for()
+    outcome = window.get("outcome")
+    assert isinstance(outcome, dict)
+    stored = studio.get(f"{RUN}/frames/{FRAME}")
+    line = studio.get(f"{RUN}/frames")["frames"][FRAME]
+    assert outcome["before"]["error_mm"] == pytest.approx(line["error_mm"], rel=1e-6)
+    assert outcome["after"]["error_mm"] != outcome["before"]["error_mm"]
+    assert outcome["stored"]["log_weight"] == pytest.approx(stored["log_weight"])
+    limbs = bar.locator("th").all_inner_texts()
+    assert {"error", "log weight", "evaluations", "time", "left arm", "right leg"} <= set(limbs)
+    assert "→" in page.locator("#frame-label").inner_text()
+    # Both results are outlined in the pictures, and in the charts before stands beside after.
+    page.click("[data-panel=cameras]")
+    until(page, lambda: "beside=" in str(page.locator(".view img").first.get_attribute("src")))
+    drawn = show(window, "schedule")
+    window.until("get('whatIf') !== null")
+    assert {"before", "after"} <= {str(one["name"]) for one in drawn}
+    page.locator("#what-if").get_by_role("button", name="Discard", exact=True).click()
+    window.until("get('whatIf') === null && get('outcome') === null")
+    page.locator("#what-if", has_text="re-annealed").wait_for(state="hidden")
+    assert studio.get(f"{RUN}/frames/{FRAME}") == stored
+    page.get_by_role("button", name="Put back", exact=True).click()
+    page.locator("#what-if").wait_for(state="hidden")
+
+
+def moved_knobs(window: StudioPage) -> dict[str, tuple[object, object]]:
+    """What the page says of knobs that were moved: before and after by label."""
+    moved = window.get("moved") or []
+    assert isinstance(moved, list)
+    return {one["label"]: (one["before"], one["after"]) for one in moved}
+
+
+def test_moved_knobs_are_kept_per_run_until_they_are_put_back(
+    browser: Browser, window: StudioPage, studio: StudioServer
+) -> None:
+    page = window.page
+    page.bring_to_front()
+    studio.post(
+        "/api/sessions/walk/runs", {"name": "beside", "first": 0, "last": 1, "settings": SETTINGS, "seed": 2}
+    )
+    show(window, "schedule")
+    stored = studio.get(f"{RUN}/settings")["values"]
+    studio.post(f"{RUN}/settings?frame={FRAME}", {"survival": 0.5, "particles": 70}, method="PATCH")
+    studio.until(lambda state: state["state"] != "reannealing")
+    wanted = {"survival rate": (SETTINGS["survival"], 0.5), "particles": (PARTICLES, 70)}
+    window.until("get('moved')?.length === 2 && get('whatIf')")
+    assert moved_knobs(window) == wanted
+    bar = page.locator("#what-if")
+    bar.get_by_text("survival rate 0.3 → 0.5, particles 60 → 70.").wait_for()
+    # Another run, back, and a reload: the knobs of this run are as they were left, what was annealed is not stored.
+    page.locator('.run[data-key="walk/beside"]').click()
+    window.until("get('run') === 'beside' && get('moved')?.length === 0")
+    bar.wait_for(state="hidden")
+    studio.post("/api/sessions/walk/runs/beside/open")
+    studio.until(lambda state: state["run"] == "beside")
+    page.go_back()
+    window.until("get('run') === 'seen' && get('moved')?.length === 2")
+    page.reload()
+    window.until("get('moved')?.length === 2")
+    assert moved_knobs(window) == wanted
+    assert window.get("whatIf") is None
+    # So does another browser; it may put them back.
+    fresh = StudioPage(browser, studio, open_at=f"{studio.address}&session=walk&run=seen", with_scene=False)
+    fresh.until("get('moved')?.length === 2")
+    fresh.page.get_by_role("button", name="Put back", exact=True).click()
+    for one in (fresh, window):
+        one.page.bring_to_front()
+        one.until("get('moved')?.length === 0")
+        one.page.locator("#what-if").wait_for(state="hidden")
+    fresh.close()
+    page.bring_to_front()
+    assert studio.get(f"{RUN}/settings")["values"] == stored
+    assert studio.get(f"{RUN}/settings")["moved"] == {}
+
+
+def test_the_views_look_designed(window: StudioPage, artefacts: Path) -> None:
+    page = window.page
+    for theme in ("dark", "light"):
+        for width, height in ((1024, 720), (1280, 800), (1920, 1080), (2560, 1440)):
+            page.set_viewport_size({"width": width, "height": height})
+            for view in ("variance", "clouds") if width in (1024, 2560) else ("genealogy", "blame"):
+                page.evaluate(SET, {"panel": "views", "view": view, "frame": FRAME, "over": None})
+                body = page.locator("#panel-views .figure-body")
+                expect(body).to_have_attribute("data-drawn", re.compile(f"{view} {theme}"), timeout=PATIENCE)
+                page.wait_for_timeout(500)
+                window.shoot(artefacts / f"view-{view}-{theme}-{width}x{height}.png")
+                assert page.evaluate("document.documentElement.scrollWidth") == width
+                assert page.evaluate("document.documentElement.scrollHeight") == height
+        page.click("#theme")
+    page.set_viewport_size({"width": 1280, "height": 800})
+
+
+def test_a_large_picture_follows_the_timeline(window: StudioPage) -> None:
+    page = window.page
+    page.evaluate(SET, {"panel": "cameras", "frame": FRAME})
+    page.locator(".view").nth(1).click()
+    large = page.locator("dialog.large-view img")
+    until(page, lambda: f"/frames/{FRAME}/views/cam2.jpg" in str(large.get_attribute("src")))
+    page.keyboard.press("ArrowRight")
+    window.until(f"get('frame') === {FRAME + 1}")
+    until(page, lambda: f"/frames/{FRAME + 1}/views/cam2.jpg" in str(large.get_attribute("src")))
+    page.keyboard.press("Escape")
+    large.wait_for(state="detached" if not large.count() else "hidden")
+
+
+def test_nothing_that_is_drawn_is_made_up(window: StudioPage, studio: StudioServer) -> None:
+    """What why says stands in the panel, word by word."""
+    window.page.evaluate(SET, {"panel": "why", "frame": FRAME})
+    answer = studio.get(f"{RUN}/frames/{FRAME}/views/why")
+    words = window.page.locator(".why-words")
+    for finding in answer["findings"]:
+        words.get_by_text(finding["words"]).wait_for()
+    rows = rows_of(studio, "why", "limbs", run=True)
+    until(window.page, lambda: bool(window.page.evaluate(OPTION, "#panel-why .figure-chart")))
+    (heat,) = [
+        one for one in window.page.evaluate(OPTION, "#panel-why .figure-chart") if one["type"] == "heatmap"
+    ]
+    assert sorted(cell[2] for cell in heat["data"]) == pytest.approx(sorted(row["error"] for row in rows))
+
+
+def test_stored_runs_are_compared_side_by_side(window: StudioPage, studio: StudioServer) -> None:
+    page = window.page
+    page.bring_to_front()
+    runs = "/api/sessions/walk/runs"
+    for name, survival in (("second", 0.6), ("third", 0.15)):
+        studio.post(
+            runs, {"name": name, "last": FRAMES, "settings": SETTINGS | {"survival": survival}, "seed": 3}
+        )
+        studio.post(f"{runs}/{name}/start")
+        studio.until(lambda state, name=name: state["run"] == name and state["state"] == "finished")
+    window.until("get('sessions')[0].runs.length >= 3 && get('run') === 'seen'")
+    page.locator('.run[data-key="walk/seen"]').hover()
+    window.choose(page.locator('.run[data-key="walk/seen"] .more'), "Compare with…")
+    form = page.locator("dialog form")
+    for name in ("second", "third"):
+        form.locator(f'[name="walk/{name}"]').check()
+    form.get_by_role("button", name="Compare", exact=True).click()
+    window.until("get('panel') === 'compare' && get('compared')?.split(',').length === 2")
+    answer = studio.get("/api/compared-runs?run=walk/seen&run=walk/second&run=walk/third")
+    tables = {table["name"]: table for table in answer["tables"]}
+    figure = "#panel-compare .figure-chart"
+    until(page, lambda: len(page.evaluate(OPTION, figure)) > 6)
+    drawn = page.evaluate(OPTION, figure)
+    keys = [column["key"] for column in tables["curves"]["columns"]]
+    rows = [dict(zip(keys, row, strict=True)) for row in tables["curves"]["rows"]]
+    curves = {name: [row["error"] for row in rows if row["run"] == name] for name in answer["runs"]}
+    for name, curve in curves.items():
+        assert curve in [one["data"] for one in drawn if one["name"] == name]
+    apart = [other - own for own, other in zip(curves["walk/seen"], curves["walk/third"], strict=True)]
+    assert any(
+        np.allclose(one["data"], apart)
+        for one in drawn
+        if one["name"] == "walk/third" and len(one["data"]) == FRAMES
+    )
+    page.locator("#panel-compare").get_by_role("cell", name="survival", exact=True).wait_for()
+    # Their outlines stand in the camera pictures, each in its colour.
+    page.click("[data-panel=cameras]")
+    others = [name.removeprefix("walk/") for name in answer["runs"][1:]]
+    ordered = [name.removeprefix("walk/") for name in str(window.get("compared")).split(",")]
+    assert sorted(ordered) == sorted(others)
+    wanted = f"compared={'%2C'.join(ordered)}"
+    until(page, lambda: wanted in str(page.locator(".view img").first.get_attribute("src")))
+    assert page.locator(".run-colours > span").all_inner_texts() == ["seen", *ordered]
+    page.click("[data-panel=compare]")
+    worst = dict(zip([row[0] for row in tables["worst"]["rows"]], tables["worst"]["rows"], strict=True))
+    page.locator('[data-key="worst-walk/third"]').click()
+    window.until(f"get('frame') === {worst['walk/third'][1]}")
+    page.get_by_role("button", name="walk/third", exact=True).click()
+    window.until("get('run') === 'third' && get('compared') === 'walk/seen,walk/second'")
+    assert window.get("frame") == worst["walk/third"][1]
+    page.go_back()
+    window.until("get('run') === 'seen' && get('compared') === 'walk/third,walk/second'")
+
+
+def test_a_frame_s_seeds_are_searched_and_drawn(window: StudioPage, studio: StudioServer) -> None:
+    page = window.page
+    page.bring_to_front()
+    page.evaluate(SET, {"panel": "views", "view": "seeds", "frame": FRAME, "compared": None})
+    field = page.get_by_label("How many other seeds")
+    field.fill("3")
+    field.press("Tab")
+    page.get_by_role("button", name="Search with other seeds", exact=True).click()
+    page.locator("#panel-views .readout", has_text="Monte-Carlo error").wait_for()
+    rows = rows_of(studio, "seeds", "limbs")
+    drawn = {str(one["name"]): one["data"] for one in page.evaluate(OPTION, FIGURE)}
+    for name, key in (
+        ("within a seed", "within"),
+        ("between seeds", "between"),
+        ("Monte-Carlo error", "error"),
+    ):
+        assert [bar["value"] for bar in drawn[name]] == pytest.approx([row[key] for row in rows])
+    assert len(rows_of(studio, "seeds", "seeds")) >= 3
+
+
+def test_a_new_run_shows_what_it_costs_and_may_only_be_made(window: StudioPage, studio: StudioServer) -> None:
+    page = window.page
+    page.bring_to_front()
+    page.locator(".session.open .new-run").click()
+    form = page.locator("dialog form")
+    assert form.locator("[name=knob-particles]").input_value() == "100"
+    form.get_by_text("1000 evaluations a frame").wait_for()
+    form.locator("[name=knob-particles]").fill("40")
+    form.locator("[name=knob-survival]").fill("0.45")
+    form.locator("[name=knob-survival]").press("Tab")
+    form.get_by_text("400 evaluations a frame").wait_for()
+    form.locator("[name=name]").fill("made")
+    form.locator("[name=last]").fill("4")
+    form.locator("[name=start]").uncheck()
+    form.get_by_role("button", name="Track", exact=True).click()
+    window.until("get('run') === 'made'")
+    made = studio.get("/api/sessions/walk/runs/made")
+    assert (made["settings"]["particles"], made["settings"]["survival"]) == (40, 0.45)
+    assert made["settings"]["layers"] == 10
+    assert studio.get("/api/worker")["run"] != "made"

@@ -1,0 +1,37 @@
+"""`studio view`, from a terminal."""
+
+import csv
+import io
+import json
+from pathlib import Path
+
+from click.testing import CliRunner
+
+from studio.cli.main import main
+from studio.sessions.session import Session
+
+
+def test_a_layer_is_named_as_the_tables_count_it(session_on_disk: Session, tmp_path: Path) -> None:
+    runner = CliRunner()
+    knobs = ["--particles", "20", "--layers", "3", "--set", "constraints=clamp"]
+    assert runner.invoke(main, ["track", "toy", *knobs, "--name", "one", "--frames", "0:2"]).exit_code == 0
+    words = ["view", "toy", "one", "--view", "weights", "--frame", "1"]
+    file = tmp_path / "weights.csv"
+    printed = runner.invoke(main, [*words, "--layer", "3", "--csv", str(file)])
+    assert printed.exit_code == 0, printed.output
+    found = json.loads(runner.invoke(main, [*words, "--layer", "3", "--json"]).stdout)["tables"]
+    indices = {table: [row["layer"] for row in rows] for table, rows in found.items() if "layer" in rows[0]}
+    read = {}
+    for part in file.read_text().split("# ")[2:]:
+        title, *lines = csv.reader(io.StringIO(part))
+        if "layer" in lines[0]:
+            at = lines[0].index("layer")
+            read[title[0].split(":")[0]] = [int(line[at]) for line in lines[1:]]
+    assert read
+    assert read == {table: [index + 1 for index in numbers] for table, numbers in indices.items()}
+    last = runner.invoke(main, [*words, "--json"]).stdout
+    assert json.loads(last)["tables"] == found
+    refused = runner.invoke(main, [*words, "--layer", "4"])
+    assert refused.exit_code == 2
+    assert "no layer 4" in refused.stderr
+    assert "layers 1 to 3" in refused.stderr

@@ -1,0 +1,45 @@
+"""The network that finds a person and cuts him out: the vendored file, and what it sees in rendered pictures."""
+
+import hashlib
+from importlib import resources
+
+import numpy as np
+import pytest
+from rendered_people import Rendered, overlap, rendered_walk
+
+from studio.evidence.person_network import MODEL, PersonNetwork
+
+
+@pytest.fixture(scope="module")
+def network() -> PersonNetwork:
+    return PersonNetwork()
+
+
+@pytest.fixture(scope="module")
+def walk() -> Rendered:
+    return rendered_walk(1)
+
+
+def test_the_vendored_file_is_the_one_that_is_described() -> None:
+    folder = resources.files("studio.evidence") / "models"
+    digest = hashlib.sha256((folder / MODEL).read_bytes()).hexdigest()
+    assert f"SHA-256 {digest} " in (folder / "README.md").read_text()
+    assert "Apache License" in (folder / "pose_landmark_full-LICENSE").read_text()
+
+
+@pytest.mark.parametrize("turns", [0, 1])
+def test_a_person_is_found_and_cut_out(walk: Rendered, network: PersonNetwork, turns: int) -> None:
+    """Also in a picture that has to be turned clockwise by so many quarters to be upright."""
+    camera = walk.cameras[2].name
+    picture = np.ascontiguousarray(np.rot90(walk.pictures[camera, 0], turns))
+    true = np.rot90(walk.masks[camera, 0], turns)
+    found = network.found(picture, turns)
+    assert found
+    mask = found[0].mask(picture)
+    assert mask.shape == picture.shape[:2]
+    assert set(np.unique(mask)) == {0, 255}
+    assert overlap(mask, true) >= 0.9
+
+
+def test_nobody_is_found_in_an_empty_room(walk: Rendered, network: PersonNetwork) -> None:
+    assert network.found(walk.empty[walk.cameras[2].name]) == []

@@ -1,0 +1,202 @@
+"""Every format that the studio reads: where its small valid files come from, and all that reads them."""
+
+import contextlib
+import dataclasses
+import json
+import shutil
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from toy_session import make_session, true_poses
+from tracked_runs import finish
+
+from studio.behaviour.model_file import read_model
+from studio.body.reader import read_body
+from studio.body.robots import read_robot
+from studio.body.subject import Subject, write_subject
+from studio.calibration.floor import clicked_floor, read_clicks
+from studio.capture.calibration_files import find_calibrations, read_calibration, read_intrinsics
+from studio.capture.camera_addresses import camera_address
+from studio.capture.pictures import check_picture, read_picture
+from studio.capture.stream_files import mend_recording
+from studio.capture.timestamps import offsets_from_times, read_timestamps
+from studio.capture.video import VideoReader, measure_video, probe_video
+from studio.errors import StudioError
+from studio.motion_files.c3d import read_c3d
+from studio.motion_files.reading import read_recording
+from studio.motion_files.trc import read_trc
+from studio.runs.new_run import prepare_run
+from studio.runs.session_settings import session_settings
+from studio.runs.tracks import BEST, RAW, read_track, write_track
+from studio.runs.verifying import verify
+from studio.sessions.archives import unpack
+from studio.sessions.importers.bodytrack import read_numbers
+from studio.sessions.live_recordings import read_sets
+from studio.sessions.named_rows import write_pose, write_sigma
+from studio.sessions.run_log import append_to_log, read_log
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+from studio.settings import changed_settings, default_settings
+
+SEEDS = Path(__file__).resolve().parent / "seeds"
+Read = Callable[[Path], object]
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """readers : each is given the folder. files : pattern of those that are malformed. made : fills the folder where
+    its files are not in `seeds`.
+    """
+
+    readers: tuple[Read, ...]
+    files: str = "*"
+    made: Callable[[Path], object] | None = None
+
+    def fill(self, name: str, folder: Path) -> None:
+        """The valid files."""
+        if self.made is None:
+            shutil.copytree(SEEDS / name, folder)
+        else:
+            self.made(folder)
+
+
+def _each(read: Read, pattern: str = "*") -> Read:
+    """Read each file of a folder."""
+
+    def all_of_them(folder: Path) -> None:
+        for path in sorted(folder.glob(pattern)):
+            read(path)
+
+    return all_of_them
+
+
+def _make_session(folder: Path) -> None:
+    """A session with a finished run, a derived track and everything else that is kept as a file."""
+    session = make_session(folder / "toy", 3)
+    changes = {"particles": 5, "layers": 1, "start_repeats": 1}
+    body = session.body()
+    run = prepare_run(session, name="a", start_pose=true_poses()[0], knobs=changes)
+    finish(session, run)
+    write_track(run, dataclasses.replace(read_track(run, RAW), name="smooth", made_by={"verb": "smooth"}))
+    append_to_log(run.folder, "info", "Finished.")
+    names = tuple(entry.name for entry in body.parameters)
+    write_pose(session.path / "start_pose.csv", names, body.neutral)
+    write_sigma(session.path / "sigma.csv", names, np.full(len(names), 0.05), 60.0)
+    write_subject(Subject(session.manifest.body), session.path / "subject.toml")
+    (session.path / "evidence.json").write_text('{"schema": 1, "knobs": {"background_model": "median"}}')
+    verify(session)
+
+
+def _read_session(folder: Path) -> None:
+    """All that a page or a command asks of a session; what is refused does not end it."""
+    session = Session(folder / "toy")
+    for read in (
+        lambda: session.manifest,
+        session.cameras,
+        session.body_with_notes,
+        session.start_pose,
+        session.sigma,
+        lambda: session_settings(session),
+        lambda: session.footage().picture(session.manifest.footage.cameras[0].name, 1),
+        lambda: verify(session),
+        lambda: _read_run(session.run("a")),
+    ):
+        with contextlib.suppress(StudioError):
+            read()
+
+
+def _read_run(run: StoredRun) -> None:
+    for read in (
+        run.summary,
+        run.body,
+        run.cameras,
+        run.behaviour,
+        lambda: read_track(run, "smooth"),
+        lambda: read_track(run, BEST),
+        lambda: read_log(run.folder),
+    ):
+        with contextlib.suppress(StudioError):
+            read()
+    with run.results() as results:
+        results.settings_history()
+        results.timeline()
+        results.partial()
+        results.ended()
+        results.arrivals()
+        for frame in results.frames():
+            results.result(frame)
+            results.layers(frame)
+
+
+def _read_settings(folder: Path) -> None:
+    """The values of knobs, of any type; what is no JSON is a client's matter."""
+    with contextlib.suppress(ValueError, RecursionError):
+        found = json.loads((folder / "settings.json").read_bytes())
+        if isinstance(found, dict):
+            changed_settings(default_settings("annealed", "edge-region"), found)
+
+
+def _read_clicks(folder: Path) -> None:
+    cameras = read_calibration(SEEDS / "toml-calibration" / "cameras.toml").cameras
+    clicked_floor(read_clicks(folder / "clicks.json"), cameras)
+
+
+def _read_video(path: Path) -> None:
+    probe_video(path)
+    reader = VideoReader(path, measure_video(path).frame_count)
+    try:
+        reader.read(1)
+    finally:
+        reader.close()
+
+
+def _unpack(path: Path) -> None:
+    with tempfile.TemporaryDirectory(dir=path.parent.parent) as into:
+        unpack(path, Path(into))
+
+
+CALIBRATION = (_each(read_calibration), _each(read_intrinsics), find_calibrations)
+PICTURE = (_each(read_picture), _each(check_picture))
+
+FORMATS: Mapping[str, Format] = {
+    "toml-calibration": Format(CALIBRATION),
+    "freemocap-calibration": Format(CALIBRATION),
+    "opencv-yaml": Format(CALIBRATION),
+    "opencv-xml": Format(CALIBRATION),
+    "easymocap": Format(CALIBRATION),
+    "bouguet": Format(CALIBRATION),
+    "qualisys": Format(CALIBRATION),
+    "numbers": Format((_each(read_numbers),)),
+    "clicks": Format((_read_clicks,)),
+    "timestamps": Format((_each(lambda path: offsets_from_times(read_timestamps(path))),)),
+    "body": Format((_each(read_body),)),
+    "urdf": Format((_each(read_robot),)),
+    "mjcf": Format((_each(read_robot),)),
+    "acclaim": Format((_each(read_recording, "*.amc"),)),
+    "bvh": Format((_each(read_recording),)),
+    "humanoid-npz": Format((_each(read_recording),)),
+    "trc": Format((_each(read_trc),)),
+    "c3d": Format((_each(read_c3d),)),
+    "png": Format(PICTURE),
+    "jpeg": Format(PICTURE),
+    "bmp": Format(PICTURE),
+    "tiff": Format(PICTURE),
+    "video": Format((_each(_read_video), _each(mend_recording))),
+    "behaviour": Format((_each(read_model),)),
+    "zip": Format((_each(_unpack),)),
+    "tar": Format((_each(_unpack),)),
+    "tar-gz": Format((_each(_unpack),)),
+    "tar-xz": Format((_each(_unpack),)),
+    "take": Format((read_sets,), "live/*"),
+    "log": Format((read_log,)),
+    "settings": Format((_read_settings,)),
+    "address": Format((_each(lambda path: camera_address("cam1", path.read_text("latin-1"), replays=True)),)),
+    "session-record": Format((_read_session,), "toy/session.json", _make_session),
+    "session-files": Format((_read_session,), "toy/*.*", _make_session),
+    "run-record": Format((_read_session,), "toy/runs/a/run.json", _make_session),
+    "run-files": Format((_read_session,), "toy/runs/a/**/*.*", _make_session),
+    "results": Format((_read_session,), "toy/runs/a/results.sqlite", _make_session),
+}

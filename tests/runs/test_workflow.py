@@ -1,0 +1,55 @@
+"""The guided way: how far a session is, and what a change makes stale."""
+
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from studio.body.subject import Subject, write_subject
+from studio.errors import SessionError
+from studio.runs.workflow import workflow_of
+from studio.runs.workflow_setup import subject_step
+from studio.sessions.made_from import note
+from studio.sessions.session import SUBJECT_NAME
+from studio.sessions.workspace import Workspace, begin_session
+
+STEPS = ["footage", "calibration", "background", "subject", "start-pose", "track", "check", "export"]
+
+
+def states(session) -> dict[str, str]:
+    """Step to state."""
+    return {step.step: step.state for step in workflow_of(session).steps}
+
+
+def test_an_empty_session_waits_for_footage(tmp_path):
+    workspace = Workspace(tmp_path)
+    session = begin_session(workspace.place_for("mine"), "My take")
+    way = workflow_of(session)
+    assert [step.step for step in way.steps] == STEPS
+    assert way.next == "footage"
+    assert [step.state for step in way.steps] == ["ready"] + ["blocked"] * 7
+    assert all(step.why for step in way.steps[1:])
+    assert [summary.name for summary in workspace.sessions()] == ["mine"]
+    with pytest.raises(SessionError, match="no footage yet"):
+        session.cameras()
+    with pytest.raises(SessionError, match="no footage yet"):
+        session.footage()
+
+
+def test_a_name_is_taken_once(tmp_path):
+    workspace = Workspace(tmp_path)
+    begin_session(workspace.place_for("mine"))
+    with pytest.raises(SessionError, match="already"):
+        workspace.place_for("mine")
+
+
+def test_a_fitted_subject_is_as_tall_as_its_body_stands_not_as_was_guessed(tmp_path: Path) -> None:
+    session = begin_session(Workspace(tmp_path).place_for("mine"), body="human31")
+    guess = Subject(body="human31", height_mm=1800.0)
+    write_subject(guess, session.path / SUBJECT_NAME)
+    assert subject_step(session).words == "human31, 1.80 m, by height"
+    body = session.body()
+    shorter = {name: 0.95 * body.dimensions[name] for name in ("left_shin_length", "right_shin_length")}
+    write_subject(msgspec.structs.replace(guess, dimensions_mm=shorter), session.path / SUBJECT_NAME)
+    note(session, "subject")
+    assert subject_step(session).words == "human31, 1.78 m, fitted to the footage"

@@ -1,0 +1,108 @@
+// The address is the state: what is open, shown and chosen stands in it, so that reload, back, forward, a copied link and a
+// second window show the same.
+
+import { openSession } from "./sessions.js";
+import { get, set, watch } from "./state.js";
+
+const SETTLE_MILLISECONDS = 200;
+
+const word = { read: (text) => text || null, write: (value) => value };
+const count = { read: (text) => (/^\d{1,9}$/.test(text) ? Number(text) : null), write: String };
+const place = { read: (text) => (/^(-?\d+(\.\d+)?,){5}-?\d+(\.\d+)?$/.test(text) ? text : null), write: (value) => value };
+
+/** A run by its name; "" says that none is open, nothing that the newest is meant. */
+const run = { read: (text) => text || null, write: (value) => value ?? "" };
+
+// Every entry of the state that the address holds. `usual`: what is meant where it is left out. `step`: whether "back" takes a
+// change of it back.
+const HELD = [
+  { name: "session", kind: word, step: true },
+  { name: "run", kind: run, usual: undefined, step: true },
+  { name: "track", kind: word, usual: "raw", step: true },
+  { name: "frame", kind: count },
+  { name: "layer", kind: count },
+  { name: "limb", kind: word },
+  { name: "parameter", kind: word },
+  { name: "particle", kind: count },
+  { name: "camera", kind: word },
+  { name: "through", kind: word, step: true },
+  { name: "eye", kind: place },
+  { name: "panel", kind: word, step: true },
+  { name: "view", kind: word, step: true },
+  { name: "over", kind: word, step: true },
+  { name: "second", kind: word },
+  { name: "towards", kind: word },
+  { name: "compared", kind: word, step: true },
+];
+
+/** @param {{ usual?: string }} entry */
+const usualOf = (entry) => ("usual" in entry ? entry.usual : null);
+
+/** The state that an address holds. @param {string} [query] */
+export function held(query = location.search) {
+  const given = new URLSearchParams(query);
+  return Object.fromEntries(HELD.map((one) => [one.name, given.has(one.name) ? one.kind.read(given.get(one.name)) : usualOf(one)]));
+}
+
+/** The address of the state as it is, with some entries changed: a link to it. @param {Record<string, any>} [changes] */
+export function addressOf(changes = {}) {
+  const query = new URLSearchParams();
+  // A frame that is followed while it is searched is not a place to come back to.
+  const searched = get("follow") && ["tracking", "compiling"].includes(get("work")?.state);
+  for (const one of HELD) {
+    const { name } = one;
+    const value = name in changes ? changes[name] : name === "frame" && searched ? null : get(name);
+    if (value !== usualOf(one)) query.set(name, one.kind.write(value));
+  }
+  return `/?${query}`;
+}
+
+let isDue = false;
+let timer = 0;
+let restoring = true;    // whether what changes now follows from an address that was opened
+
+/** Write the state into the address: as a step of its own where one of its steps changed, else over the last one. */
+function write() {
+  isDue = false;
+  const wanted = addressOf();
+  if (!get("session") || wanted === location.pathname + location.search) { restoring = false; return; }
+  const before = held();
+  if (!restoring && HELD.some(({ name, step }) => step && get(name) !== before[name])) history.pushState(null, "", wanted);
+  else history.replaceState(null, "", wanted);
+  restoring = false;
+}
+
+/** Write once what changes now has changed; @param {number} milliseconds until then. */
+function writeIn(milliseconds) {
+  clearTimeout(timer);
+  timer = window.setTimeout(write, milliseconds);
+}
+
+/** Steps are written at once, so that "back" finds them; what moves with every frame is written when it rests. */
+const writeSoon = () => { if (!isDue) writeIn(SETTLE_MILLISECONDS); isDue = true; };
+const writeNow = () => { isDue = true; writeIn(0); };
+
+/** Show what the address says: the newest run of a session where it names none, the first session where it names none. */
+function read() {
+  restoring = true;
+  const sessions = get("sessions") ?? [];
+  const { session, run: named, ...shown } = held();
+  const first = sessions.find((one) => one.name === session) ?? sessions.find((one) => one.runs.length) ?? sessions[0];
+  if (!first) return;
+  const isThere = first.name === session && (named === null || first.runs.some((one) => one.name === named));
+  const chosen = isThere ? named : undefined;
+  const more = isThere || (first.name === session && named === undefined) ? shown : {};
+  if (first.name === get("session") && chosen === get("run")) {
+    const { frame, ...rest } = more;
+    set({ ...rest, ...(frame === null || frame === undefined ? {} : { frame, follow: false, whatIf: null }) });
+  } else openSession(first.name, chosen, more);
+  writeNow();
+}
+
+/** Open what the address says, and keep it true from then on; called once the sessions are known. */
+export function startAddress() {
+  read();
+  addEventListener("popstate", read);
+  watch([...HELD.filter((one) => !one.step).map((one) => one.name), "follow", "work"], writeSoon);
+  watch(HELD.filter((one) => one.step).map((one) => one.name), writeNow);
+}

@@ -1,0 +1,32 @@
+// Views of a frame whose layers come with the events while it is searched: the same tables as the API's, made of these layers.
+
+import { get } from "./state.js";
+
+const table = (name, title, columns, rows) => ({ name, title, columns: columns.map((key) => ({ key, label: key.replaceAll("_", " "), unit: "" })), rows });
+
+/** Variance: every parameter in every layer, and which layer settled it. */
+function variance(layers, parameters) {
+  const rows = parameters.flatMap(({ name, limb, unit }, at) => layers.map((layer) => [name, limb, unit, layer.layer, layer.variance_weighed[at], layer.variance_resampled[at], layer.variance_diffused[at]]));
+  const settled = parameters.map(({ name, limb, unit }, at) => {
+    const factor = (layer) => (layer.variance_resampled[at] > 0 ? layer.variance_weighed[at] / layer.variance_resampled[at] : 1);
+    const most = layers.reduce((best, layer) => (factor(layer) > factor(best) ? layer : best));
+    const [first, last] = [layers[0].variance_weighed[at], layers.at(-1).variance_resampled[at]];
+    return [name, limb, unit, most.layer, first, last, last > 0 ? first / last : null];
+  });
+  return [table("layers", "Variance of every parameter in every layer", ["parameter", "limb", "unit", "layer", "weighed", "before", "after"], rows),
+    table("settled", "Layer that settled each parameter", ["parameter", "limb", "unit", "layer", "first", "last", "reduction"], settled)];
+}
+
+/** Schedule: exponent and survival of every layer. */
+const schedule = (layers) => [table("layers", "Exponent and survival of every layer", ["layer", "beta", "alpha_wanted", "alpha_reached", "effective", "particles", "best_log_weight", "milliseconds", "alarm"],
+  layers.map((layer) => [layer.layer, layer.beta, layer.alpha_wanted, layer.alpha_reached, layer.effective_share === null ? null : layer.effective_share * layer.particles, layer.particles, layer.best_log_weight, layer.milliseconds, ""]))];
+
+const LIVE = { variance, schedule };
+
+/** A view of the frame in progress; null for those that need its stored result. */
+export function liveView(name) {
+  const detail = get("detail");
+  if (!LIVE[name] || !detail?.layers.length || detail.frame !== get("frame") || !get("parameters")) return null;
+  const state = detail.finished ? "" : ` in progress, ${detail.layers.length} layers`;
+  return { caption: `Session ${get("session")}, run ${get("run")}, frame ${detail.frame}${state}: ${get("summary")?.describe ?? ""}.`, notes: [], tables: LIVE[name](detail.layers, get("parameters")) };
+}

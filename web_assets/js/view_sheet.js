@@ -1,0 +1,209 @@
+// A sheet of drawings: several plots beside and below one another in one chart, so that they are seen, exported and printed
+// together. A drawing function fills one; what of it can be clicked says what it chooses.
+
+import { axis, figure, token } from "./chart_looks.js";
+
+const HEADING = 30, LEGEND = 17;
+const FAMILY = "Inter, system-ui, sans-serif";
+
+/**
+ * @typedef {{ left: number, top: number, width: number, height: number }} Box pixels of the plot itself, without its labels
+ * @typedef {Record<string, any>} Changes of the selection
+ */
+
+const pen = document.createElement("canvas").getContext("2d");
+
+/** A text that takes at most `width` pixels. */
+function shortened(text, width) {
+  if (pen.measureText(text).width <= width) return text;
+  let kept = text;
+  while (kept && pen.measureText(`${kept}…`).width > width) kept = kept.slice(0, -1);
+  return kept.length > 3 ? `${kept.trimEnd()}…` : "";
+}
+
+/** A sheet of `width` pixels that grows with what is put on it. */
+export class Sheet {
+  /** @type {Record<string, any>} */
+  option = { animation: false, title: [], grid: [], xAxis: [], yAxis: [], series: [], visualMap: [], legend: [], tooltip: { trigger: "item" } };
+  /** @type {Map<string, (event: any) => Changes | null>} */
+  clicks = new Map();
+  /** What is called with a place in a plot that is clicked where nothing is. @type {{ box: Box, index: number, act: (x: number, y: number) => Changes | null }[]} */
+  grounds = [];
+  height = 0;
+
+  constructor(width) { this.width = width; }
+
+  /** Columns of equal (or given) shares of the width, each with room for labels at its left. @returns {{ left: number, width: number }[]} */
+  columns(count, { gutters = 58, right = 16, shares = Array(count).fill(1) } = {}) {
+    const rooms = Array.isArray(gutters) ? gutters : Array(count).fill(gutters);
+    const free = this.width - rooms.reduce((sum, one) => sum + one, 0) - right * count;
+    const whole = shares.reduce((sum, one) => sum + one, 0);
+    let left = 0;
+    return shares.map((share, at) => {
+      left += rooms[at];
+      const width = Math.max(40, (free * share) / whole);
+      const made = { left, width };
+      left += width + right;
+      return made;
+    });
+  }
+
+  /**
+   * A plot with its axes. `x`, `y`: ECharts' axes; returns its number, by which series name it.
+   * @param {Box} box
+   * @param {{ title?: string, unit?: string, x: any, y: any, below?: number, names?: string[], over?: (points: any[]) => string, click?: (x: number, y: number) => Changes | null }} more
+   */
+  plot(box, { title = "", unit = "", x, y, below = 34, names = null, over = null, click = null }) {
+    const index = this.option.grid.length;
+    const { left, width } = box;
+    // A legend, and an axis above the plot, take a line each.
+    const lines = (names ? LEGEND : 0) + (x.position === "top" ? LEGEND : 0);
+    const top = box.top + (title ? HEADING : 8) + lines;
+    const height = Math.max(40, box.height - lines);
+    if (title) this.heading(title, unit, left, box.top, width + 12);
+    if (names) this.legend(names, left, box.top + HEADING - 7, width);
+    this.option.grid.push({
+      left, top, width, height, ...(over ? { tooltip: { trigger: "axis", formatter: (points) => over(Array.isArray(points) ? points : [points]) } } : {}),
+    });
+    this.option.xAxis.push(axis({ gridIndex: index, ...x }));
+    this.option.yAxis.push(axis({ gridIndex: index, ...y }));
+    this.height = Math.max(this.height, top + height + below);
+    if (click) this.grounds.push({ box: { left, top, width, height }, index, act: click });
+    return index;
+  }
+
+  /** A heading of a plot. */
+  heading(text, whole, left, top, width = Infinity) {
+    pen.font = `11px ${FAMILY}`;
+    const unit = shortened(whole, width - 1.16 * pen.measureText(text).width - 12);
+    this.option.title.push({
+      left: left - 2, top: top + 6, text: unit ? `{a|${text}}  {b|${unit}}` : `{a|${text}}`, padding: 0,
+      textStyle: { fontWeight: "normal", rich: { a: { color: token("text"), fontWeight: 600, fontSize: 12, fontFamily: FAMILY }, b: { color: token("text-quiet"), fontSize: 11, fontFamily: FAMILY } } },
+    });
+  }
+
+  /** A series in a plot; `click` says what a click on one of its items chooses. */
+  series(plot, { click = null, tip = null, ...more }) {
+    const id = `s${this.option.series.length}`;
+    this.option.series.push({ id, xAxisIndex: plot, yAxisIndex: plot, ...(tip ? { tooltip: { formatter: tip } } : {}), ...(click ? {} : { cursor: "default" }), ...more });
+    if (click) this.clicks.set(id, click);
+    return id;
+  }
+
+  /** A line; `dashed` and `stepped` as they say. */
+  line(plot, name, data, colour, { dashed = false, stepped = false, symbols = true, width = 2, ...more } = {}) {
+    return this.series(plot, {
+      name, type: "line", data, step: stepped ? "middle" : false, symbol: "circle", symbolSize: dashed ? 4 : 6, showSymbol: symbols, connectNulls: false,
+      lineStyle: { color: colour, type: dashed ? "dashed" : "solid", width: dashed ? Math.min(width, 1.5) : width }, itemStyle: { color: colour }, ...more,
+    });
+  }
+
+  /**
+   * A map of cells [column, row, value] on two axes of categories; the colours run from `low` to `high`.
+   * @param {number} plot
+   * @param {{ cells: any[], low: number, high: number, colours?: string[], ends?: [string, string], key?: { left: number, top: number, height?: number }, click?: (event: any) => Changes | null, tip: (event: any) => string, framed?: boolean }} more
+   */
+  heat(plot, { cells, low, high, colours = ["heat-lowest", "heat-low", "heat-middle", "heat-high"], ends = ["", ""], key = null, click = null, tip, framed = true }) {
+    this.series(plot, {
+      type: "heatmap", data: cells, click, tip, progressive: 0, emphasis: { itemStyle: { borderColor: token("text"), borderWidth: 1.5 } },
+      itemStyle: framed ? { borderColor: token("surface"), borderWidth: 1 } : { borderWidth: 0 },
+    });
+    this.option.visualMap.push({
+      type: "continuous", min: low, max: high === low ? low + 1 : high, seriesIndex: this.option.series.length - 1, dimension: 2, calculable: false, show: Boolean(key), orient: "vertical", itemWidth: 9,
+      itemHeight: key?.height ?? 80, left: key?.left, top: key?.top, text: ends, textGap: 4, precision: 2, hoverLink: false,
+      inRange: { color: colours.map(token) }, textStyle: { color: token("text-quiet"), fontSize: 10 },
+    });
+  }
+
+  /** Lines across a plot at values of its axes, each with a word. @param {{ x?: any, y?: any, word?: string, colour?: string, dashed?: boolean }[]} marks */
+  marks(plot, marks) {
+    const shown = marks.filter((one) => (one.x ?? one.y) !== null && (one.x ?? one.y) !== undefined);
+    if (!shown.length) return;
+    // Words of neighbouring lines stand on either side of them.
+    const order = shown.map((one) => one.x).sort((a, b) => a - b);
+    const sides = (x) => (x === order[0] && order.length > 1 ? -1 : 1);
+    this.series(plot, {
+      type: "line", data: [], silent: true, tooltip: { show: false },
+      markLine: {
+        symbol: "none", silent: true, animation: false,
+        data: shown.map(({ x, y, word = "", colour = "text-quiet", dashed = false }) => ({
+          ...(x === undefined ? { yAxis: y } : { xAxis: x }), lineStyle: { color: token(colour), width: 1.4, type: dashed ? "dashed" : "solid", opacity: 0.9 },
+          label: { show: Boolean(word), formatter: word, position: x === undefined ? "insideEndTop" : "end", rotate: 0, align: x === undefined ? "right" : sides(x) < 0 ? "right" : "left", color: token(colour), fontSize: 10, distance: 2 },
+        })),
+      },
+    });
+  }
+
+  /** A frame around a column and a row of categories (by number or name): what is chosen. */
+  chosen(plot, { column = null, row = null }) {
+    const bands = [...(column === null ? [] : [[column, null]]), ...(row === null ? [] : [[null, row]])];
+    if (!bands.length) return;
+    const [x, y] = [this.option.xAxis[plot], this.option.yAxis[plot]];
+    const isMap = this.option.series.some((one) => one.type === "heatmap" && one.xAxisIndex === plot);
+    const place = (axis, value) => (typeof value === "number" || axis.type !== "category" ? value : axis.data.indexOf(value));
+    this.series(plot, {
+      type: "custom", silent: true, z: 6, tooltip: { show: false }, encode: { x: [], y: [] }, data: bands.map((_, at) => [at]),
+      renderItem: ({ coordSys }, api) => {
+        const [across, down] = bands[api.value(0)];
+        const isColumn = down === null;
+        const at = place(isColumn ? x : y, isColumn ? across : down);
+        if (at === undefined || at < 0) return null;
+        const [size, middle] = isColumn ? [api.size([1, 0])[0], api.coord([at, 0])[0]] : [api.size([0, 1])[1], api.coord([0, at])[1]];
+        const room = Math.max(3, size);
+        const shape = isColumn ? { x: middle - room / 2, y: coordSys.y, width: room, height: coordSys.height } : { x: coordSys.x, y: middle - room / 2, width: coordSys.width, height: room };
+        return { type: "rect", shape, style: isMap ? { fill: "none", stroke: token("accent"), lineWidth: 1.5 } : { fill: token("accent"), opacity: 0.2 }, silent: true };
+      },
+    });
+    this.option.series.at(-1).isFrame = true;
+  }
+
+  /** A legend of names of series at a place. */
+  legend(names, left, top, width) {
+    this.option.legend.push({ type: "scroll", width, left, top, data: names, itemWidth: 14, itemHeight: 8, itemGap: 10, padding: 0, textStyle: { color: token("text-quiet"), fontSize: 11 }, pageIconColor: token("text"), pageTextStyle: { color: token("text-quiet") }, pageIconSize: 9 });
+  }
+
+  /** Words in place of a plot that has nothing to draw. */
+  words(text, left, top, width) {
+    this.option.title.push({ left, top, padding: 0, text, textStyle: { color: token("text-quiet"), fontSize: 12, fontWeight: 450, fontFamily: FAMILY, width, overflow: "break", lineHeight: 17 } });
+    this.height = Math.max(this.height, top + 40);
+  }
+}
+
+/** An axis of categories. */
+export const categories = (data, name, /** @type {Record<string, any>} */ more = {}) => ({ type: "category", data, name, nameLocation: "middle", nameGap: 20, splitLine: { show: false }, ...more });
+/** An axis of numbers. */
+export const numbers = (name = "", more = {}) => ({ type: "value", name, nameLocation: "middle", nameGap: 22, scale: true, axisLabel: { formatter: (value) => figure(value) }, ...more });
+/** A logarithmic axis: only where all numbers are above 0. */
+export const logarithmic = (name = "", more = {}) => ({ type: "log", name, nameLocation: "middle", nameGap: 22, axisLabel: { formatter: (value) => figure(value) }, ...more });
+
+/** The rows of a table by key. */
+export const records = (table) => (table?.rows ?? []).map((row) => Object.fromEntries(table.columns.map((column, at) => [column.key, row[at]])));
+
+/** Values in the order of their first appearance. */
+export const distinct = (values) => [...new Set(values)];
+
+/** Rows by the value of a key, in order. @returns {Map<any, any[]>} */
+export function grouped(rows, key) {
+  const groups = new Map();
+  for (const row of rows) {
+    if (!groups.has(row[key])) groups.set(row[key], []);
+    groups.get(row[key]).push(row);
+  }
+  return groups;
+}
+
+/** Least and most of the finite numbers; [0, 1] without any. @returns {[number, number]} */
+export function extent(values) {
+  const finite = values.filter(Number.isFinite);
+  return finite.length ? [Math.min(...finite), Math.max(...finite)] : [0, 1];
+}
+
+/** A value of a pose in the unit of the screen: degrees for radians. */
+export const onScreen = (value, unit) => (unit === "rad" && Number.isFinite(value) ? (value * 180) / Math.PI : value);
+/** The unit of the screen. */
+export const screenUnit = (unit) => (unit === "rad" ? "°" : unit);
+/** A value with its unit, as it is on the screen. */
+export const withUnit = (value, unit) => (Number.isFinite(value) ? `${figure(onScreen(value, unit))}${unit === "rad" ? "°" : unit ? ` ${unit}` : ""}` : "–");
+const plain = (value) => String(value ?? "–").replaceAll("&", "&amp;").replaceAll("<", "&lt;");
+/** Lines of a tooltip: a heading and pairs. @param {[string, any][]} pairs */
+export const tipOf = (heading, pairs) => `<b>${plain(heading)}</b>${pairs.map(([name, value]) => `<br>${plain(name)} <b>${typeof value === "number" ? figure(value) : plain(value)}</b>`).join("")}`;

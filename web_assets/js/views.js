@@ -1,0 +1,224 @@
+// The views of a run's search: a list of them, and the one that is shown, as a figure. Their numbers come from the API; what is
+// clicked in one of them is chosen everywhere.
+
+import { addressOf } from "./address.js";
+import { fetchJson, frameView, post, runView } from "./api.js";
+import { button, byId, element, fill, select as choice } from "./elements.js";
+import { Figure } from "./figure.js";
+import { onEvent } from "./live.js";
+import { liveView } from "./live_views.js";
+import { complain } from "./messages.js";
+import { paced } from "./pacing.js";
+import { followsSearch, isStored, layersShown, select } from "./selection.js";
+import { seedTools, startSeeds } from "./seeds.js";
+import { get, set, watch } from "./state.js";
+import { records } from "./view_sheet.js";
+import { ANSWER_VIEWS } from "./views_answer.js";
+import { SEARCH_VIEWS } from "./views_search.js";
+
+/** @import { Schemas } from "./api_types" */
+
+const LOAD_MILLISECONDS = 120;
+const DRAWINGS = { ...SEARCH_VIEWS, ...ANSWER_VIEWS };
+const OVER_FRAMES = {
+  name: "frames", title: "Over the frames", question: "How did the run go?", uses: [], evaluates: false, is_job: false,
+  columns: [["frame", "Frame", ""], ["error_mm", "Error of the markers", "mm"], ["log_weight", "Log weight", ""], ["milliseconds", "Time", "ms"], ["evaluations", "Evaluations", ""], ["tracking", "The search's own state", ""], ["lost", "Limb lost (truth)", ""]],
+};
+const SELECTED = { layer: "layer", parameter: "parameter", limb: "limb", particle: "particle", camera: "camera", track: "track", second: "second", towards: "towards" };
+const TOWARDS = [["truth", "from estimate to truth"], ["mode", "from estimate to the best particle"], ["mean", "from estimate to the mean"], ["searched", "from refined to searched"], ["particle", "from estimate to the chosen particle"]];
+
+const panel = byId("panel-views");
+const list = element("nav", { className: "view-list", ariaLabel: "Views" });
+const place = element("section", { className: "figure", ariaLabel: "View" });
+/** @type {any[]} */
+let views = [];
+/** @type {Figure} */
+let figure = null;
+/** The newest answer, and what it was asked with. @type {{ key: string, answer: any } | null} */
+let held = null;
+let age = 0;   // rises when what is stored changed
+
+/** All views, for the command palette. */
+export const allViews = () => views;
+/** Show a view. */
+export const showView = (name) => set({ panel: "views", view: name });
+
+const current = () => views.find((one) => one.name === get("view")) ?? views[0];
+const isOfRun = (view) => { const drawing = DRAWINGS[view.name]; return !drawing.frame || (get("over") === "run" && Boolean(drawing.run)); };
+
+/** Label of a parameter; its name where the run is not known yet. */
+export const labelOf = (name) => get("parameters")?.find((one) => one.name === name)?.label ?? name;
+
+/** What a view's numbers depend on, as its address says it; a limb is marked in the drawing, all the others stay in it. */
+function asked(view) {
+  const query = new URLSearchParams();
+  for (const name of view.uses.filter((one) => one !== "limb" && !(view.name === "clouds" && one === "parameter"))) {
+    const value = get(SELECTED[name]);
+    if (value !== null && value !== undefined && !(name === "track" && value === "raw")) query.set(name, String(value));
+  }
+  return String(query);
+}
+
+/** A view's numbers. @returns {Promise<any>} */
+async function numbersOf(view) {
+  if (view.name === "frames") return overFrames();
+  const [session, run, frame] = [get("session"), get("run"), get("frame")];
+  if (isOfRun(view)) return fetchJson(runView(session, run, view.name, asked(view)));
+  const whole = await fetchJson(frameView(session, run, frame, view.name, asked(view)));
+  if (view.name !== "clouds") return whole;
+  // All layers of one parameter stand beside the first and last set of them all.
+  const parameter = get("parameter") ?? mostLearnt(records(whole.tables.find((table) => table.name === "summary")));
+  const query = new URLSearchParams([["parameter", parameter], ...new URLSearchParams(asked(view))]);
+  const own = await fetchJson(frameView(session, run, frame, view.name, String(query)));
+  return { ...whole, tables: [...whole.tables.filter((table) => table.name !== "ridges"), ...own.tables.filter((table) => table.name === "ridges"), ...own.tables.filter((table) => table.name === "summary").map((table) => ({ ...table, name: "own" }))] };
+}
+
+/** The parameter whose cloud became the narrowest beside what it was. */
+function mostLearnt(summary) {
+  const first = new Map();
+  let best = { parameter: summary[0]?.parameter, factor: 0 };
+  for (const row of summary) {
+    if (!first.has(row.parameter)) first.set(row.parameter, row.deviation);
+    else if (row.deviation > 0 && first.get(row.parameter) / row.deviation > best.factor) best = { parameter: row.parameter, factor: first.get(row.parameter) / row.deviation };
+  }
+  return best.parameter;
+}
+
+/** The page's own view of the run's frames. */
+async function overFrames() {
+  const summary = get("summary");
+  const { caption } = await fetchJson(runView(get("session"), get("run"), "schedule"));
+  const columns = OVER_FRAMES.columns.map(([key, label, unit]) => ({ key, label, unit: key === "log_weight" ? summary.score[1] : unit }));
+  return { caption, notes: [], tables: [{ name: "frames", title: "Weight and error by frame", columns, rows: summary.frames.map((line) => columns.map(({ key }) => line[key] ?? null)) }] };
+}
+
+async function load() {
+  if (panel.hidden || !views.length) return;
+  const view = current();
+  if (!get("run") || get("frame") === null || (!get("summary")?.frames.length && !get("detail"))) { held = null; return figure.show(null, "No frames yet: track a run to look into its search."); }
+  if (!isOfRun(view) && (followsSearch() || !isStored())) {
+    held = null;
+    const live = liveView(view.name);
+    if (live) return show(view, live);
+    if (followsSearch() || !get("detail")) return figure.show(null, "The search goes on: this view is drawn of the frame that is chosen, or once the search is paused.");
+  }
+  const key = [get("session"), get("run"), view.name, asked(view), view.name === "clouds" ? get("parameter") : "", age, isOfRun(view) ? get("summary")?.frames.length : get("frame")].join(" ");
+  if (held?.key === key) return figure.refresh();
+  place.ariaBusy = "true";
+  try {
+    const answer = await numbersOf(view);
+    if (current() !== view) return;
+    held = { key, answer };
+    show(view, answer);
+  } catch (error) {
+    if (current() !== view || error.name === "AbortError") return;
+    held = null;
+    figure.show(null, `${error.message} ${error.hint ?? ""}`);
+  } finally { place.ariaBusy = "false"; }
+}
+
+const loadLater = paced(load, LOAD_MILLISECONDS);
+
+/** What a drawing knows beside its tables. */
+const at = (room) => ({
+  layer: get("layer"), limb: get("limb"), parameter: get("parameter"), particle: get("particle"), camera: get("camera"), frame: get("frame"), over: get("over") === "run",
+  layers: Math.max(1, layersShown() || get("layerCount") || 1), label: labelOf, room, whatIf: get("whatIf"), score: get("summary")?.score ?? ["log weight", ""],
+});
+
+function show(view, answer) {
+  const tables = Object.fromEntries(answer.tables.map((table) => [table.name, records(table)]));
+  const main = answer.tables.some((table) => table.rows.length);
+  if (!main) return figure.show({ ...shownOf(view, answer), draw: null }, answer.notes.join(" ") || (view.is_job ? "Nothing computed yet: start it with the button above." : "There are no numbers of this frame."));
+  const drawing = DRAWINGS[view.name];
+  const draw = isOfRun(view) ? drawing.run : drawing.frame;
+  figure.show({ ...shownOf(view, answer), draw: (sheet, room) => draw(sheet, tables, at(room)) });
+}
+
+const shownOf = (view, answer) => ({
+  name: [get("session"), get("run"), ...(isOfRun(view) ? [] : [`frame${get("frame")}`]), view.name].join("-"), title: view.title, question: view.question, caption: answer.caption,
+  notes: answer.notes, tables: answer.tables, draw: null, choose, link: () => addressOf({ frame: get("frame") }),
+});
+
+/** A click in a drawing: what it chooses, or which body it draws beside the answer. */
+function choose(/** @type {Record<string, any>} */ { ghosts, mode, seed, place: _place, ...changes }) {
+  if (ghosts) drawBeside(ghosts);
+  else if (mode !== undefined || seed !== undefined) {
+    const [key, value] = mode === undefined ? ["seed", seed] : ["mode", mode];
+    const row = records(held?.answer.tables.find((table) => table.name === "poses")).find((one) => one[key] === value);
+    if (row && get("parameters")) drawBeside([{ colour: "accent", pose: get("parameters").map(({ name }) => row[name]) }]);
+  } else select(changes);
+}
+
+/** Draw bodies beside the answer in the scene. @param {{ colour: string, pose: number[] }[]} ghosts */
+export const drawBeside = (ghosts) => post("/api/scene/show", { ghosts }).catch(complain);
+
+/** What can be chosen of the view that is shown. */
+function tools() {
+  const view = current();
+  if (!view || !get("run")) return [];
+  const drawing = DRAWINGS[view.name];
+  const made = [];
+  if (drawing.frame && drawing.run) {
+    const scope = (label, over) => button(label, () => set({ over }), "small toggle", { ariaPressed: String((get("over") === "run") === (over === "run")) });
+    made.push(element("div", { className: "group", role: "group", ariaLabel: "Of what" }, scope("This frame", null), scope("Whole run", "run")));
+  }
+  const parameters = get("parameters") ?? [];
+  const offered = parameters.map(({ name, label }) => /** @type {[string, string]} */ ([name, label]));
+  if (view.uses.includes("parameter")) made.push(choice([["", view.name === "landscape" ? "parameter…" : "parameter: chosen for you"], ...offered], get("parameter") ?? "", { ariaLabel: "Parameter", onchange: ({ target }) => select({ parameter: target.value || null }) }));
+  if (view.uses.includes("second")) made.push(choice([["", "one parameter"], ...offered.filter(([name]) => name !== get("parameter"))], get("second") ?? "", { ariaLabel: "Second parameter", onchange: ({ target }) => set({ second: target.value || null }) }));
+  if (view.uses.includes("towards")) made.push(choice([["", get("parameter") ? "along the parameter" : "line: chosen for you"], .../** @type {[string, string][]} */ (TOWARDS)], get("towards") ?? "", { ariaLabel: "Line", onchange: ({ target }) => set({ towards: target.value || null }) }));
+  if (view.name === "seeds") made.push(...seedTools());
+  return made;
+}
+
+function drawList() {
+  const shown = current();
+  fill(list, views.map((view, index) => element("button", {
+    type: "button", className: "view-entry", ariaCurrent: view === shown ? "true" : "false", tabIndex: view === shown ? 0 : -1, title: view.question, dataset: { key: view.name }, onclick: () => set({ view: view.name }),
+  }, element("b", {}, index + 1), view.title)));
+}
+
+/** Up and down go from view to view. */
+function takeArrow(event) {
+  const by = { ArrowDown: 1, ArrowUp: -1 }[event.key];
+  if (!by) return;
+  event.preventDefault();
+  stepView(by);
+  /** @type {HTMLElement} */ (list.querySelector("[aria-current=true]"))?.focus();
+}
+
+/** Show the next view, or (by < 0) the one before. */
+export function stepView(by) {
+  if (!views.length) return;
+  showView(views[(views.indexOf(current()) + by + views.length) % views.length].name);
+}
+
+/** Choose the next parameter, or (by < 0) the one before. */
+export function stepParameter(by) {
+  const names = (get("parameters") ?? []).map((one) => one.name);
+  if (!names.length) return;
+  const next = names.indexOf(get("parameter")) + by;
+  select({ parameter: names[(next + names.length) % names.length] });
+}
+
+/** Show the numbers of the view as a table, or its drawing again. */
+export const toggleTable = () => { if (!panel.hidden) { figure.isTable = !figure.isTable; figure.refresh(); } };
+/** Write the view as something. @param {"svg" | "pdf" | "csv" | "link"} kind */
+export const saveView = (kind) => figure.save(kind);
+
+/** Wire the panel to the state. */
+export function startViews() {
+  fill(panel, list, place);
+  figure = new Figure(place, tools);
+  list.addEventListener("keydown", takeArrow);
+  fetchJson("/api/views").then((answer) => {
+    views = [...answer.views.filter((view) => DRAWINGS[view.name]), OVER_FRAMES];
+    drawList();
+    loadLater();
+  }).catch(complain);
+  watch(["view"], () => { drawList(); figure.isTable = false; });
+  watch(["session", "run", "frame", "layer", "limb", "parameter", "particle", "camera", "track", "over", "second", "towards", "view", "panel", "summary", "whatIf", "parameters", "detail", "follow", "work"], loadLater);
+  onEvent("frame", (event, here) => { if (here && !event.reannealed) age += 1; });
+  startSeeds((ended) => { if (ended) age += 1; figure.refresh(); loadLater(); });
+  document.addEventListener("panel", () => loadLater());
+}

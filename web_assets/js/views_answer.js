@@ -1,0 +1,231 @@
+// Views of the answer: what the likelihood looks like around it, which camera and term pulls where, whether there is a second
+// answer, whether another seed agrees, whether the spread predicts the error; and weight and error over the frames.
+
+import { figure, token } from "./chart_looks.js";
+import { isChosenLimb, limbGroup } from "./selection.js";
+import { layerColour, seriesColour } from "./theme.js";
+import { categories, distinct, extent, grouped, logarithmic, numbers, onScreen, screenUnit, tipOf, withUnit } from "./view_sheet.js";
+
+/** @import { Drawing } from "./views_search.js" */
+
+const nats = (value) => `${figure(value)} nats`;
+const LIMB_ROW = 18;
+const WHOLE = "whole body";
+
+/** Of a line in pose space: a pose at a place of it, from its ends. */
+function poseAt(ends, place, [first, last]) {
+  const share = last === first ? 0 : (place - first) / (last - first);
+  return ends.map((row) => row.from + share * (row.to - row.from));
+}
+
+/** Landscape: the log weight along a line or over two parameters, at each layer's β, by camera and term. */
+function landscape(sheet, { slice, terms, tempered, plane, rug, marks, ends }, at) {
+  const unit = slice[0]?.unit ?? "";
+  const isParameter = Boolean(at.parameter) && unit !== "";
+  const height = Math.max(130, at.room - 76);
+  const x = (name = "") => numbers(name, { scale: true });
+  const nameOf = isParameter ? `${at.label(at.parameter)}, ${screenUnit(unit)}` : "from the estimate (0) to the other pose (1)";
+  const range = extent(slice.map((row) => row.at));
+  const put = (value) => onScreen(value, unit);
+  const back = (value) => (unit === "rad" ? (value * Math.PI) / 180 : value);
+  const ghost = (value) => ({ ghosts: [{ colour: "accent", pose: poseAt(ends, value, range) }], place: value });
+  const markSpots = marks.map((row) => ({ x: put(row.at), word: row.name, colour: row.name === "truth" ? "truth" : row.name === "estimate" ? "text" : "accent" }));
+  if (plane.length) return landscapePlane(sheet, { plane, rug, marks }, at, { unit, height, put });
+  const [one, two, three] = sheet.columns(3, { gutters: [62, 40, 58], shares: [1.4, 1, 1.2] });
+  const main = sheet.plot({ ...one, top: 0, height }, { title: "Log weight", unit: `${nameOf}; a click moves the body there`, x: x(), y: numbers(""), click: (value) => ghost(back(value)), over: (points) => tipOf(`${figure(points[0].axisValue)}${screenUnit(unit)}`, points.filter((point) => point.seriesName === "log weight").map((point) => ["log weight", nats(point.data[1])])) });
+  const finite = slice.filter((row) => Number.isFinite(row.log_weight));
+  const [low, high] = extent(finite.map((row) => row.log_weight));
+  const outside = slice.filter((row) => row.possible === false);
+  if (outside.length) {
+    const edges = [slice.find((row) => row.possible !== false)?.at, slice.findLast((row) => row.possible !== false)?.at];
+    sheet.marks(main, edges.filter((edge) => edge !== undefined && edge !== range[0] && edge !== range[1]).map((edge) => ({ x: put(edge), word: "limit", dashed: true })));
+  }
+  sheet.line(main, "log weight", slice.map((row) => [put(row.at), row.log_weight]), token("accent"), { symbols: false });
+  const own = rug.filter((row) => at.layer === null || row.layer === at.layer);
+  const bounds = extent(slice.map((row) => row.at));
+  sheet.series(main, {
+    name: "particles", type: "scatter", symbol: "rect", symbolSize: [1.5, 9], data: own.filter((row) => row.at >= bounds[0] && row.at <= bounds[1]).map((row) => ({ value: [put(row.at), low - 0.04 * (high - low || 1)], row, itemStyle: { color: layerColour(row.layer, at.layers), opacity: 0.75 } })),
+    click: ({ data }) => ({ layer: data.row.layer, particle: data.row.particle }), tip: ({ data: { row } }) => tipOf(`particle ${row.particle}, layer ${row.layer + 1}`, [["place", isParameter ? withUnit(row.at, unit) : figure(row.at)], ["log weight", nats(row.log_weight)]]),
+  });
+  sheet.marks(main, markSpots);
+
+  const layers = [...grouped(tempered, "layer")];
+  const most = new Map(layers.map(([layer, rows]) => [layer, Math.max(...rows.map((row) => row.density)) || 1]));
+  const beta = sheet.plot({ ...two, top: 0, height }, { title: "At each layer's β", unit: "density, each to its own height", x: x(), y: numbers("", { scale: false, min: 0, max: 1.05, axisLabel: { show: false } }) });
+  for (const [layer, rows] of layers) {
+    sheet.line(beta, `layer ${layer + 1}`, rows.map((row) => ({ value: [put(row.at), row.density / most.get(layer)], row })), layerColour(layer, at.layers), {
+      width: at.layer === layer ? 3 : 1.4, symbols: false, triggerLineEvent: true, click: () => ({ layer }), emphasis: { focus: "series" }, tip: () => tipOf(`layer ${layer + 1}`, [["β", rows[0].beta]]),
+    });
+  }
+  sheet.marks(beta, markSpots.map((one) => ({ ...one, word: "" })));
+
+  const groups = [...grouped(terms.map((row) => ({ ...row, name: [row.camera, row.term].filter(Boolean).join(" · ") })), "name")];
+  const part = sheet.plot({ ...three, top: 0, height }, { title: "By camera and term", unit: "log-likelihood beside its best, nats", names: groups.map(([name]) => name), x: x(), y: numbers("") });
+  groups.forEach(([name, rows], index) => {
+    const best = Math.max(...rows.map((row) => row.value).filter(Number.isFinite));
+    const dim = at.camera !== null && rows[0].camera !== at.camera;
+    sheet.line(part, name, rows.map((row) => [put(row.at), row.value - best]), seriesColour(index), {
+      width: at.camera === rows[0].camera ? 3 : 1.5, symbols: false, triggerLineEvent: true, click: () => (rows[0].camera ? { camera: rows[0].camera } : null), lineStyle: { color: seriesColour(index), width: at.camera === rows[0].camera ? 3 : 1.5, opacity: dim ? 0.25 : 1 }, tip: () => tipOf(name, [["best along the line", nats(best)]]),
+    });
+  });
+  sheet.marks(part, markSpots.map((one) => ({ ...one, word: "" })));
+  const best = finite.reduce((found, row) => (row.log_weight > (found?.log_weight ?? -Infinity) ? row : found), null);
+  return `${best ? `Best along the line: ${nats(best.log_weight)} at ${isParameter ? withUnit(best.at, unit) : figure(best.at)}. ` : ""}${marks.map((row) => `${row.name}: ${nats(row.log_weight)} at ${isParameter ? withUnit(row.at, unit) : figure(row.at)}`).join("; ")}.`;
+}
+
+/** The landscape over two parameters. */
+function landscapePlane(sheet, { plane, rug, marks }, at, { height, put, unit }) {
+  const [one] = sheet.columns(1, { gutters: 70, right: 110 });
+  const [across, down] = [distinct(plane.map((row) => row.at)), distinct(plane.map((row) => row.second))];
+  const [low, high] = extent(plane.map((row) => row.log_weight));
+  const plot = sheet.plot({ ...one, top: 0, height }, { title: "Log weight over two parameters", unit: `${at.label(at.parameter ?? "")}, ${screenUnit(unit)}, and another`, x: categories(across.map((value) => figure(put(value))), at.label(at.parameter ?? "")), y: categories(down.map((value) => figure(value)), "") });
+  sheet.heat(plot, { cells: plane.map((row) => [across.indexOf(row.at), down.indexOf(row.second), row.log_weight ?? "-"]), low, high, framed: false, ends: [figure(high), figure(low)], key: { left: one.left + one.width + 12, top: 40 }, tip: ({ value }) => tipOf(`${figure(put(across[value[0]]))}, ${figure(down[value[1]])}`, [["log weight", nats(value[2])]]) });
+  const nearest = (values, value) => values.reduce((best, one, index) => (Math.abs(one - value) < Math.abs(values[best] - value) ? index : best), 0);
+  const points = (name, rows, colour, size) => sheet.series(plot, { name, type: "scatter", symbolSize: size, itemStyle: { color: token(colour), opacity: 0.8 }, data: rows.filter((row) => Number.isFinite(row.at) && Number.isFinite(row.second)).map((row) => ({ value: [nearest(across, row.at), nearest(down, row.second)], row })), tip: ({ data: { row } }) => tipOf(row.name ?? `particle ${row.particle}`, [["log weight", nats(row.log_weight)]]) });
+  points("particles", rug, "text", 3);
+  points("marks", marks, "accent", 10);
+  return marks.map((row) => `${row.name}: ${nats(row.log_weight)}`).join("; ");
+}
+
+/** Blame: what each camera and term says of each limb, and what the answer would be without it. */
+function blame(sheet, { matrix, left_out: leftOut, areas }, at) {
+  const limbs = distinct(matrix.map((row) => row.limb));
+  const sources = distinct(matrix.map((row) => `${row.camera} · ${row.term}`));
+  const hasReference = matrix.some((row) => row.difference !== null);
+  const key = hasReference ? "difference" : "value";
+  const [low, high] = extent(matrix.map((row) => row[key]));
+  const bound = Math.max(Math.abs(low), Math.abs(high), 1e-9);
+  const height = Math.max(limbs.length * LIMB_ROW, at.room - 110);
+  const [one, two] = sheet.columns(2, { gutters: [124, 190], shares: [1.3, 1], right: 70 });
+  const plot = sheet.plot({ ...one, top: 0, height }, {
+    title: hasReference ? "Pose less reference pose" : "Log-likelihood at the pose", unit: hasReference ? "nats; orange speaks for the pose, blue against it" : "nats", below: 64,
+    x: categories(sources, "", { axisLabel: { interval: 0, rotate: sources.length > 5 ? 28 : 0, fontSize: 10, width: 96, overflow: "truncate" } }), y: categories(limbs, "", { inverse: true, axisLabel: { interval: 0 } }),
+  });
+  const rowOf = new Map(matrix.map((row) => [`${row.camera} · ${row.term}/${row.limb}`, row]));
+  sheet.heat(plot, {
+    cells: matrix.map((row) => [sources.indexOf(`${row.camera} · ${row.term}`), limbs.indexOf(row.limb), row[key] ?? "-"]), ...(hasReference ? { low: -bound, high: bound, colours: ["less", "none", "more"] } : { low, high }),
+    ends: [figure(hasReference ? bound : high), figure(hasReference ? -bound : low)], key: { left: one.left + one.width + 12, top: 40 },
+    click: ({ value }) => { const row = rowOf.get(`${sources[value[0]]}/${limbs[value[1]]}`); return { limb: row.limb === WHOLE ? null : limbGroup(row.limb), camera: row.camera || null }; },
+    tip: ({ value }) => { const row = rowOf.get(`${sources[value[0]]}/${limbs[value[1]]}`); const area = areas.find((one) => one.camera === row.camera && one.limb === row.limb); return tipOf(`${row.limb}: ${sources[value[0]]}`, [["at the pose", nats(row.value)], ["at the reference", nats(row.reference)], ["difference", nats(row.difference)], ...(area ? /** @type {[string, any][]} */ ([["body outside the silhouette", `${figure(area.outside)} mm²`], ["silhouette without body", `${figure(area.bare)} mm²`]]) : [])]); },
+  });
+  for (const limb of limbs) if (at.limb && isChosenLimb(limb, at.limb)) sheet.chosen(plot, { row: limbs.indexOf(limb) });
+  const nameOf = (row) => `${[row.camera, row.term].filter(Boolean).join(" · ") || "all"}, ${row.factor === 0 ? "left out" : `counts ${figure(row.factor)}`}`;
+  const shown = [...leftOut].sort((a, b) => Math.abs(b.change ?? 0) - Math.abs(a.change ?? 0)).slice(0, Math.max(6, Math.floor(height / LIMB_ROW)));
+  const bars = sheet.plot({ ...two, top: 0, height: Math.min(height, Math.max(90, shown.length * 22)) }, { title: "When one counts less", unit: "change of preference for the pose, nats", x: numbers("", { scale: false }), y: categories(shown.map(nameOf), "", { inverse: true, axisLabel: { interval: 0, width: 180, overflow: "truncate" } }) });
+  sheet.series(bars, {
+    type: "bar", barMaxWidth: 12, data: shown.map((row) => ({ value: row.change, row, itemStyle: { color: token((row.change ?? 0) < 0 ? "less" : "more"), opacity: at.camera === null || at.camera === row.camera ? 1 : 0.35 } })),
+    click: ({ data }) => (data.row.camera ? { camera: data.row.camera } : null), tip: ({ data: { row } }) => tipOf(nameOf(row), [["at the pose", nats(row.log_weight)], ["at the reference", nats(row.reference)], ["preference", nats(row.preference)], ["change", nats(row.change)]]),
+  });
+  const [most] = shown;
+  const own = at.limb ? matrix.filter((row) => isChosenLimb(row.limb, at.limb) && (at.camera === null || row.camera === at.camera)) : [];
+  return own.length ? own.map((row) => `${row.limb}, ${row.camera} · ${row.term}: ${nats(row.value)}${row.difference === null ? "" : `, ${figure(row.difference)} beside the reference`}`).slice(0, 4).join("; ") : most ? `${nameOf(most)}: the preference for the pose changes by ${nats(most.change)}.` : "";
+}
+
+/** Modes of a frame: the share of the weight that each cluster of the particles holds, layer by layer. */
+function modesOfFrame(sheet, { modes, layers: rows }, at) {
+  const [one, two] = sheet.columns(2, { gutters: [52, 60], shares: [1.5, 1], right: 20 });
+  const height = Math.max(120, at.room - 76);
+  const names = distinct(rows.map((row) => row.layer)).sort((a, b) => a - b);
+  const numbersOf = distinct([...modes, ...rows].map((row) => row.mode));
+  const plot = sheet.plot({ ...one, top: 0, height }, { title: "Share of the weight", unit: "of each mode, layer by layer", names: numbersOf.map((mode) => `mode ${mode}`), x: categories(names.map((layer) => String(layer + 1)), "layer"), y: numbers("", { scale: false, min: 0, max: 1 }) });
+  numbersOf.forEach((mode, index) => {
+    sheet.series(plot, {
+      name: `mode ${mode}`, type: "bar", stack: "mass", barMaxWidth: 34, itemStyle: { color: seriesColour(index) }, data: names.map((layer) => { const row = rows.find((entry) => entry.layer === layer && entry.mode === mode); return { value: row?.mass ?? 0, row, layer }; }),
+      click: ({ data }) => ({ layer: data.layer }), tip: ({ data }) => tipOf(`mode ${mode}, layer ${data.layer + 1}`, [["share", `${figure(100 * data.value)} %`], ["particles", data.row?.particles ?? 0]]),
+    });
+  });
+  sheet.chosen(plot, { column: at.layer === null ? null : String(at.layer + 1) });
+  const bars = sheet.plot({ ...two, top: 0, height }, { title: "Last layer", unit: "share of the weight; a click draws that mode's body", x: categories(modes.map((row) => String(row.mode)), "mode"), y: numbers("", { scale: false, min: 0, max: 1 }) });
+  sheet.series(bars, {
+    type: "bar", barMaxWidth: 40, data: modes.map((row) => ({ value: row.mass ?? null, row, itemStyle: { color: seriesColour(numbersOf.indexOf(row.mode)) } })), click: ({ data }) => ({ mode: data.row.mode }),
+    tip: ({ data: { row } }) => tipOf(`mode ${row.mode}`, Object.entries(row).filter(([name]) => name !== "mode").map(([name, value]) => [name.replaceAll("_", " "), value])),
+  });
+  return modes.length > 1 ? `${modes.length} modes: ${modes.map((row) => `mode ${row.mode} holds ${figure(100 * (row.mass ?? 0))} %`).join(", ")}.` : "One mode: the particles agree about one pose.";
+}
+
+/** Modes of the run: how many there are in each frame, and how far apart. */
+function modesOfRun(sheet, { frames: rows }, at) {
+  const places = sheet.columns(3, { gutters: 52 });
+  const height = Math.max(110, at.room - 76);
+  const names = rows.map((row) => String(row.frame));
+  for (const [column, title, unit, key, more] of /** @type {const} */ ([[0, "Modes", "clusters of the last set", "modes", { min: 0 }], [1, "Heaviest mode", "share of the weight", "first_mass", { min: 0, max: 1 }], [2, "Distance", "of the two heaviest, mm", "distance", { min: 0 }]])) {
+    const plot = sheet.plot({ ...places[column], top: 0, height }, { title, unit, x: categories(names, "frame"), y: numbers("", { scale: false, ...more }), over: (points) => tipOf(`frame ${points[0].axisValue}`, [[title, points[0].data], ["farthest limb", rows[points[0].dataIndex]?.farthest]]) });
+    sheet.line(plot, title, rows.map((row) => row[key]), token("accent"), { symbols: rows.length < 60, triggerLineEvent: true, click: ({ dataIndex }) => (dataIndex === undefined ? null : { frame: rows[dataIndex].frame }), stepped: key === "modes" });
+    sheet.chosen(plot, { column: String(at.frame) });
+  }
+  const row = rows.find((one) => one.frame === at.frame);
+  return row ? `Frame ${row.frame}: ${row.modes} ${row.modes === 1 ? "mode" : "modes"}, the heaviest holds ${figure(100 * row.first_mass)} %${row.distance ? `, the next is ${figure(row.distance)} mm away, farthest in ${row.farthest}` : ""}.` : "";
+}
+
+/** Seeds: what differs within a seed and between them, and whose particles lie where among all. */
+function seeds(sheet, { limbs, seeds: rows, ranks }, at) {
+  const [one, two, three] = sheet.columns(3, { gutters: [124, 54, 54], shares: [1.2, 1, 1.2], right: 18 });
+  const height = Math.max(limbs.length * LIMB_ROW, at.room - 76);
+  const names = limbs.map((row) => row.limb);
+  const plot = sheet.plot({ ...one, top: 0, height }, { title: "Spread", unit: "mm", names: ["within a seed", "between seeds", "Monte-Carlo error"], x: numbers("", { scale: false }), y: categories(names, "", { inverse: true, axisLabel: { interval: 0 } }) });
+  for (const [name, key, colour] of [["within a seed", "within", "text-quiet"], ["between seeds", "between", "series-1"], ["Monte-Carlo error", "error", "accent"]]) {
+    sheet.series(plot, { name, type: "bar", barMaxWidth: 7, barGap: "10%", itemStyle: { color: token(colour) }, data: limbs.map((row) => ({ value: row[key], row })), click: ({ data }) => ({ limb: data.row.limb }), tip: ({ data: { row } }) => tipOf(row.limb, [["within a seed", `${figure(row.within)} mm`], ["between seeds", `${figure(row.between)} mm`], ["Monte-Carlo error of one seed", `${figure(row.error)} mm`], ["R̂", row.r_hat]]) });
+  }
+  sheet.chosen(plot, { row: at.limb && names.includes(at.limb) ? names.indexOf(at.limb) : null });
+  const bars = sheet.plot({ ...two, top: 0, height }, { title: "Each seed's log weight", unit: "nats", x: categories(rows.map((row) => String(row.seed)), "seed"), y: numbers("") });
+  sheet.series(bars, { type: "scatter", symbolSize: 9, data: rows.map((row, index) => ({ value: [String(row.seed), row.log_weight], row, itemStyle: { color: seriesColour(index) } })), click: ({ data }) => ({ seed: data.row.seed }), tip: ({ data: { row } }) => tipOf(`seed ${row.seed}`, [["log weight", nats(row.log_weight)], ["error", row.error === null ? "–" : `${figure(row.error)} mm`], ["evaluations", row.evaluations]]) });
+  const chosen = distinct(ranks.map((row) => row.parameter)).find((name) => name === at.parameter) ?? ranks[0]?.parameter;
+  const own = ranks.filter((row) => row.parameter === chosen);
+  const rank = sheet.plot({ ...three, top: 0, height }, { title: `Ranks: ${chosen ? at.label(chosen) : ""}`, unit: "of each seed's particles among all; level where seeds agree", x: categories(distinct(own.map((row) => row.bin)).map((bin) => String(bin + 1)), "bin of rank"), y: numbers("", { scale: false, min: 0 }) });
+  [...grouped(own, "seed")].forEach(([seed, entries], index) => { sheet.line(rank, `seed ${seed}`, entries.map((row) => row.count), seriesColour(index), { stepped: true, symbols: false, tip: () => tipOf(`seed ${seed}`, []) }); });
+  if (own.length) sheet.marks(rank, [{ y: own[0].expected, word: "expected", dashed: true }]);
+  const row = limbs.find((entry) => entry.limb === at.limb) ?? limbs.reduce((worst, entry) => ((entry.error ?? 0) > (worst?.error ?? -1) ? entry : worst), null);
+  return row ? `${row.limb}: ${figure(row.within)} mm within a seed, ${figure(row.between)} mm between seeds, Monte-Carlo error ${figure(row.error)} mm, R̂ ${figure(row.r_hat)}.` : "";
+}
+
+/** Coverage: spread against error, and the rank of the truth in the last set. */
+function coverage(sheet, { frames: rows, correlation, pit }, at) {
+  const [one, two] = sheet.columns(2, { gutters: [62, 56], shares: [1.25, 1], right: 20 });
+  const height = Math.max(120, at.room - 76);
+  const limbs = distinct(rows.map((row) => row.limb));
+  const known = rows.filter((row) => row.spread > 0 && row.error > 0);
+  const plot = sheet.plot({ ...one, top: 0, height }, { title: "Spread and error", unit: "mm, log scales; on the line the spread is the error", x: logarithmic("spread of the last set, mm"), y: logarithmic("") });
+  limbs.forEach((limb, index) => {
+    const dim = at.limb !== null && at.limb !== limb;
+    sheet.series(plot, { name: limb, type: "scatter", symbolSize: (_value, { data }) => (data.row.frame === at.frame ? 11 : 5), itemStyle: { color: seriesColour(index), opacity: dim ? 0.08 : 0.6 }, data: known.filter((row) => row.limb === limb).map((row) => ({ value: [row.spread, row.error], row })), click: ({ data }) => ({ frame: data.row.frame, limb: data.row.limb }), tip: ({ data: { row } }) => tipOf(`${row.limb}, frame ${row.frame}`, [["spread", `${figure(row.spread)} mm`], ["error", `${figure(row.error)} mm`]]) });
+  });
+  const bounds = extent(known.flatMap((row) => [row.spread, row.error]));
+  if (known.length) sheet.line(plot, "", [[bounds[0], bounds[0]], [bounds[1], bounds[1]]], token("text-quiet"), { dashed: true, symbols: false, silent: true });
+  const limb = at.limb && pit.some((row) => row.limb === at.limb) ? at.limb : pit[0]?.limb;
+  const own = pit.filter((row) => row.limb === limb);
+  const bars = sheet.plot({ ...two, top: 0, height }, { title: `Rank of the truth: ${limb ?? ""}`, unit: "level where the spread is right; band: 95 % of luck", x: categories(own.map((row) => String(row.bin + 1)), "bin of rank"), y: numbers("", { scale: false, min: 0 }) });
+  sheet.series(bars, { type: "bar", barMaxWidth: 30, data: own.map((row) => ({ value: row.count, row, itemStyle: { color: token(row.count > row.upper ? "bad" : row.count < row.lower ? "warn" : "accent") } })), tip: ({ data: { row } }) => tipOf(`bin ${row.bin + 1}`, [["share", row.count], ["expected", row.expected], ["band", `${figure(row.lower)} to ${figure(row.upper)}`]]) });
+  if (own.length) sheet.marks(bars, [{ y: own[0].expected, word: "expected" }, { y: own[0].lower, dashed: true }, { y: own[0].upper, dashed: true }]);
+  const row = correlation.find((entry) => entry.limb === at.limb) ?? correlation[0];
+  return row ? `${row.limb}: over ${row.frames} frames spread and error rank with ρ = ${figure(row.rho)} (p = ${figure(row.p_value)}).` : "";
+}
+
+/** Weight and, with truth, error over the frames. */
+function overFrames(sheet, { frames: rows }, at) {
+  const measured = rows.some((row) => row.error_mm !== null);
+  const places = sheet.columns(measured ? 3 : 2, { gutters: 62 });
+  const height = Math.max(110, at.room - 76);
+  const names = rows.map((row) => String(row.frame));
+  const click = ({ dataIndex }) => (dataIndex === undefined ? null : { frame: rows[dataIndex].frame });
+  const draw = (column, title, unit, key, colour, y) => {
+    const plot = sheet.plot({ ...places[column], top: 0, height }, { title, unit, x: categories(names, "frame"), y: numbers("", y), click: (x) => (rows[Math.round(x)] ? { frame: rows[Math.round(x)].frame } : null), over: (points) => tipOf(`frame ${points[0].axisValue}`, [[title, `${figure(points[0].data)} ${unit}`]]) });
+    sheet.line(plot, title, rows.map((row) => row[key]), token(colour), { symbols: rows.length < 3, triggerLineEvent: true, click });
+    sheet.chosen(plot, { column: String(at.frame) });
+  };
+  const zero = { scale: false, min: 0 };
+  if (measured) draw(0, "Error of the markers", "mm", "error_mm", "layer-7", zero);
+  draw(measured ? 1 : 0, at.score[0], at.score[1], "log_weight", "accent", {});
+  draw(measured ? 2 : 1, "Time", "ms a frame", "milliseconds", "text-quiet", zero);
+  const row = rows.find((one) => one.frame === at.frame);
+  return row ? `Frame ${row.frame}: ${measured ? `error ${figure(row.error_mm)} mm, ` : ""}${at.score[0]} ${figure(row.log_weight)} ${at.score[1]}, ${row.evaluations} evaluations in ${figure(row.milliseconds)} ms.` : "";
+}
+
+/** How each view is drawn; see SEARCH_VIEWS. @type {Record<string, { frame?: Drawing, run?: Drawing }>} */
+export const ANSWER_VIEWS = {
+  landscape: { frame: landscape },
+  blame: { frame: blame },
+  modes: { frame: modesOfFrame, run: modesOfRun },
+  seeds: { frame: seeds },
+  coverage: { run: coverage },
+  frames: { run: overFrames },
+};

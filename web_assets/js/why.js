@@ -1,0 +1,108 @@
+// Why a frame is as it is, in words made from the stored search, and a button that tries what may help.
+
+import { addressOf } from "./address.js";
+import { fetchJson, frameView, patch, runPath, runView } from "./api.js";
+import { figure as figureWords } from "./chart_looks.js";
+import { button, byId, element, fill, hint } from "./elements.js";
+import { Figure } from "./figure.js";
+import { onEvent } from "./live.js";
+import { complain, say } from "./messages.js";
+import { paced } from "./pacing.js";
+import { followsSearch, isStored, select } from "./selection.js";
+import { setupPath } from "./sessions.js";
+import { get, set, watch } from "./state.js";
+import { records } from "./view_sheet.js";
+import { drawLimbs } from "./why_drawing.js";
+
+/** @import { Schemas } from "./api_types" */
+
+const LOAD_MILLISECONDS = 200;
+const STEPS = { "start pose": "start", calibrate: "calibration", masks: "background" };
+
+const panel = byId("panel-why");
+const words = element("section", { className: "why-words", ariaLabel: "Why" });
+const place = element("section", { className: "figure", ariaLabel: "Limbs and frames" });
+/** @type {Figure} */
+let figure = null;
+/** @type {{ key: string, frame: Schemas["ViewAnswer"], run: Schemas["ViewAnswer"] } | null} */
+let held = null;
+let age = 0;
+
+const query = () => (get("track") && get("track") !== "raw" ? `track=${encodeURIComponent(get("track"))}` : "");
+
+async function load() {
+  if (panel.hidden) return;
+  if (get("run") && !get("summary")) { held = null; return drawNothing("The run is being read ..."); }
+  if (!get("run") || get("frame") === null || !get("summary")?.frames.length) { held = null; return drawNothing("No frames yet: track a run, then this says why a frame failed."); }
+  if (followsSearch()) { held = null; return drawNothing("The search goes on. Choose a frame, or pause it, to see why a frame is as it is."); }
+  if (!isStored()) { held = null; return drawNothing(`Frame ${get("frame")} is not finished yet.`); }
+  const [session, run, frame] = [get("session"), get("run"), get("frame")];
+  const key = `${session}/${run} ${frame} ${query()} ${age} ${get("summary").frames.length}`;
+  if (held?.key === key) return draw();
+  if (held?.frame.session !== session || held?.frame.run !== run) drawNothing(`Frame ${frame} is being looked into ...`);
+  words.ariaBusy = "true";
+  try {
+    const [ofFrame, ofRun] = await Promise.all([fetchJson(frameView(session, run, frame, "why", query())), fetchJson(runView(session, run, "why", query()))]);
+    if (frame !== get("frame") || run !== get("run") || session !== get("session")) return;
+    held = { key, frame: ofFrame, run: ofRun };
+    draw();
+  } catch (error) {
+    if (frame === get("frame")) drawNothing(`${error.message} ${error.hint ?? ""}`);
+  } finally { words.ariaBusy = "false"; }
+}
+
+function drawNothing(text) {
+  fill(words, element("p", { className: "empty" }, text));
+  figure.show(null, "");
+}
+
+/** Go to what a finding speaks of. @param {Schemas["ViewAnswer"]["findings"][number]} finding */
+function follow(finding) {
+  const named = { frame: finding.frame ?? undefined, limb: finding.limb || undefined, layer: finding.layer ?? undefined, camera: finding.camera || undefined };
+  select(Object.fromEntries(Object.entries(named).filter(([, value]) => value !== undefined)));
+}
+
+/** Try what may help. @param {Schemas["ViewAnswer"]["remedies"][number]} remedy */
+async function attempt(remedy) {
+  const step = STEPS[remedy.action];
+  if (step) { location.href = `${setupPath({ name: get("session") })}&step=${step}`; return; }
+  if (!Object.keys(remedy.settings ?? {}).length) return;
+  try {
+    set({ follow: false });
+    await patch(`${runPath(get("session"), get("run"))}/settings?frame=${get("frame")}`, remedy.settings);
+    say(`Frame ${get("frame")} is annealed again: ${remedy.title}. Its outcome stands over the scene.`);
+  } catch (error) { complain(error); }
+}
+
+const knobWords = (settings) => Object.entries(settings ?? {}).map(([name, value]) => `${name.replaceAll("_", " ")} ${typeof value === "number" ? figureWords(value) : value === "" ? "none" : value}`).join(", ");
+
+/** @param {Schemas["ViewAnswer"]["remedies"][number]} remedy */
+const remedyCard = (remedy) => element("div", { className: "remedy-card" }, element("b", {}, remedy.title), element("p", {}, remedy.words, knobWords(remedy.settings) && ` (${knobWords(remedy.settings)})`),
+  (STEPS[remedy.action] || Object.keys(remedy.settings ?? {}).length > 0) && button(STEPS[remedy.action] ? "Go there" : "Try it", () => attempt(remedy), "small", { ariaLabel: `Try: ${remedy.title}` }));
+
+function draw() {
+  const { frame, run } = held;
+  const findings = frame.findings ?? [];
+  const kept = words.scrollTop;
+  fill(words, element("h2", {}, `Why is frame ${frame.frame} as it is?`),
+    findings.length ? element("ul", { className: "why-findings" }, findings.map((finding, at) => element("li", { className: finding.kind === "fits" ? "fine" : finding.is_cause ? "chief" : "" }, button(finding.words, () => follow(finding), "", { dataset: { key: `finding-${at}` } })))) : hint("Nothing stands out in this frame."),
+    frame.notes.map((note) => hint(note)),
+    frame.remedies?.length > 0 && [element("h3", {}, "What may help"), element("div", { className: "remedies" }, frame.remedies.map(remedyCard))]);
+  words.scrollTop = kept;
+  const tables = Object.fromEntries([...frame.tables, ...run.tables].map((table) => [table.name, records(table)]));
+  figure.show({
+    name: [get("session"), get("run"), `frame${frame.frame}`, "why"].join("-"), title: "Limbs and frames", question: "Which limb, from when on?", caption: frame.caption, notes: frame.notes,
+    tables: [...frame.tables, ...run.tables], choose: select, link: () => addressOf(), draw: (sheet, room) => drawLimbs(sheet, tables, { frame: get("frame"), limb: get("limb"), layer: get("layer") }, room),
+  });
+}
+
+/** Wire the panel to the state. */
+export function startWhy() {
+  fill(panel, words, place);
+  figure = new Figure(place);
+  const later = paced(load, LOAD_MILLISECONDS);
+  watch(["session", "run", "frame", "track", "summary", "panel", "limb", "layer", "follow", "work"], later);
+  onEvent("frame", (event, here) => { if (here && !event.reannealed) age += 1; });
+  document.addEventListener("panel", () => later());
+}
+
