@@ -110,6 +110,9 @@ class Shown(SceneFrame, Protocol):
     @property
     def editing(self) -> bool: ...
 
+    @property
+    def asked(self) -> int: ...
+
 
 class EditedPose(SceneFrame, Protocol):
     """What is being edited in the scene (`scene.scene_server.Editing`)."""

@@ -1,7 +1,7 @@
 """Comparisons and reports in the page: asked for, watched, cancelled, gone on with, read, downloaded, thrown away."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -196,29 +196,39 @@ def test_points_of_the_charts_lead_to_their_trials(window: StudioPage) -> None:
     assert (stored["run"] != "", other["run"]) == (True, "")
     curves, bars = page.locator(".findings-canvas").all()
     # A trial without a run, the middle one of three bars: nothing is tracked, the button that does it has the focus.
-    click_value(bars, 0, other["mean_mm"] / 2)
     button = page.get_by_role("button", name=f"Track {other['tracker']} with seed {other['seed']} again")
-    until(page, lambda: button.evaluate("element => element === document.activeElement"))
+    click_value(bars, 0, other["mean_mm"] / 2, lambda: is_focused(button))
     assert window.studio.get(FIRST)["trials"][2]["run"] == ""
     # The curve of a seed, at a frame.
     errors = response["result"]["per_frame"]["error_mm"][stored["tracker"]][1]
-    click_value(curves, 7, errors[7])
-    page.wait_for_url("**/?*panel=why*")
+    click_value(curves, 7, errors[7], lambda: "panel=why" in page.url)
     window.until(f"get('run') === '{stored['run']}' && get('frame') === 7")
     page.go_back()
     page.locator(".trials").wait_for()
 
 
-def click_value(chart: Locator, x: float, y: float) -> None:
-    """Click on a chart where a value is drawn."""
+def is_focused(element: Locator) -> bool:
+    return element.evaluate("element => element === document.activeElement")
+
+
+def click_value(chart: Locator, x: float, y: float, done: Callable[[], bool]) -> None:
+    """Click on a chart where a value is drawn, again while nothing came of it: a bar that is drawn anew for the
+    window's size is there again a moment later.
+    """
     chart.scroll_into_view_if_needed()
     until(chart.page, lambda: chart.get_attribute("data-drawn"))
-    across, down = chart.evaluate(
-        """async (place, value) => (await import('/assets/vendor/echarts.esm.min.js'))
-          .getInstanceByDom(place).convertToPixel('grid', value)""",
-        [x, y],
-    )
-    chart.click(position={"x": across, "y": down})
+    for _ in range(10):
+        across, down = chart.evaluate(
+            """async (place, value) => (await import('/assets/vendor/echarts.esm.min.js'))
+              .getInstanceByDom(place).convertToPixel('grid', value)""",
+            [x, y],
+        )
+        chart.click(position={"x": across, "y": down})
+        for _ in range(10):
+            if done():
+                return
+            chart.page.wait_for_timeout(200)
+    raise AssertionError(f"clicks at {x}, {y} lead nowhere")
 
 
 def test_again_asks_for_the_same(window: StudioPage) -> None:

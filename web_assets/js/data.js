@@ -26,6 +26,8 @@ let arrived = [];      // lines of frames that finished since the summary was la
 let layers = [];       // of the frame that is being searched
 let drawnAt = 0;       // when live layers were last shown
 let scene = {};        // what the scene last showed
+let moves = 0;         // of the page, which the scene is asked to follow
+let asked = 0;         // the last move that it was asked to follow
 let isAnew = true;     // whether the page was loaded since: a frame that was annealed again before is not shown on it
 
 /** The run's frames; those that finish while the answer is on its way are kept. */
@@ -90,20 +92,25 @@ const shownNow = (frame) => ({
 /** The six numbers of a place in the scene, from the text that the address holds. */
 const eyeOf = (text) => text?.split(",").map(Number) ?? null;
 
-/** Move the scene to what the page shows. While a search is followed the scene follows it by itself. */
+/** What the scene should show. While a search is followed the scene follows it by itself. */
+const wantedNow = () => shownNow(get("follow") && searching() ? null : get("frame"));
+const isElsewhere = (shown) => Object.keys(shown).some((name) => shown[name] !== scene[name]);
+
+/** Move the scene to what the page shows. */
 async function showInScene() {
   if (!get("session")) return;
-  const shown = shownNow(get("follow") && searching() ? null : get("frame"));
-  if (Object.keys(shown).every((name) => shown[name] === scene[name])) return;
+  const shown = wantedNow();
+  if (!isElsewhere(shown) && asked === moves) return;
   scene = shown;
+  asked = moves;
   const discard = isAnew;
   isAnew = false;
-  await post("/api/scene/show", { ...shown, eye: eyeOf(shown.eye), discard }).catch(complain);
+  await post("/api/scene/show", { ...shown, eye: eyeOf(shown.eye), asked, discard }).catch(complain);
 }
 
-/** The scene's own controls moved, or it plays: follow them, without sending the change back. */
+/** The scene's own controls moved, or it plays: follow them, without sending the change back. What it said before it knew of the page's own last move is old. */
 function takeScene(event) {
-  if (!isShown(event.session, event.run)) return;
+  if (!isShown(event.session, event.run) || event.asked !== moves) return;
   const chosen = { limb: event.limb, parameter: event.parameter, camera: event.camera, through: event.look_through, eye: event.eye?.join(",") ?? null };
   Object.assign(scene, chosen, { look_through: event.look_through });
   if (event.follow && get("follow") && searching()) return set(chosen);
@@ -179,7 +186,10 @@ export function startData() {
   let shownTrack = get("track");
   watch(["track"], () => { if (get("track") !== shownTrack) { shownTrack = get("track"); if (get("summary")) loadSummary(); } });
   watch(["session", "run", "frame"], detailLater);
-  watch(["session", "run", "frame", "layer", "follow", "limb", "parameter", "particle", "camera", "through", "eye"], sceneLater);
+  watch(["session", "run", "frame", "layer", "follow", "limb", "parameter", "particle", "camera", "through", "eye"], () => {
+    if (isElsewhere(wantedNow())) moves += 1;
+    sceneLater();
+  });
   onEvent("frame", (event, here) => {
     if (!here || event.reannealed) return;
     takeFrame(event);
