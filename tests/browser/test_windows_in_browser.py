@@ -1,5 +1,6 @@
 """Several windows of one browser, each on a session of its own: what each shows, and whose the keys are."""
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -130,6 +131,32 @@ def test_what_is_annealed_again_in_one_window_leaves_the_frame_of_another(
     other.close()
     left.key("ArrowRight")
     left.until("get('whatIf') === null")
+
+
+def test_what_the_scene_said_before_it_knew_of_a_move_changes_nothing(
+    browser: Browser, studio: StudioServer, windows: dict[str, StudioPage]
+) -> None:
+    left = windows["left"]
+    left.context.add_init_script(
+        "window.WebSocket = class extends WebSocket { constructor(...a) { super(...a); window.events = this; } };"
+    )
+    window = StudioPage(browser, studio, open_at=f"{studio.address}&session=left&run=of-left", beside=left)
+    window.until(f"get('summary')?.frames.length === {FRAMES} && get('frame') !== null")
+    wishes: list[dict[str, object]] = []
+    window.page.on(
+        "request",
+        lambda request: wishes.append(request.post_data_json) if "scene/show" in request.url else None,
+    )
+    window.key("End")
+    window.key("Home")
+    until(window.page, lambda: wishes and wishes[-1]["frame"] == 0)
+    asked = int(str(wishes[-1]["asked"]))
+    said = {"type": "scene", "session": "left", "run": "of-left", "frame": FRAMES - 1, "follow": True}
+    for known, frame in ((asked - 1, 0), (asked, FRAMES - 1)):
+        event = json.dumps(said | {"asked": known})
+        window.page.evaluate("event => window.events.onmessage({ data: event })", event)
+        assert window.get("frame") == frame
+    window.close()
 
 
 def test_a_window_keeps_its_name_when_it_is_loaded_again_and_a_copy_gets_another(
