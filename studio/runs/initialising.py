@@ -1,9 +1,11 @@
 """The start pose of a body in a frame of a session, from the pictures and the body's dimensions alone.
 
-The masks' visual hull gives the place (Caillette, Galata & Howard 2007, section 6.2), `tracking.initialisation` the
-pose. The result is a function of the frame's pictures, the body, the settings and the seed.
+The masks' visual hull gives the place (Caillette, Galata & Howard 2007, section 6.2), `trackers.initialisation` the
+pose; which way a person faces, the network that knows people has a say in (`runs.person_facing`). The result is a
+function of the frame's pictures, the body, the settings and the seed.
 """
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +24,7 @@ from studio.likelihood.catalogue import WEIGHTINGS
 from studio.progress import Progress, unheard
 from studio.runs.behaviour_models import fitting, model_folders, model_path
 from studio.runs.initial_limbs import limbs_put_right
+from studio.runs.person_facing import NETWORK_ODDS, facing_agreement
 from studio.runs.problem_source import ProblemSource
 from studio.runs.search_space import parameter_names, search_space, session_sigma
 from studio.runs.session_settings import session_settings
@@ -31,7 +34,15 @@ from studio.sessions.named_rows import write_pose
 from studio.sessions.names import free_name
 from studio.sessions.session import START_POSE_NAME, Session
 from studio.settings import DEFAULT_TRACKER, RunSettings
-from studio.trackers.initialisation import PER_FAMILY, THOROUGH, Effort, FoundStart, StartSearch
+from studio.trackers.initialisation import (
+    PER_FAMILY,
+    THOROUGH,
+    Effort,
+    FoundStart,
+    StartSearch,
+    confidence,
+    facing_odds,
+)
 from studio.trackers.loss_detection import Onlooker, anything_seen
 from studio.trackers.start_candidates import facing, start_candidates
 from studio.trackers.tracker import LIMB_LOST_SHARE, FrameLikelihood, SearchSpace
@@ -48,6 +59,7 @@ those put an arm in front of the chest.
 """
 HULL_DEPTH = 6
 FEWEST_VIEWS = 2
+TURNED = "By the silhouettes the person would face the other way; the pictures say this one."
 HIPS, NEAR, FAR, AHEAD, AROUND = 950.0, 1500.0, 8000.0, 3500.0, 1500.0
 """mm, for a single camera: height of the hips, their largest distance, their assumed distance, and its spread."""
 EVEN_SHARE, STEEPNESS = 0.1, 4.0
@@ -59,7 +71,8 @@ class InitialPose:
     """An estimated start pose.
 
     names : of the parameters. pose : (D,). body : its name. confidence : 0 to 1, that pose and heading are right.
-    margin : log weight above the best pose that faces the other way, inf without one. rival : that pose.
+    margin : log weight above the best pose that faces the other way, inf without one; negative where the pictures say
+    that a person faces as the lighter one does. rival : that pose.
     agreement : share of the last searches with this heading. overlap : f_s. hull_litres : volume of the hull, 0
     without one. note : for the user, or "". file : that it was written to.
     """
@@ -111,6 +124,7 @@ def initialise(
         evidence = problems.evidence(frame, settings)
         masks = problems.evidence(frame, session_settings(session, DEFAULT_TRACKER, WEIGHTING))
         cameras = problems.cameras_in(frame)
+        pictures = {camera.name: problems.footage.picture(camera.name, frame) for camera in cameras}
     finally:
         problems.close()
     if not anything_seen(masks):
@@ -132,6 +146,10 @@ def initialise(
         progress=lambda done, total: progress("searching for the pose", done, total),
     )
     progress("checking each limb", 0, 1)
+    said = facing_agreement(tree, cameras, pictures, found.pose)
+    found = facing_as_said(found, len(cameras), said)
+    if found.margin < 0.0:
+        note = f"{note} {TURNED}".strip()
     stands = limbs_put_right(tree, cameras, masks, found.pose, seed, draw=len(cameras) >= FEWEST_VIEWS)
     shares = stands.off.shares()
     denied = [limb for limb, share in shares.items() if share > LIMB_LOST_SHARE]
@@ -151,6 +169,20 @@ def initialise(
         evaluations=found.evaluations,
         note=note,
     )
+
+
+def facing_as_said(found: FoundStart, cameras: int, said: float) -> FoundStart:
+    """The start pose or its rival, whichever faces the right way by its weight and by what the network says of the
+    pictures (`facing_agreement` of the start pose), with the confidence of both together.
+    """
+    weighed = 0.0 if found.rival is None and said < 0.0 else facing_odds(found.margin, cameras)
+    odds = weighed + NETWORK_ODDS * said
+    if odds < 0.0 and found.rival is not None:
+        return dataclasses.replace(
+            found, pose=found.rival, rival=found.pose, log_weight=found.log_weight - found.margin,
+            margin=-found.margin, agreement=1.0 - found.agreement, confidence=confidence(-odds),
+        )  # fmt: skip
+    return dataclasses.replace(found, confidence=confidence(odds))
 
 
 def trust(most: float) -> float:

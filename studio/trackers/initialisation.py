@@ -34,7 +34,7 @@ FAMILY_LAYERS, FAMILY_PARTICLES, FAMILY_SPREAD = 8, 100, 0.6
 RANGE_SHARE, MOVE, TURN = 0.15, 80.0, 0.25
 """Initial noise: a share of a joint's range; mm (of a person) and radians of the root."""
 MARGIN_SCALE = 0.03
-"""Log weight a camera by which the right facing usually wins (see `confidence`)."""
+"""Log weight a camera by which the right facing usually wins (see `facing_odds`)."""
 THREADS = 2
 KEY = 0x57A27
 """Key of this search's random numbers."""
@@ -196,7 +196,7 @@ class StartSearch:
         return FoundStart(
             pose=best.pose,
             log_weight=float(self._steps.problem.problem.weigh(best.pose[None])[0]),
-            confidence=confidence(margin, self._cameras),
+            confidence=confidence(facing_odds(margin, self._cameras)),
             margin=margin,
             rival=away[0].pose if away else None,
             agreement=1.0 - len(away) / len(ranked),
@@ -204,11 +204,14 @@ class StartSearch:
         )
 
 
-def confidence(margin: float, cameras: int) -> float:
-    """Confidence, 0.5 to 1, that the body faces as the best pose does. margin : log weight to the best pose of
-    the other facing.
-    """
-    return 1.0 / (1.0 + math.exp(-min(margin / (cameras * MARGIN_SCALE), 700.0)))
+def facing_odds(margin: float, cameras: int) -> float:
+    """Log odds that the body faces as the best pose does. margin : log weight to the best pose of the other facing."""
+    return margin / (cameras * MARGIN_SCALE)
+
+
+def confidence(odds: float) -> float:
+    """The probability with these log odds."""
+    return 1.0 / (1.0 + math.exp(-max(min(odds, 700.0), -700.0)))
 
 
 def first_noise(space: SearchSpace) -> Array:

@@ -10,7 +10,7 @@ from studio.body.forward_kinematics import joint_frames, marker_points
 from studio.errors import RunError
 from studio.likelihood.hard_priors import HardPriors
 from studio.runs.search_space import default_sigma, search_space
-from studio.trackers.initialisation import QUICK, StartSearch, confidence, first_noise
+from studio.trackers.initialisation import QUICK, StartSearch, confidence, facing_odds, first_noise
 from studio.trackers.start_candidates import HEADINGS, StartCandidates, facing, start_candidates
 from studio.trackers.start_lines import AtEase, Line, LineSteps, Round
 from studio.trackers.tracker import FrameLikelihood
@@ -159,11 +159,11 @@ def test_the_penalty_of_attitudes_far_from_rest() -> None:
 
 
 def test_confidence_is_one_half_without_a_margin_and_grows_with_it() -> None:
-    assert confidence(0.0, 4) == 0.5
-    rising = [confidence(margin, 4) for margin in (0.0, 0.05, 0.1, 0.3, 1.0, float("inf"))]
+    assert confidence(facing_odds(0.0, 4)) == 0.5
+    rising = [confidence(facing_odds(margin, 4)) for margin in (0.0, 0.05, 0.1, 0.3, 1.0, float("inf"))]
     assert rising == sorted(rising)
     assert rising[-1] == 1.0
-    assert confidence(0.1, 2) > confidence(0.1, 4)
+    assert facing_odds(0.1, 2) > facing_odds(0.1, 4)
 
 
 def test_candidates_stand_on_the_hull_in_every_heading() -> None:
