@@ -6,7 +6,7 @@ point as those of a pose do? A camera that sees the person from the side has sho
 
 Measured on the 22 drawn clips of `studio reproduce generalisation` that differ in motion, two frames each: of 44 start
 poses three faced the wrong way by their weight (a leap, a cartwheel, boxes before the legs; 290 to 370 mm off). All
-three were turned, at -0.50 to -0.97, and no other; of the rest 37 are at 0.7 and more, the lowest, a cartwheel, at 0.
+three were turned, at -0.50 to -0.97, and no other; of the rest 36 are at 0.7 and more, the lowest, a cartwheel, at 0.
 """
 
 import math
