@@ -13,9 +13,11 @@ from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+# The pages are drawn by the processor itself and the scene's WebGL alone by SwiftShader. With "swiftshader" whatever
+# moves on any page goes through it as well, at several times the cost.
 ARGUMENTS = [
     "--no-sandbox",
-    "--use-angle=swiftshader",
+    "--use-angle=swiftshader-webgl",
     "--enable-unsafe-swiftshader",
     "--disable-background-networking",
     "--disable-component-update",
