@@ -67,7 +67,9 @@ def measure_long_run(browser: Browser, folder: Path, frames: int = FRAMES, looks
     found.lines.append(f"{frames} frames, every layer's particles: {size / 1e6:.0f} MB")
     studio = StudioServer("serve", folder / "workspace")
     try:
-        window = StudioPage(watched(browser), studio, open_at=f"{studio.address}&session=walk&run=short")
+        # A view of what is stored: there are fewer pictures than frames, and "why" looks at those.
+        address = "session=walk&run=short&panel=views&view=schedule"
+        window = StudioPage(watched(browser), studio, open_at=f"{studio.address}&{address}")
         window.see_scene()
         window.until(f"get('summary')?.frames.length === {TRACKED} && get('detail')")
         drawing, clouds = Drawing(window), stored_clouds(window, 0)

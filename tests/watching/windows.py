@@ -83,6 +83,7 @@ def _socket(studio: StudioServer, path: str, *protocols: str) -> ClientConnectio
         max_queue=None,
         proxy=None,
         ping_interval=None,
+        open_timeout=PATIENCE,
     )
 
 
