@@ -11,6 +11,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any, TypeVarTuple
 
@@ -66,9 +67,12 @@ from studio.settings import all_knobs
 REDRAW_SECONDS = 1.0 / 30.0
 PICTURE_SECONDS, LIVE_PICTURE_SECONDS = 1.0 / 10.0, 1.0 / 2.0
 """Composing pictures ten times a second costs a third of a core, which a live run needs."""
-PICTURES_WAIT = 0.06
-"""Seconds without another change after which pictures are composed, so that a burst of changes, as a frame that is
-annealed again, has its clouds first and its pictures once."""
+PICTURES_WAIT, ANNEALED_PICTURES_WAIT = 0.06, 0.4
+"""Seconds without another change after which pictures are composed, so that a burst of changes has its pictures once,
+and a frame that is annealed again its clouds before: a browser that draws in software takes so long for them."""
+ANNEALED_SECONDS = 0.2
+"""What a frame that is annealed again shows is drawn when it is whole, or as often as this: a browser that still draws
+the first layers would show the last ones later."""
 IDLE_SECONDS = 0.5
 EYE_TOLERANCE = 0.02
 """Metres within which a viewer has not moved."""
@@ -295,11 +299,29 @@ class SceneController:
         self.views.look_at_person(move_viewers=not same_place)
         subject = subject_of(found)
         self.handles = PoseHandles(self._server, subject.dragger, self.post)
+        if found.results is not None and not found.results.is_checked():
+            threading.Thread(target=self._check, args=(found,), name="scene-check", daemon=True).start()
         if found.truth_problem:
             notify(self._server, "The truth cannot be shown", found.truth_problem, bad=True)
         return opened(
             model, session, run, subject, found.frames(), found.settings(), edit_of(found.start_pose())
         )
+
+    def _check(self, found: OpenedRun) -> None:
+        """Read all that is stored, beside the scene's thread, and leave out what is damaged."""
+        with suppress(StudioError):
+            self.post(self._leave_out, found, set(found.checked_frames()))
+
+    def _leave_out(self, model: Model, found: OpenedRun, whole: set[int]) -> Model:
+        """Leave out the frames that were found damaged after their run was opened."""
+        damaged = [frame for frame in model.frames if frame not in whole]
+        if found is not self.opened or not damaged or found.results is None:
+            return model
+        # Frames that were finished since it was read are no damage.
+        known = found.results.damaged(blobs=False)
+        model = replace(model, frames=tuple(frame for frame in model.frames if frame not in known))
+        found.forget_from(damaged[0])
+        return show_frame(model, model.selection.frame)
 
     def _close(self) -> None:
         """Release what is open and clear the scene."""
@@ -355,6 +377,7 @@ class SceneController:
     def _run(self) -> None:
         before = time.monotonic()
         while not self._stopping.is_set():
+            self._pace()
             self._listen(self._patience())
             self._take_posts()
             if self._looking is not None:
@@ -363,11 +386,20 @@ class SceneController:
             if self.model.playback.playing:
                 self._happen(advance, (now - before,))
             before = now
-            self._drawings[1].pause = picture_pause(self.model.search)
+            self._pace()
             for drawing, draw in zip(self._drawings, (self._draw, self._draw_pictures), strict=True):
                 if drawing.is_due(now):
                     drawing.done(now)
                     self._guarded(draw)
+
+    def _pace(self) -> None:
+        """Set how soon what is pending is drawn."""
+        scene, pictures = self._drawings
+        held = is_annealed_again(self.model)
+        scene.pause, scene.calm = (ANNEALED_SECONDS, ANNEALED_SECONDS) if held else (REDRAW_SECONDS, 0.0)
+        late = held or self.model.live.reannealed
+        pictures.calm = ANNEALED_PICTURES_WAIT if late else PICTURES_WAIT
+        pictures.pause = LIVE_PICTURE_SECONDS if late else picture_pause(self.model.search)
 
     def _patience(self) -> float:
         """Seconds to wait for events: until the next redraw is due."""
@@ -530,6 +562,14 @@ def picture_pause(state: StateChanged) -> float:
     """Seconds between two updates of the pictures; what is searched comes first."""
     searches = state.state == "reannealing" or (state.live is not None and state.state == "tracking")
     return LIVE_PICTURE_SECONDS if searches else PICTURE_SECONDS
+
+
+def is_annealed_again(model: Model) -> bool:
+    """Whether the shown frame is annealed again, from the moved knob to the last layer."""
+    if model.is_searching:
+        return False
+    is_asked = model.knobs is not None and bool(model.knobs.requested)
+    return is_asked or (model.live.reannealed and model.live.result is None)
 
 
 def subject_of(found: OpenedRun) -> Subject:

@@ -67,8 +67,15 @@ class OpenedRun:
         return 0, self.session.manifest.footage.frame_count
 
     def frames(self) -> list[int]:
-        """The finished frames, ascending."""
-        return self.results.frames() if self.results else []
+        """The finished frames, ascending; what is not known to be damaged yet counts as intact."""
+        return self.results.frames(blobs=False) if self.results else []
+
+    def checked_frames(self) -> list[int]:
+        """The finished frames that are whole, ascending, after all that is stored was read; from any thread."""
+        if self.run is None:
+            return []
+        with self.run.results() as results:
+            return results.frames()
 
     def result(self, frame: int) -> FrameResult | None:
         """The stored result of a frame, None while there is none."""
@@ -106,7 +113,7 @@ class OpenedRun:
         if self.results is None:
             return np.zeros(0, dtype=np.int64), np.zeros((0, len(self.body.parameters)))
         found = self._read_track(track)
-        return self.results.poses() if found is None else (found.frames, found.poses)
+        return self.results.poses(blobs=False) if found is None else (found.frames, found.poses)
 
     def tracks(self) -> tuple[str, ...]:
         """The run's tracks, raw first."""

@@ -31,7 +31,7 @@ from studio.server.result_schemas import (
     PoseGiven,
 )
 from studio.server.run_errors import evaluation_of
-from studio.server.run_routes import RUN, OpenRun
+from studio.server.run_routes import RUN, Checked, OpenRun
 from studio.server.session_routes import OpenSession
 from studio.server.session_views import describe, parameter_views
 from studio.server.setting_views import changes_of, history_of
@@ -54,11 +54,13 @@ def frames(
     session: OpenSession,
     run: OpenRun,
     track: Annotated[str, Query(max_length=64, description="Whose poses the errors are of.")] = RAW,
+    check: Checked = True,
 ) -> FramesSummary:
     """Weight, time and (with truth) error of every finished frame, where settings changed, what was corrected."""
     record = run.record
     with run.results() as results:
-        timeline, partial, damaged = results.timeline(), results.partial(), results.damaged()
+        damaged, timeline = results.damaged(blobs=check), results.timeline(blobs=check)
+        partial, checked = results.partial(), check or results.is_checked()
     lines = [
         FrameLine(
             frame=int(timeline.frames[at]),
@@ -79,12 +81,13 @@ def frames(
         frames=lines,
         settings_changes=changes_of(history_of(run)),
         damaged=damaged,
+        checked=checked,
         partial=partial.frame if partial else None,
         mean_milliseconds=float(times.mean()) if len(times) else None,
         made_from=record.made_from or None,
         track=track,
     )
-    return _with_errors(summary, session, run, track)
+    return _with_errors(summary, session, run, track, check)
 
 
 @router.get(RUN + "/live")
@@ -106,7 +109,7 @@ def frame_detail(run: OpenRun, frame: int) -> FrameDetail:
     """A frame with all its layers; of the frame in progress those that are done."""
     with run.results() as results:
         layers = results.layers(frame)
-        finished = frame in results.frames()
+        finished = results.is_whole(frame)
         result = results.result(frame) if finished else None
     entry = history_of(run).in_use(frame, layers[-1].layer)
     estimate = result.estimate if result else None
@@ -237,10 +240,12 @@ def evaluation(session: OpenSession, run: OpenRun) -> EvaluationView:
     return EvaluationView.model_validate(measured)
 
 
-def _with_errors(summary: FramesSummary, session: Session, run: StoredRun, track: str) -> FramesSummary:
+def _with_errors(
+    summary: FramesSummary, session: Session, run: StoredRun, track: str, check: bool
+) -> FramesSummary:
     """The summary with each frame's error; a truth that cannot be used is named, not fatal."""
     try:
-        measured = evaluation_of(session, run, track)
+        measured = evaluation_of(session, run, track, blobs=check)
     except NotFoundError:
         raise
     except StudioError as error:

@@ -57,6 +57,7 @@ class FramesSummary(Answer):
     damaged: dict[int, str] = Field(
         {}, description="Frames damaged on the disk, and what of each; resuming the run tracks them again."
     )
+    checked: bool = Field(True, description="Whether all that is stored was read and checked for damage.")
     partial: int | None = Field(None, description="The frame in which the search stands, if it does.")
     mean_mm: Number = None
     worst_mm: Number = None

@@ -5,6 +5,7 @@ from collections import OrderedDict
 from functools import lru_cache
 from pathlib import Path
 
+from studio.arrays import Array, Indices
 from studio.evaluation.errors import Evaluation, evaluate
 from studio.motion_files.trc import MarkerMotion, read_trc
 from studio.runs.tracks import RAW, read_track, track_stamp
@@ -17,9 +18,11 @@ _lock = threading.Lock()
 _evaluations: OrderedDict[tuple[Path, int, int, str, int], Evaluation] = OrderedDict()
 
 
-def evaluation_of(session: Session, run: StoredRun, track: str = RAW) -> Evaluation | None:
+def evaluation_of(
+    session: Session, run: StoredRun, track: str = RAW, *, blobs: bool = True
+) -> Evaluation | None:
     """The errors of all frames of a track (the search's own: the finished ones); None without a truth or before the
-    first frame.
+    first frame. blobs : as `ResultsReader.damaged`.
 
     Raises TruthError, BodyError, NotFoundError where there is no such track.
     """
@@ -27,8 +30,7 @@ def evaluation_of(session: Session, run: StoredRun, track: str = RAW) -> Evaluat
     if path is None:
         return None
     stamp = path.stat().st_mtime_ns
-    found = read_track(run, track)
-    frames, poses = found.frames, found.poses
+    frames, poses = _poses_of(run, track, blobs)
     if not len(frames):
         return None
     key = (run.folder, len(frames), stamp, track, track_stamp(run, track))
@@ -45,8 +47,17 @@ def evaluation_of(session: Session, run: StoredRun, track: str = RAW) -> Evaluat
 
 def mean_error(session: Session, run: StoredRun, done: int) -> float | None:
     """The mean marker error in mm; None where there is nothing to measure."""
-    measured = evaluation_of(session, run) if done else None
+    measured = evaluation_of(session, run, blobs=False) if done else None
     return None if measured is None else measured.mean_mm
+
+
+def _poses_of(run: StoredRun, track: str, blobs: bool) -> tuple[Indices, Array]:
+    """The frames (K,) of a track and its poses (K, D)."""
+    if track != RAW:
+        found = read_track(run, track)
+        return found.frames, found.poses
+    with run.results() as results:
+        return results.poses(blobs=blobs)
 
 
 @lru_cache(maxsize=8)

@@ -6,7 +6,7 @@ event stream. Each names its run, which the process opens first if it is not ope
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter, Depends, Query
 
 from studio.errors import RunError
 from studio.jobs import commands
@@ -49,6 +49,13 @@ def run_of(session: OpenSession, run: str) -> StoredRun:
 
 
 OpenRun = Annotated[StoredRun, Depends(run_of)]
+Checked = Annotated[
+    bool,
+    Query(
+        description="Whether all that is stored is read and checked for damage first, once by each server: of thousands"
+        " of frames it takes seconds. False: numbers and poses are checked, and known damage is left out."
+    ),
+]
 
 
 @router.get("/sessions/{session}/runs")
@@ -73,12 +80,12 @@ def make_run(
 
 
 @router.get(RUN)
-def run_detail(session: OpenSession, run: OpenRun) -> RunDetail:
+def run_detail(session: OpenSession, run: OpenRun, check: Checked = True) -> RunDetail:
     """What was requested of the run, how far it got, and its body's parameters."""
     record = run.record
     return RunDetail.of(
         record,
-        run=completed(RunLine.model_validate(run.summary()), session),
+        run=completed(RunLine.model_validate(run.summary(blobs=check)), session),
         parameters=parameter_views(run.body()),
         notes=list(notes_of(run)),
     )

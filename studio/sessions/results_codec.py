@@ -264,25 +264,64 @@ class Sums:
         )
 
 
+class Found:
+    """What is known of a store: which frames were found whole, and which damaged. Every method is one step of a
+    dictionary, so threads may share it.
+    """
+
+    def __init__(self) -> None:
+        self._rows: dict[int, int] = {}
+        self._blobs: dict[int, int] = {}
+        self._damage: dict[int, tuple[int, str]] = {}
+
+    def holds(self, frame: int, text: str) -> bool:
+        """Whether the frame's blobs were found to fit these checksums."""
+        return self._blobs.get(frame) == hash(text)
+
+    def holds_row(self, frame: int, text: str, row: tuple[object, ...]) -> bool:
+        """Whether the frame's numbers were found to fit these checksums."""
+        return self._rows.get(frame) == hash((text, row))
+
+    def add(self, frame: int, text: str) -> None:
+        """The frame's blobs fit these checksums."""
+        self._blobs[frame] = hash(text)
+        self._damage.pop(frame, None)
+
+    def add_row(self, frame: int, text: str, row: tuple[object, ...]) -> None:
+        """The frame's numbers fit these checksums."""
+        self._rows[frame] = hash((text, row))
+
+    def add_damage(self, frame: int, text: str, part: str) -> None:
+        """A blob of the frame does not fit these checksums. part : which, as text."""
+        self._blobs.pop(frame, None)
+        self._damage[frame] = hash(text), part
+
+    def damage(self) -> dict[int, tuple[int, str]]:
+        """The damaged blobs, by frame: the hash of the checksums, and the part as text."""
+        return self._damage.copy()
+
+
 class Verified:
-    """Which frames of which stores were found whole, so that a list need not read every blob again. Thread-safe."""
+    """What is known of which stores, so that a list need not read every blob again. Thread-safe."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._stores: OrderedDict[Path, dict[int, int]] = OrderedDict()
+        self._stores: OrderedDict[Path, Found] = OrderedDict()
+        self._reading: dict[Path, threading.Lock] = {}
 
-    def holds(self, path: Path, frame: int, text: str) -> bool:
-        """Whether the frame was found to fit these checksums."""
+    def of(self, path: Path) -> Found:
+        """What is known of a store until it is forgotten."""
         with self._lock:
-            return self._stores.get(path, {}).get(frame) == hash(text)
-
-    def add(self, path: Path, frame: int, text: str) -> None:
-        """The frame fits these checksums."""
-        with self._lock:
-            self._stores.setdefault(path, {})[frame] = hash(text)
+            found = self._stores.setdefault(path, Found())
             self._stores.move_to_end(path)
             if len(self._stores) > STORES_REMEMBERED:
-                self._stores.popitem(last=False)
+                self._reading.pop(self._stores.popitem(last=False)[0], None)
+            return found
+
+    def reading(self, path: Path) -> threading.Lock:
+        """Held by who reads a whole store to check it: whoever comes later finds it checked."""
+        with self._lock:
+            return self._reading.setdefault(path, threading.Lock())
 
     def forget(self, path: Path) -> None:
         """Something in the store was found damaged after all."""

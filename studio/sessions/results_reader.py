@@ -3,9 +3,10 @@
 import math
 import sqlite3
 import threading
-from collections.abc import Callable, Generator, Iterable
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Generator, Iterable, Mapping
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -20,6 +21,7 @@ from studio.sessions.results_codec import (
     PARTIAL,
     SETTINGS,
     VERIFIED,
+    Found,
     Sums,
     unpack,
     unpack_layer,
@@ -45,6 +47,8 @@ UNWATCHED = (TRACKED, None, 0)
 ROWS = "SELECT frames.frame, log_weight, milliseconds, evaluations, layers, settings_version, pose"
 NUMBERS, RESULT, LOST = "its numbers", "its result", "all of it"
 """The damaged parts of a frame as text; of layers: "layer 3"."""
+READ_TOGETHER = 8
+"""Frames whose blobs are read at once to be checked: so many queries less."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,8 +102,7 @@ class ResultsReader:
         self._lock = threading.RLock()
         self._within = False
         self._connection: sqlite3.Connection | None = None
-        self._known: tuple[object, list[Row], dict[int, str]] | None = None
-        self._fitting: dict[int, tuple[str, Row]] = {}
+        self._known: tuple[object, list[Row], dict[int, str], bool] | None = None
 
     def __enter__(self) -> "ResultsReader":
         return self
@@ -122,10 +125,23 @@ class ResultsReader:
     def damaged(self, *, blobs: bool = True) -> dict[int, str]:
         """The damaged finished frames, and the damaged parts of each as text.
 
-        blobs : also check results and layers that this process has not yet found intact; else only the numbers.
-        Frames without checksums (of older stores) count as intact.
+        blobs : also check results and layers that this process has not yet found intact; else only the numbers, and
+        what this process found before is left out, too. Frames without checksums (of older stores) count as intact.
         """
         return self._state(blobs)[1]
+
+    def is_checked(self) -> bool:
+        """Whether this process found every finished frame intact, or knows all that is damaged."""
+        return self._state(False)[2]
+
+    def is_whole(self, frame: int) -> bool:
+        """Whether a frame is finished and intact; nothing of other frames is read."""
+        with self._snapshot():
+            text, rows = self._sums(FRAME, frame).get(frame), self._rows(frame)
+            if text is None or not rows:
+                return bool(rows) and text is None
+            known = VERIFIED.of(self._folder)
+            return not (_damage(known, frame, text, rows[0]) or self._damaged_blobs(frame, text))
 
     def unchecked(self) -> list[int]:
         """The finished frames that have no checksums: they were stored before there were any."""
@@ -136,7 +152,6 @@ class ResultsReader:
         """Forget what was read, also what was found intact."""
         VERIFIED.forget(self._folder)
         self._known = None
-        self._fitting.clear()
 
     def check_again(self, frame: int) -> str:
         """The parts of a frame without checksums that cannot be unpacked, as text; "" if all can."""
@@ -189,17 +204,17 @@ class ResultsReader:
             raise self._missing(f"layer {layer + 1} of frame {frame}")
         return self._layer(frame, layer, blobs[layer])
 
-    def poses(self) -> tuple[Indices, Array]:
-        """The finished frames (K,) that are whole and their estimates (K, D), radians and mm."""
-        rows = self._whole_rows()
+    def poses(self, *, blobs: bool = True) -> tuple[Indices, Array]:
+        """The finished frames (K,) that are whole and their estimates (K, D), radians and mm. blobs : as `damaged`."""
+        rows = self._state(blobs)[0]
         frames = np.array([row[0] for row in rows], dtype=np.int64)
         if not rows:
             return frames, np.zeros((0, 0))
         return frames, np.stack([np.frombuffer(row[6], dtype="<f8") for row in rows]).astype(np.float64)
 
-    def timeline(self) -> Timeline:
-        """Weight, time and effort of every finished frame that is whole."""
-        rows = self._whole_rows()
+    def timeline(self, *, blobs: bool = True) -> Timeline:
+        """Weight, time and effort of every finished frame that is whole. blobs : as `damaged`."""
+        rows = self._state(blobs)[0]
         columns = list(zip(*rows, strict=True)) if rows else [()] * 12
         whole = [np.array(columns[index], dtype=np.int64) for index in (0, 3, 4, 5)]
         real = [np.array(columns[index], dtype=np.float64) for index in (1, 2)]
@@ -213,45 +228,70 @@ class ResultsReader:
 
     # ------------------------------------------------------------------ integrity
 
-    def _whole_rows(self) -> list[Row]:
-        return self._state(True)[0]
+    def _state(self, blobs: bool) -> tuple[list[Row], dict[int, str], bool]:
+        """The rows of the intact frames, the damage of the others, and whether all blobs are checked; cached until the
+        store changes or more is known of it.
+        """
+        with VERIFIED.reading(self._folder) if blobs else nullcontext():
+            known = VERIFIED.of(self._folder)
+            version = (self._query("PRAGMA data_version"), blobs, known.damage())
+            if self._known is not None and self._known[0] == version and (blobs or self._known[3]):
+                return self._known[1:]
+            with self._snapshot():
+                sums, rows = self._sums(FRAME), {row[0]: row for row in self._rows()}
+                parts = {frame: _damage(known, frame, text, rows.get(frame)) for frame, text in sums.items()}
+                # What was found damaged is checked again: it may have been mended.
+                due = {
+                    frame: text
+                    for frame, text in sums.items()
+                    if not parts[frame] and not known.holds(frame, text)
+                }
+                found = self._check_blobs(known, due) if blobs else _known_damage(known, due)
+            damaged = {frame: part for frame, part in sorted((parts | found).items()) if part}
+            whole = [row for frame, row in rows.items() if frame not in damaged]
+            version = (*version[:2], known.damage())
+            self._known = (version, whole, damaged, all(frame in found for frame in due))
+            return self._known[1:]
 
-    def _state(self, blobs: bool) -> tuple[list[Row], dict[int, str]]:
-        """The rows of the intact frames, and the damage of the others; cached until the store changes."""
-        version, known = self._query("PRAGMA data_version"), self._known
-        if known is not None and known[0] == (version, blobs):
-            return known[1], known[2]
-        with self._snapshot():
-            sums, rows = self._sums(FRAME), {row[0]: row for row in self._rows()}
-            parts = {frame: self._damage(frame, text, rows.get(frame), blobs) for frame, text in sums.items()}
-        damaged = {frame: part for frame, part in sorted(parts.items()) if part}
-        whole = [row for frame, row in rows.items() if frame not in damaged]
-        self._known = ((version, blobs), whole, damaged)
-        return whole, damaged
-
-    def _damage(self, frame: int, text: str, row: Row | None, blobs: bool) -> str:
-        """The parts of a frame that do not match their checksums, as text; "" if all match or did before."""
-        if row is None:
-            return LOST
-        if self._fitting.get(frame) != (text, row):
-            if text == GIVEN_UP or not Sums(text).row_fits(row):
-                return NUMBERS
-            self._fitting[frame] = (text, row)
-        if blobs and not VERIFIED.holds(self._folder, frame, text):
-            part = self._damaged_blobs(frame, text)
+    def _check_blobs(self, known: Found, due: Mapping[int, str]) -> dict[int, str]:
+        """The damaged blobs of some frames, as text; "" of those that are intact. Some frames are read at a time."""
+        parts: dict[int, str] = {}
+        for _, group in groupby(sorted(due), key=lambda frame: frame // READ_TOGETHER):
+            frames = list(group)
+            between = (frames[0], frames[-1])
+            try:
+                results = dict(
+                    self._query("SELECT frame, blob FROM frames WHERE frame BETWEEN ? AND ?", between)
+                )
+                stored = self._query(
+                    "SELECT frame, layer, blob FROM layers WHERE frame BETWEEN ? AND ?", between
+                )
+            except SessionError:
+                parts |= {frame: self._damaged_blobs(frame, due[frame]) for frame in frames}
+                continue
+            layers: dict[int, dict[int, bytes]] = {}
+            for frame, layer, blob in stored:
+                layers.setdefault(frame, {})[layer] = blob
+            for frame in frames:
+                parts[frame] = _wrong(Sums(due[frame]), results.get(frame), layers.get(frame, {}))
+        for frame, part in parts.items():
             if part:
-                return part
-            VERIFIED.add(self._folder, frame, text)
-        return ""
+                known.add_damage(frame, due[frame], part)
+            else:
+                known.add(frame, due[frame])
+        return parts
 
-    def _rows(self) -> list[Row]:
-        """Every finished frame's numbers and pose, without blobs; columns missing in older stores are NULL."""
+    def _rows(self, frame: int | None = None) -> list[Row]:
+        """Every finished frame's numbers and pose, or those of one, without blobs; columns missing in older stores are
+        NULL.
+        """
         columns, joined = ROWS, ""
         for table, names in LATER_TABLES:
             known = self._has_table(table)
             columns += "".join(f", {name if known else 'NULL'}" for name in names)
             joined += f" LEFT JOIN {table} USING (frame)" if known else ""
-        return self._query(f"{columns} FROM frames{joined} ORDER BY frames.frame")
+        one = "" if frame is None else f" WHERE frames.frame = {int(frame)}"
+        return self._query(f"{columns} FROM frames{joined}{one} ORDER BY frames.frame")
 
     def _sums(self, what: str, number: int | None = None) -> dict[int, str]:
         """The stored checksums; nothing in stores that are older than these."""
@@ -262,15 +302,12 @@ class ResultsReader:
 
     def _damaged_blobs(self, frame: int, text: str) -> str:
         """The blobs of a frame that do not match their checksums, as text; "" if all do."""
-        sums = Sums(text)
         try:
             blob = self._query("SELECT blob FROM frames WHERE frame = ?", (frame,))
             layers = dict(self._query("SELECT layer, blob FROM layers WHERE frame = ?", (frame,)))
         except SessionError:
             return LOST
-        if not blob or not sums.fits("result", blob[0][0]):
-            return RESULT if blob else LOST
-        return _named(sums.wrong_layers(layers))
+        return _wrong(Sums(text), blob[0][0] if blob else None, layers)
 
     def _layer_blobs(self, frame: int) -> dict[int, bytes]:
         """The intact layers of a frame. Raises DamagedError."""
@@ -297,7 +334,8 @@ class ResultsReader:
             raise self._is_damaged(frame, part) from None
 
     def _is_damaged(self, frame: int, part: str) -> DamagedError:
-        VERIFIED.forget(self._folder)
+        if frame not in VERIFIED.of(self._folder).damage():
+            VERIFIED.forget(self._folder)
         self._known = None
         checked = frame in self._sums(FRAME)
         return DamagedError(
@@ -436,6 +474,34 @@ def time_from(text: str) -> TimeTaken | None:
         return decode_json(text, TimeTaken)
     except DecodeError:
         return None
+
+
+def _damage(known: Found, frame: int, text: str, row: Row | None) -> str:
+    """What of a frame's numbers does not match its checksums, as text; "" if all do or did before."""
+    if row is None:
+        return LOST
+    if not known.holds_row(frame, text, row):
+        if text == GIVEN_UP or not Sums(text).row_fits(row):
+            return NUMBERS
+        known.add_row(frame, text, row)
+    return ""
+
+
+def _known_damage(known: Found, due: Mapping[int, str]) -> dict[int, str]:
+    """The damage of some frames that was found before, as text."""
+    damage = known.damage()
+    return {
+        frame: damage[frame][1]
+        for frame, text in due.items()
+        if frame in damage and damage[frame][0] == hash(text)
+    }
+
+
+def _wrong(sums: Sums, result: bytes | None, layers: Mapping[int, bytes]) -> str:
+    """The blobs of a frame that do not match its checksums, as text; "" if all do. result : None where it has none."""
+    if result is None or not sums.fits("result", result):
+        return LOST if result is None else RESULT
+    return _named(sums.wrong_layers(layers))
 
 
 def _named(layers: Iterable[int]) -> str:

@@ -1,7 +1,9 @@
 """A long run that is watched: what the page asks of the server and what it keeps stay small."""
 
+import sqlite3
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -9,6 +11,10 @@ from playwright.sync_api import Browser
 from studio_page import StudioPage
 from studio_server import StudioServer
 from toy_session import make_session, true_poses
+from tracked_runs import finish
+
+from studio.runs.new_run import prepare_run
+from studio.sessions.results_reader import FILE_NAME
 
 pytestmark = pytest.mark.browser
 
@@ -62,3 +68,20 @@ def test_a_watched_run_asks_little_and_keeps_little(browser: Browser, studio: St
     assert asked["GET /api/sessions"] <= 3
     assert heap(window) - before < 8 * MEGABYTE
     window.close()
+
+
+def test_what_of_a_run_is_damaged_is_said_once_all_of_it_was_read(browser: Browser, tmp_path: Path) -> None:
+    session = make_session(tmp_path / "workspace" / "arm")
+    run = prepare_run(session, name="torn", last=3, start_pose=true_poses(1)[0])
+    finish(session, run)
+    with closing(sqlite3.connect(run.folder / FILE_NAME)) as connection:
+        connection.execute("UPDATE layers SET blob = X'00' WHERE frame = 1 AND layer = 0")
+        connection.commit()
+    studio = StudioServer("serve", tmp_path / "workspace")
+    try:
+        window = StudioPage(browser, studio, with_scene=False)
+        window.until("get('summary')?.checked && '1' in get('summary').damaged")
+        window.until("get('summary').frames.map((line) => line.frame).join() === '0,2'")
+        window.close()
+    finally:
+        studio.stop()

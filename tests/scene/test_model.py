@@ -12,6 +12,7 @@ from studio.body.mirroring import Mirror
 from studio.body.model import BodyModel
 from studio.jobs.events import Event, FrameFinished, LayerFinished, SettingsApplied, StateChanged
 from studio.scene import model as scene
+from studio.scene.controller import is_annealed_again
 from studio.scene.model import LiveSearch, Model, Playback, Selection, ViewOptions
 from studio.scene.pose_edit import edit_of
 from studio.settings import changed_settings, default_settings
@@ -186,6 +187,16 @@ def test_the_frame_in_progress_is_followed_and_a_what_if_ends_with_its_frame(
     assert scene.show_frame(what_if, 2).live.reannealed
     foreign = LayerFinished("s", "another", cloud_record(human, 1, 0))
     assert after(shown, foreign) is shown
+
+
+def test_a_frame_is_annealed_again_from_the_moved_knob_to_the_last_layer(
+    shown: Model, human: BodyModel
+) -> None:
+    asked = scene.request(shown, "one", {"survival": 0.7})
+    first = after(shown, layer(human, 4, 0, True))
+    whole = after(first, finished(human, 4, True))
+    assert [is_annealed_again(one) for one in (shown, asked, first, whole)] == [False, True, True, False]
+    assert not is_annealed_again(after(asked, TRACKING)), "what is tracked is drawn as it comes"
 
 
 def test_pictures_are_drawn_anew_for_results_and_not_for_layers(shown: Model, human: BodyModel) -> None:

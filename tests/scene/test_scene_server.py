@@ -3,6 +3,8 @@
 import asyncio
 import dataclasses
 import socket
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -23,11 +25,19 @@ from studio.errors import SettingsError, StudioError
 from studio.jobs import commands
 from studio.jobs.events import FrameFinished, LayerFinished, SettingsApplied
 from studio.runs.start_pose_file import keep_start_pose
-from studio.scene.controller import Due
+from studio.scene.controller import (
+    ANNEALED_PICTURES_WAIT,
+    ANNEALED_SECONDS,
+    PICTURES_WAIT,
+    REDRAW_SECONDS,
+    Due,
+)
 from studio.scene.model import Model, Selection
 from studio.scene.panel import Panel
 from studio.scene.scene_server import SceneServer
 from studio.scene.scene_views import SceneViews
+from studio.sessions.results_codec import VERIFIED
+from studio.sessions.results_reader import FILE_NAME
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.workspace import Workspace
 
@@ -402,6 +412,39 @@ def test_frames_that_were_not_heard_of_are_known_with_the_next(
         writer.write_frame(frame_result(human, FRAMES - 1), layers)
     control.emit(FrameFinished("swaying", "run-1", frame_result(human, FRAMES - 1)))
     until(lambda: stage._controller.model.frames == tuple(range(FRAMES)))
+
+
+def test_frames_that_are_found_damaged_after_a_run_was_opened_leave_the_scene(
+    stage: SceneServer, workspace: Workspace
+) -> None:
+    folder = workspace.session("swaying").run("run-1").folder
+    with closing(sqlite3.connect(folder / FILE_NAME)) as connection:
+        connection.execute("UPDATE layers SET blob = X'00' WHERE frame = 1 AND layer = 0")
+        connection.commit()
+    VERIFIED.forget(folder)
+    with VERIFIED.reading(folder):
+        open_run(stage)
+        stage.show_frame(1)
+        until(lambda: stage.shown.frame == 1)
+    until(lambda: stage._controller.model.frames == (0, *range(2, FRAMES - 1)))
+    until(lambda: stage.shown.frame in (0, 2))
+
+
+def test_a_frame_that_is_annealed_again_is_drawn_whole_and_its_pictures_after_it(
+    stage: SceneServer, control: FakeControl, human: BodyModel
+) -> None:
+    open_run(stage)
+    drawing, pictures = stage._controller._drawings
+    assert (drawing.pause, drawing.calm, pictures.calm) == (REDRAW_SECONDS, 0.0, PICTURES_WAIT)
+    stage.show_frame(2)
+    control.emit(LayerFinished("swaying", "run-1", cloud_record(human, 2, 0), True))
+    until(lambda: drawing.calm == drawing.pause == ANNEALED_SECONDS)
+    until(lambda: pictures.calm == ANNEALED_PICTURES_WAIT)
+    control.emit(FrameFinished("swaying", "run-1", frame_result(human, 2, shift=120.0), True))
+    until(lambda: (drawing.pause, drawing.calm) == (REDRAW_SECONDS, 0.0))
+    assert pictures.calm == ANNEALED_PICTURES_WAIT <= pictures.pause
+    stage.show_frame(3)
+    until(lambda: pictures.calm == PICTURES_WAIT)
 
 
 def trial_stands_at(stage: SceneServer, body: BodyModel, pose: np.ndarray) -> bool:

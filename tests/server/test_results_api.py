@@ -208,6 +208,22 @@ def test_pictures_that_are_not_there(studio: Studio, tracked: StoredRun, path: s
     assert answer.json()["message"]
 
 
+def test_the_timeline_is_there_before_all_is_checked_and_then_says_what_is_damaged(
+    studio: Studio, tracked: StoredRun
+) -> None:
+    with contextlib.closing(sqlite3.connect(tracked.folder / FILE_NAME)) as connection:
+        connection.execute("UPDATE layers SET blob = X'00' WHERE frame = 1 AND layer = 0")
+        connection.commit()
+    VERIFIED.forget(tracked.folder)
+    known = []
+    for check in ("false", "true", "false"):
+        answer = studio.client.get(f"{RUN}/frames", params={"check": check}).json()
+        frames = [entry["frame"] for entry in answer["frames"]]
+        done = studio.client.get(RUN, params={"check": "false"}).json()["run"]["done"]
+        known.append((answer["checked"], frames, answer["damaged"], done))
+    assert known == [(False, [0, 1], {}, 2), *[(True, [0], {"1": "layer 1"}, 1)] * 2]
+
+
 def test_every_flip_in_a_store_is_a_named_gap_and_no_fault_of_the_server(
     studio: Studio, tracked: StoredRun
 ) -> None:

@@ -270,6 +270,103 @@ def test_a_damaged_blob_is_reported_and_the_rest_stays_readable(tmp_path: Path) 
         assert len(reader.layers(1)) == 3
 
 
+def set_layer(tmp_path: Path, frame: int, blob: bytes) -> bytes:
+    """Put another blob in the place of a frame's layer 1; returns the one before."""
+    with closing(sqlite3.connect(tmp_path / FILE_NAME)) as connection:
+        place = "FROM layers WHERE frame = ? AND layer = 1"
+        [(before,)] = connection.execute(f"SELECT blob {place}", (frame,)).fetchall()
+        connection.execute("UPDATE layers SET blob = ? WHERE frame = ? AND layer = 1", (blob, frame))
+        connection.commit()
+    return before
+
+
+@pytest.fixture
+def blobs_read(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The queries for blobs of any reader."""
+    asked: list[str] = []
+    query = ResultsReader._query
+
+    def noting(self: ResultsReader, sql: str, values: tuple[int, ...] = ()) -> list[tuple[object, ...]]:
+        if "blob" in sql:
+            asked.append(sql)
+        return query(self, sql, values)
+
+    monkeypatch.setattr(ResultsReader, "_query", noting)
+    return asked
+
+
+def test_what_is_stored_is_read_once_by_a_process_and_some_frames_at_a_time(
+    tmp_path: Path, blobs_read: list[str]
+) -> None:
+    with ResultsWriter(tmp_path) as writer:
+        for frame in range(20):
+            write(writer, frame)
+    with ResultsReader(tmp_path) as reader:
+        assert reader.frames(blobs=False) == list(range(20))
+        assert len(reader.poses(blobs=False)[0]) == len(reader.timeline(blobs=False).frames) == 20
+        assert not reader.is_checked()
+        assert blobs_read == []
+        assert reader.frames() == list(range(20))
+        assert len(blobs_read) == 6, "results and layers of eight frames each"
+    with ResultsReader(tmp_path) as reader:
+        assert reader.is_checked()
+        assert reader.frames() == list(range(20))
+    assert len(blobs_read) == 6
+
+
+def test_damage_that_was_found_is_known_without_reading_until_it_is_mended(
+    tmp_path: Path, blobs_read: list[str]
+) -> None:
+    with ResultsWriter(tmp_path) as writer:
+        for frame in range(3):
+            write(writer, frame)
+    before = set_layer(tmp_path, 1, b"no layer")
+    with ResultsReader(tmp_path) as reader, ResultsReader(tmp_path) as other:
+        assert reader.frames(blobs=False) == [0, 1, 2]
+        assert other.damaged() == {1: "layer 2"}
+        blobs_read.clear()
+        assert reader.frames(blobs=False) == [0, 2]
+        assert reader.damaged(blobs=False) == {1: "layer 2"}
+        assert reader.is_checked()
+        assert blobs_read == []
+        set_layer(tmp_path, 1, before)
+        assert other.frames() == [0, 1, 2]
+        assert reader.frames(blobs=False) == [0, 1, 2]
+
+
+def test_frames_that_cannot_be_read_together_are_read_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with ResultsWriter(tmp_path) as writer:
+        for frame in range(4):
+            write(writer, frame)
+    set_layer(tmp_path, 2, b"no layer")
+    query = ResultsReader._query
+
+    def torn(self: ResultsReader, sql: str, values: tuple[int, ...] = ()) -> list[tuple[object, ...]]:
+        if "BETWEEN" in sql:
+            raise SessionError("The results cannot be read.", "")
+        return query(self, sql, values)
+
+    monkeypatch.setattr(ResultsReader, "_query", torn)
+    with ResultsReader(tmp_path) as reader:
+        assert reader.damaged() == {2: "layer 2"}
+
+
+def test_a_frame_alone_is_judged_without_the_others(tmp_path: Path, blobs_read: list[str]) -> None:
+    with ResultsWriter(tmp_path) as writer:
+        for frame in range(3):
+            write(writer, frame)
+    set_layer(tmp_path, 1, b"no layer")
+    with ResultsReader(tmp_path) as reader:
+        assert [reader.is_whole(frame) for frame in (0, 1, 2, 3)] == [True, False, True, False]
+        assert all("WHERE frame = ?" in sql for sql in blobs_read)
+        with closing(sqlite3.connect(tmp_path / FILE_NAME)) as connection:
+            connection.execute("UPDATE frames SET log_weight = log_weight + 1 WHERE frame = 2")
+            connection.commit()
+        assert not reader.is_whole(2)
+
+
 def test_another_process_reads_while_it_is_written(tmp_path: Path) -> None:
     script = (
         "import sys; from pathlib import Path; from studio.sessions.results_store import ResultsReader;"

@@ -44,6 +44,12 @@ class Figures:
         return "\n".join([*self.lines, *(f"WRONG {text}" for text in self.wrong)])
 
 
+def spent(studio: int) -> tuple[float, float]:
+    """Processor seconds of the studio, by its process, and of everything else below this process: the browser."""
+    own = cpu_seconds(studio)
+    return own, cpu_seconds(os.getpid()) - own
+
+
 def cpu_seconds(pid: int) -> float:
     """Processor time of a process and all below it, that of children that ended too."""
     total = 0.0

@@ -17,7 +17,7 @@ from studio.runs.new_run import prepare_run
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session
 from watching.drawing import Drawing, cloud_sizes, watched
-from watching.figures import Figures
+from watching.figures import Figures, spent
 
 FRAMES, LOOKS = 5000, 30
 TRACKED = 6
@@ -67,17 +67,29 @@ def measure_long_run(browser: Browser, folder: Path, frames: int = FRAMES, looks
     found.lines.append(f"{frames} frames, every layer's particles: {size / 1e6:.0f} MB")
     studio = StudioServer("serve", folder / "workspace")
     try:
-        window = StudioPage(watched(browser), studio, open_at=f"{studio.address}&session=walk&run=short")
+        # A view of what is stored: there are fewer pictures than frames, and "why" looks at those.
+        address = "session=walk&run=short&panel=views&view=schedule"
+        window = StudioPage(watched(browser), studio, open_at=f"{studio.address}&{address}")
         window.see_scene()
         window.until(f"get('summary')?.frames.length === {TRACKED} && get('detail')")
         drawing, clouds = Drawing(window), stored_clouds(window, 0)
         sizes = cloud_sizes(len(clouds[0]))
         with found.loaded():
             drawing.clear()
+            before = spent(studio.process.pid)
             began, ready = window.page.evaluate(OPEN, ["long", frames])
+            after = spent(studio.process.pid)
             drawn = drawing.settled(sizes)
             found.times("a long run is opened: its timeline and newest frame are there", [ready - began])
             found.times("and its particles drawn", [drawn[-1] - began])
+            took = [1e3 * (now - then) for then, now in zip(before, after, strict=True)]
+            found.lines.append(
+                f"processor time until timeline and newest frame are there: server {took[0]:.0f} ms, browser"
+                f" {took[1]:.0f} ms"
+            )
+            window.until("get('summary')?.checked")
+            checked = spent(studio.process.pid)[0] - after[0]
+            found.lines.append(f"and of the server until all is read and drawn: {1e3 * checked:.0f} ms")
             there, seen, answered = list[float](), list[float](), list[float]()
             choose, shown = random.Random(0), -1
             for _ in range(looks):
@@ -87,13 +99,16 @@ def measure_long_run(browser: Browser, folder: Path, frames: int = FRAMES, looks
                 there.append(ready - began)
                 seen.append(drawing.settled(sizes)[-1] - began)
                 shown = frame
+            before = spent(studio.process.pid)
             for _ in range(looks):
                 clock = time.perf_counter()
                 studio.get(f"/api/sessions/walk/runs/long/frames/{choose.randrange(frames)}")
                 answered.append(1e3 * (time.perf_counter() - clock))
+            share = 1e3 * (spent(studio.process.pid)[0] - before[0]) / looks
         if differing(window.wire.layers(), stored_clouds(window, shown)) != set():
             found.wrong.append(f"of frame {shown} other particles are drawn than are stored")
         found.times("a frame at random: the server's answer", answered)
+        found.lines.append(f"of it processor time: {share:.0f} ms")
         found.times("its numbers on the page", there)
         found.times("its particles drawn", seen)
         window.close()

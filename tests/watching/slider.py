@@ -3,7 +3,6 @@
 The demo's run is paused at its newest frame; each move of the survival rate by the keyboard anneals that frame again.
 """
 
-import os
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,7 +17,7 @@ from studio_page import StudioPage
 from studio_server import StudioServer
 
 from watching.drawing import Drawing, cloud_sizes, watched
-from watching.figures import Figures, cpu_seconds
+from watching.figures import Figures, spent
 
 RUN = "/api/sessions/walk/runs/run-1"
 FRAMES_BEFORE = 6
@@ -102,7 +101,7 @@ def measure_slider(browser: Browser, folder: Path, moves: int = MOVES) -> Figure
         window.slider("survival rate").focus()
         _moved(window, wire, drawing, sizes, 0)
         first, whole, parts = list[float](), list[float](), list[tuple[float, ...]]()
-        before = _spent(window)
+        before = spent(window.studio.process.pid)
         with found.loaded():
             for number in range(1, moves + 1):
                 key, drawn = _moved(window, wire, drawing, sizes, number)
@@ -110,7 +109,7 @@ def measure_slider(browser: Browser, folder: Path, moves: int = MOVES) -> Figure
                 first.append(drawn[0] - key)
                 whole.append(drawn[-1] - key)
                 parts.append((sent - key, came - sent, drawn[-1] - came))
-        after = _spent(window)
+        after = spent(window.studio.process.pid)
         if differing(window.wire.layers(), clouds) != set(clouds) - {0}:
             found.wrong.append("the clouds that are drawn at the end are not the new ones")
         found.times("slider's move to the first new layer drawn", first)
@@ -122,12 +121,6 @@ def measure_slider(browser: Browser, folder: Path, moves: int = MOVES) -> Figure
             f"processor time a move: server and search {per_move[0]:.0f} ms, browser {per_move[1]:.0f} ms"
         )
     return found
-
-
-def _spent(window: StudioPage) -> tuple[float, float]:
-    """Processor seconds of the studio, and of everything else below this process: the browser."""
-    studio = cpu_seconds(window.studio.process.pid)
-    return studio, cpu_seconds(os.getpid()) - studio
 
 
 def _moved(

@@ -1,8 +1,8 @@
 """Ten windows on ten runs: each shows its own, and what looking costs a run that is tracked meanwhile.
 
 The windows are sockets without a browser, as each brings its own processor where it is looked at: a page's events and
-its scene, read to the end. One of them follows the run that is tracked. Stretches with and without them take turns
-within that run, so that other load disturbs both alike.
+its scene, read to the end. One of them follows the run that is tracked. Stretches with and without them take turns, so
+that other load disturbs both alike; each tracks the same frames as a run of its own, which ends by itself.
 """
 
 import contextlib
@@ -10,7 +10,7 @@ import json
 import statistics
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import viser
@@ -28,10 +28,13 @@ from studio.server.app import SWEEP_SECONDS
 from watching.figures import Figures, cpu_seconds
 
 WINDOWS, STRETCHES, FRAMES = 10, 8, 12
-"""STRETCHES : with and without the windows, together. FRAMES : tracked in each."""
+"""STRETCHES : with and without the windows, together. FRAMES : tracked in each of them."""
+PATIENCE = 300.0
+"""Seconds without an event after which a stretch counts as failed."""
+REST_SECONDS = 3.0
+"""Windows that were sent nothing for so long have all that they show."""
 SURVIVAL = "survival rate"
 PARTICLES = 400
-WATCHED = "/api/sessions/walk/runs/watched"
 
 
 def survival_of(number: int) -> float:
@@ -80,13 +83,14 @@ def _socket(studio: StudioServer, path: str, *protocols: str) -> ClientConnectio
         max_queue=None,
         proxy=None,
         ping_interval=None,
+        open_timeout=PATIENCE,
     )
 
 
 @contextlib.contextmanager
-def _open(studio: StudioServer, found: Figures, sizes: list[int]) -> Iterator[None]:
+def _open(studio: StudioServer, watched: str, found: Figures, sizes: list[int]) -> Iterator[None]:
     """Ten windows, the last on the run that is tracked."""
-    runs = [*(f"run-{number}" for number in range(WINDOWS - 1)), "watched"]
+    runs = [*(f"run-{number}" for number in range(WINDOWS - 1)), watched]
     windows = [Window(studio, run) for run in runs]
     try:
         for number, window in enumerate(windows):
@@ -94,27 +98,37 @@ def _open(studio: StudioServer, found: Figures, sizes: list[int]) -> Iterator[No
                 window.shows(survival_of(number))
             except AssertionError as problem:
                 found.wrong.append(f"{window.name}: {problem}")
+        _rest(windows)
+        before = windows[-1].received
         yield
-        sizes.append(windows[-1].received)
+        sizes.append(windows[-1].received - before)
     finally:
         for window in windows:
             window.close()
 
 
-def _tracked(studio: StudioServer, events: ClientConnection, count: int) -> list[float]:
-    """Track on for so many frames, then pause. Returns when each was told of, seconds."""
-    with contextlib.suppress(TimeoutError):
-        while True:  # frames that were done after the last pause was wished
-            events.recv(timeout=0.5)
-    studio.post(f"{WATCHED}/start")
-    times = list[float]()
-    while len(times) < count:
-        event = json.loads(events.recv(timeout=120.0))
-        if event["type"] == "frame" and not event["reannealed"] and event["run"] == "watched":
-            times.append(time.monotonic())
-    studio.post(f"{WATCHED}/pause")
-    studio.until(lambda state: state["state"] in ("paused", "finished"))
-    return times
+def _rest(windows: Sequence[Window]) -> None:
+    """Wait until the windows have all that they show, pictures too: opening them is not what is measured."""
+    before, deadline = -1, time.monotonic() + PATIENCE
+    while (now := sum(window.received for window in windows)) != before and time.monotonic() < deadline:
+        before = now
+        time.sleep(REST_SECONDS)
+
+
+def _pace(studio: StudioServer, run: str) -> float:
+    """Track a run to its end. Returns the milliseconds that a frame took after the first one."""
+    with contextlib.closing(_socket(studio, f"/api/events?window=clock-of-{run}")) as events:
+        studio.post(f"/api/sessions/walk/runs/{run}/start")
+        told = list[float]()
+        while True:
+            event = json.loads(events.recv(timeout=PATIENCE))
+            if event["type"] == "frame" and event["run"] == run:
+                told.append(time.monotonic())
+            elif event["type"] == "state" and event["run"] == run and event["state"] == "failed":
+                raise AssertionError(f"{run} failed: {event['message']}")
+            elif event["type"] == "state" and event["run"] == run and event["state"] == "finished":
+                break
+    return 1e3 * (told[-1] - told[0]) / (len(told) - 1)
 
 
 def measure_windows(
@@ -128,25 +142,25 @@ def measure_windows(
         knobs = {"survival": survival_of(number), "particles": 20, "layers": 3}
         finish(session, prepare_run(session, name=f"run-{number}", last=2, knobs=knobs))
     knobs = {"survival": survival_of(WINDOWS - 1), "particles": PARTICLES}
-    prepare_run(session, name="watched", knobs=knobs)
+    # The first one reads and compiles what no later one has to, and does not count.
+    for number in range(stretches + 1):
+        prepare_run(session, name=f"watched-{number}", last=frames, knobs=knobs)
     studio = StudioServer("serve", folder / "workspace")
     try:
-        events = _socket(studio, "/api/events?window=clock")
-        _tracked(studio, events, frames)  # what is compiled or read the first time does not count
+        _pace(studio, "watched-0")
         paces: dict[bool, list[float]] = {True: [], False: []}
         costs: dict[bool, list[float]] = {True: [], False: []}
         sizes = list[int]()
         with found.loaded():
-            for number in range(stretches):
-                is_watched = number % 4 in (1, 2)
-                if number % 4 == 3:
+            for number in range(1, stretches + 1):
+                is_watched, run = number % 4 in (2, 3), f"watched-{number}"
+                if number % 4 == 0:
                     # The scenes of closed windows are kept for a while, in case they come back.
                     time.sleep(GRACE_SECONDS + 2 * SWEEP_SECONDS)
-                with _open(studio, found, sizes) if is_watched else contextlib.nullcontext():
+                with _open(studio, run, found, sizes) if is_watched else contextlib.nullcontext():
                     before = _spent(studio)
-                    times = _tracked(studio, events, frames)
+                    paces[is_watched].append(_pace(studio, run))
                     costs[is_watched].append(1e3 * (_spent(studio) - before) / frames)
-                    paces[is_watched].append(1e3 * (times[-1] - times[0]) / (len(times) - 1))
         alone, seen = statistics.median(paces[False]), statistics.median(paces[True])
         found.lines += [
             f"a frame of {PARTICLES} particles: {alone:.1f} ms alone, {seen:.1f} ms with {WINDOWS} windows: ratio"
@@ -155,7 +169,6 @@ def measure_windows(
             f" {statistics.median(costs[True]):.1f} ms with {WINDOWS} windows",
             f"sent to the window that follows: {statistics.median(sizes) / 1e3 / frames:.0f} kB a frame",
         ]
-        events.close()
     finally:
         studio.stop()
     return found

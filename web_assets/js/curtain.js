@@ -145,6 +145,12 @@ async function measure(event) {
 export function startCurtain() {
   watch(["sessions", "session", "run", "work", "connected", "stranger"], draw);
   watch(["whatIf", "outcome", "moved", "work", "session", "run"], drawWhatIf);
-  watch(["whatIf"], () => { if (get("whatIf") === null || get("whatIf").length === 1) set({ outcome: null }); });
+  // An outcome is that of one search: its first layer stays the same.
+  let first = null;
+  watch(["whatIf"], () => {
+    if (get("whatIf")?.[0] === first) return;
+    first = get("whatIf")?.[0];
+    set({ outcome: null });
+  });
   onEvent("frame", (event, here) => { if (here && event.reannealed) measure(event); });
 }

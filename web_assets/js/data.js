@@ -18,6 +18,8 @@ const MOVED_MILLISECONDS = 250;
 // A frame that takes longer than this is shown layer by layer while it is searched, quicker ones when they are done;
 // a search that is slowed to be watched is shown layer by layer always.
 const PATIENCE_MILLISECONDS = 700;
+// A frame that is annealed again is shown when it is whole; one that takes longer than this, with the layers so far.
+const AGAIN_MILLISECONDS = 250;
 
 const searching = () => ["tracking", "compiling"].includes(get("work")?.state);
 const isShown = (session, run) => session === get("session") && run === get("run");
@@ -28,17 +30,25 @@ let drawnAt = 0;       // when live layers were last shown
 let scene = {};        // what the scene last showed
 let moves = 0;         // of the page, which the scene is asked to follow
 let asked = 0;         // the last move that it was asked to follow
+let again = [];        // layers of the frame that is annealed again
+let showsAgain = 0;    // timer that shows them
 let isAnew = true;     // whether the page was loaded since: a frame that was annealed again before is not shown on it
 
-/** The run's frames; those that finish while the answer is on its way are kept. */
+/** The run's frames: shown at once, and again when the server has read all that is stored of them and knows what is damaged. */
 async function loadSummary() {
+  if (get("summary") === null && await loadFrames(false)) return;
+  await loadFrames(true);
+}
+
+/** Load the run's frames; those that finish while the answer is on its way are kept. Whether no other answer is to be asked for. */
+async function loadFrames(check) {
   const [session, run] = [get("session"), get("run")];
-  if (!run) return;
+  if (!run) return true;
   arrived = [];
   try {
     const track = get("track");
-    const summary = await fetchJson(`${runPath(session, run)}/frames?track=${encodeURIComponent(track)}`);
-    if (!isShown(session, run) || track !== get("track")) return;
+    const summary = await fetchJson(`${runPath(session, run)}/frames?${new URLSearchParams({ track, check: String(check) })}`);
+    if (!isShown(session, run) || track !== get("track")) return true;
     const last = summary.frames.at(-1)?.frame ?? -1;
     summary.frames.push(...arrived.filter((line) => line.frame > last));
     const newest = summary.frames.at(-1)?.frame ?? null;
@@ -46,7 +56,9 @@ async function loadSummary() {
     // An address may name a frame that is not tracked.
     const known = summary.frames.some((line) => line.frame === get("frame")) || get("detail")?.frame === get("frame");
     if (summary.frames.length && !known && !searching()) goTo(get("frame"));
+    return summary.checked;
   } catch (error) { complain(error); }
+  return true;
 }
 
 /** The run: its parameters and its layers. */
@@ -55,7 +67,7 @@ async function loadRun() {
   layers = [];
   if (!run) return;
   try {
-    const { parameters, settings } = await fetchJson(runPath(session, run));
+    const { parameters, settings } = await fetchJson(`${runPath(session, run)}?check=false`);
     if (isShown(session, run)) set({ parameters, layerCount: get("layerCount") ?? layersOf(settings) });
   } catch (error) { complain(error); }
 }
@@ -127,14 +139,22 @@ function takeLayer(event) {
   if (event.reannealed) {
     // What another window anneals again, or this one did before it moved on, changes nothing here.
     if (event.frame !== get("frame")) return;
-    const before = get("whatIf");
-    const goesOn = event.layer > 0 && before?.[0].frame === event.frame;
-    return set({ whatIf: [...(goesOn ? before.filter((layer) => layer.layer < event.layer) : []), event] });
+    const goesOn = event.layer > 0 && again[0]?.frame === event.frame;
+    again = [...(goesOn ? again.filter((layer) => layer.layer < event.layer) : []), event];
+    showsAgain ||= setTimeout(showAgain, AGAIN_MILLISECONDS);
+    return;
   }
   layers = [...layers.filter((layer) => layer.frame === event.frame && layer.layer < event.layer), event];
   if (!get("follow")) return;
   const slow = performance.now() - drawnAt > PATIENCE_MILLISECONDS;
   if (!searching() || slow || isWatched()) showLive(event.frame, false);
+}
+
+/** Show the layers of the frame that is annealed again, all that came together: each would have every chart drawn anew, beside the scene. */
+function showAgain() {
+  clearTimeout(showsAgain);
+  showsAgain = 0;
+  if (again.length && again[0].frame === get("frame")) set({ whatIf: again });
 }
 
 /** Show the layers that came with the events; whether they could be shown. */
@@ -191,7 +211,8 @@ export function startData() {
     sceneLater();
   });
   onEvent("frame", (event, here) => {
-    if (!here || event.reannealed) return;
+    if (!here) return;
+    if (event.reannealed) return showAgain();
     takeFrame(event);
     detailLater();
     summaryLater();
