@@ -131,7 +131,7 @@ def seen_subjects(session: Session, frame: int = 0) -> tuple[SeenSubject, ...]:
     """Who is in view in a frame, the largest first. Raises FootageError, NotFoundError."""
     carver = _Carver(session)
     with closing(WholeMasks(session)) as whole:
-        hull, small = carver.hull({camera.name: whole.of(camera.name, frame) for camera in carver.cameras})
+        hull, small = carver.hull(whole.by_camera(carver.cameras, frame))
     return () if hull.empty else tuple(map(_seen, subjects_of(hull, small, carver.small)[1]))
 
 

@@ -68,7 +68,7 @@ def test_background(way: GuidedSetup, raw: Path) -> None:
     plates = sorted((raw / "calibration" / "extrinsics").glob("*.png"))
     page.get_by_label("Pictures or clips of the empty room").set_input_files(plates)
     expect(page.locator(".plates summary")).to_contain_text("4 of 4")
-    page.get_by_label("exclude regions that the person never comes near").check()
+    page.get_by_label("exclude regions that the subject never comes near").check()
     way.press("Set up the background")
     shares = way.agreement()
     print("before the cameras are turned:", shares)
