@@ -1,5 +1,6 @@
 """Several subjects in view: found in the hull, cut from the masks, given sessions, tracked at once."""
 
+import itertools
 from contextlib import closing
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from studio.runs.background_setup import set_up_background
 from studio.runs.mask_quality import mask_quality
 from studio.runs.problem_source import ProblemSource
 from studio.runs.session_settings import session_settings
-from studio.runs.subject_masks import WholeMasks, seen_subjects
+from studio.runs.subject_masks import WholeMasks, cut_frames, seen_subjects
 from studio.runs.together import track_together
 from studio.sessions.session import Session
 from studio.settings import default_settings
@@ -92,21 +93,27 @@ def test_who_is_in_view_is_told_by_the_hull(made: TwoPeople) -> None:
     assert all(1.5 < one.height < 2.0 for one in seen_subjects(made.session))
 
 
-def test_what_an_absent_camera_shows_does_not_say_who_is_in_view(
+def test_a_camera_without_a_picture_says_nothing_of_who_is_in_view(
     made: TwoPeople, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    name = made.session.manifest.footage.cameras[0].name
+    gone = made.session.manifest.footage.cameras[0].name
     mask_of, asked = WholeMasks.of, set[str]()
 
     def heard(whole: WholeMasks, camera: str, frame: int) -> Bytes:
         asked.add(camera)
         return mask_of(whole, camera, frame)
 
-    monkeypatch.setattr(Footage, "absent", lambda *_: frozenset({name}))
     monkeypatch.setattr(WholeMasks, "of", heard)
+    monkeypatch.setattr(Footage, "absent", lambda *_: frozenset({gone}))
     assert len(seen_subjects(made.session)) == 2
     assert asked
-    assert name not in asked
+    assert gone not in asked
+    # Nor is anybody lost in a frame that it lacks.
+    monkeypatch.setattr(Footage, "absent", lambda _, frame: frozenset({gone} if frame else ()))
+    _, second = itertools.islice(cut_frames(made.session, made.places()), 2)
+    assert second.lost == ()
+    assert not second.parts[0][gone].any()
+    assert all(part.any() for parts in second.parts for name, part in parts.items() if name != gone)
 
 
 def test_masks_of_two_are_not_called_usable(made: TwoPeople) -> None:

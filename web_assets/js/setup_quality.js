@@ -7,8 +7,8 @@ import { button, element, hint, notice, percent } from "./elements.js";
 
 const USABLE = 0.9;
 
-/** In per cent, so fine that what is below the mark never reads like the mark. */
-const agreementOf = ({ agreement, usable }) => (usable || agreement === null ? percent(agreement) : `${(Math.floor(1000 * agreement) / 10).toFixed(1)} %`);
+/** A camera's agreement in per cent, so fine that what is below the mark never reads like the mark. */
+export const agreementOf = ({ agreement, usable }) => (usable || agreement === null ? percent(agreement) : `${(Math.floor(1000 * agreement) / 10).toFixed(1)} %`);
 
 function agreementBar(line) {
   const kind = line.usable ? "good" : line.agreement !== null && line.agreement >= 0.8 ? "warn" : "bad";
