@@ -167,6 +167,7 @@ def test_track_and_check(way: GuidedSetup) -> None:
     way.to("check")
     way.press("Check the motion")
     expect(page.locator(".share-strip button").first).to_be_visible()
+    expect(page.locator("#step .step-progress")).to_have_count(0)
     way.shoot("check")
 
 
