@@ -133,6 +133,8 @@ class MaskQuality:
         least = min(float(np.nan_to_num(view.agreement)) for view in self.views)
         if self.usable:
             return f"every view agrees by {least:.2f} or more"
+        # Rounded down: what is below the mark never reads like it.
+        least = np.floor(1000.0 * least) / 1000.0
         return f"least agreement {least:.3f}, below the mark of {USABLE:g}: check camera {self.worst}"
 
 
