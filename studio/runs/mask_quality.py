@@ -133,7 +133,9 @@ class MaskQuality:
         least = min(float(np.nan_to_num(view.agreement)) for view in self.views)
         if self.usable:
             return f"every view agrees by {least:.2f} or more"
-        return f"check camera {self.worst}, least agreement {least:.2f}"
+        # Rounded down: what is below the mark never reads like it.
+        least = np.floor(1000.0 * least) / 1000.0
+        return f"least agreement {least:.3f}, below the mark of {USABLE:g}: check camera {self.worst}"
 
 
 def mask_quality(

@@ -6,7 +6,7 @@ frame (`volume.hull_subjects`), and each pixel of a mask goes to those whose pie
 """
 
 import contextlib
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence, Set
 from contextlib import closing
 from dataclasses import dataclass
 
@@ -119,20 +119,27 @@ class _Carver:
             )
         self.small = tuple(camera.reduced(CARVED_SIDE) for camera in self.cameras)
         self.scale = scale_of(session.body())
-        self._reconstructor = Reconstructor(self.small, box_of(self.cameras, scale=self.scale), CARVED)
+        self._box = box_of(self.cameras, scale=self.scale)
+        self._reconstructors: dict[tuple[Camera, ...], Reconstructor] = {}
 
-    def hull(self, masks: Mapping[str, Bytes]) -> tuple[Hull, list[Bytes]]:
-        """Of masks (H, W) by camera; and these, of the size of `small`."""
-        small = [reduced(masks[camera.name], camera) for camera in self.small]
-        return self._reconstructor.shape(small), small
+    def hull(self, whole: Mapping[str, Bytes], absent: Set[str]) -> tuple[Hull, list[Bytes], list[Camera]]:
+        """Of masks (H, W) by camera, without the cameras that have no picture (their empty masks would leave nothing);
+        the masks and cameras that it is of, as small as `small`.
+        """
+        cameras = tuple(camera for camera in self.small if camera.name not in absent)
+        if cameras not in self._reconstructors:
+            self._reconstructors[cameras] = Reconstructor(cameras, self._box, CARVED)
+        masks = [reduced(whole[camera.name], camera) for camera in cameras]
+        return self._reconstructors[cameras].shape(masks), masks, list(cameras)
 
 
 def seen_subjects(session: Session, frame: int = 0) -> tuple[SeenSubject, ...]:
     """Who is in view in a frame, the largest first. Raises FootageError, NotFoundError."""
     carver = _Carver(session)
     with closing(WholeMasks(session)) as whole:
-        hull, small = carver.hull({camera.name: whole.of(camera.name, frame) for camera in carver.cameras})
-    return () if hull.empty else tuple(map(_seen, subjects_of(hull, small, carver.small)[1]))
+        masks = whole.by_camera(carver.cameras, frame)
+        hull, seen, cameras = carver.hull(masks, whole.footage.absent(frame))
+    return () if hull.empty else tuple(map(_seen, subjects_of(hull, seen, cameras)[1]))
 
 
 def count_subjects(masks: Sequence[Bytes], cameras: Sequence[Camera], scale: float = 1.0) -> int:
@@ -175,26 +182,26 @@ def cut_frames(session: Session, places: Sequence[Place], progress: Progress = u
         for frame in range(footage.frame_count):
             progress(FOLLOWING, frame, footage.frame_count)
             masks = whole.by_camera(carver.cameras, frame)
-            hull, small = carver.hull(masks)
+            hull, seen, cameras = carver.hull(masks, footage.absent(frame))
             if follower is None:
-                labels, count = _first(hull, small, carver, places)
+                labels, count = _first(hull, seen, cameras, places, carver.scale)
                 follower = HullFollower(hull, labels, carver.scale)
             else:
-                labels = follower.step(hull, small, carver.small)
+                labels = follower.step(hull, seen, cameras)
             yield _cut(frame, masks, hull, labels, count, len(places), carver.small)
     progress(FOLLOWING, footage.frame_count, footage.frame_count)
 
 
 def _first(
-    hull: Hull, small: Sequence[Bytes], carver: _Carver, places: Sequence[Place]
+    hull: Hull, masks: Sequence[Bytes], cameras: Sequence[Camera], places: Sequence[Place], scale: float
 ) -> tuple[Labels, int]:
     if hull.empty:
         raise FootageError(
             "Nobody is seen in the first frame: the views' masks have nothing in common.",
             "Look at the masks, or begin the footage where the subjects are in view.",
         )
-    labels, found = subjects_of(hull, small, carver.small)
-    named, number = labels_at(hull, labels, found, MM * np.array(places), carver.scale)
+    labels, found = subjects_of(hull, masks, cameras)
+    named, number = labels_at(hull, labels, found, MM * np.array(places), scale)
     if named is None:
         x, y = places[number]
         seen = "; ".join(_seen(one).in_words() for one in found)

@@ -103,9 +103,9 @@ def background_step(session: Session) -> StepStatus:
 
 
 def _what_to_look_at(session: Session) -> str:
-    """The remedy for masks that disagree: they are poor, or the calibration is wrong."""
+    """The remedy for masks that disagree, by what was measured."""
     if misses_in_words(session) or standing_doubts(session):
-        return "the cameras are not what the calibration says, see there"
+        return "the calibration, which the silhouettes contradict, may be the cause: see there, then check the masks"
     return "check the masks, and measure whether the cameras agree"
 
 

@@ -5,7 +5,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser
+from guided_setup import PATIENCE, GuidedSetup
+from playwright.sync_api import Browser, expect
 from studio_page import StudioPage
 from studio_server import StudioServer
 from toy_session import make_session
@@ -36,6 +37,27 @@ def window(browser: Browser, studio: StudioServer) -> Iterator[StudioPage]:
     opened = StudioPage(browser, studio, with_scene=False)
     yield opened
     opened.close()
+
+
+@pytest.fixture(scope="module")
+def way(
+    browser: Browser,
+    tmp_path_factory: pytest.TempPathFactory,
+    artefacts: Path,
+    request: pytest.FixtureRequest,
+) -> Iterator[GuidedSetup]:
+    """The guided set-up of a studio with an empty workspace that may read no folder, for all tests of a file, which
+    names the folder of its `PICTURES`; the scene is left blank.
+    """
+    studio = StudioServer("serve", tmp_path_factory.mktemp("way") / "workspace")
+    expect.set_options(timeout=PATIENCE)
+    try:
+        opened = StudioPage(browser, studio, with_scene=False)
+        yield GuidedSetup(opened, artefacts / request.module.PICTURES)
+        opened.close()
+    finally:
+        expect.set_options(timeout=5_000)  # Playwright's own
+        studio.stop()
 
 
 @pytest.fixture(scope="session")

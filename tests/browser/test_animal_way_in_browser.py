@@ -6,23 +6,21 @@ no command typed. Pictures of every step are kept in STUDIO_ARTEFACTS/animal-way
 
 import csv
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import av
 import numpy as np
 import pytest
-from page_watch import PageWatch
-from playwright.sync_api import Browser, Page, expect
-from studio_server import StudioServer
+from guided_setup import GuidedSetup
+from playwright.sync_api import Page, expect
 
 from studio.synthesis.clips import ClipWriter
 
 pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.real_data, pytest.mark.timeout(3600)]
 
-PATIENCE, LONGEST_STEP = 60_000, 900_000
-"""Milliseconds: until the page answers; until a step's work is done."""
+PICTURES = "animal-way"
 FRAMES = 10
 SIZE = (1280, 1024)
 """Pixels, width and height."""
@@ -35,38 +33,8 @@ TURNED: tuple[Callable[[float, float], tuple[float, float]], ...] = (
 """Where a pixel lies after quarter turns clockwise."""
 CAMERAS = ("back", "mid", "side", "top")
 STROKES = Path(__file__).resolve().parents[1] / "real_data" / "mouse_way_strokes.json"
-LOADED = "() => [...document.querySelectorAll('figure.picture img')].every((one) => one.naturalWidth > 0)"
-SIZES = (("light", 1280, 800), ("dark", 1920, 1080))
 APART_MM = {("Nose", "TTI"): (60.0, 130.0), ("Shoulder_left", "Shoulder_right"): (15.0, 40.0)}
 """Distances of a grown mouse's points (by the footage's proofread points: 85 and 27 mm)."""
-
-
-class Way:
-    """One window that goes the whole way."""
-
-    def __init__(self, page: Page, studio: StudioServer, folder: Path) -> None:
-        self.page, self.studio, self.folder, self.shots = page, studio, folder, 0
-
-    def shoot(self, name: str) -> None:
-        """Keep the step as it looks, in both themes and sizes; nothing is cut off."""
-        self.shots += 1
-        for theme, width, height in SIZES:
-            self.page.set_viewport_size({"width": width, "height": height})
-            self.page.evaluate("theme => { document.documentElement.dataset.theme = theme; }", theme)
-            self.page.wait_for_function(LOADED)
-            self.page.screenshot(path=self.folder / f"{self.shots:02d}-{name}-{theme}.png")
-            assert self.page.evaluate("document.documentElement.scrollWidth <= innerWidth"), name
-
-    def to(self, step: str) -> None:
-        entry = self.page.locator(f"#stepper [data-step={step}]")
-        entry.click()
-        expect(entry).to_have_attribute("aria-current", "step")
-
-    def stands(self, step: str, state: str) -> None:
-        expect(self.page.locator(f"#stepper [data-step={step}]")).to_have_attribute("data-state", state)
-
-    def press(self, name: str) -> None:
-        self.page.locator("#step").get_by_role("button", name=name, exact=True).click()
 
 
 @pytest.fixture(scope="module")
@@ -88,27 +56,7 @@ def raw(real_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture(scope="module")
-def way(browser: Browser, tmp_path_factory: pytest.TempPathFactory, artefacts: Path) -> Iterator[Way]:
-    """A studio with an empty workspace that may read no folder, and a window on it; the scene is left blank."""
-    studio = StudioServer("serve", tmp_path_factory.mktemp("animal") / "workspace")
-    folder = artefacts / "animal-way"
-    folder.mkdir(parents=True, exist_ok=True)
-    context = browser.new_context(viewport={"width": 1280, "height": 800}, accept_downloads=True)
-    context.set_default_timeout(PATIENCE)
-    expect.set_options(timeout=LONGEST_STEP)
-    page = context.new_page()
-    watch = PageWatch(page, studio.origin)
-    page.route("**/scene/**", lambda route: route.fulfill(body="", content_type="text/html"))
-    page.goto(studio.address)
-    page.goto(f"{studio.origin}/way?new")
-    yield Way(page, studio, folder)
-    context.close()
-    studio.stop()
-    watch.check()
-
-
-def test_footage(way: Way, raw: Path) -> None:
+def test_footage(way: GuidedSetup, raw: Path) -> None:
     page = way.page
     page.locator("dialog input[name=name]").fill("mouse")
     page.get_by_role("combobox", name="Who or what is tracked").select_option("mouse")
@@ -120,7 +68,7 @@ def test_footage(way: Way, raw: Path) -> None:
     way.shoot("footage")
 
 
-def test_calibration_from_pictures_of_a_board(way: Way, raw: Path) -> None:
+def test_calibration_from_pictures_of_a_board(way: GuidedSetup, raw: Path) -> None:
     """One folder of pictures a camera gives lenses, places and, by its first picture, the floor."""
     page = way.page
     way.to("calibration")
@@ -157,7 +105,7 @@ def paint(page: Page, stroke: dict[str, Any], turns: int) -> None:
     page.mouse.up()
 
 
-def test_masks_from_strokes(way: Way) -> None:
+def test_masks_from_strokes(way: GuidedSetup) -> None:
     page = way.page
     strokes = json.loads(STROKES.read_text())["strokes"]
     turns = {one["name"]: one["quarter_turns"] for one in way.studio.get("/api/sessions/mouse")["cameras"]}
@@ -173,15 +121,13 @@ def test_masks_from_strokes(way: Way) -> None:
         page.get_by_role("button", name="Keep", exact=True).first.click()
         page.locator(".masks .picture").first.wait_for()
     way.press("Set up the background")
-    shown = page.locator("ul.agree .figure")
-    expect(shown).to_have_count(4)
-    shares = [float(text.removesuffix("%")) / 100.0 for text in shown.all_inner_texts()]
+    shares = way.agreement()
     print("agreement:", shares)
     assert min(shares) >= 0.8
     way.shoot("masks")
 
 
-def test_the_body_is_made_of_the_shipped_mouse(way: Way) -> None:
+def test_the_body_is_made_of_the_shipped_mouse(way: GuidedSetup) -> None:
     """The shipped mouse is chosen, changed on the page of bodies, and saved as this session's own."""
     page = way.page
     way.to("subject")
@@ -204,7 +150,7 @@ def test_the_body_is_made_of_the_shipped_mouse(way: Way) -> None:
     assert way.studio.get("/api/sessions/mouse")["body"]["name"] == "my-mouse"
 
 
-def test_start_pose(way: Way) -> None:
+def test_start_pose(way: GuidedSetup) -> None:
     way.to("start-pose")
     way.press("Find it automatically")
     way.stands("start-pose", "done")
@@ -213,7 +159,7 @@ def test_start_pose(way: Way) -> None:
     way.press("Yes, track from here")
 
 
-def test_track_and_check(way: Way) -> None:
+def test_track_and_check(way: GuidedSetup) -> None:
     page = way.page
     page.locator("#step form button.primary").click()
     way.stands("track", "done")
@@ -221,20 +167,18 @@ def test_track_and_check(way: Way) -> None:
     way.to("check")
     way.press("Check the motion")
     expect(page.locator(".share-strip button").first).to_be_visible()
+    expect(page.locator("#step .step-progress")).to_have_count(0)
     way.shoot("check")
 
 
-def test_a_csv_of_points_comes_out(way: Way, tmp_path: Path) -> None:
+def test_a_csv_of_points_comes_out(way: GuidedSetup, tmp_path: Path) -> None:
     page = way.page
     way.to("export")
     page.locator(".export .format", has_text=".csv").click()
     page.locator(".export-actions button.primary").click()
     way.stands("export", "done")
     way.shoot("export")
-    with page.expect_download() as waiting:
-        page.locator(".export-files a").first.click()
-    file = tmp_path / waiting.value.suggested_filename
-    waiting.value.save_as(file)
+    file = way.download(tmp_path)
     with file.open(newline="") as opened:
         rows = list(csv.DictReader(line for line in opened if not line.startswith("#")))
     assert len(rows) == FRAMES

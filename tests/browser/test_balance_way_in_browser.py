@@ -6,78 +6,22 @@ another reader opens. Pictures of every step are kept in STUDIO_ARTEFACTS/balanc
 
 import contextlib
 import io
-import json
 import re
-import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import bvhsdk
 import numpy as np
 import pytest
-from page_watch import PageWatch
-from playwright.sync_api import Browser, Locator, Page, expect
-from studio_server import StudioServer
+from guided_setup import GuidedSetup
+from playwright.sync_api import expect
 
 pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.real_data, pytest.mark.timeout(3600)]
 
-PATIENCE = 900_000
+PICTURES = "balance-way"
 FIRST_PART, FRAMES = 60, 100
 """The subject is fitted to poses of the first part; then all is tracked."""
 WEIGHTING = "edge-silhouette"
 HEIGHT_METRES = "1.80"
-LOADED = "() => [...document.querySelectorAll('figure.picture img')].every((one) => one.naturalWidth > 0)"
-MASKED = "() => document.querySelectorAll('.masks .picture.waiting').length === 0"
-SIZES = (("light", 1280, 800), ("dark", 1920, 1080))
-
-
-class Workflow:
-    """One window that goes the whole way, and how long its steps take."""
-
-    def __init__(self, page: Page, studio: StudioServer, folder: Path) -> None:
-        self.page, self.studio, self.folder = page, studio, folder
-        self.seconds: dict[str, float] = {}
-        self._since = time.monotonic()
-
-    def shoot(self, name: str) -> None:
-        """Keep the step as it looks, in both themes and sizes, once its pictures are there; nothing is cut off."""
-        self.seconds[name] = round(time.monotonic() - self._since, 1)
-        for theme, width, height in SIZES:
-            self.page.set_viewport_size({"width": width, "height": height})
-            self.page.evaluate("theme => { document.documentElement.dataset.theme = theme; }", theme)
-            self.page.wait_for_function(LOADED)
-            self.page.wait_for_function(MASKED)
-            self.page.screenshot(path=self.folder / f"{len(self.seconds):02d}-{name}-{theme}.png")
-            assert self.page.evaluate("document.documentElement.scrollWidth <= innerWidth"), name
-        (self.folder / "seconds.json").write_text(json.dumps(self.seconds, indent=2))
-        print(f"{name}: {self.seconds[name]} s: {self.words(name.partition('.')[0])}")
-        self._since = time.monotonic()
-
-    def to(self, step: str) -> None:
-        """Go on with a step by the list at the left."""
-        self._entry(step).click()
-        expect(self._entry(step)).to_have_attribute("aria-current", "step")
-
-    def stands(self, step: str, state: str) -> None:
-        """Wait until a step stands so."""
-        expect(self._entry(step)).to_have_attribute("data-state", state)
-
-    def words(self, step: str) -> str:
-        """What the list at the left says of a step."""
-        return " ".join(self._entry(step).inner_text().split())
-
-    def press(self, name: str) -> None:
-        """Press a button of the step."""
-        self.page.locator("#step").get_by_role("button", name=name, exact=True).click()
-
-    def agreement(self) -> list[float]:
-        """The shares of agreement that the page shows, a camera each."""
-        shown = self.page.locator("ul.agree .figure")
-        expect(shown).to_have_count(4)
-        return [float(text.removesuffix("%")) / 100.0 for text in shown.all_inner_texts()]
-
-    def _entry(self, step: str) -> Locator:
-        return self.page.locator(f"#stepper [data-step={step}]")
 
 
 @pytest.fixture(scope="module")
@@ -86,27 +30,7 @@ def raw(real_data: Path) -> Path:
     return real_data / "pose2sim-balance"
 
 
-@pytest.fixture(scope="module")
-def way(browser: Browser, tmp_path_factory: pytest.TempPathFactory, artefacts: Path) -> Iterator[Workflow]:
-    """A studio with an empty workspace that may read no folder, and a window on it; the scene is left blank."""
-    studio = StudioServer("serve", tmp_path_factory.mktemp("balance") / "workspace")
-    folder = artefacts / "balance-way"
-    folder.mkdir(parents=True, exist_ok=True)
-    context = browser.new_context(viewport={"width": 1280, "height": 800}, accept_downloads=True)
-    context.set_default_timeout(PATIENCE)
-    expect.set_options(timeout=PATIENCE)
-    page = context.new_page()
-    watch = PageWatch(page, studio.origin)
-    page.route("**/scene/**", lambda route: route.fulfill(body="", content_type="text/html"))
-    page.goto(studio.address)
-    page.goto(f"{studio.origin}/way?new")
-    yield Workflow(page, studio, folder)
-    context.close()
-    studio.stop()
-    watch.check()
-
-
-def test_footage(way: Workflow, raw: Path) -> None:
+def test_footage(way: GuidedSetup, raw: Path) -> None:
     """Four videos are uploaded; a name with a space is put right while it is typed."""
     page = way.page
     page.locator("dialog input[name=name]").press_sequentially("balance man")
@@ -121,7 +45,7 @@ def test_footage(way: Workflow, raw: Path) -> None:
     way.shoot("footage")
 
 
-def test_calibration(way: Workflow, raw: Path) -> None:
+def test_calibration(way: GuidedSetup, raw: Path) -> None:
     """The file is read, shown and used; the page says that two cameras recorded another size."""
     page = way.page
     way.to("calibration")
@@ -136,7 +60,7 @@ def test_calibration(way: Workflow, raw: Path) -> None:
     way.shoot("calibration")
 
 
-def test_background(way: Workflow, raw: Path) -> None:
+def test_background(way: GuidedSetup, raw: Path) -> None:
     """Pictures of the room, in which people stand, and the footage together."""
     page = way.page
     way.to("background")
@@ -144,14 +68,14 @@ def test_background(way: Workflow, raw: Path) -> None:
     plates = sorted((raw / "calibration" / "extrinsics").glob("*.png"))
     page.get_by_label("Pictures or clips of the empty room").set_input_files(plates)
     expect(page.locator(".plates summary")).to_contain_text("4 of 4")
-    page.get_by_label("exclude regions that the person never comes near").check()
+    page.get_by_label("exclude regions that the subject never comes near").check()
     way.press("Set up the background")
     shares = way.agreement()
     print("before the cameras are turned:", shares)
     way.shoot("background")
 
 
-def test_cameras_that_were_touched_are_turned(way: Workflow) -> None:
+def test_cameras_that_were_touched_are_turned(way: GuidedSetup) -> None:
     """The published calibration misses by a dozen pixels; afterwards the views agree by 0.9 and more."""
     page = way.page
     asked = page.locator("section", has=page.get_by_role("heading", name="Do the cameras agree?"))
@@ -172,7 +96,7 @@ def test_cameras_that_were_touched_are_turned(way: Workflow) -> None:
     way.shoot("background.turned")
 
 
-def test_subject(way: Workflow) -> None:
+def test_subject(way: GuidedSetup) -> None:
     """His height as a person would type it."""
     way.to("subject")
     height = way.page.get_by_label("Height in centimetres")
@@ -185,7 +109,7 @@ def test_subject(way: Workflow) -> None:
     way.shoot("subject")
 
 
-def test_start_pose(way: Workflow) -> None:
+def test_start_pose(way: GuidedSetup) -> None:
     """Found automatically, with its confidence, and drawn over all views."""
     way.to("start-pose")
     way.press("Find it automatically")
@@ -196,7 +120,7 @@ def test_start_pose(way: Workflow) -> None:
     way.press("Yes, track from here")
 
 
-def tracked(way: Workflow, frames: int, evaluations: int) -> None:
+def tracked(way: GuidedSetup, frames: int, evaluations: int) -> None:
     """Track the first frames; the room is full of things."""
     page = way.page
     page.select_option("#step select[name=weighting]", WEIGHTING)
@@ -207,13 +131,13 @@ def tracked(way: Workflow, frames: int, evaluations: int) -> None:
     assert way.studio.get("/api/sessions/balance-man")["runs"][0]["done"] == frames
 
 
-def made_better(way: Workflow, verb: str, made: str) -> None:
+def made_better(way: GuidedSetup, verb: str, made: str) -> None:
     way.press(verb)
     expect(way.page.locator(f"#step input[value={made}]")).to_be_checked()
     expect(way.page.locator("#step .step-progress")).to_have_count(0)
 
 
-def test_track_a_first_part(way: Workflow) -> None:
+def test_track_a_first_part(way: GuidedSetup) -> None:
     """The first second, with the body of the guessed height, refined."""
     tracked(way, FIRST_PART, 2000)
     way.to("check")
@@ -223,7 +147,7 @@ def test_track_a_first_part(way: Workflow) -> None:
     way.shoot("check.first")
 
 
-def test_fit_the_subject(way: Workflow) -> None:
+def test_fit_the_subject(way: GuidedSetup) -> None:
     """Lengths and radii from the first part's poses: he is some five centimetres shorter than was guessed."""
     way.to("subject")
     way.press("Fit the subject")
@@ -234,7 +158,7 @@ def test_fit_the_subject(way: Workflow) -> None:
     way.shoot("subject.fitted")
 
 
-def test_track(way: Workflow) -> None:
+def test_track(way: GuidedSetup) -> None:
     """All of it, from a start pose of the body that was fitted."""
     way.to("start-pose")
     way.press("Find it automatically")
@@ -244,7 +168,7 @@ def test_track(way: Workflow) -> None:
     way.shoot("track")
 
 
-def test_check(way: Workflow) -> None:
+def test_check(way: GuidedSetup) -> None:
     """Looked at, refined, smoothed: most of the model lies in the masks of every tenth frame, nobody turns round."""
     way.to("check")
     way.press("Check the motion")
@@ -262,17 +186,14 @@ def test_check(way: Workflow) -> None:
     way.shoot("check")
 
 
-def test_export(way: Workflow, tmp_path: Path) -> None:
+def test_export(way: GuidedSetup, tmp_path: Path) -> None:
     """A BVH, which another reader opens: every frame, at 60 a second, a man's hips at a man's height."""
     page = way.page
     way.to("export")
     page.locator(".export .format", has_text=".bvh").click()
     page.locator(".export-actions button.primary").click()
     way.stands("export", "done")
-    with page.expect_download() as waiting:
-        page.locator(".export-files a").first.click()
-    file = tmp_path / waiting.value.suggested_filename
-    waiting.value.save_as(file)
+    file = way.download(tmp_path)
     assert file.name == "balance-man-run-2-smoothed.bvh"
     with contextlib.redirect_stdout(io.StringIO()):
         read = bvhsdk.ReadFile(str(file))

@@ -107,3 +107,13 @@ def test_the_camera_to_look_at_is_named() -> None:
     denying = quality.MaskQuality((0,), (view("a", 0.7), view("b", 0.85, denied=0.2)), (80.0,))
     assert denying.worst == "b"
     assert "camera b" in denying.in_words()
+
+
+def test_what_is_below_the_mark_does_not_read_like_the_mark() -> None:
+    views = tuple(
+        quality.ViewQuality(name, agreement, agreement, 0.0, ())
+        for name, agreement in (("a", 0.94), ("b", 0.8996))
+    )
+    found = quality.MaskQuality((0,), views, (80.0,))
+    assert not found.usable
+    assert found.in_words() == "least agreement 0.899, below the mark of 0.9: check camera b"

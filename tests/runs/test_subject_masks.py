@@ -1,5 +1,6 @@
 """Several subjects in view: found in the hull, cut from the masks, given sessions, tracked at once."""
 
+import itertools
 from contextlib import closing
 from pathlib import Path
 
@@ -8,6 +9,8 @@ import pytest
 from rendered_people import overlap
 from two_people import TwoPeople, two_people
 
+from studio.arrays import Bytes
+from studio.capture.footage import Footage
 from studio.errors import FootageError, RunError, SessionError, WorkCancelledError
 from studio.operations.masks import background
 from studio.operations.subjects import subjects, together
@@ -15,7 +18,7 @@ from studio.runs.background_setup import set_up_background
 from studio.runs.mask_quality import mask_quality
 from studio.runs.problem_source import ProblemSource
 from studio.runs.session_settings import session_settings
-from studio.runs.subject_masks import seen_subjects
+from studio.runs.subject_masks import WholeMasks, cut_frames, seen_subjects
 from studio.runs.together import track_together
 from studio.sessions.session import Session
 from studio.settings import default_settings
@@ -88,6 +91,29 @@ def test_who_is_in_view_is_told_by_the_hull(made: TwoPeople) -> None:
             apart = [np.hypot(one.at[0] - place[0], one.at[1] - place[1]) for one in seen]
             assert min(apart) < 0.15
     assert all(1.5 < one.height < 2.0 for one in seen_subjects(made.session))
+
+
+def test_a_camera_without_a_picture_says_nothing_of_who_is_in_view(
+    made: TwoPeople, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gone = made.session.manifest.footage.cameras[0].name
+    mask_of, asked = WholeMasks.of, set[str]()
+
+    def heard(whole: WholeMasks, camera: str, frame: int) -> Bytes:
+        asked.add(camera)
+        return mask_of(whole, camera, frame)
+
+    monkeypatch.setattr(WholeMasks, "of", heard)
+    monkeypatch.setattr(Footage, "absent", lambda *_: frozenset({gone}))
+    assert len(seen_subjects(made.session)) == 2
+    assert asked
+    assert gone not in asked
+    # Nor is anybody lost in a frame that it lacks.
+    monkeypatch.setattr(Footage, "absent", lambda _, frame: frozenset({gone} if frame else ()))
+    _, second = itertools.islice(cut_frames(made.session, made.places()), 2)
+    assert second.lost == ()
+    assert not second.parts[0][gone].any()
+    assert all(part.any() for parts in second.parts for name, part in parts.items() if name != gone)
 
 
 def test_masks_of_two_are_not_called_usable(made: TwoPeople) -> None:

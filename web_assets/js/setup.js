@@ -32,7 +32,7 @@ const STEPS = {
   calibration: { name: "Calibration", lead: "Positions and lenses of the cameras, and whether they are right." },
   background: { name: "Background", lead: "The subject's mask in each picture, and how far the views agree." },
   subject: { name: "Subject", lead: "The tracked body and its measures." },
-  "start-pose": { name: "Start pose", lead: "The person's pose in the frame where tracking begins." },
+  "start-pose": { name: "Start pose", lead: "The subject's pose in the frame where tracking begins." },
   track: { name: "Track", lead: "The motion, frame by frame." },
   check: { name: "Check", lead: "Whether the motion fits the pictures, and how to improve it." },
   export: { name: "Export", lead: "The motion as a file for other programs." },

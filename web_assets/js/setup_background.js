@@ -20,7 +20,7 @@ const SOURCES = {
   combined: ["Combined", "Pictures of the empty room where there are any, the footage elsewhere; cleaned with the other views. The best choice with three cameras or more."],
   plate: ["Picture", "A picture of the empty room from each camera, unchanged."],
   clip: ["Clip", "A short video of the empty room from each camera, unchanged."],
-  median: ["Median", "The median of the footage. Good if the person moves about."],
+  median: ["Median", "The median of the footage. Good if the subject moves about."],
   person: ["Person", "A network finds the person and cuts him out, frame by frame: no picture of the empty room, and he may stay in place. People only; the one whom most cameras see."],
   strokes: ["Strokes", "Anything: you paint a few lines inside and outside the subject in one picture of each camera; they are carried through all frames, and corrected by more strokes in any frame."],
   threshold: ["Brightness and colour", "For a subject that is lit so that these alone tell it from all else: a white mouse on dark litter, a glove of one colour."],
@@ -49,7 +49,7 @@ export function mount(place, setup) {
   /** @type {Schemas["BackgroundRequest"]["source"]} */
   let source = null;
   let tune = true;
-  let unused = false;    // whether what the person never comes near is excluded
+  let unused = false;    // whether what the subject never comes near is excluded
   /** @type {Record<string, string | number | boolean>} */
   let changed = {};      // knobs that are tried
   let quality = null;
@@ -202,7 +202,7 @@ export function mount(place, setup) {
     fill(make, background.source === "masks" && notice("Masks came with the footage and are used unchanged. Set up a background only if they are not good."),
       sourceChoices(), source === "strokes" ? strokeList() : source === "subject" ? subjectList() : plates(),
       !AS_THEY_ARE.includes(source) && check("tune the knobs for the best agreement of the views", { checked: tune, onchange: ({ target }) => { tune = target.checked; } }, "Knobs that you set below stay fixed."),
-      source === "combined" && check("exclude regions that the person never comes near", { checked: unused, onchange: ({ target }) => { unused = target.checked; } }, "A bystander, a monitor, a window: motion there is not the person."),
+      source === "combined" && check("exclude regions that the subject never comes near", { checked: unused, onchange: ({ target }) => { unused = target.checked; } }, "A bystander, a monitor, a window: motion there is not the subject."),
       !running && actions(button("Set up the background", setUp, "primary", { disabled: !source || !background.possible.includes(source) || (source === "subject" && !subjectAt) })), going, failure(failed),
       background.job?.choice && sourceTable(background.job.choice), (background.job?.notes ?? []).map((note) => hint(note)));
     if (running) drawGoing();

@@ -7,7 +7,7 @@ import { complain } from "./messages.js";
 
 const UNDONE = 30;
 const PICTURE_HEIGHT = 1080;
-const HELP = "Paint what is not the person. Keys: arrows move, space paints, x paints or erases, [ and ] change the size, ctrl z undoes, enter keeps, escape leaves.";
+const HELP = "Paint what is not the subject. Keys: arrows move, space paints, x paints or erases, [ and ] change the size, ctrl z undoes, enter keeps, escape leaves.";
 
 /** Edit what is excluded of `lens` (name, picture_width, picture_height, quarter_turns, frame, excluded: whether there is
  * something already, shown before a stroke can be made: one that came after would undo what was painted meanwhile);

@@ -101,7 +101,7 @@ export function mount(place, setup) {
     const covered = seen.reduce((sum, share) => sum + share, 0) / seen.length;
     const parts = [
       check.good ? "The motion fits the pictures." : "Check the marked frames.",
-      `${percent(check.inside_mean)} of the model lies in the masks${seen.length ? `, ${percent(covered)} of the masks under the model: where it is little, an arm or a leg is elsewhere` : ""}.`,
+      `${percent(check.inside_mean)} of the model lies in the masks${seen.length ? `, ${percent(covered)} of the masks under the model: where it is little, a limb is elsewhere` : ""}.`,
       check.turned.length ? `The body turns round suddenly ${check.turned.length} times: left and right may be exchanged.` : "No sudden turn: left and right were not exchanged.",
       check.jumps.length ? `A limb jumps ${check.jumps.length === 1 ? "once" : `${check.jumps.length} times`}: it was lost or taken for another.` : "",
       check.jitter_mm !== null ? `The markers jitter by ${check.jitter_mm.toFixed(1)} mm.` : "",

@@ -1,7 +1,8 @@
 // The pictures of all views with their masks, in a frame that can be chosen; knobs that are tried show at once.
 
 import { sessionPath } from "./api.js";
-import { button, check, element, fill, percent, spring } from "./elements.js";
+import { button, check, element, fill, spring } from "./elements.js";
+import { agreementOf } from "./setup_quality.js";
 
 const HEIGHT = 420;
 const SPREAD = 5;
@@ -49,7 +50,7 @@ export function maskPictures(setup, paint, strokes) {
   function caption(view) {
     const line = state.quality?.cameras.find((one) => one.camera === view.camera.name);
     fill(view.caption, element("div", { className: "head-line" }, element("b", {}, view.camera.name),
-      line && element("span", { className: `badge ${line.usable ? "good" : "bad"}` }, line.agreement === null ? "empty" : percent(line.agreement)),
+      line && element("span", { className: `badge ${line.usable ? "good" : "bad"}` }, line.agreement === null ? "empty" : agreementOf(line)),
       view.camera.excluded && element("span", { className: "hint" }, "regions excluded"), spring(), view.strokes, view.brush));
   }
 

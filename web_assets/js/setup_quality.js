@@ -7,6 +7,9 @@ import { button, element, hint, notice, percent } from "./elements.js";
 
 const USABLE = 0.9;
 
+/** A camera's agreement in per cent, so fine that what is below the mark never reads like the mark. */
+export const agreementOf = ({ agreement, usable }) => (usable || agreement === null ? percent(agreement) : `${(Math.floor(1000 * agreement) / 10).toFixed(1)} %`);
+
 function agreementBar(line) {
   const kind = line.usable ? "good" : line.agreement !== null && line.agreement >= 0.8 ? "warn" : "bad";
   return element("div", {
@@ -20,7 +23,7 @@ function agreementBar(line) {
 export function qualityList(quality, paint, measured = "", source = "") {
   if (!quality && measured) return [hint(`When it was last measured, ${measured}. Measure again to see every camera.`)];
   if (!quality) return [hint("Not measured yet. No ground truth is needed: the masks of all views must agree in the visual hull.")];
-  const rows = quality.cameras.map((line) => element("li", {}, element("span", {}, line.camera), agreementBar(line), element("span", { className: "figure" }, percent(line.agreement)), line.note && hint(line.note)));
+  const rows = quality.cameras.map((line) => element("li", {}, element("span", {}, line.camera), agreementBar(line), element("span", { className: "figure" }, agreementOf(line)), line.note && hint(line.note)));
   const worst = quality.cameras.find((line) => line.camera === quality.worst);
   const doubts = quality.doubts.length > 0 && element("div", {}, notice("The silhouettes contradict the calibration:"), findingList({ findings: quality.doubts }));
   const verdict = worst
@@ -48,10 +51,11 @@ const BY_HAND = {
 };
 
 function remedy(line, source) {
-  const first = `Check ${line.camera} first.`;
+  const below = line.agreement !== null && line.agreement < USABLE && ` It agrees with the other views by ${agreementOf(line)}; ${percent(USABLE)} is the mark.`;
+  const first = `Check ${line.camera} first.${below || ""}`;
   if (BY_HAND[source]) return `${first} ${BY_HAND[source]}`;
   if (line.agreement === null) return `${first} Its mask is empty: lower “mask threshold”, or give a picture of its empty room.`;
-  if (line.denied > 0.05) return `${first} Its mask has holes that carve the person in all views: lower “mask threshold”, or switch “shadow test” off.`;
+  if (line.denied > 0.05) return `${first} Its mask has holes that carve the subject in all views: lower “mask threshold”, or switch “shadow test” off.`;
   if (line.covered !== null && line.covered < USABLE) return `${first} It holds something that no other view has: a bystander, a reflection, a shadow. Exclude the region, or raise “mask threshold”.`;
-  return `${first} It lacks parts of the person: lower “mask threshold”, or raise “close gaps”.`;
+  return `${first} It lacks parts of the subject: lower “mask threshold”, or raise “close gaps”.`;
 }

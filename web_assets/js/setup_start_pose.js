@@ -110,7 +110,7 @@ export function mount(place, setup) {
     };
     const disabled = going || editing;
     fill(steps, field("In frame", which),
-      hint("The frame in which tracking begins: the whole person in view, arms away from the trunk if you can choose. Frames before it can be tracked backwards from it."),
+      hint("The frame in which tracking begins: the whole subject in view, limbs away from the trunk if you can choose. Frames before it can be tracked backwards from it."),
       editing ? editingBox() : actions(button("Find it automatically", find, pose?.stored ? "" : "primary", { disabled }), button("Edit by hand", edit, "", { disabled })), failure(failed));
     drawVerdicts();
     if (!editing) drawPictures();
@@ -139,7 +139,7 @@ export function mount(place, setup) {
     const swatch = (side) => element("i", { className: `side-swatch ${side}` });
     const act = (label, work, className = "") => button(label, work, className, { disabled: going });
     return [
-      ...(pose.has_sides ? [element("h2", {}, "Left and right"), element("p", { className: "side-check" }, swatch("left"), "the person's left, ", swatch("right"), "the person's right. Is it so in every picture?")] : []),
+      ...(pose.has_sides ? [element("h2", {}, "Left and right"), element("p", { className: "side-check" }, swatch("left"), "the subject's left, ", swatch("right"), "the subject's right. Is it so in every picture?")] : []),
       actions(act("Yes, track from here", () => setup.go("track"), "primary"),
         pose.has_sides && [act("No: facing the other way", () => exchange("turned round")), act("Mirror", () => exchange("in place"))], act("Refine from here", refine)),
     ];
