@@ -28,7 +28,7 @@ PATIENCE = 120.0
 
 
 @pytest.fixture(scope="module")
-def address() -> Iterator[str]:
+def pool() -> Iterator[LocalCluster]:
     """A scheduler with two workers, each a process that a nanny starts again."""
     with (
         dask.config.set({"distributed.scheduler.allowed-failures": 1}),
@@ -36,7 +36,14 @@ def address() -> Iterator[str]:
             n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0", memory_limit=0
         ) as made,
     ):
-        yield made.scheduler_address
+        yield made
+
+
+@pytest.fixture
+def address(pool: LocalCluster) -> str:
+    """Of the scheduler, with both workers there again after a test that killed one."""
+    pool.wait_for_workers(2, PATIENCE)
+    return pool.scheduler_address
 
 
 def identifier() -> int:
