@@ -205,9 +205,7 @@ def test_a_worker_that_comes_later_without_the_folder_ends_the_work(address: str
 
 def test_other_versions_are_named(address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cluster, "_software", lambda: {**software, "numpy": "1.0"})
-    with pytest.raises(
-        RunError, match=r"A worker on .* has numpy .*, this machine has 1\.0\."
-    ) as no:
+    with pytest.raises(RunError, match=r"A worker on .* has numpy .*, this machine has 1\.0\.") as no:
         ClusterExecutor(address, tmp_path)
     assert "same versions" in no.value.hint
 
