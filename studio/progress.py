@@ -2,7 +2,9 @@
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 
 Progress = Callable[[str, int, int], None]
 """Called often, with the name of a step, the number of parts done and of all (0: unknown). Its exception ends the work,
@@ -19,6 +21,28 @@ ASSUMED_SPREAD = 0.5
 FACTOR = 2.0
 """An estimate is given when the true time is likely to lie within this factor of it."""
 KEPT = 64
+
+
+_listener: ContextVar[Callable[..., None] | None] = ContextVar("listener", default=None)
+
+
+def report(*words: object) -> None:
+    """Called by a task in its own thread: passed on to what runs it, an executor of processes or of a cluster, whose
+    exception ends the task. Elsewhere nothing happens.
+    """
+    listener = _listener.get()
+    if listener is not None:
+        listener(*words)
+
+
+@contextmanager
+def heard_by(listener: Callable[..., None]) -> Generator[None]:
+    """While a task runs in this thread: what its `report` calls."""
+    before = _listener.set(listener)
+    try:
+        yield
+    finally:
+        _listener.reset(before)
 
 
 def unheard(_step: str, _done: int, _total: int) -> None:

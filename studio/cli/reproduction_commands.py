@@ -10,6 +10,7 @@ from studio.cli.output import errors_in_words, note, print_result, progress
 from studio.comparison.findings import FAILED
 from studio.comparison.findings_document import REPORT, REPRODUCTIONS, SUMMARY, Document
 from studio.comparison.trials import Scale
+from studio.jobs.cluster import CLUSTER_HELP
 from studio.reproduction.catalogue import EXPERIMENTS, find_experiments
 from studio.reproduction.experiment import Experiment
 from studio.reproduction.findings_files import number_in_words, read_findings
@@ -33,9 +34,16 @@ JSON_HELP = "Print one JSON object and nothing else on standard output."
 @click.option("--quick", is_flag=True, help=QUICK_HELP)
 @click.option("--seeds", type=click.IntRange(1, 1000), metavar="N", help=SEEDS_HELP)
 @click.option("--processes", type=click.IntRange(1, 1024), metavar="N", help=PROCESSES_HELP)
+@click.option("--cluster", default="", metavar="ADDRESS", help=CLUSTER_HELP)
 @click.option("--json", "as_json", is_flag=True, help=JSON_HELP)
 def reproduce_command(
-    name: str, out: Path | None, quick: bool, seeds: int | None, processes: int | None, as_json: bool
+    name: str,
+    out: Path | None,
+    quick: bool,
+    seeds: int | None,
+    processes: int | None,
+    cluster: str,
+    as_json: bool,
 ) -> None:
     """Rerun the experiment NAME of a paper, `all` of them, or `list` what there is.
 
@@ -48,19 +56,21 @@ def reproduce_command(
         if name == "list":
             print_result(_listed(folder), as_json)
             return
-        found = _run(find_experiments(name), folder, scale_of(seeds, quick), processes)
+        found = _run(find_experiments(name), folder, scale_of(seeds, quick), processes, cluster)
         print_result(_answer(found, folder), as_json)
         if any(document["verdict"] == FAILED for document in found.documents):
             sys.exit(NOT_CONCLUDED)
 
 
 def _run(
-    experiments: tuple[Experiment, ...], folder: Path, scale: Scale, processes: int | None
+    experiments: tuple[Experiment, ...], folder: Path, scale: Scale, processes: int | None, cluster: str
 ) -> Reproduction:
     try:
         with progress("reproducing") as report:
             catalogue = tuple(EXPERIMENTS.values())
-            return reproduce(experiments, folder, scale, report, catalogue=catalogue, processes=processes)
+            return reproduce(
+                experiments, folder, scale, report, catalogue=catalogue, processes=processes, cluster=cluster
+            )
     except KeyboardInterrupt:
         typed = shlex.join(["studio", *sys.argv[1:]])
         note(f"Every finished trial is kept in '{folder}'. Go on with: {typed}")

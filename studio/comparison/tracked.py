@@ -24,6 +24,7 @@ from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.motion_files.trc import read_trc
+from studio.progress import report
 from studio.runs.behaviour_models import check_prediction, fitting, model_folders, model_path
 from studio.runs.following import Following
 from studio.runs.search_space import search_space, session_sigma
@@ -271,4 +272,4 @@ def tracking_trial(group: str, attempt: Attempt) -> Trial:
 @kept_as("tracking_trials.measure_tracking")
 def measure_tracking(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
     """Track; the fields of `Tracked`."""
-    return asdict(track(Attempt.of_plain(arguments), cache))
+    return asdict(track(Attempt.of_plain(arguments), cache, on_frame=partial(report, "tracking")))

@@ -10,10 +10,9 @@ from pathlib import Path
 from studio.behaviour.settings import LearningSettings
 from studio.body.catalogue import load_body
 from studio.errors import BehaviourError
-from studio.jobs import process_executor
 from studio.jobs.process_executor import ProcessExecutor, ProcessLostError
 from studio.knobs import Value, changed, knobs_of
-from studio.progress import Progress
+from studio.progress import Progress, report
 from studio.runs.behaviour_models import models_folder
 from studio.sessions.session import BODIES_NAME
 from studio.sessions.workspace import Workspace
@@ -86,7 +85,6 @@ def learn_in_process(
 
 def learn_to_order(order: LearningOrder) -> dict[str, object]:
     """Learn and keep the model, reporting its progress; its numbers. Raises StudioError."""
-    report: Progress = process_executor.report
     workspace, body = Workspace(order.root), load_body(order.body, (order.root / BODIES_NAME,))
     place_for_model(order.name, workspace)
     learning, material = order.settings()

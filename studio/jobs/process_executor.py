@@ -20,6 +20,7 @@ from multiprocessing.process import BaseProcess
 from typing import Any, ParamSpec, TypeVar
 
 from studio.errors import RunError
+from studio.progress import heard_by
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -56,7 +57,7 @@ class ProcessExecutor(Executor):
 
     environment : variables of the processes. near : of a task's function and arguments; a process takes the tasks with
     the value of its last one first, then those with a value that no other process has. on_report : hears, in
-    another thread, what tasks `report`. niceness : of the processes.
+    another thread, what tasks `progress.report`. niceness : of the processes.
     """
 
     def __init__(
@@ -143,13 +144,6 @@ def nearest(waiting: Sequence[Hashable], own: Hashable, others: Sequence[Hashabl
     same = (at for at, near in enumerate(waiting) if near == own)
     free = (at for at, near in enumerate(waiting) if near not in others)
     return next(same, next(free, 0))
-
-
-def report(*words: object) -> None:
-    """Called by a task in a process: passed on to the executor's `on_report`. Elsewhere nothing happens."""
-    if _outbox is not None:
-        with suppress(OSError):
-            _outbox.send(("report", words))
 
 
 @dataclass(frozen=True, slots=True)
@@ -254,33 +248,37 @@ def _environment(values: Mapping[str, str]) -> Generator[None]:
 
 # ------------------------------------------------------------------ in the process
 
-_outbox: Connection | None = None
-
 
 def _run_tasks(pipe: Connection, niceness: int) -> None:
     """The process's whole life: tasks in, what they report and what comes of them out, until the other end is gone."""
-    global _outbox
-    _outbox = pipe
+
+    def tell(*words: object) -> None:
+        with suppress(OSError):
+            pipe.send(("report", words))
+
     # Ctrl-C in the terminal reaches all processes; the one that started them decides.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if niceness and hasattr(os, "nice"):
         os.nice(niceness)
     threading.Thread(target=_end_with_parent, name="parent-watch", daemon=True).start()
-    with suppress(EOFError, OSError):
+    with suppress(EOFError, OSError), heard_by(tell):
         while True:
-            content = pipe.recv_bytes()
-            try:
-                function, arguments, options = pickle.loads(content)
-                answer = ("returned", function(*arguments, **options))
-            except Exception as problem:
-                problem.add_note(traceback.format_exc())
-                answer = ("raised", problem)
-            try:
-                travelling = pickle.dumps(answer)
-            except Exception as problem:
-                what = f"What came of it cannot be pickled: {problem!r}; {answer[1]!r:.200}"
-                travelling = pickle.dumps(("raised", RuntimeError(what)))
-            pipe.send_bytes(travelling)
+            pipe.send_bytes(answered(pipe.recv_bytes()))
+
+
+def answered(content: bytes) -> bytes:
+    """Run a pickled (function, arguments, options); ("returned", result) or ("raised", exception), pickled."""
+    try:
+        function, arguments, options = pickle.loads(content)
+        answer = ("returned", function(*arguments, **options))
+    except Exception as problem:
+        problem.add_note(traceback.format_exc())
+        answer = ("raised", problem)
+    try:
+        return pickle.dumps(answer)
+    except Exception as problem:
+        what = f"What came of it cannot be pickled: {problem!r}; {answer[1]!r:.200}"
+        return pickle.dumps(("raised", RuntimeError(what)))
 
 
 def _end_with_parent() -> None:

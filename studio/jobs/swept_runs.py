@@ -8,7 +8,7 @@ from studio.comparison.footage_cache import FootageCache
 from studio.comparison.sweep import measured_run
 from studio.comparison.trials import kept_as
 from studio.jobs.batch import track_to_end
-from studio.progress import unheard
+from studio.progress import report
 from studio.runs.new_run import prepare_run
 from studio.runs.session_settings import session_settings
 from studio.sessions.names import free_name
@@ -24,7 +24,7 @@ def measure_run(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, 
     session = cache.session(arguments["footage"])
     run = _begun(session, arguments) or _new(session, arguments)
     if run.summary(blobs=False).done < run.record.frame_count:
-        track_to_end(session, run, unheard)
+        track_to_end(session, run, report)
     return asdict(measured_run(session, run))
 
 

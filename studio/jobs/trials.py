@@ -12,7 +12,8 @@ from pathlib import Path
 from studio.comparison.footage_cache import MOST_BYTES, FootageCache
 from studio.comparison.kept_trials import plain
 from studio.comparison.trials import Plain, TrialJob, failure_in_words
-from studio.jobs.process_executor import ONE_CORE, ProcessExecutor, cores
+from studio.errors import StudioError
+from studio.jobs.process_executor import ONE_CORE, ProcessExecutor, ProcessLostError, cores
 
 LOSSES_ALLOWED = 1
 """How often a trial is tried again whose process, or machine, was lost."""
@@ -45,15 +46,16 @@ def run_jobs(
     """Run all jobs, those that must be alone at the end, one by one.
 
     on_result : called here, as each is done. processes : at once, None for one a core. executor : runs them instead of
-    processes of this call's own (threads, or another machine's: a Dask client's `get_executor()`); it is left open.
+    processes of this call's own (threads, or other machines': `cluster.ClusterExecutor`); it is left open.
     checkpoint : called here, several times a second. Whatever is raised here (KeyboardInterrupt, or what `on_result`
-    and `checkpoint` raise), no process of this call's own is left, and what waits elsewhere is cancelled.
+    and `checkpoint` raise), no process of this call's own is left, and what waits elsewhere is cancelled. Raises
+    StudioError of an executor that cannot run any.
     """
     shared = [job for job in jobs if not job.alone]
     alone = [job for job in jobs if job.alone]
     if executor is not None:
         for group in ([shared] if shared else []) + [[job] for job in alone]:
-            _run(group, footage_folder, on_result, executor, MOST_BYTES, checkpoint)
+            _run(group, footage_folder, on_result, executor, None, checkpoint)
         return
     for group, most, environment in ((shared, processes or cores(), ONE_CORE), (alone, 1, None)):
         if not group:
@@ -61,20 +63,23 @@ def run_jobs(
         count = max(1, min(most, len(group)))
         own = ProcessExecutor(count, environment=environment, near=_footage_of)
         try:
-            _run(group, footage_folder, on_result, own, _cache_bytes(count), checkpoint)
+            _run(group, footage_folder, on_result, own, count, checkpoint)
         finally:
             own.shutdown(cancel_futures=True)
 
 
-def run_trial(job: TrialJob, footage_folder: str, cache_bytes: int) -> TrialResult:
-    """Run one job; whatever goes wrong becomes words. Evidence of its footage is kept for the thread's next."""
+def run_trial(job: TrialJob, footage_folder: str, at_once: int | None) -> TrialResult:
+    """Run one job; whatever goes wrong becomes words. Evidence of its footage is kept for the thread's next.
+
+    at_once : trials that share this machine's memory, None for one a core.
+    """
     began = time.perf_counter()
     measured, failure = None, ""
     cache: FootageCache | None = getattr(_here, "cache", None)
     if cache is None or cache.folder != Path(footage_folder):
         if cache is not None:
             cache.close()
-        cache = _here.cache = FootageCache(Path(footage_folder), cache_bytes)
+        cache = _here.cache = FootageCache(Path(footage_folder), _cache_bytes(at_once or cores()))
     try:
         measured = plain(job.measure(job.arguments, cache))
     except Exception as error:
@@ -90,14 +95,14 @@ def _run(
     footage_folder: Path,
     on_result: OnResult,
     executor: Executor,
-    cache_bytes: int,
+    at_once: int | None,
     checkpoint: Callable[[], None],
 ) -> None:
     lost = dict[str, int]()
     going = dict[Future[TrialResult], TrialJob]()
 
     def submit(job: TrialJob) -> None:
-        going[executor.submit(run_trial, job, str(footage_folder), cache_bytes)] = job
+        going[executor.submit(run_trial, job, str(footage_folder), at_once)] = job
 
     try:
         for job in jobs:
@@ -111,7 +116,9 @@ def _run(
                 if problem is None:
                     on_result(job, future.result())
                     continue
-                # A trial raises nothing: what ran it was lost.
+                # A trial raises nothing: what ran it was lost, or refuses to run any.
+                if isinstance(problem, StudioError) and not isinstance(problem, ProcessLostError):
+                    raise problem
                 lost[job.key] = lost.get(job.key, 0) + 1
                 if lost[job.key] <= LOSSES_ALLOWED:
                     with suppress(Exception):

@@ -14,6 +14,7 @@ from studio.comparison.plan import Comparison, Plan, plan_comparison
 from studio.comparison.sweep import Sweep, expected, plan_sweep, run_name
 from studio.declaring import Body, Despite, Knobs, Model, OneOf, Terminal, Values, Web, operation
 from studio.errors import RunError, SessionError
+from studio.jobs.cluster import Cluster, chosen_executor
 from studio.jobs.comparison_run import done_before, run_comparison, run_sweep
 from studio.jobs.process_executor import cores
 from studio.likelihood.catalogue import WEIGHTINGS
@@ -81,6 +82,7 @@ def compare(
     processes: Annotated[
         int | None, Field(ge=1, description="Trials at once; default: one a core."), Web(left_out=True)
     ] = None,
+    cluster: Cluster = "",
     progress: Reporting = None,
 ) -> Compared:
     """Compare trackers on a session with a truth: same evidence, same number of evaluations a frame, same seeds.
@@ -105,12 +107,15 @@ def compare(
         layers=layers,
         changes=changes,
     )
-    kept = _kept(opened, plan, name, Path(out) if out else None)
-    before = done_before(kept, plan)
-    if before:
-        say(progress, [f"{before} of {seeds * len(plan.entrants)} trials are there already."])
-    with reporting(progress, f"{opened.name} / {kept.name}") as report:
-        comparison = run_comparison(kept, opened, report, processes=processes)
+    with chosen_executor(cluster, opened.path) as executor:
+        kept = _kept(opened, plan, name, Path(out) if out else None)
+        before = done_before(kept, plan)
+        lines = [executor.in_words] if executor else []
+        if before:
+            lines.append(f"{before} of {seeds * len(plan.entrants)} trials are there already.")
+        say(progress, lines)
+        with reporting(progress, f"{opened.name} / {kept.name}") as report:
+            comparison = run_comparison(kept, opened, report, processes=processes, executor=executor)
     say(progress, [f"Kept in {kept.folder}"])
     return Compared(comparison, kept)
 
@@ -163,6 +168,7 @@ def sweep(
     processes: Annotated[
         int | None, Field(ge=1, description="Runs at once; default: one a core."), Web(left_out=True)
     ] = None,
+    cluster: Cluster = "",
     progress: Reporting = None,
 ) -> SweptGrid:
     """Track every combination of some knobs' values with several seeds, and compare the runs.
@@ -188,12 +194,16 @@ def sweep(
         fit_shape=fit_shape,
         despite_findings=despite_findings,
     )
-    kept = kept_sweep(opened, plan, name)
-    wait = expected(opened, plan, processes or cores(), cores())
-    before = done_before(kept, plan)
-    say(progress, [wait.in_words, *([f"{before} of {wait.runs} runs are there already."] if before else [])])
-    with reporting(progress, f"{opened.name} / {kept.name}") as report:
-        found = run_sweep(kept, opened, report, processes=processes)
+    with chosen_executor(cluster, opened.path) as executor:
+        kept = kept_sweep(opened, plan, name)
+        at_once = executor.threads or 1 if executor else processes or cores()
+        wait = expected(opened, plan, at_once, cores())
+        lines = [*([executor.in_words] if executor else []), wait.in_words]
+        if before := done_before(kept, plan):
+            lines.append(f"{before} of {wait.runs} runs are there already.")
+        say(progress, lines)
+        with reporting(progress, f"{opened.name} / {kept.name}") as report:
+            found = run_sweep(kept, opened, report, processes=processes, executor=executor)
     say(progress, [f"Kept in {kept.folder}"])
     return SweptGrid(found, kept)
 

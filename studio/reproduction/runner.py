@@ -6,6 +6,7 @@ Every result is stored at once: the same command resumes a killed one, and runs 
 import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from studio.comparison.findings_document import Document, Making, as_document, f
 from studio.comparison.kept_trials import KeptOutcome, KeptTrials, measured_by
 from studio.comparison.trials import Outcome, Scale, Trial, TrialJob, failure_in_words
 from studio.errors import RunError, SessionError, StudioError
+from studio.jobs.cluster import chosen_executor
 from studio.jobs.trials import TrialResult, run_jobs
 from studio.progress import Progress
 from studio.reproduction.experiment import Experiment
@@ -53,21 +55,24 @@ def reproduce(
     *,
     catalogue: Sequence[Experiment] = (),
     processes: int | None = None,
+    cluster: str = "",
     executor: Executor | None = None,
 ) -> Reproduction:
     """Run the missing trials of some experiments and write the folder `out`.
 
     catalogue : experiments whose findings the report shows, by default the experiments. processes, executor : see
-    `worker.trials.run_jobs`. A trial or a conclusion that fails makes its experiment "failed" and no other. Raises
-    SessionError for a folder that cannot be used, RunError while another process works in it, KeyboardInterrupt with
-    all results stored.
+    `jobs.trials.run_jobs`. cluster : where no executor is given, see `jobs.cluster.chosen_executor`. A trial or a
+    conclusion that fails makes its experiment "failed" and no other. Raises SessionError for a folder that cannot be
+    used, RunError while another process works in it and for a cluster that cannot be used, KeyboardInterrupt with all
+    results stored.
     """
     lock = _taken(out)
     try:
         planned = [plan(experiment, scale) for experiment in experiments]
         work = _Work(out, planned, tuple(catalogue or experiments), report)
         try:
-            work.run(processes, executor)
+            with nullcontext(executor) if executor else chosen_executor(cluster, out) as chosen:
+                work.run(processes, chosen)
         finally:
             results = work.write_overview()
         documents = tuple(work.documents[entry.experiment.name] for entry in planned)

@@ -1,7 +1,7 @@
 """Comparing trackers and sweeping knobs: start in the background, look, cancel, go on, throw away, download.
 
-A comparison lies in its session's folder and is measured by processes of its own, one comparison at a time; how far
-it is comes as `comparison` events and in every list.
+A comparison lies in its session's folder and is measured by processes of its own, or by the cluster that STUDIO_CLUSTER
+names, one comparison at a time; how far it is comes as `comparison` events and in every list.
 """
 
 from functools import lru_cache
@@ -25,6 +25,7 @@ from studio.comparison.sweep import expected, plan_sweep
 from studio.comparison.trial_runs import run_of_trial, trial_lines
 from studio.errors import NotFoundError, RunError, StudioError, WorkCancelledError
 from studio.jobs import commands
+from studio.jobs.cluster import chosen_executor
 from studio.jobs.comparison_run import done_before, run_comparison, run_sweep
 from studio.jobs.job_runner import Job
 from studio.jobs.process_executor import cores
@@ -256,7 +257,10 @@ def _start(app: AppState, session: Session, kept: KeptComparison) -> ComparisonL
 
         try:
             work_at = run_sweep if is_sweep else run_comparison
-            work_at(kept, session, report, processes=_processes(), checkpoint=job.check)
+            with chosen_executor("", session.path) as executor:
+                work_at(
+                    kept, session, report, processes=_processes(), executor=executor, checkpoint=job.check
+                )
         except WorkCancelledError:
             if not job.closing:
                 kept.end("cancelled")

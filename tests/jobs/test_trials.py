@@ -13,9 +13,9 @@ from toy_experiments import toy
 
 from studio.comparison.trials import Scale, TrialJob
 from studio.errors import FootageError
-from studio.jobs import process_executor
 from studio.jobs.process_executor import ProcessExecutor, ProcessLostError, nearest
 from studio.jobs.trials import TrialResult, run_jobs, run_trial
+from studio.progress import report
 from studio.reproduction.plan import each_once, plan
 
 PATIENCE = 120.0
@@ -39,7 +39,7 @@ def die_unless(place: Path) -> str:
 
 def speak(words: int) -> str:
     for number in range(words):
-        process_executor.report("step", number)
+        report("step", number)
     return os.environ.get("TOY", "")
 
 
