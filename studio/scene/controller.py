@@ -70,9 +70,6 @@ PICTURE_SECONDS, LIVE_PICTURE_SECONDS = 1.0 / 10.0, 1.0 / 2.0
 PICTURES_WAIT, ANNEALED_PICTURES_WAIT = 0.06, 0.4
 """Seconds without another change after which pictures are composed, so that a burst of changes has its pictures once,
 and a frame that is annealed again its clouds before: a browser that draws in software takes so long for them."""
-ANNEALED_SECONDS = 0.2
-"""What a frame that is annealed again shows is drawn when it is whole, or as often as this: a browser that still draws
-the first layers would show the last ones later."""
 IDLE_SECONDS = 0.5
 EYE_TOLERANCE = 0.02
 """Metres within which a viewer has not moved."""
@@ -393,11 +390,9 @@ class SceneController:
                     self._guarded(draw)
 
     def _pace(self) -> None:
-        """Set how soon what is pending is drawn."""
-        scene, pictures = self._drawings
-        held = is_annealed_again(self.model)
-        scene.pause, scene.calm = (ANNEALED_SECONDS, ANNEALED_SECONDS) if held else (REDRAW_SECONDS, 0.0)
-        late = held or self.model.live.reannealed
+        """Set how soon what is pending is drawn; layers that are annealed again and come together are drawn at once."""
+        (scene, pictures), late = self._drawings, is_annealed_again(self.model)
+        scene.calm = REDRAW_SECONDS if late else 0.0
         pictures.calm = ANNEALED_PICTURES_WAIT if late else PICTURES_WAIT
         pictures.pause = LIVE_PICTURE_SECONDS if late else picture_pause(self.model.search)
 
@@ -565,11 +560,10 @@ def picture_pause(state: StateChanged) -> float:
 
 
 def is_annealed_again(model: Model) -> bool:
-    """Whether the shown frame is annealed again, from the moved knob to the last layer."""
+    """Whether the shown frame is annealed again or was: from the moved knob on, until another frame is shown."""
     if model.is_searching:
         return False
-    is_asked = model.knobs is not None and bool(model.knobs.requested)
-    return is_asked or (model.live.reannealed and model.live.result is None)
+    return model.live.reannealed or (model.knobs is not None and bool(model.knobs.requested))
 
 
 def subject_of(found: OpenedRun) -> Subject:
