@@ -307,17 +307,14 @@ class SceneController:
     def _check(self, found: OpenedRun) -> None:
         """Read all that is stored, beside the scene's thread, and leave out what is damaged."""
         with suppress(StudioError):
-            self.post(self._leave_out, found, set(found.checked_frames()))
+            self.post(self._leave_out, found, found.damaged_frames())
 
-    def _leave_out(self, model: Model, found: OpenedRun, whole: set[int]) -> Model:
+    def _leave_out(self, model: Model, found: OpenedRun, damaged: set[int]) -> Model:
         """Leave out the frames that were found damaged after their run was opened."""
-        damaged = [frame for frame in model.frames if frame not in whole]
-        if found is not self.opened or not damaged or found.results is None:
+        if found is not self.opened or not damaged.intersection(model.frames):
             return model
-        # Frames that were finished since it was read are no damage.
-        known = found.results.damaged(blobs=False)
-        model = replace(model, frames=tuple(frame for frame in model.frames if frame not in known))
-        found.forget_from(damaged[0])
+        model = replace(model, frames=tuple(frame for frame in model.frames if frame not in damaged))
+        found.forget_from(min(damaged))
         return show_frame(model, model.selection.frame)
 
     def _close(self) -> None:

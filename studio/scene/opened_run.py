@@ -70,12 +70,12 @@ class OpenedRun:
         """The finished frames, ascending; what is not known to be damaged yet counts as intact."""
         return self.results.frames(blobs=False) if self.results else []
 
-    def checked_frames(self) -> list[int]:
-        """The finished frames that are whole, ascending, after all that is stored was read; from any thread."""
+    def damaged_frames(self) -> set[int]:
+        """The finished frames that are damaged, after all that is stored was read; from any thread."""
         if self.run is None:
-            return []
+            return set()
         with self.run.results() as results:
-            return results.frames()
+            return set(results.damaged())
 
     def result(self, frame: int) -> FrameResult | None:
         """The stored result of a frame, None while there is none."""
