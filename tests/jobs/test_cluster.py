@@ -27,23 +27,23 @@ from studio.reproduction.plan import each_once, plan
 PATIENCE = 120.0
 
 
-@pytest.fixture(scope="module")
-def pool() -> Iterator[LocalCluster]:
+def two_workers() -> LocalCluster:
     """A scheduler with two workers, each a process that a nanny starts again."""
-    with (
-        dask.config.set({"distributed.scheduler.allowed-failures": 1}),
-        LocalCluster(
-            n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0", memory_limit=0
-        ) as made,
-    ):
-        yield made
+    return LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0", memory_limit=0)
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[str]:
+    """Of a scheduler with two workers that nobody kills."""
+    with two_workers() as made:
+        yield made.scheduler_address
 
 
 @pytest.fixture
-def address(pool: LocalCluster) -> str:
-    """Of the scheduler, with both workers there again after a test that killed one."""
-    pool.wait_for_workers(2, PATIENCE)
-    return pool.scheduler_address
+def doomed() -> Iterator[str]:
+    """Of one whose workers are killed; a task is given up after two."""
+    with dask.config.set({"distributed.scheduler.allowed-failures": 1}), two_workers() as made:
+        yield made.scheduler_address
 
 
 def identifier() -> int:
@@ -127,9 +127,9 @@ def test_results_errors_reports_and_what_cannot_travel(address: str, tmp_path: P
         executor.submit(identifier)
 
 
-def test_24_trials_with_a_worker_killed_are_those_of_a_serial_run(address: str, tmp_path: Path) -> None:
+def test_24_trials_with_a_worker_killed_are_those_of_a_serial_run(doomed: str, tmp_path: Path) -> None:
     wanted = measured(jobs_of(tmp_path / "serial", 12), tmp_path, serially)
-    with ClusterExecutor(address, tmp_path) as executor:
+    with ClusterExecutor(doomed, tmp_path) as executor:
         jobs = jobs_of(tmp_path / "log", 12, seed5="die once")
         found = measured(jobs, tmp_path, partial(run_jobs, executor=executor))
     assert len(found) == 24
@@ -140,8 +140,8 @@ def test_24_trials_with_a_worker_killed_are_those_of_a_serial_run(address: str, 
     assert by[0] != by[1]
 
 
-def test_what_loses_workers_again_and_again_is_said(address: str, tmp_path: Path) -> None:
-    with ClusterExecutor(address, tmp_path) as executor:
+def test_what_loses_workers_again_and_again_is_said(doomed: str, tmp_path: Path) -> None:
+    with ClusterExecutor(doomed, tmp_path) as executor:
         lost = executor.submit(die).exception(PATIENCE)
         assert isinstance(lost, ProcessLostError)
         assert "It lost 2 workers one after another, the last one was tcp://" in lost.message
