@@ -213,6 +213,8 @@ export function startData() {
   onEvent("frame", (event, here) => {
     if (!here) return;
     if (event.reannealed) return showAgain();
+    // What is kept comes as layers that are annealed again and a frame that is stored.
+    again = [];
     takeFrame(event);
     detailLater();
     summaryLater();
