@@ -140,6 +140,8 @@ def test_24_trials_with_a_worker_killed_are_those_of_a_serial_run(doomed: str, t
     assert by[0] != by[1]
 
 
+# It waits for Dask's nannies to start both workers again, which now and then take minutes beside other tests.
+@pytest.mark.slow
 def test_what_loses_workers_again_and_again_is_said(doomed: str, tmp_path: Path) -> None:
     with ClusterExecutor(doomed, tmp_path) as executor:
         lost = executor.submit(die).exception(PATIENCE)
