@@ -35,7 +35,7 @@ from studio.runs.start_pose_file import keep_start_pose
 from studio.scene import METRES_PER_MM
 from studio.scene.body_trial import TrialView, trial_pose
 from studio.scene.controls import Change
-from studio.scene.floor_view import FloorView
+from studio.scene.floor_view import FloorView, light
 from studio.scene.model import (
     Model,
     Selection,
@@ -103,7 +103,7 @@ class SceneController:
         self._drawings = Due(REDRAW_SECONDS), Due(PICTURE_SECONDS, PICTURES_WAIT)
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="scene", daemon=True)
-        self._theme = ""
+        self._theme, self._has_shadows = "", True
         self.bare = False
         """Whether it has no controls."""
         self._looking: viser.CameraHandle | None = None
@@ -482,6 +482,9 @@ class SceneController:
         if tokens.name != self._theme:
             dress(self._server, tokens)
             self._theme = tokens.name
+        if model.options.shadows != self._has_shadows:
+            self._has_shadows = model.options.shadows
+            light(self._server, self._has_shadows)
         self.panel.show(model, moment, tokens)
         if self.views is not None and moment is not None:
             self.views.show(model, moment, tokens)
@@ -505,7 +508,7 @@ class SceneController:
             self._trial = self._trial or TrialView(self._server, trial)
             self._trial.show(tokens, model.selection.look_through is None)
             if self._floor is not None:
-                self._floor.show(tokens)
+                self._floor.show(tokens, shadows=model.options.shadows)
 
     def _draw_pictures(self) -> None:
         moment = self._moment()

@@ -1,16 +1,16 @@
-"""The floor: a slab that takes shadows, with half-metre lines, under the cameras' field of view."""
+"""The floor, with half-metre lines, under the cameras' field of view, and the light above it."""
 
 from collections.abc import Sequence
 
 import numpy as np
-import trimesh
 import viser
 
 from studio.arrays import Array
 from studio.runs.colour_tokens import ColourTokens
 from studio.scene import METRES_PER_MM
 
-_THICKNESS = 0.02
+_SHADOW, _SKY = 0.5, 1.5
+"""How dark a shadow is, and how bright a sky that stands for lamps and their reflections."""
 _LEAST_HALF_WIDTH, _MOST_HALF_WIDTH = 2.0, 8.0
 
 
@@ -22,17 +22,8 @@ class FloorView:
     def __init__(self, server: viser.ViserServer, points: Sequence[Array], scale: float = 1.0) -> None:
         middle, half_width = floor_extent(points, scale)
         width = 2.0 * half_width
-        mesh = trimesh.creation.box(extents=(width, width, scale * _THICKNESS))
-        self._slab = server.scene.add_mesh_simple(
-            "/floor/slab",
-            np.asarray(mesh.vertices),
-            np.asarray(mesh.faces),
-            flat_shading=True,
-            cast_shadow=False,
-            position=(*middle, -scale * _THICKNESS),
-        )
-        self._lines = server.scene.add_grid(
-            "/floor/lines",
+        self.plane = server.scene.add_grid(
+            "/floor/plane",
             width,
             width,
             plane="xy",
@@ -40,15 +31,23 @@ class FloorView:
             section_size=scale,
             cell_thickness=0.6,
             section_thickness=1.2,
-            shadow_opacity=0.25,
+            plane_opacity=1.0,
             position=(*middle, 0.0),
         )
+        self.sky = server.scene.add_light_hemisphere("/floor/sky", intensity=_SKY)
 
-    def show(self, tokens: ColourTokens, visible: bool = True) -> None:
-        """Draw the floor in a theme's colours, or hide it."""
-        self._slab.visible = self._lines.visible = visible
-        self._slab.color = tokens["scene-floor"]
-        self._lines.cell_color = self._lines.section_color = tokens["scene-floor-line"]
+    def show(self, tokens: ColourTokens, visible: bool = True, shadows: bool = True) -> None:
+        """Draw the floor in a theme's colours, or hide it. shadows : else the sky lights all sides alike."""
+        self.plane.visible, self.sky.visible = visible, not shadows
+        self.plane.plane_color = tokens["scene-floor"]
+        self.plane.cell_color = self.plane.section_color = tokens["scene-floor-line"]
+        self.plane.shadow_opacity = _SHADOW if shadows else 0.0
+
+
+def light(server: viser.ViserServer, shadows: bool) -> None:
+    """Lamps that cast shadows in surroundings that reflect, as viser has them at first, or lamps alone."""
+    server.scene.configure_default_lights(cast_shadow=shadows)
+    server.scene.configure_environment_map("city" if shadows else None)
 
 
 def floor_extent(points: Sequence[Array], scale: float = 1.0) -> tuple[tuple[float, float], float]:

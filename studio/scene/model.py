@@ -63,6 +63,8 @@ class ViewOptions:
     the pictures on them. hull : the frame's visual hull as voxels. blobs : the blobs fitted to it beside the answer's
     own, in runs that are weighed by them. track : whose poses are drawn, of `runs.tracks`; the search's own stand
     beside as the grey cage. overlays : of `runs.overlay_drawing.OVERLAYS`. dark : the theme.
+    shadows : cast by the body, and light reflected by its surroundings: what a browser without a graphics card draws
+    slowest.
     """
 
     body: bool = True
@@ -83,6 +85,7 @@ class ViewOptions:
     track: str = RAW
     overlays: tuple[str, ...] = ("outline",)
     dark: bool = True
+    shadows: bool = True
 
 
 @dataclass(frozen=True, slots=True)

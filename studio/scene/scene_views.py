@@ -110,7 +110,7 @@ class SceneViews:
             self.volume.show(volume, moment.pose, tokens, hull=options.hull, blobs=options.blobs)
             self.cameras.show(tokens, options.cameras, options.pictures, through)
             # Through a camera the floor is the one in the picture.
-            self.floor.show(tokens, is_free)
+            self.floor.show(tokens, is_free, options.shadows)
 
     def _show_ghosts(self, ghosts: Sequence[Ghost], tokens: ColourTokens) -> None:
         """Draw bodies beside the answer; their meshes are made when they are first needed."""

@@ -29,6 +29,7 @@ SWITCHES = (
     ("trails", "trails", "Paths of the chosen joints."),
     ("cameras", "cameras", "The cameras; click one to look through it."),
     ("pictures", "pictures", "The pictures on the cameras."),
+    ("shadows", "shadows", "Shadows and reflected light; left out at first without a graphics card."),
     (
         "hull",
         "visual hull",

@@ -9,12 +9,15 @@ from scene_messages import decoded
 
 
 class SceneWire:
-    """Keeps the newest of each thing that the browser was told to draw. viewer : from where it said that it looks."""
+    """Keeps the newest of each thing that the browser was told to draw. viewer : from where it said that it looks.
+    shadows : whether lamps cast any.
+    """
 
     def __init__(self, page: Page) -> None:
         self.clouds: dict[str, np.ndarray] = {}
         self.visible: dict[str, bool] = {}
         self.camera_moves = 0
+        self.shadows = True
         self.viewer: tuple[float, ...] = ()
         self._raw: list[bytes | str] = []
         page.on("websocket", self._opened)
@@ -63,6 +66,8 @@ class SceneWire:
             self.visible[name] = message["visible"]
         elif kind == "SetCameraPositionMessage":
             self.camera_moves += 1
+        elif kind == "EnableLightsMessage":
+            self.shadows = message["cast_shadow"]
         elif kind == "RemoveSceneNodeMessage":
             self.clouds.pop(name, None)
             self.visible.pop(name, None)

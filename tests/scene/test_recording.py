@@ -60,7 +60,7 @@ def test_limbs_move_as_tracked_and_hide_when_lost(run, tmp_path: Path, ending: s
     ]
     assert shown == [(HIDDEN, False), (HIDDEN + 1, True)]
     names = {message.get("name") for _, message in recording.messages}
-    assert {"/floor/slab", "/cameras/front"} <= names
+    assert {"/floor/plane", "/cameras/front"} <= names
 
 
 def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:

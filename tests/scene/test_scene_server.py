@@ -223,6 +223,34 @@ def test_the_theme_changes_every_colour(stage: SceneServer) -> None:
         stage.set_options(colour="red")
 
 
+def test_without_shadows_the_sky_lights_the_body_and_no_lamp_casts_any(stage: SceneServer) -> None:
+    open_run(stage)
+
+    def lit() -> tuple[bool, ...]:
+        shown = stage._controller.views
+        if shown is None:
+            return ()
+        sent = {
+            type(one).__name__: one
+            for one in stage._server._websock_server._broadcast_buffer.message_from_id.values()
+        }
+        lamps, around = sent.get("EnableLightsMessage"), sent.get("EnvironmentMapMessage")
+        return (
+            lamps is None or lamps.cast_shadow,
+            around is None or around.hdri_data is not None,
+            shown.floor.plane.shadow_opacity > 0.0,
+            not shown.floor.sky.visible,
+        )
+
+    until(lambda: lit() == (True, True, True, True))
+    stage.set_options(shadows=False)
+    until(lambda: lit() == (False, False, False, False))
+    stage.show_run("swaying")
+    until(lambda: stage.shown.run == "" and lit() == (False, False, False, False))
+    stage.set_options(shadows=True)
+    until(lambda: lit() == (True, True, True, True))
+
+
 def test_a_session_without_a_run_and_none_at_all(stage: SceneServer, human: BodyModel) -> None:
     stage.show_run("swaying")
     until(lambda: stage.shown.session == "swaying" and stage.shown.run == "")

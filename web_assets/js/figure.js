@@ -212,7 +212,7 @@ export class Figure {
       this.chart.on("click", (event) => this.clicked(event));
       this.chart.getZr().on("click", (event) => this.clickedGround(event));
     }
-    this.chart.resize({ width: "auto" });
+    if (this.chart.getWidth() !== this.chartPlace.clientWidth || this.chart.getHeight() !== height) this.chart.resize({ width: "auto" });
     this.chart.setOption({ ...look(), ...sheet.option, tooltip: { ...tooltip(), ...sheet.option.tooltip, transitionDuration: 0 } }, { notMerge: true });
     this.body.dataset.drawn = `${shown.name} ${theme()} ${width}`;
   }

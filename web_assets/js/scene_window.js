@@ -6,12 +6,24 @@ import { scenePath } from "./window.js";
 
 let isLoaded = false;
 
-/** Put the scene into the page's theme. */
-export const dressScene = () => post("/api/scene/view", { dark: theme() === "dark" }).catch(() => {});
+/** Whether this browser draws without a graphics card. */
+function drawsInSoftware() {
+  const context = document.createElement("canvas").getContext("webgl2");
+  const names = context?.getExtension("WEBGL_debug_renderer_info");
+  const name = names ? context.getParameter(names.UNMASKED_RENDERER_WEBGL) : "";
+  context?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
+}
+
+const look = () => ({ dark: theme() === "dark" });
+const show = (change) => post("/api/scene/view", change).catch(() => {});
+
+/** Put a new scene into the page's theme, and take out what this browser would draw too slowly. */
+export const dressScene = () => show({ ...look(), ...(drawsInSoftware() ? { options: { shadows: false } } : {}) });
 
 /** Load the scene into a frame; returns the frame. */
 export function loadScene(frame) {
-  if (!isLoaded) onTheme(dressScene);
+  if (!isLoaded) onTheme(() => show(look()));
   isLoaded = true;
   dressScene();
   frame.src = scenePath;

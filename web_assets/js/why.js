@@ -24,11 +24,13 @@ const words = element("section", { className: "why-words", ariaLabel: "Why" });
 const place = element("section", { className: "figure", ariaLabel: "Limbs and frames" });
 /** @type {Figure} */
 let figure = null;
-/** @type {{ key: string, frame: Schemas["ViewAnswer"], run: Schemas["ViewAnswer"] } | null} */
+/** What is drawn, and what was chosen when it was. @type {{ key: string, frame: Schemas["ViewAnswer"], run: Schemas["ViewAnswer"], chosen: string } | null} */
 let held = null;
 let age = 0;
 
 const query = () => (get("track") && get("track") !== "raw" ? `track=${encodeURIComponent(get("track"))}` : "");
+
+const chosenNow = () => JSON.stringify([get("frame"), get("limb"), get("layer")]);
 
 async function load() {
   if (panel.hidden) return;
@@ -38,16 +40,16 @@ async function load() {
   if (!isStored()) { held = null; return drawNothing(`Frame ${get("frame")} is not finished yet.`); }
   const [session, run, frame] = [get("session"), get("run"), get("frame")];
   const key = `${session}/${run} ${frame} ${query()} ${age} ${get("summary").frames.length}`;
-  if (held?.key === key) return draw();
+  if (held?.key === key) return held.chosen === chosenNow() ? undefined : draw();
   if (held?.frame.session !== session || held?.frame.run !== run) drawNothing(`Frame ${frame} is being looked into ...`);
   words.ariaBusy = "true";
   try {
     const [ofFrame, ofRun] = await Promise.all([fetchJson(frameView(session, run, frame, "why", query())), fetchJson(runView(session, run, "why", query()))]);
     if (frame !== get("frame") || run !== get("run") || session !== get("session")) return;
-    held = { key, frame: ofFrame, run: ofRun };
+    held = { key, frame: ofFrame, run: ofRun, chosen: "" };
     draw();
   } catch (error) {
-    if (frame === get("frame")) drawNothing(`${error.message} ${error.hint ?? ""}`);
+    if (frame === get("frame")) { held = null; drawNothing(`${error.message} ${error.hint ?? ""}`); }
   } finally { words.ariaBusy = "false"; }
 }
 
@@ -82,6 +84,7 @@ const remedyCard = (remedy) => element("div", { className: "remedy-card" }, elem
 
 function draw() {
   const { frame, run } = held;
+  held.chosen = chosenNow();
   const findings = frame.findings ?? [];
   const kept = words.scrollTop;
   fill(words, element("h2", {}, `Why is frame ${frame.frame} as it is?`),

@@ -9,6 +9,7 @@ export interface Chart {
   dispatchAction(action: object): void;
   resize(size?: { width: number | "auto" }): void;
   getWidth(): number;
+  getHeight(): number;
   renderToSVGString(): string;
   isDisposed(): boolean;
   dispose(): void;
