@@ -10,7 +10,7 @@ import contextlib
 import dataclasses
 import logging
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from pathlib import Path
 
@@ -66,9 +66,11 @@ class StudioControl:
         process = self._process
         return process.identifier if process else None
 
-    def subscribe(self) -> Subscription[Event]:
-        """Every event from now on, newest wins; close it when done."""
-        return self._watchers.subscribe()
+    def subscribe(self, wanted: Callable[[Event], bool] = lambda _: True) -> Subscription[Event]:
+        """Every event from now on that is wanted, newest wins; close it when done. `wanted` is called in the thread
+        that takes the events from the process.
+        """
+        return self._watchers.subscribe(wanted)
 
     # ------------------------------------------------------------------ asking
 

@@ -10,7 +10,7 @@ import contextlib
 import queue
 import threading
 from collections import OrderedDict
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from typing import Generic, TypeVar
 
 from studio.jobs.events import Event
@@ -23,11 +23,12 @@ LIMIT = 512
 class Subscription(Generic[T]):
     """What one watcher has not taken yet. Reads like a `queue.Queue`, and from an event loop; thread-safe.
 
-    dropped : how many entries were lost beyond the limit.
+    wanted : which entries it takes; called in the thread of who offers them. dropped : how many were lost beyond the
+    limit.
     """
 
-    def __init__(self, limit: int = LIMIT) -> None:
-        self._limit = limit
+    def __init__(self, limit: int = LIMIT, wanted: Callable[[T], bool] = lambda _: True) -> None:
+        self._limit, self._wanted = limit, wanted
         self._number = 0
         self._waiting: OrderedDict[Hashable, T] = OrderedDict()
         self._something = threading.Condition()
@@ -37,6 +38,8 @@ class Subscription(Generic[T]):
 
     def put(self, entry: T, key: Hashable = None) -> None:
         """Offer an entry in the place of what has its key; never waits."""
+        if not self._wanted(entry):
+            return
         with self._something:
             if self.closed:
                 return
@@ -98,9 +101,9 @@ class Watchers:
         self._lock = threading.Lock()
         self._subscriptions: list[Subscription[Event]] = []
 
-    def subscribe(self) -> Subscription[Event]:
-        """A new subscription; events from now on."""
-        subscription = Subscription[Event]()
+    def subscribe(self, wanted: Callable[[Event], bool] = lambda _: True) -> Subscription[Event]:
+        """A new subscription; events from now on, those that are wanted."""
+        subscription = Subscription[Event](wanted=wanted)
         with self._lock:
             self._subscriptions.append(subscription)
         return subscription

@@ -41,16 +41,27 @@ class ColourTokens:
 
     def layer(self, index: int, count: int) -> Colour:
         """The RGB of layer `index` of `count`, from cool to warm."""
-        share = 1.0 if count <= 1 else index / (count - 1)
-        red, green, blue = self.ramp(np.array([share]))[0]
-        return int(red), int(green), int(blue)
+        return _on_ramp(self._stops(), 1.0 if count <= 1 else index / (count - 1))
 
     def ramp(self, shares: NDArray[np.float64]) -> NDArray[np.uint8]:
         """(N,) numbers in 0..1 to (N, 3) uint8 RGB along the layers' ramp, cool to warm."""
-        stops = np.array([self[f"layer-{stop}"] for stop in range(LAYER_STOPS)], dtype=np.float64)
-        place = np.clip(shares, 0.0, 1.0) * (LAYER_STOPS - 1)
-        channels = [np.interp(place, np.arange(LAYER_STOPS), stops[:, channel]) for channel in range(3)]
-        return np.round(np.stack(channels, axis=-1)).astype(np.uint8)
+        return _along(self._stops(), shares)
+
+    def _stops(self) -> tuple[Colour, ...]:
+        return tuple(self[f"layer-{stop}"] for stop in range(LAYER_STOPS))
+
+
+def _along(stops: tuple[Colour, ...], shares: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """(N,) numbers in 0..1 to (N, 3) uint8 RGB between colours at even distances."""
+    place, colours = np.clip(shares, 0.0, 1.0) * (len(stops) - 1), np.array(stops, dtype=np.float64)
+    channels = [np.interp(place, np.arange(len(stops)), colours[:, channel]) for channel in range(3)]
+    return np.round(np.stack(channels, axis=-1)).astype(np.uint8)
+
+
+@cache
+def _on_ramp(stops: tuple[Colour, ...], share: float) -> Colour:
+    red, green, blue = _along(stops, np.array([share]))[0]
+    return int(red), int(green), int(blue)
 
 
 def tokens_file() -> Path:

@@ -27,7 +27,7 @@ from studio.body.scale import scale_of
 from studio.errors import BodyError, StudioError
 from studio.jobs import commands
 from studio.jobs.control import StudioControl
-from studio.jobs.events import Acknowledged, Event, FrameFinished, StateChanged
+from studio.jobs.events import Acknowledged, Event, FrameFinished, LayerFinished, StateChanged
 from studio.knobs import Value, checked
 from studio.runs.colour_tokens import ColourTokens, colour_tokens
 from studio.runs.pose_search import BetterPose
@@ -49,6 +49,7 @@ from studio.scene.model import (
     opened,
     refuse,
     request,
+    same_drawing,
     same_pictures,
     select,
     set_playback,
@@ -71,6 +72,8 @@ PICTURES_WAIT, ANNEALED_PICTURES_WAIT = 0.06, 0.4
 """Seconds without another change after which pictures are composed, so that a burst of changes has its pictures once,
 and a frame that is annealed again its clouds before: a browser that draws in software takes so long for them."""
 IDLE_SECONDS = 0.5
+SHARES = 0.1, 0.05
+"""Of a core's time that a scene and its pictures take while frames are tracked as fast as they can be."""
 EYE_TOLERANCE = 0.02
 """Metres within which a viewer has not moved."""
 _LOG = logging.getLogger(__name__)
@@ -98,7 +101,7 @@ class SceneController:
         self.views: SceneViews | None = None
         self.handles: PoseHandles | None = None
         self._refining: PoseRefining | None = None
-        self._events = process.subscribe()
+        self._events = process.subscribe(self._concerns)
         self._inbox: deque[tuple[Change, tuple[Any, ...], bool]] = deque()
         self._drawings = Due(REDRAW_SECONDS), Due(PICTURE_SECONDS, PICTURES_WAIT)
         self._stopping = threading.Event()
@@ -384,7 +387,9 @@ class SceneController:
             for drawing, draw in zip(self._drawings, (self._draw, self._draw_pictures), strict=True):
                 if drawing.is_due(now):
                     drawing.done(now)
+                    began = time.thread_time()
                     self._guarded(draw)
+                    drawing.took = time.thread_time() - began
 
     def _pace(self) -> None:
         """Set how soon what is pending is drawn; layers that are annealed again and come together are drawn at once."""
@@ -392,6 +397,9 @@ class SceneController:
         scene.calm = REDRAW_SECONDS if late else 0.0
         pictures.calm = ANNEALED_PICTURES_WAIT if late else PICTURES_WAIT
         pictures.pause = LIVE_PICTURE_SECONDS if late else picture_pause(self.model.search)
+        search = self.model.search
+        is_fast = search.state == "tracking" and not search.seconds_a_layer
+        scene.share, pictures.share = SHARES if is_fast else (1.0, 1.0)
 
     def _patience(self) -> float:
         """Seconds to wait for events: until the next redraw is due."""
@@ -414,11 +422,21 @@ class SceneController:
         """Apply the posted changes; of a drag only the newest, so that solving never lags behind the hand."""
         while self._inbox:
             change, values, announce = self._inbox.popleft()
+            for drawing in self._drawings:
+                drawing.took = 0.0  # What a person does is drawn at once.
             if change is drag and self._inbox and not values[-1]:
                 following, newer, _ = self._inbox[0]
                 if following is drag and newer[0] == values[0]:
                     continue
             self._happen(change, values, announce=announce)
+
+    def _concerns(self, event: Event) -> bool:
+        """Whether an event is for this scene, as far as its sender can tell: layers of other runs are many."""
+        shown = self.model.selection
+        return not isinstance(event, LayerFinished) or (event.session, event.run) == (
+            shown.session,
+            shown.run,
+        )
 
     def _hear(self, model: Model, event: Event) -> Model:
         if isinstance(event, Acknowledged):
@@ -442,7 +460,7 @@ class SceneController:
         after = self._guarded(lambda: change(before, *values))
         if after is not None:
             self.model = after
-        if self.model is before:
+        if self.model is before or same_drawing(before, self.model):
             return
         now = time.monotonic()
         self._drawings[0].want(now)
@@ -524,12 +542,14 @@ def _put(client: viser.ClientHandle, eye: tuple[float, ...]) -> None:
 
 class Due:
     """A redraw, pending or not, at most once in `pause` seconds. calm : seconds without a further change that it waits
-    for, no longer than the pause.
+    for, no longer than the pause. share : of a core's time that it may take. took : seconds of
+    it that it took last.
     """
 
     def __init__(self, pause: float, calm: float = 0.0) -> None:
-        self.pause, self.calm, self.is_wanted = pause, calm, False
+        self.pause, self.calm, self.share, self.is_wanted = pause, calm, 1.0, False
         self._last = self._first = self._newest = float("-inf")
+        self.took = 0.0
 
     def want(self, now: float) -> None:
         """Note a change that is to be drawn."""
@@ -550,7 +570,8 @@ class Due:
         self._last, self.is_wanted = now, False
 
     def _from(self) -> float:
-        return max(self._last + self.pause, min(self._newest + self.calm, self._first + self.pause))
+        pause = max(self.pause, self.took / self.share)
+        return max(self._last + pause, min(self._newest + self.calm, self._first + self.pause))
 
 
 def picture_pause(state: StateChanged) -> float:

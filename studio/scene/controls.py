@@ -30,6 +30,7 @@ class Control:
         self._loop = handle._impl.gui_api._event_loop
         self._change = change
         self._reported = self._decided = 0
+        self._shown: object = None
 
         async def report(event: viser.GuiEvent[Any]) -> None:
             if event.client_id is not None:
@@ -43,7 +44,13 @@ class Control:
         return self._change(model, value)
 
     def show(self, value: object) -> None:
-        """Show a value soon, without reporting it as user input."""
+        """Show a value soon, without reporting it as user input. One that stands there is not written again, unless a
+        person's change waits to be decided on.
+        """
+        is_decided = self._reported == self._decided
+        if is_decided and self._shown == value and self.handle.value == value:
+            return
+        self._shown = value
         self._loop.call_soon_threadsafe(self._write, value)
 
     def _write(self, value: object) -> None:

@@ -7,7 +7,7 @@ and the views draw the model.
 
 import bisect
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 
 from studio.arrays import Array
 from studio.body.dragging import Dragger
@@ -222,6 +222,17 @@ class Model:
     def edited_pose(self) -> Array | None:
         """(D,) the pose that is edited, None while none is."""
         return self.edit.pose if self.edit is not None and self.edit.active else None
+
+
+def same_drawing(one: Model, other: Model) -> bool:
+    """Whether two models are drawn alike: while a stored run is shown, how the search of another one goes is not."""
+    others = (entry.name for entry in fields(Model) if entry.name != "search")
+    searches = [one.is_searched, other.is_searched, *(model.search.state == "lost" for model in (one, other))]
+    return (
+        one.subject is not None
+        and not any(searches)
+        and all(getattr(one, name) is getattr(other, name) for name in others)
+    )
 
 
 def same_pictures(one: Model, other: Model) -> bool:

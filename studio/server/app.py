@@ -128,7 +128,9 @@ def build_app(
     are answered (default: this machine's loopback). footage_roots : folders from which footage may be imported by
     path. log_path : named in answers to unforeseen errors.
     """
-    state = AppState(workspace, control, scenes, EventStream(control), footage_roots, log_path)
+    state = AppState(
+        workspace, control, scenes, EventStream(control, scenes.open_scenes), footage_roots, log_path
+    )
     app = FastAPI(
         title="Capture studio",
         responses={status: {"model": ErrorAnswer} for status in (400, 403, 404, 409, 422, 500)},

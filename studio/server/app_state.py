@@ -54,8 +54,8 @@ class Control(Protocol):
         """Post a command and wait until it is acknowledged. Raises what it was refused with."""
         ...
 
-    def subscribe(self) -> Subscription[Event]:
-        """All events from now on."""
+    def subscribe(self, wanted: Callable[[Event], bool] = ...) -> Subscription[Event]:
+        """All events from now on that are wanted."""
         ...
 
     def restart(self, resume: bool = True) -> None:

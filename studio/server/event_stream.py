@@ -8,6 +8,7 @@ beyond the limit is counted and said.
 import asyncio
 import queue
 import threading
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
@@ -18,7 +19,7 @@ from studio.server.event_encoding import as_json, key_of, message_of
 from studio.server.windows import WindowInQuery
 
 if TYPE_CHECKING:
-    from studio.server.app_state import Control
+    from studio.server.app_state import Control, WindowScene
 
 router = APIRouter(tags=["events"])
 
@@ -29,10 +30,14 @@ Watcher = Subscription[str]
 
 
 class EventStream:
-    """Takes the worker's events and the web's own messages to all watchers."""
+    """Takes the worker's events and the web's own messages to all watchers. scenes : the open ones by window; layers,
+    of which there are many, go to the windows whose scene shows their run.
+    """
 
-    def __init__(self, control: "Control") -> None:
-        self._control = control
+    def __init__(
+        self, control: "Control", scenes: "Callable[[], Mapping[str, WindowScene]]" = lambda: {}
+    ) -> None:
+        self._control, self._scenes = control, scenes
         self._lock = threading.Lock()
         self._watchers: dict[Watcher, str] = {}
         self._settings: dict[str, object] | None = None
@@ -71,12 +76,23 @@ class EventStream:
 
     def publish(self, message: dict[str, object], window: str | None = None) -> None:
         """Send a message to one window, or to all (None); from any thread."""
+        elsewhere = self._elsewhere(message) if message["type"] == "layer" else set[str]()
         with self._lock:
-            watchers = [watcher for watcher, of in self._watchers.items() if window in (None, of)]
+            watchers = [
+                watcher
+                for watcher, of in self._watchers.items()
+                if window in (None, of) and of not in elsewhere
+            ]
         if watchers:
             text, key = as_json(message), key_of(message)
             for watcher in watchers:
                 watcher.put(text, key)
+
+    def _elsewhere(self, message: dict[str, object]) -> set[str]:
+        """The windows that show another run than a message's."""
+        run = message["session"], message["run"]
+        shown = {window: scene.shown for window, scene in self._scenes().items() if window}
+        return {window for window, seen in shown.items() if (seen.session, seen.run) != run}
 
     def session_changed(self, session: str, run: str = "") -> None:
         """Tell all pages that a session is not as it was; "" for the list of them. run : that it concerns, if one."""

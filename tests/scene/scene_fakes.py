@@ -27,9 +27,9 @@ class FakeControl:
         """Remember a command."""
         self.commands.append(command)
 
-    def subscribe(self) -> Subscription:
+    def subscribe(self, wanted: Callable[[Event], bool] = lambda _: True) -> Subscription:
         """A queue that `say` fills."""
-        return self.watchers.subscribe()
+        return self.watchers.subscribe(wanted)
 
     def emit(self, event: Event) -> None:
         """Tell all watchers an event."""

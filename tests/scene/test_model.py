@@ -60,6 +60,16 @@ def knob(model: Model, name: str = "survival") -> object:
 # What is selected.
 
 
+def test_how_the_search_of_another_run_goes_is_not_drawn(shown: Model) -> None:
+    elsewhere = [dataclasses.replace(TRACKING, run="other", done=done) for done in (1, 2)]
+    one = scene.opened(after(shown, elsewhere[0]), "s", "r", shown.subject, FRAMES, default_settings())
+    assert scene.same_drawing(one, after(one, elsewhere[1]))
+    assert not scene.same_drawing(one, after(one, PAUSED)), "its own run was opened"
+    assert not scene.same_drawing(shown, after(shown, TRACKING))
+    assert not scene.same_drawing(one, after(one, dataclasses.replace(elsewhere[1], state="lost")))
+    assert not scene.same_drawing(one, scene.select(after(one, elsewhere[1]), frame=0))
+
+
 def test_a_run_is_opened_at_its_newest_frame(shown: Model) -> None:
     assert shown.selection == Selection("s", "r", 4)
     moved = scene.select(scene.set_playback(shown, True), follow=False, layer=2, look_through="cam1")

@@ -412,6 +412,16 @@ def test_a_drawing_waits_until_its_pause_is_over_and_longer_while_a_live_run_is_
     assert drawing.is_due(10.5)
 
 
+def test_a_drawing_takes_no_more_than_its_share_of_the_time() -> None:
+    drawing = Due(0.1)
+    drawing.share = 0.05
+    drawing.done(10.0)
+    drawing.took = 0.02
+    drawing.want(10.1)
+    assert not drawing.is_due(10.3)
+    assert drawing.is_due(10.4)
+
+
 def test_pictures_wait_for_the_end_of_a_burst_of_changes_but_no_longer_than_their_pause() -> None:
     pictures = Due(0.5, calm=0.1)
     for at in (10.0, 10.08, 10.16):

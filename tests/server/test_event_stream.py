@@ -8,10 +8,11 @@ import queue
 import numpy as np
 import pytest
 from fastapi import WebSocketDisconnect
-from web_doubles import RecordingControl, Studio, cookie_header, state_of
+from web_doubles import RecordingControl, RecordingStage, Studio, cookie_header, state_of
 from websockets.sync.client import ClientConnection, connect
 
 from studio.jobs.events import Acknowledged, FrameFinished, LayerFinished, LogLine, SettingsApplied
+from studio.scene.model import Selection
 from studio.server.event_encoding import effective_share, key_of, layer_summary, message_of
 from studio.server.event_stream import LIMIT, EventStream, Watcher, _send_all
 from studio.trackers.tracker import Estimate, FilterState, FrameResult, LayerRecord
@@ -156,6 +157,19 @@ def test_a_sleeping_browser_is_told_how_much_it_lost() -> None:
     assert [json.loads(other.get_nowait())["frame"] for _ in range(2)] == [99, 99]
     with pytest.raises(queue.Empty):
         other.get_nowait()
+
+
+def test_layers_go_to_the_windows_that_show_their_run_and_to_who_has_no_scene() -> None:
+    scenes = {name: RecordingStage() for name in ("own", "other")}
+    scenes["own"].shown, scenes["other"].shown = Selection("s", "r"), Selection("s", "another")
+    stream = EventStream(RecordingControl(), lambda: scenes)
+    windows = {name: stream.watch(name) for name in ("own", "other", "new", "")}
+    for watcher in windows.values():
+        watcher.get_nowait()
+    stream.publish({"type": "layer", "session": "s", "run": "r", "reannealed": False, "frame": 0, "layer": 0})
+    assert {name for name, watcher in windows.items() if watcher._waiting} == {"own", "new", ""}
+    stream.publish({"type": "frame", "session": "s", "run": "r", "reannealed": False, "frame": 0})
+    assert all(watcher._waiting for watcher in windows.values())
 
 
 def test_a_watcher_that_sleeps_holds_a_bounded_number_of_messages() -> None:

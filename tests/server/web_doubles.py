@@ -57,8 +57,8 @@ class RecordingControl:
         if isinstance(command, ChangeSettings):
             self.changes.append(dict(command.changes))
 
-    def subscribe(self) -> Subscription:
-        return self.watchers.subscribe()
+    def subscribe(self, wanted: Callable[[Event], bool] = lambda _: True) -> Subscription:
+        return self.watchers.subscribe(wanted)
 
     def restart(self, resume: bool = True) -> None:
         self.calls.append(f"restart resume={resume}")
