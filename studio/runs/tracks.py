@@ -130,11 +130,13 @@ def _up_to_date(run: StoredRun, track: Track, names: tuple[str, ...]) -> bool:
     return True
 
 
-def read_track(run: StoredRun, name: str = RAW) -> Track:
-    """A track by its name, BEST for the best. Raises NotFoundError if there is none, SessionError if it is damaged."""
+def read_track(run: StoredRun, name: str = RAW, *, blobs: bool = True) -> Track:
+    """A track by its name, BEST for the best. blobs : of the search's own, as `ResultsReader.damaged`. Raises
+    NotFoundError if there is none, SessionError if it is damaged.
+    """
     name = track_named(run, name)
     if name == RAW:
-        return _raw_track(run)
+        return _raw_track(run, blobs)
     path = _path(run, name)
     if not path.is_file():
         raise NotFoundError(
@@ -227,11 +229,11 @@ def _path(run: StoredRun, name: str) -> Path:
     return run.folder / FOLDER / f"{checked_name(name, 'track')}{ENDING}"
 
 
-def _raw_track(run: StoredRun) -> Track:
+def _raw_track(run: StoredRun, blobs: bool) -> Track:
     """The track in the results store; empty for a run without frames."""
     with run.results() as results:
-        frames, poses = results.poses()
-        timeline = results.timeline()
+        frames, poses = results.poses(blobs=blobs)
+        timeline = results.timeline(blobs=blobs)
     recorded = dict(
         zip(timeline.frames.tolist(), zip(timeline.overlaps, timeline.tracking, strict=True), strict=True)
     )

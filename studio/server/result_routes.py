@@ -12,6 +12,7 @@ import numpy as np
 from fastapi import APIRouter, Query, Response
 
 from studio.errors import NotFoundError, SettingsError, StudioError
+from studio.evaluation.errors import Evaluation
 from studio.geometry.reach import within_reach
 from studio.inspection.reading import InspectedRun
 from studio.inspection.reference import body_points, by_limb, true_points
@@ -61,20 +62,26 @@ def frames(
     with run.results() as results:
         damaged, timeline = results.damaged(blobs=check), results.timeline(blobs=check)
         partial, checked = results.partial(), check or results.is_checked()
+    measured, problem = _measured(session, run, track, check)
+    errors = dict(zip(measured.frames, measured.per_frame_mm, strict=True)) if measured else {}
+    lost = dict(zip(measured.frames, measured.lost_by_frame, strict=True)) if measured else {}
     lines = [
         FrameLine(
-            frame=int(timeline.frames[at]),
+            frame=frame,
             log_weight=float(timeline.log_weights[at]),
             milliseconds=float(timeline.milliseconds[at]),
             evaluations=int(timeline.evaluations[at]),
             layers=int(timeline.layers[at]),
             settings_version=int(timeline.settings_versions[at]),
+            error_mm=errors.get(frame),
+            lost=bool(lost.get(frame)),
+            lost_limbs=list(lost.get(frame, ())),
             tracking=timeline.tracking[at],
         )
-        for at in range(len(timeline.frames))
+        for at, frame in enumerate(timeline.frames.tolist())
     ]
     times = timeline.milliseconds
-    summary = FramesSummary.of(
+    return FramesSummary.of(
         record,
         describe=describe(record),
         score=TRACKERS.get(record.tracker, Tracker).score,
@@ -86,8 +93,10 @@ def frames(
         mean_milliseconds=float(times.mean()) if len(times) else None,
         made_from=record.made_from or None,
         track=track,
+        truth_problem=problem,
+        mean_mm=measured.mean_mm if measured else None,
+        worst_mm=measured.worst_mm if measured else None,
     )
-    return _with_errors(summary, session, run, track, check)
 
 
 @router.get(RUN + "/live")
@@ -240,33 +249,14 @@ def evaluation(session: OpenSession, run: OpenRun) -> EvaluationView:
     return EvaluationView.model_validate(measured)
 
 
-def _with_errors(
-    summary: FramesSummary, session: Session, run: StoredRun, track: str, check: bool
-) -> FramesSummary:
-    """The summary with each frame's error; a truth that cannot be used is named, not fatal."""
+def _measured(session: Session, run: StoredRun, track: str, check: bool) -> tuple[Evaluation | None, str]:
+    """The track's errors, None without a truth; and why that cannot be used, which is named, not fatal."""
     try:
-        measured = evaluation_of(session, run, track, blobs=check)
+        return evaluation_of(session, run, track, blobs=check), ""
     except NotFoundError:
         raise
     except StudioError as error:
-        return summary.model_copy(update={"truth_problem": str(error)})
-    if measured is None:
-        return summary
-    errors = dict(zip(measured.frames, measured.per_frame_mm, strict=True))
-    lost = dict(zip(measured.frames, measured.lost_by_frame, strict=True))
-    lines = [
-        line.model_copy(
-            update={
-                "error_mm": errors.get(line.frame),
-                "lost": bool(lost.get(line.frame)),
-                "lost_limbs": list(lost.get(line.frame, ())),
-            }
-        )
-        for line in summary.frames
-    ]
-    return summary.model_copy(
-        update={"frames": lines, "mean_mm": measured.mean_mm, "worst_mm": measured.worst_mm}
-    )
+        return None, str(error)
 
 
 def _binary(record: LayerRecord) -> Response:

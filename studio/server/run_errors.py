@@ -34,11 +34,11 @@ def evaluation_of(
     if not len(frames):
         return None
     key = (run.folder, len(frames), stamp, track, track_stamp(run, track))
+    # A run's page asks for it three times at once: one measures, the others wait for that.
     with _lock:
         if key in _evaluations:
             return _evaluations[key]
-    measured = evaluate(poses, frames, run.body(), _truth(path, stamp), run.record.fps)
-    with _lock:
+        measured = evaluate(poses, frames, run.body(), _truth(path, stamp), run.record.fps)
         _evaluations[key] = measured
         if len(_evaluations) > KEPT:
             _evaluations.popitem(last=False)

@@ -5,10 +5,8 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Response
 
-from studio.evaluation.errors import evaluate
 from studio.jobs.job_runner import Job
 from studio.knobs import changed, knobs_of
-from studio.motion_files.trc import read_trc
 from studio.operations.results import refine, smooth
 from studio.operations.tracking import correct, corrected_run
 from studio.runs.correcting import track_backwards
@@ -24,6 +22,7 @@ from studio.server.app_state import App
 from studio.server.job_kinds import TRACK
 from studio.server.job_routes import add_job_routes, begin_job
 from studio.server.requests import Arguments, body_of
+from studio.server.run_errors import evaluation_of
 from studio.server.run_routes import RUN, OpenRun
 from studio.server.session_routes import OpenSession
 from studio.server.setting_views import knob_view
@@ -128,14 +127,13 @@ add_job_routes(router, "/track-jobs/{identifier}", TRACK)
 
 
 def _line(session: Session, run: StoredRun, name: str) -> TrackLine:
-    track = read_track(run, name)
+    track = read_track(run, name, blobs=False)
     line = TrackLine(name=name, frames=len(track.frames), made_by=dict(track.made_by))
     if not len(track.frames):
         return line
     line.jitter_mm = jitter(run, track)
-    path = session.truth_path
-    if path is not None:
-        found = evaluate(track.poses, track.frames, run.body(), read_trc(path), run.record.fps)
+    found = evaluation_of(session, run, name, blobs=False)
+    if found is not None:
         line.mean_mm, line.worst_mm = found.mean_mm, found.worst_mm
         line.mean_angle_deg, line.mean_direction_deg = found.mean_angle_deg, found.mean_direction_deg
     return line

@@ -234,8 +234,8 @@ class ResultsReader:
         """
         with VERIFIED.reading(self._folder) if blobs else nullcontext():
             known = VERIFIED.of(self._folder)
-            version = (self._query("PRAGMA data_version"), blobs, known.damage())
-            if self._known is not None and self._known[0] == version and (blobs or self._known[3]):
+            stored = self._query("PRAGMA data_version")
+            if self._known is not None and self._known[0] == (stored, blobs, known.whole(), known.damage()):
                 return self._known[1:]
             with self._snapshot():
                 sums, rows = self._sums(FRAME), {row[0]: row for row in self._rows()}
@@ -249,7 +249,7 @@ class ResultsReader:
                 found = self._check_blobs(known, due) if blobs else _known_damage(known, due)
             damaged = {frame: part for frame, part in sorted((parts | found).items()) if part}
             whole = [row for frame, row in rows.items() if frame not in damaged]
-            version = (*version[:2], known.damage())
+            version = (stored, blobs, known.whole(), known.damage())
             self._known = (version, whole, damaged, all(frame in found for frame in due))
             return self._known[1:]
 

@@ -32,12 +32,20 @@ let moves = 0;         // of the page, which the scene is asked to follow
 let asked = 0;         // the last move that it was asked to follow
 let again = [];        // layers of the frame that is annealed again
 let showsAgain = 0;    // timer that shows them
+let asking = "";       // the frame whose layers are on their way
+let isOpening = false; // whether the run's frames are on their way: the scene is built after that
 let isAnew = true;     // whether the page was loaded since: a frame that was annealed again before is not shown on it
 
-/** The run's frames: shown at once, and again when the server has read all that is stored of them and knows what is damaged. */
-async function loadSummary() {
-  if (get("summary") === null && await loadFrames(false)) return;
-  await loadFrames(true);
+const sceneLater = paced(() => showInScene(), SCENE_MILLISECONDS);
+
+/** The run's frames: shown at once, with the chosen one, before anything of `next`; and again when the server has read all that is stored of them and knows what is damaged. */
+async function loadSummary(next = () => {}) {
+  const isAll = await loadFrames(get("summary") !== null);
+  isOpening = false;
+  sceneLater();
+  await loadDetail();
+  next();
+  if (!isAll) await loadFrames(true);
 }
 
 /** Load the run's frames; those that finish while the answer is on its way are kept. Whether no other answer is to be asked for. */
@@ -64,7 +72,6 @@ async function loadFrames(check) {
 /** The run: its parameters and its layers. */
 async function loadRun() {
   const [session, run] = [get("session"), get("run")];
-  layers = [];
   if (!run) return;
   try {
     const { parameters, settings } = await fetchJson(`${runPath(session, run)}?check=false`);
@@ -88,11 +95,13 @@ async function loadMoved() {
 async function loadDetail() {
   const [session, run, frame] = [get("session"), get("run"), get("frame")];
   if (!run || frame === null) return set({ detail: null });
-  if (get("detail")?.frame === frame) return;
+  const key = `${runPath(session, run)}/frames/${frame}`;
+  if (get("detail")?.frame === frame || key === asking) return;
+  asking = key;
   try {
-    const detail = await fetchJson(`${runPath(session, run)}/frames/${frame}`);
+    const detail = await fetchJson(key);
     if (isShown(session, run) && frame === get("frame")) set({ detail });
-  } catch (error) { if (error.status !== 404) complain(error); }
+  } catch (error) { if (error.status !== 404) complain(error); } finally { if (asking === key) asking = ""; }
 }
 
 /** What the page shows, as the scene takes it. */
@@ -110,7 +119,7 @@ const isElsewhere = (shown) => Object.keys(shown).some((name) => shown[name] !==
 
 /** Move the scene to what the page shows. */
 async function showInScene() {
-  if (!get("session")) return;
+  if (!get("session") || isOpening) return;
   const shown = wantedNow();
   if (!isElsewhere(shown) && asked === moves) return;
   scene = shown;
@@ -197,12 +206,15 @@ function layersOf(values) {
 
 /** Wire events and state to the API. */
 export function startData() {
-  const summaryLater = paced(loadSummary, SUMMARY_MILLISECONDS);
+  const summaryLater = paced(() => loadSummary(), SUMMARY_MILLISECONDS);
   const detailLater = paced(loadDetail, DETAIL_MILLISECONDS);
-  const sceneLater = paced(showInScene, SCENE_MILLISECONDS);
   const movedLater = paced(loadMoved, MOVED_MILLISECONDS);
   const sessionsLater = paced(refreshSessions, SESSIONS_MILLISECONDS);
-  watch(["session", "run"], () => { loadRun(); loadSummary(); movedLater(); });
+  watch(["session", "run"], () => {
+    layers = [];
+    isOpening = Boolean(get("run"));
+    loadSummary(() => { loadRun(); movedLater(); });
+  });
   let shownTrack = get("track");
   watch(["track"], () => { if (get("track") !== shownTrack) { shownTrack = get("track"); if (get("summary")) loadSummary(); } });
   watch(["session", "run", "frame"], detailLater);

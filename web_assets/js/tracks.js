@@ -76,7 +76,14 @@ function sayMade(ended, run) {
 /** Wire the choice of the track. */
 export function startTracks() {
   choice.onchange = () => set({ track: choice.value });
-  watch(["session", "run"], loadTracks);
+  let shown = "";
+  watch(["session", "run", "parameters"], () => {
+    // Timeline and frame come first, then what is known of the run.
+    const run = `${get("session")}/${get("run")}`;
+    if (run === shown || (get("run") && !get("parameters"))) return;
+    shown = run;
+    loadTracks();
+  });
   watch(["track"], () => {
     choice.value = get("track");
     if (get("session")) post("/api/scene/show", { options: { track: get("track") } }).catch(complain);
