@@ -82,6 +82,12 @@ def test_what_of_a_run_is_damaged_is_said_once_all_of_it_was_read(browser: Brows
         window = StudioPage(browser, studio, with_scene=False)
         window.until("get('summary')?.checked && '1' in get('summary').damaged")
         window.until("get('summary').frames.map((line) => line.frame).join() === '0,2'")
+        window.until("get('parameters') !== null && get('moved') !== null")
+        # The timeline comes before what else is asked of the run, and its frame once.
+        path, asked = "/api/sessions/arm/runs/torn", window.watch.requests
+        others = [f"GET {path}", f"GET {path}/settings", f"GET {path}/frames/2", "POST /api/scene/show"]
+        assert all(asked.index(f"GET {path}/frames") < asked.index(other) for other in others)
+        assert asked.count(f"GET {path}/frames/2") == 1
         window.close()
     finally:
         studio.stop()

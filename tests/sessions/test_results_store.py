@@ -15,7 +15,7 @@ from store_records import layer_of, result_of
 
 from studio.errors import NotFoundError, RunError, SessionError
 from studio.sessions.results_codec import kept_rows, particles_from
-from studio.sessions.results_reader import FILE_NAME
+from studio.sessions.results_reader import FILE_NAME, Row
 from studio.sessions.results_store import ResultsReader, ResultsWriter, is_being_written
 from studio.trackers.tracker import LayerRecord
 
@@ -312,6 +312,31 @@ def test_what_is_stored_is_read_once_by_a_process_and_some_frames_at_a_time(
         assert reader.is_checked()
         assert reader.frames() == list(range(20))
     assert len(blobs_read) == 6
+
+
+def test_the_numbers_are_read_once_until_something_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read, rows = list[int](), ResultsReader._rows
+
+    def noting(self: ResultsReader, frame: int | None = None) -> list[Row]:
+        read.append(1)
+        return rows(self, frame)
+
+    monkeypatch.setattr(ResultsReader, "_rows", noting)
+    with ResultsWriter(tmp_path) as writer, ResultsReader(tmp_path) as reader:
+        write(writer, 0)
+        for _ in range(3):
+            assert reader.damaged(blobs=False) == {}
+            assert len(reader.timeline(blobs=False).frames) == 1
+            assert not reader.is_checked()
+        assert len(read) == 1
+        write(writer, 1)
+        assert reader.frames(blobs=False) == [0, 1]
+        assert len(read) == 2
+        with ResultsReader(tmp_path) as other:
+            other.frames()
+        assert reader.is_checked()
 
 
 def test_damage_that_was_found_is_known_without_reading_until_it_is_mended(
