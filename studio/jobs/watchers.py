@@ -80,9 +80,9 @@ class Subscription(Generic[T]):
             await future
 
     def close(self) -> None:
-        """Take no more events; those that wait can still be read."""
+        """Take no more events; those that wait can still be read. Whoever said what is wanted is let go."""
         with self._something:
-            self.closed = True
+            self.closed, self._wanted = True, lambda _: False
             self._wake()
 
     def _wake(self) -> None:
