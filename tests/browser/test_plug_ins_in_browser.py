@@ -1,11 +1,10 @@
 """A person chooses a tracker and a likelihood of another package in the form of a new run."""
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from guide_package import ROOT, install_guide_package
+from guide_package import install_guide_package
 from playwright.sync_api import Browser
 from studio_page import StudioPage
 from studio_server import StudioServer
@@ -15,12 +14,11 @@ pytestmark = pytest.mark.browser
 
 
 @pytest.fixture
-def studio(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[StudioServer]:
+def studio(tmp_path: Path) -> Iterator[StudioServer]:
     """`studio serve` with the planar arm, and the guide's package beside the studio."""
     install_guide_package(tmp_path / "site")
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join((str(tmp_path / "site"), str(ROOT))))
     make_session(tmp_path / "workspace" / "toy")
-    made = StudioServer("serve", tmp_path / "workspace")
+    made = StudioServer("serve", tmp_path / "workspace", beside=tmp_path / "site")
     yield made
     made.stop()
 
