@@ -24,7 +24,7 @@ from studio.reproduction.deutscher_reid import (
     weight_of_a_knee,
 )
 from studio.reproduction.experiment import Experiment
-from studio.reproduction.open_questions import evaluations, generalisation, posterior, robustness
+from studio.reproduction.open_questions import effort, evaluations, generalisation, posterior, robustness
 
 # New experiments are added here.
 LISTED: tuple[Experiment, ...] = (
@@ -59,6 +59,7 @@ LISTED: tuple[Experiment, ...] = (
     *robustness.EXPERIMENTS,
     generalisation.EXPERIMENT,
     evaluations.EXPERIMENT,
+    effort.EXPERIMENT,
     posterior.EXPERIMENT,
 )
 

@@ -1,0 +1,93 @@
+"""How much search a frame needs whose result is refined: fewer layers and particles than the default's 10 x 100.
+
+The default tracker as a run begins with it (frames refined, the shape learnt on the way), on three clips of the half
+that defaults are chosen by and on the three of the same kinds of the other half, which only report.
+"""
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from studio.comparison.findings import Plain, Table
+from studio.comparison.statistics import number
+from studio.comparison.tracked import Tracked
+from studio.reproduction.claims import sign_tests
+from studio.reproduction.experiment import Part
+from studio.reproduction.open_questions.generalisation import AS_A_RUN, REFINED
+from studio.reproduction.tracking import (
+    Candidate,
+    Line,
+    error_rows,
+    lost_percent,
+    mean_errors,
+    tracked_experiment,
+)
+from studio.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING
+from studio.synthesis.drawn_recipes import HALVES, clip_name
+
+KIND_OF_CLIPS = ("turns", "kick", "dance")
+SIZES = ((10, 100), (10, 50), (10, 33), (5, 100), (5, 66), (3, 110), (3, 66))
+"""Layers and particles, the default first."""
+LAST, QUICK_LAST = 100, 24
+
+
+def _name(layers: int, particles: int) -> str:
+    return f"{layers} × {particles}"
+
+
+def _lines(quick: bool) -> Iterator[Line]:
+    """Clip by clip, so that a clip's evidence is computed once."""
+    for half in HALVES:
+        for kind in KIND_OF_CLIPS:
+            for layers, particles in SIZES:
+                knobs = {"layers": layers, "particles": particles, **REFINED}
+                one = Candidate(_name(layers, particles), DEFAULT_TRACKER, DEFAULT_WEIGHTING, knobs)
+                wanted = {**AS_A_RUN, "last": QUICK_LAST if quick else LAST}
+                yield Line(f"{one.name}, {half} {kind}", one, clip_name(half, kind), wanted=wanted)
+
+
+def _shown(found: dict[str, list[Tracked]]) -> Iterable[Part]:
+    """By half: the mean error of every size over its clips, its limbs lost, and sign tests against the default."""
+    for half in HALVES:
+        runs = {
+            _name(*size): [found[f"{_name(*size)}, {half} {kind}"] for kind in KIND_OF_CLIPS]
+            for size in SIZES
+        }
+        for name, clips in runs.items():
+            by_seed = list(zip(*clips, strict=True))
+            errors = [float(np.mean(mean_errors(one))) for one in by_seed]
+            lost = [float(np.mean([lost_percent(run) for run in one])) for one in by_seed]
+            yield number(f"mean error, {name}, {half}", errors, "mm", better="lower")
+            yield number(f"frames with a limb lost, {name}, {half}", lost, "%", better="lower")
+        rows: list[tuple[Plain, ...]] = []
+        for name, clips in runs.items():
+            cells = [
+                f"{np.mean(mean_errors(one)):.1f} / {max(run.worst_mm for run in one):.0f}" for one in clips
+            ]
+            rows.append((name, *cells))
+        yield Table(
+            f"{half}: mean error / worst frame of any seed (mm)", ("size", *KIND_OF_CLIPS), tuple(rows)
+        )
+
+        def of(name: str, runs: dict[str, list[list[Tracked]]] = runs) -> tuple[list[float], list[float]]:
+            clips = runs[name]
+            means = [error for one in clips for error in mean_errors(one)]
+            return means, [float(error) for one in clips for error in error_rows(one).ravel()]
+
+        yield sign_tests(of, [(_name(*size), _name(*SIZES[0])) for size in SIZES[1:]])
+    yield {
+        "tracker": DEFAULT_TRACKER,
+        "weighting": DEFAULT_WEIGHTING,
+        "frames": max(len(runs[0].frames) for runs in found.values()),
+        "refined": "every frame, the shape after its first frames",
+    }
+
+
+EXPERIMENT = tracked_experiment(
+    "effort",
+    "How much search a refined frame needs",
+    "an open question",
+    "How few layers and particles give the default's error, when every frame is refined?",
+    lines=_lines,
+    shown=_shown,
+)
