@@ -26,7 +26,7 @@ from studio.runs.search_space import search_space, session_sigma
 from studio.sessions.session import Session
 from studio.settings import changed_settings, default_settings
 from studio.trackers.catalogue import TRACKERS
-from studio.trackers.tracker import FilterState, Foreseeing, generator, start_of
+from studio.trackers.tracker import FilterState, generator, start_of
 from studio.typed_decoding import is_table
 
 TRACKER, WEIGHTING = "behaviour", "blobs"
@@ -120,7 +120,6 @@ def _measured(session: Session, model: Path, progress: Progress | None) -> dict[
         clock.lap("reconstruction")
         particles = tracker.begin_frame(generator(0, frame, -1), carried, space, settings.tracker)
         clock.lap("prediction and evaluation")
-        assert isinstance(tracker, Foreseeing)
         expected = tracker.expectations(particles, space, settings.tracker)
         informed = problem.expecting(expected, carried.memory)
         clock.lap("blob fitting")

@@ -13,7 +13,7 @@ from studio.arrays import Array
 from studio.errors import NotFoundError
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.inspection.reading import InspectedFrame, InspectedRun
-from studio.likelihood.problem import POOLED, WHOLE, Expectant, FrameLikelihood, PreparedProblem, Shares
+from studio.likelihood.problem import POOLED, WHOLE, FittedToPoses, FrameLikelihood, PreparedProblem, Shares
 from studio.runs.problem_source import ProblemSource
 from studio.runs.run_footage import footage_of
 
@@ -58,7 +58,7 @@ def evaluation_of(frame: InspectedFrame) -> FrameEvaluation:
     """
     source, settings = source_of(frame.of), frame.settings
     problem, evidence = source.problem(frame.number, settings), source.evidence(frame.number, settings)
-    if isinstance(problem, Expectant):
+    if isinstance(problem, FittedToPoses):
         problem = problem.expecting(frame.searched()[None], _memory(frame))
     return FrameEvaluation(problem, evidence)
 

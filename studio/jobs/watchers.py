@@ -82,7 +82,7 @@ class Subscription(Generic[T]):
     def close(self) -> None:
         """Take no more events; those that wait can still be read. Whoever said what is wanted is let go."""
         with self._something:
-            self.closed, self._wanted = True, lambda _: False
+            self.closed, self._wanted = True, _nothing
             self._wake()
 
     def _wake(self) -> None:
@@ -120,6 +120,10 @@ class Watchers:
         with self._lock:
             for entry in self._subscriptions:
                 entry.close()
+
+
+def _nothing(_: object) -> bool:
+    return False
 
 
 def _settle(future: "asyncio.Future[None]") -> None:

@@ -8,7 +8,7 @@ pose weighs 1 / D, D the relative entropy between the mixture that its own blobs
 A pose costs its forward kinematics and a few products a blob, no picture is read.
 
 **Expectations and memory.** The fit depends on where it starts, so a search gives the frame its expected poses before
-it weighs (`weighting.problem.Expectant`). The learnt blobs pass from frame to frame as memory, with the particles,
+it weighs (`likelihood.problem.FittedToPoses`). The learnt blobs pass from frame to frame as memory, with the particles,
 through the results store; a frame's problem is a function of evidence, expectations and memory. A run begins with the
 blobs of the body's cones and no colours. After each of the first `blob_learning` frames the found pose assigns voxels
 to limbs, and the blobs are relearnt from all such frames (the paper's 20 frames); frames without a person, or lost, are

@@ -88,7 +88,7 @@ class PreparedProblem(ABC):
 
 
 @runtime_checkable
-class Expectant(Protocol):
+class FittedToPoses(Protocol):
     """A frame that needs expected poses before it can weigh well: the blobs of Caillette, Galata & Howard 2007,
     section 6.3, which are fitted to the hull from predicted poses.
 
@@ -109,7 +109,7 @@ class Expectant(Protocol):
 
 
 @runtime_checkable
-class SelfJudging(Protocol):
+class QualityMeasured(Protocol):
     """A frame that measures how well its pictures can be explained by any pose (section 6.3: a poor likelihood of the
     voxels means that the tracker is lost).
     """

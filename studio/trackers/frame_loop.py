@@ -16,13 +16,12 @@ import numpy as np
 
 from studio.errors import RunError
 from studio.knobs import knobs_of
-from studio.likelihood.problem import Expectant
+from studio.likelihood.problem import FittedToPoses
 from studio.trackers.particles import WeightError
 from studio.trackers.tracker import (
     HIDDEN,
     Array,
     FilterState,
-    Foreseeing,
     FrameLikelihood,
     FrameResult,
     LayerRecord,
@@ -168,14 +167,11 @@ class FrameSearch:
         return self.tracker.begin_frame(rng, start, self.space, settings)
 
     def _expected(self, particles: ParticleSet, settings: Any) -> Array:  # noqa: ANN401
-        """(S, D) poses expected by a search that starts from these particles: the tracker's own, else their mean; after
+        """(S, D) poses expected by a search that starts from these particles: the tracker's; after
         the first come the last pose moved on at constant velocity and the last reported pose, as far as they are
         known.
         """
-        if isinstance(self.tracker, Foreseeing):
-            poses = self.tracker.expectations(particles, self.space, settings)
-        else:
-            poses = particles.poses.mean(axis=0)[None]
+        poses = self.tracker.expectations(particles, self.space, settings)
         last, before = self.previous.estimate, self.previous.previous_estimate
         if last is None:
             return poses
@@ -187,7 +183,7 @@ class FrameSearch:
         kept = self._prepared
         if kept is None or kept[0] is not problem or kept[1] != repeat:
             informed = problem
-            if isinstance(problem, Expectant):
+            if isinstance(problem, FittedToPoses):
                 informed = problem.expecting(expected, self.previous.memory)
             kept = self._prepared = (problem, repeat, informed)
         return kept[2]
@@ -200,7 +196,7 @@ class FrameSearch:
     ) -> Mapping[str, Array]:
         """Memory for the next frame: the likelihood's, updated with this frame's estimate, and the hidden areas."""
         before = self.previous.memory
-        if not isinstance(informed, Expectant):
+        if not isinstance(informed, FittedToPoses):
             return before
         found = informed.remembered(self.tracker.end_frame(particles, self.space, settings).pose)
         return {**{name: values for name, values in before.items() if name.startswith(HIDDEN)}, **found}

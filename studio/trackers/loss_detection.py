@@ -45,7 +45,7 @@ from studio.geometry.camera import Camera
 from studio.likelihood.catalogue import LossLimit
 from studio.likelihood.outline_kernels import LANES, SEEN_ROW
 from studio.likelihood.outlines import OutlineProjector
-from studio.likelihood.problem import SelfJudging
+from studio.likelihood.problem import QualityMeasured
 from studio.likelihood.silhouette_areas import HALF, silhouettes_of
 from studio.trackers.tracker import FrameLikelihood
 
@@ -93,7 +93,7 @@ class Onlooker:
         self, evidence: FrameEvidence, problem: FrameLikelihood | None = None
     ) -> Callable[[Array], Sight]:
         """`sight` of one frame as a function of poses (D,). Holds only the evidence's silhouettes, a bit a pixel."""
-        lost = isinstance(problem, SelfJudging) and problem.lost_evidence
+        lost = isinstance(problem, QualityMeasured) and problem.lost_evidence
         names = np.array([view.camera for view in evidence.views])
         blank = np.array([is_blank(view) for view in evidence.views])
         carved = all(view.background is not None for view in evidence.views)
@@ -103,7 +103,7 @@ class Onlooker:
         if blank.all():
             return lambda _: Sight(float("nan"), seen=False, judged_lost=lost, notes=notes)
         if carved and empty.all():
-            nothing = isinstance(problem, SelfJudging) and problem.quality == -np.inf
+            nothing = isinstance(problem, QualityMeasured) and problem.quality == -np.inf
             return lambda _: Sight(float("nan"), seen=not nothing, judged_lost=lost, notes=notes)
         silhouettes, projector = silhouettes_of(evidence, HALF), self._projector(evidence)
 

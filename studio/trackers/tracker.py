@@ -9,7 +9,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Protocol, runtime_checkable
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,9 +100,9 @@ class FilterState:
     """State that one frame passes to the next; also the start of a run.
 
     particles : the weighted set at the end of the frame; None = start uniformly over the space's limits.
-    estimate, previous_estimate : (D,) the last two reported poses (dynamics, Eq. 10); None where there is
-    none yet. memory : the likelihood's state (`weighting.problem.Expectant`), and under names that begin with HIDDEN
-    the occluded areas (`hidden_areas`); trackers pass both on unread.
+    estimate, previous_estimate : (D,) the last two reported poses (dynamics, Eq. 10); None where there is none yet.
+    memory : the likelihood's state (`likelihood.problem.FittedToPoses`), and under names that begin with HIDDEN the
+    occluded areas (`hidden_areas`); trackers pass both on unread.
     """
 
     particles: ParticleSet | None
@@ -282,14 +282,11 @@ class Tracker(ABC):
     def end_frame(self, particles: ParticleSet, space: SearchSpace, settings: Any) -> Estimate:  # noqa: ANN401
         """The pose that is reported, from the last layer's weighted set."""
 
-
-@runtime_checkable
-class Foreseeing(Protocol):
-    """A tracker that can expect several poses at once (of motion clusters, for example)."""
-
     def expectations(self, particles: ParticleSet, space: SearchSpace, settings: Any) -> Array:  # noqa: ANN401
-        """(S, D) expected poses, the likeliest first, from the unweighted set that the first layer will weigh."""
-        ...
+        """(S, D) expected poses, the likeliest first, from the unweighted set that the first layer will weigh: its mean
+        where the tracker expects no several (of motion clusters, for example).
+        """
+        return particles.poses.mean(axis=0)[None]
 
 
 def generator(seed: int, frame: int, layer: int) -> np.random.Generator:

@@ -13,7 +13,7 @@ from studio.errors import BodyError, FootageError
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.likelihood.blob_settings import BlobSettings
 from studio.likelihood.blobs import NOTHING_SEEN, BlobWeigher, ExpectedBlobs, blob_mixture
-from studio.likelihood.problem import TRUNK_FIRST, Expectant, SelfJudging
+from studio.likelihood.problem import TRUNK_FIRST, FittedToPoses, QualityMeasured
 from studio.volume.relative_entropy import kept_divergence
 
 Array = np.ndarray
@@ -78,11 +78,11 @@ def test_without_expectations_the_mean_of_the_weighed_poses_is_expected(
     body: BodyModel, evidence: FrameEvidence, weigher: BlobWeigher
 ) -> None:
     problem = weigher.problem(evidence)
-    assert isinstance(problem, Expectant)
-    assert not isinstance(problem, SelfJudging)
+    assert isinstance(problem, FittedToPoses)
+    assert not isinstance(problem, QualityMeasured)
     poses = scattered(body, 9)
     informed = problem.expecting(poses.mean(axis=0)[None], {})
-    assert isinstance(informed, SelfJudging)
+    assert isinstance(informed, QualityMeasured)
     np.testing.assert_array_equal(problem.weigh(poses), informed.weigh(poses))
     assert problem.weigh(np.zeros((0, 25))).shape == (0,)
     assert blob_mixture(problem) is None

@@ -13,7 +13,7 @@ from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
 from studio.comparison.footage_cache import FootageCache
 from studio.errors import SettingsError, TruthError
-from studio.likelihood.problem import Expectant
+from studio.likelihood.problem import FittedToPoses
 from studio.motion_files.trc import read_trc, write_trc
 from studio.reproduction.caillette import training_set
 from studio.reproduction.caillette.following import (
@@ -190,8 +190,8 @@ def test_frames_are_given_the_truth_once(cache) -> None:
     settings = changed_settings(default_settings("condensation", "blobs"), COARSE)
     of_frame = known_problems(cache, session, settings, truth)
     assert isinstance(of_frame(1), Known)
-    assert not isinstance(of_frame(1), Expectant)
-    assert isinstance(problems(cache, session, settings, LAST)(1), Expectant)
+    assert not isinstance(of_frame(1), FittedToPoses)
+    assert isinstance(problems(cache, session, settings, LAST)(1), FittedToPoses)
     assert known_problems(cache, session, settings, truth)(1) is of_frame(1)
     away = truth[1] + np.where(np.arange(truth.shape[1]) < 3, 150.0, 0.0)
     near, far = of_frame(1).weigh(np.stack([truth[1], away]))

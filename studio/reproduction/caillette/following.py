@@ -19,7 +19,7 @@ from studio.errors import SettingsError
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.likelihood.blobs import BlobProblem
 from studio.likelihood.catalogue import WEIGHTINGS
-from studio.likelihood.problem import Expectant, FrameLikelihood, SelfJudging
+from studio.likelihood.problem import FittedToPoses, FrameLikelihood, QualityMeasured
 from studio.reproduction.caillette.training_set import Training, learnt
 from studio.reproduction.caillette.true_motion import TrueMotion, joint_errors, true_motion
 from studio.reproduction.tracking import Candidate
@@ -91,13 +91,13 @@ def known_problems(
         of_frame = problems(cache, session, settings, last)
         for frame, pose in enumerate(true_poses):
             problem = of_frame(frame)
-            if not isinstance(problem, Expectant):
+            if not isinstance(problem, FittedToPoses):
                 raise SettingsError(
                     f"Weighting '{settings.weighting_name}' uses no expected poses.",
                     "Take one that fits blobs.",
                 )
             expecting = problem.expecting(pose[None], memory)
-            memory = cast("Expectant", expecting).remembered(pose)
+            memory = cast("FittedToPoses", expecting).remembered(pose)
             found.append(Known(expecting))
         return found
 
@@ -221,10 +221,10 @@ class Recovering(Following):
 
     def _is_lost(self, problem: FrameLikelihood, before: FilterState, result: FrameResult) -> bool:
         """Whether blobs fitted from where the body was found give the voxels a poor likelihood."""
-        if not isinstance(problem, Expectant):
+        if not isinstance(problem, FittedToPoses):
             return False
         fitted = problem.expecting(result.estimate.pose[None], before.memory)
-        return isinstance(fitted, SelfJudging) and fitted.lost_evidence
+        return isinstance(fitted, QualityMeasured) and fitted.lost_evidence
 
 
 RESET_KEY = 0x5EED
