@@ -162,7 +162,7 @@ Rows = Mapping[str, Sequence[Row]]
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What a view's function found: rows by table, and what is told beside them."""
+    """What a view's function found: rows by table, and the notes beside them."""
 
     rows: Rows
     notes: tuple[str, ...] = ()

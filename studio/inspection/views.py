@@ -71,11 +71,11 @@ def look_over(run: InspectedRun, name: str, selection: Selection) -> Viewed:
 def _viewed(
     run: InspectedRun, view: View, kinds: Sequence[TableKind], found: Found | Rows, notes: tuple[str, ...]
 ) -> Viewed:
-    told = found if isinstance(found, Found) else Found(found)
+    given = found if isinstance(found, Found) else Found(found)
     tables = [
-        Table(kind.name, kind.title, _columns(run, kind), told.rows.get(kind.name, ())) for kind in kinds
+        Table(kind.name, kind.title, _columns(run, kind), given.rows.get(kind.name, ())) for kind in kinds
     ]
-    return Viewed(tuple(tables), (*notes, *told.notes), told.findings, told.remedies)
+    return Viewed(tuple(tables), (*notes, *given.notes), given.findings, given.remedies)
 
 
 def _columns(run: InspectedRun, kind: TableKind) -> tuple[Column, ...]:

@@ -309,7 +309,7 @@ def _run_there(content: bytes, needs: _Needs) -> bytes:
     worker, marker = _dask().get_worker(), Path(needs.folder) / needs.marker
     looked = time.monotonic()
 
-    def tell(*words: object) -> None:
+    def report(*words: object) -> None:
         nonlocal looked
         if needs.topic:
             worker.log_event(needs.topic, words)
@@ -318,5 +318,5 @@ def _run_there(content: bytes, needs: _Needs) -> bytes:
             if not marker.exists():
                 raise WorkCancelledError("Nobody waits for it any more.")
 
-    with heard_by(tell):
+    with heard_by(report):
         return answered(content)

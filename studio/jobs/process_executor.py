@@ -252,7 +252,7 @@ def _environment(values: Mapping[str, str]) -> Generator[None]:
 def _run_tasks(pipe: Connection, niceness: int) -> None:
     """The process's whole life: tasks in, what they report and what comes of them out, until the other end is gone."""
 
-    def tell(*words: object) -> None:
+    def report(*words: object) -> None:
         with suppress(OSError):
             pipe.send(("report", words))
 
@@ -261,7 +261,7 @@ def _run_tasks(pipe: Connection, niceness: int) -> None:
     if niceness and hasattr(os, "nice"):
         os.nice(niceness)
     threading.Thread(target=_end_with_parent, name="parent-watch", daemon=True).start()
-    with suppress(EOFError, OSError), heard_by(tell):
+    with suppress(EOFError, OSError), heard_by(report):
         while True:
             pipe.send_bytes(answered(pipe.recv_bytes()))
 

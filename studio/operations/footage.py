@@ -161,7 +161,7 @@ def synchronise(
     apply: Annotated[bool, Field(description="Write what was estimated or read into the session.")] = False,
     progress: Reporting = None,
 ) -> Synchronised:
-    """Tell by how many frames the cameras of a session began apart.
+    """Say by how many frames the cameras of a session began apart.
 
     Without offsets or turns, estimates it from what moves in the pictures and says how far to trust it; nothing is
     changed unless that is applied. Offsets and turns by hand are written at once.

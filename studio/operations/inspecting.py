@@ -65,7 +65,7 @@ def why(
     *,
     track: Annotated[str, Field(description="Whose pose; default: what the search found.")] = "",
 ) -> Viewed:
-    """Tell why a frame failed, and what may help: findings and remedies, from measurements.
+    """Say why a frame failed, and what may help: findings and remedies, from measurements.
 
     Raises RunError for a run without frames.
     """

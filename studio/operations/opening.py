@@ -104,7 +104,7 @@ def bodies() -> tuple[BodyModel, ...]:
 
 @operation
 def way(session: SessionName) -> Workflow:
-    """Tell how far a session is on the way from footage to an exported motion, and what is next."""
+    """Say how far a session is on the way from footage to an exported motion, and what is next."""
     opened = open_session(session)
     run = newest_run(opened)
     return workflow_of(opened, exports=exported_files(run) if run else ())

@@ -123,7 +123,7 @@ def check(
     every: Annotated[int, Field(ge=1, le=10_000, description="Look at so-many-th frames.")] = EVERY,
     progress: Reporting = None,
 ) -> RunCheck:
-    """Tell how well a run fits its pictures: share in the masks, lost frames and limbs, sudden turns, jumps, jitter.
+    """Say how well a run fits its pictures: share in the masks, lost frames and limbs, sudden turns, jumps, jitter.
 
     What was measured is kept beside the run, and shown in the guided set-up's step Check.
 

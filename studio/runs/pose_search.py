@@ -58,8 +58,8 @@ def better_pose(
     """The best pose near a given one (D,) in a frame. run : whose body, cameras and likelihood are used; None: the
     session's.
 
-    progress : told before each layer. Raises RunError where nothing is to be seen in the frame or the pose does not fit
-    the body.
+    progress : called before each layer. Raises RunError where nothing is to be seen in the frame or the pose does not
+    fit the body.
     """
     body = run.body() if run else session.body()
     given = np.asarray(pose, dtype=np.float64)

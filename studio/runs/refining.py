@@ -70,7 +70,7 @@ def refine_run(
     """Refine every frame of a track and store the result as another (see `runs.refined_frames`).
 
     source : "" for what was tracked, with its sides put right first (`runs.sides`) where they are not yet. progress :
-    told after each frame; where it raises, nothing is kept. Raises
+    called after each frame; where it raises, nothing is kept. Raises
     SessionError where `into` is taken, RunError for a run without frames, and what reading the footage raises.
     """
     knobs = settings or RefinementSettings()

@@ -75,11 +75,11 @@ def track_together(sessions: Sequence[Session], progress: Progress = unheard) ->
         puts = [stack.enter_context(subject_masks_of(session)) for session in sessions]
         count = whole.footage.frame_count
 
-        def told(step: str, before: int) -> Progress:
+        def report(step: str, before: int) -> Progress:
             return lambda _, done, total: progress(step, before + done, 2 * total)
 
         work = _Work(sessions[0].cameras(), bodies, whole)
-        work.follow(range(first, count), told(STEP, 0), _forget)
+        work.follow(range(first, count), report(STEP, 0), _forget)
         work.fit()
         for frame in range(first):
             masks = work.masks(frame)
@@ -92,7 +92,7 @@ def track_together(sessions: Sequence[Session], progress: Progress = unheard) ->
                 own = {name: share.mask for name, share in part.items()}
                 put(frame, (own, masks, {name: share.hidden for name, share in part.items()}))
 
-        work.follow(range(first, count), told(STEP, count - first), keep)
+        work.follow(range(first, count), report(STEP, count - first), keep)
     return BodiesTogether(first, tuple(np.array(body.following.poses) for body in bodies))
 
 

@@ -34,7 +34,7 @@ class Selection:
     layer : one layer's cloud, None for all together. limb, parameter, camera : names. particle : a row of the layer's
     cloud. look_through : the camera whose place the viewers take, None for the free view. eye : from where a viewer
     looks freely, place and what is looked at (6,) metres, None for the usual place. follow : the frame moves on with
-    the tracking. editing : whether a pose is edited. asked : the number of the page's request that this answers.
+    the tracking. editing : whether a pose is edited. request_number : of the page's request that this answers.
     """
 
     session: str = ""
@@ -49,7 +49,7 @@ class Selection:
     eye: tuple[float, ...] | None = None
     follow: bool = True
     editing: bool = False
-    asked: int = 0
+    request_number: int = 0
 
 
 @dataclass(frozen=True, slots=True)

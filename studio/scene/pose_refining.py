@@ -33,7 +33,7 @@ class PoseRefining:
     ) -> None:
         self._stopping = threading.Event()
 
-        def told(_: str, step: int, total: int) -> None:
+        def report(_: str, step: int, total: int) -> None:
             if self._stopping.is_set():
                 raise WorkCancelledError("The search around the pose was stopped.")
             progress(step / total)
@@ -45,7 +45,7 @@ class PoseRefining:
                     frame,
                     pose,
                     run=run,
-                    progress=told,
+                    progress=report,
                 )
             except StudioError as problem:
                 found = problem

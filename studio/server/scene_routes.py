@@ -38,7 +38,7 @@ class SceneRequest(Request):
     limb, parameter, particle (a row of the layer's cloud), camera: what else is chosen, null for none. eye: from where
     the scene is looked at and what is looked at, metres; null: the usual place. ghosts: bodies beside the answer, until
     another frame is shown. body: the file of a body that is being made, shown in place of the session's own, or without
-    a session alone. asked: a number of the asker's own; `scene` events carry the last one that they know of.
+    a session alone. request_number: the page's own; `scene` events carry the last one that they know of.
     """
 
     session: RunName | None = None
@@ -58,7 +58,7 @@ class SceneRequest(Request):
     playing: bool | None = None
     speed: float | None = Field(None, gt=0.0, le=10.0)
     loop: bool | None = None
-    asked: int = Field(0, ge=0)
+    request_number: int = Field(0, ge=0)
     body: str | None = Field(None, max_length=MOST_TEXT)
     options: dict[str, bool | int | float | str | list[str] | None] = Field(default_factory=dict)
 
@@ -111,8 +111,8 @@ def show(request: SceneRequest, app: App, scene: Scene) -> None:
         scene.set_options(**options)
     if {"playing", "speed", "loop"} & given:
         scene.play(request.playing, speed=request.speed, loop=request.loop)
-    if "asked" in given:
-        scene.select(asked=request.asked)
+    if "request_number" in given:
+        scene.select(request_number=request.request_number)
 
 
 @router.post("/view", status_code=204)
@@ -140,7 +140,7 @@ def report_moves(app: AppState) -> None:
                 "eye": shown.eye,
                 "follow": shown.follow,
                 "editing": shown.editing,
-                "asked": shown.asked,
+                "request_number": shown.request_number,
             },
             window,
         )

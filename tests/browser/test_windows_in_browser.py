@@ -150,10 +150,10 @@ def test_what_the_scene_said_before_it_knew_of_a_move_changes_nothing(
     window.key("End")
     window.key("Home")
     until(window.page, lambda: wishes and wishes[-1]["frame"] == 0)
-    asked = int(str(wishes[-1]["asked"]))
+    number = int(str(wishes[-1]["request_number"]))
     said = {"type": "scene", "session": "left", "run": "of-left", "frame": FRAMES - 1, "follow": True}
-    for known, frame in ((asked - 1, 0), (asked, FRAMES - 1)):
-        event = json.dumps(said | {"asked": known})
+    for known, frame in ((number - 1, 0), (number, FRAMES - 1)):
+        event = json.dumps(said | {"request_number": known})
         window.page.evaluate("event => window.events.onmessage({ data: event })", event)
         assert window.get("frame") == frame
     window.close()

@@ -29,7 +29,7 @@ let layers = [];       // of the frame that is being searched
 let drawnAt = 0;       // when live layers were last shown
 let scene = {};        // what the scene last showed
 let moves = 0;         // of the page, which the scene is asked to follow
-let asked = 0;         // the last move that it was asked to follow
+let requested = 0;     // the last move that it was asked to follow
 let again = [];        // layers of the frame that is annealed again
 let showsAgain = 0;    // timer that shows them
 let asking = "";       // the frame whose layers are on their way
@@ -121,17 +121,17 @@ const isElsewhere = (shown) => Object.keys(shown).some((name) => shown[name] !==
 async function showInScene() {
   if (!get("session") || isOpening) return;
   const shown = wantedNow();
-  if (!isElsewhere(shown) && asked === moves) return;
+  if (!isElsewhere(shown) && requested === moves) return;
   scene = shown;
-  asked = moves;
+  requested = moves;
   const discard = isAnew;
   isAnew = false;
-  await post("/api/scene/show", { ...shown, eye: eyeOf(shown.eye), asked, discard }).catch(complain);
+  await post("/api/scene/show", { ...shown, eye: eyeOf(shown.eye), request_number: requested, discard }).catch(complain);
 }
 
 /** The scene's own controls moved, or it plays: follow them, without sending the change back. What it said before it knew of the page's own last move is old. */
 function takeScene(event) {
-  if (!isShown(event.session, event.run) || event.asked !== moves) return;
+  if (!isShown(event.session, event.run) || event.request_number !== moves) return;
   const chosen = { limb: event.limb, parameter: event.parameter, camera: event.camera, through: event.look_through, eye: event.eye?.join(",") ?? null };
   Object.assign(scene, chosen, { look_through: event.look_through });
   if (event.follow && get("follow") && searching()) return set(chosen);

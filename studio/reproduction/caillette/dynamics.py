@@ -182,7 +182,7 @@ def _fig_11(outcomes: Sequence[Outcome]) -> Iterator[Part]:
 
 
 def _fig_11_trials(scale: Scale) -> tuple[Trial, ...]:
-    """As `_trials`; those with the paper's recovery are told so."""
+    """As `_trials`; those with the paper's recovery are marked so."""
     plain_ones = tuple(one for one in FIG_11 if one not in RESETTING)
     within: dict[str, Any] = {"frames": FIG_11_FRAMES, "seeds": FIG_11_SEEDS}
     return (
