@@ -139,7 +139,10 @@ def track(
     settings = changed_settings(default_settings(attempt.tracker, attempt.weighting), changes)
     cameras, fps = _cameras(session, attempt.cameras), session.manifest.fps
     seen_with, rate = spoilt.cameras(cameras), fps / attempt.every
-    frames = range(attempt.first, attempt.last or session.manifest.frame_count, attempt.every)
+    count = session.manifest.frame_count
+    frames = range(attempt.first, attempt.last or count, attempt.every)
+    if frames[-1] >= count:
+        raise NotFoundError(f"There is no frame {frames[-1]}. '{attempt.footage}' has 0 to {count - 1}.", "")
 
     def evidence(frame: int, name: str = attempt.weighting) -> FrameEvidence:
         """The evidence of a frame for a weighting."""

@@ -26,9 +26,9 @@ from studio.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING
 from studio.synthesis.drawn_recipes import HALVES, clip_name
 
 KIND_OF_CLIPS = ("turns", "kick", "dance")
-SIZES = ((10, 100), (10, 50), (10, 33), (5, 100), (5, 66), (3, 110), (3, 66))
+SIZES = ((10, 100), (10, 50), (5, 100), (5, 66), (3, 110))
 """Layers and particles, the default first."""
-LAST, QUICK_LAST = 100, 24
+FRAMES, QUICK_FRAMES = 75, 24
 
 
 def _name(layers: int, particles: int) -> str:
@@ -42,7 +42,7 @@ def _lines(quick: bool) -> Iterator[Line]:
             for layers, particles in SIZES:
                 knobs = {"layers": layers, "particles": particles, **REFINED}
                 one = Candidate(_name(layers, particles), DEFAULT_TRACKER, DEFAULT_WEIGHTING, knobs)
-                wanted = {**AS_A_RUN, "last": QUICK_LAST if quick else LAST}
+                wanted = {**AS_A_RUN, "last": QUICK_FRAMES if quick else FRAMES}
                 yield Line(f"{one.name}, {half} {kind}", one, clip_name(half, kind), wanted=wanted)
 
 
