@@ -123,10 +123,9 @@ def track(
     cache: FootageCache,
     *,
     on_layer: Callable[[LayerRecord], None] | None = None,
-    on_frame: Callable[[int, int], None] | None = None,
     spoilt: Changed = UNCHANGED,
 ) -> Tracked:
-    """Track and measure. on_layer : called with every layer. on_frame : frames done, frames in all; may raise to stop.
+    """Track and measure; each frame is reported. on_layer : called with every layer.
 
     Raises TruthError for a footage without truth and what tracking raises.
     """
@@ -176,8 +175,7 @@ def track(
         evaluations = result.evaluations
         named.append(list(result.limbs_lost))
         seconds += time.perf_counter() - began if number else 0.0
-        if on_frame is not None:
-            on_frame(number + 1, len(frames))
+        report("tracking", number + 1, len(frames))
     poses = np.array(following.poses)
     if settings.refinement.refine_frames:
 
@@ -275,4 +273,4 @@ def tracking_trial(group: str, attempt: Attempt) -> Trial:
 @kept_as("tracking_trials.measure_tracking")
 def measure_tracking(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
     """Track; the fields of `Tracked`."""
-    return asdict(track(Attempt.of_plain(arguments), cache, on_frame=partial(report, "tracking")))
+    return asdict(track(Attempt.of_plain(arguments), cache))

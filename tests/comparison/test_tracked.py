@@ -12,6 +12,7 @@ from studio.comparison.tracked import Attempt, Changed, track
 from studio.errors import NotFoundError, SessionError
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.evidence.settings import EvidenceSettings
+from studio.progress import heard_by
 
 SAMPLES = Path(__file__).parents[2] / "sample_sessions"
 SMALL = {"layers": 3, "particles": 20}
@@ -73,13 +74,9 @@ def test_damage_changes_the_trackers_input_and_nothing_stored(cache) -> None:
 
 def test_layers_and_frames_are_reported(cache) -> None:
     layers, frames = [], []
-    track(
-        attempt(last=2),
-        cache,
-        on_layer=layers.append,
-        on_frame=lambda done, total: frames.append((done, total)),
-    )
-    assert frames == [(1, 2), (2, 2)]
+    with heard_by(lambda step, done, total: frames.append((step, done, total))):
+        track(attempt(last=2), cache, on_layer=layers.append)
+    assert frames == [("tracking", 1, 2), ("tracking", 2, 2)]
     assert [record.frame for record in layers] == [0] * 6 + [1] * 3
 
 
@@ -88,6 +85,9 @@ def test_unknown_footage_and_camera_are_named(cache) -> None:
         track(Attempt("no-such-walk", "annealed", "edge-region", 0), cache)
     with pytest.raises(NotFoundError, match="cam9"):
         track(attempt(cameras=("cam9",)), cache)
+    count = cache.session("walk").manifest.frame_count
+    with pytest.raises(NotFoundError, match=f"no frame {count}"):
+        track(attempt(last=count + 1), cache)
 
 
 def test_the_cache_drops_the_oldest_evidence_first() -> None:

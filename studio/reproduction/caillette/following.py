@@ -20,6 +20,7 @@ from studio.evidence.frame_evidence import FrameEvidence
 from studio.likelihood.blobs import BlobProblem
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.likelihood.problem import FittedToPoses, FrameLikelihood, QualityMeasured
+from studio.progress import report
 from studio.reproduction.caillette.training_set import Training, learnt
 from studio.reproduction.caillette.true_motion import TrueMotion, joint_errors, true_motion
 from studio.reproduction.tracking import Candidate
@@ -240,7 +241,7 @@ def _fitted_from_many(problem: FrameLikelihood) -> FrameLikelihood:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Workflow:
+class FollowedRun:
     """The poses (F, D) of a run, and its frames' records.
 
     model : the behaviour model at its end, if any. resets : as in `Followed`. overlaps : of each frame's pose with the
@@ -277,12 +278,12 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
     model = learnt(cache, wanted.training).model if wanted.training else None
     session = cache.session(wanted.footage)
     truth = true_motion(cache, session, wanted.last)
-    return asdict(followed(session, truth, workflow_of(cache, session, truth, wanted, model)))
+    return asdict(followed(session, truth, run_of(cache, session, truth, wanted, model)))
 
 
-def workflow_of(
+def run_of(
     cache: FootageCache, session: Session, truth: TrueMotion, wanted: Follow, model: BehaviourModel | None
-) -> Workflow:
+) -> FollowedRun:
     """The run that tracks the footage from the true pose of its first frame."""
     settings, body, fps = wanted.settings(), session.body(), session.manifest.fps
     problem_of = problems(cache, session, settings, wanted.last)
@@ -309,8 +310,9 @@ def workflow_of(
         began = time.perf_counter()
         evaluations = following.step(frame, problem).evaluations
         seconds += time.perf_counter() - began if frame else 0.0
+        report("tracking", frame + 1, wanted.last)
     resets = following.resets if isinstance(following, Recovering) else []
-    return Workflow(
+    return FollowedRun(
         np.array(following.poses), free, evaluations, seconds, following.model, resets, following.overlaps
     )
 
@@ -332,7 +334,7 @@ def _overlap_of(
     return overlap
 
 
-def followed(session: Session, truth: TrueMotion, way: Workflow) -> Followed:
+def followed(session: Session, truth: TrueMotion, way: FollowedRun) -> Followed:
     """The errors of a run."""
     body = session.body()
     found = joint_errors(body, feature_space(body, session.manifest.fps).columns, way.poses, truth)

@@ -34,7 +34,7 @@ from studio.reproduction.caillette.comparing import (
     ratio,
     summary_table,
 )
-from studio.reproduction.caillette.following import Follow, Followed, follow_trial, followed, workflow_of
+from studio.reproduction.caillette.following import Follow, Followed, follow_trial, followed, run_of
 from studio.reproduction.caillette.following import measure as measure_following
 from studio.reproduction.caillette.setting import (
     BLOBS,
@@ -195,19 +195,19 @@ def measure_online(arguments: Mapping[str, Any], cache: FootageCache) -> dict[st
     model = learnt(cache, wanted.training).model
     session = cache.session(wanted.footage)
     truth = true_motion(cache, session, wanted.last)
-    passes = {PLAIN: workflow_of(cache, session, truth, wanted, model)}
+    passes = {PLAIN: run_of(cache, session, truth, wanted, model)}
     taught: dict[str, BehaviourModel] = {}
     for gate, knobs in GATES.items():
         changes = {**wanted.changes, "online_learning": True, **knobs}
         learning = dataclasses.replace(wanted, changes=changes)
-        first = passes[FIRST.format(gate)] = workflow_of(cache, session, truth, learning, model)
+        first = passes[FIRST.format(gate)] = run_of(cache, session, truth, learning, model)
         assert first.model is not None
         taught[gate] = first.model
     fitted = fitting(model, session.body(), session.manifest.fps)
     rng, every = np.random.default_rng(wanted.seed), np.ones(len(truth.poses), dtype=bool)
     taught[TRUTH] = updated_model(fitted, fitted, truth.poses, every, rng)
     for gate, known in taught.items():
-        passes[SECOND.format(gate)] = workflow_of(cache, session, truth, wanted, known)
+        passes[SECOND.format(gate)] = run_of(cache, session, truth, wanted, known)
     least = wanted.settings().tracker.learning_overlap
     agreeing = [overlap >= least for overlap in passes[FIRST.format(GATED)].overlaps]
     return {
