@@ -26,7 +26,7 @@ from studio.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING
 from studio.synthesis.drawn_recipes import HALVES, clip_name
 
 KIND_OF_CLIPS = ("turns", "kick", "dance")
-SIZES = ((10, 100), (10, 50), (5, 100), (5, 66), (3, 110))
+SIZES = ((10, 100), (10, 50), (10, 33), (10, 20), (5, 100), (5, 66), (3, 110))
 """Layers and particles, the default first."""
 FRAMES, QUICK_FRAMES = 75, 24
 
