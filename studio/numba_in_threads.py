@@ -64,7 +64,9 @@ def parallel_blocks(kernel: Callable[..., None], blocks: int, least: int, *argum
     least : blocks that are worth a thread. Threads take a few at a time; one that is scheduled late (a browser that
     draws the scene may have all cores) finds them done by the others and is not waited for.
     """
-    threads = min(int(numba.get_num_threads()), blocks // least)
+    threads = blocks // least
+    if threads > 1:
+        threads = min(int(numba.get_num_threads()), threads)
     if threads <= 1:
         kernel(0, blocks, *arguments)
         return

@@ -33,6 +33,7 @@ from studio.trackers.guided_particles import STATES, foreseen, is_guided
 from studio.trackers.guided_start import arrived, descended, guided_set, settled_walkers
 from studio.trackers.layer_record import layer_record
 from studio.trackers.model_free import judged, share_in
+from studio.trackers.particle_kernels import Moments, moments
 from studio.trackers.particles import (
     estimate,
     expected,
@@ -122,16 +123,16 @@ class AnnealedParticleFilter(Tracker):
                 extra = arrived(rng, particles.poses, extra, space)
             return ParticleSet(particles.poses, annealed.log_weights, raw, extra), record
         survivors, first, second = _survivors(rng, weighted, space, settings)
-        spread = _spread(survivors, layer, space, settings)
+        of_survivors = moments(survivors)
+        spread = _spread(survivors, of_survivors, layer, space, settings)
         poses = settle(rng, spread, spread.draw(rng), survivors, problem, space, settings)
-        kept, diffused = survivors.var(axis=0), poses.var(axis=0)
         record = layer_record(
             layer,
             weighted,
             annealed,
             survival,
-            resampled=kept,
-            diffused=diffused,
+            resampled=of_survivors.variance,
+            diffused=moments(poses).variance,
             free=free,
             parents=np.stack([first, second]),
         )
@@ -173,12 +174,14 @@ def _survivors(
     return children, parents, np.where(crossed, others, NO_PARENT)
 
 
-def _spread(survivors: Array, layer: int, space: SearchSpace, settings: AnnealedSettings) -> Spread:
-    """Survivors (N, D) plus B_m: planned (Eq. 13) or following their own covariance (Eq. 18)."""
+def _spread(
+    survivors: Array, own: Moments, layer: int, space: SearchSpace, settings: AnnealedSettings
+) -> Spread:
+    """Survivors (N, D), whose moments these are, plus B_m: planned (Eq. 13) or by their own covariance (Eq. 18)."""
     if not settings.adaptive_diffusion:
         survivals = layer_survivals(settings, layer + 2)
         sigma = planned_sigma(space.sigma * settings.diffusion_scale, survivals, settings.diffusion_decay)
         return noise_about(survivors, sigma)
     if settings.diffusion_form == "shrink":
-        return shrunk_noise(survivors, settings.diffusion_fraction, settings.diffusion_covariance)
-    return proportional_noise(survivors, settings.diffusion_constant, settings.diffusion_covariance)
+        return shrunk_noise(survivors, own, settings.diffusion_fraction, settings.diffusion_covariance)
+    return proportional_noise(survivors, own, settings.diffusion_constant, settings.diffusion_covariance)

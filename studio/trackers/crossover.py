@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.arrays import Array, Mask
+from studio.trackers.particle_kernels import children
 from studio.trackers.tracker import SearchSpace
 
 
@@ -24,10 +25,7 @@ def cross(
     count = len(first)
     place: NDArray[np.int64] = limb_places(space) if by == "limbs" else np.arange(1, int(first.shape[1]) + 1)
     chosen = rng.random(count) < share
-    cuts = np.sort(1 + np.floor(rng.random((count, 2)) * place[-1]).astype(np.int64), axis=1)
-    taken = (place > cuts[:, :1]) & (place <= cuts[:, 1:])
-    crossed = taken & chosen[:, None]
-    return np.where(crossed, second, first), np.asarray(crossed.any(axis=1))
+    return children(first, second, place, chosen, rng.random((count, 2)))
 
 
 def limb_places(space: SearchSpace) -> NDArray[np.int64]:

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.arrays import Array
+from studio.trackers.particle_kernels import Moments
 
 
 def planned_sigma(sigma: Array, survivals: Sequence[float], decay: str) -> Array:
@@ -61,28 +62,28 @@ def noise_about(poses: Array, sigma: Array) -> Spread:
     return Spread(poses, 1.0, sigma)
 
 
-def shrunk_noise(poses: Array, fraction: float, covariance: str) -> Spread:
+def shrunk_noise(poses: Array, own: Moments, fraction: float, covariance: str) -> Spread:
     """Poses (N, D) perturbed without changing their mean and covariance in expectation.
 
-    fraction : h, noise as a share of the sample's standard deviation. covariance : "diagonal" or "full".
+    own : their moments. fraction : h, noise as a share of the sample's standard deviation. covariance : "diagonal" or
+    "full".
     """
-    mean = poses.mean(axis=0)
-    kept = mean + np.sqrt(1.0 - fraction * fraction) * (poses - mean)
-    return Spread(kept, fraction, *_sample_noise(poses, covariance))
+    kept = own.mean + np.sqrt(1.0 - fraction * fraction) * (poses - own.mean)
+    return Spread(kept, fraction, *_sample_noise(poses, own, covariance))
 
 
-def proportional_noise(poses: Array, constant: float, covariance: str) -> Spread:
-    """Poses (N, D) plus noise of covariance `constant` × their own (Eq. 18 as written)."""
-    return Spread(poses, float(np.sqrt(constant)), *_sample_noise(poses, covariance))
+def proportional_noise(poses: Array, own: Moments, constant: float, covariance: str) -> Spread:
+    """Poses (N, D), whose moments these are, plus noise of covariance `constant` × their own (Eq. 18 as written)."""
+    return Spread(poses, float(np.sqrt(constant)), *_sample_noise(poses, own, covariance))
 
 
-def _sample_noise(poses: Array, covariance: str) -> tuple[Array, Array | None]:
+def _sample_noise(poses: Array, own: Moments, covariance: str) -> tuple[Array, Array | None]:
     """Deviation and turn of noise with the sample's variances, or its full covariance (Eq. 18's sum over N)."""
-    deviation = poses.std(axis=0)
+    deviation = np.sqrt(own.variance)
     if covariance == "diagonal":
         return deviation, None
     # Scaled to unit variances first: millimetres beside radians would drown the small eigenvalues.
     unit = np.where(deviation > 0.0, deviation, 1.0)
-    centred = (poses - poses.mean(axis=0)) / unit
+    centred = (poses - own.mean) / unit
     values, vectors = np.linalg.eigh(centred.T @ centred / len(poses))
     return unit, np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T

@@ -7,6 +7,7 @@ import numpy as np
 
 from studio.arrays import Array, Indices
 from studio.trackers.annealing import Annealed
+from studio.trackers.particle_kernels import moments
 from studio.trackers.particles import weighted_mean
 from studio.trackers.tracker import LayerRecord, ParticleSet
 
@@ -33,7 +34,7 @@ def layer_record(
         beta=annealed.beta,
         alpha_wanted=wanted,
         alpha_reached=annealed.survival,
-        variance_weighed=weighted.poses.var(axis=0),
+        variance_weighed=moments(weighted.poses).variance,
         variance_resampled=resampled,
         variance_diffused=diffused,
         best=weighted.poses[best],

@@ -9,6 +9,7 @@ and needs no sorting. It is the default: on the test problems it leaves more dis
 import numpy as np
 
 from studio.arrays import Array, Indices
+from studio.trackers.particle_kernels import drawn
 
 
 def draw(rng: np.random.Generator, weights: Array, count: int, scheme: str) -> Indices:
@@ -18,12 +19,7 @@ def draw(rng: np.random.Generator, weights: Array, count: int, scheme: str) -> I
     """
     offset = rng.random()
     singles = rng.random(count)
-    marks = (np.arange(count) + offset) / count if scheme == "systematic" else singles
-    cumulated = np.cumsum(weights)
-    cumulated /= cumulated[-1]
-    # The last non-zero weight takes the rounding remainder.
-    found = np.searchsorted(cumulated, marks, side="right")
-    return np.minimum(found, np.flatnonzero(weights)[-1]).astype(np.int64)
+    return drawn(weights, (np.arange(count) + offset) / count if scheme == "systematic" else singles)
 
 
 def equal_draw(population: int, count: int) -> Indices:

@@ -5,6 +5,7 @@ import pytest
 from scipy import stats
 
 from studio.trackers.diffusion import noise_about, planned_sigma, proportional_noise, shrunk_noise
+from studio.trackers.particle_kernels import moments
 
 COUNT = 40000
 # Standard error of a variance of n normal numbers, relative: √(2/n); four of them.
@@ -48,7 +49,7 @@ def test_plain_noise_is_gaussian_of_sigma() -> None:
 @pytest.mark.parametrize("covariance", ["diagonal", "full"])
 def test_shrinking_keeps_mean_and_variance(fraction: float, covariance: str) -> None:
     poses = sample()
-    spread = shrunk_noise(poses, fraction, covariance).draw(np.random.default_rng(2))
+    spread = shrunk_noise(poses, moments(poses), fraction, covariance).draw(np.random.default_rng(2))
     assert np.allclose(spread.var(axis=0), poses.var(axis=0), rtol=2 * RELATIVE)
     standard_error = np.sqrt(np.diag(COVARIANCE) / COUNT)
     assert np.all(np.abs(spread.mean(axis=0) - poses.mean(axis=0)) < 4 * standard_error)
@@ -59,7 +60,7 @@ def test_shrinking_keeps_mean_and_variance(fraction: float, covariance: str) -> 
 @pytest.mark.parametrize("covariance", ["diagonal", "full"])
 def test_the_papers_form_adds_variance(covariance: str) -> None:
     poses = sample()
-    spread = proportional_noise(poses, 0.25, covariance).draw(np.random.default_rng(3))
+    spread = proportional_noise(poses, moments(poses), 0.25, covariance).draw(np.random.default_rng(3))
     assert np.allclose(spread.var(axis=0), 1.25 * poses.var(axis=0), rtol=2 * RELATIVE)
     kept = 0.9 if covariance == "full" else 0.9 / 1.25
     assert correlation(spread) == pytest.approx(kept, abs=4 / np.sqrt(COUNT))
@@ -70,15 +71,15 @@ def test_without_selection_only_the_papers_form_grows() -> None:
     shrunk = added = start
     rng = np.random.default_rng(5)
     for _ in range(10):
-        shrunk = shrunk_noise(shrunk, 0.4, "diagonal").draw(rng)
-        added = proportional_noise(added, 0.16, "diagonal").draw(rng)
+        shrunk = shrunk_noise(shrunk, moments(shrunk), 0.4, "diagonal").draw(rng)
+        added = proportional_noise(added, moments(added), 0.16, "diagonal").draw(rng)
     assert np.allclose(shrunk.var(axis=0), start.var(axis=0), rtol=0.3)
     assert np.all(added.var(axis=0) > 3.0 * start.var(axis=0))
 
 
 def test_fewer_particles_than_parameters_stay_in_their_plane() -> None:
     poses = np.random.default_rng(6).standard_normal((3, 8)) * np.array([1000.0, 1, 1, 1, 0.01, 1, 1, 1])
-    spread = shrunk_noise(poses, 0.4, "full").draw(np.random.default_rng(7))
+    spread = shrunk_noise(poses, moments(poses), 0.4, "full").draw(np.random.default_rng(7))
     centred, moved = poses - poses.mean(axis=0), spread - poses.mean(axis=0)
     residual = moved - moved @ np.linalg.pinv(centred) @ centred
     assert np.abs(residual / poses.std(axis=0)).max() < 1e-6
@@ -87,14 +88,16 @@ def test_fewer_particles_than_parameters_stay_in_their_plane() -> None:
 @pytest.mark.parametrize("covariance", ["diagonal", "full"])
 def test_a_point_stays_a_point(covariance: str) -> None:
     one = np.full((4, 3), 2.5)
-    assert np.allclose(shrunk_noise(one, 0.4, covariance).draw(np.random.default_rng(0)), one)
-    assert np.allclose(proportional_noise(one, 0.4, covariance).draw(np.random.default_rng(0)), one)
+    assert np.allclose(shrunk_noise(one, moments(one), 0.4, covariance).draw(np.random.default_rng(0)), one)
+    assert np.allclose(
+        proportional_noise(one, moments(one), 0.4, covariance).draw(np.random.default_rng(0)), one
+    )
 
 
 @pytest.mark.parametrize("covariance", ["diagonal", "full"])
 def test_some_rows_may_be_drawn_again(covariance: str) -> None:
     poses = sample()[:200]
-    spread = shrunk_noise(poses, 0.4, covariance)
+    spread = shrunk_noise(poses, moments(poses), 0.4, covariance)
     rows = np.repeat([7, 3], 20000)
     drawn = spread.draw(np.random.default_rng(8), rows)
     assert np.allclose(drawn[:20000].mean(axis=0), spread.centres[7], atol=4 * 0.4 * poses.std(axis=0) / 141)
