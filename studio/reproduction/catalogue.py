@@ -24,7 +24,14 @@ from studio.reproduction.deutscher_reid import (
     weight_of_a_knee,
 )
 from studio.reproduction.experiment import Experiment
-from studio.reproduction.open_questions import effort, evaluations, generalisation, posterior, robustness
+from studio.reproduction.open_questions import (
+    effort,
+    evaluations,
+    generalisation,
+    posterior,
+    robustness,
+    start_poses,
+)
 
 # New experiments are added here.
 LISTED: tuple[Experiment, ...] = (
@@ -61,6 +68,7 @@ LISTED: tuple[Experiment, ...] = (
     evaluations.EXPERIMENT,
     effort.EXPERIMENT,
     posterior.EXPERIMENT,
+    start_poses.EXPERIMENT,
 )
 
 ALL = "all"
