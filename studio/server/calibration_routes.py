@@ -31,7 +31,6 @@ from studio.errors import CalibrationError, NotFoundError
 from studio.geometry.camera import Camera
 from studio.runs.overlay_drawing import encode_jpeg
 from studio.server.app_state import App, AppState, release
-from studio.server.calibration_places import chosen_file, place_of
 from studio.server.calibration_proposals import (
     Proposal,
     backdrop,
@@ -39,15 +38,16 @@ from studio.server.calibration_proposals import (
     proposal_of_file,
     with_floor,
 )
-from studio.server.calibration_schemas import (
+from studio.server.calibration_views import (
     ApplyRequest,
     CalibrationFileRequest,
     CalibrationView,
     FloorRequest,
-    FootagePlace,
     ProposalView,
+    calibration_view,
+    proposal_view,
 )
-from studio.server.calibration_views import calibration_view, proposal_view
+from studio.server.safe_paths import FootagePlace, chosen_file, place_of
 from studio.server.session_routes import OpenSession
 from studio.sessions.calibration_changes import earlier_calibration, replace_calibration
 from studio.sessions.session import CAMERAS_PATH, Session

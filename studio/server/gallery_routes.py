@@ -4,15 +4,21 @@ from fastapi import APIRouter, Response
 from pydantic import Field
 
 from studio.errors import NotFoundError
-from studio.jobs.job_runner import Job, SessionJob
+from studio.jobs.job_runner import Job, JobKind, SessionJob
 from studio.operations.gallery import CARDS, Card, CardKind, CardStanding, card_of, make_card, standing_of
 from studio.runs.samples import sample_folder
 from studio.server.app_state import App, AppState
-from studio.server.job_kinds import GALLERY, GalleryState
 from studio.server.schemas import Answer
 from studio.sessions.session import Session, thumbnail_of
 
 router = APIRouter(prefix="/api/gallery", tags=["gallery"])
+
+
+class GalleryState(SessionJob):
+    """How the making of a card's session stands."""
+
+
+GALLERY = JobKind("gallery", "session", GalleryState, changes_session=True)
 
 
 class CardView(Answer):

@@ -61,7 +61,7 @@ class StrokesRequest(Request):
     strokes: list[StrokeEntry] = Field(max_length=MOST_STROKES)
 
 
-class PreviewRequest(StrokesRequest):
+class StrokesPreviewRequest(StrokesRequest):
     """Strokes of one camera that are tried, and the frame whose mask they are to give."""
 
     frame: int = Field(ge=0)
@@ -94,7 +94,7 @@ def put_strokes(session: OpenSession, camera: str, request: StrokesRequest) -> S
 
 
 @router.post("/{camera}/preview", response_class=Response)
-def preview(session: OpenSession, camera: str, request: PreviewRequest) -> Response:
+def preview(session: OpenSession, camera: str, request: StrokesPreviewRequest) -> Response:
     """About the mask that strokes give in a frame: a transparent PNG to lie over the picture, upright; nothing (204)
     where no stroke says anything of the frame yet. Changes nothing.
     """
