@@ -8,6 +8,7 @@ from studio.comparison.findings import Chart, Findings, Series, Table
 from studio.comparison.plan import Comparison, PairTest, TrackerResult
 from studio.comparison.statistics import SignTest, number
 from studio.settings import values
+from studio.words import counted
 
 SIGNIFICANT = 0.05
 COLUMNS = (
@@ -113,17 +114,13 @@ def in_words(comparison: Comparison) -> str:
     ranked = sorted(comparison.trackers, key=lambda result: result.mean_mm)
     order = ", ".join(f"{result.tracker} {result.mean_mm:.1f} mm" for result in ranked)
     count, seeds = len(comparison.frames), len(comparison.plan.seeds)
-    sentences = [
-        f"Mean error over {count} frames and {seeds} {'seed' if seeds == 1 else 'seeds'}, best first: {order}."
-    ]
+    sentences = [f"Mean error over {count} frames and {counted(seeds, 'seed')}, best first: {order}."]
     sentences += [pair_words(pair) for pair in comparison.pairs]
     if comparison.pairs:
         sentences.append(NOT_INDEPENDENT)
         if 0.5 ** (seeds - 1) > SIGNIFICANT:
             least = 0.5 ** (seeds - 1)
-            sentences.append(
-                f"With {seeds} {'seed' if seeds == 1 else 'seeds'} the seeds' p cannot fall below {least:.2g};"
-            )
+            sentences.append(f"With {counted(seeds, 'seed')} the seeds' p cannot fall below {least:.2g};")
             sentences[-1] += " six or more can show a difference at 5 %."
     return " ".join(sentences)
 

@@ -35,6 +35,7 @@ from studio.sessions.stored_run import StoredRun
 from studio.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, all_knobs, changed_settings, values
 from studio.trackers.catalogue import TRACKERS
 from studio.trackers.tracker import LIMB_LOST, LOST, Value
+from studio.words import counted
 
 MOST_RUNS, MOST_KNOBS = 1000, 6
 
@@ -121,7 +122,7 @@ class Expected:
     @property
     def in_words(self) -> str:
         """As a sentence."""
-        count = f"{self.runs} {'run' if self.runs == 1 else 'runs'} of {self.frames} frames"
+        count = f"{counted(self.runs, 'run')} of {self.frames} frames"
         words = f"{count}, {self.evaluations:,} evaluations"
         if self.seconds is None:
             return f"{words}; how long that takes is known once the first one is done."

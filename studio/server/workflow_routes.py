@@ -8,8 +8,7 @@ from starlette.responses import Response
 
 from studio.export.kept_exports import exported_files
 from studio.operations.footage import new_session
-from studio.runs.workflow import Workflow, workflow_of
-from studio.runs.workflow_results import newest_run
+from studio.runs.workflow import Workflow, newest_run, workflow_of
 from studio.server.app_state import App, AppState
 from studio.server.background_routes import BACKGROUND
 from studio.server.export_routes import EXPORT

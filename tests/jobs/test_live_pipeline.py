@@ -7,7 +7,7 @@ import pytest
 
 from studio.capture.frame_clock import Arrival
 from studio.errors import FootageError
-from studio.jobs.live_pipeline import LivePipeline
+from studio.jobs.open_live_run import LivePipeline
 
 PATIENCE = 20.0
 
