@@ -83,7 +83,7 @@ def document(comparison: Comparison) -> dict[str, Any]:
         "trackers": [_plain_tracker(result, plan.seeds) for result in comparison.trackers],
         "settings": {
             candidate.name: {"weighting": candidate.weighting, **dict(candidate.changes)}
-            for candidate in plan.entrants
+            for candidate in plan.candidates
         },
         "sign_tests": [
             {
@@ -207,7 +207,7 @@ def _settings(comparison: Comparison) -> dict[str, Any]:
         "body": plan.body or "the session's",
         "seeds": ", ".join(str(seed) for seed in plan.seeds),
     }
-    for candidate in plan.entrants:
+    for candidate in plan.candidates:
         defaults = values(candidate.settings())
         listed[candidate.name] = ", ".join(
             [candidate.weighting, *(f"{knob} {defaults[knob]}" for knob in candidate.changes)]

@@ -28,9 +28,9 @@ from studio.runs.person_facing import NETWORK_ODDS, facing_agreement
 from studio.runs.problem_source import ProblemSource
 from studio.runs.search_space import parameter_names, search_space, session_sigma
 from studio.runs.session_settings import session_settings
-from studio.sessions.made_from import note
 from studio.sessions.named_rows import write_pose
 from studio.sessions.names import free_name
+from studio.sessions.provenance import note
 from studio.sessions.session import START_POSE_NAME, Session
 from studio.settings import DEFAULT_TRACKER, RunSettings
 from studio.trackers.initialisation import (

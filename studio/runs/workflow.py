@@ -1,7 +1,7 @@
 """The guided set-up: the status of each step of a session, computed from its files.
 
 A step is "done", "ready" to be done, "blocked" by an earlier one, "stale" if its inputs have changed since, or
-"running". The status is not stored; `sessions.made_from` and the snapshots in the runs' folders have the inputs of a
+"running". The status is not stored; `sessions.provenance` and the snapshots in the runs' folders have the inputs of a
 result.
 """
 
@@ -25,7 +25,7 @@ from studio.sessions.background_files import (
     read_evidence,
 )
 from studio.sessions.footage_changes import stale_runs
-from studio.sessions.made_from import changed_inputs, origin_of
+from studio.sessions.provenance import changed_inputs, origin_of
 from studio.sessions.run_record import CAMERAS_NAME
 from studio.sessions.session import CAMERAS_PATH, START_POSE_NAME, SUBJECT_NAME, Session
 from studio.sessions.stored_run import StoredRun, damage_in_words

@@ -85,7 +85,7 @@ async def begin(
     def work(job: Job) -> dict[str, object]:
         aligned = align(session, **arguments, keep=False, progress=job.report_or_stop)
         job.found = aligned.found
-        return _told(aligned)
+        return _result(aligned)
 
     return app.jobs.begin(ALIGNMENT, AlignmentJob(session=session.name), work)
 
@@ -144,7 +144,7 @@ def _found(session: Session, app: AppState) -> SessionAlignment | None:
     return found if isinstance(found, SessionAlignment) else None
 
 
-def _told(aligned: Alignment) -> dict[str, object]:
+def _result(aligned: Alignment) -> dict[str, object]:
     return {
         "cameras": [
             AlignmentLine(

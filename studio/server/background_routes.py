@@ -41,8 +41,8 @@ from studio.sessions.background_files import (
     set_exclusion,
     write_evidence,
 )
-from studio.sessions.made_from import origin_of
 from studio.sessions.names import place_in, relative_path
+from studio.sessions.provenance import origin_of
 from studio.sessions.session import Session
 from studio.sessions.stroke_files import read_strokes
 from studio.settings import values

@@ -42,7 +42,7 @@ from studio.trackers.catalogue import TRACKERS
 router = APIRouter(prefix="/api/comparisons", tags=["comparisons"])
 
 
-class EntrantRequest(Request):
+class CandidateRequest(Request):
     """A tracker that takes part. name: a tracker, tracker:label, or a line-up; settings: its own knobs."""
 
     name: str = Field(pattern=r"^[A-Za-z0-9_-]{1,64}(:[A-Za-z0-9_-]{1,40})?$")
@@ -133,7 +133,7 @@ class ComparisonDetail(Answer):
     trials: list[TrialLine]
 
 
-class EntrantChoice(Answer):
+class CandidateChoice(Answer):
     """A name that can take part. changes: the knobs that it brings along. sized_by: those that follow from the
     evaluations.
     """
@@ -155,14 +155,14 @@ class LineupChoice(Answer):
 class ComparisonChoices(Answer):
     """Who can take part."""
 
-    entrants: list[EntrantChoice]
+    candidates: list[CandidateChoice]
     lineups: list[LineupChoice]
     weightings: list[str]
 
 
 WHO: dict[str, Any] = {
     "session": (RunName, ...),
-    "trackers": (Annotated[list[EntrantRequest], Field(min_length=1, max_length=MOST_TRACKERS)], ...),
+    "trackers": (Annotated[list[CandidateRequest], Field(min_length=1, max_length=MOST_TRACKERS)], ...),
     "settings": (
         dict[str, Value],
         Field(dict[str, Value](), description="Knobs of all trackers that have them."),
@@ -182,8 +182,8 @@ Kept = Annotated[KeptComparison, Depends(comparison_of)]
 @router.get("/choices")
 def choices() -> ComparisonChoices:
     """Who can be compared: trackers, labels that bring their knobs, line-ups of several."""
-    entrants = [
-        EntrantChoice(
+    candidates = [
+        CandidateChoice(
             name=name,
             tracker=tracker.name,
             help=entry.help if entry else tracker.label,
@@ -194,7 +194,7 @@ def choices() -> ComparisonChoices:
         for tracker in (TRACKERS[name.partition(":")[0]],)
     ]
     return ComparisonChoices(
-        entrants=entrants,
+        candidates=candidates,
         lineups=[LineupChoice(name=name, trackers=list(members)) for name, members in LINEUPS.items()],
         weightings=list(WEIGHTINGS),
     )
@@ -254,7 +254,7 @@ def detail(session: OpenSession, kept: Kept, app: App) -> ComparisonDetail:
         fps=plan.fps,
         settings={
             candidate.name: {WEIGHTING: candidate.weighting, **candidate.changes}
-            for candidate in plan.entrants
+            for candidate in plan.candidates
         },
         fit_shape=plan.fit_shape,
         result=kept.result(),
@@ -323,13 +323,13 @@ def frames_as_csv(session: OpenSession, kept: Kept) -> Response:
 
 def _plan(session: Session, arguments: Arguments) -> Plan:
     """The request, checked. Raises StudioError for what cannot be compared."""
-    shared, entrants = arguments.more["settings"], arguments.more["trackers"]
+    shared, candidates = arguments.more["settings"], arguments.more["trackers"]
     changes: dict[str, dict[str, Any]] = {"": shared} if shared else {}
-    for candidate in entrants:
+    for candidate in candidates:
         own = dict(candidate.settings) | ({WEIGHTING: candidate.weighting} if candidate.weighting else {})
         if own:
             changes[candidate.name] = own
-    return planned(session, [candidate.name for candidate in entrants], changes=changes, **arguments)
+    return planned(session, [candidate.name for candidate in candidates], changes=changes, **arguments)
 
 
 def _sweep_plan(session: Session, arguments: Arguments) -> Plan:
@@ -387,7 +387,7 @@ def _line(app: AppState, session: Session, kept: KeptComparison) -> ComparisonLi
     job = app.jobs.known(COMPARISON, f"{session.name}/{kept.name}")
     going = job if job is not None and job.state.is_going else None
     status = going.state.value if going else kept.status()
-    total = len(plan.seeds) * len(plan.entrants)
+    total = len(plan.seeds) * len(plan.candidates)
     if status == "done":
         done = total
     else:
@@ -397,8 +397,8 @@ def _line(app: AppState, session: Session, kept: KeptComparison) -> ComparisonLi
         name=kept.name,
         created=record.created,
         status=status,  # pyright: ignore[reportArgumentType]
-        trackers=[candidate.name for candidate in plan.entrants],
-        tracker=plan.entrants[0].tracker if plan.vary else "",
+        trackers=[candidate.name for candidate in plan.candidates],
+        tracker=plan.candidates[0].tracker if plan.vary else "",
         evaluations=plan.evaluations,
         seeds=len(plan.seeds),
         first=plan.first,

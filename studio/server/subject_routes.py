@@ -24,7 +24,7 @@ from studio.server.picture_routes import Height
 from studio.server.requests import Arguments, body_of
 from studio.server.schemas import Answer, Number, Numbers
 from studio.server.session_routes import OpenSession
-from studio.sessions.made_from import origin_of
+from studio.sessions.provenance import origin_of
 from studio.sessions.session import SUBJECT_NAME, Session
 
 router = APIRouter(prefix="/api", tags=["subject"])
