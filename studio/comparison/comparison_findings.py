@@ -1,12 +1,11 @@
 """A comparison as an experiment's findings (drawn in the same way), as plain JSON, CSV and text."""
 
-import csv
-import io
 from typing import Any
 
 from studio.comparison.findings import Chart, Findings, Series, Table
 from studio.comparison.plan import Comparison, PairTest, TrackerResult
 from studio.comparison.statistics import SignTest, number
+from studio.sessions.named_rows import as_csv
 from studio.settings import values
 from studio.words import counted
 
@@ -99,14 +98,13 @@ def document(comparison: Comparison) -> dict[str, Any]:
 
 def frames_csv(comparison: Comparison) -> str:
     """A row a tracker, seed and frame: its error and the limbs lost in it."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("tracker", "seed", "frame", "error_mm", "limbs_lost"))
-    for result in comparison.trackers:
-        for seed, run in zip(comparison.plan.seeds, result.seeds, strict=True):
-            for frame, error, lost in zip(comparison.frames, run.per_frame_mm, run.lost, strict=True):
-                writer.writerow((result.tracker, seed, frame, f"{error:.3f}", " ".join(lost)))
-    return text.getvalue()
+    rows = [
+        (result.tracker, seed, frame, f"{error:.3f}", " ".join(lost))
+        for result in comparison.trackers
+        for seed, run in zip(comparison.plan.seeds, result.seeds, strict=True)
+        for frame, error, lost in zip(comparison.frames, run.per_frame_mm, run.lost, strict=True)
+    ]
+    return as_csv([("tracker", "seed", "frame", "error_mm", "limbs_lost"), *rows])
 
 
 def in_words(comparison: Comparison) -> str:

@@ -4,8 +4,6 @@ A sweep is a comparison whose candidates are the points of a grid (`Plan.vary`).
 their frames, so that any of them can be opened; a session needs no truth for it: without one the silhouettes judge.
 """
 
-import csv
-import io
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -29,6 +27,7 @@ from studio.runs.new_run import checked_frames
 from studio.runs.pace import stored_pace
 from studio.runs.session_settings import session_settings
 from studio.runs.silhouette_doubts import accepted_doubts
+from studio.sessions.named_rows import as_csv
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, all_knobs, changed_settings, values
@@ -297,14 +296,13 @@ def sweep_document(sweep: Sweep) -> dict[str, Any]:
 
 def sweep_csv(sweep: Sweep) -> str:
     """A row a run and frame: the knobs, the seed, the run, its error or its share in the masks."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
     what = "error_mm" if any(run.error is not None for run in sweep.runs) else "overlap"
-    writer.writerow((*sweep.plan.vary, "seed", "run", "frame", what))
-    for point, seed, run in _each(sweep):
-        for frame, value in zip(run.frames, run.per_frame, strict=True):
-            writer.writerow((*point, seed, run.run, frame, "" if value is None else value))
-    return text.getvalue()
+    rows = [
+        (*point, seed, run.run, frame, "" if value is None else value)
+        for point, seed, run in _each(sweep)
+        for frame, value in zip(run.frames, run.per_frame, strict=True)
+    ]
+    return as_csv([(*sweep.plan.vary, "seed", "run", "frame", what), *rows])
 
 
 def sweep_text(sweep: Sweep) -> str:

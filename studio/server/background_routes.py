@@ -25,6 +25,7 @@ from studio.runs.overlay_pictures import forget_composers
 from studio.runs.session_settings import session_settings
 from studio.runs.stroke_masks import unpainted_cameras
 from studio.runs.subject_masks import SeenSubject, seen_subjects
+from studio.server import files
 from studio.server.app_state import App, AppState
 from studio.server.picture_routes import Knobs, knob_changes
 from studio.server.requests import Arguments, body_of
@@ -203,7 +204,7 @@ def exclusion(session: OpenSession, camera: str) -> Response:
     path = exclusion_path(session, camera)
     if path is None:
         raise NotFoundError(f"Nothing of camera '{camera[:64]}' is excluded.", "Paint something.")
-    return Response(path.read_bytes(), media_type="image/png", headers={"cache-control": "no-store"})
+    return files.picture(path.read_bytes(), "png")
 
 
 @router.put("/exclusions/{camera}")

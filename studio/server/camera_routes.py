@@ -20,6 +20,7 @@ from studio.jobs.camera_service import RecordingState
 from studio.jobs.camera_tracking import LiveRecordingRequest
 from studio.jobs.commands import Start, about
 from studio.operations.tracking import live
+from studio.server import files
 from studio.server.app_state import App, AppState
 from studio.server.requests import Arguments, body_of
 from studio.server.safe_paths import folder_to_import
@@ -122,9 +123,7 @@ def picture(
 ) -> Response:
     """A camera's last picture (JPEG)."""
     shot = app.cameras.newest(name)
-    return Response(
-        preview_jpeg(shot, height), media_type="image/jpeg", headers={"cache-control": "no-store"}
-    )
+    return files.picture(preview_jpeg(shot, height))
 
 
 @router.get("/recordings")

@@ -31,6 +31,7 @@ from studio.jobs.job_runner import Job, JobKind, SessionJob
 from studio.jobs.process_executor import cores
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.operations.comparing import MOST_TRACKERS, compare, kept_sweep, planned, sweep
+from studio.server import files
 from studio.server.app_state import App, AppState, release
 from studio.server.error_responses import log
 from studio.server.requests import Arguments, body_of
@@ -318,7 +319,7 @@ def result_json(session: OpenSession, kept: Kept) -> Response:
 @router.get(ONE + "/frames.csv", response_class=Response)
 def frames_as_csv(session: OpenSession, kept: Kept) -> Response:
     """A row a tracker, seed and frame: its error in mm and the limbs lost."""
-    return _file(session, kept, FRAMES_NAME, "text/csv; charset=utf-8", "csv")
+    return _file(session, kept, FRAMES_NAME, files.CSV, "csv")
 
 
 def _plan(session: Session, arguments: Arguments) -> Plan:
@@ -434,5 +435,4 @@ def _file(session: Session, kept: KeptComparison, name: str, kind: str, ending: 
     path = kept.folder / name
     if not path.is_file():
         raise NotFoundError(f"Comparison '{kept.name}' is not finished.", "Wait for it, or let it go on.")
-    headers = {"content-disposition": f'attachment; filename="{session.name}-{kept.name}.{ending}"'}
-    return Response(path.read_bytes(), media_type=kind, headers=headers)
+    return files.download(path.read_bytes(), f"{session.name}-{kept.name}.{ending}", kind)

@@ -16,6 +16,7 @@ from studio.jobs.job_runner import Job, JobKind, SessionJob
 from studio.operations.footage import synchronise
 from studio.runs.footage_pictures import bare_picture
 from studio.runs.overlay_drawing import encode_jpeg
+from studio.server import files
 from studio.server.app_state import App, release
 from studio.server.requests import Arguments, body_of
 from studio.server.schemas import Answer
@@ -121,7 +122,7 @@ def footage_picture(
 ) -> Response:
     """A camera's picture with its offset and turn, as it is before any calibration (JPEG)."""
     picture = bare_picture(session, camera, frame, height)
-    return Response(encode_jpeg(picture), media_type="image/jpeg", headers={"cache-control": "no-store"})
+    return files.picture(encode_jpeg(picture))
 
 
 @router.post("/sessions/{session}/footage/times")

@@ -3,9 +3,6 @@
 Everything is read from the store, also while it is being written.
 """
 
-import csv
-import io
-from collections.abc import Sequence
 from typing import Annotated, Literal
 
 import numpy as np
@@ -19,6 +16,7 @@ from studio.inspection.reading import InspectedRun
 from studio.inspection.reference import body_points, by_limb, true_points
 from studio.runs.live_summary import summary_of
 from studio.runs.tracks import RAW
+from studio.server import files
 from studio.server.event_encoding import layer_summary
 from studio.server.run_errors import evaluation_of
 from studio.server.run_routes import RUN, Checked, OpenRun
@@ -26,6 +24,7 @@ from studio.server.schemas import Answer, Number, Numbers, Request, Value
 from studio.server.session_routes import OpenSession
 from studio.server.session_views import ParameterView, describe, parameter_views
 from studio.server.setting_views import SettingsChange, changes_of, history_of
+from studio.sessions.named_rows import as_csv, poses_csv
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.trackers.catalogue import TRACKERS
@@ -387,21 +386,17 @@ def variance_csv(run: OpenRun, frame: int) -> Response:
         for record in layers
         for moment, name in MOMENTS
     ]
-    return _csv(
-        ["frame", "layer", "moment", *run.record.parameters], rows, f"{run.name}-frame{frame}-variance.csv"
-    )
+    heads = ["frame", "layer", "moment", *run.record.parameters]
+    return files.download(as_csv([heads, *rows]), f"{run.name}-frame{frame}-variance.csv", files.CSV)
 
 
 @router.get(RUN + "/poses.csv", response_class=Response)
-def poses_csv(session: OpenSession, run: OpenRun) -> Response:
+def poses_csv_of(session: OpenSession, run: OpenRun) -> Response:
     """All poses: frame, then one column per parameter in the body's order (radians and mm)."""
     with run.results() as results:
         numbers, poses = results.poses()
-    rows = [
-        [int(number), *(repr(float(value)) for value in pose)]
-        for number, pose in zip(numbers, poses, strict=True)
-    ]
-    return _csv(["frame", *run.record.parameters], rows, f"{session.name}-{run.name}-poses.csv")
+    name = f"{session.name}-{run.name}-poses.csv"
+    return files.download(poses_csv(run.record.parameters, numbers, poses), name, files.CSV)
 
 
 @router.get(RUN + "/evaluation")
@@ -430,12 +425,3 @@ def _binary(record: LayerRecord) -> Response:
     table = np.column_stack([record.poses, record.log_weights]).astype("<f4")
     headers = {"x-studio-rows": str(table.shape[0]), "x-studio-columns": str(table.shape[1])}
     return Response(table.tobytes(), media_type="application/octet-stream", headers=headers)
-
-
-def _csv(head: list[str], rows: Sequence[Sequence[object]], name: str) -> Response:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(head)
-    writer.writerows(rows)
-    headers = {"content-disposition": f'attachment; filename="{name}"'}
-    return Response(text.getvalue(), media_type="text/csv; charset=utf-8", headers=headers)

@@ -10,6 +10,7 @@ from studio.comparison.folders import bring_back
 from studio.comparison.kept_comparison import RECORD_NAME as COMPARISON_FILE_NAME
 from studio.comparison.kept_comparison import KeptComparison
 from studio.errors import NotFoundError, StudioError
+from studio.server import files
 from studio.server.app_state import App, AppState, release
 from studio.server.schemas import Answer, Request, RunName
 from studio.server.session_views import SessionDetail, SessionLine, session_detail, session_line
@@ -100,7 +101,7 @@ def thumbnail(session: OpenSession) -> Response:
     path = session.thumbnail()
     if path is None:
         raise NotFoundError(f"Session '{session.name}' has no picture to show.", "Check its footage.")
-    return Response(path.read_bytes(), media_type="image/jpeg", headers={"cache-control": "no-cache"})
+    return files.picture(path.read_bytes(), checked_anew=True)
 
 
 @router.patch("/sessions/{session}")

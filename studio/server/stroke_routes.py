@@ -10,6 +10,7 @@ from studio.errors import NotFoundError
 from studio.evidence.strokes import Stroke, StrokeKind
 from studio.runs.overlay_drawing import upright
 from studio.runs.stroke_masks import by_frame, first_frame, preview_mask
+from studio.server import files
 from studio.server.schemas import Answer, Request
 from studio.server.session_routes import OpenSession
 from studio.sessions.session import Session
@@ -111,11 +112,7 @@ def preview(session: OpenSession, camera: str, request: StrokesPreviewRequest) -
         else 0
     )
     shown = np.where(upright(mask, turns)[..., None] > 127, np.array(SHOWN, np.uint8), np.uint8(0))
-    return Response(
-        cv2.imencode(".png", shown)[1].tobytes(),
-        media_type="image/png",
-        headers={"cache-control": "no-store"},
-    )
+    return files.picture(cv2.imencode(".png", shown)[1].tobytes(), "png")
 
 
 def _strokes(camera: str, request: StrokesRequest) -> list[Stroke]:

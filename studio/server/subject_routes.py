@@ -18,6 +18,7 @@ from studio.runs.overlay_drawing import encode_jpeg
 from studio.runs.overlay_pictures import compose_view, forget_composers
 from studio.runs.subject_choice import body_of_choice, keep_fitted
 from studio.runs.subject_fitting import FittedSubject
+from studio.server import files
 from studio.server.app_state import App, AppState
 from studio.server.job_routes import add_job_routes
 from studio.server.picture_routes import Height
@@ -189,7 +190,7 @@ def fitted_picture(identifier: str, frame: int, camera: str, app: App, height: H
     picture = compose_view(
         session, None, frame, camera, ("outline", "mask"), pose, height=height, body=found.body
     )
-    return Response(encode_jpeg(picture), media_type="image/jpeg", headers={"cache-control": "no-store"})
+    return files.picture(encode_jpeg(picture))
 
 
 def _found(identifier: str, app: AppState) -> FittedSubject:

@@ -15,6 +15,7 @@ from studio.runs.checking import RunCheck, kept_check
 from studio.runs.correcting import track_backwards
 from studio.runs.refining import REFINED, SMOOTHED, MadeTrack, check_making, jitter
 from studio.runs.tracks import BEST, best_track, read_track, track_named, track_names
+from studio.server import files
 from studio.server.app_state import App, AppState
 from studio.server.job_routes import add_job_routes
 from studio.server.requests import Arguments, body_of
@@ -152,11 +153,7 @@ def track_csv(session: OpenSession, run: OpenRun, track: str) -> Response:
     """A track's poses: frame, then one column per parameter in the body's order (radians and mm)."""
     found = read_track(run, track)
     name = f"{session.name}-{run.name}-{found.name}-poses.csv"
-    return Response(
-        poses_csv(run.record.parameters, found.frames, found.poses),
-        media_type="text/csv; charset=utf-8",
-        headers={"Content-Disposition": f'attachment; filename="{name}"'},
-    )
+    return files.download(poses_csv(run.record.parameters, found.frames, found.poses), name, files.CSV)
 
 
 @router.post(RUN + "/refine", status_code=202)

@@ -14,6 +14,7 @@ from studio.inspection.tables import Column, Remedy, Selection, Viewed
 from studio.inspection.views import look, look_over
 from studio.jobs.job_runner import Job, JobKind, NumberedJob
 from studio.operations.inspecting import seeds, worst_frame
+from studio.server import files
 from studio.server.app_state import App
 from studio.server.job_routes import add_job_routes
 from studio.server.requests import Arguments, body_of
@@ -146,8 +147,7 @@ def shared(
     """The run as one page that opens without the studio."""
     opened = InspectedRun(session, run)
     text = shared_page(opened, worst_frame(opened) if frame is None else frame, track=track)
-    headers = {"content-disposition": f'attachment; filename="{session.name}-{run.name}.html"'}
-    return Response(text, media_type="text/html; charset=utf-8", headers=headers)
+    return files.download(text, f"{session.name}-{run.name}.html", "text/html; charset=utf-8")
 
 
 @router.post(RUN + "/frames/{frame}/seeds", status_code=202)

@@ -43,7 +43,7 @@ def begin(
 
 @router.get("/api/evaluations")
 def evaluations(tracker: str, evaluations: Annotated[int, Query(ge=1, le=1_000_000)]) -> dict[str, int]:
-    """Knobs with which a tracker weighs about so many poses a frame."""
+    """Knobs with which a tracker evaluates about so many poses a frame."""
     return knobs_for_evaluations(tracker, evaluations)
 
 
