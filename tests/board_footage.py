@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.arrays import Array, Bytes
-from studio.calibration.board_pattern import drawn
+from studio.calibration.board_pdf import drawn
 from studio.calibration.boards import Board
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project

@@ -20,7 +20,6 @@ from studio.synthesis.person_footage import render_person
 from studio.synthesis.recipe_file import Recipe
 
 FPS = 60.0
-LEVEL = 1.2
 """A sole may be this many ankle heights above the floor: the lower foot stands."""
 
 

@@ -31,7 +31,6 @@ CAMERA = (
     + LENS
     + "distortions = [0.0, 0.0, 0.0, 0.0]\nrotation = [0.0, 0.0, 0.0]\ntranslation = [0, 0, 9]\n"
 )
-BOUGUET = "120 120 {centre} 48 0  0 0 0 0 0  1 0 0 0 1 0 0 0 1  0 0 900  0 0 0"
 OPENCV = (
     "%YAML:1.0\n---\ncamera_matrix: !!opencv-matrix\n  rows: 3\n  cols: 3\n  dt: d\n"
     "  data: [ 120., 0., {centre}, 0., 120., 48., 0., 0., 1. ]\n"

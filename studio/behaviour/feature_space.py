@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from studio.arrays import Array
 from studio.body.model import MOVE, BodyModel
 from studio.errors import BehaviourError
+from studio.words import counted
 
 IntArray = NDArray[np.int64]
 
@@ -68,7 +69,7 @@ class FeatureSpace:
         """
         if len(poses) < 2:
             raise BehaviourError(
-                f"A recording of {len(poses)} frame{'' if len(poses) == 1 else 's'} has no derivatives.",
+                f"A recording of {counted(len(poses), 'frame')} has no derivatives.",
                 "Give recordings of at least two frames.",
             )
         values = self.continuous(poses)

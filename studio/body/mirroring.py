@@ -27,6 +27,15 @@ LEVEL = 0.3
 """Least level part of a body's sideways axis for an upright mirror."""
 
 
+def has_sides(body: BodyModel) -> bool:
+    """Whether a body has a left and a right."""
+    try:
+        Mirror(body)
+    except BodyError:
+        return False
+    return True
+
+
 class Mirror:
     """Mirrors poses of one body. Raises BodyError for a body that has no left and right."""
 

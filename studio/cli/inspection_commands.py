@@ -1,6 +1,5 @@
 """What shows the inside of runs: `view`, `why`, `seeds`, `compare-runs`."""
 
-import csv
 import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -14,6 +13,7 @@ from studio.inspection.comparing import RunsCompared
 from studio.inspection.tables import Cell, Table, Viewed
 from studio.operations.inspecting import compare_runs, inspected, seeds, view, why, worst_frame
 from studio.sessions.atomic_files import write_bytes
+from studio.sessions.named_rows import as_csv
 
 MOST_ROWS = 40
 CSV = click.option(
@@ -75,7 +75,7 @@ def _answer(
     tables: Sequence[Table], notes: Sequence[str], caption: str, file: Path | None
 ) -> dict[str, object]:
     if file is not None:
-        write_bytes(file, as_csv(tables, caption).encode())
+        write_bytes(file, tables_csv(tables, caption).encode())
     shown = [_drawn(table) for table in tables if table.rows] if file is None else [f"{file}"]
     return {
         "caption": caption,
@@ -85,16 +85,14 @@ def _answer(
     }
 
 
-def as_csv(tables: Sequence[Table], caption: str) -> str:
+def tables_csv(tables: Sequence[Table], caption: str) -> str:
     """The tables one after the other: caption and titles as comments, units in the head."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    text.write(f"# {caption}\n")
+    parts = [f"# {caption}\n"]
     for table in tables:
-        text.write(f"# {table.name}: {table.title}\n")
-        writer.writerow(f"{one.key} [{one.unit}]" if one.unit else one.key for one in table.columns)
-        writer.writerows(["" if cell is None else cell for cell in row] for row in table.for_readers())
-    return text.getvalue()
+        heads = [f"{one.key} [{one.unit}]" if one.unit else one.key for one in table.columns]
+        rows = [["" if cell is None else cell for cell in row] for row in table.for_readers()]
+        parts.append(f"# {table.name}: {table.title}\n{as_csv([heads, *rows])}")
+    return "".join(parts)
 
 
 def _drawn(table: Table) -> str:

@@ -17,8 +17,8 @@ from studio.operations.sharing import Shared, share
 from studio.runs.refining import MadeTrack
 from studio.runs.tracks import track_named
 from studio.runs.verifying import Repair, Verification
-from studio.runs.workflow_step import counted
 from studio.sessions.stored_run import StoredRun
+from studio.words import counted
 
 
 @command_of(refine)

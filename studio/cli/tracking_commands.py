@@ -1,6 +1,5 @@
 """Tracking: `track`, `live`, `correct`."""
 
-import csv
 import os
 from pathlib import Path
 
@@ -24,6 +23,7 @@ from studio.operations.tracking import (
     track,
 )
 from studio.runs.sides import exchanged_sides, in_words
+from studio.sessions.named_rows import poses_csv
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.trackers.catalogue import TRACKERS
@@ -204,12 +204,8 @@ def _write_poses(run: StoredRun, path: Path) -> None:
     with run.results() as results:
         frames, rows = results.poses()
     try:
-        with path.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(["frame", *run.record.parameters])
-            writer.writerows(
-                [int(frame), *map(repr, map(float, row))] for frame, row in zip(frames, rows, strict=True)
-            )
+        with path.open("w", newline="\r\n", encoding="utf-8") as file:
+            file.write(poses_csv(run.record.parameters, frames, rows))
     except OSError as error:
         raise RunError(
             f"'{path}' cannot be written ({error.strerror}).", "Choose another place; the run is stored."

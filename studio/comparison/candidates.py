@@ -145,7 +145,7 @@ def _candidate(name: str, lineup: Lineup) -> Candidate:
         abs(usual - lineup.evaluations), UNEQUAL_SHARE * lineup.evaluations
     ):
         raise SettingsError(
-            f"'{name}' would weigh {total} poses a frame instead of {lineup.evaluations}.",
+            f"'{name}' would evaluate {total} poses a frame instead of {lineup.evaluations}.",
             f"Leave {', '.join(equal)} as they follow from the evaluations, or change them together.",
         )
     chosen = values(changed)

@@ -1,13 +1,13 @@
 """A comparison as an experiment's findings (drawn in the same way), as plain JSON, CSV and text."""
 
-import csv
-import io
 from typing import Any
 
 from studio.comparison.findings import Chart, Findings, Series, Table
 from studio.comparison.plan import Comparison, PairTest, TrackerResult
 from studio.comparison.statistics import SignTest, number
+from studio.sessions.named_rows import as_csv
 from studio.settings import values
+from studio.words import counted
 
 SIGNIFICANT = 0.05
 COLUMNS = (
@@ -82,7 +82,7 @@ def document(comparison: Comparison) -> dict[str, Any]:
         "trackers": [_plain_tracker(result, plan.seeds) for result in comparison.trackers],
         "settings": {
             candidate.name: {"weighting": candidate.weighting, **dict(candidate.changes)}
-            for candidate in plan.entrants
+            for candidate in plan.candidates
         },
         "sign_tests": [
             {
@@ -98,14 +98,13 @@ def document(comparison: Comparison) -> dict[str, Any]:
 
 def frames_csv(comparison: Comparison) -> str:
     """A row a tracker, seed and frame: its error and the limbs lost in it."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("tracker", "seed", "frame", "error_mm", "limbs_lost"))
-    for result in comparison.trackers:
-        for seed, run in zip(comparison.plan.seeds, result.seeds, strict=True):
-            for frame, error, lost in zip(comparison.frames, run.per_frame_mm, run.lost, strict=True):
-                writer.writerow((result.tracker, seed, frame, f"{error:.3f}", " ".join(lost)))
-    return text.getvalue()
+    rows = [
+        (result.tracker, seed, frame, f"{error:.3f}", " ".join(lost))
+        for result in comparison.trackers
+        for seed, run in zip(comparison.plan.seeds, result.seeds, strict=True)
+        for frame, error, lost in zip(comparison.frames, run.per_frame_mm, run.lost, strict=True)
+    ]
+    return as_csv([("tracker", "seed", "frame", "error_mm", "limbs_lost"), *rows])
 
 
 def in_words(comparison: Comparison) -> str:
@@ -113,17 +112,13 @@ def in_words(comparison: Comparison) -> str:
     ranked = sorted(comparison.trackers, key=lambda result: result.mean_mm)
     order = ", ".join(f"{result.tracker} {result.mean_mm:.1f} mm" for result in ranked)
     count, seeds = len(comparison.frames), len(comparison.plan.seeds)
-    sentences = [
-        f"Mean error over {count} frames and {seeds} {'seed' if seeds == 1 else 'seeds'}, best first: {order}."
-    ]
+    sentences = [f"Mean error over {count} frames and {counted(seeds, 'seed')}, best first: {order}."]
     sentences += [pair_words(pair) for pair in comparison.pairs]
     if comparison.pairs:
         sentences.append(NOT_INDEPENDENT)
         if 0.5 ** (seeds - 1) > SIGNIFICANT:
             least = 0.5 ** (seeds - 1)
-            sentences.append(
-                f"With {seeds} {'seed' if seeds == 1 else 'seeds'} the seeds' p cannot fall below {least:.2g};"
-            )
+            sentences.append(f"With {counted(seeds, 'seed')} the seeds' p cannot fall below {least:.2g};")
             sentences[-1] += " six or more can show a difference at 5 %."
     return " ".join(sentences)
 
@@ -210,7 +205,7 @@ def _settings(comparison: Comparison) -> dict[str, Any]:
         "body": plan.body or "the session's",
         "seeds": ", ".join(str(seed) for seed in plan.seeds),
     }
-    for candidate in plan.entrants:
+    for candidate in plan.candidates:
         defaults = values(candidate.settings())
         listed[candidate.name] = ", ".join(
             [candidate.weighting, *(f"{knob} {defaults[knob]}" for knob in candidate.changes)]

@@ -23,14 +23,14 @@ from studio.comparison.trials import Scale, Trial
 from studio.sessions import atomic_files
 from studio.sessions.manifest import now
 from studio.sessions.process_lock import ProcessLock
-from studio.sessions.record_files import RecordFile
+from studio.sessions.record_files import RecordFile, renamed
 from studio.sessions.session import Session
 from studio.typed_decoding import decode_json
 
 RECORD_NAME, RESULT_NAME, FRAMES_NAME = "comparison.json", "result.json", "frames.csv"
 BEHAVIOUR_NAME = "behaviour.model"
 LOCK_NAME, TRIALS_NAME = "comparison.lock", "trials"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 
 class ComparisonRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -55,6 +55,7 @@ RECORD = RecordFile(
     "Start a new one.",
     ("There is no comparison '{name}'.", "Start one with 'studio compare'."),
     SCHEMA_VERSION,
+    {1: lambda entries: entries | {"plan": renamed(entrants="candidates")(entries["plan"])}},
 )
 
 
@@ -157,11 +158,11 @@ def result_of(comparison: Comparison) -> dict[str, Any]:
 def _findings_document(comparison: Comparison) -> dict[str, Any]:
     """The comparison as an experiment's document."""
     plan = comparison.plan
-    names = ", ".join(candidate.name for candidate in plan.entrants)
+    names = ", ".join(candidate.name for candidate in plan.candidates)
     heading = Heading(
         "comparison", f"{names} on {plan.session}", f"{plan.evaluations} evaluations a frame", claim=""
     )
     seconds = sum(result.seconds for result in comparison.trackers)
-    count = len(plan.seeds) * len(plan.entrants)
+    count = len(plan.seeds) * len(plan.candidates)
     making = Making(Scale(plan.seeds), count, seconds, measured_by(), (), now())
     return as_document(heading, findings(comparison), making)

@@ -15,7 +15,7 @@ import numpy as np
 from studio.body.model import BodyModel
 from studio.comparison.candidates import Candidate, Lineup, candidates
 from studio.comparison.statistics import SignTest, sign_test
-from studio.comparison.tracked import Attempt, Tracked, tracking_trial
+from studio.comparison.tracked import Tracked, TrackingTrial, tracking_trial
 from studio.comparison.trials import Outcome, Trial
 from studio.errors import RunError, TruthError
 from studio.likelihood.catalogue import WEIGHTINGS
@@ -34,13 +34,13 @@ class Plan:
     """The plan of a comparison. footage : the session's folder. session : its name. first, last : frames, half open.
     fps : of the footage. body : a name, "" for the session's own. behaviour : name of the model of those that need one,
     "" for none; behaviour_digest : of its file; behaviour_path : its present path. vary : of a sweep the values of each
-    knob, whose combinations are the entrants, and evaluations are then the most of any; empty where trackers are
+    knob, whose combinations are the candidates, and evaluations are then the most of any; empty where trackers are
     compared. fit_shape, despite_findings : of a sweep's runs.
     """
 
     footage: str
     session: str
-    entrants: tuple[Candidate, ...]
+    candidates: tuple[Candidate, ...]
     evaluations: int
     seeds: tuple[int, ...]
     first: int
@@ -154,14 +154,27 @@ def plan_comparison(
     start_of(session, model, None)
     taking_part = candidates(replace(lineup, weighting=weighting))
     chosen = _chosen_model(session, model, taking_part, behaviour)
+    return plan_of(session, taking_part, lineup.evaluations, seeds, (begin, end), body, chosen)
+
+
+def plan_of(
+    session: Session,
+    candidates: tuple[Candidate, ...],
+    evaluations: int,
+    seeds: Sequence[int],
+    frames: tuple[int, int],
+    body: str,
+    chosen: ChosenModel | None,
+) -> Plan:
+    """The plan of checked parts. frames : first, last. chosen : the behaviour model, None without one."""
     return Plan(
         footage=str(session.path.absolute()),
         session=session.name,
-        entrants=taking_part,
-        evaluations=lineup.evaluations,
+        candidates=candidates,
+        evaluations=evaluations,
         seeds=tuple(seeds),
-        first=begin,
-        last=end,
+        first=frames[0],
+        last=frames[1],
         fps=session.manifest.fps,
         body=body,
         behaviour=chosen.name if chosen else "",
@@ -185,19 +198,19 @@ def check_seeds(seeds: Sequence[int]) -> None:
 def trials(plan: Plan) -> tuple[Trial, ...]:
     """One a tracker and seed; every tracker's first seed first, so that an early look compares them all."""
     return tuple(
-        tracking_trial(candidate.name, attempt_of(plan, candidate, seed))
+        tracking_trial(candidate.name, tracking_trial_of(plan, candidate, seed))
         for seed in plan.seeds
-        for candidate in plan.entrants
+        for candidate in plan.candidates
     )
 
 
 def conclude(plan: Plan, outcomes: Sequence[Outcome]) -> Comparison:
     """The comparison from the outcomes of all trials, in the order of `trials`."""
-    count = len(plan.entrants)
+    count = len(plan.candidates)
     runs = [Tracked(**outcome.measured) for outcome in outcomes]
     trackers = tuple(
         TrackerResult(candidate.name, tuple(runs[place::count]))
-        for place, candidate in enumerate(plan.entrants)
+        for place, candidate in enumerate(plan.candidates)
     )
     pairs = tuple(
         PairTest(
@@ -221,10 +234,10 @@ def _chosen_model(
     return None
 
 
-def attempt_of(plan: Plan, candidate: Candidate, seed: int) -> Attempt:
+def tracking_trial_of(plan: Plan, candidate: Candidate, seed: int) -> TrackingTrial:
     """What a trial tracks."""
     guided = plan.behaviour_path and needs_model(candidate.tracker, candidate.settings().tracker)
-    return Attempt(
+    return TrackingTrial(
         plan.footage,
         candidate.tracker,
         candidate.weighting,

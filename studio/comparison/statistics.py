@@ -19,6 +19,7 @@ from scipy import stats
 
 from studio.arrays import Array
 from studio.comparison.findings import FIRM_SEEDS, Number
+from studio.words import counted
 
 HARDEST_FIRST = ("not reproduced", "undecided", "reproduced", "better")
 
@@ -151,7 +152,7 @@ def firmness(seeds: int) -> str:
     """Text to add to a verdict: empty with enough seeds, else that it is not firm."""
     if seeds >= FIRM_SEEDS:
         return ""
-    return f"not firm: {seeds} {'seed' if seeds == 1 else 'seeds'} of at least {FIRM_SEEDS}"
+    return f"not firm: {counted(seeds, 'seed')} of at least {FIRM_SEEDS}"
 
 
 def _interval(samples: tuple[Array, ...], statistic: Statistic, level: float) -> tuple[float, float]:

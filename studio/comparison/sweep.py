@@ -4,12 +4,9 @@ A sweep is a comparison whose candidates are the points of a grid (`Plan.vary`).
 their frames, so that any of them can be opened; a session needs no truth for it: without one the silhouettes judge.
 """
 
-import csv
-import hashlib
-import io
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -17,7 +14,7 @@ import numpy as np
 
 from studio.comparison.candidates import Candidate
 from studio.comparison.kept_trials import measured_by
-from studio.comparison.plan import Plan, attempt_of, check_seeds
+from studio.comparison.plan import Plan, check_seeds, plan_of, tracking_trial_of
 from studio.comparison.statistics import bootstrap_interval
 from studio.comparison.trials import Outcome, Trial
 from studio.errors import RunError, SettingsError, TruthError
@@ -30,11 +27,13 @@ from studio.runs.new_run import checked_frames
 from studio.runs.pace import stored_pace
 from studio.runs.session_settings import session_settings
 from studio.runs.silhouette_doubts import accepted_doubts
+from studio.sessions.named_rows import as_csv
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, all_knobs, changed_settings, values
 from studio.trackers.catalogue import TRACKERS
 from studio.trackers.tracker import LIMB_LOST, LOST, Value
+from studio.words import counted
 
 MOST_RUNS, MOST_KNOBS = 1000, 6
 
@@ -103,7 +102,7 @@ class Sweep:
 
     def of_point(self, place: int) -> tuple[Swept, ...]:
         """The runs of a point of the grid, one a seed."""
-        return self.runs[place :: len(self.plan.entrants)]
+        return self.runs[place :: len(self.plan.candidates)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +120,7 @@ class Expected:
     @property
     def in_words(self) -> str:
         """As a sentence."""
-        count = f"{self.runs} {'run' if self.runs == 1 else 'runs'} of {self.frames} frames"
+        count = f"{counted(self.runs, 'run')} of {self.frames} frames"
         words = f"{count}, {self.evaluations:,} evaluations"
         if self.seconds is None:
             return f"{words}; how long that takes is known once the first one is done."
@@ -166,23 +165,9 @@ def plan_sweep(
     model = session.body(body or None)
     guided = next((one.settings() for one in points if needs_model(tracker, one.settings().tracker)), None)
     chosen = chosen_model(session, model, guided, behaviour) if guided else None
-    return Plan(
-        footage=str(session.path.absolute()),
-        session=session.name,
-        entrants=tuple(points),
-        evaluations=max(one.evaluations for one in points),
-        seeds=tuple(seeds),
-        first=begin,
-        last=end,
-        fps=session.manifest.fps,
-        body=body,
-        behaviour=chosen.name if chosen else "",
-        behaviour_digest=hashlib.sha256(chosen.path.read_bytes()).hexdigest()[:16] if chosen else "",
-        behaviour_path=str(chosen.path) if chosen else "",
-        vary=grid,
-        fit_shape=fit_shape,
-        despite_findings=despite_findings,
-    )
+    evaluations = max(one.evaluations for one in points)
+    plan = plan_of(session, tuple(points), evaluations, seeds, (begin, end), body, chosen)
+    return replace(plan, vary=grid, fit_shape=fit_shape, despite_findings=despite_findings)
 
 
 def point_name(point: Mapping[str, Value]) -> str:
@@ -212,20 +197,20 @@ def sweep_trials(plan: Plan) -> tuple[Trial, ...]:
         Trial(
             f"{candidate.name}, seed {seed}",
             {
-                **attempt_of(plan, candidate, seed).plain(),
+                **tracking_trial_of(plan, candidate, seed).plain(),
                 "fit_shape": plan.fit_shape,
                 "despite_findings": plan.despite_findings,
             },
         )
         for seed in plan.seeds
-        for candidate in plan.entrants
+        for candidate in plan.candidates
     )
 
 
 def run_name(sweep: str, plan: Plan, place: int) -> str:
     """The name of the run of a trial by its place: SWEEP-pPOINT-sSEED."""
-    seed, point = divmod(place, len(plan.entrants))
-    digits = len(str(len(plan.entrants)))
+    seed, point = divmod(place, len(plan.candidates))
+    digits = len(str(len(plan.candidates)))
     return f"{sweep}-p{point + 1:0{digits}}-s{plan.seeds[seed]}"
 
 
@@ -273,7 +258,7 @@ def measured_run(session: Session, run: StoredRun) -> Swept:
 
 def conclude_sweep(plan: Plan, outcomes: Sequence[Outcome]) -> Sweep:
     """The sweep from the outcomes of all trials, in the order of `sweep_trials`."""
-    known = {entry.name: entry for entry in all_knobs(plan.entrants[0].settings())}
+    known = {entry.name: entry for entry in all_knobs(plan.candidates[0].settings())}
     return Sweep(
         plan,
         tuple(Swept(**outcome.measured) for outcome in outcomes),
@@ -288,7 +273,7 @@ def sweep_document(sweep: Sweep) -> dict[str, Any]:
     plan, chief = sweep.plan, sweep.chief
     means = {
         candidate.name: float(np.mean([getattr(run, chief.key) for run in sweep.of_point(place)]))
-        for place, candidate in enumerate(plan.entrants)
+        for place, candidate in enumerate(plan.candidates)
     }
     best = (max if chief.more_is_better else min)(means, key=lambda name: means[name])
     return {
@@ -297,8 +282,8 @@ def sweep_document(sweep: Sweep) -> dict[str, Any]:
         "frames": [plan.first, plan.last],
         "fps": plan.fps,
         "body": plan.body,
-        "tracker": plan.entrants[0].tracker,
-        "weighting": plan.entrants[0].weighting,
+        "tracker": plan.candidates[0].tracker,
+        "weighting": plan.candidates[0].weighting,
         "seeds": list(plan.seeds),
         "vary": {name: list(chosen) for name, chosen in plan.vary.items()},
         "knobs": [{"name": knob.name, "label": knob.label, "unit": knob.unit} for knob in sweep.knobs],
@@ -311,14 +296,13 @@ def sweep_document(sweep: Sweep) -> dict[str, Any]:
 
 def sweep_csv(sweep: Sweep) -> str:
     """A row a run and frame: the knobs, the seed, the run, its error or its share in the masks."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
     what = "error_mm" if any(run.error is not None for run in sweep.runs) else "overlap"
-    writer.writerow((*sweep.plan.vary, "seed", "run", "frame", what))
-    for point, seed, run in _each(sweep):
-        for frame, value in zip(run.frames, run.per_frame, strict=True):
-            writer.writerow((*point, seed, run.run, frame, "" if value is None else value))
-    return text.getvalue()
+    rows = [
+        (*point, seed, run.run, frame, "" if value is None else value)
+        for point, seed, run in _each(sweep)
+        for frame, value in zip(run.frames, run.per_frame, strict=True)
+    ]
+    return as_csv([(*sweep.plan.vary, "seed", "run", "frame", what), *rows])
 
 
 def sweep_text(sweep: Sweep) -> str:
@@ -327,7 +311,7 @@ def sweep_text(sweep: Sweep) -> str:
     shown = [one for one in sweep.measures if one.key != chief.key and one.key != "worst"]
     head = [*sweep.plan.vary, f"{chief.label} [95 %]", *(one.label for one in shown)]
     lines: list[tuple[float, list[str]]] = []
-    for place, candidate in enumerate(sweep.plan.entrants):
+    for place, candidate in enumerate(sweep.plan.candidates):
         runs = sweep.of_point(place)
         mean, low, high = _mean([float(getattr(run, chief.key)) for run in runs])
         cells = [str(candidate.changes[name]) for name in sweep.plan.vary]
@@ -345,9 +329,9 @@ def sweep_text(sweep: Sweep) -> str:
 def expected(session: Session, plan: Plan, processes: int, cores: int) -> Expected:
     """How many runs a plan has and about how long they take, so many at a time on so many cores."""
     frames = plan.frame_count
-    evaluations = sum(one.evaluations for one in plan.entrants) * len(plan.seeds) * frames
-    runs = len(plan.entrants) * len(plan.seeds)
-    first = plan.entrants[0]
+    evaluations = sum(one.evaluations for one in plan.candidates) * len(plan.seeds) * frames
+    runs = len(plan.candidates) * len(plan.seeds)
+    first = plan.candidates[0]
     pace = stored_pace(session, first.tracker, first.weighting, evaluations / runs / frames)
     if pace is None:
         return Expected(runs, frames, evaluations, None, "")
@@ -363,9 +347,9 @@ def _each(sweep: Sweep) -> list[tuple[tuple[Value, ...], int, Swept]]:
         (
             tuple(candidate.changes[name] for name in plan.vary),
             seed,
-            sweep.runs[at * len(plan.entrants) + place],
+            sweep.runs[at * len(plan.candidates) + place],
         )
-        for place, candidate in enumerate(plan.entrants)
+        for place, candidate in enumerate(plan.candidates)
         for at, seed in enumerate(plan.seeds)
     ]
 
@@ -397,7 +381,7 @@ def _points_table(sweep: Sweep) -> dict[str, Any]:
         ),
     ]  # fmt: skip
     rows: list[list[object]] = []
-    for place, candidate in enumerate(sweep.plan.entrants):
+    for place, candidate in enumerate(sweep.plan.candidates):
         point = [candidate.changes[name] for name in sweep.plan.vary]
         for one in sweep.measures:
             found = [getattr(run, one.key) for run in sweep.of_point(place)]

@@ -38,11 +38,11 @@ from studio.trackers.side_exchange import with_sides_right
 from studio.trackers.tracker import LayerRecord, start_of
 
 AS_PUBLISHED: Mapping[str, Any] = {"refine_frames": False}
-"""Knobs without refinement, as in the papers; an attempt that refines sets them."""
+"""Knobs without refinement, as in the papers; a trial that refines sets them."""
 
 
 @dataclass(frozen=True, slots=True)
-class Attempt:
+class TrackingTrial:
     """One run: all that its poses depend on, plain values.
 
     footage : a recipe's name, or the path of a session. changes : knobs by flat name. first, last : frames, half
@@ -79,7 +79,7 @@ class Attempt:
         }
 
     @classmethod
-    def of_plain(cls, arguments: Mapping[str, Any]) -> "Attempt":
+    def of_plain(cls, arguments: Mapping[str, Any]) -> "TrackingTrial":
         """From a trial's arguments, as read from JSON."""
         words: dict[str, Any] = {**arguments, "cameras": tuple(arguments.get("cameras", ()))}
         return cls(**words)
@@ -87,7 +87,7 @@ class Attempt:
 
 @dataclass(frozen=True, slots=True)
 class Tracked:
-    """The errors of an attempt, mm without alignment.
+    """The errors of a trial, mm without alignment.
 
     frames : numbers in the footage. per_frame_mm : mean over markers. lost : per frame the names of limbs that are
     lost (a marker more than 150 mm off). evaluations : poses weighed in a frame after the first. seconds : of the
@@ -119,7 +119,7 @@ UNCHANGED = Changed()
 
 
 def track(
-    attempt: Attempt,
+    trial: TrackingTrial,
     cache: FootageCache,
     *,
     on_layer: Callable[[LayerRecord], None] | None = None,
@@ -129,28 +129,28 @@ def track(
 
     Raises TruthError for a footage without truth and what tracking raises.
     """
-    session = cache.session(attempt.footage)
+    session = cache.session(trial.footage)
     if session.truth_path is None:
         raise TruthError(f"Session '{session.name}' has no truth.", "Take one made by 'studio synthesize'.")
-    subject = read_subject(session.path / attempt.subject) if attempt.subject else None
-    body = session.body(attempt.body or None, subject)
-    changes = {**AS_PUBLISHED, **attempt.changes}
-    settings = changed_settings(default_settings(attempt.tracker, attempt.weighting), changes)
-    cameras, fps = _cameras(session, attempt.cameras), session.manifest.fps
-    seen_with, rate = spoilt.cameras(cameras), fps / attempt.every
+    subject = read_subject(session.path / trial.subject) if trial.subject else None
+    body = session.body(trial.body or None, subject)
+    changes = {**AS_PUBLISHED, **trial.changes}
+    settings = changed_settings(default_settings(trial.tracker, trial.weighting), changes)
+    cameras, fps = _cameras(session, trial.cameras), session.manifest.fps
+    seen_with, rate = spoilt.cameras(cameras), fps / trial.every
     count = session.manifest.frame_count
-    frames = range(attempt.first, attempt.last or count, attempt.every)
+    frames = range(trial.first, trial.last or count, trial.every)
     if frames[-1] >= count:
-        raise NotFoundError(f"There is no frame {frames[-1]}. '{attempt.footage}' has 0 to {count - 1}.", "")
+        raise NotFoundError(f"There is no frame {frames[-1]}. '{trial.footage}' has 0 to {count - 1}.", "")
 
-    def evidence(frame: int, name: str = attempt.weighting) -> FrameEvidence:
+    def evidence(frame: int, name: str = trial.weighting) -> FrameEvidence:
         """The evidence of a frame for a weighting."""
         kind, pictures = WEIGHTINGS[name].edge_kind, WEIGHTINGS[name].reads_pictures
         return spoilt.evidence(cache.evidence(session, cameras, frame, settings.evidence, kind, pictures))
 
-    start = _start_pose(session, body, attempt.first, fps)
-    if attempt.shape_frames and start is not None:
-        sigma, first = session_sigma(session, body, rate), frames[: attempt.shape_frames]
+    start = _start_pose(session, body, trial.first, fps)
+    if trial.shape_frames and start is not None:
+        sigma, first = session_sigma(session, body, rate), frames[: trial.shape_frames]
         of_shape = partial(evidence, name=WEIGHTING)
         shaped = shaped_body(body, seen_with, of_shape, first, np.array(start), sigma)
         body, start = shaped.body, tuple(float(value) for value in shaped.start)
@@ -158,15 +158,15 @@ def track(
         settings,
         search_space(
             body,
-            session_sigma(session, body, rate) * attempt.sigma_scale,
-            _behaviour(session, body, settings, attempt),
+            session_sigma(session, body, rate) * trial.sigma_scale,
+            _behaviour(session, body, settings, trial),
         ),
         start_of(start),
-        attempt.seed,
-        FrameRefiner(body, seen_with, attempt.seed),
+        trial.seed,
+        FrameRefiner(body, seen_with, trial.seed),
         on_layer,
     )
-    weigher = WEIGHTINGS[attempt.weighting].prepare(body, seen_with, settings.weighting)
+    weigher = WEIGHTINGS[trial.weighting].prepare(body, seen_with, settings.weighting)
     seconds, evaluations, named = 0.0, 0, list[list[str]]()
     for number, frame in enumerate(frames):
         seen = evidence(frame)
@@ -215,14 +215,14 @@ def measured(
 
 
 def _behaviour(
-    session: Session, body: BodyModel, settings: RunSettings, attempt: Attempt
+    session: Session, body: BodyModel, settings: RunSettings, trial: TrackingTrial
 ) -> BehaviourModel | None:
-    """The attempt's model at the rate of its frames. Raises SettingsError where one is needed and none given."""
-    if not attempt.behaviour:
+    """The trial's model at the rate of its frames. Raises SettingsError where one is needed and none given."""
+    if not trial.behaviour:
         check_prediction(settings, has_model=False)
         return None
-    path = model_path(model_folders(session), attempt.behaviour)
-    return fitting(read_model(path), body, session.manifest.fps / attempt.every)
+    path = model_path(model_folders(session), trial.behaviour)
+    return fitting(read_model(path), body, session.manifest.fps / trial.every)
 
 
 def _cameras(session: Session, names: tuple[str, ...]) -> tuple[Camera, ...]:
@@ -235,8 +235,8 @@ def _cameras(session: Session, names: tuple[str, ...]) -> tuple[Camera, ...]:
     return tuple(camera for camera in known if not names or camera.name in names)
 
 
-def start_of_attempt(session: Session, body: str, first: int) -> tuple[float, ...] | None:
-    """The pose that an attempt starts from. body : a name, "" for the session's own."""
+def start_of_trial(session: Session, body: str, first: int) -> tuple[float, ...] | None:
+    """The pose that a trial starts from. body : a name, "" for the session's own."""
     return _start_pose(session, session.body(body or None), first, session.manifest.fps)
 
 
@@ -262,15 +262,15 @@ def _pose_on_truth(session: Session, body: BodyModel, frame: int, fps: float, ne
     return pose_from_markers(body, names, points, body.neutral if near is None else near)[0]
 
 
-# The trial that experiments on tracked footage and comparisons share: the same attempt is the same trial.
+# The trial that experiments on tracked footage and comparisons share: equal settings are the same trial.
 
 
-def tracking_trial(group: str, attempt: Attempt) -> Trial:
-    """The trial of an attempt. group : contender and setting in words, the same for all its seeds."""
-    return Trial(f"{group}, seed {attempt.seed}", attempt.plain())
+def tracking_trial(group: str, trial: TrackingTrial) -> Trial:
+    """A tracking as a trial of an experiment. group : candidate and setting in words, the same for all its seeds."""
+    return Trial(f"{group}, seed {trial.seed}", trial.plain())
 
 
 @kept_as("tracking_trials.measure_tracking")
 def measure_tracking(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
     """Track; the fields of `Tracked`."""
-    return asdict(track(Attempt.of_plain(arguments), cache))
+    return asdict(track(TrackingTrial.of_plain(arguments), cache))

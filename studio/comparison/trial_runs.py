@@ -12,7 +12,7 @@ from studio.comparison.candidates import Candidate
 from studio.comparison.folders import runs_of
 from studio.comparison.kept_comparison import KeptComparison
 from studio.comparison.plan import Plan
-from studio.comparison.tracked import start_of_attempt
+from studio.comparison.tracked import start_of_trial
 from studio.errors import NotFoundError
 from studio.runs.behaviour_models import needs_model
 from studio.runs.new_run import prepare_run
@@ -67,9 +67,9 @@ def run_of_trial(session: Session, kept: KeptComparison, tracker: str, seed: int
     Raises NotFoundError where the comparison has no such trial, StudioError where the run cannot be made.
     """
     plan = kept.plan(session)
-    candidate = next((one for one in plan.entrants if one.name == tracker), None)
+    candidate = next((one for one in plan.candidates if one.name == tracker), None)
     if candidate is None or seed not in plan.seeds:
-        names = ", ".join(one.name for one in plan.entrants)
+        names = ", ".join(one.name for one in plan.candidates)
         raise NotFoundError(
             f"Comparison '{kept.name}' has no trial of '{tracker[:64]}' with seed {seed}.",
             f"It has {names}, seeds {plan.seeds[0]} to {plan.seeds[-1]}.",
@@ -90,7 +90,7 @@ def _made(
         weighting=candidate.weighting,
         body=plan.body,
         behaviour=plan.behaviour_path if guided else "",
-        start_pose=start_of_attempt(session, plan.body, plan.first),
+        start_pose=start_of_trial(session, plan.body, plan.first),
         first=plan.first,
         last=plan.last,
         seed=seed,

@@ -13,7 +13,7 @@ from studio.export.options import ExportOptions
 from studio.export.task import Writer
 from studio.progress import Progress, unheard
 from studio.runs.tracks import BEST, RAW, best_track, read_track, track_digest, track_names
-from studio.runs.workflow_results import ExportedFile
+from studio.runs.workflow import ExportedFile
 from studio.sessions.record_files import RecordFile
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun

@@ -12,6 +12,7 @@ from studio.export.task import ExportTask, Written, agreed, apart, turned_apart
 from studio.motion_files.c3d import MOST_FRAMES as MOST_C3D_FRAMES
 from studio.motion_files.c3d import read_c3d_points, write_c3d
 from studio.motion_files.trc import TRC_FROM_WORLD, MarkerMotion, read_trc, write_trc
+from studio.words import counted
 
 
 def marked_points(task: ExportTask) -> tuple[Points, Array]:
@@ -110,6 +111,6 @@ def write_cameras(task: ExportTask) -> Written:
     checked = agreed(task.place, apart_mm, turned)
     return Written(
         tuple(written.files),
-        f"{len(cameras)} {'camera' if len(cameras) == 1 else 'cameras'}, {checked}",
+        f"{counted(len(cameras), 'camera')}, {checked}",
         tuple(written.notes),
     )

@@ -16,6 +16,7 @@ from studio.body.model import BodyModel
 from studio.errors import ExportError
 from studio.export.options import OWN
 from studio.typed_decoding import decode_toml
+from studio.words import enumerated
 
 
 class PlaceEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -81,7 +82,7 @@ def points_of(body: BodyModel, names: str) -> Points:
     note = ""
     if missing:
         title = name_map(names).title
-        note = f"Body '{body.name}' has no {_listed(missing)}: these points of {title} are left out."
+        note = f"Body '{body.name}' has no {enumerated(missing)}: these points of {title} are left out."
     joints = np.array([joint for joint, _ in found.values()], dtype=np.int64)
     return Points(tuple(found), joints, np.array([offset for _, offset in found.values()]), note)
 
@@ -99,7 +100,7 @@ def joint_names(own: tuple[str, ...], names: str) -> tuple[tuple[str, ...], str]
             renamed = name
         renames.append(renamed)
     note = (
-        f"{name_map(names).title} has no name for {_listed(kept)}: these joints keep their own names."
+        f"{name_map(names).title} has no name for {enumerated(kept)}: these joints keep their own names."
         if kept
         else ""
     )
@@ -118,7 +119,3 @@ def _place(body: BodyModel, entries: tuple[PlaceEntry, ...]) -> tuple[int, Array
             limb = limbs[entry.limb]
             return limb.joint, np.array([0.0, 0.0, entry.at * limb.length])
     return None
-
-
-def _listed(names: list[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -35,8 +35,7 @@ from studio.inspection.camera_checks import CameraFault, fault_of, view_fits
 from studio.inspection.likelihoods import FrameEvaluation, evaluation_of
 from studio.inspection.modes import exchanged_in
 from studio.inspection.reading import InspectedFrame, no_value
-from studio.inspection.reference import body_points, by_limb, true_points
-from studio.inspection.refined_reference import refined_pose
+from studio.inspection.reference import body_points, by_limb, refined_pose, true_points
 from studio.inspection.retracking import Change, Retracking, more_evaluations
 from studio.inspection.schedule import effective_number
 from studio.inspection.tables import Finding, Found, Remedy, Row, Selection
@@ -45,6 +44,7 @@ from studio.likelihood.catalogue import WEIGHTINGS
 from studio.runs.tracks import RAW
 from studio.settings import RunSettings
 from studio.trackers.tracker import LIMB_LOST_SHARE
+from studio.words import enumerated
 
 WRONG_MM, RIGHT_MM, NEAR_MM = 80.0, 45.0, 60.0
 """Mean distance of a limb's points from the reference: from here on it is wrong; below this it was right; nearer than
@@ -395,14 +395,14 @@ def _verdict(case: Case) -> Finding:
         return Finding("fits", words, limb, numbers=numbers)
     named = sorted(case.wrong, key=lambda name: -case.errors[name])
     parts = [f"the {limb} by {case.errors[limb]:.0f} mm" for limb in named]
-    words = f"Off from {_of(case.reference.kind)}: {_listed(parts)}."
+    words = f"Off from {_of(case.reference.kind)}: {enumerated(parts)}."
     lost = (
         []
         if result is None
         else [limb for limb, share in result.disagreement.items() if share > LIMB_LOST_SHARE]
     )
     if lost:
-        words += f" The silhouettes contradict the {_listed(lost)} too."
+        words += f" The silhouettes contradict the {enumerated(lost)} too."
     words += _mended(case)
     return Finding("wrong limb", words, named[0], numbers=numbers)
 
@@ -640,10 +640,6 @@ def _of(kind: str) -> str:
     return {"truth": "the truth", "refined": "its refinement", "best particle": "the best particle"}.get(
         kind, usual
     )
-
-
-def _listed(parts: Sequence[str]) -> str:
-    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
 
 
 def _lowered(text: str) -> str:

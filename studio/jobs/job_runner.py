@@ -94,6 +94,7 @@ class JobKind(Generic[SomeState]):
 
     states : the class of its states. changes_session : once it is done, all pages hear that the session has changed.
     busy : why no other of the kind can begin, with fields of the state in braces; "" where several may be under way.
+    keeps_session : meanwhile its session stays where it is, under its name.
     """
 
     event: str
@@ -101,6 +102,7 @@ class JobKind(Generic[SomeState]):
     states: type[SomeState]
     changes_session: bool = False
     busy: str = ""
+    keeps_session: bool = False
 
 
 class Job:
@@ -112,7 +114,7 @@ class Job:
         self.state: SessionJob = state
         self.found: object = None
         self.closing = False
-        self._kind, self._publish = kind, publish
+        self.kind, self._publish = kind, publish
         self._lock = threading.RLock()
         self._stop = threading.Event()
         self._left, self._step, self._reported = TimeLeft(), "", 0.0
@@ -131,8 +133,8 @@ class Job:
         """Replace entries of the state and report to all pages; from any thread."""
         with self._lock:
             # Validated, so that numbers that are none become null.
-            self.state = self._kind.states.model_validate({**dict(self.state), **changes})
-            self._publish({"type": self._kind.event, "run": "", **self.state.model_dump(mode="json")})
+            self.state = self.kind.states.model_validate({**dict(self.state), **changes})
+            self._publish({"type": self.kind.event, "run": "", **self.state.model_dump(mode="json")})
 
     def report(self, step: str, done: int, total: int, **more: object) -> None:
         """Tell how far the work is: at once for a new step and for its end, else as often as is read.
@@ -148,7 +150,7 @@ class Job:
     def check(self) -> None:
         """Raises WorkCancelledError once it shall end."""
         if self.cancelled():
-            raise WorkCancelledError(f"The {self._kind.noun} was cancelled.", "Start it again when you like.")
+            raise WorkCancelledError(f"The {self.kind.noun} was cancelled.", "Start it again when you like.")
 
     def report_or_stop(self, step: str, done: int, total: int, **more: object) -> None:
         """`report` and `check`, for work that cannot be ended in another way."""
@@ -157,7 +159,7 @@ class Job:
 
     def do(self, work: Work, log_path: Path | None) -> None:
         """Work in this thread, and report what becomes of it; never raises."""
-        kind, state = self._kind, self.state
+        kind, state = self.kind, self.state
         try:
             self.check()
             self._enter(JobState.RUNNING, JobState.QUEUED)
@@ -212,7 +214,14 @@ class JobRunner:
         """Raise RunError where another of the kind cannot begin."""
         going = self.going(kind)
         if kind.busy and going:
-            raise RunError(kind.busy.format(**dict(going[0])), "Wait for it, or cancel it.")
+            raise _busy(kind, going[0])
+
+    def check_movable(self, session: str) -> None:
+        """Raise RunError while a job is under way that keeps a session where it is."""
+        for job in [job for jobs in list(self._jobs.values()) for job in list(jobs.values())]:
+            state = job.state
+            if job.kind.keeps_session and state.session == session and state.state.is_going:
+                raise _busy(job.kind, state)
 
     def known(self, kind: JobKind[State], key: str) -> State | None:
         """How a job stands, None where there is none."""
@@ -261,3 +270,7 @@ class JobRunner:
         if job is None:
             raise NotFoundError(f"There is no {kind.noun} '{key[:40]}'.", "Begin a new one.")
         return job
+
+
+def _busy(kind: JobKind[State], state: State) -> RunError:
+    return RunError(kind.busy.format(**dict(state)), "Wait for it, or cancel it.")

@@ -15,6 +15,7 @@ from studio.errors import FootageError, StudioError
 from studio.jobs.camera_readers import CameraReaders
 from studio.sessions.live_recordings import SetWriter, finish_recording
 from studio.sessions.session import Session
+from studio.words import counted
 
 LONGEST_SILENCE = 10.0
 """With no camera left for so long, a recording ends."""
@@ -67,7 +68,7 @@ class SetStanding:
     def in_words(self) -> str:
         """As a status line says it."""
         words = [
-            f"{self.sets} set{'s' if self.sets != 1 else ''}",
+            f"{counted(self.sets, 'set')}",
             f"{self.spreads.median:.0f} ms apart" if self.spreads.sets else "",
         ]
         words += [one.in_words for one in self.stopped]

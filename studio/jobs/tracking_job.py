@@ -6,20 +6,69 @@ between two layers of a frame. Everything that is to be known comes out as event
 
 import contextlib
 import math
+import threading
 import time
 import traceback
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from studio.errors import RunError, StudioError
+from studio.errors import RunError, StudioError, WorkCancelledError
 from studio.jobs import commands
 from studio.jobs.events import Acknowledged, Event, FrameFinished, LayerFinished
 from studio.jobs.open_live_run import opened
 from studio.jobs.open_run import FINISHED, PAUSED, OpenRun
 from studio.jobs.reporter import IDLE, Place, Reporter, names_of, unforeseen
 from studio.jobs.search_pace import SearchPace
-from studio.jobs.side_looking import SideLooking
+from studio.runs.problem_source import ProblemSource
+from studio.runs.sides import can_be_looked_at, in_words, put_sides_right
+
+Say = Callable[[OpenRun, str, str], None]
+"""A line for a run's log: the run, level, text."""
+
+
+class SideLooking:
+    """Puts sides right in a thread of its own. Close it when done: what is under way is given up."""
+
+    def __init__(self, say: Say) -> None:
+        self._say = say
+        self._ended = threading.Event()
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="sides")
+
+    def add(self, run: OpenRun) -> None:
+        """Look at a finished run when those before it are done. It may be closed meanwhile."""
+        if can_be_looked_at(run.stored):
+            self._thread.submit(self._look, run)
+
+    def close(self) -> None:
+        """End, at the next frame that is read."""
+        self._ended.set()
+        self._thread.shutdown(cancel_futures=True)
+
+    def _look(self, run: OpenRun) -> None:
+        try:
+            with closing(ProblemSource(run.session, run.stored.body(), run.stored.cameras())) as problems:
+                words = put_sides_right(run.stored, problems, self._go_on)
+        except WorkCancelledError:
+            return
+        except StudioError as error:
+            self._say(run, "error", f"Left and right were not looked at again: {error}")
+        except Exception:
+            if not run.stored.folder.is_dir():  # moved or deleted meanwhile
+                return
+            self._say(run, "error", traceback.format_exc())
+        else:
+            if words:
+                self._say(run, "info", in_words(words))
+
+    def _go_on(self, _frame: int) -> None:
+        if self._ended.is_set():
+            raise WorkCancelledError(
+                "Looking at left and right was given up.", "'studio refine' does it, too."
+            )
+
 
 COMPILING, TRACKING, REANNEALING = "compiling", "tracking", "reannealing"
 CANCELLED, FAILED = "cancelled", "failed"

@@ -112,7 +112,7 @@ def compare(
         before = done_before(kept, plan)
         lines = [executor.in_words] if executor else []
         if before:
-            lines.append(f"{before} of {seeds * len(plan.entrants)} trials are there already.")
+            lines.append(f"{before} of {seeds * len(plan.candidates)} trials are there already.")
         say(progress, lines)
         with reporting(progress, f"{opened.name} / {kept.name}") as report:
             comparison = run_comparison(kept, opened, report, processes=processes, executor=executor)
@@ -215,7 +215,7 @@ def kept_sweep(session: Session, plan: Plan, name: str = "") -> KeptComparison:
         if again is not None:
             return again
     folder = place_of(session, name, sweep=True)
-    checked_name(run_name(folder.name, plan, len(plan.entrants) * len(plan.seeds) - 1), "run of a sweep")
+    checked_name(run_name(folder.name, plan, len(plan.candidates) * len(plan.seeds) - 1), "run of a sweep")
     if (folder / RECORD_NAME).is_file():
         return _same(folder, plan)
     return new_comparison(folder, plan)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from studio.comparison.tracked import Attempt
+from studio.comparison.tracked import TrackingTrial
 from studio.comparison.trials import TrialJob
 from studio.declaring import operation
 from studio.errors import RunError
@@ -105,7 +105,7 @@ def finished(session: Session, run: CourseRun) -> bool:
 
 
 def _job(session: Session, run: CourseRun, model: Path) -> TrialJob:
-    attempt = Attempt(
+    trial = TrackingTrial(
         str(session.path.absolute()),
         run.tracker,
         session.manifest.weighting or DEFAULT_WEIGHTING,
@@ -118,9 +118,9 @@ def _job(session: Session, run: CourseRun, model: Path) -> TrialJob:
         key=run.name,
         experiment="course",
         label=run.words,
-        arguments={**attempt.plain(), "fit_shape": True, "run": run.name},
+        arguments={**trial.plain(), "fit_shape": True, "run": run.name},
         measure=measure_run,
-        footage=(attempt.footage,),
+        footage=(trial.footage,),
         frames=None,
         alone=False,
     )

@@ -14,8 +14,7 @@ from studio.declaring import Target, operation
 from studio.errors import RunError
 from studio.export.kept_exports import exported_files
 from studio.runs.tracks import Track
-from studio.runs.workflow import Workflow, workflow_of
-from studio.runs.workflow_results import newest_run
+from studio.runs.workflow import Workflow, newest_run, workflow_of
 from studio.sessions.session import BODIES_NAME, RUNS_NAME, Session
 from studio.sessions.stored_run import RunSummary, StoredRun
 from studio.sessions.workspace import Workspace

@@ -105,8 +105,8 @@ def footage_needed(jobs: Iterable[TrialJob]) -> dict[str, int | None]:
 
 
 def frames_of(arguments: Plain) -> int | None:
-    """The last frame named in a trial's arguments, as in `Attempt` ("last", half open); None without one. If there is
-    an attempt among them, parts without a last frame do not count.
+    """The last frame named in a trial's arguments, as in `TrackingTrial` ("last", half open); None without one. If
+    there is one among them, parts without a last frame do not count.
     """
     if not is_mapping(arguments):
         return None

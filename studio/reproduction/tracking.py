@@ -12,7 +12,7 @@ import numpy as np
 from studio.arrays import Array
 from studio.comparison.findings import Chart, Number, Series, Table
 from studio.comparison.statistics import number
-from studio.comparison.tracked import Attempt, Tracked, measure_tracking, tracking_trial
+from studio.comparison.tracked import Tracked, TrackingTrial, measure_tracking, tracking_trial
 from studio.comparison.trials import Outcome, Scale, Trial
 from studio.reproduction.claims import ratio, sign_tests
 from studio.reproduction.drawing import seeds_and_mean, table_over
@@ -32,19 +32,19 @@ class Candidate:
     weighting: str
     changes: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
-    def attempt(self, footage: str, seed: int, evaluations: int, **wanted: Any) -> Attempt:  # noqa: ANN401
+    def attempt(self, footage: str, seed: int, evaluations: int, **wanted: Any) -> TrackingTrial:  # noqa: ANN401
         """A run of `evaluations` evaluations a frame, 0 where the knobs give them. wanted : other fields of
-        `Attempt`."""
+        `TrackingTrial`."""
         knobs = knobs_for_evaluations(self.tracker, evaluations) if evaluations else {}
-        return Attempt(footage, self.tracker, self.weighting, seed, {**knobs, **self.changes}, **wanted)
+        return TrackingTrial(footage, self.tracker, self.weighting, seed, {**knobs, **self.changes}, **wanted)
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
     """A line of an experiment's table of settings, tracked with every seed.
 
-    evaluations : a frame, 0 where the contender's knobs give them. wanted : other fields of `Attempt`, by seed where it
-    is a function.
+    evaluations : a frame, 0 where the contender's knobs give them. wanted : other fields of `TrackingTrial`, by seed
+    where it is a function.
     """
 
     name: str

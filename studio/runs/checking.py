@@ -37,6 +37,7 @@ from studio.trackers.hidden_areas import without_hidden
 from studio.trackers.loss_detection import anything_seen
 from studio.trackers.start_candidates import facing
 from studio.trackers.tracker import LIMB_LOST_SHARE
+from studio.words import counted
 
 FOLDER = "checks"
 SCHEMA_VERSION = 1
@@ -270,7 +271,7 @@ def _leaps(jumps: Sequence[Jump]) -> str:
     """The number of jumps, and the first few."""
     some = "; ".join(jump.in_words() for jump in jumps[:NAMED])
     more = f"; and {len(jumps) - NAMED} more" if len(jumps) > NAMED else ""
-    return f"{len(jumps)} {'jump' if len(jumps) == 1 else 'jumps'} ({some}{more})"
+    return f"{counted(len(jumps), 'jump')} ({some}{more})"
 
 
 def _share(part: int, whole: int) -> float | None:

@@ -28,10 +28,9 @@ from studio.runs.person_facing import NETWORK_ODDS, facing_agreement
 from studio.runs.problem_source import ProblemSource
 from studio.runs.search_space import parameter_names, search_space, session_sigma
 from studio.runs.session_settings import session_settings
-from studio.runs.workflow_step import enumerated
-from studio.sessions.made_from import note
 from studio.sessions.named_rows import write_pose
 from studio.sessions.names import free_name
+from studio.sessions.provenance import note
 from studio.sessions.session import START_POSE_NAME, Session
 from studio.settings import DEFAULT_TRACKER, RunSettings
 from studio.trackers.initialisation import (
@@ -51,6 +50,7 @@ from studio.volume.body_space import space_of
 from studio.volume.hull import Hull
 from studio.volume.reconstruction import HullSettings, reconstruct
 from studio.volume.tracking_space import HEIGHT, Box
+from studio.words import enumerated
 
 WEIGHTING = "edge-silhouette"
 """The likelihood that separates poses best: of 20 moments of the Lee walk's twin (human31) it found all, 24 mm off on

@@ -26,7 +26,7 @@ from studio.progress import Progress
 from studio.runs.session_settings import session_settings
 from studio.runs.silhouette_doubts import MEASURED, height_of, person_alone, silhouette_doubts
 from studio.runs.subject_masks import count_subjects
-from studio.sessions.made_from import note
+from studio.sessions.provenance import note
 from studio.sessions.session import Session
 from studio.volume.hull import Hull
 from studio.volume.hull_pieces import chosen_voxels, piece_numbers

@@ -36,7 +36,7 @@ from studio.runs.following import Following
 from studio.runs.problem_source import ProblemSource
 from studio.runs.search_space import search_space, session_sigma
 from studio.runs.subject_frames import varied_frames
-from studio.sessions.made_from import digests
+from studio.sessions.provenance import digests
 from studio.sessions.record_files import RecordFile
 from studio.sessions.session import Session
 from studio.settings import RunSettings, default_settings

@@ -12,7 +12,7 @@ from studio.errors import CalibrationError, StudioError
 from studio.evidence.masks import cleaned
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
-from studio.sessions.made_from import changed_inputs, origin_of
+from studio.sessions.provenance import changed_inputs, origin_of
 from studio.sessions.session import Session
 
 PERSON_ALONE = EvidenceSettings(

@@ -13,9 +13,9 @@ from studio.errors import RunError, TruthError
 from studio.geometry.reach import within_reach
 from studio.motion_files.trc import read_trc
 from studio.runs.search_space import parameter_names
-from studio.sessions.made_from import note
 from studio.sessions.named_rows import pose_frame, read_pose, write_pose
 from studio.sessions.names import free_name
+from studio.sessions.provenance import note
 from studio.sessions.session import START_POSE_NAME, Session
 
 FEWEST_MARKERS = 4

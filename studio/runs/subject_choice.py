@@ -9,7 +9,7 @@ from studio.body.model import BodyModel
 from studio.body.subject import Subject, fit_subject, write_subject
 from studio.errors import BodyError
 from studio.runs.subject_fitting import FittedSubject, keep_subject, replace_subject
-from studio.sessions.made_from import note
+from studio.sessions.provenance import note
 from studio.sessions.session import SUBJECT_NAME, Session, described_anew
 
 LEAST_HEIGHT, MOST_HEIGHT = 300.0, 3000.0

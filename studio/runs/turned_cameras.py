@@ -14,7 +14,7 @@ from studio.errors import CalibrationError, NotFoundError
 from studio.runs.aligning import SessionAlignment, keep_alignment
 from studio.sessions.atomic_files import write_bytes
 from studio.sessions.calibration_changes import CalibrationChange, earlier_calibration, restore_calibration
-from studio.sessions.made_from import changed_inputs, note, origin_of
+from studio.sessions.provenance import changed_inputs, note, origin_of
 from studio.sessions.session import CAMERAS_PATH, Session
 from studio.typed_decoding import decode_json
 

@@ -5,27 +5,62 @@ from collections.abc import Sequence
 from typing import Annotated
 
 from fastapi import APIRouter
+from pydantic import Field
 
 from studio.errors import NotFoundError, RunError
-from studio.jobs.job_runner import Job
+from studio.jobs.job_runner import Job, JobKind, SessionJob
 from studio.operations.cameras import Alignment, align
 from studio.runs.aligning import SessionAlignment
 from studio.runs.overlay_pictures import forget_composers
-from studio.runs.turned_cameras import (
-    is_of,
-    turn_back,
-    turn_cameras,
-    turned_from,
-)
-from studio.server.alignment_schemas import AlignmentAnswer, AlignmentJob, AlignmentLine
+from studio.runs.turned_cameras import is_of, turn_back, turn_cameras, turned_from
 from studio.server.app_state import App, AppState, release
-from studio.server.job_kinds import ALIGNMENT
 from studio.server.requests import Arguments, body_of
+from studio.server.schemas import Answer, Number
 from studio.server.session_routes import OpenSession
 from studio.sessions.calibration_changes import CalibrationChange
 from studio.sessions.session import Session
 
 router = APIRouter(prefix="/api/sessions/{session}/alignment", tags=["calibration"])
+
+
+class AlignmentLine(Answer):
+    """One camera. before_px, after_px: by which the silhouettes miss, as it stands and turned (median, null where
+    nothing shows); turn_degrees: by which it would be turned.
+    """
+
+    camera: str
+    before_px: Number
+    after_px: Number
+    turn_degrees: Number
+
+
+class AlignmentJob(SessionJob):
+    """How comparing the cameras stands, and what came of it. needed: the misses matter; better: turning the cameras
+    explains them; words: a sentence; kept: the session uses the turned cameras.
+    """
+
+    cameras: list[AlignmentLine] = Field(default_factory=list[AlignmentLine])
+    frames: list[int] = Field(default_factory=list[int])
+    needed: bool = False
+    better: bool = False
+    words: str = ""
+    kept: bool = False
+
+
+ALIGNMENT = JobKind("alignment", "comparison of the cameras", AlignmentJob)
+
+
+class AlignmentAnswer(Answer):
+    """possible: there are several calibrated cameras. job: under way, or the last one with the calibration in use.
+    turned: the cameras in use were turned from an earlier calibration, which can be had back. notes: what a change just
+    made means for what is there.
+    """
+
+    session: str
+    possible: bool
+    job: AlignmentJob | None
+    turned: bool
+    notes: list[str] = Field(default_factory=list)
 
 
 @router.get("")
@@ -50,7 +85,7 @@ async def begin(
     def work(job: Job) -> dict[str, object]:
         aligned = align(session, **arguments, keep=False, progress=job.report_or_stop)
         job.found = aligned.found
-        return _told(aligned)
+        return _result(aligned)
 
     return app.jobs.begin(ALIGNMENT, AlignmentJob(session=session.name), work)
 
@@ -109,7 +144,7 @@ def _found(session: Session, app: AppState) -> SessionAlignment | None:
     return found if isinstance(found, SessionAlignment) else None
 
 
-def _told(aligned: Alignment) -> dict[str, object]:
+def _result(aligned: Alignment) -> dict[str, object]:
     return {
         "cameras": [
             AlignmentLine(

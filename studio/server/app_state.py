@@ -24,7 +24,6 @@ from studio.runs.overlay_pictures import forget_composers
 from studio.server.access import VIEWING
 from studio.server.calibration_proposals import Proposals
 from studio.server.event_stream import EventStream
-from studio.server.job_kinds import COMPARISON
 from studio.server.windows import Window
 from studio.sessions.session import RUNS_NAME
 from studio.sessions.workspace import Workspace
@@ -303,8 +302,8 @@ def release(app: AppState, session: str, run: str = "") -> None:
 
     Raises RunError while the run is being tracked, or trackers are being compared on the session.
     """
-    if not run and app.jobs.going(COMPARISON, session):
-        app.jobs.check_free(COMPARISON)
+    if not run:
+        app.jobs.check_movable(session)
     state, folder = app.control.state, app.workspace.root / session
     # Else the process itself knows whether that is what it has open; a search elsewhere is not waited for.
     if state.state != "lost" and (state.session == session or state.state not in ("tracking", "compiling")):

@@ -12,16 +12,15 @@ from studio.behaviour.settings import LearningSettings
 from studio.body.catalogue import list_bodies, load_body
 from studio.errors import BehaviourError, NotFoundError
 from studio.footage_recipes import recipe_names
-from studio.jobs.job_runner import Job
+from studio.jobs.job_runner import Job, JobKind, SessionJob
 from studio.jobs.learning_process import LearningOrder, learn_in_process
 from studio.knobs import knobs_of
 from studio.operations.behaviours import learn
 from studio.runs.behaviour_models import SUFFIX, models_folder
 from studio.server.app_state import App, AppState
-from studio.server.behaviour_learning_schemas import LearningChoices, LearningProgress
-from studio.server.job_kinds import LEARNING
 from studio.server.requests import Arguments, MaybeName, body_of
-from studio.server.setting_views import knob_view
+from studio.server.schemas import Answer
+from studio.server.setting_views import KnobView, knob_view
 from studio.server.upload_routes import forget, upload_folder
 from studio.sessions.archives import ENDINGS, unpacked
 from studio.sessions.names import checked_name
@@ -30,6 +29,42 @@ from studio.training.oversampling import OversamplingSettings
 from studio.training.sources import FPS, MOTION_FILES
 
 router = APIRouter(prefix="/api/learning", tags=["behaviours"])
+
+
+Source = str
+
+
+class LearningProgress(SessionJob):
+    """How the learning stands. learnt: frames, clusters, states, entropies and the frames that fitted badly, when it is
+    done.
+    """
+
+    name: str
+    body: str
+    learnt: dict[str, object] = Field(default_factory=dict)
+
+
+LEARNING = JobKind(
+    "learning",
+    "learning",
+    LearningProgress,
+    busy="Model '{name}' is being learnt; one is learnt at a time.",
+)
+
+
+class LearningChoices(Answer):
+    """What a form needs: the knobs group after group, the bodies, the endings of motion files, bundled recipes of a
+    person, and what is being learnt or was last, null before the first.
+    """
+
+    knobs: list[KnobView]
+    bodies: list[str]
+    default_body: str
+    fps: float
+    endings: list[str]
+    recipes: list[str]
+    progress: LearningProgress | None
+
 
 SKELETON = ".asf"
 GIVEN: dict[str, Any] = {

@@ -1,7 +1,7 @@
 """Bodies: which there are, what each is made of, and those of one's own, made by changing another."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from fastapi import APIRouter, Query
@@ -10,29 +10,117 @@ from pydantic import Field
 from studio.body.catalogue import body_files, list_bodies, load_body
 from studio.body.definition import BodyDefinition, split_sign
 from studio.body.editing import SIZES
-from studio.body.mirroring import Mirror
+from studio.body.mirroring import has_sides
 from studio.body.model import BodyModel
 from studio.body.writing import body_text
 from studio.errors import BodyError, StudioError
 from studio.operations.own_bodies import body_to_edit, edit_body
 from studio.server.app_state import App, AppState
-from studio.server.body_schemas import (
-    BodyDetail,
-    BodyEntry,
-    BodyList,
-    DimensionView,
-    DiscardedBody,
-    LimbSizes,
-    LimitView,
-    MarkerView,
-    SizeView,
-)
 from studio.server.requests import Arguments, MaybeName, body_of
-from studio.server.subject_routes import limb_drawings
+from studio.server.schemas import Answer, Number
+from studio.server.subject_routes import LimbDrawing, limb_drawings
 from studio.sessions.own_bodies import bodies_folder, body_folders, discard_body
 from studio.sessions.session import Session
 
 router = APIRouter(prefix="/api/bodies", tags=["bodies"])
+
+
+class BodyEntry(Answer):
+    """A body that can be tracked. own: whose it is: the workspace's, a session's, "" for one that is shipped.
+    problem: why its file cannot be read, "" if it can.
+    """
+
+    name: str
+    title: str
+    parameters: int
+    limbs: int
+    own: Literal["", "workspace", "session"]
+    problem: str = ""
+
+
+class BodyList(Answer):
+    """All bodies by name. chosen: the session's, "" without one."""
+
+    bodies: list[BodyEntry]
+    chosen: str = ""
+
+
+class SizeView(Answer):
+    """A size of a limb: mm, or for a scale without unit. dimension: its name in the body's file, "" where the limb has
+    a number of its own.
+    """
+
+    value: float
+    dimension: str
+
+
+class LimbSizes(Answer):
+    """A limb that can be changed."""
+
+    name: str
+    joint: str
+    side: str
+    length: SizeView
+    radius_start: SizeView
+    radius_end: SizeView
+    scale_x: SizeView
+    scale_y: SizeView
+
+
+class DimensionView(Answer):
+    """A dimension that is no limb's size: where joints and markers lie. unit: "mm", or "" for a ratio."""
+
+    name: str
+    value: float
+    unit: Literal["mm", ""]
+
+
+class LimitView(Answer):
+    """A parameter: degrees or mm. lower, upper: null where there is none. neutral: null where it follows from sizes."""
+
+    name: str
+    label: str
+    kind: Literal["angle", "length"]
+    limb: str
+    lower: Number
+    upper: Number
+    neutral: Number
+    max_step: float
+
+
+class MarkerView(Answer):
+    """A named point, mm in its joint's frame."""
+
+    name: str
+    joint: str
+    at: list[float]
+
+
+class BodyDetail(Answer):
+    """A body with all that can be changed. text: its file. sided: whether it has a left and a right. drawings: its
+    limbs as it stands. saved: what it was saved as, "" where it was not.
+    """
+
+    name: str
+    title: str
+    source: str
+    text: str
+    sided: bool
+    limbs: list[LimbSizes]
+    dimensions: list[DimensionView]
+    limits: list[LimitView]
+    markers: list[MarkerView]
+    joints: list[str]
+    drawings: list[LimbDrawing]
+    notes: list[str] = Field(default_factory=list)
+    saved: str = ""
+
+
+class DiscardedBody(Answer):
+    """Where a body lies that was thrown away, in the workspace's trash."""
+
+    trash: str
+
 
 OfSession = Annotated[
     str, Query(max_length=64, description="A session, whose own bodies count too; its body is in its size.")
@@ -124,7 +212,7 @@ def body_detail(body: BodyModel, text: str, notes: list[str] | None = None, save
         title=body.title,
         source=definition.source,
         text=text,
-        sided=_has_sides(body),
+        sided=has_sides(body),
         limbs=limbs,
         dimensions=[
             DimensionView(
@@ -168,14 +256,6 @@ def _limits(body: BodyModel, definition: BodyDefinition) -> list[LimitView]:
         )
         for entry, model in zip(definition.parameters, body.parameters, strict=True)
     ]
-
-
-def _has_sides(body: BodyModel) -> bool:
-    try:
-        Mirror(body)
-    except BodyError:
-        return False
-    return True
 
 
 def _session(app: AppState, name: str) -> Session | None:

@@ -30,8 +30,8 @@ from studio.capture.calibration_files import (
 from studio.errors import CalibrationError, NotFoundError
 from studio.geometry.camera import Camera
 from studio.runs.overlay_drawing import encode_jpeg
+from studio.server import files
 from studio.server.app_state import App, AppState, release
-from studio.server.calibration_places import chosen_file, place_of
 from studio.server.calibration_proposals import (
     Proposal,
     backdrop,
@@ -39,15 +39,16 @@ from studio.server.calibration_proposals import (
     proposal_of_file,
     with_floor,
 )
-from studio.server.calibration_schemas import (
+from studio.server.calibration_views import (
     ApplyRequest,
     CalibrationFileRequest,
     CalibrationView,
     FloorRequest,
-    FootagePlace,
     ProposalView,
+    calibration_view,
+    proposal_view,
 )
-from studio.server.calibration_views import calibration_view, proposal_view
+from studio.server.safe_paths import FootagePlace, chosen_file, place_of
 from studio.server.session_routes import OpenSession
 from studio.sessions.calibration_changes import earlier_calibration, replace_calibration
 from studio.sessions.session import CAMERAS_PATH, Session
@@ -116,7 +117,7 @@ async def view(
     picture = await asyncio.to_thread(backdrop, session, found, camera, board, frame)
     points: list[list[float]] = found.clicked.points.tolist() if found.clicked is not None else []
     drawn = world_picture(picture, placed, points, height, bare=not axes)
-    return Response(encode_jpeg(drawn), media_type="image/jpeg", headers={"cache-control": "no-store"})
+    return files.picture(encode_jpeg(drawn))
 
 
 @router.get(HERE + "/proposals/{identifier}/coverage/{camera}.png", response_class=Response)
@@ -142,7 +143,7 @@ def coverage(session: OpenSession, identifier: str, camera: str, app: App) -> Re
         raise NotFoundError(
             f"Camera '{name}' was not calibrated from a board here.", "Calibrate it from boards."
         )
-    return Response(content, media_type="image/png", headers={"cache-control": "no-store"})
+    return files.picture(content, "png")
 
 
 @router.get(HERE + "/export", response_class=Response)
@@ -156,11 +157,7 @@ def export(session: OpenSession, form: Annotated[str, Query(alias="format", max_
         place = Path(folder) / (writer.file_name.format(session.name) + writer.suffix)
         written = export_calibration(cameras, place, form)
         name, content = _packed(written.files, f"{session.name}-{form}.zip")
-    headers = {
-        "content-disposition": f'attachment; filename="{name}"',
-        "x-studio-notes": quote("\n".join(written.notes)),
-    }
-    return Response(content, media_type="application/octet-stream", headers=headers)
+    return files.download(content, name, files.BINARY, x_studio_notes=quote("\n".join(written.notes)))
 
 
 @router.get("/calibration-boards.pdf", response_class=Response)
@@ -176,8 +173,7 @@ def board_pdf(
         write_board_pdf(made, place, page)
         content = place.read_bytes()
     plain = made.text.replace(":", "-").replace(",", "-")
-    headers = {"content-disposition": f'attachment; filename="{plain}.pdf"', "x-studio-board": made.text}
-    return Response(content, media_type="application/pdf", headers=headers)
+    return files.download(content, f"{plain}.pdf", "application/pdf", x_studio_board=made.text)
 
 
 def _read(session: Session, request: CalibrationFileRequest, app: AppState) -> Proposal:

@@ -11,21 +11,40 @@ from pydantic import Field
 from studio.calibration.board_footage_reading import find_board_footage, list_footage
 from studio.calibration.boards import Board, board_from_text
 from studio.calibration.verbs import calibrate as solve
-from studio.jobs.job_runner import Job
+from studio.jobs.job_runner import Job, JobKind, NumberedJob
 from studio.operations.cameras import calibrate
 from studio.progress import Progress, TimeLeft
 from studio.server.app_state import App, AppState
-from studio.server.calibration_places import place_of
 from studio.server.calibration_proposals import Proposal, proposal_of_boards
-from studio.server.calibration_schemas import DistanceRequest, FootagePlace, SolveState
-from studio.server.job_kinds import CALIBRATION
 from studio.server.job_routes import add_job_routes
 from studio.server.requests import Arguments, body_of
+from studio.server.safe_paths import FootagePlace, place_of
+from studio.server.schemas import Number, Request
 from studio.server.session_routes import OpenSession
 from studio.sessions.board_calibration import footage_sizes, how_taken
 from studio.sessions.session import Session
 
 router = APIRouter(prefix="/api", tags=["calibration"])
+
+
+class DistanceRequest(Request):
+    """A measured distance between two cameras' lenses."""
+
+    first: str = Field(max_length=64)
+    second: str = Field(max_length=64)
+    mm: float = Field(gt=0, le=1e6)
+
+
+class SolveState(NumberedJob):
+    """How a calibration from boards stands. share: of all, about, null while unknown; seconds_left: of all; proposal:
+    what came of it.
+    """
+
+    share: Number = None
+    proposal: str = ""
+
+
+CALIBRATION = JobKind("calibration", "calibration", SolveState)
 
 
 LOOKING = "Looking for the board"

@@ -5,23 +5,117 @@ from collections.abc import Sequence
 
 import msgspec
 import numpy as np
+from pydantic import Field
 
 from studio.calibration.board_footage_reading import find_board_footage
-from studio.calibration.findings import blocking
+from studio.calibration.findings import Finding, blocking
 from studio.calibration.report import report_of
 from studio.capture.calibration_files import CALIBRATION_FORMATS
+from studio.capture.naming import CameraMatch
 from studio.errors import CalibrationError
 from studio.server.calibration_proposals import Proposal, proposal_in_use
-from studio.server.calibration_schemas import (
-    CalibratedCamera,
-    CalibrationView,
-    ClickedPoint,
-    ProposalView,
-    Rig,
-)
+from studio.server.safe_paths import FootagePlace, PlaceName
+from studio.server.schemas import Answer, Number, Numbers, Request
 from studio.sessions.calibration_changes import earlier_calibrations, stale_runs
+from studio.sessions.importers.importing import Unit, Up
 from studio.sessions.session import CAMERAS_PATH, Session
 from studio.typed_decoding import decode_json, is_list, is_table
+
+Pixel = tuple[float, float]
+
+
+class CalibrationFileRequest(FootagePlace):
+    """A calibration to look at. Nothing is changed by it. file: which one of a folder or upload that holds several;
+    earlier: one that the session used before, instead of a path.
+    """
+
+    file: PlaceName = ""
+    earlier: str = Field("", max_length=64)
+    unit: Unit = ""
+    up: Up = "z"
+
+
+class PointRequest(Request):
+    """A point clicked in two cameras or more. world: where it is known to lie, mm; for all points or for none."""
+
+    pixels: dict[str, Pixel] = Field(min_length=2, max_length=64)
+    world: tuple[float, float, float] | None = None
+
+
+class FloorRequest(Request):
+    """Points of the floor: the first is the origin, the second lies on X. proposal: "" for the calibration in use."""
+
+    proposal: str = Field("", max_length=64)
+    points: list[PointRequest] = Field(min_length=3, max_length=64)
+
+
+class ApplyRequest(Request):
+    """anyway: also if a finding says that results would be wrong."""
+
+    anyway: bool = False
+
+
+class CalibratedCamera(Answer):
+    """A camera as it stands. forward: its optical axis; rms_px: of its board corners, null where no board was seen."""
+
+    name: str
+    width: int
+    height: int
+    focal_px: Numbers
+    centre_px: Numbers
+    position: Numbers
+    forward: Numbers
+    quarter_turns: int
+    rms_px: Number = None
+
+
+class ClickedPoint(Answer):
+    """A clicked point in space, mm, and how many pixels each camera's click misses it by."""
+
+    place: Numbers
+    missed_px: dict[str, Number]
+
+
+class Rig(Answer):
+    """Cameras with what speaks for and against them. report: as the command writes it, {} for files."""
+
+    source: str
+    cameras: list[CalibratedCamera]
+    notes: list[str] = Field(default_factory=list)
+    findings: list[Finding] = Field(default_factory=list[Finding])
+    usable: bool = True
+    floor: str = ""
+    report: dict[str, object] = Field(default_factory=dict)
+    points: list[ClickedPoint] = Field(default_factory=list[ClickedPoint])
+
+
+class ProposalView(Rig):
+    """A calibration to look at before it is applied; it lives until the studio ends. unit_note: how the unit was
+    found. matching: the footage's cameras to the calibration's own names.
+    """
+
+    identifier: str
+    session: str
+    unit_note: str = ""
+    matching: list[CameraMatch] = Field(default_factory=list[CameraMatch])
+
+
+class CalibrationView(Answer):
+    """The calibration in use, null while there is none. earlier: those before it, newest first. stale_runs: tracked
+    with another one. changed: when it was replaced (ISO 8601). board_footage: folders in the session, if any. notes:
+    what the change that was just made means.
+    """
+
+    session: str
+    present: Rig | None
+    changed: str = ""
+    earlier: list[str] = Field(default_factory=list)
+    stale_runs: list[str] = Field(default_factory=list)
+    board_footage: bool = False
+    footage: list[str] = Field(default_factory=list, description="Names of the cameras that have footage.")
+    formats: dict[str, str] = Field(default_factory=dict, description="Formats of the export.")
+    notes: list[str] = Field(default_factory=list)
+
 
 Report = dict[str, object]
 

@@ -6,9 +6,10 @@ be taken from.
 
 import asyncio
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Query, Request
+from fastapi import APIRouter, Query
+from fastapi import Request as HttpRequest
 from fastapi.responses import Response
 from pydantic import Field
 
@@ -19,23 +20,72 @@ from studio.jobs.camera_service import RecordingState
 from studio.jobs.camera_tracking import LiveRecordingRequest
 from studio.jobs.commands import Start, about
 from studio.operations.tracking import live
+from studio.server import files
 from studio.server.app_state import App, AppState
-from studio.server.camera_schemas import (
-    CameraRequest,
-    CamerasView,
-    LiveCameraView,
-    PreviewRequest,
-    SpreadView,
-)
 from studio.server.requests import Arguments, body_of
 from studio.server.safe_paths import folder_to_import
-from studio.server.schemas import RunName
+from studio.server.schemas import Answer, Number, Request, RunName
 from studio.sessions.names import PathRefused
 from studio.sessions.recordings import calibration_given
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 
 router = APIRouter(prefix="/api", tags=["cameras"])
+
+
+Knob = bool | int | float | str
+
+
+class CameraRequest(Request):
+    """A camera: its name in the calibration, and http://… (MJPEG), rtsp://…, /dev/video0 or the path of a video to be
+    replayed. Names and passwords in it are neither shown nor logged.
+    """
+
+    name: str = Field(min_length=1, max_length=40)
+    address: str = Field(min_length=1, max_length=2000)
+
+
+class CamerasRequest(Request):
+    """The cameras to look at, instead of those before; none closes all."""
+
+    cameras: list[CameraRequest] = Field(max_length=16)
+
+
+class LiveCameraView(Answer):
+    """A camera now. state: connecting, running, stopped, ended. age: seconds since its last picture."""
+
+    name: str
+    shown: str
+    state: Literal["connecting", "running", "stopped", "ended"]
+    seconds: float
+    age: Number
+    fps: float
+    pictures: int
+    width: int
+    height: int
+    message: str
+    attempts: int
+
+
+class SpreadView(Answer):
+    """How far apart the pictures of the last sets came, ms. apart: sets of more than half a frame, of `sets`."""
+
+    median: Number
+    most: Number
+    worst: Number
+    apart: int
+    sets: int
+    lagging: str
+
+
+class CamerasView(Answer):
+    """The cameras that are open, and the last recording."""
+
+    cameras: list[LiveCameraView]
+    spread: SpreadView
+    fps: float
+    recording: RecordingState | None
+
 
 OF_RUN = ("tracker", "weighting", "body", "behaviour", "seed", "knobs")
 TRACKED = ("seconds", "keep_start", *OF_RUN)
@@ -56,7 +106,7 @@ def cameras(app: App) -> CamerasView:
 
 
 @router.post("/cameras/preview")
-async def preview(request: PreviewRequest, http: Request, app: App) -> CamerasView:
+async def preview(request: CamerasRequest, http: HttpRequest, app: App) -> CamerasView:
     """Open these cameras instead of those before. They close when they are not read for a while."""
     server = http.scope.get("server") or ("", 0)
     ports = {int(server[1] or 0), *(scene.port for scene in app.scenes.open_scenes().values())}
@@ -73,9 +123,7 @@ def picture(
 ) -> Response:
     """A camera's last picture (JPEG)."""
     shot = app.cameras.newest(name)
-    return Response(
-        preview_jpeg(shot, height), media_type="image/jpeg", headers={"cache-control": "no-store"}
-    )
+    return files.picture(preview_jpeg(shot, height))
 
 
 @router.get("/recordings")

@@ -5,7 +5,7 @@ names, one comparison at a time; how far it is comes as `comparison` events and 
 """
 
 from functools import lru_cache
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Depends, Query, Response
 from pydantic import Field
@@ -21,44 +21,149 @@ from studio.comparison.folders import (
 )
 from studio.comparison.kept_comparison import FRAMES_NAME, RESULT_NAME, KeptComparison
 from studio.comparison.plan import Plan
-from studio.comparison.sweep import expected, plan_sweep
-from studio.comparison.trial_runs import run_of_trial, trial_lines
+from studio.comparison.sweep import Expected, expected, plan_sweep
+from studio.comparison.trial_runs import TrialLine, run_of_trial, trial_lines
 from studio.errors import NotFoundError, RunError, StudioError, WorkCancelledError
 from studio.jobs import commands
 from studio.jobs.cluster import chosen_executor
 from studio.jobs.comparison_run import done_before, run_comparison, run_sweep
-from studio.jobs.job_runner import Job
+from studio.jobs.job_runner import Job, JobKind, SessionJob
 from studio.jobs.process_executor import cores
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.operations.comparing import MOST_TRACKERS, compare, kept_sweep, planned, sweep
+from studio.server import files
 from studio.server.app_state import App, AppState, release
-from studio.server.comparison_schemas import (
-    ComparisonChoices,
-    ComparisonDetail,
-    ComparisonLine,
-    ComparisonList,
-    ComparisonState,
-    EntrantChoice,
-    EntrantRequest,
-    LineupChoice,
-    SweepExpected,
-    TrialLine,
-    TrialRequest,
-    TrialRun,
-)
 from studio.server.error_responses import log
-from studio.server.job_kinds import COMPARISON
 from studio.server.requests import Arguments, body_of
-from studio.server.schemas import RunName, TrashEntry, Value
-from studio.server.session_routes import OpenSession, trash_entry
+from studio.server.schemas import Answer, Request, RunName, Value
+from studio.server.session_routes import OpenSession, TrashEntry, trash_entry
 from studio.sessions.session import Session
 from studio.trackers.catalogue import TRACKERS
 
 router = APIRouter(prefix="/api/comparisons", tags=["comparisons"])
 
+
+class CandidateRequest(Request):
+    """A tracker that takes part. name: a tracker, tracker:label, or a line-up; settings: its own knobs."""
+
+    name: str = Field(pattern=r"^[A-Za-z0-9_-]{1,64}(:[A-Za-z0-9_-]{1,40})?$")
+    weighting: RunName | None = Field(None, description="Null: that of all.")
+    settings: dict[str, Value] = Field(default_factory=dict)
+
+
+class ComparisonState(SessionJob):
+    """How a comparison stands that is being worked at. step: the trial that was done last; done, total: trials."""
+
+    name: str
+
+    @property
+    def key(self) -> str:
+        """The name that it is requested by."""
+        return f"{self.session}/{self.name}"
+
+
+COMPARISON = JobKind(
+    "comparison",
+    "comparison",
+    ComparisonState,
+    busy="Comparison '{name}' of '{session}' is running; one runs at a time.",
+    keeps_session=True,
+)
+
+
+class ComparisonLine(Answer):
+    """A comparison in a list. done, total: trials. best: the tracker with the smallest mean error, once it is done."""
+
+    session: str
+    name: str
+    created: str
+    status: Literal["queued", "running", "cancelling", "done", "interrupted", "cancelled", "failed"]
+    trackers: list[str]
+    tracker: str = Field("", description="Of a sweep.")
+    evaluations: int
+    seeds: int
+    first: int
+    last: int
+    done: int
+    total: int
+    step: str = ""
+    seconds_left: float | None = None
+    problem: str = ""
+    best: str = ""
+    best_mm: float | None = None
+    vary: dict[str, list[Value]] = Field(
+        default_factory=dict[str, list[Value]],
+        description="Of a sweep the values of each knob, else empty; trackers are then its points.",
+    )
+
+
+class ComparisonList(Answer):
+    """Comparisons, newest first within their session."""
+
+    comparisons: list[ComparisonLine]
+
+
+class TrialRequest(Request):
+    """A trial by its tracker's name in the comparison and its seed."""
+
+    tracker: str = Field(max_length=110)
+    seed: int = Field(ge=0, lt=2**63)
+
+
+class TrialRun(Answer):
+    """The run of a trial. is_new: made by this request and not tracked yet."""
+
+    session: str
+    run: str
+    is_new: bool
+
+
+class ComparisonDetail(Answer):
+    """A comparison. settings: by tracker its weighting and knobs; result: null until it is done, else the numbers
+    as `studio compare --json` prints them, every frame's error and the findings; of a sweep as `studio sweep --json`.
+    trials: of a finished comparison.
+    """
+
+    comparison: ComparisonLine
+    body: str
+    behaviour: str = ""
+    fit_shape: bool = Field(False, description="Of a sweep: whether each run fits the body's shape.")
+    fps: float
+    settings: dict[str, dict[str, Value]]
+    result: dict[str, Any] | None
+    trials: list[TrialLine]
+
+
+class CandidateChoice(Answer):
+    """A name that can take part. changes: the knobs that it brings along. sized_by: those that follow from the
+    evaluations.
+    """
+
+    name: str
+    tracker: str
+    help: str
+    sized_by: list[str]
+    changes: dict[str, Value] = Field(default_factory=dict)
+
+
+class LineupChoice(Answer):
+    """A name that stands for several."""
+
+    name: str
+    trackers: list[str]
+
+
+class ComparisonChoices(Answer):
+    """Who can take part."""
+
+    candidates: list[CandidateChoice]
+    lineups: list[LineupChoice]
+    weightings: list[str]
+
+
 WHO: dict[str, Any] = {
     "session": (RunName, ...),
-    "trackers": (Annotated[list[EntrantRequest], Field(min_length=1, max_length=MOST_TRACKERS)], ...),
+    "trackers": (Annotated[list[CandidateRequest], Field(min_length=1, max_length=MOST_TRACKERS)], ...),
     "settings": (
         dict[str, Value],
         Field(dict[str, Value](), description="Knobs of all trackers that have them."),
@@ -78,8 +183,8 @@ Kept = Annotated[KeptComparison, Depends(comparison_of)]
 @router.get("/choices")
 def choices() -> ComparisonChoices:
     """Who can be compared: trackers, labels that bring their knobs, line-ups of several."""
-    entrants = [
-        EntrantChoice(
+    candidates = [
+        CandidateChoice(
             name=name,
             tracker=tracker.name,
             help=entry.help if entry else tracker.label,
@@ -90,7 +195,7 @@ def choices() -> ComparisonChoices:
         for tracker in (TRACKERS[name.partition(":")[0]],)
     ]
     return ComparisonChoices(
-        entrants=entrants,
+        candidates=candidates,
         lineups=[LineupChoice(name=name, trackers=list(members)) for name, members in LINEUPS.items()],
         weightings=list(WEIGHTINGS),
     )
@@ -133,17 +238,10 @@ def begin_sweep(
 @router.post("/sweeps/expected")
 def expected_of_sweep(
     arguments: Annotated[Arguments, body_of(sweep, "ExpectedRequest", session=(RunName, ...))], app: App
-) -> SweepExpected:
+) -> Expected:
     """How many runs a sweep has and about how long they take; 422 for what cannot be swept."""
     session = app.workspace.session(arguments.more["session"])
-    found = expected(session, _sweep_plan(session, arguments), _processes(), cores())
-    return SweepExpected(
-        runs=found.runs,
-        frames=found.frames,
-        evaluations=found.evaluations,
-        seconds=found.seconds,
-        judged_by=found.judged_by,
-    )
+    return expected(session, _sweep_plan(session, arguments), _processes(), cores())
 
 
 @router.get(ONE)
@@ -157,11 +255,11 @@ def detail(session: OpenSession, kept: Kept, app: App) -> ComparisonDetail:
         fps=plan.fps,
         settings={
             candidate.name: {WEIGHTING: candidate.weighting, **candidate.changes}
-            for candidate in plan.entrants
+            for candidate in plan.candidates
         },
         fit_shape=plan.fit_shape,
         result=kept.result(),
-        trials=[TrialLine.of(line) for line in trial_lines(session, kept)],
+        trials=trial_lines(session, kept),
     )
 
 
@@ -221,18 +319,18 @@ def result_json(session: OpenSession, kept: Kept) -> Response:
 @router.get(ONE + "/frames.csv", response_class=Response)
 def frames_as_csv(session: OpenSession, kept: Kept) -> Response:
     """A row a tracker, seed and frame: its error in mm and the limbs lost."""
-    return _file(session, kept, FRAMES_NAME, "text/csv; charset=utf-8", "csv")
+    return _file(session, kept, FRAMES_NAME, files.CSV, "csv")
 
 
 def _plan(session: Session, arguments: Arguments) -> Plan:
     """The request, checked. Raises StudioError for what cannot be compared."""
-    shared, entrants = arguments.more["settings"], arguments.more["trackers"]
+    shared, candidates = arguments.more["settings"], arguments.more["trackers"]
     changes: dict[str, dict[str, Any]] = {"": shared} if shared else {}
-    for candidate in entrants:
+    for candidate in candidates:
         own = dict(candidate.settings) | ({WEIGHTING: candidate.weighting} if candidate.weighting else {})
         if own:
             changes[candidate.name] = own
-    return planned(session, [candidate.name for candidate in entrants], changes=changes, **arguments)
+    return planned(session, [candidate.name for candidate in candidates], changes=changes, **arguments)
 
 
 def _sweep_plan(session: Session, arguments: Arguments) -> Plan:
@@ -290,7 +388,7 @@ def _line(app: AppState, session: Session, kept: KeptComparison) -> ComparisonLi
     job = app.jobs.known(COMPARISON, f"{session.name}/{kept.name}")
     going = job if job is not None and job.state.is_going else None
     status = going.state.value if going else kept.status()
-    total = len(plan.seeds) * len(plan.entrants)
+    total = len(plan.seeds) * len(plan.candidates)
     if status == "done":
         done = total
     else:
@@ -300,8 +398,8 @@ def _line(app: AppState, session: Session, kept: KeptComparison) -> ComparisonLi
         name=kept.name,
         created=record.created,
         status=status,  # pyright: ignore[reportArgumentType]
-        trackers=[candidate.name for candidate in plan.entrants],
-        tracker=plan.entrants[0].tracker if plan.vary else "",
+        trackers=[candidate.name for candidate in plan.candidates],
+        tracker=plan.candidates[0].tracker if plan.vary else "",
         evaluations=plan.evaluations,
         seeds=len(plan.seeds),
         first=plan.first,
@@ -337,5 +435,4 @@ def _file(session: Session, kept: KeptComparison, name: str, kind: str, ending: 
     path = kept.folder / name
     if not path.is_file():
         raise NotFoundError(f"Comparison '{kept.name}' is not finished.", "Wait for it, or let it go on.")
-    headers = {"content-disposition": f'attachment; filename="{session.name}-{kept.name}.{ending}"'}
-    return Response(path.read_bytes(), media_type=kind, headers=headers)
+    return files.download(path.read_bytes(), f"{session.name}-{kept.name}.{ending}", kind)

@@ -3,14 +3,38 @@
 from fastapi import APIRouter
 
 from studio.errors import StudioError
-from studio.jobs.job_runner import Job
+from studio.jobs.job_runner import Job, JobKind, SessionJob
 from studio.jobs.process_executor import cores
 from studio.operations.course import RUNS, SAMPLE, finished, make_course
 from studio.server.app_state import App
-from studio.server.course_schemas import CourseRunLine, CourseState, CourseView
-from studio.server.job_kinds import COURSE
+from studio.server.schemas import Answer
 
 router = APIRouter(prefix="/api/course", tags=["course"])
+
+
+class CourseState(SessionJob):
+    """How the making of the course's runs stands."""
+
+
+COURSE = JobKind(
+    "course", "course", CourseState, changes_session=True, busy="The course's runs are being made."
+)
+
+
+class CourseRunLine(Answer):
+    """A run of the course. there: whether it is tracked to its end."""
+
+    name: str
+    words: str
+    there: bool
+
+
+class CourseView(Answer):
+    """The course's runs. job: how their making stands, null where nobody has begun it."""
+
+    session: str
+    runs: list[CourseRunLine]
+    job: CourseState | None
 
 
 @router.get("")

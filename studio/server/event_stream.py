@@ -18,10 +18,12 @@ from studio.jobs.watchers import Subscription
 from studio.server.event_encoding import as_json, key_of, message_of
 from studio.server.windows import WindowInQuery
 
+router = APIRouter(tags=["events"])
+
+
 if TYPE_CHECKING:
     from studio.server.app_state import Control, WindowScene
 
-router = APIRouter(tags=["events"])
 
 LIMIT = 256
 

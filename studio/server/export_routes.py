@@ -2,37 +2,93 @@
 
 from fastapi import APIRouter
 from fastapi.responses import FileResponse, Response
+from pydantic import Field
 
 from studio.capture.calibration_files import CALIBRATION_FORMATS
 from studio.export.exporting import settled
 from studio.export.formats import FORMATS, format_of
-from studio.export.kept_exports import (
-    discard_export,
-    export_into_run,
-    kept_exports,
-    kept_file,
-    stale_export,
-)
+from studio.export.kept_exports import discard_export, export_into_run, kept_exports, kept_file, stale_export
 from studio.export.options import ExportOptions
-from studio.jobs.job_runner import Job
+from studio.jobs.job_runner import Job, JobKind, NumberedJob
 from studio.knobs import knobs_of
 from studio.runs.tracks import best_track, track_names
 from studio.server.app_state import App
-from studio.server.export_schemas import (
-    ExportChoices,
-    ExportLine,
-    ExportList,
-    ExportRequest,
-    ExportState,
-    FormatView,
-)
-from studio.server.job_kinds import EXPORT
 from studio.server.job_routes import add_job_routes
 from studio.server.run_routes import RUN, OpenRun
+from studio.server.schemas import Answer, Request, Value
 from studio.server.session_routes import OpenSession
-from studio.server.setting_views import knob_view
+from studio.server.setting_views import KnobView, knob_view
 
 router = APIRouter(prefix="/api", tags=["exports"])
+
+
+class FormatView(Answer):
+    """A format. opens: what opens it. takes: names of the options that mean something here. unit, up: what auto is."""
+
+    name: str
+    title: str
+    opens: str
+    takes: list[str]
+    unit: str
+    up: str
+    what: str = Field(description="motion, video, scene or cameras.")
+
+
+class ExportChoices(Answer):
+    """What a run can be exported to, and how. calibrations: writers by the ending of their files."""
+
+    formats: list[FormatView]
+    options: list[KnobView]
+    calibrations: dict[str, list[str]]
+
+
+class ExportRequest(Request):
+    """A format's name, and options by name where they are not the usual ones."""
+
+    format: str = Field(max_length=20)
+    options: dict[str, Value] = Field(default_factory=dict)
+
+
+class ExportLine(Answer):
+    """A finished export. checked: what reading the file back showed. notes: on gaps, names and axes. stale: why it does
+    not hold its track as it is now.
+    """
+
+    file: str
+    format: str
+    made: str
+    bytes: int
+    frames: int
+    fps: float
+    checked: str
+    notes: list[str]
+    options: dict[str, Value]
+    track: str = ""
+    stale: str = ""
+
+
+class ExportState(NumberedJob):
+    """How an export stands. result: of one that is done."""
+
+    run: str
+    format: str
+    result: ExportLine | None = None
+
+
+EXPORT = JobKind("export", "export", ExportState)
+
+
+class ExportList(Answer):
+    """A run's exports, newest first, those under way, and its tracks and cameras to choose among. best: the track that
+    is written unless another is chosen; note: on better ones that are out of date.
+    """
+
+    exports: list[ExportLine]
+    running: list[ExportState]
+    tracks: list[str]
+    best: str
+    note: str = ""
+    cameras: list[str]
 
 
 @router.get("/exports/choices")

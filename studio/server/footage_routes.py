@@ -9,26 +9,89 @@ from pathlib import Path
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
+from pydantic import Field
 
 from studio.capture.timestamps import TIMESTAMP_NAMES
-from studio.jobs.job_runner import Job
+from studio.jobs.job_runner import Job, JobKind, SessionJob
 from studio.operations.footage import synchronise
 from studio.runs.footage_pictures import bare_picture
 from studio.runs.overlay_drawing import encode_jpeg
+from studio.server import files
 from studio.server.app_state import App, release
-from studio.server.footage_schemas import (
-    FootageCamera,
-    FootageState,
-    SynchronyState,
-    TimedAnswer,
-)
-from studio.server.job_kinds import SYNCHRONY
 from studio.server.requests import Arguments, body_of
+from studio.server.schemas import Answer
 from studio.server.session_routes import OpenSession
 from studio.sessions.footage_changes import change_footage, recorded_offsets, stale_runs, synchrony_of
 from studio.sessions.session import Session
 
 router = APIRouter(prefix="/api", tags=["footage"])
+
+
+MOST_OFFSET = 1_000_000
+
+
+class FootageCamera(Answer):
+    """One camera's footage. offset: the file's frame that is frame 0 of the session. turned: degrees clockwise."""
+
+    name: str
+    kind: str
+    offset: int
+    turned: int
+    width: int
+    height: int
+    frame_count: int
+    has_masks: bool
+    has_background: bool
+
+
+class FootageState(Answer):
+    """How a session's cameras are put together. frame_count: frames that all have. stale_runs: those made before the
+    footage was last changed. notes: what the change that was just made means.
+    """
+
+    session: str
+    layout: str
+    fps: float
+    frame_count: int
+    cameras: list[FootageCamera]
+    stale_runs: list[str]
+    notes: list[str] = Field(default_factory=list)
+
+
+class TimedAnswer(Answer):
+    """Offsets by a recorder's times; nothing of it is applied. apart: frames that they are apart at most after it."""
+
+    offsets: dict[str, int]
+    apart: float
+    notes: list[str]
+
+
+class PairView(Answer):
+    """Two cameras by themselves: lag in frames, correlation there, peak over the next best, frames nearly as good."""
+
+    first: str
+    second: str
+    lag: int
+    peak: float
+    ratio: float
+    within: int
+    sure: bool
+
+
+class SynchronyState(SessionJob):
+    """How an estimate of the offsets stands, and what it found; nothing of it is applied. confidence: peak over second
+    peak; spread: frames that it may be off.
+    """
+
+    offsets: dict[str, int] = Field(default_factory=dict)
+    confidence: dict[str, float] = Field(default_factory=dict)
+    spread: dict[str, int] = Field(default_factory=dict)
+    sure: bool = False
+    notes: list[str] = Field(default_factory=list)
+    pairs: list[PairView] = Field(default_factory=list[PairView])
+
+
+SYNCHRONY = JobKind("synchrony", "estimate", SynchronyState)
 
 
 @router.get("/sessions/{session}/footage")
@@ -59,7 +122,7 @@ def footage_picture(
 ) -> Response:
     """A camera's picture with its offset and turn, as it is before any calibration (JPEG)."""
     picture = bare_picture(session, camera, frame, height)
-    return Response(encode_jpeg(picture), media_type="image/jpeg", headers={"cache-control": "no-store"})
+    return files.picture(encode_jpeg(picture))
 
 
 @router.post("/sessions/{session}/footage/times")

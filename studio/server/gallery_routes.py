@@ -4,15 +4,22 @@ from fastapi import APIRouter, Response
 from pydantic import Field
 
 from studio.errors import NotFoundError
-from studio.jobs.job_runner import Job, SessionJob
+from studio.jobs.job_runner import Job, JobKind, SessionJob
 from studio.operations.gallery import CARDS, Card, CardKind, CardStanding, card_of, make_card, standing_of
 from studio.runs.samples import sample_folder
+from studio.server import files
 from studio.server.app_state import App, AppState
-from studio.server.job_kinds import GALLERY, GalleryState
 from studio.server.schemas import Answer
 from studio.sessions.session import Session, thumbnail_of
 
 router = APIRouter(prefix="/api/gallery", tags=["gallery"])
+
+
+class GalleryState(SessionJob):
+    """How the making of a card's session stands."""
+
+
+GALLERY = JobKind("gallery", "session", GalleryState, changes_session=True)
 
 
 class CardView(Answer):
@@ -57,7 +64,7 @@ def card_picture(card: str, app: App) -> Response:
         content = thumbnail_of(Session(sample_folder(found.name))) if found.kind == "sample" else None
     if content is None:
         raise NotFoundError(f"Card '{card}' has no picture.", "Make its session first.")
-    return Response(content, media_type="image/jpeg", headers={"cache-control": "no-cache"})
+    return files.picture(content, checked_anew=True)
 
 
 @router.post("/{card}", status_code=202)

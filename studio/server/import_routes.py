@@ -9,28 +9,23 @@ of it was read.
 import asyncio
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query
 from pydantic import Field
 
-from studio.jobs.job_runner import Job
+from studio.capture.naming import CameraMatch
+from studio.jobs.job_runner import Job, JobKind, NumberedJob
 from studio.operations.footage import add_footage, import_footage
 from studio.progress import Progress
 from studio.runs.overlay_pictures import forget_composers
 from studio.runs.samples import install_sample
 from studio.server.app_state import App, AppState, release
-from studio.server.import_schemas import (
-    FolderView,
-    ImportState,
-    SampleRequest,
-)
-from studio.server.job_kinds import IMPORT
 from studio.server.job_routes import add_job_routes
 from studio.server.requests import Arguments, MaybeName, body_of
 from studio.server.safe_paths import folder_to_import
-from studio.server.schemas import NewName, RunName
-from studio.server.session_routes import OpenSession
+from studio.server.schemas import Answer, Request, RunName
+from studio.server.session_routes import NewName, OpenSession
 from studio.server.upload_routes import forget, upload_folder
 from studio.sessions.archives import FOOTAGE_PARTS, only_archive, unpacked, unwrapped
 from studio.sessions.importers.importing import ImportReport
@@ -38,6 +33,33 @@ from studio.sessions.names import PathRefused, relative_path
 from studio.sessions.session import Session
 
 router = APIRouter(prefix="/api", tags=["importing"])
+
+
+class ImportState(NumberedJob):
+    """How an import stands. name: of the session. layout: whose the source was taken for."""
+
+    name: str
+    notes: list[str] = Field(default_factory=list)
+    warnings: list[str] = Field(default_factory=list)
+    matching: list[CameraMatch] = Field(default_factory=list[CameraMatch])
+    layout: str = ""
+
+
+IMPORT = JobKind("import", "import", ImportState, changes_session=True)
+
+
+class FolderView(Answer):
+    """Folders of the server's machine that footage may be imported from."""
+
+    path: str
+    parent: str | None
+    folders: list[str]
+
+
+class SampleRequest(Request):
+    """A session that travels with the studio."""
+
+    name: Literal["walk", "planar_arm", "branched_arms"] = "walk"
 
 
 Taker = Callable[[Path, Progress], ImportReport | Session]
@@ -51,7 +73,6 @@ FROM: dict[str, Any] = {
 }
 """Where footage lies, for a body: a folder of this machine, or an upload."""
 NAMED: dict[str, Any] = {"name": (RunName, Field(description="What the session will be called.")), **FROM}
-
 FOLDERS_SHOWN = 1000
 
 

@@ -2,12 +2,8 @@
 
 from fastapi import APIRouter
 
-from studio.jobs.job_runner import JobKind, SessionJob, State, Work
-from studio.server.app_state import App, AppState
-from studio.server.job_kinds import TRACK
-from studio.server.track_schemas import TrackJobState, Verb
-from studio.sessions.session import Session
-from studio.sessions.stored_run import StoredRun
+from studio.jobs.job_runner import JobKind, SessionJob, State
+from studio.server.app_state import App
 
 
 def add_job_routes(router: APIRouter, path: str, kind: JobKind[State]) -> None:
@@ -23,11 +19,3 @@ def add_job_routes(router: APIRouter, path: str, kind: JobKind[State]) -> None:
         """Stop it; nothing of it is kept but what is done frame by frame."""
         app.jobs.cancel(kind, identifier)
         return app.jobs.state(kind, identifier)
-
-
-def begin_job(
-    app: AppState, verb: Verb, session: Session, run: StoredRun | None, work: Work
-) -> TrackJobState:
-    """Begin work on a session's poses or tracks. run : that it is about, if it is about one."""
-    state = TrackJobState(verb=verb, session=session.name, run=run.name if run else "")
-    return app.jobs.begin(TRACK, state, work)

@@ -1,4 +1,4 @@
-"""The page around the scene: `index.html`, its styles and modules, and what a browser wants remembered."""
+"""The pages: the studio's own around the scene, those of documents, and what a browser wants remembered."""
 
 import mimetypes
 from pathlib import Path
@@ -10,12 +10,22 @@ from starlette.responses import Response
 
 from studio.errors import StudioError
 from studio.server.app_state import AppState, app_state
-from studio.server.pages import NAME, html_page
+from studio.server.pages import NAME, PLACES, html_page
 from studio.sessions.atomic_files import write_bytes
 from studio.typed_decoding import decode_json
 
 router = APIRouter(tags=["page"])
 
+DOCUMENT = "document.html"
+"""One frame with a bar of places; what is in it is drawn by each page's own module."""
+RAILED = ("comparisons", "bodies", "behaviours")
+"""Pages that have a list at the left, and a button that makes something."""
+UNRAILED = ("gallery", "recording", "reports")
+RAIL = (
+    '<nav class="rail" aria-label="{title}">\n    <div class="rail-head">\n      <h2>{title}</h2>\n      '
+    '<button class="quiet small" id="new">+ New</button>\n    </div>'
+    '\n    <div class="entries" id="entries"></div>\n  </nav>'
+)
 PREFERENCES_FILE = "preferences.json"
 PREFERENCES_LIMIT = 16_384
 
@@ -37,6 +47,22 @@ class PreferencesError(StudioError):
 def page() -> Response:
     """The studio's page."""
     return html_page("index.html", "/", {"title": NAME})
+
+
+def _add_document(name: str) -> None:
+    """Add a page by its name: that of its address and of its module."""
+    address, railed = f"/{name}", name in RAILED
+
+    @router.get(address, include_in_schema=False)
+    def document_page() -> Response:
+        """A page of its own beside the studio's."""
+        title = PLACES[address]
+        own = {"title": f"{title} · {NAME}", "module": name, "columns": "" if railed else "wide"}
+        return html_page(DOCUMENT, address, own | {"rail": RAIL.format(title=title) if railed else ""})
+
+
+for _name in (*RAILED, *UNRAILED):
+    _add_document(_name)
 
 
 @router.get("/api/preferences")

@@ -14,6 +14,7 @@ from studio.runs.overlay_drawing import encode_jpeg
 from studio.runs.overlay_pictures import OtherBody, compose_view
 from studio.runs.session_settings import session_settings
 from studio.runs.tracks import RAW, pose_in_track
+from studio.server import files
 from studio.server.run_routes import RUN, OpenRun
 from studio.server.session_routes import OpenSession
 from studio.sessions.session import Session
@@ -66,7 +67,7 @@ def picture(
     picture = compose_view(
         session, None, frame, camera, _layers(show), _posed(session, pose), height=height, settings=wanted
     )
-    return _jpeg(encode_jpeg(picture))
+    return files.picture(encode_jpeg(picture))
 
 
 @router.get(RUN + VIEW, response_class=Response)
@@ -101,7 +102,7 @@ def overlay(
     picture = compose_view(
         session, run, frame, camera, _layers(show), pose, height=height, beside=others, own=own
     )
-    return _jpeg(encode_jpeg(picture))
+    return files.picture(encode_jpeg(picture))
 
 
 def _body_of(session: Session, name: str, frame: int, place: int) -> OtherBody | None:
@@ -171,7 +172,3 @@ def _check_view(session: Session, frame: int, camera: str, run: StoredRun | None
         raise NotFoundError(
             f"Session '{session.name}' has no camera '{camera[:64]}'.", f"It has {', '.join(names)}."
         )
-
-
-def _jpeg(content: bytes) -> Response:
-    return Response(content, media_type="image/jpeg", headers={"cache-control": "no-store"})

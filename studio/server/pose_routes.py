@@ -1,41 +1,147 @@
 """Poses set by hand: start poses, dragging, mirroring, the search around a pose, and the editor in the scene."""
 
+import asyncio
 import math
+from contextlib import suppress
+from typing import Annotated, Literal
 
 import numpy as np
 from fastapi import APIRouter
+from pydantic import Field
 
 from studio.arrays import Array
 from studio.body.dragging import Dragger
-from studio.body.mirroring import Mirror
+from studio.body.mirroring import Mirror, has_sides
 from studio.body.model import BodyModel
-from studio.errors import BodyError, SettingsError
-from studio.jobs.job_runner import Job
+from studio.errors import SettingsError, StudioError
+from studio.jobs.job_runner import Job, JobKind, NumberedJob
+from studio.likelihood.catalogue import WEIGHTINGS
+from studio.operations.person import initialise
+from studio.runs.initialising import InitialPose
 from studio.runs.new_run import checked_frames
 from studio.runs.pose_search import better_pose
 from studio.runs.start_pose_file import keep_start_pose
 from studio.server.app_state import App, Scene
-from studio.server.job_routes import begin_job
-from studio.server.pose_schemas import (
-    BetterPoseRequest,
-    DragRequest,
-    EditRequest,
-    EditState,
-    GripView,
-    MirrorRequest,
-    PoseRequest,
-    PoseView,
-    StartPoseRequest,
-)
+from studio.server.job_routes import add_job_routes
+from studio.server.requests import Arguments, body_of
+from studio.server.schemas import Answer, Number, Numbers, Request, RunName
 from studio.server.session_routes import OpenSession
-from studio.server.session_views import parameter_views
-from studio.server.track_schemas import TrackJobState
+from studio.server.session_views import ParameterView, parameter_views
+from studio.server.track_routes import TrackJobState, begin_job
+from studio.server.windows import Window
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 
 router = APIRouter(prefix="/api", tags=["poses"])
 
+
+class GripView(Answer):
+    """A limb's end that can be dragged. place: where it is in the pose, mm."""
+
+    name: str
+    side: str
+    place: list[float]
+
+
+class PoseView(Answer):
+    """A pose of the session's body: radians and mm in the order of `parameters`.
+
+    stored: whether it is the session's start pose (else the rest pose); frame: that it is of. left_mm: after a drag,
+    how far the limb's end still is from where it was dragged.
+    """
+
+    body: str
+    parameters: list[ParameterView]
+    pose: list[float]
+    grips: list[GripView]
+    stored: bool = False
+    frame: int = 0
+    left_mm: Number = None
+    has_sides: bool = Field(False, description="Whether it can be mirrored.")
+
+
+class StartPoseRequest(Request):
+    """The session's start pose from now on; the one it had stays beside it. frame: that it is of, in which tracking
+    begins; null: as before.
+    """
+
+    pose: list[float]
+    frame: int | None = Field(None, ge=0)
+
+
+class PoseRequest(Request):
+    """A pose, of the session's body or of a run's (which then also says with what weighting it is judged)."""
+
+    pose: list[float]
+    run: RunName | None = None
+
+
+class DragRequest(PoseRequest):
+    """A limb's end that is dragged to a place (x, y, z, mm); the body follows, its limits kept."""
+
+    limb: str = Field(max_length=64)
+    target: tuple[float, float, float]
+
+
+class MirrorRequest(PoseRequest):
+    """How it is mirrored: `in place`, facing where it faces, or `turned round`, facing the other way as well."""
+
+    how: Literal["in place", "turned round"] = "in place"
+
+
+class BetterPoseRequest(PoseRequest):
+    """A short search around the pose in a frame, then local refinement."""
+
+    frame: int = Field(0, ge=0)
+    seed: int = Field(0, ge=0, le=2**63 - 1)
+
+
+class EditRequest(Request):
+    """What the scene lets a person edit. run: null for the session's start pose, else `frame` of it is corrected. pose:
+    to begin with, or to go on to; null: the one that is shown there.
+    """
+
+    session: RunName
+    run: RunName | None = None
+    frame: int | None = Field(None, ge=0)
+    pose: list[float] | None = None
+
+
+class EditState(Answer):
+    """What is being edited in the scene; all null while nothing is. moved: whether it is another pose than it was."""
+
+    editing: bool = False
+    session: str | None = None
+    run: str | None = None
+    frame: int | None = None
+    pose: list[float] | None = None
+    moved: bool = False
+
+
 SESSION = "/sessions/{session}"
+
+
+class InitialisationState(NumberedJob):
+    """How the search stands.
+
+    pose: radians and mm, in the order of `parameters`. confidence: 0 to 1, that the body stands so and faces so.
+    margin: log weight by which the best pose that faces the other way is beaten, null without one. overlap: of the
+    silhouettes. file: that it was written to, in the session's folder.
+    """
+
+    frame: int
+    body: str = ""
+    parameters: list[str] = Field(default_factory=list)
+    pose: Numbers | None = None
+    confidence: Number = None
+    margin: Number = None
+    overlap: Number = None
+    source: str = ""
+    note: str = ""
+    file: str = ""
+
+
+START_POSE = JobKind("initialise", "search", InitialisationState, changes_session=True)
 
 
 @router.get(SESSION + "/start-pose")
@@ -170,13 +276,46 @@ def _view(
         stored=stored,
         frame=frame,
         left_mm=left_mm,
-        has_sides=_has_sides(body),
+        has_sides=has_sides(body),
     )
 
 
-def _has_sides(body: BodyModel) -> bool:
-    try:
-        Mirror(body)
-    except BodyError:
-        return False
-    return True
+@router.post("/sessions/{session}/initialise", status_code=202)
+async def begin_initialisation(
+    session: OpenSession,
+    arguments: Annotated[Arguments, body_of(initialise, "InitialisationRequest", without=("keep",))],
+    app: App,
+    window: Window = "",
+) -> InitialisationState:
+    """Begin to look for the pose in a frame. Ask for its state, or wait for `initialise` events."""
+    frame = arguments["frame"]
+    checked_frames(session, frame, frame + 1)
+    await asyncio.to_thread(session.body, arguments.get("body"))
+    if "weighting" in arguments:
+        WEIGHTINGS[arguments["weighting"]]
+
+    def work(job: Job) -> dict[str, object]:
+        found = initialise(session, **arguments, progress=job.report_or_stop)
+        with suppress(StudioError):  # without room for a scene the pose is found all the same
+            scene = app.scenes.scene(window)
+            scene.poses.propose(session.name, found.pose.tolist(), found.source, found.frame)
+        return {"file": found.file.name if found.file else "", **_answer(found)}
+
+    state = InitialisationState(session=session.name, frame=frame)
+    return app.jobs.begin(START_POSE, state, work)
+
+
+add_job_routes(router, "/initialisations/{identifier}", START_POSE)
+
+
+def _answer(found: InitialPose) -> dict[str, object]:
+    return {
+        "body": found.body,
+        "parameters": list(found.names),
+        "pose": found.pose.tolist(),
+        "confidence": found.confidence,
+        "margin": found.margin,
+        "overlap": found.overlap,
+        "source": found.source,
+        "note": found.note,
+    }

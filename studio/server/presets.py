@@ -9,13 +9,22 @@ from pathlib import Path
 import msgspec
 
 from studio.errors import NotFoundError, StudioError
-from studio.server.setting_schemas import PresetView
+from studio.server.schemas import Answer, Value
 from studio.sessions.atomic_files import write_bytes
 from studio.settings import in_todays_names, knob_table
 from studio.trackers.catalogue import presets
 from studio.typed_decoding import decode_json
 
-Value = bool | int | float | str
+
+class PresetView(Answer):
+    """Ready-made settings: a handful of knobs. own: made by a person, so that it can be deleted."""
+
+    name: str
+    label: str
+    help: str
+    values: dict[str, Value]
+    own: bool = False
+
 
 FILE_NAME = "presets.json"
 MOST = 100

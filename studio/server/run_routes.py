@@ -7,37 +7,94 @@ event stream. Each names its run, which the process opens first if it is not ope
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query
+from pydantic import Field
 
 from studio.errors import RunError
 from studio.jobs import commands
-from studio.jobs.search_pace import offered
+from studio.jobs.search_pace import MOST_SECONDS, SpeedChoice, offered
 from studio.operations.tracking import new_run
 from studio.progress import unheard
 from studio.runs.sides import notes_of
 from studio.server.app_state import App, AppState, release
 from studio.server.event_encoding import message_of, plain
 from studio.server.requests import Arguments, body_of
-from studio.server.schemas import (
-    Frame,
-    LogEntry,
-    LogLines,
-    NewName,
-    PaceRequest,
-    PaceView,
-    Posted,
-    ReannealRequest,
-    RunDetail,
-    RunLine,
-    RunList,
-    SessionChange,
-    TrashEntry,
-)
-from studio.server.session_routes import OpenSession, trash_entry
-from studio.server.session_views import completed, parameter_views
+from studio.server.schemas import Answer, Numbers, Request, Value
+from studio.server.session_routes import NewName, OpenSession, SessionChange, TrashEntry, trash_entry
+from studio.server.session_views import ParameterView, RunLine, parameter_views, run_line
 from studio.sessions.run_log import read_log
 from studio.sessions.stored_run import StoredRun
 
 router = APIRouter(prefix="/api", tags=["runs"])
+
+
+class Frame(Request):
+    """A frame by its number."""
+
+    frame: int = Field(ge=0)
+
+
+class ReannealRequest(Request):
+    """Which frame (-1: the selected one), and whether the answer replaces the stored one."""
+
+    frame: int = Field(-1, ge=-1)
+    keep: bool = False
+
+
+class Posted(Answer):
+    """A command handed to the tracking process; an `acknowledged` event with its identifier follows."""
+
+    identifier: str
+    command: str
+
+
+class RunList(Answer):
+    """The runs of a session, newest first."""
+
+    runs: list[RunLine]
+
+
+class RunDetail(Answer):
+    """A run and its request. settings: at its start; parameters: of its pose vector, as sigma and start_pose."""
+
+    run: RunLine
+    settings: dict[str, Value]
+    parameters: list[ParameterView]
+    sigma: Numbers
+    start_pose: Numbers | None
+    start_source: str
+    software: str
+    fps: float
+    notes: list[str]
+    behaviour: str = ""
+    live: bool = False
+
+
+class LogEntry(Answer):
+    """One line of a run's log. time: seconds since the epoch."""
+
+    level: str
+    time: float
+    text: str
+
+
+class LogLines(Answer):
+    """What the tracking process said, oldest first."""
+
+    lines: list[LogEntry]
+
+
+class PaceRequest(Request):
+    """How long each tracked layer takes at least; 0: as fast as it can."""
+
+    seconds_a_layer: float = Field(ge=0.0, le=MOST_SECONDS, allow_inf_nan=False)
+
+
+class PaceView(Answer):
+    """The pace that the search has, and what is offered: fast to slow, the present one among them."""
+
+    seconds_a_layer: float
+    choices: list[SpeedChoice]
+
 
 SEARCHING = ("tracking", "compiling")
 RUN = "/sessions/{session}/runs/{run}"
@@ -61,8 +118,7 @@ Checked = Annotated[
 @router.get("/sessions/{session}/runs")
 def runs(session: OpenSession) -> RunList:
     """The session's runs, newest first."""
-    lines = [RunLine.model_validate(run.summary()) for run in reversed(session.runs())]
-    return RunList(runs=[completed(line, session) for line in lines])
+    return RunList(runs=[run_line(run.summary(), session) for run in reversed(session.runs())])
 
 
 @router.post("/sessions/{session}/runs", status_code=201)
@@ -76,7 +132,7 @@ def make_run(
     }
     made = new_run(session, **options, progress=unheard)
     app.events.session_changed(session.name, made.name)
-    return completed(RunLine.model_validate(made.summary()), session)
+    return run_line(made.summary(), session)
 
 
 @router.get(RUN)
@@ -85,7 +141,7 @@ def run_detail(session: OpenSession, run: OpenRun, check: Checked = True) -> Run
     record = run.record
     return RunDetail.of(
         record,
-        run=completed(RunLine.model_validate(run.summary(blobs=check)), session),
+        run=run_line(run.summary(blobs=check), session),
         parameters=parameter_views(run.body()),
         notes=list(notes_of(run)),
     )

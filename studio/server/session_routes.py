@@ -1,26 +1,19 @@
 """Sessions: list, look, rename, duplicate, throw away, bring back."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, Response
+from pydantic import Field
 
 from studio.comparison.folders import bring_back
 from studio.comparison.kept_comparison import RECORD_NAME as COMPARISON_FILE_NAME
 from studio.comparison.kept_comparison import KeptComparison
 from studio.errors import NotFoundError, StudioError
+from studio.server import files
 from studio.server.app_state import App, AppState, release
-from studio.server.schemas import (
-    NewName,
-    Restored,
-    SessionChange,
-    SessionDetail,
-    SessionList,
-    TrashChoice,
-    TrashEntry,
-    TrashList,
-)
-from studio.server.session_views import session_detail, session_line
+from studio.server.schemas import Answer, Request, RunName
+from studio.server.session_views import SessionDetail, SessionLine, session_detail, session_line
 from studio.sessions.manifest import FILE_NAME, read_manifest
 from studio.sessions.names import inside
 from studio.sessions.run_record import FILE_NAME as RUN_FILE_NAME
@@ -30,6 +23,55 @@ from studio.sessions.workspace import TRASH_NAME, SessionSummary
 from studio.training.model_repository import bring_back_model, thrown_model
 
 router = APIRouter(prefix="/api", tags=["sessions"])
+
+
+class SessionList(Answer):
+    """All sessions of the workspace, by name."""
+
+    sessions: list[SessionLine]
+
+
+class SessionChange(Request):
+    """New words for a session; both may change at once."""
+
+    name: RunName | None = None
+    title: str | None = Field(None, max_length=200)
+
+
+class NewName(Request):
+    """A name; null lets the studio find a free one."""
+
+    name: RunName | None = None
+
+
+class TrashEntry(Answer):
+    """Something in the trash. name: what it was called; what is "other" cannot be restored."""
+
+    id: str
+    name: str
+    kind: Literal["session", "run", "comparison", "model", "other"]
+    restorable: bool = True
+
+
+class TrashList(Answer):
+    """What lies in the trash, oldest first."""
+
+    entries: list[TrashEntry]
+
+
+class Restored(Answer):
+    """Where something came back to. name: the session, "" for a model; run, comparison, model: "" where it is none."""
+
+    name: str
+    run: str = ""
+    comparison: str = ""
+    model: str = ""
+
+
+class TrashChoice(Request):
+    """An entry of the trash by its id."""
+
+    entry: RunName
 
 
 def session_of(session: str, app: App) -> Session:
@@ -59,7 +101,7 @@ def thumbnail(session: OpenSession) -> Response:
     path = session.thumbnail()
     if path is None:
         raise NotFoundError(f"Session '{session.name}' has no picture to show.", "Check its footage.")
-    return Response(path.read_bytes(), media_type="image/jpeg", headers={"cache-control": "no-cache"})
+    return files.picture(path.read_bytes(), checked_anew=True)
 
 
 @router.patch("/sessions/{session}")

@@ -1,26 +1,148 @@
 """Sessions, cameras and bodies as the API shows them."""
 
+import dataclasses
+from dataclasses import dataclass
+
+from pydantic import Field
+
 from studio.body.dimensions import follows_height
 from studio.body.model import BodyModel
 from studio.capture.footage_source import CameraSource
+from studio.capture.naming import CameraMatch
 from studio.comparison.folders import comparison_count
 from studio.errors import StudioError
 from studio.geometry.camera import Camera
 from studio.runs.silhouette_doubts import standing_doubts
 from studio.server.run_errors import mean_error
-from studio.server.schemas import BodyView, CameraView, ParameterView, RunLine, SessionDetail, SessionLine
+from studio.server.schemas import Answer, Number, Numbers
 from studio.sessions.run_record import RunRecord
 from studio.sessions.session import Session
+from studio.sessions.stored_run import RunSummary
 from studio.sessions.workspace import SessionSummary, next_step
 from studio.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING
 from studio.trackers.catalogue import size_in_words
 
 
+@dataclass(frozen=True)
+class RunLine(RunSummary):
+    """A run in a list: its status, computed from its store. describe : tracker, layers and particles in a few words.
+    mean_mm : mean marker error where the session has a truth.
+    """
+
+    describe: str = ""
+    mean_mm: float | None = None
+
+
+class SessionLine(Answer):
+    """A session in a list; runs newest first. thumbnail: address of a JPEG. problem: why it cannot be
+    opened.
+    """
+
+    name: str
+    title: str
+    created: str
+    body: str
+    tracker: str
+    weighting: str
+    cameras: int
+    camera_names: list[str]
+    frame_count: int
+    fps: float
+    has_truth: bool
+    thumbnail: str
+    notes: list[str]
+    warnings: list[str]
+    runs: list[RunLine]
+    comparisons: int = 0
+    next_step: str = Field("", description="footage or calibration, where that is lacking; else empty.")
+    problem: str = ""
+
+
+class CameraView(Answer):
+    """A calibrated camera and its footage."""
+
+    name: str
+    width: int
+    height: int
+    quarter_turns: int = Field(description="Clockwise quarter turns that show the picture upright.")
+    matrix: list[list[float]]
+    distortion: Numbers
+    rotation: list[list[float]]
+    translation: Numbers
+    centre: Numbers
+    picture_width: int
+    picture_height: int
+    frame_count: int
+    has_masks: bool
+    has_background: bool
+
+
+class ParameterView(Answer):
+    """One entry of the pose vector. unit: mm or rad; limits null where there are none."""
+
+    name: str
+    label: str
+    unit: str
+    lower: Number
+    upper: Number
+    max_step: Number
+    neutral: float
+    limb: str
+
+
+class BodyView(Answer):
+    """A body as tables: parameters in the order of the pose vector. by_height: whether its lengths follow from a
+    person's height, unlike those of animals and machines.
+    """
+
+    name: str
+    title: str
+    by_height: bool
+    parameters: list[ParameterView]
+    limbs: list[str]
+    markers: list[str]
+    dimensions: dict[str, float]
+
+
+class SubjectView(Answer):
+    """The person's measures, mm."""
+
+    body: str
+    height_mm: Number
+    lengths_mm: dict[str, float]
+
+
+class SessionDetail(Answer):
+    """Everything about a session but its pictures."""
+
+    name: str
+    title: str
+    created: str
+    fps: float
+    frame_count: int
+    body: BodyView
+    cameras: list[CameraView]
+    subject: SubjectView | None
+    has_truth: bool
+    next_step: str = ""
+    has_start_pose: bool
+    start_pose_frame: int = 0
+    tracker: str
+    weighting: str
+    calibration_source: str
+    imported_from: str
+    matching: list[CameraMatch]
+    assumptions: list[str]
+    notes: list[str]
+    warnings: list[str]
+    doubts: list[str] = Field(
+        default_factory=list, description="What the footage says against the calibration."
+    )
+    runs: list[RunLine]
+
+
 def session_line(summary: SessionSummary, session: Session | None) -> SessionLine:
     """A session in the list; its runs carry their mean error where `session` has a truth."""
-    runs = [RunLine.model_validate(run) for run in reversed(summary.runs)]
-    if session is not None:
-        runs = [completed(run, session) for run in runs]
     return SessionLine.of(
         summary,
         tracker=_tracker(session),
@@ -29,21 +151,21 @@ def session_line(summary: SessionSummary, session: Session | None) -> SessionLin
         camera_names=list(summary.cameras),
         frame_count=summary.frames,
         thumbnail=f"/api/sessions/{summary.name}/thumbnail.jpg",
-        runs=runs,
+        runs=[run_line(run, session) for run in reversed(summary.runs)],
         comparisons=comparison_count(session) if session else 0,
         next_step=next_step(len(summary.cameras), bool(session and session.is_calibrated)),
     )
 
 
-def completed(line: RunLine, session: Session) -> RunLine:
-    """A run's line with its description and its mean error.
-
-    Both are left out where they cannot be had; the run's own page says why.
-    """
+def run_line(summary: RunSummary, session: Session | None) -> RunLine:
+    """A run in a list; without description and error where they cannot be had: the run's own page says why."""
+    line = RunLine(**{entry.name: getattr(summary, entry.name) for entry in dataclasses.fields(summary)})
+    if session is None:
+        return line
     try:
         run = session.run(line.name)
-        line = line.model_copy(update={"describe": describe(run.record)})
-        return line.model_copy(update={"mean_mm": mean_error(session, run, line.done)})
+        line = dataclasses.replace(line, describe=describe(run.record))
+        return dataclasses.replace(line, mean_mm=mean_error(session, run, line.done))
     except StudioError:
         return line
 
@@ -84,7 +206,7 @@ def session_detail(session: Session) -> SessionDetail:
         tracker=_tracker(session),
         weighting=_weighting(session),
         doubts=list(standing_doubts(session)),
-        runs=[completed(RunLine.model_validate(run.summary()), session) for run in reversed(session.runs())],
+        runs=[run_line(run.summary(), session) for run in reversed(session.runs())],
     )
 
 

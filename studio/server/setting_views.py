@@ -1,10 +1,55 @@
 """Knobs and settings as the API shows them."""
 
+from pydantic import Field
+
 from studio.knobs import Knob
 from studio.runs.moved_knobs import moved_between, settings_with_moved, stored_settings
-from studio.server.setting_schemas import KnobView, SettingsChange, SettingsInUse
+from studio.server.schemas import Answer, Value
 from studio.sessions.stored_run import StoredRun
 from studio.settings import RunSettings, SettingsEntry, SettingsHistory, all_knobs, default_settings
+
+
+class KnobView(Answer):
+    """The declaration of one knob: all that a slider needs."""
+
+    name: str
+    label: str
+    kind: str = Field(description="bool, int, float or str.")
+    default: Value
+    low: float | None
+    high: float | None
+    step: float | None
+    unit: str
+    choices: list[str]
+    takes_effect: str = Field(description="next layer, next frame or new run.")
+    help: str
+    group: str
+
+
+class SettingsChange(Answer):
+    """When a version of the settings came into use, and which knobs moved."""
+
+    version: int
+    frame: int
+    layer: int
+    changed: list[str]
+
+
+class SettingsInUse(Answer):
+    """A run's settings: the newest version that its frames used, since when it is in use, and all changes before.
+
+    moved : knobs that were moved since and that no stored frame uses; the search goes on with these values.
+    """
+
+    tracker: str
+    weighting: str
+    version: int
+    frame: int
+    layer: int
+    values: dict[str, Value]
+    knobs: list[KnobView]
+    changes: list[SettingsChange]
+    moved: dict[str, Value]
 
 
 def knob_views(settings: RunSettings) -> list[KnobView]:

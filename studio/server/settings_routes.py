@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Annotated
 
 from fastapi import APIRouter, Query
+from pydantic import Field
 
 from studio.body.catalogue import body_files, list_bodies, load_body
 from studio.body.dimensions import follows_height
@@ -21,24 +22,11 @@ from studio.runs.behaviour_models import check_prediction, models_folder, models
 from studio.runs.moved_knobs import settings_with_moved
 from studio.runs.pace import stored_pace
 from studio.server.app_state import App, AppState
-from studio.server.presets import all_presets, drop_preset, keep_preset, preset
+from studio.server.presets import PresetView, all_presets, drop_preset, keep_preset, preset
 from studio.server.run_routes import RUN, OpenRun, check_free
+from studio.server.schemas import Answer, Request, RunName, Value
 from studio.server.session_routes import OpenSession
-from studio.server.setting_schemas import (
-    BehaviourChoice,
-    BodyChoice,
-    Choice,
-    Choices,
-    KnobList,
-    PresetChoice,
-    PresetList,
-    PresetRequest,
-    ResetRequest,
-    SettingsInUse,
-    StoredPaceView,
-    TrackerChoice,
-)
-from studio.server.setting_views import knob_views, settings_of
+from studio.server.setting_views import KnobView, SettingsInUse, knob_views, settings_of
 from studio.sessions.own_bodies import body_folders
 from studio.sessions.stored_run import StoredRun
 from studio.settings import (
@@ -54,7 +42,98 @@ from studio.trackers.catalogue import TRACKERS
 
 router = APIRouter(prefix="/api", tags=["settings"])
 
-Value = bool | int | float | str
+
+class KnobList(Answer):
+    """The knobs of a tracker with a weighting. json_schema: the same as JSON Schema (2020-12)."""
+
+    tracker: str
+    weighting: str
+    knobs: list[KnobView]
+    values: dict[str, Value]
+    json_schema: dict[str, object]
+
+
+class StoredPaceView(Answer):
+    """How long an evaluated pose takes, and beside the search each frame. run: the stored one that tells; empty, and
+    the times null, where none does.
+    """
+
+    run: str
+    milliseconds: float | None
+    frame_milliseconds: float | None
+
+
+class ResetRequest(Request):
+    """Which knobs go back to their defaults; none named means all that may change inside a run."""
+
+    names: list[str] = Field(default_factory=list)
+
+
+class PresetChoice(Request):
+    """A preset by its name."""
+
+    name: str = Field(max_length=64)
+
+
+class PresetList(Answer):
+    """All presets, the studio's first."""
+
+    presets: list[PresetView]
+
+
+class PresetRequest(Request):
+    """A preset to keep."""
+
+    values: dict[str, Value] = Field(min_length=1, max_length=200)
+    help: str = Field("", max_length=300)
+
+
+class Choice(Answer):
+    """Something that has a name and a label."""
+
+    name: str
+    label: str
+
+
+class TrackerChoice(Choice):
+    """needs_behaviour : whether a run with it has to have a behaviour model."""
+
+    needs_behaviour: bool = False
+
+
+class BodyChoice(Answer):
+    """A body that runs may use. by_height: whether its lengths follow from a person's height."""
+
+    name: str
+    label: str
+    parameters: int
+    limbs: int
+    by_height: bool
+
+
+class BehaviourChoice(Answer):
+    """A behaviour model of the workspace. problem : why it cannot be used, "" if it can."""
+
+    name: str
+    body: str
+    clusters: int
+    states: int
+    frames: int
+    problem: str
+
+
+class Choices(Answer):
+    """What a new run can be made of. problems : what is wrong with trackers and weightings that packages add."""
+
+    trackers: list[TrackerChoice]
+    weightings: list[Choice]
+    bodies: list[BodyChoice]
+    behaviours: list[BehaviourChoice]
+    presets: list[PresetView]
+    default_tracker: RunName
+    default_weighting: RunName
+    default_body: str
+    problems: list[str]
 
 
 @router.get("/choices")

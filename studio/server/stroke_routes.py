@@ -10,6 +10,7 @@ from studio.errors import NotFoundError
 from studio.evidence.strokes import Stroke, StrokeKind
 from studio.runs.overlay_drawing import upright
 from studio.runs.stroke_masks import by_frame, first_frame, preview_mask
+from studio.server import files
 from studio.server.schemas import Answer, Request
 from studio.server.session_routes import OpenSession
 from studio.sessions.session import Session
@@ -61,7 +62,7 @@ class StrokesRequest(Request):
     strokes: list[StrokeEntry] = Field(max_length=MOST_STROKES)
 
 
-class PreviewRequest(StrokesRequest):
+class StrokesPreviewRequest(StrokesRequest):
     """Strokes of one camera that are tried, and the frame whose mask they are to give."""
 
     frame: int = Field(ge=0)
@@ -94,7 +95,7 @@ def put_strokes(session: OpenSession, camera: str, request: StrokesRequest) -> S
 
 
 @router.post("/{camera}/preview", response_class=Response)
-def preview(session: OpenSession, camera: str, request: PreviewRequest) -> Response:
+def preview(session: OpenSession, camera: str, request: StrokesPreviewRequest) -> Response:
     """About the mask that strokes give in a frame: a transparent PNG to lie over the picture, upright; nothing (204)
     where no stroke says anything of the frame yet. Changes nothing.
     """
@@ -111,11 +112,7 @@ def preview(session: OpenSession, camera: str, request: PreviewRequest) -> Respo
         else 0
     )
     shown = np.where(upright(mask, turns)[..., None] > 127, np.array(SHOWN, np.uint8), np.uint8(0))
-    return Response(
-        cv2.imencode(".png", shown)[1].tobytes(),
-        media_type="image/png",
-        headers={"cache-control": "no-store"},
-    )
+    return files.picture(cv2.imencode(".png", shown)[1].tobytes(), "png")
 
 
 def _strokes(camera: str, request: StrokesRequest) -> list[Stroke]:

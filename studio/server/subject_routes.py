@@ -1,7 +1,7 @@
 """The person in front of the cameras: by height, and fitted to the footage in the background (`subject` events)."""
 
 import asyncio
-from typing import Annotated
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Response
 from pydantic import Field
@@ -10,7 +10,7 @@ from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
 from studio.body.subject import SHORTEST_MM, TALLEST_MM, Subject
 from studio.errors import BodyError, NotFoundError
-from studio.jobs.job_runner import Job
+from studio.jobs.job_runner import Job, JobKind, NumberedJob
 from studio.operations.person import fit_subject
 from studio.operations.person import subject as write_subject
 from studio.progress import unheard
@@ -18,21 +18,73 @@ from studio.runs.overlay_drawing import encode_jpeg
 from studio.runs.overlay_pictures import compose_view, forget_composers
 from studio.runs.subject_choice import body_of_choice, keep_fitted
 from studio.runs.subject_fitting import FittedSubject
+from studio.server import files
 from studio.server.app_state import App, AppState
-from studio.server.job_kinds import SUBJECT
 from studio.server.job_routes import add_job_routes
 from studio.server.picture_routes import Height
 from studio.server.requests import Arguments, body_of
+from studio.server.schemas import Answer, Number, Numbers
 from studio.server.session_routes import OpenSession
-from studio.server.subject_schemas import (
-    FitSubjectState,
-    LimbDrawing,
-    SubjectAnswer,
-)
-from studio.sessions.made_from import origin_of
+from studio.sessions.provenance import origin_of
 from studio.sessions.session import SUBJECT_NAME, Session
 
 router = APIRouter(prefix="/api", tags=["subject"])
+
+
+class LimbDrawing(Answer):
+    """A drawn limb of the body as it stands upright. start, end: mm, x to the front, y to the left, z up. radii: at
+    both. dimension: the name of its length, "" where it has none.
+    """
+
+    name: str
+    side: str
+    start: list[float]
+    end: list[float]
+    radii: tuple[float, float]
+    dimension: str
+
+
+class SubjectAnswer(Answer):
+    """A session's person. dimensions: mm (ratios without unit), by the body's own names. source: of proportions.
+    saved: whether the session has a subject at all; fitted: whether it was fitted to the footage.
+    """
+
+    body: str
+    height_mm: Number
+    dimensions: dict[str, float]
+    notes: list[str]
+    source: str
+    limbs: list[LimbDrawing]
+    saved: bool = False
+    fitted: bool = False
+
+
+class SizeLine(Answer):
+    """A group of dimensions, mm. deviation: one standard deviation of `after`."""
+
+    name: str
+    kind: Literal["length", "radius"]
+    before: Number
+    after: Number
+    deviation: Number
+
+
+class FitSubjectState(NumberedJob):
+    """How a fit stands. overlap: f_s of each frame's silhouettes.
+    limbs: of the body that was found. file: what it was kept as, "" where it is not.
+    """
+
+    body: str = ""
+    frames: list[int] = Field(default_factory=list[int])
+    poses_from: str = ""
+    sizes: list[SizeLine] = Field(default_factory=list[SizeLine])
+    overlap_before: Numbers | None = None
+    overlap: Numbers | None = None
+    limbs: list[LimbDrawing] = Field(default_factory=list[LimbDrawing])
+    file: str = ""
+
+
+SUBJECT = JobKind("subject", "fit", FitSubjectState, changes_session=True)
 
 
 @router.get("/sessions/{session}/subject")
@@ -138,7 +190,7 @@ def fitted_picture(identifier: str, frame: int, camera: str, app: App, height: H
     picture = compose_view(
         session, None, frame, camera, ("outline", "mask"), pose, height=height, body=found.body
     )
-    return Response(encode_jpeg(picture), media_type="image/jpeg", headers={"cache-control": "no-store"})
+    return files.picture(encode_jpeg(picture))
 
 
 def _found(identifier: str, app: AppState) -> FittedSubject:

@@ -1,36 +1,29 @@
 """Tracks of a run: listed, made in the background with progress as `track` events, downloaded; runs corrected."""
 
 import asyncio
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Response
+from pydantic import Field
 
-from studio.jobs.job_runner import Job
+from studio.jobs.job_runner import Job, JobKind, NumberedJob, Work
 from studio.knobs import changed, knobs_of
+from studio.operations.results import check as check_run
 from studio.operations.results import refine, smooth
 from studio.operations.tracking import correct, corrected_run
+from studio.runs.checking import RunCheck, kept_check
 from studio.runs.correcting import track_backwards
-from studio.runs.refining import (
-    REFINED,
-    SMOOTHED,
-    MadeTrack,
-    check_making,
-    jitter,
-)
-from studio.runs.tracks import read_track, track_names
-from studio.server.app_state import App
-from studio.server.job_kinds import TRACK
-from studio.server.job_routes import add_job_routes, begin_job
+from studio.runs.refining import REFINED, SMOOTHED, MadeTrack, check_making, jitter
+from studio.runs.tracks import BEST, best_track, read_track, track_named, track_names
+from studio.server import files
+from studio.server.app_state import App, AppState
+from studio.server.job_routes import add_job_routes
 from studio.server.requests import Arguments, body_of
 from studio.server.run_errors import evaluation_of
 from studio.server.run_routes import RUN, OpenRun
+from studio.server.schemas import Answer, Number
 from studio.server.session_routes import OpenSession
-from studio.server.setting_views import knob_view
-from studio.server.track_schemas import (
-    TrackJobState,
-    TrackLine,
-    TrackList,
-)
+from studio.server.setting_views import KnobView, knob_view
 from studio.sessions.named_rows import poses_csv
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -38,6 +31,108 @@ from studio.trackers.refinement import RefinementSettings
 from studio.trackers.smoothing import SmoothingSettings
 
 router = APIRouter(prefix="/api", tags=["tracks"])
+Verb = Literal["refine", "smooth", "correct", "pose", "check"]
+
+
+class TrackLine(Answer):
+    """A track of a run. made_by: verb, what it was made from, settings, and of a smoothed one the frames that were
+    filled and left out; empty for raw. jitter_mm: root mean square second difference of the markers. mean_mm, worst_mm:
+    against the session's truth; mean_angle_deg, mean_direction_deg: the same, of the angles between limbs and of the
+    limbs' directions.
+    """
+
+    name: str
+    frames: int
+    made_by: dict[str, object] = Field(default_factory=dict)
+    jitter_mm: Number = None
+    mean_mm: Number = None
+    mean_angle_deg: Number = None
+    mean_direction_deg: Number = None
+    worst_mm: Number = None
+
+
+class TrackList(Answer):
+    """The run's tracks, raw first, those under way, and the knobs of refining and smoothing."""
+
+    tracks: list[TrackLine]
+    running: list["TrackJobState"]
+    refine_settings: list[KnobView]
+    smooth_settings: list[KnobView]
+
+
+class TrackJobState(NumberedJob):
+    """How refining, smoothing or correcting stands.
+
+    made_run: the corrected run. track: the track that is made. pose, gain, overlap_before, overlap: of a search around
+    a pose (verb pose; run is "" where it is the session's).
+    """
+
+    verb: Verb
+    run: str
+    track: str = ""
+    made_run: str = ""
+    jitter_before_mm: Number = None
+    jitter_after_mm: Number = None
+    moved: int = 0
+    filled: int = 0
+    left_out: int = 0
+    pose: list[float] | None = None
+    gain: Number = None
+    overlap_before: Number = None
+    overlap: Number = None
+
+
+TRACK = JobKind("track", "job", TrackJobState)
+
+
+class JumpLine(Answer):
+    """A limb that leaps into a frame. mm: the largest second difference of its markers; usual_mm: the median."""
+
+    frame: int
+    limb: str
+    mm: Number
+    usual_mm: Number
+
+
+class CheckLine(Answer):
+    """What was measured. inside: per looked-at frame and camera, the share of the model's pixels that lie in the mask;
+    covered: of the mask's, under the model. poor: frames whose views have too little of it inside; turned: sudden
+    turns. lost_limbs: limbs that the masks deny in more than one of the frames, with these.
+    """
+
+    cameras: list[str]
+    frames: list[int]
+    inside: list[list[Number]]
+    covered: list[list[Number]]
+    poor: list[int]
+    lost: list[int]
+    doubtful: list[int]
+    turned: list[int]
+    jitter_mm: Number
+    jumps: list[JumpLine] = Field(default_factory=list[JumpLine])
+    lost_limbs: dict[str, list[int]] = Field(default_factory=dict)
+    inside_mean: Number
+    good: bool
+    words: str
+
+
+class CheckAnswer(Answer):
+    """track: the one that is requested; usual: the best, which is exported unless another is chosen; note: on better
+    tracks that are out of date; check: null before.
+    """
+
+    track: str
+    usual: str
+    note: str = ""
+    check: CheckLine | None
+
+
+def begin_job(
+    app: AppState, verb: Verb, session: Session, run: StoredRun | None, work: Work
+) -> TrackJobState:
+    """Begin work on a session's poses or tracks. run : that it is about, if it is about one."""
+    state = TrackJobState(verb=verb, session=session.name, run=run.name if run else "")
+    return app.jobs.begin(TRACK, state, work)
 
 
 @router.get(RUN + "/tracks")
@@ -58,11 +153,7 @@ def track_csv(session: OpenSession, run: OpenRun, track: str) -> Response:
     """A track's poses: frame, then one column per parameter in the body's order (radians and mm)."""
     found = read_track(run, track)
     name = f"{session.name}-{run.name}-{found.name}-poses.csv"
-    return Response(
-        poses_csv(run.record.parameters, found.frames, found.poses),
-        media_type="text/csv; charset=utf-8",
-        headers={"Content-Disposition": f'attachment; filename="{name}"'},
-    )
+    return files.download(poses_csv(run.record.parameters, found.frames, found.poses), name, files.CSV)
 
 
 @router.post(RUN + "/refine", status_code=202)
@@ -148,3 +239,36 @@ def _answer(made: MadeTrack) -> dict[str, Any]:
         "filled": len(made.filled),
         "left_out": len(made.left_out),
     }
+
+
+@router.get(RUN + "/check")
+def check(run: OpenRun, track: str = "") -> CheckAnswer:
+    """What was measured of a track as it is now (empty: the best)."""
+    best = best_track(run)
+    name = best.name if track in ("", BEST) else track
+    read_track(run, name)
+    found = kept_check(run, name)
+    check = None if found is None else _check_line(found)
+    return CheckAnswer(track=name, usual=best.name, note=best.note, check=check)
+
+
+@router.post(RUN + "/check", status_code=202)
+async def begin_check(
+    session: OpenSession,
+    run: OpenRun,
+    arguments: Annotated[Arguments, body_of(check_run, "CheckRequest")],
+    app: App,
+) -> TrackJobState:
+    """Measure a track in every so-many-th frame."""
+    name = await asyncio.to_thread(track_named, run, arguments.get("track", BEST))
+    await asyncio.to_thread(read_track, run, name)
+
+    def work(job: Job) -> dict[str, object]:
+        check_run(run, name, every=arguments["every"], progress=job.report_or_stop)
+        return {"track": name}
+
+    return begin_job(app, "check", session, run, work)
+
+
+def _check_line(found: RunCheck) -> CheckLine:
+    return CheckLine.of(found, jumps=found.jumps or (), words=found.in_words())

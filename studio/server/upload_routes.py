@@ -17,10 +17,28 @@ from fastapi import APIRouter, Query, Request
 from studio.errors import NotFoundError, SessionError, StudioError
 from studio.server.app_state import App, AppState
 from studio.server.error_responses import TooLargeError
-from studio.server.import_schemas import FileState, UploadState
+from studio.server.schemas import Answer
 from studio.sessions.names import inside, place_in, relative_path
 
 router = APIRouter(prefix="/api/uploads", tags=["importing"])
+
+
+class UploadState(Answer):
+    """An unfinished upload: its files with the bytes received of each."""
+
+    identifier: str
+    files: dict[str, int]
+    total: int
+    limit: int
+
+
+class FileState(Answer):
+    """One file of an upload. received: its bytes; total: bytes of the whole upload."""
+
+    path: str
+    received: int
+    total: int
+
 
 LIMIT = 20 << 30
 FILES = 20_000

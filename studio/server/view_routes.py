@@ -3,34 +3,96 @@
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, Response
+from pydantic import BeforeValidator, Field
 
 from studio.errors import RunError
-from studio.inspection.catalogue import VIEWS, view_named
+from studio.inspection.catalogue import VIEWS, View, view_named
 from studio.inspection.comparing import compare_stored
 from studio.inspection.reading import InspectedRun
 from studio.inspection.shared_page import shared_page
-from studio.inspection.tables import Selection, Viewed
+from studio.inspection.tables import Column, Remedy, Selection, Viewed
 from studio.inspection.views import look, look_over
-from studio.jobs.job_runner import Job
+from studio.jobs.job_runner import Job, JobKind, NumberedJob
 from studio.operations.inspecting import seeds, worst_frame
+from studio.server import files
 from studio.server.app_state import App
-from studio.server.job_kinds import SEEDS
 from studio.server.job_routes import add_job_routes
 from studio.server.requests import Arguments, body_of
 from studio.server.run_routes import RUN, OpenRun
+from studio.server.schemas import Answer, finite
 from studio.server.session_routes import OpenSession
-from studio.server.view_schemas import (
-    FindingView,
-    RemedyView,
-    RunsComparedView,
-    SeedsState,
-    TableView,
-    ViewAnswer,
-    ViewLine,
-    ViewList,
-)
 
 router = APIRouter(prefix="/api", tags=["views"])
+
+
+Cell = Annotated[bool | int | float | str | None, BeforeValidator(finite)]
+
+
+class ViewList(Answer):
+    """All views, in the order in which a person looks at them."""
+
+    views: list[View]
+
+
+class TableView(Answer):
+    """A table; each row has a cell a column."""
+
+    name: str
+    title: str
+    columns: tuple[Column, ...]
+    rows: list[list[Cell]]
+
+
+class FindingView(Answer):
+    """One thing that was found about a frame. kind: see the view `why`. numbers: what it rests on. is_cause: it is the
+    main cause. layer: its index. frame: to look at, where that is another one.
+    """
+
+    kind: str
+    words: str
+    limb: str = ""
+    layer: int | None = None
+    camera: str = ""
+    term: str = ""
+    numbers: dict[str, Cell] = Field(default_factory=dict)
+    is_cause: bool = False
+    frame: int | None = None
+
+
+class ViewAnswer(Answer):
+    """A view's tables, and the sentences and remedies of `why`. frame: null in the answer for a whole run."""
+
+    view: str
+    title: str
+    question: str
+    caption: str
+    session: str
+    run: str
+    frame: int | None
+    notes: list[str]
+    tables: list[TableView]
+    findings: list[FindingView] = Field(default_factory=list[FindingView])
+    remedies: tuple[Remedy, ...] = ()
+
+
+class RunsComparedView(Answer):
+    """Runs side by side. runs: as SESSION/RUN. tables: curves (a row a run and frame), settings (what differs, a column
+    a run), worst (the worst frame of each).
+    """
+
+    runs: list[str]
+    tables: list[TableView]
+
+
+class SeedsState(NumberedJob):
+    """How a search with other seeds stands. Once it is done, the view `seeds` of that frame has its numbers."""
+
+    run: str
+    frame: int
+
+
+SEEDS = JobKind("seeds", "search with other seeds", SeedsState)
+
 
 Name = Annotated[str, Query(max_length=64)]
 
@@ -58,7 +120,7 @@ Selected = Annotated[Selection, Depends(selection_of)]
 @router.get("/views")
 def views() -> ViewList:
     """All views: what each answers, what of the selection it uses, and its tables."""
-    return ViewList(views=[ViewLine.model_validate(view) for view in VIEWS.values()])
+    return ViewList(views=list(VIEWS.values()))
 
 
 @router.get(RUN + "/frames/{frame}/views/{view}")
@@ -85,8 +147,7 @@ def shared(
     """The run as one page that opens without the studio."""
     opened = InspectedRun(session, run)
     text = shared_page(opened, worst_frame(opened) if frame is None else frame, track=track)
-    headers = {"content-disposition": f'attachment; filename="{session.name}-{run.name}.html"'}
-    return Response(text, media_type="text/html; charset=utf-8", headers=headers)
+    return files.download(text, f"{session.name}-{run.name}.html", "text/html; charset=utf-8")
 
 
 @router.post(RUN + "/frames/{frame}/seeds", status_code=202)
@@ -139,5 +200,5 @@ def _answer(run: InspectedRun, name: str, viewed: Viewed, frame: int | None) -> 
         notes=list(viewed.notes),
         tables=[TableView.model_validate(table) for table in viewed.tables],
         findings=[FindingView.model_validate(finding) for finding in viewed.findings],
-        remedies=[RemedyView.model_validate(remedy) for remedy in viewed.remedies],
+        remedies=viewed.remedies,
     )

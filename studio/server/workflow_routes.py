@@ -8,14 +8,17 @@ from starlette.responses import Response
 
 from studio.export.kept_exports import exported_files
 from studio.operations.footage import new_session
-from studio.runs.workflow import Workflow, workflow_of
-from studio.runs.workflow_results import newest_run
+from studio.runs.workflow import Workflow, newest_run, workflow_of
 from studio.server.app_state import App, AppState
-from studio.server.job_kinds import BACKGROUND, EXPORT, START_POSE, SUBJECT, TRACK
+from studio.server.background_routes import BACKGROUND
+from studio.server.export_routes import EXPORT
 from studio.server.pages import NAME, PLACES, html_page
+from studio.server.pose_routes import START_POSE
 from studio.server.requests import Arguments, body_of
-from studio.server.schemas import NewName, RunName
-from studio.server.session_routes import OpenSession
+from studio.server.schemas import RunName
+from studio.server.session_routes import NewName, OpenSession
+from studio.server.subject_routes import SUBJECT
+from studio.server.track_routes import TRACK
 from studio.sessions.session import Session
 from studio.trackers.catalogue import knobs_for_evaluations
 
@@ -40,7 +43,7 @@ def begin(
 
 @router.get("/api/evaluations")
 def evaluations(tracker: str, evaluations: Annotated[int, Query(ge=1, le=1_000_000)]) -> dict[str, int]:
-    """Knobs with which a tracker weighs about so many poses a frame."""
+    """Knobs with which a tracker evaluates about so many poses a frame."""
     return knobs_for_evaluations(tracker, evaluations)
 
 

@@ -26,7 +26,7 @@ from studio.capture.footage_source import CameraSource
 from studio.capture.naming import CameraMatch, listed, match_names
 from studio.errors import CalibrationError, FootageError, NotFoundError
 from studio.geometry.camera import Camera
-from studio.sessions import atomic_files, made_from
+from studio.sessions import atomic_files, provenance
 from studio.sessions.manifest import SessionManifest
 from studio.sessions.names import inside
 from studio.sessions.run_record import CAMERAS_NAME
@@ -81,7 +81,7 @@ def replace_calibration(session: Session, new: NewCalibration) -> CalibrationCha
         raise CalibrationError(
             f"The calibration has no camera {listed(missing)}.", "Give one of all cameras that have footage."
         )
-    made_from.adopt(session)
+    provenance.adopt(session)
     place = session.path / CAMERAS_PATH
     before = read_calibration(place).cameras if _readable(place) else ()
     place.parent.mkdir(exist_ok=True)
@@ -233,7 +233,7 @@ def _consequences(
     if not far or max(far) < MOVED_MM:
         return notes
     moved = f"The cameras are up to {max(far):.0f} mm from their earlier places"
-    if (session.path / made_from.FILES["start-pose"]).exists():
+    if (session.path / provenance.FILES["start-pose"]).exists():
         notes.append(f"{moved}: check whether the start pose still fits, or find it again.")
     if session.truth_path is not None:
         notes.append(f"{moved}: the truth stays in the old world.")

@@ -28,7 +28,7 @@ from studio.sessions.background_files import (
     without_made_masks,
 )
 from studio.sessions.importers.measuring import checked_turn, in_step
-from studio.sessions.made_from import adopt
+from studio.sessions.provenance import adopt
 from studio.sessions.run_record import FILE_NAME as RUN_FILE_NAME
 from studio.sessions.session import START_POSE_NAME, THUMBNAIL_NAME, Session, described_anew
 from studio.sessions.stored_run import StoredRun

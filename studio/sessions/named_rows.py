@@ -8,6 +8,7 @@ is known to be of a frame has one, too.
 import csv
 import io
 import math
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -49,7 +50,7 @@ def pose_frame(path: Path) -> int | None:
 def write_pose(path: Path, names: tuple[str, ...], pose: Array, frame: int | None = None) -> None:
     """Write one pose under its parameters' names, in one step. pose : (D,) radians and mm. frame : it is of."""
     head, first = ([], []) if frame is None else ([FRAME], [str(frame)])
-    write_text(path, _as_csv([[*head, *names], [*first, *(repr(float(value)) for value in pose)]]))
+    write_text(path, as_csv([[*head, *names], [*first, *(repr(float(value)) for value in pose)]]))
 
 
 def read_sigma(path: Path, names: tuple[str, ...], fps: float) -> Array:
@@ -74,7 +75,7 @@ def read_sigma(path: Path, names: tuple[str, ...], fps: float) -> Array:
 
 def write_sigma(path: Path, names: tuple[str, ...], sigma: Array, fps: float) -> None:
     """Write standard deviations (rad, mm from frame to frame at `fps`) under their parameters' names."""
-    write_text(path, _as_csv([[FPS, *names], [repr(float(fps)), *(repr(float(value)) for value in sigma)]]))
+    write_text(path, as_csv([[FPS, *names], [repr(float(fps)), *(repr(float(value)) for value in sigma)]]))
 
 
 def poses_csv(names: tuple[str, ...], frames: Indices, poses: Array) -> str:
@@ -84,10 +85,11 @@ def poses_csv(names: tuple[str, ...], frames: Indices, poses: Array) -> str:
         [str(int(frame)), *(repr(float(value)) for value in pose)]
         for frame, pose in zip(frames, poses, strict=True)
     ]
-    return _as_csv([[FRAME, *names], *rows])
+    return as_csv([[FRAME, *names], *rows])
 
 
-def _as_csv(rows: list[list[str]]) -> str:
+def as_csv(rows: Iterable[Iterable[object]]) -> str:
+    """Rows as CSV text; a line ends with a line feed."""
     stream = io.StringIO()
     csv.writer(stream, lineterminator="\n").writerows(rows)
     return stream.getvalue()

@@ -19,7 +19,7 @@ from studio.errors import StudioError
 from studio.geometry.rotations import axis_turn
 from studio.motion_files.recorded_motion import RecordedMotion
 from studio.synthesis.gait import eased
-from studio.training.smooth_noise import smooth_noise, warped_times
+from studio.training.oversampling import smooth_noise, warped_times
 
 # Another performance of a person's motion: the same movements in another tempo, every joint a little different, the
 # feet where they stood.

@@ -153,17 +153,17 @@ def walkers_from(
     )
 
 
-def walked(
-    rng: np.random.Generator, walkers: GuidedParticles, space: SearchSpace, rules: GuidedRules, sigma: Array
+def propagated(
+    rng: np.random.Generator, guided: GuidedParticles, space: SearchSpace, rules: GuidedRules, sigma: Array
 ) -> GuidedParticles:
     """The particles propagated one frame (Eq. 3 and 4), or `steps` of the space. sigma : (D,) noise, over all of these,
     of what the model does not cover or move.
     """
     model, columns = model_of(space), columns_of(space)
-    free = walkers.free
-    noise = rng.standard_normal(walkers.poses.shape) * sigma
-    poses = walkers.poses + np.where(free[:, None], noise, rules.global_scale * noise)
-    states, angles, velocity = walkers.states, walkers.poses[:, columns], walkers.velocity
+    free = guided.free
+    noise = rng.standard_normal(guided.poses.shape) * sigma
+    poses = guided.poses + np.where(free[:, None], noise, rules.global_scale * noise)
+    states, angles, velocity = guided.states, guided.poses[:, columns], guided.velocity
     for _ in range(space.steps):
         moved = propagate(
             rng, model, states, angles, velocity, rules.attenuation, rules.entering, rules.automaton_share
@@ -173,8 +173,8 @@ def walked(
             labels = np.maximum(model.automaton.last_symbols[states], 0)
             poses = np.where(free[:, None], poses, model.root.moved(rng, poses, labels, ROOT_SPREAD))
     poses[:, columns] = np.where(free[:, None], poses[:, columns], angles)
-    velocity = np.where(free[:, None], walkers.velocity, velocity)
-    alone = followed(rng, model, walkers.states, poses[:, columns], velocity, space.steps)
+    velocity = np.where(free[:, None], guided.velocity, velocity)
+    alone = followed(rng, model, guided.states, poses[:, columns], velocity, space.steps)
     return GuidedParticles(poses, np.where(free, alone, states), velocity, free)
 
 

@@ -19,7 +19,7 @@ from studio.trackers.guided_particles import (
     known_of,
     model_of,
     near,
-    walked,
+    propagated,
     walkers_from,
 )
 from studio.trackers.hard_priors import Proposals, settled
@@ -46,7 +46,7 @@ def guided_set(
     share = share_of(rules.model_free_share, rules.model_free_grows, previous.particles.extra)
     free = chosen_free(rng, len(rows), share)
     past = walkers_from(rng, previous, rows, free, space)
-    following = _walking_set(walked(rng, past, space, rules, sigma), past, space, rules)
+    following = _walking_set(propagated(rng, past, space, rules, sigma), past, space, rules)
     if BEATEN in previous.particles.extra:
         following.extra[BEATEN] = previous.particles.extra[BEATEN]
     return following
@@ -74,7 +74,7 @@ def settled_walkers(
     first = GuidedParticles(particles.poses, extra[STATES], extra[VELOCITY], extra[FREE])
 
     def again(rows: Indices) -> Proposals:
-        return _packed(walked(rng, past.at(rows), space, rules, sigma))
+        return _packed(propagated(rng, past.at(rows), space, rules, sigma))
 
     done = settled(problem, space, rules, _packed(first), past.poses, again)
     states = done.velocities[:, -1].astype(np.int64) - 1
@@ -146,7 +146,7 @@ def _walking_set(
     return unweighted(poses, carried)
 
 
-def _packed(walkers: GuidedParticles) -> Proposals:
+def _packed(guided: GuidedParticles) -> Proposals:
     """Poses, and beside each the movement and 1 + the state: rules that stop a particle set them to zero."""
-    beside = np.column_stack([walkers.velocity, 1.0 + walkers.states]).astype(np.float64)
-    return Proposals(walkers.poses, beside)
+    beside = np.column_stack([guided.velocity, 1.0 + guided.states]).astype(np.float64)
+    return Proposals(guided.poses, beside)

@@ -19,7 +19,7 @@ from studio.trackers.guided_particles import (
     known_of,
     model_of,
     near,
-    walked,
+    propagated,
     walkers_from,
 )
 from studio.trackers.model_free import BEATEN, FREE, chosen_free, share_of
@@ -50,7 +50,7 @@ def predicted_starts(
     )
     free = chosen_free(rng, count, share_of(rules.model_free_share, rules.model_free_grows, carried))
     before = walkers_from(rng, alone, np.zeros(count, dtype=np.int64), free, space)
-    expected = walked(rng, before, space, rules, np.zeros(len(space.names)))
+    expected = propagated(rng, before, space, rules, np.zeros(len(space.names)))
     arrays: Arrays = {
         STATES: expected.states,
         VELOCITY: expected.velocity,

@@ -80,7 +80,7 @@ def test_it_gets_another_name_goes_and_comes_back(window: StudioPage) -> None:
     assert names(window) == ["swing"]
 
 
-def test_what_cannot_be_learnt_is_told_in_the_form(window: StudioPage) -> None:
+def test_what_cannot_be_learnt_is_reported_in_the_form(window: StudioPage) -> None:
     page = window.page
     window.watch.allow(422, "/api/learning")
     page.click("#new")

@@ -92,7 +92,7 @@ def test_a_body_is_edited_mirrored_undone_saved_and_tracked_with(
     assert StoredRun(studio.workspace / "walk" / "runs" / "own").record.body == "walker"
 
 
-def test_a_file_of_ones_own_is_opened_and_a_broken_one_is_told(
+def test_a_file_of_ones_own_is_opened_and_a_broken_one_is_reported(
     window: StudioPage, studio: StudioServer
 ) -> None:
     page = window.page

@@ -78,12 +78,12 @@ def test_the_studio_leads_to_comparing(window: StudioPage, artefacts: Path) -> N
     form = page.locator(".compare-form")
     assert form.locator("[name=session]").input_value() == "walk"
     assert form.locator("[name=last]").input_value() == "149"
-    names = [row.locator("select").first.input_value() for row in form.locator(".entrant").all()]
+    names = [row.locator("select").first.input_value() for row in form.locator(".candidate").all()]
     assert names == ["annealed", "swarm", "condensation"]
     shoot(window, artefacts, "compare-form")
 
 
-def test_what_cannot_be_compared_is_told_in_the_form(window: StudioPage) -> None:
+def test_what_cannot_be_compared_is_reported_in_the_form(window: StudioPage) -> None:
     window.watch.allow(422, "/api/comparisons")
     form = fill(window, evaluations="30")
     form.get_by_role("button", name="Compare", exact=True).click()
@@ -241,7 +241,7 @@ def test_again_asks_for_the_same(window: StudioPage) -> None:
     assert "survival=0.4" in form.locator("[aria-label=Knobs]").first.input_value()
     assert "particles" not in form.locator("[aria-label=Knobs]").first.input_value()
     form.locator("[aria-label=Line-up]").select_option("improvements")
-    assert form.locator(".entrant").count() == 3
+    assert form.locator(".candidate").count() == 3
     form.get_by_text("the planned noise of Eq. 13").wait_for()
 
 

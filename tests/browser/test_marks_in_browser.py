@@ -37,7 +37,7 @@ def studio(tmp_path: Path) -> Iterator[StudioServer]:
     made.stop()
 
 
-def test_the_marks_are_named_told_and_reached_by_keys(
+def test_the_marks_are_named_reported_and_reached_by_keys(
     browser: Browser, studio: StudioServer, artefacts: Path
 ) -> None:
     opened = f"{studio.address}&session=walk&run=thrown"

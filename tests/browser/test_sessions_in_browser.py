@@ -88,7 +88,7 @@ def test_an_empty_workspace_offers_the_sample(window: StudioPage, artefacts: Pat
     window.page.wait_for_function(loaded)
 
 
-def test_a_wrong_folder_is_told_in_the_form(window: StudioPage, footage: Path, artefacts: Path) -> None:
+def test_a_wrong_folder_is_reported_in_the_form(window: StudioPage, footage: Path, artefacts: Path) -> None:
     window.watch.allow(404, "/api/imports")
     window.page.get_by_role("button", name="+ Import", exact=True).click()
     form = fill(window, "Import", source=str(footage / "nowhere"), name="gone")

@@ -18,7 +18,7 @@ from studio.jobs.batch import track_to_end
 from studio.runs.new_run import prepare_run
 from studio.runs.start_pose_file import keep_start_pose
 from studio.runs.tracks import read_track, write_track
-from studio.sessions.made_from import note
+from studio.sessions.provenance import note
 from studio.sessions.session import Session
 
 pytestmark = pytest.mark.browser
@@ -120,7 +120,7 @@ def test_leaps_are_called_out_and_an_old_export_is(page: Page, studio: StudioSer
     expect(export).to_have_attribute("data-state", "done")
 
 
-def test_a_doubted_calibration_is_tracked_only_if_wished(
+def test_a_doubted_calibration_is_tracked_only_if_requested(
     page: Page, studio: StudioServer, artefacts: Path
 ) -> None:
     doubt = "Cameras cam1 and cam3 seem to carry each other's names. Exchange them."

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from studio.calibration.board_pattern import drawn
+from studio.calibration.board_pdf import drawn
 from studio.calibration.boards import Board, board_from_text
 from studio.errors import CalibrationError
 

@@ -20,7 +20,7 @@ def kept(session: Session, name: str, poses: np.ndarray) -> None:
     write_track(run, Track(name, np.arange(count), poses, np.full(count, 0.9), ("tracked",) * count))
 
 
-def test_a_leap_is_told_and_kept(session_on_disk: Session) -> None:
+def test_a_leap_is_reported_and_kept(session_on_disk: Session) -> None:
     prepare_run(session_on_disk, name="one", start_pose=true_poses()[0])
     wrong = true_poses()
     wrong[5:, 0] += 1.0

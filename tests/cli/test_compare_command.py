@@ -62,7 +62,7 @@ def test_the_document_is_as_agreed(walk: Session, tmp_path: Path) -> None:
     assert again.exit_code == 0
     other = run("walk", "--trackers", "annealed", "--seeds", "2", *SMALL, "--out", str(out))
     assert other.exit_code == 2
-    assert "other entrants" in other.stderr
+    assert "other candidates" in other.stderr
 
 
 def test_after_ctrl_c_the_same_command_goes_on(walk: Session, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -118,7 +118,7 @@ def swept(*arguments: str) -> Result:
     return CliRunner().invoke(main, ["sweep", "walk", *arguments], catch_exceptions=False)
 
 
-def test_a_sweep_is_told_of_before_and_printed_after(walk: Session) -> None:
+def test_a_sweep_is_reported_of_before_and_printed_after(walk: Session) -> None:
     small = ("--seeds", "1", "--frames", "0:2", "--layers", "2", "--particles", "10", "--keep-shape")
     done = swept("--vary", "survival=0.2,0.5", *small, "--processes", "1", "--json")
     assert done.exit_code == 0, done.stderr

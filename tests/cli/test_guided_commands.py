@@ -13,8 +13,8 @@ from studio.body.forward_kinematics import marker_points
 from studio.cli.main import main
 from studio.comparison.kept_comparison import BEHAVIOUR_NAME
 from studio.motion_files.trc import MarkerMotion, write_trc
-from studio.sessions.made_from import note
 from studio.sessions.named_rows import write_pose
+from studio.sessions.provenance import note
 from studio.sessions.session import Session
 
 

@@ -61,7 +61,7 @@ def test_json_is_one_object_and_failures_have_an_exit_code(tmp_path: Path) -> No
     assert printed["experiments"][0]["quick"] is True
 
 
-def test_wrong_calls_are_told_a_remedy(tmp_path: Path) -> None:
+def test_wrong_calls_are_reported_a_remedy(tmp_path: Path) -> None:
     found = run("toy-goof")
     assert found.exit_code == 2
     assert "There is no experiment 'toy-goof'." in found.stderr

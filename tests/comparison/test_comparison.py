@@ -41,7 +41,7 @@ def made_up(drawn: Plan) -> list[Outcome]:
     for trial in trials(drawn):
         seed = trial.arguments["seed"]
         tracker = next(
-            at for at, one in enumerate(drawn.entrants) if one.name == trial.label.rpartition(", seed ")[0]
+            at for at, one in enumerate(drawn.candidates) if one.name == trial.label.rpartition(", seed ")[0]
         )
         errors = [10.0 * (tracker + 1) + seed + frame / 10 for frame in range(drawn.frame_count)]
         lost = [["left leg"] if tracker == 1 and frame == 2 else [] for frame in range(drawn.frame_count)]
@@ -143,7 +143,7 @@ def test_wrong_seeds_and_frames_are_refused(wrong: dict) -> None:
 
 
 def test_one_weighting_for_all_by_default_the_sessions() -> None:
-    assert {candidate.weighting for candidate in plan("annealed", "condensation").entrants} == {
+    assert {candidate.weighting for candidate in plan("annealed", "condensation").candidates} == {
         DEFAULT_WEIGHTING
     }
     with pytest.raises(StudioError, match="no weighting 'x'"):

@@ -52,7 +52,7 @@ def test_the_request_is_read_back(walk: Session, kept: KeptComparison) -> None:
 def test_nothing_is_overwritten(walk: Session, kept: KeptComparison) -> None:
     with pytest.raises(SessionError, match="already"):
         new_comparison(kept.folder, plan("annealed"))
-    assert kept.record().plan.entrants[1].name == "condensation"
+    assert kept.record().plan.candidates[1].name == "condensation"
 
 
 def test_the_newest_comes_first_and_names_are_looked_up(walk: Session, kept: KeptComparison) -> None:
@@ -96,7 +96,7 @@ def test_a_trials_key_does_not_depend_on_the_sessions_path(walk: Session, kept: 
 
 def test_differences_are_named(kept: KeptComparison) -> None:
     assert differences(plan("annealed", "condensation"), kept.plan()) == ()
-    assert set(differences(plan("annealed", seeds=(0,)), kept.plan())) == {"entrants", "seeds"}
+    assert set(differences(plan("annealed", seeds=(0,)), kept.plan())) == {"candidates", "seeds"}
 
 
 def test_only_one_process_works_on_it(walk: Session, kept: KeptComparison) -> None:

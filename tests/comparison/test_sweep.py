@@ -35,7 +35,7 @@ from studio.comparison.sweep import (
 from studio.comparison.trials import Outcome
 from studio.errors import CalibrationError, RunError, SettingsError
 from studio.runs.new_run import prepare_run
-from studio.sessions.made_from import note
+from studio.sessions.provenance import note
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
@@ -54,12 +54,12 @@ def made_up(drawn: Plan, error: bool = True) -> list[Outcome]:
     """Outcomes: point p, seed s has the error 10 (p + 1) + s, the overlap 0.9 - p / 100."""
     found = []
     for place, trial in enumerate(sweep_trials(drawn)):
-        seed, point = divmod(place, len(drawn.entrants))
+        seed, point = divmod(place, len(drawn.candidates))
         mm = 10.0 * (point + 1) + seed
         measured = {
             "run": run_name("sweep-1", drawn, place), "worst_frame": 2, "error": mm if error else None,
             "worst": 2 * mm if error else None, "limb_lost": 0 if error else None, "overlap": 0.9 - point / 100,
-            "search_lost": point, "evaluations": drawn.entrants[point].evaluations, "milliseconds": 5.0,
+            "search_lost": point, "evaluations": drawn.candidates[point].evaluations, "milliseconds": 5.0,
             "frames": [0, 1, 2], "per_frame": [mm, None, 2 * mm],
         }  # fmt: skip
         found.append(Outcome(trial, json.loads(json.dumps(measured))))
@@ -75,16 +75,16 @@ def swept() -> Sweep:
 def test_every_combination_is_an_entrant_with_values_of_the_knobs_types() -> None:
     drawn = plan()
     assert drawn.vary == {"survival": (0.2, 0.5), "particles": (20, 40, 60)}
-    assert [one.name for one in drawn.entrants][:2] == [
+    assert [one.name for one in drawn.candidates][:2] == [
         "survival 0.2, particles 20",
         "survival 0.2, particles 40",
     ]
-    assert len(drawn.entrants) == 6
-    for one in drawn.entrants:
+    assert len(drawn.candidates) == 6
+    for one in drawn.candidates:
         assert one.changes["layers"] == 4
         assert one.evaluations == TRACKERS["annealed"].evaluations(one.settings().tracker)
-    assert len({one.evaluations for one in drawn.entrants}) == 3
-    assert drawn.evaluations == max(one.evaluations for one in drawn.entrants)
+    assert len({one.evaluations for one in drawn.candidates}) == 3
+    assert drawn.evaluations == max(one.evaluations for one in drawn.candidates)
     assert len(sweep_trials(drawn)) == 12
     assert len({trial_key(trial) for trial in sweep_trials(drawn)}) == 12
     assert run_name("s", drawn, 0) == "s-p1-s0"
@@ -175,7 +175,7 @@ def test_the_expected_time_is_judged_by_a_stored_run(tmp_path: Path) -> None:
     drawn = plan()
     before = expected(session, drawn, processes=1, cores=2)
     assert (before.runs, before.frames) == (12, 3)
-    assert before.evaluations == 2 * 3 * sum(one.evaluations for one in drawn.entrants)
+    assert before.evaluations == 2 * 3 * sum(one.evaluations for one in drawn.candidates)
     assert before.seconds is None
     assert "is known once" in before.in_words
 
@@ -189,7 +189,7 @@ def test_the_expected_time_is_judged_by_a_stored_run(tmp_path: Path) -> None:
     both = expected(session, drawn, processes=2, cores=2)
     assert both.seconds == pytest.approx(before.evaluations * 0.1e-3)
     assert "judged by run 'quick'" in both.in_words
-    elsewhere = replace(drawn, entrants=tuple(replace(one, weighting="blobs") for one in drawn.entrants))
+    elsewhere = replace(drawn, candidates=tuple(replace(one, weighting="blobs") for one in drawn.candidates))
     assert expected(session, elsewhere, processes=1, cores=2).seconds is None
 
 
@@ -223,7 +223,7 @@ def tracked(folder: Path, milliseconds: float, evaluations: int) -> None:
             writer.write_frame(replace(made, milliseconds=milliseconds, evaluations=evaluations), [])
 
 
-def test_runs_of_a_sweep_are_told_apart_by_their_notes(tmp_path: Path) -> None:
+def test_runs_of_a_sweep_are_reported_apart_by_their_notes(tmp_path: Path) -> None:
     workspace = Workspace(tmp_path)
     session = copy_of_walk(tmp_path / "walk", "videos")
     kept = new_comparison(place_of(session, "mine"), plan())
@@ -267,7 +267,7 @@ def test_a_grid_that_is_too_large_is_refused_before_its_values_are_read() -> Non
         plan_sweep(WALK, {"survival": ["x"] * 2001}, range(3))
 
 
-def test_a_doubted_calibration_is_swept_only_if_wished(tmp_path: Path) -> None:
+def test_a_doubted_calibration_is_swept_only_if_requested(tmp_path: Path) -> None:
     session = copy_of_walk(tmp_path / "walk", "videos")
     doubt = "Cameras A and B seem to be exchanged."
     note(session, "background", "in doubt", good=False, stops=(doubt,))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from studio.comparison.footage_cache import FootageCache
-from studio.comparison.tracked import Attempt, Changed, track
+from studio.comparison.tracked import Changed, TrackingTrial, track
 from studio.errors import NotFoundError, SessionError
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.evidence.settings import EvidenceSettings
@@ -26,10 +26,10 @@ def cache():
     found.close()
 
 
-def attempt(**wanted) -> Attempt:
+def attempt(**wanted) -> TrackingTrial:
     """A few frames of the walk."""
     fields = {"seed": 3, "changes": SMALL, "last": 4, **wanted}
-    return Attempt("walk", "annealed", "edge-region", **fields)
+    return TrackingTrial("walk", "annealed", "edge-region", **fields)
 
 
 def same(one, other) -> bool:
@@ -49,7 +49,7 @@ def test_an_attempt_is_measured_and_gives_the_same_again(cache) -> None:
 
 def test_attempts_and_results_survive_json(cache) -> None:
     kept = attempt(cameras=("cam1", "cam3"))
-    assert Attempt.of_plain(json.loads(json.dumps(kept.plain()))) == kept
+    assert TrackingTrial.of_plain(json.loads(json.dumps(kept.plain()))) == kept
     json.dumps(asdict(track(attempt(last=1), cache)), allow_nan=False)
 
 
@@ -82,7 +82,7 @@ def test_layers_and_frames_are_reported(cache) -> None:
 
 def test_unknown_footage_and_camera_are_named(cache) -> None:
     with pytest.raises(SessionError, match="no-such-walk"):
-        track(Attempt("no-such-walk", "annealed", "edge-region", 0), cache)
+        track(TrackingTrial("no-such-walk", "annealed", "edge-region", 0), cache)
     with pytest.raises(NotFoundError, match="cam9"):
         track(attempt(cameras=("cam9",)), cache)
     count = cache.session("walk").manifest.frame_count

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from studio.comparison.footage_cache import NO_PICTURE, FootageCache
-from studio.comparison.tracked import Attempt, track
+from studio.comparison.tracked import TrackingTrial, track
 from studio.evidence.settings import EvidenceSettings
 
 SAMPLES = Path(__file__).parents[2] / "sample_sessions"
@@ -15,8 +15,8 @@ CHANGES = {"layers": 5, "particles": 60, "hull_depth": 6}
 def test_the_walk_is_followed_by_blobs() -> None:
     cache = FootageCache(SAMPLES)
     fields = {"seed": 3, "last": 12, "body": "human25"}
-    found = track(Attempt("walk", "annealed", "blobs", changes=CHANGES, **fields), cache)
-    again = track(Attempt("walk", "annealed", "blobs", changes=CHANGES, **fields), cache)
+    found = track(TrackingTrial("walk", "annealed", "blobs", changes=CHANGES, **fields), cache)
+    again = track(TrackingTrial("walk", "annealed", "blobs", changes=CHANGES, **fields), cache)
     cache.close()
     assert found.per_frame_mm == again.per_frame_mm
     # Twelve frames of walking carry a body that is not followed some 170 mm away.

@@ -8,8 +8,7 @@ from export_runs import MADE, moving_poses, track_of
 from studio.export.formats import FORMATS
 from studio.export.kept_exports import export_into_run, exported_files, kept_exports, stale_export
 from studio.runs.tracks import read_track, write_track
-from studio.runs.workflow_results import export_step
-from studio.runs.workflow_step import StepStatus
+from studio.runs.workflow import StepStatus, export_step
 from studio.sessions.session import Session
 
 

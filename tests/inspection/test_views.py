@@ -11,7 +11,7 @@ from planted_runs import LAYERS, PARTICLES
 from scipy import stats
 
 from studio.body.forward_kinematics import marker_points
-from studio.cli.inspection_commands import as_csv
+from studio.cli.inspection_commands import tables_csv
 from studio.errors import NotFoundError, RunError, WorkCancelledError
 from studio.inspection.catalogue import VIEWS
 from studio.inspection.clouds import density, weighted_quantiles
@@ -344,7 +344,7 @@ def test_readers_count_layers_from_one(run: InspectedRun, frame: InspectedFrame)
     assert [[*row[:at], *row[at + 1 :]] for row in read] == [
         [*row[:at], *row[at + 1 :]] for row in table.rows
     ]
-    lines = list(csv.reader(io.StringIO(as_csv([table], ""))))[2:]
+    lines = list(csv.reader(io.StringIO(tables_csv([table], ""))))[2:]
     assert [int(line[at]) for line in lines[1:]] == list(range(1, LAYERS + 1))
     assert f"<tr><td>{LAYERS}</td>" in table.as_html()
     with pytest.raises(NotFoundError, match=r"no layer 8\.") as refused:

@@ -68,8 +68,8 @@ def test_it_is_broken_off_and_goes_on_with_what_is_missing(walk: Session, kept: 
 
 def test_a_trial_that_fails_ends_it_with_the_reason(walk: Session) -> None:
     plan = small(walk)
-    wrong = replace(plan.entrants[0], changes={**plan.entrants[0].changes, "survivor": 1})
-    kept = new_comparison(place_of(walk), replace(plan, entrants=(wrong,)))
+    wrong = replace(plan.candidates[0], changes={**plan.candidates[0].changes, "survivor": 1})
+    kept = new_comparison(place_of(walk), replace(plan, candidates=(wrong,)))
     with pytest.raises(RunError, match=r"annealed, seed 0 could not be tracked.*survivor"):
         run_comparison(kept, walk, lambda *_: None, processes=1)
     assert not kept.is_running()

@@ -111,7 +111,7 @@ def test_numbers_that_are_none_become_null(office: Office) -> None:
     assert office.ended(lambda _job: {"weight": math.nan}).weight is None
 
 
-def test_a_refusal_is_told_in_its_own_words(office: Office) -> None:
+def test_a_refusal_is_reported_in_its_own_words(office: Office) -> None:
     def work(_job: Job) -> Mapping[str, object]:
         raise FootageError("The clip ends.", "Give another.")
 
@@ -126,7 +126,7 @@ def test_a_refusal_is_told_in_its_own_words(office: Office) -> None:
 
 
 @pytest.mark.parametrize("answer", [None, {"weight": "much"}])
-def test_a_fault_is_logged_and_told_without_its_traceback(
+def test_a_fault_is_logged_and_reported_without_its_traceback(
     office: Office, caplog: pytest.LogCaptureFixture, answer: dict[str, object] | None
 ) -> None:
     """Also one that shows only when the answer is put into the state."""
@@ -308,7 +308,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     return made
 
 
-def test_progress_is_told_as_often_as_it_is_read(office: Office, clock: Clock) -> None:
+def test_progress_is_reported_as_often_as_it_is_read(office: Office, clock: Clock) -> None:
     """Each step's beginning, its end, and between them what is a fifth of a second apart."""
     job = Job(WEIGHING, WeighingState(session="take1"), office.said.append)
     for step, done, seconds in [
@@ -321,7 +321,7 @@ def test_progress_is_told_as_often_as_it_is_read(office: Office, clock: Clock) -
     assert reported == [("reading", 0), ("reading", 2), ("reading", 4), ("weighing", 0)]
 
 
-def test_the_time_left_is_told_once_it_is_known(
+def test_the_time_left_is_reported_once_it_is_known(
     office: Office, clock: Clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(job_runner, "TimeLeft", lambda: TimeLeft(clock.monotonic))

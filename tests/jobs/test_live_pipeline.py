@@ -7,7 +7,7 @@ import pytest
 
 from studio.capture.frame_clock import Arrival
 from studio.errors import FootageError
-from studio.jobs.live_pipeline import LivePipeline
+from studio.jobs.open_live_run import LivePipeline
 
 PATIENCE = 20.0
 
@@ -66,7 +66,7 @@ def pipeline_of(source: HandSource, maker: Maker, first: int = 0) -> LivePipelin
     return made
 
 
-def test_each_frame_is_given_once_and_the_end_is_told() -> None:
+def test_each_frame_is_given_once_and_the_end_is_reported() -> None:
     source, maker = HandSource(last=1), Maker()
     pipeline = pipeline_of(source, maker)
     assert source.first == 0

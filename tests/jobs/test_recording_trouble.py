@@ -152,7 +152,7 @@ def test_a_killed_recorder_leaves_a_take_that_can_be_finished(base: Session, tmp
     footage.close()
 
 
-def test_what_a_take_needs_is_asked_for_first(base: Session, tmp_path: Path) -> None:
+def test_what_a_take_needs_is_requested_first(base: Session, tmp_path: Path) -> None:
     with pytest.raises(FootageError, match="no camera 'left'"):
         begin_recording(base, tmp_path / "take", ("left",), 25.0, 10)
     with pytest.raises(SessionError, match=r"something at '.*base' already"):

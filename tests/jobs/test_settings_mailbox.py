@@ -3,7 +3,7 @@
 import pytest
 
 from studio.errors import SettingsError
-from studio.jobs.settings_mailbox import SettingsMailbox
+from studio.jobs.open_run import SettingsMailbox
 from studio.runs.behaviour_models import check_prediction
 from studio.settings import default_settings
 

@@ -13,7 +13,7 @@ from studio.comparison.sweep import plan_sweep, sweep_document, sweep_trials
 from studio.jobs.comparison_run import done_before, run_sweep
 from studio.jobs.swept_runs import measure_run
 from studio.runs.new_run import prepare_run
-from studio.sessions.made_from import note
+from studio.sessions.provenance import note
 from studio.sessions.session import Session
 
 GRID = {"survival": [0.2, 0.5]}

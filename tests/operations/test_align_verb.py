@@ -8,7 +8,7 @@ from studio.sessions.session import CAMERAS_PATH
 from studio.sessions.workspace import Workspace
 
 
-def test_cameras_are_turned_told_and_turned_back() -> None:
+def test_cameras_are_turned_reported_and_turned_back() -> None:
     session = make_nudged_session(Workspace().place_for("nudged"))
     before = (session.path / CAMERAS_PATH).read_bytes()
     steps: list[str] = []

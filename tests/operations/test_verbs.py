@@ -17,7 +17,7 @@ from studio.sessions.session import Session
 FEW = {"particles": 20, "layers": 2}
 
 
-def test_importing_studio_imports_no_room_until_a_verb_is_asked_for() -> None:
+def test_importing_studio_imports_no_room_until_a_verb_is_requested() -> None:
     code = (
         "import sys, studio; before = [name for name in sys.modules if name.startswith('studio.')]; "
         "studio.StudioError; print(before, 'studio.errors' in sys.modules, 'numba' in sys.modules)"
@@ -145,7 +145,7 @@ def test_a_height_in_metres_is_refused(session_on_disk: Session) -> None:
     assert studio.subject("toy").name == BODY
 
 
-def test_who_is_told_decides_the_body_of_new_runs(session_on_disk: Session) -> None:
+def test_who_is_reported_decides_the_body_of_new_runs(session_on_disk: Session) -> None:
     assert studio.subject("toy", 1700.0, body="human31").name == "human31"
     assert Session(session_on_disk.path).manifest.body == "human31"
     assert Session(session_on_disk.path).body().name == "human31"

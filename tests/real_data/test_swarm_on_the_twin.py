@@ -13,7 +13,7 @@ import pytest
 
 from studio.comparison.footage_cache import FootageCache
 from studio.comparison.statistics import sign_test
-from studio.comparison.tracked import Attempt, Tracked, track
+from studio.comparison.tracked import Tracked, TrackingTrial, track
 from studio.reproduction.fleischmann import EQ13, EVALUATIONS, FILTER_3, SWARM, SWARM_3, TWIN, TWIN_20
 from studio.reproduction.tracking import Candidate
 from studio.settings import DEFAULT_WEIGHTING
@@ -96,7 +96,9 @@ def test_the_bundled_walk_with_defaults_and_1000_evaluations(tracker: str) -> No
     cache = FootageCache(SAMPLES)
     changes = knobs_for_evaluations(tracker, EVALUATIONS)
     try:
-        found = [track(Attempt("walk", tracker, DEFAULT_WEIGHTING, seed, changes), cache) for seed in SEEDS]
+        found = [
+            track(TrackingTrial("walk", tracker, DEFAULT_WEIGHTING, seed, changes), cache) for seed in SEEDS
+        ]
     finally:
         cache.close()
     assert mean(found) <= 40.0

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from studio.comparison.findings import VERDICTS, Findings
-from studio.comparison.tracked import Attempt, Tracked, tracking_trial
+from studio.comparison.tracked import Tracked, TrackingTrial, tracking_trial
 from studio.comparison.trials import Outcome, Scale, Trial
 from studio.reproduction.catalogue import EXPERIMENTS
 from studio.reproduction.experiment import group_of
@@ -145,7 +145,9 @@ def test_damage_that_no_tracker_tolerates_is_reported() -> None:
 
 
 def test_groups_keep_the_order_of_seeds_and_curves_their_mean() -> None:
-    trials = [tracking_trial("a, b", Attempt("walk", "annealed", "edge-region", seed)) for seed in (0, 1)]
+    trials = [
+        tracking_trial("a, b", TrackingTrial("walk", "annealed", "edge-region", seed)) for seed in (0, 1)
+    ]
     assert {group_of(trial) for trial in trials} == {"a, b"}
     groups = by_group([made(trial, error) for trial, error in zip(trials, (10.0, 20.0), strict=True)])
     chart = curves("title", groups)

@@ -14,7 +14,7 @@ from studio.behaviour.model_file import read_model, write_model
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
 from studio.comparison.footage_cache import FootageCache
-from studio.comparison.tracked import Attempt, track
+from studio.comparison.tracked import TrackingTrial, track
 from studio.errors import BehaviourError, NotFoundError, SettingsError, StudioError
 from studio.motion_files.trc import MarkerMotion, write_trc
 from studio.runs.behaviour_models import check_prediction, fitting, models_folder, models_in
@@ -215,10 +215,10 @@ def test_frames_annealed_again_see_the_lessons_of_their_time(long_session: Sessi
 
 
 def test_an_attempt_without_a_model_is_the_trial_that_it_was(session_on_disk: Session) -> None:
-    without = Attempt(str(session_on_disk.path), "behaviour", "edge-region", 0, {"particles": 20})
+    without = TrackingTrial(str(session_on_disk.path), "behaviour", "edge-region", 0, {"particles": 20})
     assert "behaviour" not in without.plain()
     given = dataclasses.replace(without, behaviour="swings")
-    assert Attempt.of_plain(given.plain()) == given
+    assert TrackingTrial.of_plain(given.plain()) == given
 
 
 def test_experiments_track_with_a_model(long_session: Session) -> None:
@@ -232,7 +232,7 @@ def test_experiments_track_with_a_model(long_session: Session) -> None:
     )
     write_pose(long_session.path / "start_pose.csv", tuple(arm_model().space.parameters), true_poses()[0])
     changes = {**GUIDED["behaviour"], **LEARNING}
-    attempt = Attempt(
+    attempt = TrackingTrial(
         str(long_session.path), "behaviour", "edge-region", 4, {**changes, "refine_frames": True}
     )
     cache = FootageCache(long_session.path.parent)

@@ -11,8 +11,7 @@ from studio.runs.checking import check_run, kept_check, sudden_turns
 from studio.runs.new_run import prepare_run
 from studio.runs.refining import SMOOTHED
 from studio.runs.tracks import Track, best_track, write_track
-from studio.runs.workflow import workflow_of
-from studio.runs.workflow_results import check_step
+from studio.runs.workflow import check_step, workflow_of
 
 
 def step(session, name):

@@ -17,7 +17,7 @@ from studio.runs import shape_on_the_way
 from studio.runs.new_run import prepare_run
 from studio.runs.search_space import default_sigma
 from studio.runs.shape_on_the_way import FOLDER, shaped_body
-from studio.runs.workflow_results import run_changes
+from studio.runs.workflow import run_changes
 from studio.sessions.session import Session
 
 WALK = Path(__file__).parents[2] / "sample_sessions" / "walk"

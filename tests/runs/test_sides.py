@@ -12,7 +12,7 @@ from studio.body.forward_kinematics import marker_points
 from studio.jobs.batch import track_to_end
 from studio.jobs.open_live_run import opened
 from studio.jobs.open_run import OpenRun
-from studio.jobs.side_looking import SideLooking
+from studio.jobs.tracking_job import SideLooking
 from studio.runs.problem_source import ProblemSource
 from studio.runs.refining import smooth_run
 from studio.runs.sides import notes_of, put_sides_right

@@ -83,7 +83,7 @@ def hidden_by_the_other(session: Session, people: TwoPeople, who: int) -> tuple[
     return found, inside
 
 
-def test_who_is_in_view_is_told_by_the_hull(made: TwoPeople) -> None:
+def test_who_is_in_view_is_reported_by_the_hull(made: TwoPeople) -> None:
     for frame in (0, FRAMES - 1):
         seen = seen_subjects(made.session, frame)
         assert len(seen) == 2, seen

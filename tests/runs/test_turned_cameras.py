@@ -10,8 +10,7 @@ from studio.errors import CalibrationError, NotFoundError
 from studio.runs.aligning import SessionAlignment, align_cameras
 from studio.runs.new_run import prepare_run
 from studio.runs.turned_cameras import remember_alignment, turn_back, turn_cameras, turned_from
-from studio.runs.workflow import workflow_of
-from studio.runs.workflow_step import StepStatus
+from studio.runs.workflow import StepStatus, workflow_of
 from studio.sessions.calibration_changes import restore_calibration, stale_runs
 from studio.sessions.session import CAMERAS_PATH, Session
 

@@ -7,9 +7,8 @@ import pytest
 
 from studio.body.subject import Subject, write_subject
 from studio.errors import SessionError
-from studio.runs.workflow import workflow_of
-from studio.runs.workflow_setup import subject_step
-from studio.sessions.made_from import note
+from studio.runs.workflow import subject_step, workflow_of
+from studio.sessions.provenance import note
 from studio.sessions.session import SUBJECT_NAME
 from studio.sessions.workspace import Workspace, begin_session
 

@@ -239,7 +239,7 @@ def test_pages_need_nothing_inline(studio: Studio) -> None:
         assert 'href="http' not in text
 
 
-def test_health_is_told_to_whoever_asks_by_the_right_name(
+def test_health_is_reported_to_whoever_asks_by_the_right_name(
     studio: Studio, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     answer = httpx.get(f"{studio.base}/health")

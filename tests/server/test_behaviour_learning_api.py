@@ -40,7 +40,7 @@ def begin(studio: Studio, **wish: object):
     return studio.client.post("/api/learning", json={"name": "sway", "body": "human31", **wish})
 
 
-def test_the_form_is_told_every_knob_once(studio: Studio) -> None:
+def test_the_form_is_reported_every_knob_once(studio: Studio) -> None:
     response = studio.client.get("/api/learning").json()
     wanted = [entry.name for kind in (LearningSettings, OversamplingSettings) for entry in knobs_of(kind)]
     assert [entry["name"] for entry in response["knobs"]] == wanted
@@ -74,7 +74,7 @@ def test_uploaded_motion_becomes_a_model(studio: Studio, tmp_path, archive: bool
     assert begin(studio, sources=["walk"]).status_code == 422, "the name is taken"
 
 
-def test_what_goes_wrong_inside_is_told_in_words(studio: Studio, tracked: StoredRun) -> None:
+def test_what_goes_wrong_inside_is_reported_in_words(studio: Studio, tracked: StoredRun) -> None:
     answer = begin(studio, sources=["take1/first"])
     assert answer.status_code == 202, answer.text
     response = ended(studio)

@@ -127,7 +127,7 @@ def test_an_earlier_one_comes_back(studio: Studio, session: Session) -> None:
     assert (session.path / "calibration" / "cameras.toml").read_bytes() == original
 
 
-def test_what_blocks_can_be_used_if_told(studio: Studio, session: Session) -> None:
+def test_what_blocks_can_be_used_if_requested(studio: Studio, session: Session) -> None:
     upload = uploaded(studio, {"Calib_other.toml": turned_up(session)})
     seen = studio.client.post(f"{TAKE}/proposals", json={"upload": upload}).json()
     address = f"{TAKE}/proposals/{seen['identifier']}/apply"

@@ -73,7 +73,7 @@ def test_cameras_are_looked_at(studio: Studio, streams: Streams) -> None:
     assert closed["cameras"] == []
 
 
-def test_a_stream_that_stops_is_told(studio: Studio, streams: Streams) -> None:
+def test_a_stream_that_stops_is_reported(studio: Studio, streams: Streams) -> None:
     shown(studio, streams)
     streams.silent.add("cam2")
     response = until(studio, "/api/cameras", lambda response: response["cameras"][1]["state"] == "stopped")

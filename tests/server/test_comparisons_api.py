@@ -121,8 +121,8 @@ def test_a_server_that_ends_leaves_it_to_go_on(compared: Studio) -> None:
 def test_what_fails_is_said(compared: Studio) -> None:
     session = compared.workspace.session("walk")
     plan = plan_comparison(session, Lineup(("annealed",), "", 60, 3), (0,), last=2)
-    wrong = replace(plan.entrants[0], changes={"survivor": 1})
-    new_comparison(place_of(session), replace(plan, entrants=(wrong,)))
+    wrong = replace(plan.candidates[0], changes={"survivor": 1})
+    new_comparison(place_of(session), replace(plan, candidates=(wrong,)))
     assert compared.client.post("/api/comparisons/walk/comparison-1/resume").status_code == 202
     assert "survivor" in until(compared, "comparison-1", "failed")["comparison"]["problem"]
 
@@ -161,9 +161,9 @@ def test_addresses_lead_nowhere_else(compared: Studio) -> None:
         assert compared.client.get(f"/api/comparisons/{path}").status_code in (404, 422), path
 
 
-def test_who_can_take_part_is_told(studio: Studio) -> None:
+def test_who_can_take_part_is_reported(studio: Studio) -> None:
     response = studio.client.get("/api/comparisons/choices").json()
-    names = {entry["name"]: entry for entry in response["entrants"]}
+    names = {entry["name"]: entry for entry in response["candidates"]}
     assert {"annealed", "condensation", "swarm", "annealed:eq13"} <= names.keys()
     assert names["annealed:eq13"]["changes"]["adaptive_diffusion"] is False
     for lineup in response["lineups"]:

@@ -72,7 +72,7 @@ def test_a_page_that_is_not_there_is_a_page(studio: Studio) -> None:
     assert "<script>" not in answer.text
 
 
-def test_an_unforeseen_fault_is_told_in_words_and_logged_whole(
+def test_an_unforeseen_fault_is_reported_in_words_and_logged_whole(
     studio: Studio, monkeypatch: pytest.MonkeyPatch, records: pytest.LogCaptureFixture
 ) -> None:
     def broken(*_: object) -> None:

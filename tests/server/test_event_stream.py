@@ -111,7 +111,7 @@ def test_every_event_reaches_every_watcher_in_order(studio: Studio) -> None:
             assert (refusal["identifier"], refusal["ok"], refusal["hint"]) == ("id-1", False, "Wait.")
 
 
-def test_who_comes_later_is_told_state_and_settings(studio: Studio) -> None:
+def test_who_comes_later_is_reported_state_and_settings(studio: Studio) -> None:
     with watching(studio) as first:
         studio.control.say(state_of("take1", "first", "paused"))
         studio.control.say(SettingsApplied("take1", "first", 3, 4, 5, {"survival": 0.4}, ()))
@@ -121,7 +121,7 @@ def test_who_comes_later_is_told_state_and_settings(studio: Studio) -> None:
             assert next_of(late, "settings")["values"] == {"survival": 0.4}
 
 
-def test_changes_of_the_workspace_and_moves_of_the_scene_are_told(studio: Studio) -> None:
+def test_changes_of_the_workspace_and_moves_of_the_scene_are_reported(studio: Studio) -> None:
     with watching(studio) as socket:
         next_of(socket, "state")
         studio.client.post("/api/sessions/take1/duplicate", json={"name": "take2"})
@@ -131,7 +131,7 @@ def test_changes_of_the_workspace_and_moves_of_the_scene_are_told(studio: Studio
         assert next_of(socket, "scene")["frame"] is None
 
 
-def test_a_sleeping_browser_is_told_how_much_it_lost() -> None:
+def test_a_sleeping_browser_is_reported_how_much_it_lost() -> None:
     """Of states it gets the newest; of what cannot be replaced the newest that its queue holds."""
 
     class Sleeper:

@@ -86,7 +86,7 @@ def test_the_scene_is_recorded_by_the_stage(studio: Studio, tracked: StoredRun) 
         ({"format": "bvh", "options": {"fps": "many"}}, 422, "'fps'"),
     ],
 )
-def test_wrong_wishes_are_refused_at_once(
+def test_wrong_requests_are_refused_at_once(
     studio: Studio, tracked: StoredRun, wish: dict, status: int, words: str
 ) -> None:
     answer = studio.client.post(f"{RUN}/exports", json=wish)

@@ -79,7 +79,7 @@ def test_what_cannot_be_changed(studio: Studio, wish: dict, said: str) -> None:
     assert [camera["offset"] for camera in studio.client.get(HERE).json()["cameras"]] == [0, 0]
 
 
-def test_wishes_that_are_none(studio: Studio) -> None:
+def test_requests_that_make_no_sense(studio: Studio) -> None:
     for wish in ({"rotations": {"cam1": 45}}, {"offsets": {"cam1": "x"}}, {"speed": 3}):
         assert studio.client.patch(HERE, json=wish).status_code == 422
 

@@ -59,7 +59,7 @@ def test_a_folder_of_this_machine_is_imported(studio: Studio, source: Path) -> N
     assert names == ["second", "take1"]
 
 
-def test_what_went_wrong_is_told_in_words_and_leaves_nothing(studio: Studio, source: Path) -> None:
+def test_what_went_wrong_is_reported_in_words_and_leaves_nothing(studio: Studio, source: Path) -> None:
     empty = source.parent / "empty"
     empty.mkdir(exist_ok=True)
     response = imported(studio, name="second", source=str(empty))
@@ -208,7 +208,7 @@ def test_an_import_can_be_cancelled(studio: Studio, source: Path, monkeypatch: p
     assert not (studio.workspace.root / "x").exists()
 
 
-def test_an_unforeseen_fault_of_an_import_is_told(
+def test_an_unforeseen_fault_of_an_import_is_reported(
     studio: Studio, source: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def broken(*_: object, **__: object):

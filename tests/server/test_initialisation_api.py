@@ -64,7 +64,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> dict[str, object]:
     return asked
 
 
-def test_what_is_found_is_told_kept_and_shown(studio: Studio, session: Session, quick: dict) -> None:
+def test_what_is_found_is_reported_kept_and_shown(studio: Studio, session: Session, quick: dict) -> None:
     before = (session.path / "start_pose.csv").read_text()
     answer = studio.client.post("/api/sessions/take1/initialise", json={"frame": 2, "seed": 5})
     assert answer.status_code == 202, answer.text
@@ -114,7 +114,7 @@ def test_refusals(studio: Studio, quick: dict, wish: dict, status: int) -> None:
     assert not quick
 
 
-def test_failure_is_told_in_words(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failure_is_reported_in_words(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
     def fails(*_: object, **__: object) -> InitialPose:
         raise RunError("Nothing is to be seen.", "Choose another frame.")
 

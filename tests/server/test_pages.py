@@ -58,7 +58,7 @@ def test_every_page_is_put_together_whole(studio: Studio, address: str, title: s
         assert studio.client.get(asset).status_code == 200, asset
 
 
-def test_modules_have_the_type_that_browsers_want_and_are_asked_for_anew(studio: Studio) -> None:
+def test_modules_have_the_type_that_browsers_want_and_are_requested_anew(studio: Studio) -> None:
     module = studio.client.get("/assets/js/main.js")
     assert module.headers["content-type"].startswith("text/javascript")
     assert module.headers["cache-control"] == "no-cache"
@@ -158,14 +158,14 @@ def test_preferences_are_remembered(studio: Studio) -> None:
     ],
 )
 @pytest.mark.parametrize("path", ["show", "view"])
-def test_the_scene_is_told_what_to_show(
+def test_the_scene_is_reported_what_to_show(
     studio: Studio, tracked: StoredRun, path: str, wish: dict[str, object], calls: list[tuple]
 ) -> None:
     assert studio.client.post(f"/api/scene/{path}", json=wish).status_code == 204
     assert studio.stage.calls == calls
 
 
-def test_the_scene_is_not_told_of_what_does_not_exist(studio: Studio, tracked: StoredRun) -> None:
+def test_the_scene_is_not_reported_of_what_does_not_exist(studio: Studio, tracked: StoredRun) -> None:
     for wish in ({"session": "none"}, {"session": "take1", "run": "none"}):
         assert studio.client.post("/api/scene/show", json=wish).status_code == 404
     for wish in ({"session": "../x"}, {"frame": -1}, {"layer": "x"}, {"unknown": 1}):

@@ -135,8 +135,8 @@ def test_the_page_is_offered_them_and_tracks_with_them(page: Page) -> None:
     assert measured_by().endswith(", my-capture 1.0"), "what another version measured is measured again"
     knobs = get("/api/knobs", params={"tracker": "random", "weighting": "inside"}).json()["values"]
     assert {"reach": 1.0, "points_a_limb": 12}.items() <= knobs.items()
-    entrants = {entry["name"]: entry for entry in get("/api/comparisons/choices").json()["entrants"]}
-    assert entrants["random"]["sized_by"] == ["particles"]
+    candidates = {entry["name"]: entry for entry in get("/api/comparisons/choices").json()["candidates"]}
+    assert candidates["random"]["sized_by"] == ["particles"]
     assert get("/api/evaluations", params={"tracker": "random", "evaluations": 500}).json() == {
         "particles": 500
     }

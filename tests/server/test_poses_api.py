@@ -108,7 +108,7 @@ def test_the_editor_in_the_scene_is_opened_read_and_left(studio: Studio, toy: Se
     assert client.get("/api/scene/edit").json()["editing"] is False
 
 
-def test_pictures_carry_the_pose_that_is_asked_for(studio: Studio, toy: Session) -> None:
+def test_pictures_carry_the_pose_that_is_requested(studio: Studio, toy: Session) -> None:
     base = f"{TOY}/frames/0/views/front.jpg?show=outline"
     bare, posed = studio.client.get(base), studio.client.get(f"{base}&pose={','.join(map(str, POSE))}")
     assert bare.status_code == posed.status_code == 200

@@ -93,7 +93,7 @@ def test_from_a_new_run_to_its_end_and_into_the_trash(page: Page) -> None:
     assert client.delete("/api/sessions/take1").status_code == 200
 
 
-def test_when_the_process_is_killed_the_page_is_told_and_start_resumes(page: Page) -> None:
+def test_when_the_process_is_killed_the_page_is_reported_and_start_resumes(page: Page) -> None:
     page.post("/api/sessions/take1/runs", {"name": "small", "settings": SMALL | {"layers": 40}})
     # Four seconds a frame: it is killed in mid-run however long a busy machine keeps this thread waiting.
     page.post("/api/worker/pace", {"seconds_a_layer": 0.1})

@@ -8,7 +8,7 @@ from web_doubles import Studio, state_of
 from studio.jobs import commands
 from studio.jobs.events import StateChanged
 from studio.knobs import knobs_of
-from studio.sessions.made_from import note
+from studio.sessions.provenance import note
 from studio.sessions.run_log import append_to_log
 from studio.sessions.stored_run import StoredRun
 from studio.trackers.settings import AnnealedSettings
@@ -21,7 +21,7 @@ def posted(studio: Studio) -> list[type]:
     return [type(command) for command in studio.control.commands]
 
 
-def test_a_run_is_made_with_what_was_asked(studio: Studio) -> None:
+def test_a_run_is_made_with_what_was_requested(studio: Studio) -> None:
     wish = {
         "tracker": "condensation", "first": 1, "last": 3, "seed": 9, "settings": {"particles": 500}, "name": "c",
         "body": "human31",
@@ -133,7 +133,7 @@ def test_after_the_process_died_start_revives_it_and_goes_on(studio: Studio, tra
     assert "restart resume=True" in studio.control.calls
 
 
-def test_the_pace_is_set_and_told_with_its_choices(studio: Studio) -> None:
+def test_the_pace_is_set_and_reported_with_its_choices(studio: Studio) -> None:
     response = studio.client.get("/api/worker/pace").json()
     assert response["seconds_a_layer"] == 0.0
     assert [choice["label"] for choice in response["choices"]] == [
@@ -256,8 +256,8 @@ def test_reset_and_presets(studio: Studio, tracked: StoredRun) -> None:
     assert client.delete("/api/presets/mine").status_code == 404
 
 
-def test_a_doubted_calibration_is_told_and_tracked_only_if_wished(studio: Studio) -> None:
-    """What measuring the masks finds is remembered by `made_from`; here it is written down as it would be."""
+def test_a_doubted_calibration_is_reported_and_tracked_only_if_requested(studio: Studio) -> None:
+    """What measuring the masks finds is remembered by `provenance`; here it is written down as it would be."""
     doubt = "Cameras cam1 and cam2 seem to be exchanged. Exchange their names."
     note(studio.workspace.session("take1"), "background", "in doubt", good=False, stops=(doubt,))
     assert studio.client.get("/api/sessions/take1").json()["doubts"] == [doubt]

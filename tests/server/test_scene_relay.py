@@ -189,7 +189,7 @@ def test_without_a_scene_the_browser_is_asked_to_try_again(studio: Studio) -> No
     assert refused.value.response.status_code in (403, 503)
 
 
-def test_when_the_browser_leaves_viser_is_told(relayed: Studio, inner: GuardedServer) -> None:
+def test_when_the_browser_leaves_viser_is_reported(relayed: Studio, inner: GuardedServer) -> None:
     sockets = [opened(relayed) for _ in range(3)]
     for socket in sockets:
         socket.recv(timeout=20)

@@ -9,7 +9,7 @@ from studio.body.retargeting import lowest_of_sole
 from studio.synthesis.motions import make_motion
 from studio.synthesis.person import skeleton_of_height
 from studio.synthesis.recorded_clips import CARRIERS, Variation, from_local, performance, to_local
-from studio.training.smooth_noise import smooth_noise, warped_times
+from studio.training.oversampling import smooth_noise, warped_times
 
 BONES = skeleton_of_height(1760.0, np.random.default_rng(1))
 WALK = make_motion("walk", BONES, 240, 60.0, {})

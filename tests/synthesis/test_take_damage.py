@@ -12,7 +12,7 @@ import tomli_w
 
 from studio.body.person import PersonMotion, joint_points
 from studio.comparison.footage_cache import FootageCache
-from studio.comparison.tracked import Attempt, track
+from studio.comparison.tracked import TrackingTrial, track
 from studio.errors import StudioError
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project
@@ -186,7 +186,7 @@ def test_a_damaged_take_can_be_tracked_from_the_height_alone(tmp_path: Path) -> 
     )
     shelf = FootageCache(tmp_path)
     try:
-        attempt = Attempt(
+        attempt = TrackingTrial(
             str(session.path),
             "annealed",
             "edge-region-silhouette",

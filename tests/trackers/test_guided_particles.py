@@ -17,8 +17,8 @@ from studio.trackers.guided_particles import (
     foreseen,
     known_of,
     near,
+    propagated,
     spread_over_clusters,
-    walked,
     walkers_from,
 )
 from studio.trackers.tracker import FilterState, ParticleSet, SearchSpace
@@ -28,7 +28,7 @@ MODEL = toy_model()
 COUNT = 4000
 
 
-def walkers(frame: int = 12, free: bool = False) -> GuidedParticles:
+def guided(frame: int = 12, free: bool = False) -> GuidedParticles:
     """Particles that have followed the truth up to a frame."""
     poses = turning_poses(9, frame + 1)
     labels = MODEL.labels(poses)
@@ -46,9 +46,9 @@ def walking_space() -> SearchSpace:
 
 
 def test_the_root_gets_noise_and_the_angles_the_models_movement() -> None:
-    past = walkers()
+    past = guided()
     rules = BehaviourSettings(attenuation=0.0, global_scale=0.5)
-    moved = walked(np.random.default_rng(0), past, SPACE, rules, SPACE.sigma)
+    moved = propagated(np.random.default_rng(0), past, SPACE, rules, SPACE.sigma)
     root = moved.poses[:, :ROOT] - past.poses[:, :ROOT]
     assert np.allclose(root.mean(axis=0), 0.0, atol=5 * 0.15 / np.sqrt(COUNT))
     assert np.allclose(root.std(axis=0), 0.15, rtol=0.05)
@@ -62,10 +62,10 @@ def test_the_root_gets_noise_and_the_angles_the_models_movement() -> None:
 
 @pytest.mark.parametrize(("prediction", "wanted"), [("learnt", 0.05), ("noise", 0.0)])
 def test_the_root_moves_as_learnt_or_by_noise_alone(prediction: str, wanted: float) -> None:
-    past = walkers()
+    past = guided()
     past = dataclasses.replace(past, free=np.arange(COUNT) % 2 == 0)
     rules = BehaviourSettings(root_prediction=prediction, global_scale=0.5)
-    moved = walked(np.random.default_rng(5), past, walking_space(), rules, SPACE.sigma)
+    moved = propagated(np.random.default_rng(5), past, walking_space(), rules, SPACE.sigma)
     led, free = (moved.poses[rows, :ROOT] - past.poses[rows, :ROOT] for rows in (~past.free, past.free))
     assert np.allclose(led.mean(axis=0), [wanted, 0.0, 0.0], atol=5 * 0.3 / np.sqrt(COUNT / 2))
     # The learnt motion has almost no spread here; noise of σ0 is added as before.
@@ -76,15 +76,15 @@ def test_the_root_moves_as_learnt_or_by_noise_alone(prediction: str, wanted: flo
 
 
 def test_the_root_moves_as_many_steps_as_the_space_has() -> None:
-    past, rules = walkers(), BehaviourSettings(global_scale=0.0)
+    past, rules = guided(), BehaviourSettings(global_scale=0.0)
     space = dataclasses.replace(walking_space(), steps=3)
-    moved = walked(np.random.default_rng(6), past, space, rules, SPACE.sigma)
+    moved = propagated(np.random.default_rng(6), past, space, rules, SPACE.sigma)
     assert np.allclose(moved.poses[:, :ROOT] - past.poses[:, :ROOT], [0.15, 0.0, 0.0], atol=1e-4)
 
 
 def test_noise_of_those_that_stay_has_the_clusters_covariance_times_lambda_squared() -> None:
-    past = walkers()
-    moved = walked(np.random.default_rng(1), past, SPACE, BehaviourSettings(attenuation=0.5), SPACE.sigma)
+    past = guided()
+    moved = propagated(np.random.default_rng(1), past, SPACE, BehaviourSettings(attenuation=0.5), SPACE.sigma)
     label = int(MODEL.automaton.last_symbols[past.states[0]])
     stayed = MODEL.automaton.last_symbols[moved.states] == label
     change = moved.velocity[stayed] - past.velocity[stayed]
@@ -95,8 +95,8 @@ def test_noise_of_those_that_stay_has_the_clusters_covariance_times_lambda_squar
 
 
 def test_a_free_particle_is_spread_by_sigma_in_every_parameter_and_follows_the_automaton() -> None:
-    past = walkers(free=True)
-    moved = walked(np.random.default_rng(2), past, SPACE, BehaviourSettings(), SPACE.sigma)
+    past = guided(free=True)
+    moved = propagated(np.random.default_rng(2), past, SPACE, BehaviourSettings(), SPACE.sigma)
     change = moved.poses - past.poses
     assert np.allclose(change.std(axis=0), 0.3, rtol=0.06)
     assert np.array_equal(moved.velocity, past.velocity)

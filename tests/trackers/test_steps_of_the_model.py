@@ -6,7 +6,7 @@ import numpy as np
 from turning_behaviour import guided_space, turning_angles
 
 from studio.trackers.behaviour_settings import BehaviourSettings
-from studio.trackers.guided_particles import GuidedParticles, columns_of, model_of, walked
+from studio.trackers.guided_particles import GuidedParticles, columns_of, model_of, propagated
 from studio.trackers.guided_start import arrived
 
 COUNT = 4000
@@ -31,14 +31,16 @@ def test_three_steps_at_once_are_three_single_steps() -> None:
     nothing = np.zeros(len(space.names))
     columns = columns_of(space)
     # In the middle of a cluster's dwell nearly all particles stay in it.
-    walkers = turning(begin=3)
-    single = walkers
+    guided = turning(begin=3)
+    single = guided
     rng = np.random.default_rng(1)
     for _ in range(3):
-        single = walked(rng, single, space, STILL, nothing)
-    at_once = walked(np.random.default_rng(2), walkers, dataclasses.replace(space, steps=3), STILL, nothing)
+        single = propagated(rng, single, space, STILL, nothing)
+    at_once = propagated(
+        np.random.default_rng(2), guided, dataclasses.replace(space, steps=3), STILL, nothing
+    )
     for found in (single, at_once):
-        assert np.median(np.abs(found.poses[:, columns] - walkers.poses[:, columns]), axis=0).max() > 0.1
+        assert np.median(np.abs(found.poses[:, columns] - guided.poses[:, columns]), axis=0).max() > 0.1
     assert np.allclose(np.median(single.poses, axis=0), np.median(at_once.poses, axis=0), atol=1e-9), (
         "without noise those that stay in their cluster move alike"
     )

@@ -21,7 +21,6 @@ from studio.sessions.workspace import Workspace
 from studio.training.sources import expand, read_source, recipe_recording
 
 BODY = load_body("human25")
-ANGLES = slice(6, 25)
 FPS = 30.0
 
 

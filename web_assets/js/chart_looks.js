@@ -51,8 +51,3 @@ export const axis = ({ axisLabel = {}, ...more }) => ({
 
 /** The legend in the top right corner. */
 export const legend = (data) => ({ right: 12, top: 6, itemWidth: 12, itemHeight: 8, data, textStyle: { color: token("text-quiet"), fontSize: 11 } });
-
-/** What is drawn where there is nothing to draw. */
-export const emptyLook = (text) => ({
-  series: [], graphic: { type: "text", left: "center", top: "middle", style: { text, fill: token("text-quiet"), font: `450 13px ${FAMILY}` } },
-});

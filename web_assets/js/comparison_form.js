@@ -22,28 +22,28 @@ function readKnobs(text) {
 const writeKnobs = (settings) => Object.entries(settings).map(([name, value]) => `${name}=${value}`).join(", ");
 
 /** The rows of trackers: `box` and `lineUp` are put on the page, `fill(trackers)` and `read()` as the API has them. */
-function candidates({ entrants, weightings, lineups }, changed) {
+function candidates({ candidates: offered, weightings, lineups }, changed) {
   let rows = [];
-  const list = element("div", { className: "entrants" });
-  const more = button("+ Tracker", () => add({ name: entrants.find((one) => !rows.some((row) => row.who.value === one.name))?.name ?? entrants[0].name }), "quiet small");
-  const helpOf = (name) => (name.includes(":") ? entrants.find((one) => one.name === name)?.help ?? "" : "");
+  const list = element("div", { className: "candidates" });
+  const more = button("+ Tracker", () => add({ name: offered.find((one) => !rows.some((row) => row.who.value === one.name))?.name ?? offered[0].name }), "quiet small");
+  const helpOf = (name) => (name.includes(":") ? offered.find((one) => one.name === name)?.help ?? "" : "");
 
   function add({ name, settings = {}, weighting = "" }) {
-    const known = entrants.find((one) => one.name === name) ?? entrants.find((one) => one.name === name.split(":")[0]);
-    const help = element("p", { className: "entrant-help" }, helpOf(known.name));
-    const who = select(entrants.map((one) => one.name), known.name, { ariaLabel: "Tracker", onchange: () => { help.textContent = helpOf(who.value); draw(); } });
+    const known = offered.find((one) => one.name === name) ?? offered.find((one) => one.name === name.split(":")[0]);
+    const help = element("p", { className: "candidate-help" }, helpOf(known.name));
+    const who = select(offered.map((one) => one.name), known.name, { ariaLabel: "Tracker", onchange: () => { help.textContent = helpOf(who.value); draw(); } });
     const label = element("input", { placeholder: "own label", ariaLabel: "Label", pattern: "[A-Za-z0-9_\\-]{1,40}", title: "Letters, digits, - and _", value: known.name === name ? "" : name.split(":")[1] ?? "" });
     const likelihood = select([["", "likelihood of all"], ...weightings], weighting ?? "", { ariaLabel: "Likelihood" });
     const knobs = element("input", { placeholder: "knobs: survival=0.5, crossover=0", ariaLabel: "Knobs", value: writeKnobs(settings) });
     const remover = button("×", () => { rows = rows.filter((one) => one !== row); draw(); }, "icon quiet", { ariaLabel: "Leave this one out" });
     const swatch = element("i", { className: "swatch" });
     const read = () => {
-      const choice = entrants.find((one) => one.name === who.value);
+      const choice = offered.find((one) => one.name === who.value);
       const own = readKnobs(knobs.value);
       const named = label.value.trim();
       return { name: named ? `${choice.tracker}:${named}` : choice.name, settings: named ? { ...choice.changes, ...own } : own, weighting: likelihood.value || null };
     };
-    const row = { who, swatch, remover, read, line: element("div", { className: "entrant" }, swatch, who, label, likelihood, knobs, remover, help) };
+    const row = { who, swatch, remover, read, line: element("div", { className: "candidate" }, swatch, who, label, likelihood, knobs, remover, help) };
     rows.push(row);
     draw();
   }
@@ -115,7 +115,7 @@ export function showForm(content, { sessions, choices, bodies, initial, started,
     session: value("session"), name: value("name") || null, trackers: rows.read(), evaluations: Number(value("evaluations")), seeds: Number(value("seeds")),
     weighting: value("weighting") || null, body: value("body") || null, first: Number(value("first")), last: Number(value("last")) + 1, layers: Number(value("layers")),
   })));
-  const known = new Set(choices.entrants.map((one) => one.name));
+  const known = new Set(choices.candidates.map((one) => one.name));
   rows.fill(initial.trackers ?? USUAL.filter((name) => known.has(name)).map((name) => ({ name })));
   takeSession();
   fill(content, element("div", { className: "column" },

@@ -109,8 +109,8 @@ function initialLike({ comparison: line, settings, body }) {
   const common = weightings.size === 1 ? [...weightings][0] : null;
   const trackers = line.trackers.map((name) => {
     const { weighting, ...knobs } = settings[name];
-    const known = choices.entrants.find((one) => one.name === name)?.changes ?? {};
-    const brought = choices.entrants.find((one) => one.tracker === name.split(":")[0])?.sized_by ?? [];
+    const known = choices.candidates.find((one) => one.name === name)?.changes ?? {};
+    const brought = choices.candidates.find((one) => one.tracker === name.split(":")[0])?.sized_by ?? [];
     const own = Object.entries(knobs).filter(([knob, value]) => !brought.includes(knob) && known[knob] !== value);
     return { name, settings: Object.fromEntries(own), weighting: common ? null : weighting };
   });

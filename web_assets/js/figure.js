@@ -21,7 +21,7 @@ const LEAST_ROOM = 170;
 /**
  * What a figure shows. `draw`: fills a sheet and returns the exact numbers of what is chosen, in a sentence. `tables`: the numbers
  * behind it. `link`: its address, null where it has none.
- * @typedef {{ name: string, title: string, question: string, caption: string, notes: string[], tables: { name: string, title: string, columns: { key: string, label: string, unit: string }[], rows: any[][] }[],
+ * @typedef {{ name: string, title: string, question: string, caption: string, notes: string[], tables: { name: string, title: string, columns: { key: string, label: string, unit?: string }[], rows: any[][] }[],
  *   draw: (sheet: Sheet, room: number) => string, choose: (changes: Record<string, any>) => void, link: (() => string) | null }} Shown
  */
 
@@ -61,7 +61,7 @@ function linked(columns, row, shown) {
 }
 
 /** Tables as CSV: the caption and each table's title in lines of their own. @param {Shown} shown */
-export function csvOf({ caption, title, tables }) {
+function csvOf({ caption, title, tables }) {
   const part = (one) => [`# ${one.title}`, one.columns.map((column) => quoted(column.key)).join(","), ...one.rows.map((row) => readable(one.columns, row).map((value) => quoted(value === null ? "" : String(value))).join(","))];
   return `${[`# ${title}. ${caption}`, ...tables.filter((one) => one.rows.length).flatMap(part)].join("\n")}\n`;
 }

@@ -49,7 +49,7 @@ function take(at) {
 }
 
 /** Open the palette. */
-export function openPalette() {
+function openPalette() {
   chosen = 0;
   const list = element("ul", { className: "palette-list", role: "listbox", ariaLabel: "What there is", id: "palette-list" });
   const field = element("input", { type: "text", placeholder: "A view, a panel, a command, a run …", ariaLabel: "Find", role: "combobox", ariaExpanded: "true", autocomplete: "off" });

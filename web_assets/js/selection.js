@@ -4,7 +4,7 @@
 import { get, set } from "./state.js";
 
 /** What is chosen beside the frame; null: nothing. */
-export const CHOSEN = ["layer", "limb", "parameter", "particle", "camera"];
+const CHOSEN = ["layer", "limb", "parameter", "particle", "camera"];
 /** Nothing chosen. */
 export const nothingChosen = () => Object.fromEntries(CHOSEN.map((name) => [name, null]));
 

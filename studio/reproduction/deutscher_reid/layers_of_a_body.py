@@ -15,7 +15,7 @@ from studio.body.forward_kinematics import marker_points
 from studio.comparison.findings import Chart, Table
 from studio.comparison.footage_cache import FootageCache
 from studio.comparison.statistics import number
-from studio.comparison.tracked import Attempt, track
+from studio.comparison.tracked import TrackingTrial, track
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.errors import TruthError
 from studio.evaluation.errors import rows_of_frames
@@ -41,9 +41,9 @@ SETTINGS: Mapping[str, Any] = {"footage": CIRCLE, "body": BODY, "weighting": WEI
 
 def _tracked_layers(
     arguments: Mapping[str, Any], cache: FootageCache
-) -> tuple[Attempt, list[int], list[list[LayerRecord]], float]:
+) -> tuple[TrackingTrial, list[int], list[list[LayerRecord]], float]:
     """The attempt, its frames, every frame's layers, and the mean error, mm."""
-    attempt = Attempt.of_plain(arguments)
+    attempt = TrackingTrial.of_plain(arguments)
     records: list[LayerRecord] = []
     found = track(attempt, cache, on_layer=records.append)
     return (
@@ -73,7 +73,7 @@ def trials_fig_3(scale: Scale) -> tuple[Trial, ...]:
         each_seed(
             "clouds",
             scale.seeds,
-            lambda seed: Attempt(CIRCLE, "annealed", WEIGHTING, seed, FIG_3_KNOBS, last=last).plain(),
+            lambda seed: TrackingTrial(CIRCLE, "annealed", WEIGHTING, seed, FIG_3_KNOBS, last=last).plain(),
         )
     )
 
@@ -176,7 +176,9 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
 
     def arguments(seed: int) -> Mapping[str, Any]:
         first = seed * stride % (FOOTAGE_FRAMES - FRAMES)
-        return Attempt(CIRCLE, "annealed", WEIGHTING, seed, KNOBS, first=first, last=first + frames).plain()
+        return TrackingTrial(
+            CIRCLE, "annealed", WEIGHTING, seed, KNOBS, first=first, last=first + frames
+        ).plain()
 
     return tuple(each_seed("layers of a whole body", scale.seeds, arguments))
 

@@ -23,7 +23,7 @@ from studio.body.forward_kinematics import marker_points
 from studio.comparison.findings import Chart, Number, Series, Table
 from studio.comparison.footage_cache import FootageCache
 from studio.comparison.statistics import number
-from studio.comparison.tracked import Attempt, track
+from studio.comparison.tracked import TrackingTrial, track
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.reproduction.claims import HIGHER, beyond, geometric_mean
 from studio.reproduction.deutscher_reid.arms import TemplateArm, template_arm
@@ -415,7 +415,7 @@ def measure_body(arguments: Knobs, cache: FootageCache) -> dict[str, Any]:
     """The fewest particles for one seed."""
 
     def succeeds(particles: int, run: int) -> bool:
-        attempt = Attempt(
+        attempt = TrackingTrial(
             arguments["footage"],
             "annealed",
             WEIGHTING,

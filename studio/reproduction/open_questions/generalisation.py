@@ -14,7 +14,7 @@ import numpy as np
 from studio.comparison.findings import Plain, Table
 from studio.comparison.footage_cache import FootageCache
 from studio.comparison.statistics import number
-from studio.comparison.tracked import Attempt, Tracked, track
+from studio.comparison.tracked import Tracked, TrackingTrial, track
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.reproduction.caillette.training_set import Training, model_file
 from studio.reproduction.drawing import heat_chart
@@ -134,7 +134,7 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
     plain = dict(arguments["attempt"])
     if "training" in arguments:
         plain["behaviour"] = str(model_file(cache, Training.of_plain(arguments["training"])))
-    return asdict(track(Attempt.of_plain(plain), cache))
+    return asdict(track(TrackingTrial.of_plain(plain), cache))
 
 
 def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:

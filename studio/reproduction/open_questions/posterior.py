@@ -26,7 +26,7 @@ from studio.arrays import Array
 from studio.comparison.findings import Chart, Series, Table
 from studio.comparison.footage_cache import FootageCache
 from studio.comparison.statistics import number
-from studio.comparison.tracked import Attempt, track
+from studio.comparison.tracked import TrackingTrial, track
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.errors import TruthError
 from studio.reproduction.claims import share
@@ -91,7 +91,7 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
     """Of each layer, and of the last one at β = 1: ranks (K, D) and squared distances in variances (K, D) of the truth,
     of K frames and D parameters; effective particles.
     """
-    attempt = Attempt.of_plain(arguments)
+    attempt = TrackingTrial.of_plain(arguments)
     session = cache.session(attempt.footage)
     body = session.body()
     if session.truth_path is None:

@@ -16,7 +16,7 @@ from scipy.ndimage import gaussian_filter
 from studio.arrays import Array, Bytes
 from studio.comparison.findings import Table
 from studio.comparison.footage_cache import FootageCache
-from studio.comparison.tracked import Attempt, Changed, track
+from studio.comparison.tracked import Changed, TrackingTrial, track
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.geometry.camera import Camera
@@ -272,7 +272,7 @@ def _trials(question: Question, scale: Scale) -> tuple[Trial, ...]:
 @kept_as("open_questions.robustness.measure")
 def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
     """Track the damaged footage; the fields of `Tracked`."""
-    attempt = Attempt.of_plain(arguments["attempt"])
+    attempt = TrackingTrial.of_plain(arguments["attempt"])
     spoilt = DAMAGES[arguments["damage"]](float(arguments["degree"]), attempt.seed)
     return asdict(track(attempt, cache, spoilt=spoilt))
 

@@ -51,9 +51,9 @@ from studio.sessions.importers.writing import (
     write_person,
     write_session,
 )
-from studio.sessions.made_from import adopt
 from studio.sessions.manifest import SessionManifest
 from studio.sessions.names import free_name
+from studio.sessions.provenance import adopt
 from studio.sessions.session import CAMERAS_PATH, THUMBNAIL_NAME, Session, described_anew
 from studio.sessions.stroke_files import OUTDATED, STROKES_NAME
 

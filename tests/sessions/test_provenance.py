@@ -9,7 +9,7 @@ from toy_session import make_session, true_poses
 from studio.capture.calibration_files import read_calibration, write_calibration
 from studio.runs.new_run import prepare_run
 from studio.runs.workflow import workflow_of
-from studio.sessions import made_from
+from studio.sessions import provenance
 from studio.sessions.named_rows import write_pose
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import CAMERAS_PATH, START_POSE_NAME, Session, described_anew
@@ -38,36 +38,36 @@ def move_cameras(session: Session) -> Session:
 
 
 def test_a_start_pose_is_stale_after_the_calibration_changed(session):
-    made_from.note(session, "start-pose", "confidence 90 %")
+    provenance.note(session, "start-pose", "confidence 90 %")
     assert step(session, "start-pose").state == "done"
     assert step(session, "start-pose").words == "confidence 90 %"
     moved = move_cameras(session)
-    assert made_from.changed_inputs(moved, "start-pose") == ("calibration",)
+    assert provenance.changed_inputs(moved, "start-pose") == ("calibration",)
     stale = step(moved, "start-pose")
     assert stale.state == "stale"
     assert "calibration" in stale.why
-    made_from.note(moved, "start-pose")
+    provenance.note(moved, "start-pose")
     assert step(moved, "start-pose").state == "done"
 
 
 def test_a_given_start_pose_counts_as_of_what_was_there(session):
-    made_from.adopt(session)
+    provenance.adopt(session)
     assert step(move_cameras(session), "start-pose").state == "stale"
 
 
 def test_a_pose_that_was_replaced_by_hand_is_nobodys(session):
-    made_from.note(session, "start-pose")
+    provenance.note(session, "start-pose")
     names = tuple(entry.name for entry in session.body().parameters)
     write_pose(session.path / START_POSE_NAME, names, true_poses()[2])
-    assert made_from.changed_inputs(move_cameras(session), "start-pose") == ()
+    assert provenance.changed_inputs(move_cameras(session), "start-pose") == ()
 
 
 def test_measured_masks_are_stale_after_other_knobs(session):
-    made_from.note(session, "background", "agree 0.95", good=True)
+    provenance.note(session, "background", "agree 0.95", good=True)
     assert step(session, "background").words == "agree 0.95"
     (session.path / "evidence.json").write_text('{"schema": 1, "knobs": {"mask_threshold": 7}, "given": {}}')
-    assert made_from.changed_inputs(session, "background") == ("masks",)
-    made_from.note(session, "background", "agree 0.50", good=False)
+    assert provenance.changed_inputs(session, "background") == ("masks",)
+    provenance.note(session, "background", "agree 0.50", good=False)
     assert step(session, "background").state == "ready"
 
 
