@@ -8,7 +8,7 @@ change slowly by a little.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
+import scipy
 
 from studio.arrays import Array
 from studio.body.model import BodyModel
@@ -84,7 +84,9 @@ def smoothed_copies(body: BodyModel, poses: Array, fps: float, settings: Oversam
     found, count = list[Array](), settings.smoothings
     for number in range(count):
         width = settings.widest_smoothing * fps * number / max(count - 1, 1)
-        smooth = gaussian_filter1d(poses, width, axis=0, mode="nearest") if width > 0.0 else poses
+        smooth = (
+            scipy.ndimage.gaussian_filter1d(poses, width, axis=0, mode="nearest") if width > 0.0 else poses
+        )
         times = np.arange(len(poses)) / fps
         if number:
             smooth = poses_at(body, times, smooth, times[:-1] + number / (count * fps))

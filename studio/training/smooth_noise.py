@@ -1,7 +1,7 @@
 """Slow random changes, as between two performances of the same movement."""
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
+import scipy
 
 from studio.arrays import Array
 
@@ -15,7 +15,7 @@ def smooth_noise(rng: np.random.Generator, frames: int, width: int, fps: float, 
     spread = max(period_s * fps / PERIODS, 1e-3)
     margin = int(np.ceil(REACH * spread))
     white = rng.standard_normal((frames + 2 * margin, width))
-    smooth = gaussian_filter1d(white, spread, axis=0, truncate=REACH)[margin : margin + frames]
+    smooth = scipy.ndimage.gaussian_filter1d(white, spread, axis=0, truncate=REACH)[margin : margin + frames]
     steps = np.arange(-margin, margin + 1)
     kernel = np.exp(-0.5 * (steps / spread) ** 2)
     return smooth / np.sqrt(np.sum((kernel / kernel.sum()) ** 2))
