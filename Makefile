@@ -10,7 +10,7 @@ TOOLS := node_modules/.package-lock.json
 # Compiled modules are kept: every process that a test starts would compile some 500 of them anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: env browser demo test test-fast test-slow faults fuzz soak watching audit test-opencv-4 check check-pages bench lock guide pictures wheel-test clean
+.PHONY: env browser demo test test-fast test-slow faults fuzz soak watching audit test-opencv-4 check check-types check-style check-pages bench lock guide pictures wheel-test clean
 
 env: $(READY)
 
@@ -74,10 +74,16 @@ test-opencv-4: env
 	PYTHONPATH=$(VENV)/opencv-4 $(BIN)/pytest -m "not slow and not browser" tests/calibration tests/capture \
 	  tests/evidence tests/runs tests/sessions tests/export
 
-check: env check-pages
+# Side by side: types in Python take as long as the rest together.
+check: env $(TOOLS)
+	$(MAKE) --no-print-directory --jobs 2 --output-sync=target check-types check-pages check-style
+
+check-types: env
+	$(BIN)/pyright
+
+check-style: env
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
-	$(BIN)/pyright
 	$(BIN)/lint-imports
 
 # Lint (import cycles too) and types of the pages' JavaScript, against the API's own description.

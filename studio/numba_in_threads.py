@@ -13,13 +13,16 @@ and wait for a thread that a busy machine has no core for.
 import functools
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import Any, TypeVar
 
 import numba
-from numba import njit, prange
+from numba import prange
 from numba.core import types
+from numba.core.dispatcher import Dispatcher
 from numba.core.registry import cpu_target
 from numba.extending import intrinsic
+
+from studio.kernel_cache import KernelCache
 
 __all__ = [
     "CONTRACTED",
@@ -37,11 +40,13 @@ __all__ = [
     "types",
 ]
 
+_Function = TypeVar("_Function", bound=Callable[..., object])
+
 _everything_numba_loads: Any = cpu_target.target_context
 _everything_numba_loads.refresh()
 
-KERNEL: dict[str, Any] = {"cache": True, "nogil": True}
-"""Options of every kernel: it is compiled once on a machine, and other threads go on meanwhile."""
+KERNEL: dict[str, Any] = {"nogil": True}
+"""Options of every kernel: other threads go on meanwhile."""
 EXACT: dict[str, Any] = {**KERNEL, "error_model": "numpy"}
 """Dividing by zero gives infinity, as in NumPy."""
 CONTRACTED: dict[str, Any] = {**EXACT, "fastmath": {"contract", "nsz"}}
@@ -52,6 +57,18 @@ FAST: dict[str, Any] = {**EXACT, "fastmath": {"contract", "reassoc", "nsz", "arc
 EXACT_INLINED: dict[str, Any] = {**EXACT, "forceinline": True}
 CONTRACTED_INLINED: dict[str, Any] = {**CONTRACTED, "forceinline": True}
 FAST_INLINED: dict[str, Any] = {**FAST, "forceinline": True}
+
+
+def njit(**options: Any) -> "Callable[[_Function], Dispatcher[_Function]]":  # noqa: ANN401 - Numba's
+    """Numba's decorator, for a kernel that is compiled once on a machine."""
+
+    def decorated(function: _Function) -> "Dispatcher[_Function]":
+        kernel = numba.njit(**options)(function)
+        kernel._cache = KernelCache(kernel)  # pyright: ignore[reportAttributeAccessIssue]
+        return kernel
+
+    return decorated
+
 
 TURNS = 4
 """How often each thread takes blocks, if all are equally quick."""

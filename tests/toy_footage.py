@@ -35,6 +35,7 @@ def write_video(path: Path, frames: list[np.ndarray], fps: int = 30, **settings:
         stream = container.add_stream(str(settings.get("codec", "libx264")), rate=fps)
         stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
         stream.codec_context.gop_size = int(settings.get("gop", 12))
+        stream.codec_context.thread_count = 1  # the same bytes on any number of cores
         for number, picture in enumerate(frames):
             frame = av.VideoFrame.from_ndarray(picture, format="bgr24")
             frame.pts = number if times is None else times[number]

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from studio.arrays import Array
 from studio.body.model import MOVE, BodyModel, kinematic_tables
 from studio.errors import BodyError
-from studio.numba_in_threads import numba
+from studio.numba_in_threads import KERNEL, njit
 
 
 def joint_frames(body: BodyModel, poses: ArrayLike) -> Array:
@@ -68,7 +68,7 @@ def checked_poses(body: BodyModel, poses: ArrayLike) -> Array:
     return array
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def place_joints(
     poses: Array,
     parent: NDArray[np.integer],
@@ -95,7 +95,7 @@ def place_joints(
                 take_step(frame, kind[s], axis[s], amount)
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def take_step(frame: Array, kind: int, axis: int, amount: float) -> None:
     """Multiply frame (3, 4) from the right by one elementary motion, in place. amount : mm or radians."""
     if kind == MOVE:

@@ -6,7 +6,7 @@ in the air stretched as a dancer's. In one of them a knee is on the wrong side f
 """
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d, maximum_filter1d
+import scipy
 from scipy.spatial.transform import Rotation
 
 from studio.arrays import Array
@@ -89,7 +89,9 @@ def _smooth(values: Array, width: float) -> Array:
     before = 2.0 * values[:1] - values[margin:0:-1]
     after = 2.0 * values[-1:] - values[-2 : -margin - 2 : -1]
     extended = np.concatenate([before, values, after])
-    return gaussian_filter1d(extended, width, axis=0, mode="nearest")[margin : margin + len(values)]
+    return scipy.ndimage.gaussian_filter1d(extended, width, axis=0, mode="nearest")[
+        margin : margin + len(values)
+    ]
 
 
 def with_feet_on_floor(motion: PersonMotion) -> PersonMotion:
@@ -107,7 +109,7 @@ def with_feet_on_floor(motion: PersonMotion) -> PersonMotion:
         share = np.clip((height - ON_TOES) / (IN_THE_AIR - ON_TOES), 0.0, 1.0)
         share = share * share * (3.0 - 2.0 * share)
         bend = np.clip((1.0 - share) * standing + share * STRETCHED, BENT_UP, BENT_DOWN)
-        bend = gaussian_filter1d(bend, SMOOTHING_S * motion.fps, mode="nearest")
+        bend = scipy.ndimage.gaussian_filter1d(bend, SMOOTHING_S * motion.fps, mode="nearest")
         turns[f"{side}_foot"] = shin @ axis_turn(1, bend)
     return PersonMotion(bones, motion.fps, motion.root, turns)
 
@@ -119,8 +121,8 @@ def with_hands_above_floor(motion: PersonMotion) -> PersonMotion:
     for side in SIDES:
         arm = points[f"{side}_fingers"] - points[f"{side}_upper_arm"]
         below = np.maximum(HAND_CLEARANCE - points[f"{side}_fingers"][:, 2], 0.0)
-        held = maximum_filter1d(below, 2 * spread + 1, mode="nearest")
-        lift = gaussian_filter1d(held, spread / 3.0, radius=spread, mode="nearest")
+        held = scipy.ndimage.maximum_filter1d(below, 2 * spread + 1, mode="nearest")
+        lift = scipy.ndimage.gaussian_filter1d(held, spread / 3.0, radius=spread, mode="nearest")
         length = np.maximum(np.linalg.norm(arm, axis=1), 1e-9)
         now = np.arcsin(np.clip(arm[:, 2] / length, -1.0, 1.0))
         angle = np.arcsin(np.clip((arm[:, 2] + lift) / length, -1.0, 1.0)) - now

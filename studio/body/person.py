@@ -8,7 +8,7 @@ neck's base lies on the thorax's z axis, which turns about the pelvis centre. Kn
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from studio.arrays import Array
@@ -91,7 +91,7 @@ def sampled(motion: PersonMotion, times: Array, fps: float) -> PersonMotion:
         name: RotationSpline(known, Rotation.from_matrix(turn[low : high + 1]))(inside).as_matrix()
         for name, turn in motion.turns.items()
     }
-    root: Array = CubicSpline(known, motion.root[low : high + 1])(inside)
+    root: Array = scipy.interpolate.CubicSpline(known, motion.root[low : high + 1])(inside)
     return PersonMotion(motion.skeleton, fps, root, turns)
 
 

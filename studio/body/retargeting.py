@@ -9,7 +9,7 @@ shoulders and crown instead, since skeletons divide their joints differently.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d, maximum_filter1d
+import scipy
 
 from studio.arrays import Array
 from studio.body.person import SIDES, PersonMotion, Skeleton, joint_points
@@ -153,8 +153,8 @@ def above_floor(motion: PersonMotion) -> PersonMotion:
     below = np.max([-lowest_of_sole(motion, side) for side in SIDES], axis=0)
     spread = max(1, round(SPREAD_S * motion.fps))
     # The largest depth is held as far as the smoothing reaches, so that it never undercuts.
-    held = maximum_filter1d(np.maximum(below, 0.0), 2 * spread + 1, mode="nearest")
-    lift = gaussian_filter1d(held, spread / 3.0, radius=spread, mode="nearest")
+    held = scipy.ndimage.maximum_filter1d(np.maximum(below, 0.0), 2 * spread + 1, mode="nearest")
+    lift = scipy.ndimage.gaussian_filter1d(held, spread / 3.0, radius=spread, mode="nearest")
     return PersonMotion(motion.skeleton, motion.fps, motion.root + lift[:, None] * UP, motion.turns)
 
 

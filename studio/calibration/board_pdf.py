@@ -5,7 +5,6 @@ from pathlib import Path
 
 import cv2.aruco
 import numpy as np
-from fpdf import FPDF
 
 from studio.arrays import Array, Bytes
 from studio.calibration.boards import DEFAULT_DICTIONARY, Board
@@ -103,6 +102,8 @@ def write_board_pdf(board: Board, path: Path, page: str = "a4") -> None:
             f"A board of {pattern.width:.0f}x{pattern.height:.0f} mm does not fit on {page.upper()} paper.",
             f"Use squares of {int(fits)} mm at most, fewer squares, or larger paper.",
         )
+    from fpdf import FPDF  # noqa: PLC0415 - it loads fonts' tools, for a fifth of a second
+
     long, short = PAGES[page]
     width, height = (long, short) if landscape else (short, long)
     document = FPDF(orientation="landscape" if landscape else "portrait", unit="mm", format=(short, long))
@@ -139,6 +140,7 @@ def _room(page: str, landscape: bool) -> tuple[float, float]:
     """Width and height that a board may take, mm."""
     if page not in PAGES:
         raise CalibrationError(f"There is no paper '{page}' here.", f"Choose one of {', '.join(PAGES)}.")
+
     long, short = PAGES[page]
     width, height = (long, short) if landscape else (short, long)
     return width - 2.0 * MARGIN, height - 2.0 * MARGIN - FOOT

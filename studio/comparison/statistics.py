@@ -14,8 +14,8 @@ from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
+import scipy  # stats, half a second, are loaded once they are used
 from numpy.typing import ArrayLike
-from scipy import stats
 
 from studio.arrays import Array
 from studio.comparison.findings import FIRM_SEEDS, Number
@@ -67,7 +67,7 @@ def sign_test(ours: ArrayLike, theirs: ArrayLike) -> SignTest:
     """
     first, second = _pairs(ours, theirs)
     better, worse = int((first < second).sum()), int((first > second).sum())
-    p = float(stats.binomtest(better, better + worse).pvalue) if better + worse else 1.0
+    p = float(scipy.stats.binomtest(better, better + worse).pvalue) if better + worse else 1.0
     return SignTest(better, worse, len(first) - better - worse, p)
 
 
@@ -166,7 +166,7 @@ def _interval(samples: tuple[Array, ...], statistic: Statistic, level: float) ->
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             # Samples whose resamples hardly differ (a median, a maximum) have no acceleration: use percentiles.
             warnings.simplefilter("ignore")
-            found = stats.bootstrap(
+            found = scipy.stats.bootstrap(
                 samples,
                 statistic,
                 n_resamples=RESAMPLES,

@@ -7,7 +7,7 @@ of as many independent draws as there are frames: coordinates of one frame depen
 """
 
 import numpy as np
-from scipy import stats
+import scipy  # stats, half a second, are loaded once they are used
 
 from studio.inspection.limbs import errors_of
 from studio.inspection.over_frames import spread_by_limb, summaries
@@ -57,7 +57,7 @@ def _correlated(limb: str, pairs: list[tuple[float, float]]) -> Row:
     if len(pairs) < FEWEST or len({pair[0] for pair in pairs}) < 2:
         return (limb, len(pairs), None, None)
     table = np.array(pairs)
-    found = stats.spearmanr(table[:, 0], table[:, 1])
+    found = scipy.stats.spearmanr(table[:, 0], table[:, 1])
     return (limb, len(pairs), no_value(float(found.statistic)), no_value(float(found.pvalue)))
 
 
@@ -70,7 +70,7 @@ def _ranks(run: InspectedRun, limb: str, ranks: list[np.ndarray]) -> list[Row]:
         return []
     counts, _ = np.histogram(np.clip(values, 0.0, 1.0), BINS, (0.0, 1.0))
     low, high = (
-        float(stats.binom.ppf(at, len(ranks), 1.0 / BINS)) / len(ranks)
+        float(scipy.stats.binom.ppf(at, len(ranks), 1.0 / BINS)) / len(ranks)
         for at in ((1.0 - BAND) / 2.0, (1.0 + BAND) / 2.0)
     )
     return [(limb, at, float(count / len(values)), 1.0 / BINS, low, high) for at, count in enumerate(counts)]

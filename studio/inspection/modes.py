@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.cluster.hierarchy import fcluster, linkage
+import scipy
 
 from studio.arrays import Array, Indices, Mask
 from studio.body.model import BodyModel
@@ -74,7 +74,9 @@ def _clusters(points: Array, weights: Array, apart: float) -> list[Mask]:
             for at, one in enumerate(heavy[:-1])
         ]
     )
-    labels = fcluster(linkage(distances, "average"), apart, "distance")
+    labels = scipy.cluster.hierarchy.fcluster(
+        scipy.cluster.hierarchy.linkage(distances, "average"), apart, "distance"
+    )
     groups = [heavy[labels == label] for label in np.unique(labels)]
     groups = _joined(points, weights, groups)
     centres = np.stack([_mean(points[group], weights[group]) for group in groups])

@@ -3,7 +3,7 @@ parameter.
 """
 
 import numpy as np
-from scipy import stats
+import scipy  # stats, half a second, are loaded once they are used
 
 from studio.arrays import Mask
 from studio.inspection.genealogy import children_of
@@ -50,7 +50,7 @@ def rows(frame: InspectedFrame, selection: Selection) -> Found:
                 float(alive.mean()),
                 float(dead.mean()),
                 apart / pooled if pooled > 0.0 else None,
-                no_value(float(stats.ks_2samp(alive, dead).pvalue)),
+                no_value(float(scipy.stats.ks_2samp(alive, dead).pvalue)),
             )
         )
     return Found(

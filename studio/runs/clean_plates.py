@@ -32,7 +32,7 @@ from studio.evidence.combined_background import Combination, combination
 from studio.evidence.masks import cleaned, reduced, reduced_cleaning
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
-from studio.numba_in_threads import njit
+from studio.numba_in_threads import KERNEL, njit
 from studio.progress import Progress, unheard
 from studio.sessions.session import Session
 from studio.volume.hull_settings import HullSettings
@@ -299,7 +299,7 @@ def median_of_empty(frames: Bytes, taken: Bytes, fallback: Bytes) -> tuple[Bytes
     return out, empty
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def fill_medians_of_empty(frames: Bytes, taken: Bytes, top: int, out: Bytes, empty: Bytes) -> None:
     """`median_of_empty` of a band of rows from `top` on: frames (K, rows, W, 3). out (H, W, 3) and empty (H, W) are
     filled there, out only where enough is empty.

@@ -3,17 +3,12 @@
 import json
 import sys
 
-from fastapi import FastAPI
-
-from studio.server.app import ROUTERS
+from studio.server.app import ROUTES, Application
 
 
 def api_document() -> dict[str, object]:
     """The OpenAPI document of every route, without a studio that serves them."""
-    app = FastAPI(title="Capture studio")
-    for router in ROUTERS:
-        app.include_router(router)
-    return app.openapi()
+    return Application(title="Capture studio", routes=ROUTES).openapi()
 
 
 if __name__ == "__main__":

@@ -7,7 +7,9 @@ things (the scene, the tracking process, the stream of events) start and stop wi
 import asyncio
 from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
+from http import HTTPStatus
 from pathlib import Path
+from typing import Any
 
 from fastapi import FastAPI
 from starlette.staticfiles import StaticFiles
@@ -100,7 +102,29 @@ ROUTERS = (
     scene_relay.router,
     event_stream.router,
 )
+# As the routers made them: one that is included makes its routes a second time, while the first requests wait.
+ROUTES = [route for router in ROUTERS for route in router.routes]
+ERRORS = (400, 403, 404, 409, 422, 500)
 SWEEP_SECONDS = 5.0
+
+
+class Application(FastAPI):
+    """Serves `ROUTES`."""
+
+    def openapi(self) -> dict[str, Any]:
+        """The document, in which every route may answer an error."""
+        if self.openapi_schema is None:
+            document = super().openapi()
+            schemas = document["components"]["schemas"]
+            for unused in ("HTTPValidationError", "ValidationError"):  # FastAPI's own, which no route answers
+                del schemas[unused]
+            schemas["ErrorAnswer"] = ErrorAnswer.model_json_schema()
+            content = {"application/json": {"schema": {"$ref": "#/components/schemas/ErrorAnswer"}}}
+            errors = {str(one): {"description": HTTPStatus(one).phrase, "content": content} for one in ERRORS}
+            for operations in document["paths"].values():
+                for operation in operations.values():
+                    operation["responses"] |= errors
+        return super().openapi()
 
 
 def build_app(
@@ -123,9 +147,9 @@ def build_app(
     state = AppState(
         workspace, control, scenes, EventStream(control, scenes.open_scenes), footage_roots, log_path
     )
-    app = FastAPI(
+    app = Application(
         title="Capture studio",
-        responses={status: {"model": ErrorAnswer} for status in (400, 403, 404, 409, 422, 500)},
+        routes=ROUTES,
         description=DESCRIPTION,
         lifespan=_lifespan,
         docs_url=None,
@@ -134,8 +158,6 @@ def build_app(
     )
     app.state.studio = state
     add_error_handlers(app)
-    for router in ROUTERS:
-        app.include_router(router)
     app.mount("/assets", StaticFiles(directory=assets_folder()), name="assets")
     # The last one added is the first to see a request.
     app.add_middleware(BodyLimit)

@@ -32,14 +32,14 @@ MELT_WITHIN, MELT_BETWEEN = 26.0, 8.0
 FAR = 1e9
 
 
-@njit(cache=True, error_model="numpy", fastmath=True, inline="always")
+@njit(error_model="numpy", fastmath=True, inline="always")
 def soft_minimum(a, b, width):
     """The smaller of two distances, rounded off where they differ by less than `width`."""
     gap = max(width - abs(a - b), 0.0) / width
     return min(a, b) - gap * gap * width * 0.25
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(error_model="numpy", fastmath=True)
 def local_point(px, py, pz, piece):
     """A world point in the piece's frame: x forward, y sideways, z along it."""
     x, y, z = px - piece[START], py - piece[START + 1], pz - piece[START + 2]
@@ -50,7 +50,7 @@ def local_point(px, py, pz, piece):
     )
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(error_model="numpy", fastmath=True)
 def cone_distance(px, py, pz, piece):
     """Signed distance from a world point to a truncated cone with rounded edges."""
     x, y, z = local_point(px, py, pz, piece)
@@ -64,7 +64,7 @@ def cone_distance(px, py, pz, piece):
     return (math.sqrt(out * out + past * past) + min(max(outside, beyond), 0.0) - edge) * min(sx, sy, 1.0)
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(error_model="numpy", fastmath=True)
 def piece_distance(px, py, pz, piece):
     """Signed distance from a world point to one piece."""
     if piece[EDGE] > 0.0:
@@ -89,7 +89,7 @@ def piece_distance(px, py, pz, piece):
     return distance
 
 
-@njit(cache=True, error_model="numpy", fastmath=True, inline="always")
+@njit(error_model="numpy", fastmath=True, inline="always")
 def beyond(px, py, pz, piece, limit):
     """Whether a point is further than `limit` from the ball around a piece, which can then be skipped."""
     x, y, z = px - piece[BOUND], py - piece[BOUND + 1], pz - piece[BOUND + 2]
@@ -97,7 +97,7 @@ def beyond(px, py, pz, piece, limit):
     return reach > 0.0 and x * x + y * y + z * z > reach * reach
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(error_model="numpy", fastmath=True)
 def body_distance(px, py, pz, pieces, labels, active, count):
     """Signed distance to the union of the first `count` pieces named in `active` (in order of their groups)."""
     total, group_distance, group = FAR, FAR, -1
@@ -114,7 +114,7 @@ def body_distance(px, py, pz, pieces, labels, active, count):
     return soft_minimum(total, group_distance, MELT_BETWEEN)
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(error_model="numpy", fastmath=True)
 def nearest_piece(px, py, pz, pieces, active, count):
     """The piece whose own surface is closest: its material is used."""
     best, found = FAR, -1
@@ -127,7 +127,7 @@ def nearest_piece(px, py, pz, pieces, active, count):
     return found
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(error_model="numpy", fastmath=True)
 def gather(ox, oy, oz, dx, dy, dz, pieces, margin, active):
     """The pieces that a ray may touch: fills `active`, returns their count and the ray's stretch."""
     count, first, last = 0, FAR, 0.0
@@ -145,7 +145,7 @@ def gather(ox, oy, oz, dx, dy, dz, pieces, margin, active):
     return count, max(first, 0.0), last
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(error_model="numpy", fastmath=True)
 def gather_beam(origin, dx, dy, dz, spread, pieces, margin, active):
     """Like `gather` for all rays that stray no further than spread × distance from one."""
     count, first, last = 0, FAR, 0.0
@@ -166,7 +166,7 @@ def gather_beam(origin, dx, dy, dz, spread, pieces, margin, active):
     return count, max(first, 0.0), last
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(error_model="numpy", fastmath=True)
 def gather_among(origin, dx, dy, dz, pieces, nearby, near_count, margin, active):
     """Like `gather` among the first `near_count` pieces named in `nearby`."""
     count, first, last = 0, FAR, 0.0
@@ -186,7 +186,7 @@ def gather_among(origin, dx, dy, dz, pieces, nearby, near_count, margin, active)
     return count, max(first, 0.0), last
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(error_model="numpy", fastmath=True)
 def body_normal(px, py, pz, pieces, labels, active, count):
     """Outward unit normal by four samples on a tetrahedron."""
     step = 1.5
@@ -199,7 +199,7 @@ def body_normal(px, py, pz, pieces, labels, active, count):
     return x / size, y / size, z / size
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(error_model="numpy", fastmath=True)
 def light_share(px, py, pz, light, light_radius, pieces, labels, active):
     """Share of a round lamp that a point sees past the person: 0 in full shadow, 1 in the open.
 
@@ -224,7 +224,7 @@ def light_share(px, py, pz, light, light_radius, pieces, labels, active):
     return seen * seen * (3.0 - 2.0 * seen)
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(error_model="numpy", fastmath=True)
 def no_pieces(pieces):
     """An array for the indices that `gather` writes."""
     return np.zeros(len(pieces), np.int64)

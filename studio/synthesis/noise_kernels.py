@@ -14,7 +14,7 @@ _ACROSS, _DOWN, _DEEP = np.uint32(0x9E3779B1), np.uint32(0x27D4EB2F), np.uint32(
 _TO_UNIT = 1.0 / 4294967296.0
 
 
-@njit(cache=True, error_model="numpy", fastmath=True, inline="always")
+@njit(error_model="numpy", fastmath=True, inline="always")
 def hashed(x, y, z):
     """A uniform number in [0, 1) for three integers."""
     h = np.uint32(x) * _ACROSS ^ np.uint32(y) * _DOWN ^ np.uint32(z) * _DEEP
@@ -24,7 +24,7 @@ def hashed(x, y, z):
     return np.float64(h) * _TO_UNIT
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(error_model="numpy", fastmath=True)
 def value_noise(x, y, z):
     """Smooth noise in [0, 1] with features of size 1."""
     fx, fy, fz = math.floor(x), math.floor(y), math.floor(z)
@@ -40,7 +40,7 @@ def value_noise(x, y, z):
     return total
 
 
-@njit(cache=True, error_model="numpy", fastmath=True, parallel=True)
+@njit(error_model="numpy", fastmath=True, parallel=True)
 def add_sensor_noise(
     picture: Floats,
     deviation: float,

@@ -18,7 +18,7 @@ WALL_COLOUR, SKIRTING = (0.68, 0.67, 0.63), (0.46, 0.44, 0.42)
 SKIRTING_HEIGHT = 90.0
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(error_model="numpy", fastmath=True)
 def block_entry(ox, oy, oz, dx, dy, dz, block):
     """Distance along a ray to a turned box and the axis of the face it enters (0..2); (FAR, 0) when it misses."""
     cosine, sine = block[12], block[13]
@@ -38,7 +38,7 @@ def block_entry(ox, oy, oz, dx, dy, dz, block):
     return (enter, face) if enter < leave and enter > 0.0 else (FAR, 0)
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(error_model="numpy", fastmath=True)
 def first_surface(ox, oy, oz, dx, dy, dz, half_x, half_y, height, blocks):
     """(distance, what, face axis) of the nearest surface; what is a block's index or FLOOR, CEILING, WALL."""
     best, what, face = FAR, FLOOR, 2
@@ -61,7 +61,7 @@ def first_surface(ox, oy, oz, dx, dy, dz, half_x, half_y, height, blocks):
     return best, what, face
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(error_model="numpy", fastmath=True)
 def pattern_share(pattern, u, v):
     """Share of the second colour in a pattern at (u, v) mm of a face, and a factor for its brightness."""
     grain = value_noise(u / 14.0, v / 14.0, 3.0) - 0.5
@@ -92,7 +92,7 @@ def pattern_share(pattern, u, v):
     return 0.0, 1.0 + 0.05 * grain
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(error_model="numpy", fastmath=True)
 def surface_colour(what, face, px, py, pz, blocks, patterns, colour):
     """Writes the (3,) colour of a point of the room."""
     pattern, share, tone = PLANKS, 0.0, 1.0
@@ -118,7 +118,7 @@ def surface_colour(what, face, px, py, pz, blocks, patterns, colour):
         colour[channel] = (SKIRTING[channel] if low else WALL_COLOUR[channel]) * (1.0 + 0.08 * stain)
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(error_model="numpy", fastmath=True)
 def lamp_share(px, py, pz, lights, blocks, salt):
     """Share of the round lamp that a point of the room sees past the furniture, 0...1."""
     seen = 0
@@ -140,7 +140,7 @@ def lamp_share(px, py, pz, lights, blocks, salt):
     return seen / LAMP_SAMPLES
 
 
-@njit(cache=True, error_model="numpy", fastmath=True, parallel=True)
+@njit(error_model="numpy", fastmath=True, parallel=True)
 def trace_room(
     origin: Array,
     rays: Floats,

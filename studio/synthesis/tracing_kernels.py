@@ -31,7 +31,7 @@ NEAR, TILE = 12.0, 8
 SAME_SURFACE = 12.0
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(error_model="numpy", fastmath=True)
 def cloth_colour(material, x, y, z, wardrobe):
     """(red, green, blue) of a point in its piece's frame, so that the pattern moves with the limb.
 
@@ -62,7 +62,7 @@ def cloth_colour(material, x, y, z, wardrobe):
     return r * tone, g * tone, b * tone
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(error_model="numpy", fastmath=True)
 def shaded(px, py, pz, dx, dy, dz, person, active, count, shadow_active, out):
     """Light that a point of the person sends to the camera, written to `out` (3,), 0...1.
 
@@ -97,7 +97,7 @@ def shaded(px, py, pz, dx, dy, dz, person, active, count, shadow_active, out):
     out[2] = blue * (key * lights[2, 2] + sky * lights[3, 2] + fill)
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(error_model="numpy", fastmath=True)
 def tile_beam(rays, top, bottom, left, right):
     """The middle direction of a tile's rays and their greatest deviation from it per mm of distance."""
     ray = rays[(top + bottom) // 2, (left + right) // 2]
@@ -110,7 +110,7 @@ def tile_beam(rays, top, bottom, left, right):
     return dx, dy, dz, 1.05 * math.sqrt(spread)
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(error_model="numpy", fastmath=True)
 def beam_start(origin, dx, dy, dz, spread, pieces, labels, active):
     """Distance that all rays of a beam run free of the person, and the number of pieces that any of them may hit (in
     `active`); (-1, n) when none hits the person.
@@ -131,7 +131,7 @@ def beam_start(origin, dx, dy, dz, spread, pieces, labels, active):
     return t, count
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(error_model="numpy", fastmath=True)
 def first_touch(origin, dx, dy, dz, start, pieces, labels, nearby, near_count, active):
     """Distance along a ray to the person and the number of active pieces; (-1, n) when it misses.
 
@@ -153,7 +153,7 @@ def first_touch(origin, dx, dy, dz, start, pieces, labels, nearby, near_count, a
     return (t, count) if distance < 6.0 * TOUCH else (-1.0, count)
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(error_model="numpy", fastmath=True)
 def trace_pixel(
     origin, rays, samples, row, column, room_depth, start, nearby, near_count, scratch, person, light
 ):
@@ -180,7 +180,7 @@ def trace_pixel(
     return hits * each
 
 
-@njit(cache=True, error_model="numpy", fastmath=True, parallel=True)
+@njit(error_model="numpy", fastmath=True, parallel=True)
 def trace_person(
     origin: Array,
     rays: Floats,
@@ -228,7 +228,7 @@ def trace_person(
                 )
 
 
-@njit(cache=True, error_model="numpy", fastmath=True, parallel=True)
+@njit(error_model="numpy", fastmath=True, parallel=True)
 def floor_shadow(
     left: float,
     near: float,

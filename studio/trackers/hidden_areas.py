@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
 
 from studio.arrays import Array
 from studio.geometry.camera import Camera
@@ -80,7 +80,7 @@ def _without_hidden(view: Distances, camera: Camera, memory: Mapping[str, Array]
     if not hidden.any():
         return view
     cell = cell_size(camera)
-    near = np.asarray(distance_transform_edt(~hidden)) * cell <= ROUGH * FAR_MM / mm
+    near = np.asarray(scipy.ndimage.distance_transform_edt(~hidden)) * cell <= ROUGH * FAR_MM / mm
     left, top, signed = _with_room(view, near, cell)
     rows = (top + np.arange(len(signed))) // cell
     columns = (left + np.arange(int(signed.shape[1]))) // cell

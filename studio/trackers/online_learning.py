@@ -21,7 +21,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
+import scipy
 
 from studio.arrays import Array, Indices, Mask
 from studio.behaviour.automaton import Automaton
@@ -74,7 +74,7 @@ def stretches(poses: Array, good: Mask, model: BehaviourModel) -> list[Array]:
             continue
         smooth = np.array(poses[begin:end])
         values = model.space.continuous(smooth)
-        smooth[:, model.space.columns] = gaussian_filter1d(
+        smooth[:, model.space.columns] = scipy.ndimage.gaussian_filter1d(
             values, SMOOTHING_S * model.fps, axis=0, mode="nearest"
         )
         found.append(_at_learnt_rate(smooth, model))

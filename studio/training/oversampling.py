@@ -8,7 +8,7 @@ change slowly by a little.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
+import scipy
 
 from studio.arrays import Array
 from studio.body.model import BodyModel
@@ -25,7 +25,7 @@ def smooth_noise(rng: np.random.Generator, frames: int, width: int, fps: float, 
     spread = max(period_s * fps / PERIODS, 1e-3)
     margin = int(np.ceil(REACH * spread))
     white = rng.standard_normal((frames + 2 * margin, width))
-    smooth = gaussian_filter1d(white, spread, axis=0, truncate=REACH)[margin : margin + frames]
+    smooth = scipy.ndimage.gaussian_filter1d(white, spread, axis=0, truncate=REACH)[margin : margin + frames]
     steps = np.arange(-margin, margin + 1)
     kernel = np.exp(-0.5 * (steps / spread) ** 2)
     return smooth / np.sqrt(np.sum((kernel / kernel.sum()) ** 2))
@@ -114,7 +114,9 @@ def smoothed_copies(body: BodyModel, poses: Array, fps: float, settings: Oversam
     found, count = list[Array](), settings.smoothings
     for number in range(count):
         width = settings.widest_smoothing * fps * number / max(count - 1, 1)
-        smooth = gaussian_filter1d(poses, width, axis=0, mode="nearest") if width > 0.0 else poses
+        smooth = (
+            scipy.ndimage.gaussian_filter1d(poses, width, axis=0, mode="nearest") if width > 0.0 else poses
+        )
         times = np.arange(len(poses)) / fps
         if number:
             smooth = poses_at(body, times, smooth, times[:-1] + number / (count * fps))

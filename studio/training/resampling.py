@@ -1,7 +1,7 @@
 """Recordings at another frame rate: smooth curves through the recorded frames."""
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 
 from studio.arrays import Array
 from studio.body.model import BodyModel
@@ -31,7 +31,7 @@ def points_at(times: Array, points: Array, new_times: Array) -> Array:
         near = inside & (
             (known[after] - known[before] <= LONGEST_GAP_S) | (np.abs(known[after] - new_times) < 1e-6)
         )
-        found[near, marker] = CubicSpline(known, points[seen, marker])(new_times[near])
+        found[near, marker] = scipy.interpolate.CubicSpline(known, points[seen, marker])(new_times[near])
     return found
 
 
@@ -41,7 +41,9 @@ def poses_at(body: BodyModel, times: Array, poses: Array, new_times: Array) -> A
     unbounded = angles & ~np.isfinite([entry.upper - entry.lower for entry in body.parameters])
     steady = np.where(unbounded, np.unwrap(poses, axis=0), poses)
     found = (
-        CubicSpline(times, steady)(new_times) if len(times) > 1 else np.repeat(steady, len(new_times), axis=0)
+        scipy.interpolate.CubicSpline(times, steady)(new_times)
+        if len(times) > 1
+        else np.repeat(steady, len(new_times), axis=0)
     )
     lower = np.array([entry.lower for entry in body.parameters])
     upper = np.array([entry.upper for entry in body.parameters])

@@ -226,12 +226,13 @@ def test_nobody_answers(tmp_path: Path) -> None:
 def test_the_scheduler_goes_away(tmp_path: Path) -> None:
     own = LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address="127.0.0.1:0")
     try:
-        executor = ClusterExecutor(own.scheduler_address, tmp_path)
+        executor = ClusterExecutor(own.scheduler_address, tmp_path, patience=2.0)
         begun = executor.submit(go_on_reporting, tmp_path)
         until((tmp_path / "begun").exists)
+        own.sync(own.scheduler.close)  # at once: closing the cluster waits for the task
+        lost = begun.exception(PATIENCE)
     finally:
         threading.Thread(target=own.close, daemon=True).start()
-    lost = begun.exception(PATIENCE)
     executor.shutdown(cancel_futures=True)
     assert isinstance(lost, RunError)
     assert "is gone" in lost.message

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from small_recipes import small
 from waiting import until
 from web_doubles import Studio
 
@@ -58,8 +59,19 @@ def test_a_bundled_session_is_opened_and_stays(studio: Studio) -> None:
     assert done(studio, "planar_arm")["state"] == "done"
 
 
-def test_a_recipe_is_rendered_as_a_job(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def standing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """The one card is a recipe, whose pictures are small."""
     monkeypatch.setattr(gallery, "CARDS", (SHORT,))
+    real, recipe = gallery.synthesize, small(tmp_path, "stand", frames=60)
+    monkeypatch.setattr(
+        gallery, "synthesize", lambda _, into, report, frames: real(recipe, into, report, frames)
+    )
+
+
+def test_a_recipe_is_rendered_as_a_job(
+    studio: Studio, standing: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
     real = gallery.synthesize
     monkeypatch.setattr(gallery, "synthesize", lambda recipe, into, report, _: real(recipe, into, report, 2))
     assert studio.client.post("/api/gallery/stand").status_code == 202
@@ -67,8 +79,7 @@ def test_a_recipe_is_rendered_as_a_job(studio: Studio, monkeypatch: pytest.Monke
     assert studio.client.get("/api/sessions/stand").json()["frame_count"] == 2
 
 
-def test_rendering_that_is_cancelled_leaves_nothing(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(gallery, "CARDS", (SHORT,))
+def test_rendering_that_is_cancelled_leaves_nothing(studio: Studio, standing: None) -> None:
     studio.client.post("/api/gallery/stand")
     until(lambda: studio.client.get("/api/gallery/stand").json()["done"] > 0, 120.0)
     assert studio.client.delete("/api/gallery/stand").status_code == 202

@@ -1,11 +1,10 @@
 """From recipe to session: small renderings, read back by the studio."""
 
-import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
-import tomli_w
+from small_recipes import small
 
 from studio.body.forward_kinematics import marker_points
 from studio.capture.calibration_files import read_calibration, write_calibration
@@ -14,22 +13,8 @@ from studio.evaluation.errors import evaluate
 from studio.geometry.projection import project
 from studio.motion_files.trc import read_trc
 from studio.sessions.session import Session
-from studio.synthesis.recipe_file import find_recipe, read_recipe, recipe_cameras
+from studio.synthesis.recipe_file import read_recipe, recipe_cameras
 from studio.synthesis.recipes import synthesize
-
-
-def small(folder: Path, name: str, **changes: object) -> Path:
-    """A bundled recipe with few, small frames. Keys of tables are written table__key."""
-    entries = tomllib.loads(find_recipe(name).read_text())
-    settings = {"frames": 4, "picture__samples": 1, "picture__empty_frames": 3} | changes
-    if entries["motion"] != "arm":
-        settings = {"picture__width": 160, "picture__height": 120} | settings
-    for key, value in settings.items():
-        table, _, entry = key.rpartition("__")
-        (entries.setdefault(table, {}) if table else entries)[entry] = value
-    path = folder / f"{name}.toml"
-    path.write_text(tomli_w.dumps(entries))
-    return path
 
 
 @pytest.mark.parametrize("name", ["walk", "run", "box", "handstand"])

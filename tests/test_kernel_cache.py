@@ -1,0 +1,181 @@
+"""Compiled kernels are found again by what they are made of, in any checkout."""
+
+import hashlib
+import importlib
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from numba.core import event
+from numba.core.dispatcher import Dispatcher
+
+from studio import kernel_cache
+from studio.kernel_cache import parts_of
+
+ROOT = Path(__file__).resolve().parents[1]
+HELPERS = """
+from typing import NamedTuple
+import numpy as np
+from studio.numba_in_threads import EXACT_INLINED, njit
+
+class Sizes(NamedTuple):
+    first: float
+    second: float
+
+OFFSET, TABLE = 2.0, np.array([1.0, 5.0])
+
+@njit(**EXACT_INLINED)
+def scaled(x):
+    return 3.0 * x
+
+def squared(x):
+    return x * x
+"""
+KERNELS = """
+import helpers
+from helpers import OFFSET, TABLE, scaled
+from studio.numba_in_threads import FAST, KERNEL, njit
+
+own = njit(**KERNEL)(helpers.squared)
+
+@njit(**FAST)
+def total(x, sizes):
+    return scaled(x) + OFFSET + TABLE[1] + sizes.first + own(x) + later(x)
+
+@njit(**KERNEL)
+def later(x):
+    return 100.0 * x
+"""
+
+
+class Compilations(event.Listener):
+    """Names of what is compiled."""
+
+    def __init__(self) -> None:
+        self.names: list[str] = []
+
+    def on_start(self, event: event.Event) -> None:
+        """Nothing yet."""
+
+    def on_end(self, event: event.Event) -> None:
+        self.names.append(event.data["dispatcher"].py_func.__name__)
+
+
+@pytest.fixture
+def compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
+    """What is compiled from here on; kernels are kept in a folder of the test's own."""
+    monkeypatch.setattr(kernel_cache, "folder", lambda: tmp_path / "kept")
+    listener = Compilations()
+    with event.install_listener("numba:compile", listener):
+        yield listener.names
+
+
+@pytest.fixture
+def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., ModuleType]:
+    """Makes the two modules in a folder and loads the kernels."""
+
+    def made(folder: str, helpers: str = HELPERS, kernels: str = KERNELS) -> ModuleType:
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "helpers.py").write_text(helpers)
+        (tmp_path / folder / "kernels.py").write_text(kernels)
+        with monkeypatch.context() as patched:
+            patched.syspath_prepend(tmp_path / folder)
+            for name in ("helpers", "kernels"):
+                patched.delitem(sys.modules, name, raising=False)
+            return importlib.import_module("kernels")
+
+    return made
+
+
+def answer(module: ModuleType) -> float:
+    return module.total(2.0, module.helpers.Sizes(10.0, 20.0))
+
+
+def test_another_checkout_finds_what_one_compiled(
+    compiled: list[str], checkout: Callable[..., ModuleType]
+) -> None:
+    assert answer(checkout("one")) == 6.0 + 2.0 + 5.0 + 10.0 + 4.0 + 200.0
+    assert sorted(compiled) == ["later", "scaled", "squared", "total"]
+    compiled.clear()
+    moved = "# A line more, and a comment.\n" + KERNELS
+    assert answer(checkout("two", kernels=moved)) == 227.0
+    assert not compiled
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected", "anew"),
+    [
+        ("3.0 * x", "4.0 * x", 229.0, ["scaled", "total"]),
+        ("OFFSET, TABLE = 2.0", "OFFSET, TABLE = 7.0", 232.0, ["total"]),
+        ("[1.0, 5.0]", "[1.0, 8.0]", 230.0, ["total"]),
+        ("x * x", "x * x * x", 231.0, ["squared", "total"]),
+        ("first: float\n    second: float", "second: float\n    first: float", 237.0, ["total"]),
+    ],
+)
+def test_what_a_change_reaches_is_compiled_anew(
+    old: str,
+    new: str,
+    expected: float,
+    anew: list[str],
+    compiled: list[str],
+    checkout: Callable[..., ModuleType],
+) -> None:
+    answer(checkout("one"))
+    compiled.clear()
+    assert old in HELPERS
+    assert answer(checkout("two", HELPERS.replace(old, new))) == expected
+    assert sorted(compiled) == anew
+
+
+def test_a_damaged_file_and_a_folder_that_cannot_be_written_cost_a_compilation(
+    compiled: list[str],
+    checkout: Callable[..., ModuleType],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    answer(checkout("one"))
+    (kept,) = (tmp_path / "kept").glob("kernels.total-*")
+    kept.write_bytes(kept.read_bytes()[:-100])
+    compiled.clear()
+    assert answer(checkout("two")) == 227.0
+    assert compiled == ["total"]
+    assert answer(checkout("three")) == 227.0
+    assert compiled == ["total"]
+    monkeypatch.setattr(kernel_cache, "folder", lambda: kept)
+    assert answer(checkout("four")) == 227.0
+    assert sorted(compiled) == ["later", "scaled", "squared", "total", "total"]
+
+
+def digests() -> dict[str, str]:
+    """Of every kernel of the product. Raises UnkeyedError where one could not be kept."""
+    found: dict[str, str] = {}
+    for path in sorted((ROOT / "studio").rglob("*.py")):
+        if "numba_in_threads import" in path.read_text("utf-8"):
+            name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+            module: dict[str, Any] = vars(importlib.import_module(name))
+            for kernel in (one for one in module.values() if isinstance(one, Dispatcher)):
+                key = f"{kernel.py_func.__module__}.{kernel.py_func.__qualname__}"
+                found[key] = hashlib.sha256(b"".join(parts_of(kernel))).hexdigest()
+    return found
+
+
+def test_every_kernel_of_the_product_has_the_same_key_in_another_process() -> None:
+    program = "from test_kernel_cache import digests; print(digests())"
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "tests"), "PYTHONHASHSEED": "5"}
+    ended = subprocess.run(
+        [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True
+    )
+    here = digests()
+    assert len(here) > 150
+    assert ended.stdout.strip() == str(here)
+
+
+def test_what_has_no_key_is_named() -> None:
+    with pytest.raises(kernel_cache.UnkeyedError, match="object"):
+        list(parts_of((1, np.float32(2.0), object())))
