@@ -95,6 +95,23 @@ def curves(title: str, groups: Groups, measure: str = LIMB) -> Chart:
     return Chart(title, "lines", f"frame (at {FPS} Hz)", axis, tuple(series))
 
 
+SIDE_BY_SIDE = "Verdicts: the tracker as printed, and ours"
+TWO_TRACKERS = (
+    "The claims are judged by the paper's tracker as printed; ours ('guided') has four additions, is shown beside it, "
+    "and no claim of the paper rests on it."
+)
+
+
+def side_by_side(rows: Iterable[tuple[str, Number, Number]]) -> Table:
+    """A line a claim: the number and the verdict with the printed tracker, and with ours."""
+
+    def cells(found: Number) -> tuple[str, str]:
+        return f"{found.ours:.3g} {found.unit} [{found.low:.3g}, {found.high:.3g}]", found.verdict
+
+    heads = ("claim", "as printed", "verdict", "ours", "verdict of ours")
+    return Table(SIDE_BY_SIDE, heads, tuple((name, *cells(one), *cells(other)) for name, one, other in rows))
+
+
 def summary_table(title: str, groups: Groups) -> Table:
     """A line a contender: errors, losses, time."""
     return table_over(title, "contender", COLUMNS, groups)

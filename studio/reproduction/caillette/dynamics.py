@@ -18,18 +18,19 @@ annealed filter, tracking as a run does, at equal evaluations.
 """
 
 import dataclasses
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from studio.comparison.findings import Number, Table
+from studio.comparison.findings import Number
 from studio.comparison.statistics import number
 from studio.comparison.trials import Outcome, Scale, Trial
 from studio.reproduction.caillette.comparing import (
     MEASURES,
     OFF_MM,
     POSITION,
+    TWO_TRACKERS,
     Error,
     Groups,
     angle,
@@ -42,6 +43,7 @@ from studio.reproduction.caillette.comparing import (
     loses_track,
     position,
     ratio,
+    side_by_side,
     summary_table,
 )
 from studio.reproduction.caillette.following import Followed, follow_trial, measure
@@ -72,21 +74,6 @@ from studio.trackers.catalogue import knobs_for_evaluations
 BLIND = (CONDENSATION, ANNEALED, IMPROVED)
 PREDICTION = {"prediction": "behaviour"}
 FREE_SHARE = {"model_free_share": 0.1, "model_free_grows": True}
-SIDE_BY_SIDE = "Verdicts: the tracker as printed, and ours"
-TWO_TRACKERS = (
-    "The claims are judged by the paper's tracker as printed; ours ('guided') has four additions, is shown beside it, "
-    "and no claim of the paper rests on it."
-)
-
-
-def _side_by_side(rows: Iterable[tuple[str, Number, Number]]) -> Table:
-    """A line a claim: the number and the verdict with the printed tracker, and with ours."""
-
-    def cells(found: Number) -> tuple[str, str]:
-        return f"{found.ours:.3g} {found.unit} [{found.low:.3g}, {found.high:.3g}]", found.verdict
-
-    heads = ("claim", "as printed", "verdict", "ours", "verdict of ours")
-    return Table(SIDE_BY_SIDE, heads, tuple((name, *cells(one), *cells(other)) for name, one, other in rows))
 
 
 def _trials(
@@ -164,7 +151,7 @@ def _fig_11(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield from (number for _, number, _ in rows)
     yield from (beside(number) for _, _, number in rows)
     yield from (beside(loses(one, 0.0)) for one in (PRINTED_KEEPS, KEEPS))
-    yield _side_by_side(rows)
+    yield side_by_side(rows)
     yield from errors("joint position, RMS", groups, position, "mm")
     yield from errors("limb direction, RMS", groups, limb)
     yield from errors("longest time off", groups, longest_loss, "s")
@@ -280,7 +267,7 @@ def _fig_12(footage: str, outcomes: Sequence[Outcome]) -> Iterator[Part]:
             rows.append((f"{'equal to' if claim == EQUAL else 'nearer than'} {other.name}", printed, ours))
         yield from (number for _, number, _ in rows)
         yield from (beside(number) for _, _, number in rows)
-        yield _side_by_side(rows)
+        yield side_by_side(rows)
     yield from ratios
     if not unseen and len(groups[FEW.name][0].limb_deg) > CALM_FRAMES:
         first = {name: [beginning(run, CALM_FRAMES) for run in runs] for name, runs in groups.items()}
