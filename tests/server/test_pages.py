@@ -19,7 +19,6 @@ from studio.sessions.stored_run import StoredRun
 from studio.settings import RecordingSettings
 from studio.trackers.catalogue import TRACKERS
 
-
 GUIDE_PAGES = ("python", "verbs", "commands", "adding", "animal", "figures", "reproduction")
 
 
