@@ -34,6 +34,7 @@ FOLLOWING = (
     "caillette-fig-12-second",
     "caillette-unseen",
     "caillette-best-tracker",
+    "caillette-root-spread",
 )
 SCALE = Scale(seeds=(0, 1, 2, 3, 4))
 """Five that agree are the fewest that show a statement."""
@@ -54,6 +55,7 @@ def followed(error: float, seed: int = 0, lost: int = 0, frames: int = 90) -> Fo
         mean_mm=float(positions.mean()),
         evaluations=200,
         milliseconds=2.0,
+        centre_mm=(0.6 * positions).tolist(),
     )
 
 

@@ -33,6 +33,9 @@ angle: Error = attrgetter("angle_rms")
 limb: Error = attrgetter("limb_rms")
 position: Error = attrgetter("position_rms")
 """A run's RMS error of joint angles and of limbs' directions (degrees), and of joint positions (mm)."""
+centre: Error = attrgetter("centre_rms")
+shape: Error = attrgetter("shape_rms")
+"""The two parts of a position error (mm), whose squares add up: of the body's middle, and about it."""
 
 LIMB, ANGLE, POSITION = "limb direction", "joint angle", "joint position"
 MEASURES: Mapping[str, tuple[str, str]] = {
@@ -50,9 +53,8 @@ def by_contender(outcomes: Iterable[Outcome]) -> dict[str, list[Followed]]:
 
 def beginning(run: Followed, frames: int) -> Followed:
     """The run cut off after `frames` frames; `mean_mm` stays that of the whole."""
-    parts = {
-        name: getattr(run, name)[:frames] for name in ("angle_deg", "limb_deg", "position_mm", "lost", "free")
-    }
+    names = ("angle_deg", "limb_deg", "position_mm", "centre_mm", "lost", "free")
+    parts = {name: getattr(run, name)[:frames] for name in names}
     return dataclasses.replace(run, **parts)
 
 
@@ -128,6 +130,8 @@ COLUMNS: Mapping[str, Callable[[Runs], Any]] = {
     "joint angle, RMS (°)": lambda runs: mean_of(runs, angle),
     "limb direction, RMS (°)": lambda runs: mean_of(runs, limb),
     "joint position, RMS (mm)": lambda runs: mean_of(runs, position),
+    "of the body's middle (mm)": lambda runs: mean_of(runs, centre),
+    "about its middle (mm)": lambda runs: mean_of(runs, shape),
     "mean (mm)": lambda runs: mean_of(runs, lambda run: run.mean_mm),
     "frames with a limb lost (%)": lambda runs: 100.0 * mean_of(runs, lambda run: run.lost_share),
     "longest loss (s)": lambda runs: max(map(longest_loss, runs)),

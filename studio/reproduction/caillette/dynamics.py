@@ -23,8 +23,8 @@ from typing import Any
 
 import numpy as np
 
-from studio.comparison.findings import Number
-from studio.comparison.statistics import number
+from studio.comparison.findings import Number, Table
+from studio.comparison.statistics import number, sign_test
 from studio.comparison.trials import Outcome, Scale, Trial
 from studio.reproduction.caillette.comparing import (
     MEASURES,
@@ -36,6 +36,7 @@ from studio.reproduction.caillette.comparing import (
     angle,
     beginning,
     by_contender,
+    centre,
     curves,
     errors,
     limb,
@@ -43,6 +44,7 @@ from studio.reproduction.caillette.comparing import (
     loses_track,
     position,
     ratio,
+    shape,
     side_by_side,
     summary_table,
 )
@@ -67,6 +69,7 @@ from studio.reproduction.caillette.setting import (
     training_words,
 )
 from studio.reproduction.claims import EQUAL, LOWER, beside, share
+from studio.reproduction.drawing import line_chart, seed_range
 from studio.reproduction.experiment import Experiment, Part
 from studio.reproduction.tracking import Candidate
 from studio.trackers.catalogue import knobs_for_evaluations
@@ -220,7 +223,12 @@ measure, and positions stand beside them.
 SAME_COMPARISONS: tuple[Comparison, ...] = (
     *(
         (f"{ours.name} over {other.name}, {words}", ours, other, "", of)
-        for words, of in (("joint angle", angle), ("joint position", position))
+        for words, of in (
+            ("joint angle", angle),
+            ("joint position", position),
+            ("the body's middle", centre),
+            ("about its middle", shape),
+        )
         for ours in (PRINTED_FEW, FEW)
         for other in (ANNEALED, CONDENSATION, IMPROVED)
     ),
@@ -399,6 +407,70 @@ AS_PRINTED_EXPERIMENT = Experiment(
     measure=measure,
     shown=_additions,
     footage=tuple(EXERCISES.values()),
+)
+
+# How wide learnt root motion is spread: chosen on two performances by other dancers that no test uses.
+
+SPREADS = (0.5, 1.0, 1.5, 2.0, 3.0)
+CHOOSING = {"first exercise": "dance-choosing-1", "second exercise": "dance-choosing-2"}
+
+
+def _spread_name(spread: float) -> str:
+    return f"spread {spread:g}"
+
+
+SPREAD_CANDIDATES = tuple(guided(200, _spread_name(spread), root_spread=spread) for spread in SPREADS)
+
+
+def _spreads(outcomes: Sequence[Outcome]) -> Iterator[Part]:
+    groups = by_contender(outcomes)
+    usual = _spread_name(2.0)
+    tests: list[tuple[Any, ...]] = []
+    for name in map(_spread_name, SPREADS):
+        pairs = [(groups[f"{name}, {clip}"], groups[f"{usual}, {clip}"]) for clip in CHOOSING]
+        for clip, (ours, theirs) in zip(CHOOSING, pairs, strict=True):
+            for words, of in (("limb direction", limb), ("joint position", position)):
+                if name != usual:
+                    yield ratio(f"{name} over {usual}, {words}, {clip}", ours, theirs, "", of)
+        if name != usual:
+            for words, of in (("limb direction", limb), ("joint position", position)):
+                found = sign_test(*([of(run) for pair in pairs for run in pair[side]] for side in (0, 1)))
+                cells = (f"{found.better} : {found.worse}", float(f"{found.p:.2g}"))
+                tests.append((f"{name} against {usual}, {words}", *cells))
+    yield from errors("limb direction, RMS", groups, limb)
+    yield from errors("joint position, RMS", groups, position, "mm")
+    yield Table("Sign tests", ("pair", "nearer in runs (seeds and clips)", "p"), tuple(tests))
+    yield summary_table("200 particles, blobs fitted from the true pose", groups)
+    for words, of, unit in (("limb direction", limb, "°"), ("joint position", position, "mm")):
+        series = (
+            seed_range(
+                clip,
+                SPREADS,
+                [[of(run) for run in groups[f"{_spread_name(spread)}, {clip}"]] for spread in SPREADS],
+                group=clip,
+            )
+            for clip in CHOOSING
+        )
+        title = f"Error over the spread, {words} (bars: lowest and highest seed)"
+        yield line_chart(title, "spread (times the training's)", f"RMS error ({unit})", series)
+    yield "Neither performance, nor who performs it, is in the training or in any test."
+    yield {"footage": ", ".join(CHOOSING.values()), "weighting": BLOBS, **_settings(outcomes)}
+
+
+ROOT_SPREAD_EXPERIMENT = Experiment(
+    name="caillette-root-spread",
+    title="How wide learnt root motion is spread",
+    source="an open question",
+    claim="By how much must the root's learnt movement be spread for people who were not learnt from?",
+    trials=_trials(
+        SPREAD_CANDIDATES,
+        {f", {clip}": footage for clip, footage in CHOOSING.items()},
+        frames=ADDITION_FRAMES,
+        from_truth=True,
+    ),
+    measure=measure,
+    shown=_spreads,
+    footage=tuple(CHOOSING.values()),
 )
 
 # Which tracker a user should take.

@@ -188,8 +188,8 @@ class Follow:
 class Followed:
     """The errors of a run. Of each frame: angle_deg, limb_deg, position_mm : RMS over joint angles, limbs' directions
     and markers; lost : a marker is off by more than 150 mm; free : share of the particles that no model moved, empty
-    where none guides them; resets : the automaton was reset, empty where there is no recovery. mean_mm : mean marker
-    error. evaluations : of a frame. milliseconds : of a frame's search.
+    where none guides them; resets : the automaton was reset, empty where there is no recovery; centre_mm : error of the
+    markers' middle. mean_mm : mean marker error. evaluations : of a frame. milliseconds : of a frame's search.
     """
 
     angle_deg: list[float]
@@ -201,6 +201,17 @@ class Followed:
     evaluations: int
     milliseconds: float
     resets: list[bool] = field(default_factory=list[bool])
+    centre_mm: list[float] = field(default_factory=list[float])
+
+    @property
+    def centre_rms(self) -> float:
+        """RMS over frames of the error of the body's middle, mm."""
+        return _rms(self.centre_mm)
+
+    @property
+    def shape_rms(self) -> float:
+        """RMS over frames and markers once the body's middle is put in its place, mm."""
+        return float(np.sqrt(max(self.position_rms**2 - self.centre_rms**2, 0.0)))
 
     @property
     def angle_rms(self) -> float:
@@ -390,6 +401,7 @@ def followed(session: Session, truth: TrueMotion, way: FollowedRun) -> Followed:
         way.evaluations,
         round(1000.0 * way.seconds / max(1, len(way.poses) - 1), 3),
         way.resets,
+        _rounded(found.centre_mm),
     )
 
 
