@@ -210,7 +210,7 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield (
         "Of a posterior the curves lie in the band, error over spread is 1 and the truth lies outside the middle 95 % "
         "in 5 % of the cases. Error over spread: root mean square over frames, the median over parameters. Calibrated: "
-        "spreads multiplied by what makes them right in 95 % of the cases of the other clips; a factor that holds where "
+        "spreads multiplied by what makes them right in 95 % of the cases of the other clips; one that holds where "
         "it was not chosen would be an uncertainty to show."
     )
     heads = (
