@@ -64,7 +64,7 @@ async function showCourse() {
 async function showFindings(place) {
   const files = place.dataset.files.split(" ").filter(Boolean);
   const [echarts, { drawFindings }, experiments] = await Promise.all([
-    import("../vendor/echarts.esm.min.js"), import("./findings.js"), Promise.all(files.map((file) => fetchJson(file))),
+    import("../vendor/echarts.esm.min.js"), import("./findings.js"), Promise.all(files.map(async (file) => (await fetch(file)).json())),
   ]);
   if (experiments.length) drawFindings(place, experiments, echarts);
 }
