@@ -164,9 +164,9 @@ def before_and_after() -> str:
             firm = "" if now["firm"] else " (not firm)"
             measured = f"{now['seeds']} seeds, {now['measured'][:10]}, commit {', '.join(now['commits'])}"
             new = f"{_verdict(now['verdict'] + firm, now['lines'])}{html.escape(measured)}"
-        why = was["why"] if was and now else ""
+        why = was["why"] if was else ""
         rows.append(f"<tr><td>{head}</td><td>{old}</td><td>{new}</td><td>{html.escape(why)}</td></tr>")
-    heads = ("Experiment", f"Before ({before['date']})", "Now", "Why it changed")
+    heads = ("Experiment", f"Before ({before['date']})", "Now", "Why it changes")
     head = "".join(f"<th>{words}</th>" for words in heads)
     body = "\n".join(rows)
     return f'<div class="wide"><table><thead><tr>{head}</tr></thead>\n<tbody>{body}</tbody></table></div>'
