@@ -14,6 +14,7 @@ from studio.jobs.cluster import CLUSTER_HELP
 from studio.reproduction.catalogue import EXPERIMENTS, find_experiments
 from studio.reproduction.experiment import Experiment
 from studio.reproduction.findings_files import number_in_words, read_findings
+from studio.reproduction.guide_findings import guide_folder, write_into_guide
 from studio.reproduction.plan import FULL_SEEDS, QUICK_SEEDS, scale_of
 from studio.reproduction.runner import Reproduction, reproduce
 from studio.sessions.workspace import workspace_root
@@ -25,6 +26,10 @@ OUT_HELP = f"Folder of everything that is kept; default: '{REPRODUCTIONS}' in th
 SEEDS_HELP = f"Seeds of every setting; default {FULL_SEEDS}, with --quick {QUICK_SEEDS}."
 QUICK_HELP = "A look in minutes: fewer seeds, frames and settings."
 PROCESSES_HELP = "How many at once; default: one a core."
+INTO_GUIDE_HELP = (
+    "Write what was found into the guide of this checkout, thinned, with the commits that measured it "
+    "(web_assets/guide/reproduction)."
+)
 JSON_HELP = "Print one JSON object and nothing else on standard output."
 
 
@@ -35,6 +40,7 @@ JSON_HELP = "Print one JSON object and nothing else on standard output."
 @click.option("--seeds", type=click.IntRange(1, 1000), metavar="N", help=SEEDS_HELP)
 @click.option("--processes", type=click.IntRange(1, 1024), metavar="N", help=PROCESSES_HELP)
 @click.option("--cluster", default="", metavar="ADDRESS", help=CLUSTER_HELP)
+@click.option("--into-guide", is_flag=True, help=INTO_GUIDE_HELP)
 @click.option("--json", "as_json", is_flag=True, help=JSON_HELP)
 def reproduce_command(
     name: str,
@@ -43,6 +49,7 @@ def reproduce_command(
     seeds: int | None,
     processes: int | None,
     cluster: str,
+    into_guide: bool,
     as_json: bool,
 ) -> None:
     """Rerun the experiment NAME of a paper, `all` of them, or `list` what there is.
@@ -57,6 +64,9 @@ def reproduce_command(
             print_result(_listed(folder), as_json)
             return
         found = _run(find_experiments(name), folder, scale_of(seeds, quick), processes, cluster)
+        concluded = [document for document in found.documents if document["verdict"] != FAILED]
+        for document in concluded if into_guide else ():
+            note(f"The guide: {write_into_guide(guide_folder(), document)}")
         print_result(_answer(found, folder), as_json)
         if any(document["verdict"] == FAILED for document in found.documents):
             sys.exit(NOT_CONCLUDED)

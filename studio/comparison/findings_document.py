@@ -28,7 +28,7 @@ class Making:
 
     scale : of the experiment. trials : their number. seconds : of all of them in sequence. software : version that
     drew the conclusion; measured_by : versions that measured the trials. date : UTC, ISO 8601. commits : of the code
-    that measured the trials, as far as they are known.
+    that measured the trials, as far as they are known. measured : when the last of them was, as `date`.
     """
 
     scale: Scale
@@ -38,6 +38,7 @@ class Making:
     measured_by: tuple[str, ...]
     date: str
     commits: tuple[str, ...] = ()
+    measured: str = ""
 
 
 def as_document(heading: Heading, findings: Findings, making: Making) -> Document:
@@ -93,6 +94,7 @@ def _head(heading: Heading, making: Making) -> Document:
         "seconds": round(making.seconds, 1),
         "software": making.software,
         "commits": list(making.commits),
+        "measured": making.measured,
         "date": making.date,
     }
 

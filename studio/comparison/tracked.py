@@ -23,6 +23,7 @@ from studio.evaluation.errors import evaluate, rows_of_frames
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
 from studio.likelihood.catalogue import WEIGHTINGS
+from studio.likelihood.hard_priors import HardPriors
 from studio.motion_files.trc import read_trc
 from studio.progress import report
 from studio.runs.behaviour_models import check_prediction, fitting, model_folders, model_path
@@ -92,7 +93,8 @@ class Tracked:
     frames : numbers in the footage. per_frame_mm : mean over markers. lost : per frame the names of limbs that are
     lost (a marker more than 150 mm off). evaluations : poses weighed in a frame after the first. seconds : of the
     search (weighting and tracker), without reading and preparing pictures. named : per frame the limbs that the tracker
-    itself reported lost, as in a run's timeline.
+    itself reported lost, as in a run's timeline. impossible_frames : frames whose pose breaks a hard prior (a joint
+    beyond its limits, a limb inside another); -1 in outcomes that were kept before it was counted.
     """
 
     frames: list[int]
@@ -105,6 +107,7 @@ class Tracked:
     evaluations: int
     seconds: float
     named: list[list[str]] = field(default_factory=list[list[str]])
+    impossible_frames: int = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,7 +189,9 @@ def track(
         poses = with_sides_right(body, seen_with, np.array(frames), poses, rate, silhouettes_of)[0]
     found = measured(session, body, poses, np.array(frames), evaluations, seconds)
     by_frame = dict(zip(frames, named, strict=True))
-    return dataclasses.replace(found, named=[by_frame[frame] for frame in found.frames])
+    impossible = int((~HardPriors(body).hold(poses, limbs_apart=True)).sum())
+    named_of = [by_frame[frame] for frame in found.frames]
+    return dataclasses.replace(found, named=named_of, impossible_frames=impossible)
 
 
 def measured(

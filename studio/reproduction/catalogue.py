@@ -59,6 +59,7 @@ LISTED: tuple[Experiment, ...] = (
     dynamics.FIG_11_EXPERIMENT,
     *dynamics.FIG_12_EXPERIMENTS,
     dynamics.AS_PRINTED_EXPERIMENT,
+    dynamics.ROOT_SPREAD_EXPERIMENT,
     models.FIG_13,
     scalability.EXPERIMENT,
     models.ONLINE_LEARNING,

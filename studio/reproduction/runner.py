@@ -208,6 +208,7 @@ def conclude(planned: PlannedExperiment, kept: Mapping[str, KeptOutcome]) -> Doc
         tuple(sorted({outcome.software for outcome in outcomes})),
         now(),
         tuple(sorted({outcome.commit for outcome in outcomes} - {""})),
+        max((outcome.finished for outcome in outcomes), default=""),
     )
     reasons = [("", planned.problem)] if planned.problem else []
     reasons += [(outcome.label, outcome.failure) for outcome in outcomes if outcome.measured is None]

@@ -2,7 +2,10 @@
 
 import html
 import itertools
+import json
+from collections.abc import Iterable
 from functools import cache
+from typing import Any
 
 from fastapi import APIRouter
 from markdown_it import MarkdownIt
@@ -25,9 +28,9 @@ from studio.training.oversampling import OversamplingSettings
 
 router = APIRouter(tags=["page"], include_in_schema=False)
 
-PLACE_OF_KNOBS = "{{knobs}}"
-# The summary.md of a full `studio reproduce all`, as it was written.
-PLACE_OF_SUMMARY, SUMMARY = "{{reproduction}}", "reproduction.md"
+PLACE_OF_KNOBS, PLACE_OF_SUMMARY, PLACE_OF_FINDINGS = "{{knobs}}", "{{reproduction}}", "{{findings}}"
+# Of `studio reproduce --into-guide`, and what it is compared with.
+REPRODUCTION, BEFORE = "reproduction", "before.json"
 VERBS_WORDS = (
     "What a person lets the studio do: each is a function of <code>studio</code>, most are a command, and the page asks"
     " for them over HTTP. A keyword, an option and an entry of a body are one declaration."
@@ -45,6 +48,7 @@ TEXTS = {
     "animal": ("animal.md", "Your own animal in an hour"),
     "commands": ("commands.md", "Commands"),
     "figures": ("figures.md", "How well, how fast"),
+    REPRODUCTION: ("reproduction.md", "The papers' claims"),
 }
 """The packaged texts and their titles, by the addresses below /guide."""
 COURSE = ("course", "particle", "layer", "annealing", "partitions")
@@ -72,8 +76,6 @@ def rendered(name: str, title: str, in_course: bool = False) -> dict[str, str]:
     markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
     folder = assets_folder() / "guide"
     text = (folder / name).read_text(encoding="utf-8")
-    if PLACE_OF_SUMMARY in text:
-        text = text.replace(PLACE_OF_SUMMARY, (folder / SUMMARY).read_text(encoding="utf-8"))
     tokens = markdown.parse(text)
     contents: list[str] = [] if name == "guide.md" else ['<a href="/guide">Guide</a>']
     if in_course:
@@ -86,8 +88,14 @@ def rendered(name: str, title: str, in_course: bool = False) -> dict[str, str]:
                 contents.append(f'<a href="#{anchor}">{html.escape(inline.content)}</a>')
     # Lines within a table's cell are the one thing that the text cannot say without HTML.
     content = markdown.renderer.render(tokens, markdown.options, {}).replace("&lt;br&gt;", "<br>")
-    if PLACE_OF_KNOBS in text:
-        content = content.replace(f"<p>{PLACE_OF_KNOBS}</p>", all_knob_tables())
+    places = {
+        PLACE_OF_KNOBS: all_knob_tables,
+        PLACE_OF_SUMMARY: before_and_after,
+        PLACE_OF_FINDINGS: place_of_findings,
+    }
+    for place, made in places.items():
+        if place in text:
+            content = content.replace(f"<p>{place}</p>", made())
     return {"title": f"{title} · {NAME}", "contents": "".join(contents), "content": content}
 
 
@@ -131,6 +139,49 @@ def _entry(entry: Parameter) -> tuple[str, ...]:
         meaning = f"{meaning} {', '.join(knob.name for knob in knobs.listed())}".strip()
     code = [f"<code>{html.escape(word)}</code>" if word else "" for word in (default, option, body)]
     return f"<code>{entry.name}</code>", html.escape(meaning), *code
+
+
+def findings_of_the_guide() -> dict[str, dict[str, Any]]:
+    """What `studio reproduce --into-guide` wrote, by experiment."""
+    folder = assets_folder() / "guide" / REPRODUCTION
+    files = sorted(path for path in folder.glob("*.json") if path.name != BEFORE)
+    return {path.stem: json.loads(path.read_text(encoding="utf-8")) for path in files}
+
+
+def before_and_after() -> str:
+    """A row an experiment: its verdict and numbers of BEFORE, those of today with seeds, day and commit, and why."""
+    before = json.loads((assets_folder() / "guide" / REPRODUCTION / BEFORE).read_text(encoding="utf-8"))
+    found = findings_of_the_guide()
+    rows: list[str] = []
+    for name in dict.fromkeys((*before["rows"], *found)):
+        was, now = before["rows"].get(name), found.get(name)
+        known = now or was
+        head = f"{html.escape(known['title'])}<br><code>{name}</code><br>{html.escape(known['source'])}"
+        old = "new" if was is None else _verdict(was["verdict"], was["numbers"])
+        if now is None:
+            new = f"not measured again; measured {before['date']}, before commits were kept"
+        else:
+            firm = "" if now["firm"] else " (not firm)"
+            measured = f"{now['seeds']} seeds, {now['measured'][:10]}, commit {', '.join(now['commits'])}"
+            new = f"{_verdict(now['verdict'] + firm, now['lines'])}{html.escape(measured)}"
+        why = was["why"] if was else ""
+        rows.append(f"<tr><td>{head}</td><td>{old}</td><td>{new}</td><td>{html.escape(why)}</td></tr>")
+    heads = ("Experiment", f"Before ({before['date']})", "Now", "Why it changes")
+    head = "".join(f"<th>{words}</th>" for words in heads)
+    body = "\n".join(rows)
+    return f'<div class="wide"><table><thead><tr>{head}</tr></thead>\n<tbody>{body}</tbody></table></div>'
+
+
+def _verdict(verdict: str, numbers: Iterable[str]) -> str:
+    """A verdict with its numbers folded away."""
+    lines = "<br>".join(html.escape(line) for line in numbers)
+    return f"<details><summary>{html.escape(verdict)}</summary><small>{lines}</small></details>"
+
+
+def place_of_findings() -> str:
+    """Where `js/guide.js` draws the findings whose files it names."""
+    files = " ".join(f"/assets/guide/{REPRODUCTION}/{name}.json" for name in findings_of_the_guide())
+    return f'<div id="findings" data-files="{html.escape(files)}"></div>'
 
 
 def anchor_of(heading: str) -> str:

@@ -37,6 +37,7 @@ class BehaviourSettings:
     )  # fmt: skip
     diffusion_scale: float = shared_knobs.diffusion_scale()
     root_prediction: str = shared_knobs.root_prediction()
+    root_spread: float = shared_knobs.root_spread()
     global_scale: float = shared_knobs.global_scale(1.0)
     automaton_share: float = shared_knobs.automaton_share()
     estimate: str = knob(

@@ -33,9 +33,6 @@ STATES, VELOCITY = "automaton_state", "velocity"
 
 # Standard deviations beyond √d: the regression from a pose that lies farther outside a cluster is not used.
 NOT_BELIEVED = 3.0
-# Factor on the standard deviations of a cluster's root movement in training, as other people move differently. Of 1,
-# 1.5 and 2 on two dances of other people the last one lost the body least.
-ROOT_SPREAD = 2.0
 # Particles per block when states are sampled: the automaton has thousands of states, each with a probability.
 AT_ONCE = 4096
 
@@ -76,6 +73,11 @@ class GuidedRules(Rules, Protocol):
     @property
     def root_prediction(self) -> str:
         """ "learnt" or "noise"."""
+        ...
+
+    @property
+    def root_spread(self) -> float:
+        """Multiplies the standard deviations of learnt root motion."""
         ...
 
     @property
@@ -171,7 +173,7 @@ def propagated(
         states, angles, velocity = moved.states, moved.values, moved.velocities
         if model.root is not None and rules.root_prediction == LEARNT:
             labels = np.maximum(model.automaton.last_symbols[states], 0)
-            poses = np.where(free[:, None], poses, model.root.moved(rng, poses, labels, ROOT_SPREAD))
+            poses = np.where(free[:, None], poses, model.root.moved(rng, poses, labels, rules.root_spread))
     poses[:, columns] = np.where(free[:, None], poses[:, columns], angles)
     velocity = np.where(free[:, None], guided.velocity, velocity)
     alone = followed(rng, model, guided.states, poses[:, columns], velocity, space.steps)

@@ -68,6 +68,7 @@ class AnnealedSettings:
     attenuation: float = shared_knobs.attenuation(0.3)
     entering: str = shared_knobs.entering()
     root_prediction: str = shared_knobs.root_prediction()
+    root_spread: float = shared_knobs.root_spread()
     global_scale: float = shared_knobs.global_scale(1.0)
     automaton_share: float = shared_knobs.automaton_share()
     model_free_share: float = shared_knobs.model_free_share(0.2)

@@ -81,3 +81,22 @@ def test_after_ctrl_c_it_is_said_how_to_go_on(monkeypatch: pytest.MonkeyPatch) -
     assert found.exit_code == 130
     assert "Go on with: studio reproduce toy-good --seeds 2" in found.stderr
     assert (workspace_root() / "reproduction" / "report.html").is_file()
+
+
+def test_findings_go_into_the_guide_with_commits_that_exist(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    guide = tmp_path / "guide"
+    monkeypatch.setattr(reproduction_commands, "guide_folder", lambda: guide)
+    monkeypatch.setattr(reproduction, "commit", lambda: "0123456789ab with changes")
+    wanted = ("toy-good", "--seeds", "2", "--processes", "1", "--into-guide")
+    refused = run(*wanted)
+    assert refused.exit_code == 2
+    assert "cite no commit that exists" in refused.stderr
+    assert not guide.exists()
+    monkeypatch.setattr(reproduction, "commit", lambda: "0123456789ab")
+    assert run(*wanted, "--out", str(tmp_path / "anew")).exit_code == 0
+    written = json.loads((guide / "toy-good.json").read_text())
+    assert written["commits"] == ["0123456789ab"]
+    assert written["verdict"] == "reproduced"
+    assert any(line.startswith("error, plain: 40.") for line in written["lines"])

@@ -6,6 +6,7 @@ import pytest
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import kinematic_tables
 from studio.geometry.projection import project
+from studio.reproduction.deutscher_reid import arms
 from studio.reproduction.deutscher_reid.arms import (
     TRUE_PART,
     TemplateArm,
@@ -80,3 +81,22 @@ def test_the_arm_is_found(arm: TemplateArm) -> None:
         errors.append(np.abs(result.estimate.pose - truth).max())
     # A link's width (about 5 of its 19 pixels' length) is 0.26 rad; one pixel at its end 0.05.
     assert np.median(errors) < 0.05
+
+
+@pytest.mark.parametrize(
+    ("body", "before"), [("planar_arm4", [-1, 0, 1, 2]), ("branched_arms6", [-1, 0, 1, -1, 3, 4])]
+)
+def test_absolute_angles_keep_the_links_beyond_a_cut_where_they_point(body: str, before: list[int]) -> None:
+    arm = arms.template_arm(body)
+    places = arms.links_before(arm.body)
+    assert places.tolist() == before
+    pose = arms.true_pose(arm.space, 3)
+    frame = arms.AbsoluteAngles(arm.observed(pose), places)
+    turned = arms.absolute(pose, places)
+    assert frame.relative(turned[None])[0] == pytest.approx(pose)
+    assert frame.weigh(turned[None]) == pytest.approx(arm.observed(pose).weigh(pose[None]))
+    turned[0] += 0.2
+    moved = limb_ends(arm.body, frame.relative(turned[None]))[0] - limb_ends(arm.body, pose[None])[0]
+    beyond = [column for column in range(1, len(before)) if before[column] >= 0]
+    for column in beyond:
+        assert moved[column, 1] - moved[column, 0] == pytest.approx(np.zeros(3), abs=1e-6)

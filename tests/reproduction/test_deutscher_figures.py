@@ -22,6 +22,7 @@ from studio.reproduction.deutscher_reid import (
     localisation,
     particles_needed,
     processors,
+    tracked_people,
     weight_of_a_knee,
 )
 from studio.reproduction.deutscher_reid.particles_needed import Fewest
@@ -153,7 +154,7 @@ def test_three_cameras_are_judged_by_the_papers_own_filter(name: str) -> None:
     lost = concluded(name, lambda group, seed: run(30.0, lost=(3,) if seed % 2 else ()))
     assert "left arm in 5" in lost.words
     thick = [series for series in good.charts[0].series if not series.thin]
-    assert len(thick) == 3
+    assert len(thick) == len(tracked_people.FILTERS)
 
 
 def test_the_longest_loss_is_one_limbs_longest_spell() -> None:
@@ -270,7 +271,7 @@ def test_fig_7_measures_a_weight_that_is_largest_near_the_true_knee(cache) -> No
     trial = weight_of_a_knee.trials(Scale((0,), quick=True))[0]
     measured = plain(weight_of_a_knee.measure({**trial.arguments, "footage": "walk", "frame": 5}, cache))
     angles = np.array(measured["angles"])
-    assert set(measured["log_weights"]) == {"edges", "region", "both"}
+    assert set(measured["log_weights"]) == set(weight_of_a_knee.TERMS)
     logs = {name: np.array(values) for name, values in measured["log_weights"].items()}
     # Eq. 16: the terms add up.
     assert logs["both"] == pytest.approx(logs["edges"] + logs["region"], abs=1e-3)

@@ -206,8 +206,12 @@ def test_both_together_save_four_on_a_whole_body(both: float, verdict: str) -> N
 @pytest.mark.parametrize(("ten", "verdict"), [(100.0, "reproduced"), (300.0, "not reproduced")])
 def test_doubling_the_layers_more_than_halves_the_particles(ten: float, verdict: str) -> None:
     layers = particles_needed.MORE_LAYERS
-    found = concluded(layers, {"5 layers": 400.0, "10 layers": ten, "20 layers": 60.0})
+    of_count = {"5": 400.0, "10": ten, "20": 60.0}
+    needed = {name: of_count[name.partition(" ")[0]] for name in particles_needed.LAYER_FILTERS}
+    found = concluded(layers, needed)
     assert found.verdict == verdict
+    # Other readings are shown, and no claim rests on them.
+    assert [entry.verdict for entry in found.numbers[1:6]] == ["answered"] * 5
     assert found.numbers[0].ours == pytest.approx(400.0 / ten)
 
 

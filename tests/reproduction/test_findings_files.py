@@ -26,6 +26,7 @@ from studio.reproduction.findings_files import (
     write_findings,
     write_overview,
 )
+from studio.reproduction.guide_findings import POINTS, guide_folder, thinned
 from studio.reproduction.provenance import CHANGED, commit
 from studio.reproduction.report_document import report_html
 
@@ -210,3 +211,31 @@ def test_numbers_in_words(values: tuple, words: str) -> None:
 
 def test_csv_quotes_and_leaves_out_null() -> None:
     assert as_csv([("a,b", None, 1.5)]) == '"a,b",,1.5\n'
+
+
+def test_the_guide_keeps_the_means_and_at_most_so_many_points(document: dict) -> None:
+    x = list(range(300))
+    curve = {"name": "a", "x": x, "y": [value / 3.0 for value in x], "low": [], "high": [], "group": "a"}
+    seed = {**curve, "name": "a, seed 0", "thin": True, "dashed": False}
+    alone = {**seed, "group": "b"}
+    chart = {**document["charts"][0], "series": [seed, {**curve, "thin": False, "dashed": False}, alone]}
+    found = thinned({**document, "charts": [chart]})
+    kept = found["charts"][0]["series"]
+    assert [entry["group"] for entry in kept] == ["a", "b"]
+    assert [entry["thin"] for entry in kept] == [False, True]
+    assert (len(kept[0]["x"]), kept[0]["x"][0], kept[0]["x"][-1], kept[0]["y"][-1]) == (POINTS, 0, 299, 99.67)
+    assert found["lines"] == [
+        number_in_words(entry) for entry in document["numbers"] if entry["verdict"] != "answered"
+    ]
+
+
+def test_the_guide_cites_commits_of_this_repository() -> None:
+    def git(*words: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(["git", "-C", str(ROOT), *words], capture_output=True, text=True, check=False)
+
+    if git("rev-parse", "--is-shallow-repository").stdout.strip() != "false":
+        pytest.skip("no checkout with its whole history")
+    files = [path for path in guide_folder().glob("*.json") if path.name != "before.json"]
+    for path in files:
+        for cited in json.loads(path.read_text(encoding="utf-8"))["commits"]:
+            assert git("cat-file", "-e", f"{cited}^{{commit}}").returncode == 0, (path.name, cited)

@@ -164,5 +164,12 @@ def test_trials_of_figures_12_to_14_are_shared() -> None:
         for experiment in localisation.EXPERIMENTS
         for trial in experiment.trials(SEEDS)
     ]
-    assert len(set(searches)) == 3 * len(SEEDS.seeds)
+    assert len(set(searches)) == (3 + 2 * len(localisation.MILDER)) * len(SEEDS.seeds)
     assert {experiment.measure for experiment in localisation.EXPERIMENTS} == {measure}
+
+
+def test_slopes_tell_even_falls_from_uneven_ones() -> None:
+    layers = np.arange(6)[None, :, None]
+    even, uneven = 10.0 ** (-0.5 * layers * np.ones(4)), 10.0 ** (-layers * np.array([0.8, 0.4, 0.2, 0.1]))
+    assert localisation.slopes(even) == pytest.approx(np.full((1, 4), -0.5))
+    assert localisation.slopes(uneven)[0] == pytest.approx([-0.8, -0.4, -0.2, -0.1])

@@ -48,6 +48,13 @@ def test_the_band_has_its_level() -> None:
     assert 0.01 < np.mean(left) < 0.06
 
 
+def test_a_factor_makes_spreads_right_in_95_of_100_cases() -> None:
+    errors = np.random.default_rng(3).normal(scale=4.0, size=(4000, 2))
+    times = posterior.factor(errors**2)
+    assert times == pytest.approx(4.0, rel=0.05)
+    assert np.mean(errors**2 > times**2 * posterior.NORMAL_95) == pytest.approx(0.05, abs=0.002)
+
+
 @pytest.mark.parametrize("tracker", [0, 2, 3])
 def test_a_tracker_is_measured_layer_by_layer(tracker: int) -> None:
     cache = FootageCache(SAMPLES)

@@ -1,5 +1,6 @@
 """The page, its assets, the guide, preferences, and what the scene is told to show."""
 
+import json
 import re
 
 import pytest
@@ -10,12 +11,15 @@ from studio.evidence.settings import EvidenceSettings
 from studio.knobs import knobs_of
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.reproduction.catalogue import EXPERIMENTS
+from studio.runs.self_contained import assets_folder
 from studio.scene.model import Selection
 from studio.server.guide_routes import COURSE, anchor_of
 from studio.server.pages import PLACES
 from studio.sessions.stored_run import StoredRun
 from studio.settings import RecordingSettings
 from studio.trackers.catalogue import TRACKERS
+
+GUIDE_PAGES = ("python", "verbs", "commands", "adding", "animal", "figures", "reproduction")
 
 
 def test_the_page_and_all_that_it_names_are_there(studio: Studio) -> None:
@@ -66,16 +70,32 @@ def test_modules_have_the_type_that_browsers_want_and_are_requested_anew(studio:
     assert again.status_code == 304
 
 
-def test_the_guide_carries_what_experiments_found_with_its_verdict(studio: Studio) -> None:
-    text = studio.client.get("/guide").text
-    assert "{{reproduction}}" not in text
-    section = text.partition('id="the-papers-claims"')[2].partition("<h2")[0]
-    rows = re.findall(r"<tr>\n<td>.*?<code>([\w-]+)</code>.*?</td>\n<td>.*?</td>\n<td>(.*?)</td>", section)
-    response = {name: verdict.removesuffix(" (not firm)") for name, verdict in rows}
-    newer = set(re.findall(r"<code>([\w-]+)</code>", section.partition("not in it:")[2].partition(";")[0]))
-    assert newer.isdisjoint(response)
-    assert set(response) | newer == set(EXPERIMENTS)
-    assert set(response.values()) <= set(VERDICTS)
+def test_the_guide_carries_what_experiments_found_before_and_after(studio: Studio) -> None:
+    text = studio.client.get("/guide/reproduction").text
+    assert "{{" not in text
+    folder = assets_folder() / "guide" / "reproduction"
+    before = json.loads((folder / "before.json").read_text(encoding="utf-8"))["rows"]
+    found = {path.stem: json.loads(path.read_text(encoding="utf-8")) for path in folder.glob("*.json")}
+    del found["before"]
+    rows = re.findall(
+        r"<tr><td>.*?<code>([\w-]+)</code>.*?</td><td>(.*?)</td><td>(.*?)</td><td>(.*?)</td>", text
+    )
+    assert [name for name, *_ in rows] == list(dict.fromkeys((*before, *sorted(found))))
+    assert {name for name, *_ in rows} <= set(EXPERIMENTS)
+    for name, old, new, why in rows:
+        if name in before:
+            assert f"<summary>{before[name]['verdict']}" in old
+        if name not in found:
+            assert "before commits were kept" in new
+            continue
+        document = found[name]
+        assert document["verdict"] in VERDICTS
+        assert f"<summary>{document['verdict']}" in new
+        assert all(commit in new for commit in document["commits"])
+        # A row that changed says why.
+        firm = "" if document["firm"] else " (not firm)"
+        assert why or name not in before or before[name]["verdict"] == document["verdict"] + firm, name
+        assert studio.client.get(f"/assets/guide/reproduction/{name}.json").json()["name"] == name
 
 
 def test_the_guide_has_every_knob_with_its_range(studio: Studio) -> None:
@@ -102,7 +122,7 @@ def test_every_page_that_the_guide_refers_to_is_there(studio: Studio) -> None:
         left += set(re.findall(r'href="(/guide(?:/[a-z]+)?)"', answer.text)) - set(seen) - set(left)
     assert set(seen) == {
         "/guide",
-        *(f"/guide/{name}" for name in ("python", "verbs", "commands", "adding", "animal", "figures")),
+        *(f"/guide/{name}" for name in GUIDE_PAGES),
         *(f"/guide/{name}" for name in COURSE),
     }
     assert studio.client.get("/guide/nothing").status_code == 404

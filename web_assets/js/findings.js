@@ -92,7 +92,8 @@ function head(names, numeric = []) {
 }
 
 function section(experiment, echarts, charts) {
-  const facts = [experiment.source, `${experiment.seeds} seeds`, `${experiment.trials} trials`, duration(experiment.seconds), experiment.date.slice(0, 10)];
+  const facts = [experiment.source, `${experiment.seeds} seeds`, `${experiment.trials} trials`, duration(experiment.seconds), (experiment.measured || experiment.date).slice(0, 10)];
+  if (experiment.commits?.length) facts.push(`commit ${experiment.commits.join(", ")}`);
   const made = element("section", { className: "findings-experiment", id: anchor(experiment) },
     element("header", {}, element("div", {}, element("h2", {}, experiment.title), element("p", { className: "quiet" }, facts.join(" · "), " · ", element("code", {}, experiment.name))),
       badge(experiment.verdict, experiment.firm)),

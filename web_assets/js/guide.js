@@ -1,5 +1,5 @@
 // The guide takes the theme that every page remembers; what is wider than its place can be scrolled by keys. Pages of its
-// course know whether the runs are there that they lead to.
+// course know whether the runs are there that they lead to. The papers' claims are drawn of the findings' files.
 
 import { fetchJson, post, readOnly } from "./api.js";
 import { button, drawProgress, element, failure, fill, hint } from "./elements.js";
@@ -60,6 +60,17 @@ async function showCourse() {
   await follow();
 }
 
+/** Draw what the reproductions found. @param {HTMLElement} place */
+async function showFindings(place) {
+  const files = place.dataset.files.split(" ").filter(Boolean);
+  const [echarts, { drawFindings }, experiments] = await Promise.all([
+    import("../vendor/echarts.esm.min.js"), import("./findings.js"), Promise.all(files.map(async (file) => (await fetch(file)).json())),
+  ]);
+  if (experiments.length) drawFindings(place, experiments, echarts);
+}
+
 startTheme();
+const findings = document.getElementById("findings");
+if (findings) showFindings(findings).catch(console.error);
 for (const block of document.querySelectorAll("pre")) if (block.scrollWidth > block.clientWidth) block.tabIndex = 0;
 if (links().length || location.pathname === "/guide/course") showCourse().catch(console.error);

@@ -41,7 +41,7 @@ from studio.reproduction.experiment import Experiment, Part, each_seed, group_of
 FLOORS = (0.0, 0.003, 0.01, 0.02, 0.03, 0.05, 0.1)
 QUICK_FLOORS = (0.0, 0.02)
 MEMORIES = (1, 10, 20, 30)
-MEMORY, FRAMES = 20, 120
+MEMORY, FRAMES = 20, 150
 EXERCISES = {"first exercise": TEST, "second exercise": TEST_2}
 PARTICLES = 200
 PRINTED, OURS = "printed", "guided"

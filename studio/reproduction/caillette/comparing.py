@@ -33,6 +33,9 @@ angle: Error = attrgetter("angle_rms")
 limb: Error = attrgetter("limb_rms")
 position: Error = attrgetter("position_rms")
 """A run's RMS error of joint angles and of limbs' directions (degrees), and of joint positions (mm)."""
+centre: Error = attrgetter("centre_rms")
+shape: Error = attrgetter("shape_rms")
+"""The two parts of a position error (mm), whose squares add up: of the body's middle, and about it."""
 
 LIMB, ANGLE, POSITION = "limb direction", "joint angle", "joint position"
 MEASURES: Mapping[str, tuple[str, str]] = {
@@ -50,9 +53,8 @@ def by_contender(outcomes: Iterable[Outcome]) -> dict[str, list[Followed]]:
 
 def beginning(run: Followed, frames: int) -> Followed:
     """The run cut off after `frames` frames; `mean_mm` stays that of the whole."""
-    parts = {
-        name: getattr(run, name)[:frames] for name in ("angle_deg", "limb_deg", "position_mm", "lost", "free")
-    }
+    names = ("angle_deg", "limb_deg", "position_mm", "centre_mm", "lost", "free")
+    parts = {name: getattr(run, name)[:frames] for name in names}
     return dataclasses.replace(run, **parts)
 
 
@@ -95,6 +97,23 @@ def curves(title: str, groups: Groups, measure: str = LIMB) -> Chart:
     return Chart(title, "lines", f"frame (at {FPS} Hz)", axis, tuple(series))
 
 
+SIDE_BY_SIDE = "Verdicts: the tracker as printed, and ours"
+TWO_TRACKERS = (
+    "The claims are judged by the paper's tracker as printed; ours ('guided') has four additions, is shown beside it, "
+    "and no claim of the paper rests on it."
+)
+
+
+def side_by_side(rows: Iterable[tuple[str, Number, Number]]) -> Table:
+    """A line a claim: the number and the verdict with the printed tracker, and with ours."""
+
+    def cells(found: Number) -> tuple[str, str]:
+        return f"{found.ours:.3g} {found.unit} [{found.low:.3g}, {found.high:.3g}]", found.verdict
+
+    heads = ("claim", "as printed", "verdict", "ours", "verdict of ours")
+    return Table(SIDE_BY_SIDE, heads, tuple((name, *cells(one), *cells(other)) for name, one, other in rows))
+
+
 def summary_table(title: str, groups: Groups) -> Table:
     """A line a contender: errors, losses, time."""
     return table_over(title, "contender", COLUMNS, groups)
@@ -111,6 +130,8 @@ COLUMNS: Mapping[str, Callable[[Runs], Any]] = {
     "joint angle, RMS (°)": lambda runs: mean_of(runs, angle),
     "limb direction, RMS (°)": lambda runs: mean_of(runs, limb),
     "joint position, RMS (mm)": lambda runs: mean_of(runs, position),
+    "of the body's middle (mm)": lambda runs: mean_of(runs, centre),
+    "about its middle (mm)": lambda runs: mean_of(runs, shape),
     "mean (mm)": lambda runs: mean_of(runs, lambda run: run.mean_mm),
     "frames with a limb lost (%)": lambda runs: 100.0 * mean_of(runs, lambda run: run.lost_share),
     "longest loss (s)": lambda runs: max(map(longest_loss, runs)),

@@ -18,23 +18,25 @@ annealed filter, tracking as a run does, at equal evaluations.
 """
 
 import dataclasses
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from studio.comparison.findings import Number, Table
-from studio.comparison.statistics import number
+from studio.comparison.statistics import number, sign_test
 from studio.comparison.trials import Outcome, Scale, Trial
 from studio.reproduction.caillette.comparing import (
     MEASURES,
     OFF_MM,
     POSITION,
+    TWO_TRACKERS,
     Error,
     Groups,
     angle,
     beginning,
     by_contender,
+    centre,
     curves,
     errors,
     limb,
@@ -42,6 +44,8 @@ from studio.reproduction.caillette.comparing import (
     loses_track,
     position,
     ratio,
+    shape,
+    side_by_side,
     summary_table,
 )
 from studio.reproduction.caillette.following import Followed, follow_trial, measure
@@ -65,6 +69,7 @@ from studio.reproduction.caillette.setting import (
     training_words,
 )
 from studio.reproduction.claims import EQUAL, LOWER, beside, share
+from studio.reproduction.drawing import line_chart, seed_range
 from studio.reproduction.experiment import Experiment, Part
 from studio.reproduction.tracking import Candidate
 from studio.trackers.catalogue import knobs_for_evaluations
@@ -72,21 +77,6 @@ from studio.trackers.catalogue import knobs_for_evaluations
 BLIND = (CONDENSATION, ANNEALED, IMPROVED)
 PREDICTION = {"prediction": "behaviour"}
 FREE_SHARE = {"model_free_share": 0.1, "model_free_grows": True}
-SIDE_BY_SIDE = "Verdicts: the tracker as printed, and ours"
-TWO_TRACKERS = (
-    "The claims are judged by the paper's tracker as printed; ours ('guided') has four additions, is shown beside it, "
-    "and no claim of the paper rests on it."
-)
-
-
-def _side_by_side(rows: Iterable[tuple[str, Number, Number]]) -> Table:
-    """A line a claim: the number and the verdict with the printed tracker, and with ours."""
-
-    def cells(found: Number) -> tuple[str, str]:
-        return f"{found.ours:.3g} {found.unit} [{found.low:.3g}, {found.high:.3g}]", found.verdict
-
-    heads = ("claim", "as printed", "verdict", "ours", "verdict of ours")
-    return Table(SIDE_BY_SIDE, heads, tuple((name, *cells(one), *cells(other)) for name, one, other in rows))
 
 
 def _trials(
@@ -164,7 +154,7 @@ def _fig_11(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield from (number for _, number, _ in rows)
     yield from (beside(number) for _, _, number in rows)
     yield from (beside(loses(one, 0.0)) for one in (PRINTED_KEEPS, KEEPS))
-    yield _side_by_side(rows)
+    yield side_by_side(rows)
     yield from errors("joint position, RMS", groups, position, "mm")
     yield from errors("limb direction, RMS", groups, limb)
     yield from errors("longest time off", groups, longest_loss, "s")
@@ -233,7 +223,12 @@ measure, and positions stand beside them.
 SAME_COMPARISONS: tuple[Comparison, ...] = (
     *(
         (f"{ours.name} over {other.name}, {words}", ours, other, "", of)
-        for words, of in (("joint angle", angle), ("joint position", position))
+        for words, of in (
+            ("joint angle", angle),
+            ("joint position", position),
+            ("the body's middle", centre),
+            ("about its middle", shape),
+        )
         for ours in (PRINTED_FEW, FEW)
         for other in (ANNEALED, CONDENSATION, IMPROVED)
     ),
@@ -280,7 +275,7 @@ def _fig_12(footage: str, outcomes: Sequence[Outcome]) -> Iterator[Part]:
             rows.append((f"{'equal to' if claim == EQUAL else 'nearer than'} {other.name}", printed, ours))
         yield from (number for _, number, _ in rows)
         yield from (beside(number) for _, _, number in rows)
-        yield _side_by_side(rows)
+        yield side_by_side(rows)
     yield from ratios
     if not unseen and len(groups[FEW.name][0].limb_deg) > CALM_FRAMES:
         first = {name: [beginning(run, CALM_FRAMES) for run in runs] for name, runs in groups.items()}
@@ -412,6 +407,70 @@ AS_PRINTED_EXPERIMENT = Experiment(
     measure=measure,
     shown=_additions,
     footage=tuple(EXERCISES.values()),
+)
+
+# How wide learnt root motion is spread: chosen on two performances by other dancers that no test uses.
+
+SPREADS = (0.5, 1.0, 1.5, 2.0, 3.0)
+CHOOSING = {"first exercise": "dance-choosing-1", "second exercise": "dance-choosing-2"}
+
+
+def _spread_name(spread: float) -> str:
+    return f"spread {spread:g}"
+
+
+SPREAD_CANDIDATES = tuple(guided(200, _spread_name(spread), root_spread=spread) for spread in SPREADS)
+
+
+def _spreads(outcomes: Sequence[Outcome]) -> Iterator[Part]:
+    groups = by_contender(outcomes)
+    usual = _spread_name(2.0)
+    tests: list[tuple[Any, ...]] = []
+    for name in map(_spread_name, SPREADS):
+        pairs = [(groups[f"{name}, {clip}"], groups[f"{usual}, {clip}"]) for clip in CHOOSING]
+        for clip, (ours, theirs) in zip(CHOOSING, pairs, strict=True):
+            for words, of in (("limb direction", limb), ("joint position", position)):
+                if name != usual:
+                    yield ratio(f"{name} over {usual}, {words}, {clip}", ours, theirs, "", of)
+        if name != usual:
+            for words, of in (("limb direction", limb), ("joint position", position)):
+                found = sign_test(*([of(run) for pair in pairs for run in pair[side]] for side in (0, 1)))
+                cells = (f"{found.better} : {found.worse}", float(f"{found.p:.2g}"))
+                tests.append((f"{name} against {usual}, {words}", *cells))
+    yield from errors("limb direction, RMS", groups, limb)
+    yield from errors("joint position, RMS", groups, position, "mm")
+    yield Table("Sign tests", ("pair", "nearer in runs (seeds and clips)", "p"), tuple(tests))
+    yield summary_table("200 particles, blobs fitted from the true pose", groups)
+    for words, of, unit in (("limb direction", limb, "°"), ("joint position", position, "mm")):
+        series = (
+            seed_range(
+                clip,
+                SPREADS,
+                [[of(run) for run in groups[f"{_spread_name(spread)}, {clip}"]] for spread in SPREADS],
+                group=clip,
+            )
+            for clip in CHOOSING
+        )
+        title = f"Error over the spread, {words} (bars: lowest and highest seed)"
+        yield line_chart(title, "spread (times the training's)", f"RMS error ({unit})", series)
+    yield "Neither performance, nor who performs it, is in the training or in any test."
+    yield {"footage": ", ".join(CHOOSING.values()), "weighting": BLOBS, **_settings(outcomes)}
+
+
+ROOT_SPREAD_EXPERIMENT = Experiment(
+    name="caillette-root-spread",
+    title="How wide learnt root motion is spread",
+    source="an open question",
+    claim="By how much must the root's learnt movement be spread for people who were not learnt from?",
+    trials=_trials(
+        SPREAD_CANDIDATES,
+        {f", {clip}": footage for clip, footage in CHOOSING.items()},
+        frames=ADDITION_FRAMES,
+        from_truth=True,
+    ),
+    measure=measure,
+    shown=_spreads,
+    footage=tuple(CHOOSING.values()),
 )
 
 # Which tracker a user should take.

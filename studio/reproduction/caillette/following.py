@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from studio.arrays import Array
 from studio.behaviour.feature_space import feature_space
 from studio.behaviour.model import BehaviourModel
+from studio.body.model import BodyModel
 from studio.comparison.footage_cache import FootageCache
 from studio.comparison.trials import Trial, kept_as
 from studio.errors import SettingsError
 from studio.evidence.frame_evidence import FrameEvidence
-from studio.likelihood.blobs import BlobProblem
+from studio.likelihood.blobs import FLOOR, BlobProblem, ExpectedBlobs
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.likelihood.problem import FittedToPoses, FrameLikelihood, QualityMeasured
 from studio.progress import report
@@ -32,6 +33,7 @@ from studio.settings import RunSettings, changed_settings, default_settings
 from studio.trackers.guided_particles import spread_over_clusters
 from studio.trackers.loss_detection import Onlooker
 from studio.trackers.tracker import FilterState, FrameResult, LayerRecord, start_of
+from studio.volume.relative_entropy import DivergenceOfPoses
 
 # The frames that trials weigh, prepared once for all trials of a process that use the same ones.
 # Two ways: as in a run, where blobs are fitted from where the tracker expects the body; and with blobs that are
@@ -58,6 +60,41 @@ class Known:
         return self.informed.feasible(poses, limbs_apart)
 
 
+HIDDEN_SIDE, SPELL, NOISE_MM = "left", 30, 20.0
+"""Of occluded evidence: the blobs of this side's arm and leg are missing in every other second (30 frames), and the
+middle of every blob is off by Gaussian noise of so many mm in each direction.
+"""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Occluded(Known):
+    """A frame whose evidence is occluded and noisy. seen : of the blobs that are there."""
+
+    seen: DivergenceOfPoses
+    sharpness: float
+
+    def weigh(self, poses: Array, stage: int = 0) -> Array:
+        """(N, D) poses to (N,) log-weights by the blobs that are there, at any stage."""
+        del stage
+        return -self.sharpness * np.log(np.maximum(self.seen(poses), FLOOR))
+
+
+def occluded(body: BodyModel, frame: int, informed: FrameLikelihood) -> Known:
+    """The frame with occluded evidence, the same for every tracker and seed; as it is where nothing was seen."""
+    if not isinstance(informed, ExpectedBlobs) or informed.fitted is None:
+        return Known(informed)
+    image, limbs = informed.fitted.mixture, informed.model.limb
+    noise = np.random.default_rng((NOISE_KEY, frame)).normal(0.0, NOISE_MM, image.means.shape)
+    hidden = [body.drawn[int(limb)].side == HIDDEN_SIDE and (frame // SPELL) % 2 == 1 for limb in limbs]
+    there = np.flatnonzero(~np.array(hidden))
+    moved = dataclasses.replace(image, means=image.means + noise)
+    seen = DivergenceOfPoses.against(body, informed.model, moved, there)
+    return Occluded(informed, seen, informed.weigher.settings.blob_sharpness)
+
+
+NOISE_KEY = 0xB10B
+
+
 def problems(
     cache: FootageCache, session: Session, settings: RunSettings, last: int
 ) -> Callable[[int], FrameLikelihood]:
@@ -79,12 +116,12 @@ def problems(
 
 
 def known_problems(
-    cache: FootageCache, session: Session, settings: RunSettings, true_poses: Array
+    cache: FootageCache, session: Session, settings: RunSettings, true_poses: Array, covered: bool = False
 ) -> Callable[[int], FrameLikelihood]:
-    """Frame number to problem, each given the true pose (F, D) as the expected one. Raises SettingsError for a
-    weighting that does not use expected poses.
+    """Frame number to problem, each given the true pose (F, D) as the expected one. covered : with occluded evidence.
+    Raises SettingsError for a weighting that does not use expected poses.
     """
-    last = len(true_poses)
+    last, body = len(true_poses), session.body()
 
     def informed() -> Sequence[FrameLikelihood]:
         memory: Mapping[str, Array] = {}
@@ -99,12 +136,15 @@ def known_problems(
                 )
             expecting = problem.expecting(pose[None], memory)
             memory = cast("FittedToPoses", expecting).remembered(pose)
-            found.append(Known(expecting))
+            found.append(occluded(body, frame, expecting) if covered else Known(expecting))
         return found
 
-    key = ("known", session.path, settings.weighting, settings.evidence, last)
+    key = ("known", session.path, settings.weighting, settings.evidence, last, covered)
     kept = cache.prepared(key, informed)
     return lambda frame: kept[frame]
+
+
+LATER = ("recovers", "covered")
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +153,8 @@ class Follow:
 
     footage : a recipe's name. last : frames from the first, which begins at the true pose. changes : knobs by flat
     name. from_truth : blobs are fitted from the true pose in every frame. training : of the behaviour
-    model, None without one. recovers : by the paper's own recovery (`Recovering`).
+    model, None without one. recovers : by the paper's own recovery (`Recovering`). covered : by occluded evidence
+    (`occluded`), with blobs fitted from the true pose.
     """
 
     footage: str
@@ -125,10 +166,11 @@ class Follow:
     from_truth: bool = False
     training: Training | None = None
     recovers: bool = False
+    covered: bool = False
 
     def plain(self) -> dict[str, Any]:
-        """As a trial's arguments; `recovers` is left out where it is not, so that stored outcomes stay valid."""
-        return {name: value for name, value in asdict(self).items() if value or name != "recovers"}
+        """As a trial's arguments; the last two are left out where they are not, so that stored outcomes stay valid."""
+        return {name: value for name, value in asdict(self).items() if value or name not in LATER}
 
     @classmethod
     def of_plain(cls, arguments: Mapping[str, Any]) -> "Follow":
@@ -146,8 +188,8 @@ class Follow:
 class Followed:
     """The errors of a run. Of each frame: angle_deg, limb_deg, position_mm : RMS over joint angles, limbs' directions
     and markers; lost : a marker is off by more than 150 mm; free : share of the particles that no model moved, empty
-    where none guides them; resets : the automaton was reset, empty where there is no recovery. mean_mm : mean marker
-    error. evaluations : of a frame. milliseconds : of a frame's search.
+    where none guides them; resets : the automaton was reset, empty where there is no recovery; centre_mm : error of the
+    markers' middle. mean_mm : mean marker error. evaluations : of a frame. milliseconds : of a frame's search.
     """
 
     angle_deg: list[float]
@@ -159,6 +201,17 @@ class Followed:
     evaluations: int
     milliseconds: float
     resets: list[bool] = field(default_factory=list[bool])
+    centre_mm: list[float] = field(default_factory=list[float])
+
+    @property
+    def centre_rms(self) -> float:
+        """RMS over frames of the error of the body's middle, mm."""
+        return _rms(self.centre_mm)
+
+    @property
+    def shape_rms(self) -> float:
+        """RMS over frames and markers once the body's middle is put in its place, mm."""
+        return float(np.sqrt(max(self.position_rms**2 - self.centre_rms**2, 0.0)))
 
     @property
     def angle_rms(self) -> float:
@@ -288,7 +341,7 @@ def run_of(
     settings, body, fps = wanted.settings(), session.body(), session.manifest.fps
     problem_of = problems(cache, session, settings, wanted.last)
     if wanted.from_truth:
-        problem_of = known_problems(cache, session, settings, truth.poses)
+        problem_of = known_problems(cache, session, settings, truth.poses, wanted.covered)
     free: list[float] = []
 
     def note(record: LayerRecord) -> None:
@@ -348,6 +401,7 @@ def followed(session: Session, truth: TrueMotion, way: FollowedRun) -> Followed:
         way.evaluations,
         round(1000.0 * way.seconds / max(1, len(way.poses) - 1), 3),
         way.resets,
+        _rounded(found.centre_mm),
     )
 
 

@@ -44,7 +44,8 @@ class TrueMotion:
 @dataclass(frozen=True, slots=True, eq=False)
 class JointErrors:
     """Of each frame (F,). angle_deg : RMS over the joint angles (all but the root's), wrapped. limb_deg : RMS over the
-    limbs of the angle between found and true axis. position_mm : RMS over the markers. mean_mm : their mean. lost :
+    limbs of the angle between found and true axis. position_mm : RMS over the markers. mean_mm : their mean.
+    centre_mm : the error of the markers' middle; position² - centre² is what is left with the body in its place. lost :
     whether any marker is off by more than LOST_MM.
     """
 
@@ -52,6 +53,7 @@ class JointErrors:
     limb_deg: Array
     position_mm: Array
     mean_mm: Array
+    centre_mm: Array
     lost: NDArray[np.bool_]
 
 
@@ -104,11 +106,13 @@ def joint_errors(body: BodyModel, columns: NDArray[np.int64], poses: Array, trut
     axes, true_axes = (limb_frames(body, each)[..., 2] for each in (poses, true))
     turned = np.degrees(np.arccos(np.clip((axes * true_axes).sum(axis=2), -1.0, 1.0)))
     found = marker_points(body, poses)[:, truth.markers]
-    apart = np.linalg.norm(found - truth.points[: len(poses)], axis=2)
+    away_mm = found - truth.points[: len(poses)]
+    apart = np.linalg.norm(away_mm, axis=2)
     return JointErrors(
         np.sqrt((away**2).mean(axis=1)),
         np.sqrt((turned**2).mean(axis=1)),
         np.sqrt((apart**2).mean(axis=1)),
         apart.mean(axis=1),
+        np.linalg.norm(away_mm.mean(axis=1), axis=1),
         (apart > LOST_MM).any(axis=1),
     )

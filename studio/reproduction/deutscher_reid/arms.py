@@ -4,7 +4,7 @@ Only the joints' ranges are known before the search (Fig. 12a: the first cloud i
 expected movement is the whole range and σ0 of Eq. 13 is half of it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from studio.body.model import BodyModel, kinematic_tables
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.geometry.camera import Camera
 from studio.likelihood.catalogue import WEIGHTINGS
+from studio.runs.hierarchy import hierarchy_of
 from studio.runs.search_space import search_space
 from studio.synthesis.arm_footage import arm_outlines, filled
 from studio.trackers.catalogue import TRACKERS
@@ -94,6 +95,65 @@ def true_pose(space: SearchSpace, seed: int) -> Array:
     middle, half = (space.lower + space.upper) / 2.0, (space.upper - space.lower) / 2.0
     draws = np.random.default_rng((seed, 1)).uniform(-TRUE_PART, TRUE_PART, len(middle))
     return middle + draws * half
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AbsoluteAngles:
+    """Poses whose angles are measured from the picture's axis instead of from the link before, as functions of a frame.
+
+    before : (D,) the parameter of the link before, -1 at the root.
+    """
+
+    problem: FrameLikelihood
+    before: NDArray[np.int64]
+
+    def relative(self, poses: Array) -> Array:
+        """(N, D) absolute angles to the body's own."""
+        return poses - np.where(self.before >= 0, poses[:, self.before], 0.0)
+
+    def weigh(self, poses: Array, stage: int = 0) -> Array:
+        """(N, D) poses to (N,) log-weights."""
+        return self.problem.weigh(self.relative(poses), stage)
+
+    def fitness(self, poses: Array, stage: int = 0) -> Array:
+        """(N, D) poses to (N,) log-weights."""
+        return self.problem.fitness(self.relative(poses), stage)
+
+    def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
+        """(N, D) poses to (N,) whether the body can take them."""
+        return self.problem.feasible(self.relative(poses), limbs_apart)
+
+
+def links_before(body: BodyModel) -> NDArray[np.int64]:
+    """(D,) the parameter of the link before each parameter's, -1 at the root: of planar arms, link after link."""
+    depth = hierarchy_of(body).depth
+    # Ranks grow along an arm, to 2 at most, and begin anew with the next arm.
+    follows = np.concatenate([[False], np.diff(depth) >= 0])
+    return np.where(follows, np.arange(len(depth)) - 1, -1)
+
+
+def absolute(values: Array, before: NDArray[np.int64]) -> Array:
+    """(D,) values of the links added up from the root outwards."""
+    found = np.array(values, dtype=np.float64)
+    for index, parent in enumerate(before):
+        if parent >= 0:
+            found[index] += found[parent]
+    return found
+
+
+def localise_absolute(scene: TemplateArm, seed: int, **changes: Any) -> Array:  # noqa: ANN401
+    """(D,) the pose found by the search of `localise` over absolute angles, as the body's own angles. Limits are the
+    sums of the joints', and σ0 is half of each range as there.
+    """
+    before, tracker = links_before(scene.body), TRACKERS["annealed"]
+    lower, upper = (absolute(ends, before) for ends in (scene.space.lower, scene.space.upper))
+    space = replace(scene.space, lower=lower, upper=upper, sigma=(upper - lower) / 2.0)
+    problem = AbsoluteAngles(scene.observed(true_pose(scene.space, seed)), before)
+    settings = tracker.settings_type(**changes)
+    result = search_frame(
+        tracker, problem, FilterState(None), space, seed=seed, frame=0, settings_source=lambda: (1, settings)
+    )
+    return problem.relative(result.estimate.pose[None])[0]
 
 
 def localise(scene: TemplateArm, seed: int, **changes: Any) -> tuple[FrameResult, list[LayerRecord], Array]:  # noqa: ANN401

@@ -28,7 +28,13 @@ from studio.comparison.footage_cache import FootageCache
 from studio.comparison.statistics import number
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.reproduction.claims import EQUAL, LOWER, ratio, share
-from studio.reproduction.deutscher_reid.arms import TemplateArm, localise, template_arm
+from studio.reproduction.deutscher_reid.arms import (
+    TemplateArm,
+    localise,
+    localise_absolute,
+    template_arm,
+    true_pose,
+)
 from studio.reproduction.deutscher_reid.setting import EQ18_WORDS, SOURCE
 from studio.reproduction.drawing import (
     bar_chart,
@@ -52,12 +58,19 @@ SETTINGS: Mapping[str, Any] = {"layers": 6, "particles": 1000, "survival": 0.1, 
 NEVER = f"Layers are counted from 1; {SETTINGS['layers'] + 1} stands for a joint that does not fall."
 WITH, WITHOUT, WITH_LOUD = "adaptive (Eq. 18)", "planned (Eq. 13)", "planned with five times the noise"
 CROSSING = "adaptive with crossover"
-KINDS: Mapping[str, Mapping[str, Any]] = {
+KINDS: dict[str, Mapping[str, Any]] = {
     WITH: {"adaptive_diffusion": True},
     WITHOUT: {"adaptive_diffusion": False},
     # Noise that outweighs selection in every joint.
     WITH_LOUD: {"adaptive_diffusion": False, "diffusion_scale": 5.0, "constraints": "ignore"},
     CROSSING: {"adaptive_diffusion": True, "crossover": 1.0, "crossover_by": "parameters"},
+}
+MILDER = (0.3, 0.4, 0.5)
+"""Survival rates beside 0.1, of Fig. 14: 0.5 is that of section 3.1."""
+KINDS |= {
+    f"{kind}, α {survival:g}": {**KINDS[kind], "survival": survival}
+    for survival in MILDER
+    for kind in (WITH, WITHOUT)
 }
 
 
@@ -121,7 +134,8 @@ def reductions(outcomes: Sequence[Outcome]) -> dict[str, Reduction]:
     """By kind, in the order of the trials."""
     found: dict[str, list[Mapping[str, Any]]] = {}
     for outcome in outcomes:
-        found.setdefault(outcome.trial.label.partition(", ")[0], []).append(outcome.measured)
+        kind = outcome.trial.label.partition(f", {outcome.trial.arguments['body']}")[0]
+        found.setdefault(kind, []).append(outcome.measured)
     return {name: reduction(entries) for name, entries in found.items()}
 
 
@@ -220,6 +234,21 @@ def fig_13(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield SETTINGS
 
 
+def slopes(shares: Array) -> Array:
+    """(S, D) how fast each parameter's variance falls: the slope of its log10 over the layers (S, M, D) by least
+    squares, powers of ten a layer.
+    """
+    logs = np.log10(np.maximum(shares, 1e-12))
+    layers = np.arange(shares.shape[1]) - (shares.shape[1] - 1) / 2.0
+    return np.einsum("m,smd->sd", layers, logs) / float((layers**2).sum())
+
+
+def _slope_spread(found: Reduction) -> Array:
+    """(S,) the steepest parameter's slope over the flattest's: 1 where all fall evenly."""
+    fall = -slopes(found.shares)
+    return fall.max(axis=1) / np.maximum(fall.min(axis=1), 1e-3)
+
+
 def fig_14(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     """With planned noise all joints fall together, or the reason why not: even noise narrows the order without removing
     it, and noise that outweighs selection in every joint loses the arm.
@@ -231,6 +260,18 @@ def fig_14(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     for kind, found in (("planned", planned), ("adaptive", adaptive)):
         name = f"layers between the first and the last joint, {kind} noise"
         yield number(name, np.ptp(found.crossings, axis=1), "layers")
+    for survival in (SETTINGS["survival"], *MILDER):
+        words = "" if survival == SETTINGS["survival"] else f", α {survival:g}"
+        steep = {kind: _slope_spread(groups[f"{kind}{words}"]) for kind in (WITHOUT, WITH)}
+        for kind, values in steep.items():
+            yield number(
+                f"steepest over flattest fall, {kind}, α {survival:g}", np.minimum(values, 100.0), "×"
+            )
+        yield share(
+            f"planned noise falls more evenly than adaptive, α {survival:g}",
+            steep[WITHOUT] < steep[WITH],
+            None,
+        )
     yield from _crossing_numbers(planned, CHAIN_JOINTS)
     yield _error("mean error with planned noise", planned)
     yield _error("mean error with adaptive noise", adaptive)
@@ -247,6 +288,9 @@ def fig_14(outcomes: Sequence[Outcome]) -> Iterator[Part]:
         )
     yield _reduction_chart("Variance reduction with planned noise", planned, CHAIN_JOINTS)
     yield _reduction_chart("The same with five times the noise and no limits", loud, CHAIN_JOINTS)
+    for kind in (WITHOUT, WITH):
+        name = f"{kind}, α {MILDER[-1]:g}"
+        yield _reduction_chart(f"Variance reduction, {name}", groups[name], CHAIN_JOINTS)
     yield _crossing_table(groups, CHAIN_JOINTS)
     yield SETTINGS
 
@@ -261,7 +305,15 @@ CUTS: Mapping[str, Mapping[str, Any]] = {
     "cut by parameters, planned noise": {"crossover_by": "parameters", "adaptive_diffusion": False},
     "cut by parameters, adaptive noise": {"crossover_by": "parameters", "adaptive_diffusion": True},
     "cut by limbs, adaptive noise": {"crossover_by": "limbs", "adaptive_diffusion": True},
+    "absolute angles, cut by parameters, adaptive noise": {
+        "crossover_by": "parameters",
+        "adaptive_diffusion": True,
+    },
 }
+ABSOLUTE = "absolute angles"
+"""Of a cut: every link's angle is measured from the picture's axis, so that what is exchanged does not turn the links
+beyond it; the paper does not say how its angles are measured.
+"""
 # On a chain, which is one limb, cutting by limbs exchanges nothing: not a trial.
 PAIRS = tuple(
     (body, cut) for cut in CUTS for body in (CHAIN, BRANCHED) if (body, "limbs" in cut) != (CHAIN, True)
@@ -293,8 +345,12 @@ def measure_fig_16(arguments: Mapping[str, Any], cache: FootageCache) -> dict[st
         found: list[float] = []
         for picture in arguments["pictures"]:
             knobs = {**arguments["knobs"], "crossover": float(share_crossed)}
-            result, _, truth = localise(arm, int(picture), **knobs)
-            found.append(float(-arm.observed(truth).weigh(result.estimate.pose[None])[0]))
+            if arguments["cut"].startswith(ABSOLUTE):
+                pose = localise_absolute(arm, int(picture), **knobs)
+            else:
+                pose = localise(arm, int(picture), **knobs)[0].estimate.pose
+            observed = arm.observed(true_pose(arm.space, int(picture)))
+            found.append(float(-observed.weigh(pose[None])[0]))
         ssd.append(float(np.mean(found)))
     return {"ssd": ssd}
 
@@ -311,11 +367,12 @@ def fig_16(outcomes: Sequence[Outcome]) -> Iterator[Part]:
         groups.setdefault(name, []).append(outcome.measured["ssd"])
     ssd = {pair: np.array(groups[", ".join(pair)]) for pair in PAIRS}
     for (body, cut), rows in ssd.items():
-        claim = "" if "limbs" in cut else EQUAL if body == CHAIN else LOWER
+        claim = "" if "limbs" in cut or ABSOLUTE in cut else EQUAL if body == CHAIN else LOWER
         yield ratio(_ratio_name(body, cut), rows[:, -1].tolist(), rows[:, 0].tolist(), claim)
     yield (
         "The claims: no harm on the chain and a gain on the branched arms, cut by parameters as Eq. 19 has it, with "
-        f"either diffusion (the paper does not say which). {EQ18_WORDS}"
+        "either diffusion (the paper does not say which). Absolute angles, where a cut does not turn the links beyond "
+        f"it, stand beside them. {EQ18_WORDS}"
     )
     heads = tuple(f"{crossed:.0%} crossed" for crossed in SHARES)
     means = tuple((*pair, *(f"{value:.5f}" for value in rows.mean(axis=0))) for pair, rows in ssd.items())
@@ -446,7 +503,11 @@ EXPERIMENTS = (
         source=f"{SOURCE}, Fig. 14",
         claim="With the conventional filter all variances fall evenly over six layers; there is little evidence of "
         "hierarchical partitioning.",
-        trials=trials_of(CHAIN, WITH, WITHOUT, WITH_LOUD),
+        trials=trials_of(
+            CHAIN,
+            *(WITH, WITHOUT, WITH_LOUD),
+            *(f"{kind}, α {survival:g}" for survival in MILDER for kind in (WITH, WITHOUT)),
+        ),
         measure=measure,
         shown=fig_14,
     ),

@@ -21,6 +21,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from scipy.stats import chi2
 
 from studio.arrays import Array
 from studio.comparison.findings import Chart, Series, Table
@@ -140,12 +141,39 @@ def inside(ranks: Array) -> bool:
     return bool(np.all(np.abs(distribution(ranks) - np.array(LEVELS)) <= band(len(ranks))))
 
 
+def factor(squares: Array) -> float:
+    """What spreads must be multiplied by so that 95 % of the errors lie within 1.96 of them. squares : (K, D) squared
+    errors in variances.
+    """
+    return math.sqrt(float(np.quantile(squares, 1.0 - CONFIDENCE)) / NORMAL_95)
+
+
+NORMAL_95 = float(chi2.ppf(1.0 - CONFIDENCE, 1))
+
+
+def _calibrated(name: str, clips: Mapping[str, Sequence[Mapping[str, Any]]]) -> Iterator[Part]:
+    """Errors outside the 95 % of spreads that are calibrated on the other clips, for each clip."""
+    squares = {
+        clip: [np.array(one["layers"][LAST]["squares"]) for one in found] for clip, found in clips.items()
+    }
+    for clip, own in squares.items():
+        others = [each for other, found in squares.items() if other != clip for each in found]
+        if not others:
+            return
+        times = factor(np.concatenate(others))
+        outside = [100.0 * float((each > times**2 * NORMAL_95).mean()) for each in own]
+        title = f"{name}, calibrated by the other clips (× {times:.2g}): errors outside 95 %, {clip}"
+        yield number(title, outside, "%")
+
+
 def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     """Of each tracker's last layer: whether ranks are uniform, error in spreads; by layer, charts and a table."""
     by_tracker: dict[str, list[Mapping[str, Any]]] = {}
+    by_clip: dict[str, dict[str, list[Mapping[str, Any]]]] = {}
     for outcome in outcomes:
-        name = group_of(outcome.trial).rpartition(" on ")[0]
+        name, _, clip = group_of(outcome.trial).rpartition(" on ")
         by_tracker.setdefault(name, []).append(outcome.measured)
+        by_clip.setdefault(name, {}).setdefault(clip, []).append(outcome.measured)
     rows: list[tuple[Any, ...]] = []
     for name, found in by_tracker.items():
         layers = list(found[0]["layers"])
@@ -172,6 +200,7 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
                     round(particles, 1),
                 )
             )
+        yield from _calibrated(name, by_clip[name])
         frames = len(found[0]["layers"][layers[0]]["ranks"])
         half = band(frames)
         for sign, word in ((-1.0, "lower"), (1.0, "upper")):
@@ -180,7 +209,9 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
         yield Chart(f"Rank of the truth: {name}", "lines", "rank", "share of the ranks", tuple(series))
     yield (
         "Of a posterior the curves lie in the band, error over spread is 1 and the truth lies outside the middle 95 % "
-        "in 5 % of the cases. Error over spread: root mean square over frames, the median over parameters."
+        "in 5 % of the cases. Error over spread: root mean square over frames, the median over parameters. Calibrated: "
+        "spreads multiplied by what makes them right in 95 % of the cases of the other clips; one that holds where "
+        "it was not chosen would be an uncertainty to show."
     )
     heads = (
         "tracker",
