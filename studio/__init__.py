@@ -43,6 +43,9 @@ if TYPE_CHECKING:
     from studio.operations.person import fit_subject as fit_subject
     from studio.operations.person import initialise as initialise
     from studio.operations.person import subject as subject
+    from studio.operations.remote import batch as batch
+    from studio.operations.remote import download as download
+    from studio.operations.remote import upload as upload
     from studio.operations.results import check as check
     from studio.operations.results import evaluate as evaluate
     from studio.operations.results import export_run as export_run
@@ -79,6 +82,7 @@ _PLACES = {
     "operations.tracking": ("correct", "go_on", "live", "new_run", "replay", "resume_live", "track",),
     "operations.results": ("check", "evaluate", "export_run", "list_tracks", "markers", "read_track", "refine",
                            "smooth", "verify",),
+    "operations.remote": ("batch", "download", "upload",),
     "operations.sharing": ("share",),
     "operations.behaviours": ("learn", "models",),
     "operations.comparing": ("compare", "sweep",),

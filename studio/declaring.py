@@ -64,9 +64,13 @@ class Web:
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """The parameter is what the verb is about: "session" or "run"; the addresses of HTTP name it, not the body."""
+    """The parameter is what the verb is about: "session" or "run"; the addresses of HTTP name it, not the body.
+
+    remote : a session may lie in an object store.
+    """
 
     kind: str
+    remote: bool = False
 
 
 @dataclass(frozen=True, slots=True)

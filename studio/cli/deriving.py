@@ -7,10 +7,12 @@ from typing import Any, Literal, get_args, get_origin
 
 import click
 
-from studio.cli.output import MemberChoice, command, shown_progress
+from studio.cli.output import MemberChoice, command, progress, shown_progress
 from studio.cli.reading import camera_numbers, chosen_knobs, frame_numbers, measured, place, places
-from studio.declaring import PROGRESS, REQUIRED, Knobs, OneOf, Parameter, alternatives, declared
+from studio.declaring import PROGRESS, REQUIRED, Knobs, OneOf, Parameter, Target, alternatives, declared
 from studio.knobs import Knob, allowed
+from studio.sessions.object_stores import is_address
+from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
 
 READERS: dict[Any, tuple[str, Callable[[Sequence[str], str], object]]] = {
@@ -155,12 +157,21 @@ def _knob_options(entry: Parameter, knobs: Knobs) -> list[click.Parameter]:
     return options
 
 
+def _session(place: str, entry: Parameter) -> Session:
+    """The session that is meant. Raises StudioError."""
+    mark = entry.mark(Target)
+    if mark is None or not mark.remote or not is_address(place):
+        return Workspace().resolve(place)
+    with progress("bringing") as report:
+        return Workspace().resolve(place, remote=True, progress=report)
+
+
 def _given(entry: Parameter, options: Mapping[str, Any]) -> dict[str, object]:
     """What was given for a parameter, {} for nothing. Raises StudioError for what cannot be read."""
     if entry.terminal.left_out:
         return {}
     if entry.target:
-        session = Workspace().resolve(options["session"])
+        session = _session(options["session"], entry)
         return {entry.name: session.run(options["run"]) if entry.target == "run" else session}
     knobs = entry.mark(Knobs)
     if knobs is not None:

@@ -10,6 +10,8 @@ from studio.operations.gallery import Gallery, gallery
 from studio.operations.opening import bodies, way
 from studio.operations.own_bodies import EditedBody, edit_body
 from studio.runs.workflow import Workflow
+from studio.sessions.object_stores import is_address
+from studio.sessions.remote_sessions import sessions_at
 from studio.sessions.stored_run import damage_in_words
 from studio.sessions.workspace import Workspace
 
@@ -79,7 +81,9 @@ def edit_body_command(call: Call) -> dict[str, object]:
 @click.argument("session", required=False)
 @command
 def runs_command(session: str | None) -> dict[str, object]:
-    """List the runs of a session, or of all sessions in the workspace."""
+    """List the runs of a session, or of all sessions in the workspace; at an address those of a store."""
+    if session and is_address(session):
+        return _runs_at(session)
     workspace = Workspace()
     if session:
         opened = workspace.resolve(session)
@@ -108,6 +112,19 @@ def runs_command(session: str | None) -> dict[str, object]:
         for entry, (_, run) in zip(entries, found, strict=True)
     ]
     return {"workspace": str(workspace.root), "runs": entries, "text": "\n".join(lines) or "No runs yet."}
+
+
+def _runs_at(address: str) -> dict[str, object]:
+    found = sessions_at(address)
+    lines = [
+        f"{one.name:18} {one.bytes / 1e6:10.1f} MB  {', '.join(one.runs) if one.whole else 'half written'}"
+        for one in found
+    ]
+    return {
+        "address": address,
+        "sessions": [asdict(one) for one in found],
+        "text": "\n".join(lines) or "No sessions there.",
+    }
 
 
 @command_of(way)

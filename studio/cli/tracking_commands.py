@@ -24,6 +24,7 @@ from studio.operations.tracking import (
 )
 from studio.runs.sides import exchanged_sides, in_words
 from studio.sessions.named_rows import poses_csv
+from studio.sessions.remote_sessions import bring_runs
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.trackers.catalogue import TRACKERS
@@ -47,6 +48,7 @@ def track_command(call: Call, frames: str, poses: Path | None, resume: str | Non
     if poses:
         _check_place(poses)
     if resume:
+        bring_runs(session, resume)
         run = session.run(resume)
     else:
         first, last = frame_range(frames)

@@ -19,6 +19,8 @@ from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.pipeline import EvidenceMaker
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
+from studio.sessions.object_stores import below, is_address
+from studio.sessions.remote_sessions import remote_session, work_folder
 from studio.sessions.session import Session
 
 MOST_BYTES = 3_000_000_000
@@ -30,10 +32,16 @@ T = TypeVar("T")
 
 
 class FootageCache:
-    """Sessions of rendered recipes by name, below one folder; close it when done. Not for several threads."""
+    """Sessions of rendered recipes by name, below one place; close it when done. Not for several threads.
 
-    def __init__(self, folder: Path, most_bytes: int = MOST_BYTES) -> None:
-        self.folder = folder
+    place : a folder, or an address of a store, whose sessions are brought once. folder : where what is made of them
+    lies.
+    """
+
+    def __init__(self, place: Path | str, most_bytes: int = MOST_BYTES) -> None:
+        self.place = str(place)
+        self.folder = work_folder(self.place) if is_address(place) else Path(place)
+        self._brought: dict[str, Session] = {}
         self._most, self._bytes = most_bytes, 0
         self._evidence: OrderedDict[Hashable, FrameEvidence] = OrderedDict()
         self._prepared: OrderedDict[Hashable, Any] = OrderedDict()
@@ -41,7 +49,12 @@ class FootageCache:
         self._footage: tuple[Path, Footage, Backgrounds] | None = None
 
     def session(self, name: str) -> Session:
-        """A recipe's session, or any session by the path of its folder. Raises SessionError where there is none."""
+        """A recipe's session, or any by its folder's path or its address. Raises SessionError where there is none."""
+        if is_address(name) or is_address(self.place):
+            address = name if is_address(name) else below(self.place, name)
+            if address not in self._brought:
+                self._brought[address] = remote_session(address)
+            return self._brought[address]
         path = Path(name) if Path(name).is_absolute() else self.folder / name
         if not (path / "session.json").is_file():
             raise SessionError(

@@ -22,8 +22,10 @@ from studio.comparison.sweep import Sweep, sweep_csv, sweep_document
 from studio.comparison.trials import Scale, Trial
 from studio.sessions import atomic_files
 from studio.sessions.manifest import now
+from studio.sessions.object_stores import below, is_address
 from studio.sessions.process_lock import ProcessLock
 from studio.sessions.record_files import RecordFile, renamed
+from studio.sessions.remote_sessions import place_in_words
 from studio.sessions.session import Session
 from studio.typed_decoding import decode_json
 
@@ -87,13 +89,19 @@ class KeptComparison:
         return RECORD.read(self.folder / RECORD_NAME)
 
     def plan(self, session: Session | None = None) -> Plan:
-        """The requested plan; with the present path of the session, if one is given."""
+        """The requested plan; with the present place of the session, if one is given, which is an
+        address where it is a copy of one in a store.
+        """
         plan = self.record().plan
         if plan.behaviour:
             plan = replace(plan, behaviour_path=str((self.folder / BEHAVIOUR_NAME).absolute()))
         if session is None:
             return plan
-        return replace(plan, footage=str(session.path.absolute()), session=session.name)
+        footage = place_in_words(session)
+        if plan.behaviour and is_address(footage) and self.folder.is_relative_to(session.path):
+            place = below(footage, self.folder.parent.name, self.name, BEHAVIOUR_NAME)
+            plan = replace(plan, behaviour_path=place)
+        return replace(plan, footage=footage, session=session.name)
 
     def status(self) -> str:
         """running, done, cancelled, failed, or interrupted (its process ended; it can be resumed)."""

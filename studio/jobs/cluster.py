@@ -1,7 +1,8 @@
 """Functions run on other machines: tasks of Dask.distributed behind `concurrent.futures.Executor`.
 
 A scheduler hands them to its workers, wherever they run. All machines need the same versions, and the folder of what is
-worked at at the same path: arguments and results travel, footage and runs do not.
+worked at at the same path, or the right to use the store where it lies: arguments and results travel, footage and runs
+do not.
 """
 
 import importlib
@@ -31,6 +32,7 @@ from studio.errors import RunError, SessionError, StudioError, WorkCancelledErro
 from studio.jobs.process_executor import ProcessLostError, answered
 from studio.progress import heard_by
 from studio.sessions.atomic_files import PARTIAL_PREFIX
+from studio.sessions.object_stores import Store, is_address
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -49,16 +51,19 @@ SHARE = (
 )
 PATIENCE = 10.0
 """How long a scheduler may take to answer, s."""
-LOOKS_APART = 1.0
-"""Seconds between two looks of a task whether it is still wanted."""
+STORE = "Give all machines the same address of the store (for S3: AWS_ENDPOINT_URL), with a right to read and write."
+LOOKS_APART, REMOTE_LOOKS_APART = 1.0, 5.0
+"""Seconds between two looks of a task whether it is still wanted: at a folder, at a store."""
 COMPUTING = ("numpy", "numba", "scipy", "opencv-python-headless", "distributed")
 """Packages on whose versions results, or what is understood of a message, may depend."""
 
 
 @contextmanager
-def chosen_executor(address: str, folder: Path) -> Generator["ClusterExecutor | None"]:
-    """The executor of a cluster whose workers see `folder`; None for processes of this machine, where neither
-    `address` nor STUDIO_CLUSTER names one. What is not done at the end is cancelled. Raises RunError, SessionError.
+def chosen_executor(address: str, folder: Path | str) -> Generator["ClusterExecutor | None"]:
+    """The executor of a cluster whose workers see `folder`, which may be an address of a store; None for processes of
+    this machine, where neither `address` nor STUDIO_CLUSTER names one. What is not done at the end is cancelled.
+
+    Raises RunError, SessionError.
     """
     address = address or os.environ.get(VARIABLE, "").strip()
     if not address:
@@ -74,16 +79,17 @@ def chosen_executor(address: str, folder: Path) -> Generator["ClusterExecutor | 
 class ClusterExecutor(Executor):
     """The workers of the Dask scheduler at an address. Functions, arguments and results are pickled.
 
-    folder : which all workers have to see. on_report : hears, in another thread, what tasks `progress.report`, values
-    of MessagePack. A task whose worker is lost is given to another, as often as the scheduler allows (Dask's
-    `distributed.scheduler.allowed-failures`, 3). Raises RunError where the package is missing, the scheduler does not
-    answer, or a worker has other versions or does not see the folder; SessionError where nothing can be written there.
+    folder : which all workers have to see, or an address of a store. on_report : hears, in another thread, what tasks
+    `progress.report`, values of MessagePack. A task whose worker is lost is given to another, as often as the scheduler
+    allows (Dask's `distributed.scheduler.allowed-failures`, 3). Raises RunError where the package is missing, the
+    scheduler does not answer, or a worker has other versions or does not see the folder; SessionError where nothing can
+    be written there.
     """
 
     def __init__(
         self,
         address: str,
-        folder: Path,
+        folder: Path | str,
         on_report: Callable[..., None] | None = None,
         patience: float = PATIENCE,
     ) -> None:
@@ -92,11 +98,11 @@ class ClusterExecutor(Executor):
         self._tasks: dict[Future[Any], Any] = {}
         self._closed = False
         self._client = _connected(address, patience)
-        self._marker: Path | None = None
+        self._marker: _Marker | None = None
         try:
             self._marker = _marked(folder)
             topic = f"studio-{uuid4().hex}" if on_report else ""
-            self._needs = _Needs(_software(), str(folder.absolute()), self._marker.name, topic)
+            self._needs = _Needs(_software(), self._marker, topic)
             if on_report:
                 self._client.subscribe_topic(topic, partial(_heard, on_report))
             self._check_machines()
@@ -159,8 +165,8 @@ class ClusterExecutor(Executor):
     def _withdraw(self) -> None:
         """Tell tasks that run that they are not wanted any more."""
         if self._marker is not None:
-            with suppress(OSError):
-                self._marker.unlink(missing_ok=True)
+            with suppress(OSError, StudioError):
+                self._marker.remove()
 
     def _forget(self, future: Future[Any]) -> None:
         with self._changed:
@@ -212,14 +218,34 @@ class ClusterExecutor(Executor):
 
 
 @dataclass(frozen=True, slots=True)
+class _Marker:
+    """A file that is there as long as the executor wants its results. folder : an absolute path, or an address."""
+
+    folder: str
+    name: str
+
+    def is_there(self) -> bool:
+        """Whether this machine sees it. Raises SessionError where a store refuses."""
+        if is_address(self.folder):
+            return Store(self.folder).has(self.name)
+        return (Path(self.folder) / self.name).is_file()
+
+    def remove(self) -> None:
+        """Take it away."""
+        if is_address(self.folder):
+            Store(self.folder).remove([self.name])
+        else:
+            (Path(self.folder) / self.name).unlink(missing_ok=True)
+
+
+@dataclass(frozen=True, slots=True)
 class _Needs:
-    """What a worker must have. software : versions by name. folder : as an absolute path. marker : name of the file in
-    it that is there as long as the executor wants its results. topic : under which reports are sent, "" for none.
+    """What a worker must have. software : versions by name. marker : which it must see. topic : under which reports are
+    sent, "" for none.
     """
 
     software: Mapping[str, str]
-    folder: str
-    marker: str
+    marker: _Marker
     topic: str
 
 
@@ -240,8 +266,12 @@ def _dask() -> Any:  # noqa: ANN401 - loaded only where it is used
     return importlib.import_module("distributed")
 
 
-def _marked(folder: Path) -> Path:
-    """A new file by which workers know the folder."""
+def _marked(folder: Path | str) -> _Marker:
+    """A new file by which workers know the folder or store."""
+    if is_address(folder):
+        marker = _Marker(str(folder), f"{PARTIAL_PREFIX}cluster-{uuid4().hex}")
+        Store(marker.folder).write(marker.name, b"studio")
+        return marker
     try:
         handle, name = tempfile.mkstemp(prefix=f"{PARTIAL_PREFIX}cluster-", dir=folder)
     except OSError as problem:
@@ -250,7 +280,7 @@ def _marked(folder: Path) -> Path:
             "Give yourself the right to write there, or work without a cluster.",
         ) from None
     os.close(handle)
-    return Path(name)
+    return _Marker(str(Path(folder).absolute()), Path(name).name)
 
 
 @cache
@@ -299,23 +329,29 @@ def _check_worker(needs: _Needs) -> None:
     """Raises RunError where this worker has other versions or does not see the folder."""
     who = f"A worker on {socket.gethostname()}"
     _check_software(needs, who)
-    if not (Path(needs.folder) / needs.marker).is_file():
-        raise RunError(f"{who} does not see the folder '{needs.folder}' as this machine does.", SHARE)
+    folder = needs.marker.folder
+    try:
+        seen = needs.marker.is_there()
+    except StudioError as problem:
+        raise RunError(f"{who} cannot use the store: {problem.message}", problem.hint) from None
+    if not seen:
+        hint = STORE if is_address(folder) else SHARE
+        raise RunError(f"{who} does not see the folder '{folder}' as this machine does.", hint)
 
 
 def _run_there(content: bytes, needs: _Needs) -> bytes:
     """Run a task on a worker. Raises RunError where that is of no use."""
     _check_worker(needs)
-    worker, marker = _dask().get_worker(), Path(needs.folder) / needs.marker
-    looked = time.monotonic()
+    worker, looked = _dask().get_worker(), time.monotonic()
+    apart = REMOTE_LOOKS_APART if is_address(needs.marker.folder) else LOOKS_APART
 
     def report(*words: object) -> None:
         nonlocal looked
         if needs.topic:
             worker.log_event(needs.topic, words)
-        if time.monotonic() - looked > LOOKS_APART:
+        if time.monotonic() - looked > apart:
             looked = time.monotonic()
-            if not marker.exists():
+            if not needs.marker.is_there():
                 raise WorkCancelledError("Nobody waits for it any more.")
 
     with heard_by(report):

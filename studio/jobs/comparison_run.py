@@ -6,7 +6,6 @@ from collections.abc import Callable, Generator
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 
 from studio.comparison.kept_comparison import KeptComparison, trial_key
 from studio.comparison.kept_trials import KeptOutcome, measured_by, plain
@@ -19,6 +18,7 @@ from studio.jobs.swept_runs import measure_run
 from studio.jobs.trials import TrialResult, run_jobs
 from studio.progress import Progress
 from studio.sessions.manifest import now
+from studio.sessions.object_stores import above
 from studio.sessions.session import Session
 
 
@@ -120,8 +120,7 @@ def _measured(
         found[job.key] = Outcome(work.trials[job.key], result.measured)
         report(job.label, len(found), len(work.trials))
 
-    footage = Path(work.plan.footage).parent
-    run_jobs(jobs, footage, on_result, processes, executor=executor, checkpoint=checkpoint)
+    run_jobs(jobs, above(work.plan.footage), on_result, processes, executor=executor, checkpoint=checkpoint)
     return work.plan, [found[key] for key in work.trials]
 
 

@@ -1,4 +1,4 @@
-"""The trial of a sweep: a run of the session, tracked to its end and measured."""
+"""The trial of a sweep or a batch: a run of the session, tracked to its end and measured."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -9,23 +9,46 @@ from studio.comparison.sweep import measured_run
 from studio.comparison.trials import kept_as
 from studio.jobs.batch import track_to_end
 from studio.progress import report
-from studio.runs.new_run import prepare_run
+from studio.runs.new_run import checked_frames, prepare_run
 from studio.runs.session_settings import session_settings
 from studio.sessions.names import free_name
+from studio.sessions.remote_sessions import bring_runs, put_run, remote_runs
 from studio.sessions.run_record import RunRecord
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.settings import values
+from studio.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, values
 
 
 @kept_as("swept_runs.measure_run")
 def measure_run(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
-    """Track a run and measure it; the fields of `Swept`. One of the same name that was begun so is gone on with."""
+    """Track a run and measure it; the fields of `Swept`. One of the same name that was begun so is gone on with; of a
+    session in a store also one that another machine put there, and what is tracked is put there.
+    """
     session = cache.session(arguments["footage"])
+    bring_runs(session, arguments["run"])
     run = _begun(session, arguments) or _new(session, arguments)
     if run.summary(blobs=False).done < run.record.frame_count:
         track_to_end(session, run, report)
+    if run.name not in remote_runs(session):
+        put_run(session, run)
     return asdict(measured_run(session, run))
+
+
+@kept_as("swept_runs.measure_run_of_batch")
+def measure_run_of_batch(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
+    """The same of a session that whoever asks has not opened: what is left out is the session's own."""
+    session = cache.session(arguments["footage"])
+    about, first = session.manifest, arguments["first"]
+    first, last = checked_frames(
+        session, session.start_pose_frame() if first is None else first, arguments["last"]
+    )
+    filled = {
+        "first": first,
+        "last": last,
+        "tracker": arguments["tracker"] or about.tracker or DEFAULT_TRACKER,
+        "weighting": arguments["weighting"] or about.weighting or DEFAULT_WEIGHTING,
+    }
+    return measure_run({**arguments, **filled}, cache)
 
 
 def _begun(session: Session, arguments: Mapping[str, Any]) -> StoredRun | None:

@@ -14,6 +14,7 @@ from studio.comparison.kept_trials import plain
 from studio.comparison.trials import Plain, TrialJob, failure_in_words
 from studio.errors import StudioError
 from studio.jobs.process_executor import ONE_CORE, ProcessExecutor, ProcessLostError, cores
+from studio.sessions.remote_sessions import remote_file
 
 LOSSES_ALLOWED = 1
 """How often a trial is tried again whose process, or machine, was lost."""
@@ -36,7 +37,7 @@ OnResult = Callable[[TrialJob, TrialResult], None]
 
 def run_jobs(
     jobs: Sequence[TrialJob],
-    footage_folder: Path,
+    footage_folder: Path | str,
     on_result: OnResult,
     processes: int | None = None,
     *,
@@ -45,6 +46,7 @@ def run_jobs(
 ) -> None:
     """Run all jobs, those that must be alone at the end, one by one.
 
+    footage_folder : see `FootageCache`; an address is one that all that run jobs can use.
     on_result : called here, as each is done. processes : at once, None for one a core. executor : runs them instead of
     processes of this call's own (threads, or other machines': `cluster.ClusterExecutor`); it is left open.
     checkpoint : called here, several times a second. Whatever is raised here (KeyboardInterrupt, or what `on_result`
@@ -76,12 +78,15 @@ def run_trial(job: TrialJob, footage_folder: str, at_once: int | None) -> TrialR
     began = time.perf_counter()
     measured, failure = None, ""
     cache: FootageCache | None = getattr(_here, "cache", None)
-    if cache is None or cache.folder != Path(footage_folder):
+    if cache is None or cache.place != footage_folder:
         if cache is not None:
             cache.close()
-        cache = _here.cache = FootageCache(Path(footage_folder), _cache_bytes(at_once or cores()))
+        cache = _here.cache = FootageCache(footage_folder, _cache_bytes(at_once or cores()))
     try:
-        measured = plain(job.measure(job.arguments, cache))
+        arguments = {**job.arguments}
+        if "behaviour" in arguments:
+            arguments["behaviour"] = remote_file(arguments["behaviour"])
+        measured = plain(job.measure(arguments, cache))
     except Exception as error:
         failure = failure_in_words(error)
     return TrialResult(job.key, measured, failure, time.perf_counter() - began)
@@ -92,7 +97,7 @@ _here = threading.local()
 
 def _run(
     jobs: Sequence[TrialJob],
-    footage_folder: Path,
+    footage_folder: Path | str,
     on_result: OnResult,
     executor: Executor,
     at_once: int | None,

@@ -18,11 +18,19 @@ from studio.jobs.cluster import Cluster, chosen_executor
 from studio.jobs.comparison_run import done_before, run_comparison, run_sweep
 from studio.jobs.process_executor import cores
 from studio.likelihood.catalogue import WEIGHTINGS
-from studio.operations.opening import SessionName, open_session
+from studio.operations.opening import AnySession, open_session
 from studio.operations.progress import Reporting, reporting, say
 from studio.runs.behaviour_models import needs_model
 from studio.runs.new_run import own_knobs
 from studio.sessions.names import checked_name
+from studio.sessions.object_stores import below
+from studio.sessions.remote_sessions import (
+    COMPARISONS,
+    address_of,
+    bring_comparisons,
+    comparison_put_back,
+    place_in_words,
+)
 from studio.sessions.session import Session
 from studio.trackers.catalogue import TRACKERS
 from studio.trackers.tracker import Value
@@ -41,7 +49,7 @@ class Compared:
 
 @operation
 def compare(
-    session: SessionName,
+    session: AnySession,
     *,
     trackers: Annotated[
         Sequence[str],
@@ -93,7 +101,8 @@ def compare(
 
     Raises StudioError for what cannot be compared.
     """
-    opened = open_session(session)
+    opened = open_session(session, remote=True)
+    bring_comparisons(opened)
     plan = planned(
         opened,
         trackers,
@@ -107,16 +116,19 @@ def compare(
         layers=layers,
         changes=changes,
     )
-    with chosen_executor(cluster, opened.path) as executor:
+    with chosen_executor(cluster, place_in_words(opened)) as executor:
         kept = _kept(opened, plan, name, Path(out) if out else None)
         before = done_before(kept, plan)
         lines = [executor.in_words] if executor else []
         if before:
             lines.append(f"{before} of {seeds * len(plan.candidates)} trials are there already.")
         say(progress, lines)
-        with reporting(progress, f"{opened.name} / {kept.name}") as report:
+        with (
+            comparison_put_back(opened, kept.folder),
+            reporting(progress, f"{opened.name} / {kept.name}") as report,
+        ):
             comparison = run_comparison(kept, opened, report, processes=processes, executor=executor)
-    say(progress, [f"Kept in {kept.folder}"])
+    say(progress, [f"Kept in {_where(opened, kept)}"])
     return Compared(comparison, kept)
 
 
@@ -130,7 +142,7 @@ class SweptGrid:
 
 @operation
 def sweep(
-    session: SessionName,
+    session: AnySession,
     *,
     vary: Annotated[
         Mapping[str, Sequence[object]],
@@ -179,7 +191,8 @@ def sweep(
 
     Raises StudioError for an unknown knob or a value out of its range; then nothing was made.
     """
-    opened = open_session(session)
+    opened = open_session(session, remote=True)
+    bring_comparisons(opened)
     plan = plan_sweep(
         opened,
         vary,
@@ -194,7 +207,7 @@ def sweep(
         fit_shape=fit_shape,
         despite_findings=despite_findings,
     )
-    with chosen_executor(cluster, opened.path) as executor:
+    with chosen_executor(cluster, place_in_words(opened)) as executor:
         kept = kept_sweep(opened, plan, name)
         at_once = executor.threads or 1 if executor else processes or cores()
         wait = expected(opened, plan, at_once, cores())
@@ -202,10 +215,20 @@ def sweep(
         if before := done_before(kept, plan):
             lines.append(f"{before} of {wait.runs} runs are there already.")
         say(progress, lines)
-        with reporting(progress, f"{opened.name} / {kept.name}") as report:
+        with (
+            comparison_put_back(opened, kept.folder),
+            reporting(progress, f"{opened.name} / {kept.name}") as report,
+        ):
             found = run_sweep(kept, opened, report, processes=processes, executor=executor)
-    say(progress, [f"Kept in {kept.folder}"])
+    say(progress, [f"Kept in {_where(opened, kept)}"])
     return SweptGrid(found, kept)
+
+
+def _where(session: Session, kept: KeptComparison) -> str:
+    """Where a comparison lies for a person: at the session's address, or in a folder."""
+    address = address_of(session)
+    inside = address and kept.folder.is_relative_to(session.path)
+    return below(address, COMPARISONS, kept.name) if inside else str(kept.folder)
 
 
 def kept_sweep(session: Session, plan: Plan, name: str = "") -> KeptComparison:

@@ -21,6 +21,8 @@ from studio.sessions.workspace import Workspace
 
 SessionName = Annotated[Session | str | Path, Target("session")]
 """A session that was opened, its name in the workspace (STUDIO_WORKSPACE), or its folder."""
+AnySession = Annotated[Session | str | Path, Target("session", remote=True)]
+"""The same, or an address such as s3://bucket/sessions/walk: of verbs that put back what they make."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,9 +64,14 @@ RunName = Annotated[Tracked | StoredRun | str | Path, Target("run")]
 """A run that was tracked or opened, "SESSION/RUN" as in the workspace, or its folder."""
 
 
-def open_session(session: SessionName) -> Session:
-    """A session as it is now, by name or folder. Raises NotFoundError."""
-    return Session(session.path) if isinstance(session, Session) else Workspace().resolve(session)
+def open_session(session: AnySession, *, remote: bool = False) -> Session:
+    """A session as it is now, by name or folder. remote : also by an address, as a copy (`sessions.remote_sessions`).
+
+    Raises NotFoundError, SessionError.
+    """
+    if isinstance(session, Session):
+        return Session(session.path)
+    return Workspace().resolve(session, remote=remote)
 
 
 def list_sessions() -> tuple[str, ...]:

@@ -1,7 +1,7 @@
 """Tracking: from footage or live cameras, gone on with, again without the clock, corrected."""
 
 from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Concatenate, ParamSpec, TypeVar
@@ -21,14 +21,22 @@ from studio.declaring import (
     operation,
     taking,
 )
-from studio.errors import RunError, SettingsError
+from studio.errors import RunError, SettingsError, StudioError
 from studio.jobs.batch import BatchResult, track_to_end
 from studio.jobs.camera_tracking import LiveRecordingRequest, track_cameras
 from studio.jobs.live_tracking import replay_live, track_live
 from studio.jobs.set_recording import SetStanding
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.operations.footage import Cameras, addresses_of
-from studio.operations.opening import RunName, SessionName, Tracked, open_run, open_session, session_of
+from studio.operations.opening import (
+    AnySession,
+    RunName,
+    SessionName,
+    Tracked,
+    open_run,
+    open_session,
+    session_of,
+)
 from studio.operations.progress import Reporting, reporting, say
 from studio.progress import Progress
 from studio.runs.correcting import prepare_correction, track_backwards
@@ -38,6 +46,7 @@ from studio.runs.live_summary import LiveSummary, in_words, summary_of
 from studio.runs.new_run import DESPITE, Numbers, Pose, given_pose, own_knobs, prepare_run
 from studio.runs.tracks import pose_in_track, read_track
 from studio.sessions.names import free_name
+from studio.sessions.remote_sessions import address_of, free_run_name_at, put_run
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
@@ -56,19 +65,21 @@ def of_new_run(
 
 @operation
 @of_new_run(prepare_run)
-def new_run(session: SessionName, *, progress: Reporting = None, **options: object) -> StoredRun:
+def new_run(session: AnySession, *, progress: Reporting = None, **options: object) -> StoredRun:
     """A new run, ready to be tracked; what is left out is the session's own or the studio's default.
 
     Raises StudioError naming what is wrong; then nothing was made.
     """
-    opened = open_session(session)
+    opened = open_session(session, remote=True)
+    if address_of(opened):
+        options["name"] = free_run_name_at(opened, str(options.get("name") or ""))
     with reporting(progress, f"{opened.name}: preparing") as report:
         return prepare_run(opened, **options, progress=report)  # pyright: ignore[reportArgumentType]
 
 
 @operation
 @of_new_run(prepare_run)
-def track(session: SessionName, *, progress: Reporting = None, **options: object) -> Tracked:
+def track(session: AnySession, *, progress: Reporting = None, **options: object) -> Tracked:
     """Track a session and store the run; Ctrl-C cancels, what was tracked stays and can be gone on with.
 
     The same seed gives the same run.
@@ -87,8 +98,17 @@ def go_on(run: RunName, *, progress: Reporting = None) -> Tracked:
     def how_far() -> str:
         return f"{stored.summary().done} of {stored.record.frame_count} frames tracked."
 
+    session = session_of(stored)
     with _reporting(stored, progress, how_far) as report:
-        return _tracked(stored, track_to_end(session_of(stored), stored, report))
+        try:
+            batch = track_to_end(session, stored, report)
+        except BaseException:
+            # What broke it off counts, not that its frames cannot be put beside the original, too.
+            with suppress(StudioError):
+                put_run(session, stored)
+            raise
+        put_run(session, stored)
+        return _tracked(stored, batch)
 
 
 @contextmanager

@@ -55,6 +55,23 @@ def copy_file(source: Path, path: Path) -> None:
     write_bytes(path, content)
 
 
+def copy_database(source: Path, target: Path) -> None:
+    """A copy of an SQLite database, also of one that is being written, with all that was committed. Raises
+    SessionError.
+    """
+    reading, writing = sqlite3.connect(source), sqlite3.connect(target)
+    try:
+        reading.backup(writing)
+        writing.execute("PRAGMA journal_mode = WAL")
+    except sqlite3.DatabaseError as error:
+        raise SessionError(
+            f"'{source}' cannot be copied ({error}).", "Delete the damaged run first."
+        ) from None
+    finally:
+        reading.close()
+        writing.close()
+
+
 def new_folder_beside(path: Path) -> Path:
     """An empty hidden folder next to `path`, to be filled and then given to `move_into_place`. Raises SessionError."""
     with writing("The folder", path.parent):

@@ -37,6 +37,27 @@ class ProcessLock:
         return ProcessLock(connection)
 
     @staticmethod
+    def share(path: Path, patience: float = 0.0) -> "ProcessLock | None":
+        """Keep others from taking the lock of the file `path` (created if missing), which many may do at once; None
+        while another holds it, after so many seconds. Raises SessionError.
+        """
+        try:
+            connection = sqlite3.connect(
+                path, timeout=patience, isolation_level=None, check_same_thread=False
+            )
+        except sqlite3.DatabaseError as error:
+            raise unwritable("The lock", path, error) from None
+        try:
+            connection.execute("BEGIN")
+            connection.execute("SELECT 1 FROM sqlite_master").fetchall()
+        except sqlite3.DatabaseError as error:
+            connection.close()
+            if _is_held(error):
+                return None
+            raise unwritable("The lock", path, error) from None
+        return ProcessLock(connection)
+
+    @staticmethod
     def is_held(path: Path) -> bool:
         """Whether another holds the lock. Looking takes nothing, writes nothing and needs no permission to write."""
         if not path.exists():

@@ -4,7 +4,6 @@ import contextlib
 import dataclasses
 import os
 import shutil
-import sqlite3
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -18,10 +17,13 @@ from studio.body.catalogue import body_file_text, body_path, load_body
 from studio.body.subject import DEFAULT_BODY
 from studio.capture.footage_source import FootageSource
 from studio.errors import NotFoundError, SessionError, StudioError
+from studio.progress import Progress, unheard
 from studio.sessions import atomic_files
 from studio.sessions.atomic_files import made_whole, write_text
 from studio.sessions.manifest import FILE_NAME, SessionManifest, now, read_manifest, write_manifest
 from studio.sessions.names import checked_name, free_name, inside, is_name
+from studio.sessions.object_stores import folder_of, is_address
+from studio.sessions.remote_sessions import remote_session
 from studio.sessions.results_reader import FILE_NAME as RESULTS_NAME
 from studio.sessions.run_record import FILE_NAME as RECORD_NAME
 from studio.sessions.run_record import read_run_record, write_run_record
@@ -94,12 +96,23 @@ class Workspace:
             )
         return Session(path)
 
-    def resolve(self, name_or_path: str | Path) -> Session:
-        """The session of that name, else the one in that folder (commands only: it may lie anywhere).
+    def resolve(
+        self, name_or_path: str | Path, *, remote: bool = False, progress: Progress = unheard
+    ) -> Session:
+        """The session of that name, else the one in that folder (commands only: it may lie anywhere). remote : an
+        address of a store is brought, too.
 
-        Raises NotFoundError naming both places.
+        Raises NotFoundError naming both places, SessionError for an address that cannot be used.
         """
-        text = str(name_or_path)
+        text = folder_of(str(name_or_path))
+        if is_address(text):
+            if remote:
+                return remote_session(text, progress)
+            raise SessionError(
+                f"The session at '{text}' is not on this machine, and this would change it.",
+                f"Bring it first: studio download {text} --into NAME. Only track, batch, compare, sweep and runs take"
+                " addresses.",
+            )
         if is_name(text) and (self.root / text / FILE_NAME).is_file():
             return self.session(text)
         if "\0" not in text and (Path(text).expanduser() / FILE_NAME).is_file():
@@ -112,7 +125,12 @@ class Workspace:
 
     def place_for(self, name_or_path: str | Path) -> Path:
         """The place of a new session: a name means the workspace, a path itself. Raises SessionError if it is taken."""
-        text = str(name_or_path)
+        text = folder_of(str(name_or_path))
+        if is_address(text):
+            raise SessionError(
+                f"A new session cannot begin at '{text}'.",
+                f"Make it on this machine, then: studio upload NAME --to {text}",
+            )
         if is_name(text):
             self.root.mkdir(parents=True, exist_ok=True)
             path = inside(self.root, text)
@@ -152,7 +170,7 @@ class Workspace:
         with atomic_files.made_whole(place) as folder:
             shutil.copytree(session.path, folder, symlinks=True, dirs_exist_ok=True, ignore=_transient)
             for store in session.path.glob(f"{RUNS_NAME}/*/{RESULTS_NAME}"):
-                _copy_database(store, folder / store.relative_to(session.path))
+                atomic_files.copy_database(store, folder / store.relative_to(session.path))
             title = f"{session.manifest.title} (copy)"
             write_manifest(folder, msgspec.structs.replace(session.manifest, name=wanted, title=title))
         return Session(place)
@@ -293,20 +311,6 @@ def _transient(folder: str, names: list[str]) -> set[str]:
     itself."""
     left_out = {name for name in names if name.startswith((RESULTS_NAME, "results.lock"))}
     return left_out | {name for name in names if name.startswith(atomic_files.PARTIAL_PREFIX)}
-
-
-def _copy_database(source: Path, target: Path) -> None:
-    reading, writing = sqlite3.connect(source), sqlite3.connect(target)
-    try:
-        reading.backup(writing)
-        writing.execute("PRAGMA journal_mode = WAL")
-    except sqlite3.DatabaseError as error:
-        raise SessionError(
-            f"'{source}' cannot be copied ({error}).", "Delete the damaged run first."
-        ) from None
-    finally:
-        reading.close()
-        writing.close()
 
 
 NO_FOOTAGE = FootageSource(0.0, 0, ())

@@ -1,0 +1,176 @@
+"""Sessions on many machines: put into an object store and brought from it, tracked in a batch."""
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from studio.comparison.kept_trials import plain
+from studio.comparison.sweep import Swept
+from studio.comparison.trials import TrialJob
+from studio.declaring import Terminal, Web, operation, taking
+from studio.errors import RunError
+from studio.jobs.cluster import Cluster, chosen_executor
+from studio.jobs.swept_runs import measure_run_of_batch
+from studio.jobs.trials import TrialResult, run_jobs
+from studio.operations.opening import SessionName, open_session
+from studio.operations.progress import Reporting, reporting, say
+from studio.runs.new_run import prepare_run
+from studio.sessions import remote_sessions
+from studio.sessions.names import checked_name
+from studio.sessions.object_stores import above, folder_of, is_address
+from studio.sessions.remote_sessions import sessions_at
+from studio.sessions.session import Session
+from studio.sessions.workspace import Workspace
+
+Address = Annotated[
+    str, Field(description="Where in a store, such as s3://BUCKET/sessions/NAME."), Web(left_out=True)
+]
+
+
+@operation
+def upload(
+    session: SessionName,
+    to: Annotated[Address, Terminal("--to", "ADDRESS")],
+    *,
+    progress: Reporting = None,
+) -> str:
+    """Put a session with its runs into an object store, from which any machine tracks it; returns its address.
+
+    What is broken off is not seen as a session there; the same call begins it again.
+
+    Raises SessionError.
+    """
+    opened = open_session(session)
+    with reporting(progress, f"{opened.name}: uploading") as report:
+        return remote_sessions.upload(opened, to, report)
+
+
+@operation
+def download(
+    address: Annotated[Address, Terminal(metavar="ADDRESS")],
+    into: Annotated[
+        str | Path,
+        Field(description="Name of the new session in the workspace, or a path."),
+        Terminal("--into", "SESSION", kind=str),
+    ],
+    *,
+    progress: Reporting = None,
+) -> Session:
+    """Bring a session with its runs and comparisons from an object store, whole or not at all.
+
+    Raises NotFoundError, SessionError.
+    """
+    place = Workspace().place_for(into)
+    with reporting(progress, f"{place.name}: downloading") as report:
+        return remote_sessions.download(address, place, report)
+
+
+@dataclass(frozen=True, slots=True)
+class BatchLine:
+    """A session of a batch. place : its folder or address. run : measured; None where it failed, then `failure` says
+    why.
+    """
+
+    session: str
+    place: str
+    run: Swept | None
+    failure: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """A batch that was tracked, in the order of its sessions."""
+
+    lines: tuple[BatchLine, ...]
+
+
+@operation
+@taking(
+    prepare_run,
+    without=("session", "subject", "start_pose", "start_source", "live", "ping_pong", "note", "progress"),
+)
+def batch(
+    sessions: Annotated[
+        Sequence[str | Path],
+        Field(description="By name, folder or address; an address of a folder means all sessions below it."),
+        Terminal(metavar="SESSION…"),
+    ],
+    *,
+    name: Annotated[str, Field(description="Of the runs (letters, digits, - and _).")] = "batch",
+    processes: Annotated[
+        int | None, Field(ge=1, description="Sessions at once; default: one a core."), Web(left_out=True)
+    ] = None,
+    cluster: Cluster = "",
+    progress: Reporting = None,
+    **options: Any,  # noqa: ANN401 - of the types that are declared
+) -> Batch:
+    """Track many sessions with the same settings, on all cores or on a cluster's workers, a run each.
+
+    The runs bear one name, and lie where their sessions lie. A session that fails stops no other. The same call goes on
+    where one was broken off, and tracks nothing again.
+
+    Raises RunError where no session is given, SessionError where one is none.
+    """
+    places = [place for one in sessions for place in _places(one)]
+    if not places:
+        raise RunError("A batch without sessions tracks nothing.", "Name sessions, folders or addresses.")
+    jobs = [_job(place, name, options) for place in dict.fromkeys(places)]
+    found: dict[str, BatchLine] = {}
+
+    def on_result(job: TrialJob, result: TrialResult) -> None:
+        run = Swept(**result.measured) if result.measured is not None else None
+        found[job.key] = BatchLine(job.label, job.footage[0], run, result.failure)
+        report(job.label, len(found), len(jobs))
+
+    with (
+        chosen_executor(cluster, places[0]) as executor,
+        reporting(progress, f"{len(jobs)} sessions") as report,
+    ):
+        say(progress, [executor.in_words] if executor else [])
+        run_jobs(jobs, above(places[0]), on_result, processes, executor=executor)
+    return Batch(tuple(found[job.key] for job in jobs))
+
+
+def _places(session: str | Path) -> list[str]:
+    """The folder or address of a session, or the addresses of those below one. Raises SessionError."""
+    place = folder_of(str(session))
+    if not is_address(place):
+        return [str(open_session(place).path)]
+    found = sessions_at(place)
+    broken = next((one for one in found if not one.whole), None)
+    if broken is not None or not found:
+        # Says what is wrong with it.
+        remote_sessions.remote_session(broken.address if broken else place)
+    return [one.address for one in found]
+
+
+def _job(place: str, name: str, options: dict[str, Any]) -> TrialJob:
+    """The trial of a session. Two requests that differ in anything are two runs: their notes differ."""
+    usual = {
+        "tracker": "",
+        "weighting": "",
+        "body": "",
+        "behaviour": "",
+        "first": None,
+        "last": None,
+        "seed": 0,
+    }
+    wanted = {**usual, "fit_shape": True, "despite_findings": False}
+    wanted |= {key: value for key, value in options.items() if key != "knobs"}
+    arguments = plain({**wanted, "changes": dict(options.get("knobs") or {})})
+    digest = hashlib.sha256(json.dumps(arguments, sort_keys=True).encode()).hexdigest()[:12]
+    return TrialJob(
+        key=place,
+        experiment=checked_name(name, "run"),
+        label=Path(place).name,
+        arguments={**arguments, "footage": place, "run": name, "note": f"A run of batch {digest}."},
+        measure=measure_run_of_batch,
+        footage=(place,),
+        frames=None,
+        alone=False,
+    )
