@@ -30,6 +30,7 @@ import av.container
 import av.error
 import av.video
 import numpy as np
+from av.video.reformatter import VideoReformatter
 
 from studio.arrays import Array, Bytes
 from studio.errors import FootageError
@@ -260,6 +261,8 @@ class VideoReader:
         self._lock = threading.Lock()
         self._container: av.container.InputContainer | None = None
         self._frames: Iterator[av.VideoFrame] = iter(())
+        # Kept with its tables: making them anew costs as much as the conversion itself.
+        self._reformatter = VideoReformatter()
         self._next = 0
         self._times: list[int] | None = None
         self._keys: list[int] = []
@@ -275,7 +278,7 @@ class VideoReader:
                     raise _cut(self._path, self._next, self._count)
                 self._next += 1
                 if self._next > index:
-                    return upright_array(frame)
+                    return upright_array(frame, self._reformatter)
 
     def close(self) -> None:
         """Close the file."""
@@ -319,9 +322,9 @@ class VideoReader:
         self._next = 0
 
 
-def upright_array(frame: av.VideoFrame) -> Bytes:
+def upright_array(frame: av.VideoFrame, reformatter: VideoReformatter) -> Bytes:
     """(H, W, 3) uint8 BGR, turned as the file's rotation says."""
-    picture = frame.to_ndarray(format="bgr24").astype(np.uint8, copy=False)
+    picture = reformatter.reformat(frame, format="bgr24").to_ndarray().astype(np.uint8, copy=False)
     turns = round(frame.rotation / 90.0) % 4
     return np.ascontiguousarray(np.rot90(picture, turns) if turns else picture)
 

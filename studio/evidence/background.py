@@ -59,8 +59,8 @@ class GaussianBackground:
             self.variance = np.zeros((1, *self.mean.shape[1:]), np.float32)
         else:
             self.variance = np.ascontiguousarray(deviation, dtype=np.float32) ** 2
+        self._rough = self.mean if self.mean.dtype == np.uint8 else np.rint(self.mean).astype(np.uint8)
         self._samples = self.mean[::GAIN_STRIDE, ::GAIN_STRIDE].astype(np.float32)
-        self._in_range = (self._samples > GAIN_LEAST_LEVEL) & (self._samples < GAIN_MOST_LEVEL)
         self.is_grey = float(np.ptp(self._samples, axis=2).mean()) < GREY_SPREAD
 
     def foreground(self, picture: Bytes, settings: EvidenceSettings) -> Bytes:
@@ -70,6 +70,7 @@ class GaussianBackground:
         return differing_pixels(
             np.ascontiguousarray(picture),
             self.mean,
+            self._rough,
             self.variance,
             gain,
             np.float32(settings.mask_threshold**2),
@@ -81,24 +82,20 @@ class GaussianBackground:
     def gain(self, picture: Bytes) -> Floats:
         """(3,) factor on each colour of the background, from the median pixel (people cover less than
         half)."""
-        seen = np.ascontiguousarray(picture[::GAIN_STRIDE, ::GAIN_STRIDE])
-        usable = self._in_range & (seen < GAIN_MOST_LEVEL)
-        ratios = np.divide(seen, self._samples, where=usable, out=np.zeros(usable.shape, np.float32))
-        found = np.ones(3, np.float32)
-        for channel in range(3):
-            ratio = ratios[:, :, channel][usable[:, :, channel]]
-            if len(ratio) >= GAIN_LEAST_PIXELS:
-                found[channel] = np.clip(_median(ratio), *GAIN_RANGE)
+        ratios, counts = gain_ratios(picture, self._samples)
+        found, (least, most) = np.ones(3, np.float32), GAIN_RANGE
+        for channel, count in enumerate(counts):
+            if count >= GAIN_LEAST_PIXELS:
+                found[channel] = min(max(_median(ratios[channel, :count]), least), most)
         return found
 
 
 def _median(values: Floats) -> np.float32:
-    """`np.median` of (K,) numbers in a quarter of its time: it is needed for every colour of every picture."""
+    """`np.median` of (K,) numbers in a tenth of its time: it is needed for every colour of every picture."""
     middle = len(values) // 2
-    if len(values) % 2:
-        return np.partition(values, middle)[middle]
+    # Asked for two places NumPy takes another way, six times as quick where many values are equal.
     low, high = np.partition(values, (middle - 1, middle))[middle - 1 : middle + 1]
-    return (low + high) / np.float32(2.0)
+    return high if len(values) % 2 else (low + high) / np.float32(2.0)
 
 
 class SubtractorBackground:
@@ -179,10 +176,36 @@ def median_and_distance(values: Bytes) -> tuple[NDArray[np.float32], NDArray[np.
     return median, distance
 
 
+@njit(**EXACT)
+def gain_ratios(
+    picture: Bytes, samples: NDArray[np.float32]
+) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """Ratios (3, K) of every GAIN_STRIDE-th pixel of a picture (H, W, 3) to the background's samples (h, w, 3), each
+    colour's first `counts` (3,): those of neither too dark nor too bright a background.
+    """
+    rows, columns = samples.shape[:2]
+    ratios, counts = np.empty((3, rows * columns), np.float32), np.zeros(3, np.int64)
+    for y in range(rows):
+        for x in range(columns):
+            for c in range(3):
+                value, background = picture[GAIN_STRIDE * y, GAIN_STRIDE * x, c], samples[y, x, c]
+                if GAIN_LEAST_LEVEL < background < GAIN_MOST_LEVEL and value < GAIN_MOST_LEVEL:
+                    ratios[c, counts[c]] = np.float32(value) / background
+                    counts[c] += 1
+    return ratios, counts
+
+
+PART, WORDS = 16, 6
+"""Pixels of a row that are decided together, and 64-bit words of their flags, a byte a colour."""
+ROUGH = np.float32(0.501)
+"""Grey levels by which a rounded mean is off at most."""
+
+
 @njit(**EXACT, fastmath=True)
 def differing_pixels(
     picture: Bytes,
     mean: NDArray[np.uint8 | np.float32],
+    rough: Bytes,
     variance: NDArray[np.float32],
     gain: NDArray[np.float32],
     threshold: np.float32,
@@ -192,38 +215,53 @@ def differing_pixels(
 ) -> Bytes:
     """255 where a colour differs by more than sqrt(threshold) deviations and the pixel is no shadow.
 
-    picture : (H, W, 3) uint8. mean : (H, W, 3) uint8 or float32. variance : (H or 1, W, 3) float32. noise : least
-    variance. A shadow has
+    picture : (H, W, 3) uint8. mean : (H, W, 3) uint8 or float32. rough : (H, W, 3) uint8, the mean rounded. variance :
+    (H or 1, W, 3) float32. noise : least variance. A shadow has
     darkest <= brightness / background < 1 and a colour within `colour` of the background's, as a share of its
     brightness.
-    The first loop of a row vectorises over all its colours; the shadow test runs where something differs.
+    The first loop of a row vectorises over all its colours: nearer to the rounded mean than the least noise allows
+    nothing differs. Most of a picture is decided so, at a quarter of the bytes; only the rest is compared exactly.
     """
     height, width = picture.shape[:2]
     out = np.zeros((height, width), np.uint8)
-    gains = np.empty(3 * width, np.float32)
+    gains, slack = np.empty(3 * width, np.float32), ROUGH * max(gain[0], gain[1], gain[2])
     for k in range(3 * width):
         gains[k] = gain[k % 3]
-    differs = np.empty(3 * width, np.uint8)
+    least = np.sqrt(threshold * noise) * np.float32(0.999) - slack
+    parts = (width + PART - 1) // PART
+    far = np.zeros(3 * PART * parts, np.uint8)
+    words = far.view(np.uint64)
     flat, means = picture.reshape(height, 3 * width), mean.reshape(height, 3 * width)
-    variances = variance.reshape(len(variance), 3 * width)
+    roughly, variances = rough.reshape(height, 3 * width), variance.reshape(len(variance), 3 * width)
     for y in range(height):
-        seen, expected, row = flat[y], means[y], out[y]
+        seen, expected, about, row = flat[y], means[y], roughly[y], out[y]
         spread = variances[min(y, len(variances) - 1)]
         for k in range(3 * width):
-            away = np.float32(seen[k]) - gains[k] * np.float32(expected[k])
-            differs[k] = np.uint8(away * away > threshold * max(spread[k], noise))
-        for x in range(width):
-            k = 3 * x
-            if differs[k] | differs[k + 1] | differs[k + 2]:
-                dot, norm, square = np.float32(0.0), np.float32(0.0), np.float32(0.0)
+            far[k] = np.uint8(abs(np.float32(seen[k]) - gains[k] * np.float32(about[k])) >= least)
+        for part in range(parts):
+            found = np.uint64(0)
+            for i in range(WORDS):
+                found |= words[WORDS * part + i]
+            if found == 0:
+                continue
+            for x in range(part * PART, min(part * PART + PART, width)):
+                k = 3 * x
+                if not far[k] | far[k + 1] | far[k + 2]:
+                    continue
+                differs = False
                 for c in range(3):
-                    value, background = np.float32(seen[k + c]), gain[c] * np.float32(expected[k + c])
-                    dot += value * background
-                    norm += background * background
-                    square += value * value
-                share = dot / max(norm, np.float32(1.0))
-                off_colour = square - share * dot
-                same_colour = off_colour < colour * colour * norm + noise
-                shadow = darkest <= share and share < np.float32(1.0) and same_colour
-                row[x] = np.uint8(0) if shadow else np.uint8(255)
+                    away = np.float32(seen[k + c]) - gains[k + c] * np.float32(expected[k + c])
+                    differs |= away * away > threshold * max(spread[k + c], noise)
+                if differs:
+                    dot, norm, square = np.float32(0.0), np.float32(0.0), np.float32(0.0)
+                    for c in range(3):
+                        value, background = np.float32(seen[k + c]), gain[c] * np.float32(expected[k + c])
+                        dot += value * background
+                        norm += background * background
+                        square += value * value
+                    share = dot / max(norm, np.float32(1.0))
+                    off_colour = square - share * dot
+                    same_colour = off_colour < colour * colour * norm + noise
+                    shadow = darkest <= share and share < np.float32(1.0) and same_colour
+                    row[x] = np.uint8(0) if shadow else np.uint8(255)
     return out

@@ -8,8 +8,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Array, Bytes, Floats
+from studio.arrays import Array, Bytes, Floats, Indices
 from studio.evidence.frame_evidence import FrameEvidence
+from studio.numba_in_threads import EXACT, KERNEL, njit
 
 FOREGROUND = 128
 """Mask values from here on are silhouette."""
@@ -68,44 +69,85 @@ def distances_of(
 ) -> SilhouetteDistances:
     """The distances of a mask (H, W); empty and full masks have no border. hidden : as in `ViewEvidence`."""
     size = (mask.shape[1], mask.shape[0])
-    silhouette = np.greater_equal(mask, FOREGROUND).astype(np.uint8)
-    left, top, width, height = cv2.boundingRect(silhouette)
-    if width and hidden is not None:
-        left, top, width, height = cv2.boundingRect(silhouette | (hidden > 0).astype(np.uint8))
-    if not width:
+    left, top, right, bottom = box_of(mask, np.uint8(FOREGROUND))
+    if right and hidden is not None:
+        there = box_of(hidden, np.uint8(1))
+        if there[2]:
+            left, top = min(left, there[0]), min(top, there[1])
+            right, bottom = max(right, there[2]), max(bottom, there[3])
+    if not right:
         return SilhouetteDistances(
             size, (0, 0), np.zeros((0, 0), np.float32), np.zeros((0, 2)), np.zeros((0, 2))
         )
     margin = max(size) // MARGIN_SHARE
-    right, bottom = min(left + width + margin, size[0]), min(top + height + margin, size[1])
+    right, bottom = min(right + margin, size[0]), min(bottom + margin, size[1])
     left, top = max(left - margin, 0), max(top - margin, 0)
-    inside = np.ascontiguousarray(silhouette[top:bottom, left:right])
+    inside = np.greater_equal(mask[top:bottom, left:right], FOREGROUND).view(np.uint8)
     measure = _distances if exact else _stepped_distances
-    signed = np.where(inside > 0, 0.5 - measure(inside), measure(1 - inside) - 0.5).astype(np.float32)
+    signed = signed_of(inside, measure(inside), measure(1 - inside))
     unknown = None if hidden is None else np.ascontiguousarray(hidden[top:bottom, left:right])
     contours, _ = cv2.findContours(inside, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
-    points = np.concatenate([np.zeros((0, 2), np.int64), *(contour[:, 0] for contour in contours)])
-    at = points + np.array([left, top])
-    kept = (at > 0).all(axis=1) & (at < np.array(size) - 1).all(axis=1)
+    points = np.concatenate([np.zeros((0, 2), np.int32), *(contour[:, 0] for contour in contours)])
+    x, y = points[:, 0] + left, points[:, 1] + top
+    kept = (x > 0) & (y > 0) & (x < size[0] - 1) & (y < size[1] - 1)
     if unknown is not None:
         side = 2 * BESIDE_HIDDEN + 1
         near = np.asarray(cv2.dilate(unknown, np.ones((side, side), np.uint8)))
-        column, row = points.astype(np.int64).T
-        kept &= near[row, column] == 0
+        kept &= near[points[:, 1], points[:, 0]] == 0
     points = points[kept][:: max(1, -(-int(kept.sum()) // most))].astype(np.int64)
-    smooth = np.asarray(cv2.GaussianBlur(signed, (0, 0), SMOOTHED))
-    columns, rows = points[:, 0], points[:, 1]
-    slope = np.stack(
-        [
-            smooth[rows, columns + 1] - smooth[rows, columns - 1],
-            smooth[rows + 1, columns] - smooth[rows - 1, columns],
-        ],
-        axis=1,
-    ).astype(np.float64)
+    outward = slopes_at(points, np.asarray(cv2.GaussianBlur(signed, (0, 0), SMOOTHED), np.float32))
     if unknown is not None:
         signed = np.where(unknown > 0, np.float32(0.0), signed)
-    outward = slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-9)
     return SilhouetteDistances(size, (left, top), signed, points + np.array([left, top], np.float64), outward)
+
+
+@njit(**KERNEL)
+def box_of(picture: Bytes, least: np.uint8) -> tuple[int, int, int, int]:
+    """Left, top, right and bottom (one past the last) of what is at least so bright in a picture (H, W); 0 if nothing
+    is.
+    """
+    height, width = picture.shape
+    columns = np.zeros(width, np.uint8)
+    top = bottom = 0
+    for y in range(height):
+        row, brightest = picture[y], np.uint8(0)
+        for x in range(width):
+            columns[x] = max(columns[x], row[x])
+            brightest = max(brightest, row[x])
+        if brightest >= least:
+            top, bottom = top if bottom else y, y + 1
+    left, right = 0, width
+    while left < right and columns[left] < least:
+        left += 1
+    while right > left and columns[right - 1] < least:
+        right -= 1
+    return (left, top, right, bottom) if bottom else (0, 0, 0, 0)
+
+
+@njit(**EXACT)
+def signed_of(inside: Bytes, within: Floats, beyond: Floats) -> Floats:
+    """(H, W) pixels to the border between pixels, negative where inside (H, W) is not 0, from the distances `within` and
+    `beyond` to pixels' centres. Overwrites `beyond`.
+    """
+    half = np.float32(0.5)
+    for y in range(inside.shape[0]):
+        here, one, found = inside[y], within[y], beyond[y]
+        for x in range(inside.shape[1]):
+            found[x] = half - one[x] if here[x] else found[x] - half
+    return beyond
+
+
+@njit(**EXACT)
+def slopes_at(points: Indices, values: Floats) -> Array:
+    """(K, 2) directions in which values (H, W) rise most at points (K, 2); 0 where they do not."""
+    found = np.empty((len(points), 2))
+    for k in range(len(points)):
+        x, y = points[k]
+        across = np.float64(values[y, x + 1] - values[y, x - 1])
+        along = np.float64(values[y + 1, x] - values[y - 1, x])
+        length = max(np.sqrt(across * across + along * along), 1e-9)
+        found[k, 0], found[k, 1] = across / length, along / length
+    return found
 
 
 def _distances(mask: NDArray[np.uint8]) -> Floats:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.arrays import Bytes
-from studio.numba_in_threads import KERNEL, njit
+from studio.numba_in_threads import EXACT, KERNEL, njit
 
 EDGE_WIDTH = 4.0
 """Pixels on which the gradient of a body's edge passes the threshold; thinner edges stay below 1. On the sample walk
@@ -42,15 +42,23 @@ def proximity_edges(
     if near is not None and reach > 0:
         kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
         edges = np.asarray(cv2.bitwise_and(edges, cv2.dilate(near, kernel)), dtype=np.uint8)
-    taps = 2 * round(REACH * smoothing) + 1
-    blurred = cv2.GaussianBlur(edges, (taps, taps), smoothing, borderType=cv2.BORDER_CONSTANT)
-    return np.asarray(cv2.LUT(blurred, remap_table(smoothing)), dtype=np.uint8)
+    # The blurred middle of a straight edge of EDGE_WIDTH pixels is to reach 255.
+    peak = math.erf(0.5 * EDGE_WIDTH / (smoothing * math.sqrt(2.0)))
+    return blurred(edges, whole_taps(smoothing, 2 * round(REACH * smoothing) + 1), 255.0 / (255.0 * peak))
 
 
-def remap_table(smoothing: float) -> Bytes:
-    """(256,) table that takes the blurred middle of a straight edge of EDGE_WIDTH pixels to 255."""
-    peak = 255.0 * math.erf(0.5 * EDGE_WIDTH / (smoothing * math.sqrt(2.0)))
-    return np.minimum(255.0, np.round(np.arange(256) * (255.0 / peak))).astype(np.uint8)
+def whole_taps(sigma: float, count: int) -> NDArray[np.int64]:
+    """(count,) a Gaussian in whole numbers that sum to 256, each rounded with what the one before it left over: the
+    taps with which OpenCV blurs bytes.
+    """
+    exact = np.exp(-0.5 * ((np.arange(count) - count // 2) / sigma) ** 2)
+    exact *= 256.0 / exact.sum()
+    taps, left = np.zeros(count, np.int64), 0.0
+    for k in range(count // 2):
+        taps[k] = taps[-1 - k] = round(exact[k] + left)
+        left += exact[k] - taps[k]
+    taps[count // 2] = 256 - taps.sum()
+    return taps
 
 
 def bodytrack_edges(picture: Bytes) -> Bytes:
@@ -75,15 +83,54 @@ def edge_pixels(image: Bytes, least: float) -> Bytes:
     height, width = image.shape
     out = np.zeros((height, width), np.uint8)
     limit = np.int32(math.ceil(least))
+    smooth, slope = np.empty(width, np.int16), np.empty(width, np.int16)
+    right, left = smooth[2:], smooth[: width - 2]
+    before, middle, after = slope[: width - 2], slope[1 : width - 1], slope[2:]
     for y in range(1, height - 1):
-        above, here, below, row = image[y - 1], image[y], image[y + 1], out[y]
-        for x in range(1, width - 1):
-            right = np.int32(above[x + 1]) + 2 * np.int32(here[x + 1]) + np.int32(below[x + 1])
-            left = np.int32(above[x - 1]) + 2 * np.int32(here[x - 1]) + np.int32(below[x - 1])
-            down = np.int32(below[x - 1]) + 2 * np.int32(below[x]) + np.int32(below[x + 1])
-            up = np.int32(above[x - 1]) + 2 * np.int32(above[x]) + np.int32(above[x + 1])
-            across, along = right - left, down - up
-            row[x] = np.uint8(255) if across * across + along * along >= limit else np.uint8(0)
+        above, here, below, row = image[y - 1], image[y], image[y + 1], out[y, 1 : width - 1]
+        for x in range(width):
+            smooth[x] = np.int16(np.int16(above[x]) + np.int16(2) * np.int16(here[x]) + np.int16(below[x]))
+            slope[x] = np.int16(np.int16(below[x]) - np.int16(above[x]))
+        for x in range(width - 2):
+            across = np.int32(np.int16(right[x] - left[x]))
+            along = np.int32(np.int16(before[x] + np.int16(2) * middle[x] + after[x]))
+            strength = np.int32(across * across) + np.int32(along * along)
+            row[x] = np.uint8(255) if strength >= limit else np.uint8(0)
+    return out
+
+
+@njit(**EXACT)
+def blurred(image: Bytes, taps: NDArray[np.int64], factor: float) -> Bytes:
+    """Rows, then columns, each a sum with `taps` (K,), times a factor, at most 255; beyond the picture all is 0.
+
+    image : (H, W) uint8. Whole numbers up to the rounding of each sum and of its product, as OpenCV's GaussianBlur and
+    a table would give; halves to even.
+    """
+    height, width = image.shape
+    reach = len(taps) // 2
+    rows, padded = np.zeros((height + 2 * reach, width), np.uint16), np.zeros(width + 2 * reach, np.uint16)
+    for y in range(height):
+        source, target, centre = image[y], rows[y + reach], padded[reach : reach + width]
+        for x in range(width):
+            centre[x] = source[x]
+            target[x] = np.uint16(taps[reach]) * np.uint16(source[x])
+        for k in range(reach):
+            tap, before = np.uint16(taps[k]), padded[k : k + width]
+            after = padded[2 * reach - k : 2 * reach - k + width]
+            for x in range(width):
+                target[x] = np.uint16(target[x] + tap * np.uint16(before[x] + after[x]))
+    out, total = np.empty((height, width), np.uint8), np.empty(width, np.uint32)
+    for y in range(height):
+        centre, target, middle = rows[y + reach], out[y], np.uint32(taps[reach])
+        for x in range(width):
+            total[x] = np.uint32(1 << 15) + middle * np.uint32(centre[x])
+        for k in range(reach):
+            tap, above, below = np.uint32(taps[k]), rows[y + k], rows[y + 2 * reach - k]
+            for x in range(width):
+                total[x] = np.uint32(total[x] + tap * (np.uint32(above[x]) + np.uint32(below[x])))
+        for x in range(width):
+            value = np.rint(np.float64(np.int32(total[x] >> np.uint32(16))) * factor)
+            target[x] = np.uint8(min(255.0, value))
     return out
 
 

@@ -18,11 +18,19 @@ def cleaned(mask: Bytes, settings: EvidenceSettings) -> Bytes:
     or 255."""
     if settings.mask_opening > 1:
         mask = _morphed(mask, cv2.MORPH_OPEN, settings.mask_opening)
+    left, top, width, height = cv2.boundingRect(mask)
+    # Beyond the reach of a closing all stays background.
+    reach = settings.mask_closing + 1
+    rows = slice(max(top - reach, 0), top + height + reach)
+    columns = slice(max(left - reach, 0), left + width + reach)
+    part = mask[rows, columns]
     if settings.mask_closing > 1:
-        mask = _morphed(mask, cv2.MORPH_CLOSE, settings.mask_closing)
+        part = _morphed(part, cv2.MORPH_CLOSE, settings.mask_closing)
     if settings.mask_fill_holes or settings.mask_min_component or settings.mask_keep_components:
-        mask = _pieces(mask, settings)
-    return mask
+        part = _pieces(part, settings)
+    found = np.zeros_like(mask)
+    found[rows, columns] = part
+    return found
 
 
 def reduced(mask: Bytes, camera: Camera) -> Bytes:
@@ -116,13 +124,14 @@ def _pieces(mask: Bytes, settings: EvidenceSettings) -> Bytes:
     kept = outer[area[outer] >= settings.mask_min_component]
     if settings.mask_keep_components:
         kept = kept[np.argsort(-area[kept], kind="stable")[: settings.mask_keep_components]]
-    is_kept = np.isin(np.arange(len(contours)), kept)
+    is_kept = np.zeros(len(contours), np.bool_)
+    is_kept[kept] = True
     filled = holes[is_kept[parent[holes]] & (area[holes] < settings.mask_fill_holes)]
-    dropped = [k for k in range(len(contours)) if not is_kept[k if parent[k] < 0 else parent[k]]]
-    if len(filled) == 0 and not dropped:
+    dropped = np.flatnonzero(~is_kept[np.where(parent < 0, np.arange(len(contours)), parent)])
+    if len(filled) == 0 and len(dropped) == 0:
         return mask
     out = mask.copy()
-    if dropped:
+    if len(dropped):
         cv2.drawContours(out, [contours[k] for k in dropped], -1, 0, cv2.FILLED)
     for index in filled:
         cv2.drawContours(out, contours, int(index), 255, cv2.FILLED)
