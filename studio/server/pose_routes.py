@@ -1,7 +1,6 @@
 """Poses set by hand: start poses, dragging, mirroring, the search around a pose, and the editor in the scene."""
 
 import asyncio
-import math
 from contextlib import suppress
 from typing import Annotated, Literal
 
@@ -12,7 +11,7 @@ from pydantic import Field
 from studio.arrays import Array
 from studio.body.dragging import Dragger
 from studio.body.mirroring import Mirror, has_sides
-from studio.body.model import BodyModel
+from studio.body.model import BodyModel, checked_pose
 from studio.errors import SettingsError, StudioError
 from studio.jobs.job_runner import Job, JobKind, NumberedJob
 from studio.likelihood.catalogue import WEIGHTINGS
@@ -157,7 +156,7 @@ def start_pose(session: OpenSession) -> PoseView:
 def put_start_pose(session: OpenSession, request: StartPoseRequest, app: App) -> PoseView:
     """Make a pose the session's start pose; the one it had stays beside it."""
     body = session.body()
-    pose = _fitting(body, request.pose)
+    pose = checked_pose(body, request.pose, SettingsError)
     keep_start_pose(session, body, pose, request.frame)
     app.events.session_changed(session.name)
     return _view(body, pose, stored=True, frame=session.start_pose_frame())
@@ -167,7 +166,9 @@ def put_start_pose(session: OpenSession, request: StartPoseRequest, app: App) ->
 def drag(session: OpenSession, request: DragRequest) -> PoseView:
     """The pose with a limb's end at a place; the rest of the body follows where it must."""
     body = _body(session, request)[0]
-    found = Dragger(body).dragged(_fitting(body, request.pose), request.limb, np.array(request.target))
+    found = Dragger(body).dragged(
+        checked_pose(body, request.pose, SettingsError), request.limb, np.array(request.target)
+    )
     return _view(body, found.pose, left_mm=found.left_mm)
 
 
@@ -176,7 +177,7 @@ def mirror(session: OpenSession, request: MirrorRequest) -> PoseView:
     """The pose with left and right exchanged."""
     body = _body(session, request)[0]
     found = Mirror(body)
-    pose = _fitting(body, request.pose)
+    pose = checked_pose(body, request.pose, SettingsError)
     return _view(body, found.mirrored(pose) if request.how == "in place" else found.turned_round(pose))
 
 
@@ -185,7 +186,7 @@ async def begin_refining_pose(session: OpenSession, request: BetterPoseRequest, 
     """Begin a short search around the pose, with the weighting in use. `track` events report it."""
     checked_frames(session, request.frame, request.frame + 1)
     body, run = _body(session, request)
-    pose = _fitting(body, request.pose)
+    pose = checked_pose(body, request.pose, SettingsError)
 
     def work(job: Job) -> dict[str, object]:
         found = better_pose(
@@ -232,7 +233,7 @@ def edit(request: EditRequest, app: App, scene: Scene) -> None:
             "A correction needs a frame.", "Name the frame of the run that is to be corrected."
         )
     if request.pose is not None:
-        _fitting(run.body() if run else session.body(), request.pose)
+        checked_pose(run.body() if run else session.body(), request.pose, SettingsError)
     if request.frame is not None:
         checked_frames(session, request.frame, request.frame + 1)
     scene.poses.edit(session.name, run.name if run else "", request.frame, request.pose)
@@ -247,16 +248,6 @@ def leave(scene: Scene) -> None:
 def _body(session: Session, request: PoseRequest) -> tuple[BodyModel, StoredRun | None]:
     run = session.run(request.run) if request.run else None
     return (run.body() if run else session.body()), run
-
-
-def _fitting(body: BodyModel, pose: list[float]) -> Array:
-    """The pose (D,) if it is one of the body. Raises SettingsError."""
-    if len(pose) != len(body.parameters) or not all(math.isfinite(value) for value in pose):
-        raise SettingsError(
-            f"A pose of {body.name} has {len(body.parameters)} finite numbers, the given one does not.",
-            "Give radians and mm in the order of the body's parameters.",
-        )
-    return np.array(pose)
 
 
 def _view(
