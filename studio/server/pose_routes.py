@@ -16,7 +16,6 @@ from studio.errors import SettingsError, StudioError
 from studio.jobs.job_runner import Job, JobKind, NumberedJob
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.operations.person import initialise
-from studio.runs.initialising import InitialPose
 from studio.runs.new_run import checked_frames
 from studio.runs.pose_search import better_pose
 from studio.runs.start_pose_file import keep_start_pose
@@ -26,7 +25,7 @@ from studio.server.requests import Arguments, body_of
 from studio.server.schemas import Answer, Number, Numbers, Request, RunName
 from studio.server.session_routes import OpenSession
 from studio.server.session_views import ParameterView, parameter_views
-from studio.server.track_routes import TrackJobState, begin_job
+from studio.server.track_routes import TRACK, TrackJobState, begin_job
 from studio.server.windows import Window
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -197,12 +196,7 @@ async def begin_refining_pose(session: OpenSession, request: BetterPoseRequest, 
             seed=request.seed,
             progress=job.report_or_stop,
         )
-        return {
-            "pose": found.pose.tolist(),
-            "gain": found.gain,
-            "overlap_before": found.overlap_before,
-            "overlap": found.overlap,
-        }
+        return TRACK.entries(found, pose=found.pose.tolist())
 
     return begin_job(app, "pose", session, run, work)
 
@@ -290,23 +284,11 @@ async def begin_initialisation(
         with suppress(StudioError):  # without room for a scene the pose is found all the same
             scene = app.scenes.scene(window)
             scene.poses.propose(session.name, found.pose.tolist(), found.source, found.frame)
-        return {"file": found.file.name if found.file else "", **_answer(found)}
+        file = found.file.name if found.file else ""
+        return START_POSE.entries(found, parameters=found.names, file=file)
 
     state = InitialisationState(session=session.name, frame=frame)
     return app.jobs.begin(START_POSE, state, work)
 
 
 add_job_routes(router, "/initialisations/{identifier}", START_POSE)
-
-
-def _answer(found: InitialPose) -> dict[str, object]:
-    return {
-        "body": found.body,
-        "parameters": list(found.names),
-        "pose": found.pose.tolist(),
-        "confidence": found.confidence,
-        "margin": found.margin,
-        "overlap": found.overlap,
-        "source": found.source,
-        "note": found.note,
-    }
