@@ -21,3 +21,6 @@ class HtmlPage(HTMLParser):
     def handle_data(self, data: str) -> None:
         if self._kind:
             self.scripts[self._kind] = self.scripts.get(self._kind, "") + data
+
+    def handle_endtag(self, tag: str) -> None:
+        self._kind = ""
