@@ -21,7 +21,7 @@ from studio.comparison.folders import (
 )
 from studio.comparison.kept_comparison import FRAMES_NAME, RESULT_NAME, KeptComparison
 from studio.comparison.plan import Plan, conclude
-from studio.comparison.sweep import Expected, conclude_sweep, expected, plan_sweep
+from studio.comparison.sweep import SweepExpected, conclude_sweep, expected, plan_sweep
 from studio.comparison.trial_runs import TrialLine, run_of_trial, trial_lines
 from studio.errors import NotFoundError, RunError, StudioError, WorkCancelledError
 from studio.jobs import commands
@@ -238,7 +238,7 @@ def begin_sweep(
 @router.post("/sweeps/expected")
 def expected_of_sweep(
     arguments: Annotated[Arguments, body_of(sweep, "ExpectedRequest", session=(RunName, ...))], app: App
-) -> Expected:
+) -> SweepExpected:
     """How many runs a sweep has and about how long they take; 422 for what cannot be swept."""
     session = app.workspace.session(arguments.more["session"])
     return expected(session, _sweep_plan(session, arguments), _processes(), cores())
