@@ -5,7 +5,9 @@ For scripts and notebooks, the verbs of the command line as functions: `import s
 use, so that `import studio` costs nothing.
 """
 
+import ast
 import importlib
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -67,36 +69,22 @@ if TYPE_CHECKING:
     from studio.operations.tracking import track as track
     from studio.self_check import doctor as doctor
 
-_PLACES = {
-    "errors": ("StudioError",),
-    "self_check": ("doctor",),
-    "diagnostics_archive": ("diagnostics",),
-    "operations.opening": ("bodies", "list_runs", "list_sessions", "open_run", "open_session", "way",),
-    "operations.footage": ("add_footage", "import_footage", "new_session", "record", "synchronise", "synthesize",),
-    "operations.cameras": ("align", "board", "calibrate", "unalign",),
-    "operations.masks": ("background", "mask_quality",),
-    "operations.subjects": ("subjects", "together",),
-    "operations.gallery": ("gallery",),
-    "operations.own_bodies": ("edit_body",),
-    "operations.person": ("fit_subject", "initialise", "subject",),
-    "operations.tracking": ("correct", "go_on", "live", "new_run", "replay", "resume_live", "track",),
-    "operations.results": ("check", "evaluate", "export_run", "list_tracks", "markers", "read_track", "refine",
-                           "smooth", "verify",),
-    "operations.remote": ("batch", "download", "upload",),
-    "operations.sharing": ("share",),
-    "operations.behaviours": ("learn", "models",),
-    "operations.comparing": ("compare", "sweep",),
-    "operations.course": ("course",),
-    "operations.inspecting": ("compare_runs", "seeds", "view", "why",),
-}  # fmt: skip
-_PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}
+
+def _places() -> dict[str, str]:
+    """The module of each verb, as the imports above name it: they are its one declaration, and are not run."""
+    block = next(node for node in ast.parse(Path(__file__).read_bytes()).body if isinstance(node, ast.If))
+    imports = [node for node in block.body if isinstance(node, ast.ImportFrom)]
+    return {entry.name: str(node.module) for node in imports for entry in node.names}
+
+
+_PLACE_OF = _places()
 
 
 def __getattr__(name: str) -> object:
     """A verb, imported on first use."""
     if name not in _PLACE_OF:
         raise AttributeError(f"module 'studio' has no attribute '{name}'")
-    found = getattr(importlib.import_module(f"studio.{_PLACE_OF[name]}"), name)
+    found = getattr(importlib.import_module(_PLACE_OF[name]), name)
     globals()[name] = found
     return found
 

@@ -6,6 +6,7 @@ fixed number or by one parameter of the pose vector), so any order and direction
 down. Lengths in mm, angles in radians here (degrees in body files).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -13,6 +14,8 @@ import numpy as np
 
 from studio.arrays import Array, Indices
 from studio.body.definition import BodyDefinition
+from studio.errors import StudioError
+from studio.geometry.reach import within_reach
 
 MOVE, TURN = 0, 1
 
@@ -170,3 +173,14 @@ def extremities(body: BodyModel) -> tuple[int, ...]:
             carried.add(above)
             above = body.joints[above].parent
     return tuple(index for index, limb in enumerate(body.drawn) if limb.joint not in carried)
+
+
+def checked_pose(body: BodyModel, pose: Sequence[float] | Array, error: type[StudioError]) -> Array:
+    """(D,) the pose, if it is one of the body. Raises `error`."""
+    given = np.asarray(pose, dtype=np.float64)
+    if given.shape != (len(body.parameters),) or not within_reach(given):
+        raise error(
+            f"A pose of {body.name} has {len(body.parameters)} finite numbers, the given one does not.",
+            "Give radians and mm in the order of the body's parameters.",
+        )
+    return given

@@ -106,7 +106,7 @@ class Sweep:
 
 
 @dataclass(frozen=True, slots=True)
-class Expected:
+class SweepExpected:
     """What a sweep will take. evaluations : of all runs. seconds : None where no stored run of the session tells.
     judged_by : the run that does.
     """
@@ -326,7 +326,7 @@ def sweep_text(sweep: Sweep) -> str:
     )
 
 
-def expected(session: Session, plan: Plan, processes: int, cores: int) -> Expected:
+def expected(session: Session, plan: Plan, processes: int, cores: int) -> SweepExpected:
     """How many runs a plan has and about how long they take, so many at a time on so many cores."""
     frames = plan.frame_count
     evaluations = sum(one.evaluations for one in plan.candidates) * len(plan.seeds) * frames
@@ -334,10 +334,12 @@ def expected(session: Session, plan: Plan, processes: int, cores: int) -> Expect
     first = plan.candidates[0]
     pace = stored_pace(session, first.tracker, first.weighting, evaluations / runs / frames)
     if pace is None:
-        return Expected(runs, frames, evaluations, None, "")
+        return SweepExpected(runs, frames, evaluations, None, "")
     # A run that is tracked alone has all cores, one of a sweep has one.
     share = (pace.threads or cores) / min(processes, runs)
-    return Expected(runs, frames, evaluations, pace.seconds(evaluations, runs * frames) * share, pace.run)
+    return SweepExpected(
+        runs, frames, evaluations, pace.seconds(evaluations, runs * frames) * share, pace.run
+    )
 
 
 def _each(sweep: Sweep) -> list[tuple[tuple[Value, ...], int, Swept]]:

@@ -71,11 +71,11 @@ REFINED_NOW = "a refinement on the silhouettes"
 @dataclass(frozen=True, slots=True)
 class Preference:
     """Which of two settled poses the likelihood prefers. nats : log-weight of the pose less that of the reference.
-    tells : what has to be exceeded. camera, term : that speak most for the pose. share : nats of these.
+    threshold : what has to be exceeded. camera, term : that speak most for the pose. share : nats of these.
     """
 
     nats: float
-    tells: float
+    threshold: float
     camera: str
     term: str
     share: float
@@ -83,12 +83,12 @@ class Preference:
     @property
     def is_for_the_pose(self) -> bool:
         """Whether the wrong pose weighs more."""
-        return self.nats > self.tells
+        return self.nats > self.threshold
 
     @property
     def is_for_the_reference(self) -> bool:
         """Whether the right pose weighs more."""
-        return self.nats < -self.tells
+        return self.nats < -self.threshold
 
 
 @dataclass(frozen=True, slots=True)
@@ -452,7 +452,7 @@ def _add_search(
     case: Case, limb: str, findings: list[Finding], remedies: list[Remedy], *, cause_known: bool
 ) -> None:
     """Where and why the search lost the limb."""
-    # Refining frames on bad evidence takes long, and tells nothing.
+    # Refining frames on bad evidence takes long, and threshold nothing.
     known = case.reference.kind != REFINED_NOW or not cause_known
     began = case.stretch[0] if known else case.frame.number
     if began < case.frame.number:
@@ -630,7 +630,7 @@ def _preference_finding(case: Case) -> Finding:
     elif found.is_for_the_reference:
         words = f"The likelihood prefers the right pose, by {-found.nats:.3f} nats: the search missed it."
     else:
-        words = f"The likelihood hardly tells the two poses apart ({found.nats:+.3f} nats)."
+        words = f"The likelihood hardly threshold the two poses apart ({found.nats:+.3f} nats)."
     return Finding("preference", words, camera=found.camera, term=found.term, numbers=numbers)
 
 

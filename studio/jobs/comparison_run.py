@@ -2,15 +2,16 @@
 measured again.
 """
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import TypeVar
 
 from studio.comparison.kept_comparison import KeptComparison, trial_key
 from studio.comparison.kept_trials import KeptOutcome, measured_by, plain
-from studio.comparison.plan import Comparison, Plan, conclude, trials
-from studio.comparison.sweep import Sweep, conclude_sweep, run_name, sweep_trials
+from studio.comparison.plan import Comparison, Plan, trials
+from studio.comparison.sweep import Sweep, run_name, sweep_trials
 from studio.comparison.tracked import measure_tracking
 from studio.comparison.trials import Outcome, Trial, TrialJob
 from studio.errors import RunError
@@ -20,6 +21,8 @@ from studio.progress import Progress
 from studio.sessions.manifest import now
 from studio.sessions.object_stores import above
 from studio.sessions.session import Session
+
+Found = TypeVar("Found", bound=Comparison | Sweep)
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,38 +42,23 @@ def run_comparison(
     kept: KeptComparison,
     session: Session,
     report: Progress,
+    conclusion: Callable[[Plan, Sequence[Outcome]], Found],
     *,
     processes: int | None = None,
     executor: Executor | None = None,
     checkpoint: Callable[[], None] = lambda: None,
-) -> Comparison:
-    """Do what is still to be done of a comparison and write its result.
+) -> Found:
+    """Do what is still to be done of a comparison, and write what `conclusion` makes of it.
 
-    processes, executor, checkpoint : see `trials.run_jobs`. What ends it leaves the finished trials. Raises RunError
-    where another process works at it or a trial fails.
+    conclusion : `conclude`, of a sweep `conclude_sweep`. processes, executor, checkpoint : see `trials.run_jobs`. What
+    ends it leaves the finished trials, and of runs the finished frames. Raises RunError where another process works at
+    it or a trial fails.
     """
     with _held(kept):
         plan, outcomes = _measured(kept, session, report, processes, executor, checkpoint)
-        comparison = conclude(plan, outcomes)
-        kept.finish(comparison)
-    return comparison
-
-
-def run_sweep(
-    kept: KeptComparison,
-    session: Session,
-    report: Progress,
-    *,
-    processes: int | None = None,
-    executor: Executor | None = None,
-    checkpoint: Callable[[], None] = lambda: None,
-) -> Sweep:
-    """The same of a sweep, whose trials are runs of the session; one that was broken off goes on from its frames."""
-    with _held(kept):
-        plan, outcomes = _measured(kept, session, report, processes, executor, checkpoint)
-        sweep = conclude_sweep(plan, outcomes)
-        kept.finish(sweep)
-    return sweep
+        found = conclusion(plan, outcomes)
+        kept.finish(found)
+    return found
 
 
 def done_before(kept: KeptComparison, plan: Plan) -> int:

@@ -104,6 +104,13 @@ class JobKind(Generic[SomeState]):
     busy: str = ""
     keeps_session: bool = False
 
+    def entries(self, found: object, **own: object) -> dict[str, object]:
+        """What goes into the state of what was found, by the names of the entries. own : those that differ, or that it
+        lacks.
+        """
+        names = self.states.model_fields.keys() - SessionJob.model_fields.keys() - own.keys()
+        return {name: getattr(found, name) for name in names if hasattr(found, name)} | own
+
 
 class Job:
     """One job, as its work sees it. state : how it stands. found : what it found, for others to use. closing : it is

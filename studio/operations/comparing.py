@@ -10,12 +10,12 @@ from pydantic import Field
 from studio.comparison.candidates import DEFAULT_LAYERS, Lineup
 from studio.comparison.folders import differences, new_comparison, place_of, unfinished_like
 from studio.comparison.kept_comparison import RECORD_NAME, KeptComparison
-from studio.comparison.plan import Comparison, Plan, plan_comparison
-from studio.comparison.sweep import Sweep, expected, plan_sweep, run_name
+from studio.comparison.plan import Comparison, Plan, conclude, plan_comparison
+from studio.comparison.sweep import Sweep, conclude_sweep, expected, plan_sweep, run_name
 from studio.declaring import Body, Despite, Knobs, Model, OneOf, Terminal, Values, Web, operation
 from studio.errors import RunError, SessionError
 from studio.jobs.cluster import Cluster, chosen_executor
-from studio.jobs.comparison_run import done_before, run_comparison, run_sweep
+from studio.jobs.comparison_run import done_before, run_comparison
 from studio.jobs.process_executor import cores
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.operations.opening import AnySession, open_session
@@ -127,7 +127,9 @@ def compare(
             comparison_put_back(opened, kept.folder),
             reporting(progress, f"{opened.name} / {kept.name}") as report,
         ):
-            comparison = run_comparison(kept, opened, report, processes=processes, executor=executor)
+            comparison = run_comparison(
+                kept, opened, report, conclude, processes=processes, executor=executor
+            )
     say(progress, [f"Kept in {_where(opened, kept)}"])
     return Compared(comparison, kept)
 
@@ -219,7 +221,9 @@ def sweep(
             comparison_put_back(opened, kept.folder),
             reporting(progress, f"{opened.name} / {kept.name}") as report,
         ):
-            found = run_sweep(kept, opened, report, processes=processes, executor=executor)
+            found = run_comparison(
+                kept, opened, report, conclude_sweep, processes=processes, executor=executor
+            )
     say(progress, [f"Kept in {_where(opened, kept)}"])
     return SweptGrid(found, kept)
 

@@ -15,12 +15,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
-import numpy as np
 
 from studio.arrays import Array
 from studio.body.branches import within_limits
+from studio.body.model import checked_pose
 from studio.errors import RunError, SessionError
-from studio.geometry.reach import within_reach
 from studio.progress import Progress
 from studio.runs.new_run import software_version
 from studio.runs.problem_source import ProblemSource
@@ -54,12 +53,7 @@ def prepare_correction(
     forwards to the run's end. Raises RunError, SessionError; then nothing was made.
     """
     record, body = run.record, run.body()
-    given = np.asarray(pose, dtype=np.float64)
-    if given.shape != (len(body.parameters),) or not within_reach(given):
-        raise RunError(
-            f"A pose of {body.name} has {len(body.parameters)} finite numbers, the given one does not.",
-            "Give radians and mm in the order of the body's parameters.",
-        )
+    given = checked_pose(body, pose, RunError)
     _check_frames(run, frame, backwards_to)
     way = "on" if backwards_to is None else f"backwards to frame {backwards_to}"
     changed = msgspec.structs.replace(

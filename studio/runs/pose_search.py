@@ -9,9 +9,9 @@ import numpy as np
 
 from studio.arrays import Array
 from studio.body.branches import within_limits
+from studio.body.model import checked_pose
 from studio.errors import RunError
 from studio.evidence.distance_maps import silhouette_distances
-from studio.geometry.reach import within_reach
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.progress import Progress, unheard
 from studio.runs.problem_source import ProblemSource
@@ -62,13 +62,7 @@ def better_pose(
     fit the body.
     """
     body = run.body() if run else session.body()
-    given = np.asarray(pose, dtype=np.float64)
-    if given.shape != (len(body.parameters),) or not within_reach(given):
-        raise RunError(
-            f"A pose of {body.name} has {len(body.parameters)} finite numbers, the given one does not.",
-            "Give radians and mm in the order of the body's parameters.",
-        )
-    given = within_limits(body, given)
+    given = within_limits(body, checked_pose(body, pose, RunError))
     settings = _short_settings(session, run)
     problems = ProblemSource(session, body, run.cameras() if run else None)
     try:

@@ -7,7 +7,7 @@ result.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 from studio.body.forward_kinematics import limb_ends
 from studio.errors import StudioError
@@ -35,16 +35,7 @@ StepName = Literal[
     "footage", "calibration", "background", "subject", "start-pose", "track", "check", "export"
 ]
 StepState = Literal["done", "ready", "blocked", "stale", "running"]
-STEPS: tuple[StepName, ...] = (
-    "footage",
-    "calibration",
-    "background",
-    "subject",
-    "start-pose",
-    "track",
-    "check",
-    "export",
-)
+STEPS: tuple[StepName, ...] = get_args(StepName)
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,8 +15,10 @@ from fastapi import FastAPI
 from starlette.staticfiles import StaticFiles
 
 from studio.inspection.likelihoods import forget_evaluations, let_evaluations_rest
+from studio.jobs.control import StudioControl
 from studio.runs.overlay_pictures import forget_composers, let_composers_rest
 from studio.runs.self_contained import assets_folder
+from studio.scene.window_scenes import WindowScenes
 from studio.server import (
     alignment_routes,
     background_routes,
@@ -53,7 +55,7 @@ from studio.server import (
     workflow_routes,
 )
 from studio.server.access import AccessGuard, HostRule, binding_rule
-from studio.server.app_state import AppState, Control, Scenes
+from studio.server.app_state import AppState
 from studio.server.body_limit import BodyLimit
 from studio.server.content_policy import PolicyHeaders
 from studio.server.error_responses import ErrorsInWords, add_error_handlers, log
@@ -129,8 +131,8 @@ class Application(FastAPI):
 
 def build_app(
     workspace: Workspace,
-    control: Control,
-    scenes: Scenes,
+    control: StudioControl,
+    scenes: WindowScenes,
     token: str,
     *,
     viewers_token: str = "",

@@ -20,13 +20,13 @@ from studio.comparison.folders import (
     throw_away,
 )
 from studio.comparison.kept_comparison import FRAMES_NAME, RESULT_NAME, KeptComparison
-from studio.comparison.plan import Plan
-from studio.comparison.sweep import Expected, expected, plan_sweep
+from studio.comparison.plan import Plan, conclude
+from studio.comparison.sweep import SweepExpected, conclude_sweep, expected, plan_sweep
 from studio.comparison.trial_runs import TrialLine, run_of_trial, trial_lines
 from studio.errors import NotFoundError, RunError, StudioError, WorkCancelledError
 from studio.jobs import commands
 from studio.jobs.cluster import chosen_executor
-from studio.jobs.comparison_run import done_before, run_comparison, run_sweep
+from studio.jobs.comparison_run import done_before, run_comparison
 from studio.jobs.job_runner import Job, JobKind, SessionJob
 from studio.jobs.process_executor import cores
 from studio.likelihood.catalogue import WEIGHTINGS
@@ -238,7 +238,7 @@ def begin_sweep(
 @router.post("/sweeps/expected")
 def expected_of_sweep(
     arguments: Annotated[Arguments, body_of(sweep, "ExpectedRequest", session=(RunName, ...))], app: App
-) -> Expected:
+) -> SweepExpected:
     """How many runs a sweep has and about how long they take; 422 for what cannot be swept."""
     session = app.workspace.session(arguments.more["session"])
     return expected(session, _sweep_plan(session, arguments), _processes(), cores())
@@ -354,10 +354,15 @@ def _start(app: AppState, session: Session, kept: KeptComparison) -> ComparisonL
                 app.events.session_changed(session.name)
 
         try:
-            work_at = run_sweep if is_sweep else run_comparison
             with chosen_executor("", session.path) as executor:
-                work_at(
-                    kept, session, report, processes=_processes(), executor=executor, checkpoint=job.check
+                run_comparison(
+                    kept,
+                    session,
+                    report,
+                    conclude_sweep if is_sweep else conclude,
+                    processes=_processes(),
+                    executor=executor,
+                    checkpoint=job.check,
                 )
         except WorkCancelledError:
             if not job.closing:

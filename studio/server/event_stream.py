@@ -9,21 +9,17 @@ import asyncio
 import queue
 import threading
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 
+from studio.jobs.control import StudioControl
 from studio.jobs.events import Event, SettingsApplied, StateChanged
 from studio.jobs.watchers import Subscription
+from studio.scene.scene_server import SceneServer
 from studio.server.event_encoding import as_json, key_of, message_of
 from studio.server.windows import WindowInQuery
 
 router = APIRouter(tags=["events"])
-
-
-if TYPE_CHECKING:
-    from studio.server.app_state import Control, WindowScene
-
 
 LIMIT = 256
 
@@ -37,7 +33,7 @@ class EventStream:
     """
 
     def __init__(
-        self, control: "Control", scenes: "Callable[[], Mapping[str, WindowScene]]" = lambda: {}
+        self, control: StudioControl, scenes: Callable[[], Mapping[str, SceneServer]] = lambda: {}
     ) -> None:
         self._control, self._scenes = control, scenes
         self._lock = threading.Lock()

@@ -151,14 +151,7 @@ async def begin_synchrony(
 
     def work(job: Job) -> dict[str, object]:
         found = synchrony_of(session, job.report_or_stop, arguments["within"])
-        return {
-            "offsets": found.offsets,
-            "confidence": found.confidence,
-            "spread": found.within,
-            "sure": found.sure,
-            "notes": list(found.notes),
-            "pairs": list(found.pairs),
-        }
+        return SYNCHRONY.entries(found, spread=found.within)
 
     return app.jobs.begin(SYNCHRONY, SynchronyState(session=session.name, step="reading"), work)
 

@@ -1,7 +1,6 @@
 """Poses set by hand: start poses, dragging, mirroring, the search around a pose, and the editor in the scene."""
 
 import asyncio
-import math
 from contextlib import suppress
 from typing import Annotated, Literal
 
@@ -12,12 +11,11 @@ from pydantic import Field
 from studio.arrays import Array
 from studio.body.dragging import Dragger
 from studio.body.mirroring import Mirror, has_sides
-from studio.body.model import BodyModel
+from studio.body.model import BodyModel, checked_pose
 from studio.errors import SettingsError, StudioError
 from studio.jobs.job_runner import Job, JobKind, NumberedJob
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.operations.person import initialise
-from studio.runs.initialising import InitialPose
 from studio.runs.new_run import checked_frames
 from studio.runs.pose_search import better_pose
 from studio.runs.start_pose_file import keep_start_pose
@@ -27,7 +25,7 @@ from studio.server.requests import Arguments, body_of
 from studio.server.schemas import Answer, Number, Numbers, Request, RunName
 from studio.server.session_routes import OpenSession
 from studio.server.session_views import ParameterView, parameter_views
-from studio.server.track_routes import TrackJobState, begin_job
+from studio.server.track_routes import TRACK, TrackJobState, begin_job
 from studio.server.windows import Window
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -157,7 +155,7 @@ def start_pose(session: OpenSession) -> PoseView:
 def put_start_pose(session: OpenSession, request: StartPoseRequest, app: App) -> PoseView:
     """Make a pose the session's start pose; the one it had stays beside it."""
     body = session.body()
-    pose = _fitting(body, request.pose)
+    pose = checked_pose(body, request.pose, SettingsError)
     keep_start_pose(session, body, pose, request.frame)
     app.events.session_changed(session.name)
     return _view(body, pose, stored=True, frame=session.start_pose_frame())
@@ -167,7 +165,9 @@ def put_start_pose(session: OpenSession, request: StartPoseRequest, app: App) ->
 def drag(session: OpenSession, request: DragRequest) -> PoseView:
     """The pose with a limb's end at a place; the rest of the body follows where it must."""
     body = _body(session, request)[0]
-    found = Dragger(body).dragged(_fitting(body, request.pose), request.limb, np.array(request.target))
+    found = Dragger(body).dragged(
+        checked_pose(body, request.pose, SettingsError), request.limb, np.array(request.target)
+    )
     return _view(body, found.pose, left_mm=found.left_mm)
 
 
@@ -176,7 +176,7 @@ def mirror(session: OpenSession, request: MirrorRequest) -> PoseView:
     """The pose with left and right exchanged."""
     body = _body(session, request)[0]
     found = Mirror(body)
-    pose = _fitting(body, request.pose)
+    pose = checked_pose(body, request.pose, SettingsError)
     return _view(body, found.mirrored(pose) if request.how == "in place" else found.turned_round(pose))
 
 
@@ -185,7 +185,7 @@ async def begin_refining_pose(session: OpenSession, request: BetterPoseRequest, 
     """Begin a short search around the pose, with the weighting in use. `track` events report it."""
     checked_frames(session, request.frame, request.frame + 1)
     body, run = _body(session, request)
-    pose = _fitting(body, request.pose)
+    pose = checked_pose(body, request.pose, SettingsError)
 
     def work(job: Job) -> dict[str, object]:
         found = better_pose(
@@ -196,12 +196,7 @@ async def begin_refining_pose(session: OpenSession, request: BetterPoseRequest, 
             seed=request.seed,
             progress=job.report_or_stop,
         )
-        return {
-            "pose": found.pose.tolist(),
-            "gain": found.gain,
-            "overlap_before": found.overlap_before,
-            "overlap": found.overlap,
-        }
+        return TRACK.entries(found, pose=found.pose.tolist())
 
     return begin_job(app, "pose", session, run, work)
 
@@ -232,7 +227,7 @@ def edit(request: EditRequest, app: App, scene: Scene) -> None:
             "A correction needs a frame.", "Name the frame of the run that is to be corrected."
         )
     if request.pose is not None:
-        _fitting(run.body() if run else session.body(), request.pose)
+        checked_pose(run.body() if run else session.body(), request.pose, SettingsError)
     if request.frame is not None:
         checked_frames(session, request.frame, request.frame + 1)
     scene.poses.edit(session.name, run.name if run else "", request.frame, request.pose)
@@ -247,16 +242,6 @@ def leave(scene: Scene) -> None:
 def _body(session: Session, request: PoseRequest) -> tuple[BodyModel, StoredRun | None]:
     run = session.run(request.run) if request.run else None
     return (run.body() if run else session.body()), run
-
-
-def _fitting(body: BodyModel, pose: list[float]) -> Array:
-    """The pose (D,) if it is one of the body. Raises SettingsError."""
-    if len(pose) != len(body.parameters) or not all(math.isfinite(value) for value in pose):
-        raise SettingsError(
-            f"A pose of {body.name} has {len(body.parameters)} finite numbers, the given one does not.",
-            "Give radians and mm in the order of the body's parameters.",
-        )
-    return np.array(pose)
 
 
 def _view(
@@ -299,23 +284,11 @@ async def begin_initialisation(
         with suppress(StudioError):  # without room for a scene the pose is found all the same
             scene = app.scenes.scene(window)
             scene.poses.propose(session.name, found.pose.tolist(), found.source, found.frame)
-        return {"file": found.file.name if found.file else "", **_answer(found)}
+        file = found.file.name if found.file else ""
+        return START_POSE.entries(found, parameters=found.names, file=file)
 
     state = InitialisationState(session=session.name, frame=frame)
     return app.jobs.begin(START_POSE, state, work)
 
 
 add_job_routes(router, "/initialisations/{identifier}", START_POSE)
-
-
-def _answer(found: InitialPose) -> dict[str, object]:
-    return {
-        "body": found.body,
-        "parameters": list(found.names),
-        "pose": found.pose.tolist(),
-        "confidence": found.confidence,
-        "margin": found.margin,
-        "overlap": found.overlap,
-        "source": found.source,
-        "note": found.note,
-    }

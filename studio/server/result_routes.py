@@ -24,7 +24,8 @@ from studio.server.schemas import Answer, Number, Numbers, Request, Value
 from studio.server.session_routes import OpenSession
 from studio.server.session_views import ParameterView, describe, parameter_views
 from studio.server.setting_views import SettingsChange, changes_of, history_of
-from studio.sessions.named_rows import as_csv, poses_csv
+from studio.sessions.named_rows import as_csv
+from studio.sessions.named_rows import poses_csv as csv_of_poses
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.trackers.catalogue import TRACKERS
@@ -391,12 +392,12 @@ def variance_csv(run: OpenRun, frame: int) -> Response:
 
 
 @router.get(RUN + "/poses.csv", response_class=Response)
-def poses_csv_of(session: OpenSession, run: OpenRun) -> Response:
+def poses_csv(session: OpenSession, run: OpenRun) -> Response:
     """All poses: frame, then one column per parameter in the body's order (radians and mm)."""
     with run.results() as results:
         numbers, poses = results.poses()
     name = f"{session.name}-{run.name}-poses.csv"
-    return files.download(poses_csv(run.record.parameters, numbers, poses), name, files.CSV)
+    return files.download(csv_of_poses(run.record.parameters, numbers, poses), name, files.CSV)
 
 
 @router.get(RUN + "/evaluation")

@@ -10,7 +10,8 @@ from studio.body.reader import parse_body
 from studio.errors import SettingsError
 from studio.geometry.reach import within_reach
 from studio.operations.own_bodies import MOST_TEXT
-from studio.server.app_state import App, AppState, Scene, Shown
+from studio.scene.model import Selection
+from studio.server.app_state import App, AppState, Scene
 from studio.server.schemas import Request, RunName
 
 router = APIRouter(prefix="/api/scene", tags=["scene"])
@@ -124,7 +125,7 @@ def view(request: SceneRequest, app: App, scene: Scene) -> None:
 def report_moves(app: AppState) -> None:
     """From now on, report the moves that a scene's own controls make to its window (`scene` events)."""
 
-    def moved(window: str, shown: Shown) -> None:
+    def moved(window: str, shown: Selection) -> None:
         app.events.publish(
             {
                 "type": "scene",

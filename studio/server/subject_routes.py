@@ -158,7 +158,9 @@ async def begin_fit(
         found = fit_subject(session, **arguments, progress=job.report_or_stop)
         forget_composers()
         job.found = found
-        return {"file": found.file.name if found.file else "", **_answer(found)}
+        file = found.file.name if found.file else ""
+        body, limbs = found.body.name, limb_drawings(found.body)
+        return SUBJECT.entries(found, body=body, limbs=limbs, file=file)
 
     return app.jobs.begin(SUBJECT, FitSubjectState(session=session.name), work)
 
@@ -220,15 +222,3 @@ def limb_drawings(body: BodyModel) -> list[LimbDrawing]:
             )
         )
     return found
-
-
-def _answer(found: FittedSubject) -> dict[str, object]:
-    return {
-        "body": found.body.name,
-        "frames": list(found.frames),
-        "poses_from": found.poses_from,
-        "sizes": list(found.sizes),
-        "overlap_before": found.overlap_before.tolist(),
-        "overlap": found.overlap.tolist(),
-        "limbs": limb_drawings(found.body),
-    }

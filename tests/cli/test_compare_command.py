@@ -69,12 +69,12 @@ def test_after_ctrl_c_the_same_command_goes_on(walk: Session, monkeypatch: pytes
     arguments = ("walk", "--trackers", "annealed,condensation", "--seeds", "1", *SMALL)
     really = comparing.run_comparison
 
-    def interrupted(kept: object, session: object, _report: object, **more: object) -> object:
+    def interrupted(kept: object, session: object, _report: object, made: object, **more: object) -> object:
         def report(_step: str, done: int, _total: int) -> None:
             if done == 1:
                 raise KeyboardInterrupt
 
-        return really(kept, session, report, **more)  # pyright: ignore[reportArgumentType]
+        return really(kept, session, report, made, **more)  # pyright: ignore[reportArgumentType]
 
     monkeypatch.setattr(comparing, "run_comparison", interrupted)
     stopped = run(*arguments)

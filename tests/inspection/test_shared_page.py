@@ -3,11 +3,11 @@
 import base64
 import json
 import re
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 import pytest
+from html_page import HtmlPage
 
 import studio
 from studio.body.forward_kinematics import limb_ends
@@ -20,28 +20,8 @@ from studio.runs.self_contained import INSTALLED
 from studio.runs.tracks import RAW, read_track
 
 
-class Page(HTMLParser):
-    """What a page names, and its scripts by type."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.addresses: list[str] = []
-        self.scripts: dict[str, str] = {}
-        self._kind = ""
-        self.feed(text)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        values = dict(attrs)
-        self.addresses += [values[name] or "" for name in ("src", "href") if name in values]
-        self._kind = (values.get("type") or "plain") if tag == "script" else ""
-
-    def handle_data(self, data: str) -> None:
-        if self._kind:
-            self.scripts[self._kind] = self.scripts.get(self._kind, "") + data
-
-
 def data_of(text: str) -> dict:
-    return json.loads(Page(text).scripts["application/json"])
+    return json.loads(HtmlPage(text).scripts["application/json"])
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +35,7 @@ def data(text: str) -> dict:
 
 
 def test_nothing_is_elsewhere(text: str) -> None:
-    page = Page(text)
+    page = HtmlPage(text)
     assert page.addresses == []
     assert all(address.startswith("data:") for address in re.findall(r'url\("?([^")]{0,40})', text))
     modules = json.loads(page.scripts["importmap"])["imports"]

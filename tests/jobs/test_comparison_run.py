@@ -9,7 +9,7 @@ from sample_walk import copy_of_walk
 from studio.comparison.candidates import Lineup
 from studio.comparison.folders import new_comparison, place_of
 from studio.comparison.kept_comparison import KeptComparison
-from studio.comparison.plan import Plan, plan_comparison
+from studio.comparison.plan import Plan, conclude, plan_comparison
 from studio.errors import RunError
 from studio.jobs.comparison_run import done_before, run_comparison
 from studio.sessions.session import Session
@@ -43,13 +43,13 @@ def test_it_is_broken_off_and_goes_on_with_what_is_missing(walk: Session, kept: 
             raise Broken
 
     with pytest.raises(Broken):
-        run_comparison(kept, walk, after_two, processes=1)
+        run_comparison(kept, walk, after_two, conclude, processes=1)
     assert steps == [("", 0, 4), ("annealed, seed 0", 1, 4), ("condensation, seed 0", 2, 4)]
     assert kept.status() == "interrupted"
     assert done_before(kept, kept.plan(walk)) == 2
 
     steps.clear()
-    comparison = run_comparison(kept, walk, lambda *step: steps.append(step), processes=1)
+    comparison = run_comparison(kept, walk, lambda *step: steps.append(step), conclude, processes=1)
     assert [step[1] for step in steps] == [2, 3, 4]
     assert kept.status() == "done"
     assert [result.tracker for result in comparison.trackers] == ["annealed", "condensation"]
@@ -58,7 +58,7 @@ def test_it_is_broken_off_and_goes_on_with_what_is_missing(walk: Session, kept: 
     # Broken off or not, in processes or in threads, the same comes out.
     whole = new_comparison(place_of(walk), small(walk))
     with ThreadPoolExecutor(2) as threads:
-        again = run_comparison(whole, walk, lambda *_: None, executor=threads)
+        again = run_comparison(whole, walk, lambda *_: None, conclude, executor=threads)
     timeless = [
         [replace(seed, seconds=0.0) for result in found.trackers for seed in result.seeds]
         for found in (comparison, again)
@@ -71,5 +71,5 @@ def test_a_trial_that_fails_ends_it_with_the_reason(walk: Session) -> None:
     wrong = replace(plan.candidates[0], changes={**plan.candidates[0].changes, "survivor": 1})
     kept = new_comparison(place_of(walk), replace(plan, candidates=(wrong,)))
     with pytest.raises(RunError, match=r"annealed, seed 0 could not be tracked.*survivor"):
-        run_comparison(kept, walk, lambda *_: None, processes=1)
+        run_comparison(kept, walk, lambda *_: None, conclude, processes=1)
     assert not kept.is_running()

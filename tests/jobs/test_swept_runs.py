@@ -9,8 +9,8 @@ from tracked_runs import finish, poses_of
 
 from studio.comparison.folders import new_comparison, place_of, runs_of
 from studio.comparison.footage_cache import FootageCache
-from studio.comparison.sweep import plan_sweep, sweep_document, sweep_trials
-from studio.jobs.comparison_run import done_before, run_sweep
+from studio.comparison.sweep import conclude_sweep, plan_sweep, sweep_document, sweep_trials
+from studio.jobs.comparison_run import done_before, run_comparison
 from studio.jobs.swept_runs import measure_run
 from studio.runs.new_run import prepare_run
 from studio.sessions.provenance import note
@@ -39,10 +39,10 @@ def test_runs_are_kept_and_a_broken_sweep_goes_on(walk: Session) -> None:
             raise Broken
 
     with ThreadPoolExecutor(1) as threads, pytest.raises(Broken):
-        run_sweep(kept, walk, after_one, executor=threads)
+        run_comparison(kept, walk, after_one, conclude_sweep, executor=threads)
     with ThreadPoolExecutor(1) as threads:
         assert 1 <= done_before(kept, plan) < 4
-        sweep = run_sweep(kept, walk, lambda *_: None, executor=threads)
+        sweep = run_comparison(kept, walk, lambda *_: None, conclude_sweep, executor=threads)
     assert steps == [(0, 4), (1, 4)]
     assert [run.run for run in sweep.runs] == [
         "sweep-1-p1-s0",
@@ -114,6 +114,6 @@ def test_a_doubted_calibration_is_tracked_despite_it(walk: Session) -> None:
     )  # fmt: skip
     kept = new_comparison(place_of(walk, "doubted"), plan)
     with ThreadPoolExecutor(1) as threads:
-        sweep = run_sweep(kept, walk, lambda *_: None, executor=threads)
+        sweep = run_comparison(kept, walk, lambda *_: None, conclude_sweep, executor=threads)
     assert [run.name for run in runs_of(walk, kept).values()] == [one.run for one in sweep.runs]
     assert f"Tracked despite: {doubt}" in walk.run(sweep.runs[0].run).record.notes

@@ -9,7 +9,7 @@ from tracked_runs import finish
 from studio.comparison.candidates import Lineup
 from studio.comparison.folders import new_comparison, place_of
 from studio.comparison.kept_comparison import KeptComparison
-from studio.comparison.plan import plan_comparison
+from studio.comparison.plan import conclude, plan_comparison
 from studio.comparison.trial_runs import run_of_trial, trial_lines
 from studio.errors import NotFoundError
 from studio.evaluation.errors import evaluate
@@ -36,7 +36,7 @@ def kept(walk: Session) -> KeptComparison:
     made = new_comparison(
         place_of(walk, "small"), plan_comparison(walk, lineup, (3, 4), first=FIRST, last=LAST)
     )
-    run_comparison(made, walk, unheard, processes=1)
+    run_comparison(made, walk, unheard, conclude, processes=1)
     return made
 
 

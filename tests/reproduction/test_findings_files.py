@@ -7,10 +7,10 @@ import json
 import math
 import re
 import subprocess
-from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+from html_page import HtmlPage
 from toy_experiments import measure, toy
 
 from studio.comparison.findings import Chart, Findings, Number, Series
@@ -46,46 +46,23 @@ def document(tmp_path: Path) -> dict:
     return as_document(experiment, experiment.conclude(outcomes), making())
 
 
-class Page(HTMLParser):
-    """Scripts by type, and every address that the page names."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.scripts: dict[str, list[str]] = {}
-        self.addresses: list[str] = []
-        self._kind = ""
-        self.feed(text)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        values = dict(attrs)
-        self.addresses += [values[name] or "" for name in ("src", "href") if name in values]
-        self._kind = (values.get("type") or "plain") if tag == "script" else ""
-
-    def handle_data(self, data: str) -> None:
-        if self._kind:
-            self.scripts.setdefault(self._kind, []).append(data)
-
-    def handle_endtag(self, tag: str) -> None:
-        self._kind = ""
-
-
 def test_the_report_is_self_contained(document: dict) -> None:
     results = {"software": "<b>1</b>", "date": DATE, "experiments": [document]}
     text = report_html(results)
-    page = Page(text)
+    page = HtmlPage(text)
     assert page.addresses == []
-    assert json.loads(page.scripts["application/json"][0]) == results
+    assert json.loads(page.scripts["application/json"]) == results
     assert "<b>1</b>" not in text
     named = re.findall(r'url\("([^"]{0,40})', text)
     assert len(named) == 1
     assert named[0].startswith("data:")
-    modules = json.loads(page.scripts["importmap"][0])["imports"]
+    modules = json.loads(page.scripts["importmap"])["imports"]
     assert {"vendor/echarts.esm.min.js", "js/findings.js", "js/findings_charts.js"} <= set(modules)
     inner = {name: base64.b64decode(address.partition(",")[2]).decode() for name, address in modules.items()}
     assert "drawFindings" in inner["js/findings.js"]
     for source in inner.values():
         assert set(re.findall(r'^import [^"]*"([^"]+)"', source, re.MULTILINE)) <= set(modules)
-    assert set(re.findall(r'from "([^"]+)"', page.scripts["module"][0])) <= set(modules)
+    assert set(re.findall(r'from "([^"]+)"', page.scripts["module"])) <= set(modules)
     assert "--verdict" in text
     assert "--series-0" in text
 

@@ -105,7 +105,7 @@ function step(from, to) {
 const undo = () => step(past, undone);
 const redo = () => step(undone, past);
 
-/** A number of the body; what it is called is told to the studio as `key`. */
+/** A number of the body; its name in the request is `key`. */
 function entry(label, value, send, more = {}) {
   const input = element("input", { type: "number", step: "any", value: written(value), ariaLabel: label, disabled: readOnly, dataset: { key: label }, ...more });
   input.onchange = () => {

@@ -48,7 +48,7 @@ async function loadSummary(next = () => {}) {
   if (!isAll) await loadFrames(true);
 }
 
-/** Load the run's frames; those that finish while the answer is on its way are kept. Whether no other answer is to be asked for. */
+/** Load the run's frames; those that finish while the answer is on its way are kept. Whether no other answer is to be requested. */
 async function loadFrames(check) {
   const [session, run] = [get("session"), get("run")];
   if (!run) return true;

@@ -63,7 +63,7 @@ export async function newRunForm(entry, like = null) {
   let knobs = offered.values;
   const chief = element("div", { className: "chief-knobs" });
   const cost = element("p", { className: "hint", role: "status" });
-  let asked = 0;
+  let newest = 0;
 
   /** The chief knobs with the preset's values, and what they cost. */
   function drawChief(form) {
@@ -80,11 +80,11 @@ export async function newRunForm(entry, like = null) {
     const frames = Number(form.elements.last.value) - Number(form.elements.first.value) + 1;
     const known = [`${evaluations} evaluations a frame`, `${Math.max(0, frames)} frames`];
     if (!evaluations || frames <= 0) { cost.textContent = ""; return; }
-    asked += 1;
-    const own = asked;
+    newest += 1;
+    const own = newest;
     if (!cost.textContent) cost.textContent = dotted(...known);
     paceOf(entry.name, form.elements.tracker.value, form.elements.weighting.value, String(evaluations)).then(({ run, milliseconds, frame_milliseconds }) => {
-      if (asked === own) cost.textContent = dotted(...known, run ? `about ${duration(((milliseconds * evaluations + frame_milliseconds) * frames) / 1000)}, judged by ${run}` : "how long that takes is known once its first frames are tracked");
+      if (newest === own) cost.textContent = dotted(...known, run ? `about ${duration(((milliseconds * evaluations + frame_milliseconds) * frames) / 1000)}, judged by ${run}` : "how long that takes is known once its first frames are tracked");
     }).catch(complain);
   }
 

@@ -37,10 +37,10 @@ function variedKnobs(changed) {
     if (!knobOf(name)) return;
     const about = element("p", { className: "hint" });
     const values = text({ ariaLabel: "Values", placeholder: "values, separated by commas", value: given ?? proposed(knobOf(name)), required: true });
-    const tell = () => { const knob = knobOf(which.value); about.textContent = dotted(knob.help, `default ${knob.default}`, allowed(knob) && `allowed: ${allowed(knob)}`); };
-    const which = select(known.map((knob) => /** @type {[string, string]} */ ([knob.name, knob.label === knob.name ? knob.name : `${knob.label} (${knob.name})`])), name, { ariaLabel: "Knob", onchange: () => { values.value = proposed(knobOf(which.value)); tell(); changed(); } });
+    const describe = () => { const knob = knobOf(which.value); about.textContent = dotted(knob.help, `default ${knob.default}`, allowed(knob) && `allowed: ${allowed(knob)}`); };
+    const which = select(known.map((knob) => /** @type {[string, string]} */ ([knob.name, knob.label === knob.name ? knob.name : `${knob.label} (${knob.name})`])), name, { ariaLabel: "Knob", onchange: () => { values.value = proposed(knobOf(which.value)); describe(); changed(); } });
     const row = { which, values, line: element("div", { className: "varied-knob" }, which, values, button("×", () => { rows = rows.filter((one) => one !== row); draw(); }, "icon quiet", { ariaLabel: "Leave this knob out" }), about) };
-    tell();
+    describe();
     rows.push(row);
     draw();
   }

@@ -34,7 +34,7 @@ const place = element("section", { className: "figure", ariaLabel: "View" });
 let views = [];
 /** @type {Figure} */
 let figure = null;
-/** The newest answer, and what it was asked with. @type {{ key: string, answer: any } | null} */
+/** The newest answer, and what it was requested with. @type {{ key: string, answer: any } | null} */
 let held = null;
 let age = 0;   // rises when what is stored changed
 
@@ -50,7 +50,7 @@ const isOfRun = (view) => { const drawing = DRAWINGS[view.name]; return !drawing
 export const labelOf = (name) => get("parameters")?.find((one) => one.name === name)?.label ?? name;
 
 /** What a view's numbers depend on, as its address says it; a limb is marked in the drawing, all the others stay in it. */
-function asked(view) {
+function queryOf(view) {
   const query = new URLSearchParams();
   for (const name of view.uses.filter((one) => one !== "limb" && !(view.name === "clouds" && one === "parameter"))) {
     const value = get(SELECTED[name]);
@@ -63,12 +63,12 @@ function asked(view) {
 async function numbersOf(view) {
   if (view.name === "frames") return overFrames();
   const [session, run, frame] = [get("session"), get("run"), get("frame")];
-  if (isOfRun(view)) return fetchJson(runView(session, run, view.name, asked(view)));
-  const whole = await fetchJson(frameView(session, run, frame, view.name, asked(view)));
+  if (isOfRun(view)) return fetchJson(runView(session, run, view.name, queryOf(view)));
+  const whole = await fetchJson(frameView(session, run, frame, view.name, queryOf(view)));
   if (view.name !== "clouds") return whole;
   // All layers of one parameter stand beside the first and last set of them all.
   const parameter = get("parameter") ?? mostLearnt(records(whole.tables.find((table) => table.name === "summary")));
-  const query = new URLSearchParams([["parameter", parameter], ...new URLSearchParams(asked(view))]);
+  const query = new URLSearchParams([["parameter", parameter], ...new URLSearchParams(queryOf(view))]);
   const own = await fetchJson(frameView(session, run, frame, view.name, String(query)));
   return { ...whole, tables: [...whole.tables.filter((table) => table.name !== "ridges"), ...own.tables.filter((table) => table.name === "ridges"), ...own.tables.filter((table) => table.name === "summary").map((table) => ({ ...table, name: "own" }))] };
 }
@@ -102,7 +102,7 @@ async function load() {
     if (live) return show(view, live);
     if (followsSearch() || !get("detail")) return figure.show(null, "The search goes on: this view is drawn of the frame that is chosen, or once the search is paused.");
   }
-  const key = [get("session"), get("run"), view.name, asked(view), view.name === "clouds" ? get("parameter") : "", age, isOfRun(view) ? get("summary")?.frames.length : get("frame")].join(" ");
+  const key = [get("session"), get("run"), view.name, queryOf(view), view.name === "clouds" ? get("parameter") : "", age, isOfRun(view) ? get("summary")?.frames.length : get("frame")].join(" ");
   if (held?.key === key) return figure.refresh();
   place.ariaBusy = "true";
   try {
