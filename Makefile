@@ -29,18 +29,21 @@ browser: env
 demo: env
 	$(BIN)/studio demo
 
+# Three workers on two cores, since tests wait for processes and pages; each takes whole files, which share what they make.
 # The browser's tests go by themselves: Playwright's event loop bears no other in its process. A file of them that failed
 # is run once more, alone: what a full machine made late passes then, what is wrong fails again. Both are printed.
+WORKERS := -n 3 --dist loadfile
+IN_BROWSER := $$(grep -rl "mark\.browser" tests --include=test_*.py)
 FAILED := import json; print(*sorted({test.split("::")[0] for test in json.load(open(".pytest_cache/v/cache/lastfailed"))}))
 test: env browser
-	$(BIN)/pytest -n 2 --dist loadfile -m "not slow and not browser"
-	$(BIN)/pytest -n 2 --dist loadfile -m "browser and not slow" \
+	$(BIN)/pytest $(WORKERS) -m "not slow and not browser"
+	$(BIN)/pytest $(WORKERS) -m "browser and not slow" $(IN_BROWSER) \
 	  || $(BIN)/pytest -m "browser and not slow" $$($(BIN)/python -c '$(FAILED)')
 
 # The rooms whose tests start servers and processes, or track whole runs, take most of the time.
 LONG_ROOMS := server runs jobs calibration reproduction sessions cli
 test-fast: env
-	$(BIN)/pytest -n 2 --dist loadfile -m "not slow and not browser" $(LONG_ROOMS:%=--ignore=tests/%)
+	$(BIN)/pytest $(WORKERS) -m "not slow and not browser" $(LONG_ROOMS:%=--ignore=tests/%)
 
 test-slow: env browser
 	$(BIN)/pytest -m slow --timeout 3600

@@ -6,10 +6,12 @@ what those name. So a kernel that a change reaches is compiled anew, wherever th
 the kernel's file alone), and one that none reaches is found: by another process, another checkout, the next version.
 """
 
+import contextlib
 import functools
 import hashlib
 import os
 import pickle
+import sqlite3
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -34,6 +36,8 @@ CHECKSUM = hashlib.sha256().digest_size
 VERSIONS = f"{numba.__version__} {np.__version__} {sys.implementation.cache_tag}"
 KNOWN_BY_NAME = ("numpy", "numba", "math", "builtins")
 """Packages whose functions are what their name and version say."""
+PATIENCE_S = 60.0
+"""How long a process that compiles a kernel is waited for."""
 
 
 class UnkeyedError(TypeError):
@@ -43,12 +47,13 @@ class UnkeyedError(TypeError):
 class KernelCache:
     """Keeps what a kernel is compiled to, in place of Numba's own cache.
 
-    Where nothing can be kept (no key, no room, no right to write), each process compiles it for itself; what is damaged
-    is written again.
+    Processes that need it at once wait for the first. Where nothing can be kept (no key, no room, no right to write),
+    each compiles it for itself; what is damaged is written again.
     """
 
     def __init__(self, kernel: Dispatcher) -> None:
         self._kernel = kernel
+        self._turns: dict[Path, sqlite3.Connection] = {}
 
     @functools.cached_property
     def _parts(self) -> bytes:
@@ -76,29 +81,49 @@ class KernelCache:
     ) -> CompileResult | None:
         target_context.refresh()
         try:
-            data = self.path(sig, target_context.codegen()).read_bytes()
-        except (OSError, UnkeyedError):
+            place = self.path(sig, target_context.codegen())
+        except UnkeyedError:
             return None
-        if hashlib.sha256(data[CHECKSUM:]).digest() != data[:CHECKSUM]:
-            return None
-        return CompileResult._rebuild(target_context, *pickle.loads(data[CHECKSUM:]))
+        data = _kept(place)
+        if data is None and self._take_turn(place):
+            data = _kept(place)  # by the process that had its turn before
+            if data is not None:
+                self._give_up_turn(place)
+        return CompileResult._rebuild(target_context, *pickle.loads(data)) if data else None
 
     def save_overload(self, sig: Signature | tuple[Type, ...], data: CompileResult) -> None:
-        if any(not one.can_cache for one in data.lifted) or data.library.has_dynamic_globals:
-            return
         try:
             place = self.path(sig, data.codegen)
-            content = dumps(data._reduce())
-            place.parent.mkdir(parents=True, exist_ok=True)
-            handle, name = tempfile.mkstemp(dir=place.parent)
-            try:
-                with open(handle, "wb") as file:
-                    file.write(hashlib.sha256(content).digest() + content)
-                os.replace(name, place)
-            except OSError:
-                Path(name).unlink(missing_ok=True)
-        except (OSError, UnkeyedError):
+        except UnkeyedError:
             return
+        if all(one.can_cache for one in data.lifted) and not data.library.has_dynamic_globals:
+            _keep(place, dumps(data._reduce()))
+        self._give_up_turn(place)
+
+    def _take_turn(self, place: Path) -> bool:
+        """Wait until this process is the one that compiles it; whether that is new. The system frees what is held by a
+        process that dies.
+        """
+        if place in self._turns:
+            return False
+        try:
+            place.parent.mkdir(parents=True, exist_ok=True)
+            turn = sqlite3.connect(
+                place.with_suffix(".turn"), timeout=PATIENCE_S, isolation_level=None, check_same_thread=False
+            )
+            self._turns[place] = turn
+            turn.execute("PRAGMA journal_mode = MEMORY")
+            turn.execute("BEGIN EXCLUSIVE")
+        except (OSError, sqlite3.DatabaseError):  # no place for it, or it took too long
+            return False
+        return True
+
+    def _give_up_turn(self, place: Path) -> None:
+        turn = self._turns.pop(place, None)
+        if turn is not None:
+            turn.close()
+            with contextlib.suppress(OSError):
+                place.with_suffix(".turn").unlink(missing_ok=True)
 
 
 @functools.cache
@@ -165,3 +190,25 @@ def _parts_of_code(
 
 def _known(module: str | None) -> bool:
     return (module or "").partition(".")[0] in KNOWN_BY_NAME
+
+
+def _kept(place: Path) -> bytes | None:
+    """What is kept there; None where there is nothing, or it is damaged."""
+    try:
+        data = place.read_bytes()
+    except OSError:
+        return None
+    return data[CHECKSUM:] if hashlib.sha256(data[CHECKSUM:]).digest() == data[:CHECKSUM] else None
+
+
+def _keep(place: Path, content: bytes) -> None:
+    try:
+        handle, name = tempfile.mkstemp(dir=place.parent)
+        try:
+            with open(handle, "wb") as file:
+                file.write(hashlib.sha256(content).digest() + content)
+            os.replace(name, place)
+        except OSError:
+            Path(name).unlink(missing_ok=True)
+    except OSError:
+        return

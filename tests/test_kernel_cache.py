@@ -5,6 +5,7 @@ import importlib
 import os
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
@@ -17,6 +18,7 @@ from numba.core.dispatcher import Dispatcher
 
 from studio import kernel_cache
 from studio.kernel_cache import parts_of
+from studio.sessions.process_lock import ProcessLock
 
 ROOT = Path(__file__).resolve().parents[1]
 HELPERS = """
@@ -150,6 +152,40 @@ def test_a_damaged_file_and_a_folder_that_cannot_be_written_cost_a_compilation(
     monkeypatch.setattr(kernel_cache, "folder", lambda: kept)
     assert answer(checkout("four")) == 227.0
     assert sorted(compiled) == ["later", "scaled", "squared", "total", "total"]
+
+
+def test_who_compiles_it_just_now_is_waited_for(
+    compiled: list[str],
+    checkout: Callable[..., ModuleType],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    answer(checkout("one"))
+    assert not list((tmp_path / "kept").glob("*.turn"))
+    (kept,) = (tmp_path / "kept").glob("kernels.total-*")
+    content = kept.read_bytes()
+    compiled.clear()
+    kept.unlink()
+    other = ProcessLock.take(kept.with_suffix(".turn"))
+    assert other is not None
+
+    def ends() -> None:
+        kept.write_bytes(content)
+        other.free()
+
+    ending = threading.Timer(0.3, ends)
+    ending.start()
+    assert answer(checkout("two")) == 227.0
+    ending.join()
+    assert not compiled
+    # One that never ends is not waited for forever.
+    kept.unlink()
+    other = ProcessLock.take(kept.with_suffix(".turn"))
+    assert other is not None
+    monkeypatch.setattr(kernel_cache, "PATIENCE_S", 0.1)
+    assert answer(checkout("three")) == 227.0
+    assert compiled == ["total"]
+    other.free()
 
 
 def digests() -> dict[str, str]:
