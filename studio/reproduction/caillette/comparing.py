@@ -6,7 +6,6 @@ for every tracker alike. So trackers are judged by the angle between a limb and 
 depend on the angles' branch; joint angles are reported too.
 """
 
-import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from operator import attrgetter
 from typing import Any
@@ -49,13 +48,6 @@ MEASURES: Mapping[str, tuple[str, str]] = {
 def by_contender(outcomes: Iterable[Outcome]) -> dict[str, list[Followed]]:
     """The measurements by contender in the order of the trials, seeds in order."""
     return grouped(outcomes, Followed)
-
-
-def beginning(run: Followed, frames: int) -> Followed:
-    """The run cut off after `frames` frames; `mean_mm` stays that of the whole."""
-    names = ("angle_deg", "limb_deg", "position_mm", "centre_mm", "lost", "free")
-    parts = {name: getattr(run, name)[:frames] for name in names}
-    return dataclasses.replace(run, **parts)
 
 
 def longest_loss(run: Followed) -> float:
