@@ -64,6 +64,8 @@ MEASURES = (
     ),
     Measure("a whole frame, default tracker", ("frames", "default", "ms"), "ms", 25.0, LESS),
     Measure("of it refinement, one thread", ("frames", "default", "refinement_ms"), "ms", 5.0, LESS),
+    Measure("a whole frame, improved filter 10 × 200", ("frames", "improved", "ms"), "ms", 16.7, LESS),
+    Measure("a whole frame, swarm 1000", ("frames", "swarm", "ms"), "ms", 16.7, LESS),
     Measure("a whole frame of the benchmark's", ("frames", "bodytrack", "ms"), "ms", 7.5, LESS),
     Measure("live, scene open, 30 Hz", ("live", "scene_open", "frames_per_second"), "/s", 30.0),
     Measure("live frames dropped", ("live", "scene_open", "dropped_share"), "%", 0.1, LESS, scale=100.0),

@@ -1,6 +1,8 @@
 """Whole frames from recorded video: decoding, masks, maps, search, refinement, verdict and store, as a run does them.
 
-The bundled walk, four 640 × 480 videos. `DEFAULT` is the default tracker with its 1000 evaluations. `BODYTRACK` is what
+The bundled walk, four 640 × 480 videos. `DEFAULT` is the default tracker with its 1000 evaluations. `IMPROVED` and
+`SWARM` are the papers' searches alone, nothing refined: the improved filter's 10 layers of 200 particles weighed by
+edges and region, and 1000 evaluations of the swarm weighed by its own fitness. `BODYTRACK` is what
 the benchmark published with the Lee-walk data computes for a frame: its likelihood, 5 layers of 1000 particles, its
 edge maps, nothing refined. Every stage on every thread is recorded (`tracing`), so that a trace shows who waits
 for whom.
@@ -21,10 +23,21 @@ from studio.runs.new_run import prepare_run
 from studio.runs.samples import install_sample
 from studio.sessions.workspace import Workspace
 from studio.tracing import Trace, recorded
+from studio.trackers.catalogue import TRACKERS
 
-DEFAULT, BODYTRACK = "default", "bodytrack"
+DEFAULT, IMPROVED, SWARM, BODYTRACK = "default", "improved", "swarm", "bodytrack"
 WORKLOADS: Mapping[str, Mapping[str, Any]] = {
     DEFAULT: {},
+    IMPROVED: {
+        "tracker": "annealed",
+        "weighting": "edge-region",
+        "knobs": {"layers": 10, "particles": 200, "refine_frames": False},
+    },
+    SWARM: {
+        "tracker": "swarm",
+        "weighting": "edge-silhouette",
+        "knobs": {**TRACKERS["swarm"].evaluation_knobs(1000, 0), "refine_frames": False},
+    },
     BODYTRACK: {
         "tracker": "annealed",
         "weighting": "bodytrack",

@@ -70,7 +70,8 @@ PARTS: dict[str, Callable[[Progress], dict[str, object]]] = {
     "--workload",
     type=click.Choice(tuple(WORKLOADS)),
     multiple=True,
-    help="Whole frames of this: the default tracker, or what the published benchmark computes; default: both.",
+    help="Whole frames of this: the default tracker, the improved filter's or the swarm's search alone, or what the "
+    "published benchmark computes; default: all.",
 )
 @click.option(
     "--trace",

@@ -13,10 +13,10 @@ Frames are twelve rows of sixteen lanes as in `outline_kernels`, from which the 
 
 import numpy as np
 
-from studio.arrays import Array, Floats, Indices
+from studio.arrays import Array, Floats, Indices, Mask
 from studio.likelihood.kinematic_program import KinematicProgram
 from studio.likelihood.outline_kernels import LANES, ONE, ZERO, block_frames
-from studio.numba_in_threads import FAST, FAST_INLINED, njit
+from studio.numba_in_threads import EXACT, FAST, FAST_INLINED, njit
 
 # Squared sine of two axes' angle below which they count as parallel; squared mm that count as nothing.
 PARALLEL, NOTHING = np.float32(1.0e-6), np.float32(1.0e-6)
@@ -100,3 +100,14 @@ def ratio_blocks(
             )  # fmt: skip
             for lane in range(LANES):
                 out[block, pair, lane] = ratios[lane]
+
+
+@njit(**EXACT)
+def within_limits(poses: Array, lower: Array, upper: Array) -> Mask:
+    """(N,) whether every parameter of poses (N, D) is finite and within its limits (D,), both included."""
+    held = np.ones(len(poses), np.bool_)
+    for n in range(len(poses)):
+        for d in range(poses.shape[1]):
+            value = poses[n, d]
+            held[n] &= lower[d] <= value <= upper[d] and np.isfinite(value)
+    return held

@@ -25,7 +25,7 @@ from studio.arrays import Array, Floats
 from studio.body.forward_kinematics import checked_poses, limb_frames
 from studio.body.model import BodyModel, kinematic_tables
 from studio.errors import BodyError
-from studio.likelihood.hard_prior_kernels import ratio_blocks
+from studio.likelihood.hard_prior_kernels import ratio_blocks, within_limits
 from studio.likelihood.kinematic_program import KinematicProgram, compile_program
 from studio.likelihood.outline_kernels import LANES
 from studio.numba_in_threads import parallel_blocks
@@ -76,7 +76,7 @@ class HardPriors:
         pose with a NaN or an infinity.
         """
         poses = checked_poses(self.body, poses)
-        held = np.all((poses >= self.lower) & (poses <= self.upper) & np.isfinite(poses), axis=1)
+        held = within_limits(poses, self.lower, self.upper)
         if limbs_apart and held.any():
             held[held] = self.apart(poses[held])
         return held

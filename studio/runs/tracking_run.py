@@ -341,6 +341,8 @@ class TrackingRun:
     def _held_in(self, frame: int, settings: RunSettings) -> RunSettings:
         """The settings, with those that cannot change inside a frame as at its first layer."""
         held = self._settings_at(frame)[1]
+        if held is settings:
+            return settings
         return dataclasses.replace(
             settings,
             weighting=held_over(settings.weighting, held.weighting),

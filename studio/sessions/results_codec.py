@@ -38,7 +38,7 @@ from studio.trackers.tracker import (
 )
 from studio.typed_decoding import is_table
 
-LEVEL = 1
+LEVEL = -1
 LARGEST_BLOB = 1 << 30
 _NPZ = b"PK"
 """Begins the archives of a store's first version."""

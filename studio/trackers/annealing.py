@@ -67,10 +67,13 @@ def anneal(log_weights: Array, wanted: float, start: float | None = None) -> Ann
 def _root(below: Array, smallest_gap: float, effective: float, start: float | None) -> float:
     """β at which D (Eq. 11) equals `effective`, or the nearest bound; below : (K,) max log w - log w."""
     negative = -below
+    powers, squares = np.empty_like(negative), np.empty_like(negative)
 
     def excess(log_beta: float) -> float:
-        powers = np.exp(negative * math.exp(log_beta))
-        return float(np.add.reduce(powers)) ** 2 / float(np.add.reduce(powers * powers)) - effective
+        np.multiply(negative, math.exp(log_beta), powers)
+        np.exp(powers, powers)
+        np.multiply(powers, powers, squares)
+        return float(np.add.reduce(powers)) ** 2 / float(np.add.reduce(squares)) - effective
 
     lowest = max(math.log(1e-9) - math.log(float(np.max(below))), -LOG_BETA_BOUND)
     highest = min(math.log(FAR) - math.log(smallest_gap), LOG_BETA_BOUND)
@@ -88,8 +91,11 @@ def _first_guess(below: Array, start: float | None) -> float:
     """Initial log β: the given start, or the value that spreads the weights over about one e-fold."""
     if start is not None and math.isfinite(start) and start > 0.0:
         return math.log(start)
-    spread = float(np.std(below / np.max(below)))
-    return -math.log(float(np.max(below))) - math.log(max(spread, 1e-12))
+    most = float(np.max(below))
+    shares = below / most
+    away = shares - np.add.reduce(shares) / len(shares)
+    spread = math.sqrt(float(np.add.reduce(away * away)) / len(away))
+    return -math.log(most) - math.log(max(spread, 1e-12))
 
 
 def _bracket(

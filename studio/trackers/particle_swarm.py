@@ -32,6 +32,7 @@ from studio.trackers.guided_particles import foreseen, is_guided
 from studio.trackers.guided_swarm import BEFORE, handed_on, leader_arrived, predicted_starts
 from studio.trackers.hard_priors import Indices, Mask, Proposals, possible, settled
 from studio.trackers.model_free import FREE, judged, share_in
+from studio.trackers.particle_kernels import moments
 from studio.trackers.particles import checked_values, expected, uniform_poses, unweighted
 from studio.trackers.partitions import Stage, evaluations, layer_count, moment_of, stages_of
 from studio.trackers.swarm_settings import PRESETS, VARIANTS, SwarmSettings
@@ -313,7 +314,7 @@ def _record(
     """The record of a layer; the frame loop fills in frame, version and time. free : `share_in`."""
     values = weighed.raw_log_weights
     best = int(np.argmax(np.where(allowed, values, -np.inf) if allowed.any() else values))
-    kept = weighed.extra[BEST_POSES].var(axis=0)
+    kept, own = moments(weighed.extra[BEST_POSES]).variance, moments(weighed.poses)
     return LayerRecord(
         frame=-1,
         layer=layer,
@@ -321,12 +322,12 @@ def _record(
         beta=math.nan,
         alpha_wanted=math.nan,
         alpha_reached=math.nan,
-        variance_weighed=weighed.poses.var(axis=0),
+        variance_weighed=own.variance,
         variance_resampled=kept,
-        variance_diffused=kept if following is weighed else following.poses.var(axis=0),
+        variance_diffused=kept if following is weighed else moments(following.poses).variance,
         best=weighed.poses[best],
         best_log_weight=float(values[best]),
-        mean=weighed.poses.mean(axis=0),
+        mean=own.mean,
         poses=weighed.poses,
         log_weights=values,
         milliseconds=0.0,

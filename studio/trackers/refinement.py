@@ -175,22 +175,22 @@ class Refiner:
     def frame_loss(self, start: Array, silhouettes: Sequence[Distances]) -> "FrameLoss":
         """A frame's loss as a function of poses near `start` (D,); without silhouettes only the pull."""
         prepared = self._prepared(start, silhouettes) if silhouettes else None
+        pull = self.settings.refinement_pull**2
 
         def equations(pose: Array) -> Equations:
             size = len(pose)
-            own = (
+            loss, gradient, matrix = (
                 (0.0, np.zeros(size), np.zeros((size, size)))
                 if prepared is None
                 else self._equations(pose, prepared)
             )
-            pull = self.settings.refinement_pull**2
             away, bent = (pose - start) / self.unit, (pose - self.neutral) / self.unit
-            loss = own[0] + pull * float(away @ away) + float(self.stiffness @ np.square(bent))
-            return (
-                loss,
-                own[1] + pull * away + self.stiffness * bent,
-                own[2] + pull * np.eye(size) + np.diag(self.stiffness),
-            )
+            gradient += pull * away
+            gradient += self.stiffness * bent
+            diagonal = matrix.reshape(-1)[:: size + 1]
+            diagonal += pull
+            diagonal += self.stiffness
+            return loss + pull * float(away @ away) + float(self.stiffness @ np.square(bent)), gradient, matrix
 
         return equations
 

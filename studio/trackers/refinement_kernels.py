@@ -31,7 +31,7 @@ def turning(quad):
 
 
 @njit(**EXACT)
-def in_another(x, y, quads, usable, turns, boxes, own):
+def in_another(x, y, quads, usable, sides, boxes, own):
     """Whether a point lies inside (by MARGIN pixels) the quadrilateral of another limb than `own`."""
     for limb in range(quads.shape[0]):
         if limb == own or not usable[limb]:
@@ -40,11 +40,9 @@ def in_another(x, y, quads, usable, turns, boxes, own):
             continue
         inside = True
         for corner in range(4):
-            following = (corner + 1) & 3
-            ex = quads[limb, following, 0] - quads[limb, corner, 0]
-            ey = quads[limb, following, 1] - quads[limb, corner, 1]
+            ex, ey, least = sides[limb, corner, 0], sides[limb, corner, 1], sides[limb, corner, 2]
             across = ex * (y - quads[limb, corner, 1]) - ey * (x - quads[limb, corner, 0])
-            if turns[limb] * across <= MARGIN * np.sqrt(ex * ex + ey * ey):
+            if across <= least:
                 inside = False
                 break
         if inside:
@@ -83,36 +81,54 @@ def add_limbs(normals, pulls, slopes, usable, which, matrix, gradient):
 
     normals : (L, 8, 8) lower halves, pulls : (L, 8). slopes : (L, 4, 2, D) of the corners. which : (D,) scratch.
     """
-    mirrored = np.zeros((8, 8))
+    mirrored, product = np.zeros((8, 8)), np.zeros(8)
+    moving, row = np.zeros((8, len(which))), np.zeros(len(which))
+    m0, m1, m2, m3 = moving[0], moving[1], moving[2], moving[3]
+    m4, m5, m6, m7 = moving[4], moving[5], moving[6], moving[7]
     for limb in range(slopes.shape[0]):
         if not usable[limb]:
             continue
-        own = slopes[limb]
+        own = slopes[limb].reshape(8, len(which))
         count = 0
-        for p in range(own.shape[2]):
+        for p in range(len(which)):
             moves = False
-            for corner in range(4):
-                moves |= own[corner, 0, p] != 0.0 or own[corner, 1, p] != 0.0
+            for i in range(8):
+                moves |= own[i, p] != 0.0
             if moves:
                 which[count] = p
+                for i in range(8):
+                    moving[i, count] = own[i, p]
                 count += 1
         for i in range(8):
             for j in range(i + 1):
                 mirrored[i, j] = mirrored[j, i] = normals[limb, i, j]
         for a in range(count):
             p = which[a]
+            product[:] = 0.0
+            for i in range(8):
+                for j in range(8):
+                    product[j] += mirrored[i, j] * moving[i, a]
             for j in range(8):
-                product = 0.0
-                for i in range(8):
-                    product += mirrored[i, j] * own[i >> 1, i & 1, p]
-                gradient[p] += pulls[limb, j] * own[j >> 1, j & 1, p]
-                if product != 0.0:
-                    for b in range(a + 1):
-                        matrix[p, which[b]] += product * own[j >> 1, j & 1, which[b]]
+                gradient[p] += pulls[limb, j] * moving[j, a]
+            q0, q1, q2, q3 = product[0], product[1], product[2], product[3]
+            q4, q5, q6, q7 = product[4], product[5], product[6], product[7]
+            for b in range(a + 1):
+                row[b] = matrix[p, which[b]]
+            for b in range(a + 1):
+                total = row[b] + q0 * m0[b]
+                total = total + q1 * m1[b]
+                total = total + q2 * m2[b]
+                total = total + q3 * m3[b]
+                total = total + q4 * m4[b]
+                total = total + q5 * m5[b]
+                total = total + q6 * m6[b]
+                row[b] = total + q7 * m7[b]
+            for b in range(a + 1):
+                matrix[p, which[b]] = row[b]
 
 
 @njit(**EXACT)
-def nearest_edge(x, y, ox, oy, quads, usable, turns, boxes, ends, reach):
+def nearest_edge(x, y, ox, oy, quads, usable, turns, sides, boxes, ends, reach):
     """Limb, edge, place along it and squared distance (pixels) of the union's border nearest to a point with outward
     direction (ox, oy); limb -1 where none is within reach.
     """
@@ -140,7 +156,7 @@ def nearest_edge(x, y, ox, oy, quads, usable, turns, boxes, ends, reach):
             sign = -turns[limb] if side == 1 else turns[limb]
             if sign * (ox * ey - oy * ex) < SAME_WAY * np.sqrt(squared):
                 continue
-            if in_another(px, py, quads, usable, turns, boxes, limb):
+            if in_another(px, py, quads, usable, sides, boxes, limb):
                 continue
             found, edge, place, nearest = limb, side, u, distance
     return found, edge, place, nearest
@@ -166,7 +182,7 @@ def beyond(distance, slack):
 
 
 @njit(**EXACT)
-def add_border(border, quads, usable, turns, boxes, ends, slack, mm, scale, normals, pulls):
+def add_border(border, quads, usable, turns, sides, boxes, ends, slack, mm, scale, normals, pulls):
     """Border points (K, 4: place, outward) of one view to the outlines; returns their loss. slack : (L,) mm by which
     a limb's outline may be off at no cost. scale : c, mm.
     """
@@ -174,7 +190,7 @@ def add_border(border, quads, usable, turns, boxes, ends, slack, mm, scale, norm
     for k in range(border.shape[0]):
         x, y = border[k, 0], border[k, 1]
         limb, side, u, squared = nearest_edge(
-            x, y, border[k, 2], border[k, 3], quads, usable, turns, boxes, ends, 4.0 * scale / mm
+            x, y, border[k, 2], border[k, 3], quads, usable, turns, sides, boxes, ends, 4.0 * scale / mm
         )
         away = np.sqrt(squared) * mm
         if limb >= 0:
@@ -197,7 +213,7 @@ def add_border(border, quads, usable, turns, boxes, ends, slack, mm, scale, norm
 
 @njit(**EXACT)
 def add_outline(
-    values, view, size, quads, usable, turns, boxes, ends, slack, mm, scale, part, normals, pulls
+    values, view, size, quads, usable, sides, boxes, ends, slack, mm, scale, part, normals, pulls
 ):
     """Samples of one view's outlines to the silhouette's border; returns their loss. part : weight of a sample relative
     to a border point. view : start, width, height of its map in `values`, and in columns 5 and 6 where that begins in
@@ -215,7 +231,7 @@ def add_outline(
                 y = (1.0 - u) * quads[limb, first, 1] + u * quads[limb, second, 1]
                 if not (0.0 <= x < size[0] - 1.0 and 0.0 <= y < size[1] - 1.0):
                     continue
-                if in_another(x, y, quads, usable, turns, boxes, limb):
+                if in_another(x, y, quads, usable, sides, boxes, limb):
                     continue
                 there, value, nx, ny = read_map(x - view[5], y - view[6], values, view[0], view[1], view[2])
                 if not there:
@@ -230,15 +246,31 @@ def add_outline(
 
 
 @njit(**EXACT)
-def look_at_limbs(quads, slopes, usable, turns, boxes):
-    """Fill, of one view's limbs, usable (L,), whether it is seen, turns (L,), its orientation, and boxes
-    (L, 4): left, top, right, bottom.
+def all_finite(values):
+    """Whether all of (K,) are finite: a sum would be made one after the other."""
+    wrong = 0
+    for k in range(values.shape[0]):
+        wrong += values[k] - values[k] != 0.0
+    return wrong == 0
+
+
+@njit(**EXACT)
+def look_at_limbs(quads, slopes, usable, turns, sides, boxes):
+    """Fill, of one view's limbs, usable (L,), whether it is seen, turns (L,), its orientation, sides (L, 4, 3): of each
+    side its direction, turned so that inside is on its left, and MARGIN times its length; and boxes (L, 4): left, top,
+    right, bottom.
     """
     for limb in range(quads.shape[0]):
-        usable[limb] = np.isfinite(quads[limb].sum()) and np.isfinite(slopes[limb].sum())
+        usable[limb] = np.isfinite(quads[limb].sum()) and all_finite(slopes[limb].reshape(-1))
         turns[limb] = turning(quads[limb])
         boxes[limb, 0], boxes[limb, 2] = quads[limb, :, 0].min(), quads[limb, :, 0].max()
         boxes[limb, 1], boxes[limb, 3] = quads[limb, :, 1].min(), quads[limb, :, 1].max()
+        for corner in range(4):
+            following = (corner + 1) & 3
+            ex = quads[limb, following, 0] - quads[limb, corner, 0]
+            ey = quads[limb, following, 1] - quads[limb, corner, 1]
+            sides[limb, corner, 0], sides[limb, corner, 1] = turns[limb] * ex, turns[limb] * ey
+            sides[limb, corner, 2] = MARGIN * np.sqrt(ex * ex + ey * ey)
 
 
 @njit(**EXACT)
@@ -275,18 +307,20 @@ def normal_equations(
     point; at 0 there are no maps.
     """
     limbs = quads.shape[1]
-    normals, pulls, boxes = np.zeros((limbs, 8, 8)), np.zeros((limbs, 8)), np.zeros((limbs, 4))
+    normals, pulls = np.zeros((limbs, 8, 8)), np.zeros((limbs, 8))
+    sides, boxes = np.zeros((limbs, 4, 3)), np.zeros((limbs, 4))
     usable, turns, which = np.zeros(limbs, np.bool_), np.zeros(limbs), np.zeros(slopes.shape[4], np.int64)
     matrix[:] = 0.0
     gradient[:] = 0.0
     loss = 0.0
     for v in range(quads.shape[0]):
-        look_at_limbs(quads[v], slopes[v], usable, turns, boxes)
+        look_at_limbs(quads[v], slopes[v], usable, turns, sides, boxes)
         normals[:], pulls[:] = 0.0, 0.0
-        view, limits = quads[v], (usable, turns, boxes, ends, slack, mm[v], scales[v])
-        loss += add_border(border[views[v, 3] : views[v, 4]], view, *limits, normals, pulls)
+        view, limits = quads[v], (sides, boxes, ends, slack, mm[v], scales[v])
+        seen = border[views[v, 3] : views[v, 4]]
+        loss += add_border(seen, view, usable, turns, *limits, normals, pulls)
         if part > 0.0:
-            loss += add_outline(maps, views[v], sizes[v], view, *limits, part, normals, pulls)
+            loss += add_outline(maps, views[v], sizes[v], view, usable, *limits, part, normals, pulls)
         add_limbs(normals, pulls, slopes[v], usable, which, matrix, gradient)
     mirror_lower_half(matrix)
     return loss
