@@ -20,7 +20,7 @@ from studio.numba_in_threads import FAST, FAST_INLINED, njit
 
 CHUNK = 16
 EDGE_LINES, REGION_LINES = 2, 3
-LINE_ROWS = 4
+LINE = 4 * LANES
 # Across a limb: the middles of three equal strips.
 FIRST_STRIP, SECOND_STRIP, THIRD_STRIP = np.float32(1.0 / 6.0), np.float32(0.5), np.float32(5.0 / 6.0)
 NOTHING_SEEN, NOT_COUNTED = 0, 1
@@ -32,34 +32,33 @@ ONE_ON, ROW_ON, TWO_ROWS_ON = np.uint64(1), np.uint64(8), np.uint64(16)
 
 
 @njit(**FAST_INLINED)
-def store_line(line, lane, a, b, fraction, samples):
-    """Keep the line at a fraction of the way from side a to side b (x, y, dx, dy): the place of its first sample and
-    the step to the next; samples lie at (j + 1/2) / samples."""
+def store_line(lines, number, lane, a, b, fraction, samples):
+    """Keep the line at a fraction of the way from side a to side b (x, y, dx, dy) as line `number`: the place of its
+    first sample and the step to the next; samples lie at (j + 1/2) / samples."""
     step_x, step_y = (a[2] + fraction * (b[2] - a[2])) / samples, (a[3] + fraction * (b[3] - a[3])) / samples
-    line[lane] = a[0] + fraction * (b[0] - a[0]) + HALF * step_x
-    line[LANES + lane] = a[1] + fraction * (b[1] - a[1]) + HALF * step_y
-    line[2 * LANES + lane] = step_x
-    line[3 * LANES + lane] = step_y
+    lines[number * LINE + lane] = a[0] + fraction * (b[0] - a[0]) + HALF * step_x
+    lines[number * LINE + LANES + lane] = a[1] + fraction * (b[1] - a[1]) + HALF * step_y
+    lines[number * LINE + 2 * LANES + lane] = step_x
+    lines[number * LINE + 3 * LANES + lane] = step_y
 
 
 @njit(**FAST)
-def limb_lines(outline, edges, region, edge_samples, region_samples):
-    """The lines of a limb of sixteen poses, from its outlines (160,) in one view.
+def limb_lines(outline, lines, edge_samples, region_samples):
+    """The five lines of a limb of sixteen poses, from its outlines (160,) in one view.
 
-    edges (2, 64), region (3, 64) : four rows of sixteen lanes a line, pixels, half a pixel on so that flooring rounds.
+    lines : (320,): four rows of sixteen lanes a line, pixels, half a pixel on so that flooring rounds.
     """
-    side_a, side_b, first, second, third = edges[0], edges[1], region[0], region[1], region[2]
     for lane in range(LANES):
         ax, ay = outline[lane] + HALF, outline[LANES + lane] + HALF
         ex, ey = outline[6 * LANES + lane] + HALF, outline[7 * LANES + lane] + HALF
         bx, by = outline[2 * LANES + lane] + HALF - ax, outline[3 * LANES + lane] + HALF - ay
         cx, cy = outline[4 * LANES + lane] + HALF - ex, outline[5 * LANES + lane] + HALF - ey
         a, b = (ax, ay, bx, by), (ex, ey, cx, cy)
-        store_line(side_a, lane, a, b, ZERO, edge_samples)
-        store_line(side_b, lane, a, b, ONE, edge_samples)
-        store_line(first, lane, a, b, FIRST_STRIP, region_samples)
-        store_line(second, lane, a, b, SECOND_STRIP, region_samples)
-        store_line(third, lane, a, b, THIRD_STRIP, region_samples)
+        store_line(lines, 0, lane, a, b, ZERO, edge_samples)
+        store_line(lines, 1, lane, a, b, ONE, edge_samples)
+        store_line(lines, 2, lane, a, b, FIRST_STRIP, region_samples)
+        store_line(lines, 3, lane, a, b, SECOND_STRIP, region_samples)
+        store_line(lines, 4, lane, a, b, THIRD_STRIP, region_samples)
 
 
 @njit(**FAST_INLINED)
@@ -83,21 +82,22 @@ def fill_whole(lines, samples, width, indices):
 
     Two samples at once, so that the lanes are vectorised and not written out one by one.
     """
-    half = samples // 2
+    row = indices.ravel()
+    at = np.uint64(0)
     for number in range(lines.shape[0]):
         line = lines[number]
-        for sample in range(half):
-            one, two = np.float32(np.int32(sample)), np.float32(np.int32(sample + half))
-            near, far = indices[number * samples + sample], indices[number * samples + sample + half]
-            for lane in range(LANES):
-                near[lane] = pixel(sample_place(line, one, lane), width)
-                far[lane] = pixel(sample_place(line, two, lane), width)
+        for sample in range(0, samples, 2):
+            one, two = np.float32(np.int32(sample)), np.float32(np.int32(sample + 1))
+            for lane in range(np.uint64(LANES)):
+                row[at + lane] = pixel(sample_place(line, one, lane), width)
+                row[at + np.uint64(LANES) + lane] = pixel(sample_place(line, two, lane), width)
+            at += np.uint64(2 * LANES)
 
 
 @njit(**FAST)
-def fill_clipped(lines, seen, samples, width, height, nothing, indices):
-    """Indices of lines (K, 64) of a limb that may leave the picture: samples outside it, and all of poses that do not
-    see the limb (`seen` (16,) is negative there), read `nothing`."""
+def fill_clipped(lines, outline, samples, width, height, nothing, indices):
+    """Indices of lines (K, 64) of a limb that may leave the picture: samples outside it, and all of a pose that does
+    not see the limb, read `nothing`."""
     for number in range(lines.shape[0]):
         line = lines[number]
         for sample in range(samples):
@@ -105,23 +105,28 @@ def fill_clipped(lines, seen, samples, width, height, nothing, indices):
             for lane in range(LANES):
                 place = sample_place(line, step, lane)
                 x, y = place
-                inside = (x >= ZERO) & (x < width) & (y >= ZERO) & (y < height) & (seen[lane] > -HALF)
+                inside = (
+                    (x >= ZERO)
+                    & (x < width)
+                    & (y >= ZERO)
+                    & (y < height)
+                    & (outline[8 * LANES + lane] > -HALF)
+                )
                 row[lane] = pixel(place, width) if inside else nothing
 
 
-@njit(**FAST)
+@njit(**FAST_INLINED)
 def fill_lines(outline, lines, samples, view, indices):
     """Indices (K samples, 16) of lines (K, 64) of a limb of sixteen poses, whose outlines (160,) say how it is seen."""
-    seen = outline[8 * LANES : 9 * LANES]
-    least = ONE
+    inside = np.int32(0)
     for lane in range(LANES):
-        least = min(least, seen[lane])
+        inside += np.int32(outline[8 * LANES + lane] > HALF)
     width = np.float32(view[2])
-    if least > HALF:
+    if inside == LANES:
         fill_whole(lines, samples, width, indices)
     else:
         nothing = np.uint32(view[2] * view[3] + NOTHING_SEEN)
-        fill_clipped(lines, seen, samples, width, np.float32(view[3]), nothing, indices)
+        fill_clipped(lines, outline, samples, width, np.float32(view[3]), nothing, indices)
 
 
 @njit(**FAST)
@@ -162,8 +167,8 @@ def add_lanes(values, base, pairs, sums):
             b += values[(r >> UPPER) + base]
             c += values[(s & LOW) + base]
             d += values[(s >> UPPER) + base]
-            k += TWO_ROWS_ON
-            p, q, r, s = pairs[k], pairs[k + ONE_ON], pairs[k + ROW_ON], pairs[k + ROW_ON + ONE_ON]
+            p, q = pairs[k + TWO_ROWS_ON], pairs[k + TWO_ROWS_ON + ONE_ON]
+            r, s = pairs[k + TWO_ROWS_ON + ROW_ON], pairs[k + TWO_ROWS_ON + ROW_ON + ONE_ON]
             a += values[(p & LOW) + base]
             b += values[(p >> UPPER) + base]
             c += values[(q & LOW) + base]
@@ -172,7 +177,7 @@ def add_lanes(values, base, pairs, sums):
             b += values[(r >> UPPER) + base]
             c += values[(s & LOW) + base]
             d += values[(s >> UPPER) + base]
-            k += TWO_ROWS_ON
+            k += TWO_ROWS_ON + TWO_ROWS_ON
         at = np.uint64(4 * quarter)
         sums[at] += np.int64(a)
         sums[at + np.uint64(1)] += np.int64(b)
@@ -243,8 +248,9 @@ def weight_blocks(
     edges = np.zeros((EDGE_LINES * edge_samples, LANES), np.uint32)
     region = np.zeros((REGION_LINES * region_samples, LANES), np.uint32)
     edge_pairs, region_pairs = as_pairs(edges).ravel(), as_pairs(region).ravel()
-    sides = np.zeros((EDGE_LINES, LINE_ROWS * LANES), np.float32)
-    strips = np.zeros((REGION_LINES, LINE_ROWS * LANES), np.float32)
+    lines = np.zeros((EDGE_LINES + REGION_LINES) * LINE, np.float32)
+    sides = lines[: EDGE_LINES * LINE].reshape((EDGE_LINES, LINE))
+    strips = lines[EDGE_LINES * LINE :].reshape((REGION_LINES, LINE))
     edge_sums, region_sums, lost = (
         np.zeros(LANES, np.int64),
         np.zeros(LANES, np.int64),
@@ -257,7 +263,7 @@ def weight_blocks(
             edge_sums[:], region_sums[:], lost[:] = 0, 0, 0
             for limb in range(limbs):
                 outline = outlines[block, view, limb]
-                limb_lines(outline, sides, strips, np.float32(edge_samples), np.float32(region_samples))
+                limb_lines(outline, lines, np.float32(edge_samples), np.float32(region_samples))
                 fill_lines(outline, sides, edge_samples, views[view], edges)
                 fill_lines(outline, strips, region_samples, views[view], region)
                 if hidden.shape[0]:
@@ -294,14 +300,15 @@ def record_indices(
     edge_samples, region_samples = edges.shape[4] * CHUNK, region.shape[4] * CHUNK
     side_indices = np.zeros((EDGE_LINES * edge_samples, LANES), np.uint32)
     strip_indices = np.zeros((REGION_LINES * region_samples, LANES), np.uint32)
-    sides = np.zeros((EDGE_LINES, LINE_ROWS * LANES), np.float32)
-    strips = np.zeros((REGION_LINES, LINE_ROWS * LANES), np.float32)
+    lines = np.zeros((EDGE_LINES + REGION_LINES) * LINE, np.float32)
+    sides = lines[: EDGE_LINES * LINE].reshape((EDGE_LINES, LINE))
+    strips = lines[EDGE_LINES * LINE :].reshape((REGION_LINES, LINE))
     lost = np.zeros(LANES, np.int64)
     for block in range(edges.shape[0]):
         for view in range(edges.shape[1]):
             for limb in range(edges.shape[3]):
                 outline = outlines[block, view, limb]
-                limb_lines(outline, sides, strips, np.float32(edge_samples), np.float32(region_samples))
+                limb_lines(outline, lines, np.float32(edge_samples), np.float32(region_samples))
                 fill_lines(outline, sides, edge_samples, views[view], side_indices)
                 fill_lines(outline, strips, region_samples, views[view], strip_indices)
                 if hidden.shape[0]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from studio.arrays import Array, Floats, Indices
 from studio.likelihood.edge_region_kernels import (
     CHUNK,
-    LINE_ROWS,
+    LINE,
     add_lanes,
     as_pairs,
     fill_lines,
@@ -39,7 +39,7 @@ def fill_edge(outline, corners, hidden, samples, view, line, indices, lost):
     for lane in range(LANES):
         x, y = begin[lane] + HALF, begin[LANES + lane] + HALF
         edge = x, y, end[lane] + HALF - x, end[LANES + lane] + HALF - y
-        store_line(kept, lane, edge, edge, ZERO, count)
+        store_line(kept, 0, lane, edge, edge, ZERO, count)
     fill_lines(outline, line, samples, view, indices)
     hide(hidden, samples, view, indices, lost)
 
@@ -64,7 +64,7 @@ def edge_blocks(
     samples = chunks * CHUNK
     indices = np.zeros((samples, LANES), np.uint32)
     pairs = as_pairs(indices).ravel()
-    line = np.zeros((1, LINE_ROWS * LANES), np.float32)
+    line = np.zeros((1, LINE), np.float32)
     sums, lost = np.zeros(LANES, np.int64), np.zeros(LANES, np.int64)
     size = corners.shape[0] * samples
     for block in range(first, last):
@@ -95,7 +95,7 @@ def record_edges(
     """The index stream of `edge_blocks`: (B, V, 16, K, chunks, 1, 16). For tests."""
     samples = found.shape[4] * CHUNK
     indices = np.zeros((samples, LANES), np.uint32)
-    line, lost = np.zeros((1, LINE_ROWS * LANES), np.float32), np.zeros(LANES, np.int64)
+    line, lost = np.zeros((1, LINE), np.float32), np.zeros(LANES, np.int64)
     for block in range(found.shape[0]):
         for view in range(found.shape[1]):
             for number in range(corners.shape[0]):
