@@ -2,11 +2,12 @@
 """Edge and region sums of Eq. 14 and 15 for many poses, in two passes: indices first, then bare loads.
 
 A limb in a view is five straight lines of n samples: its two sides (edges) and three lines within (region), n
-a multiple of sixteen, found for sixteen poses at a time. The first pass steps along a pose's lines, sixteen
-samples at a time, and writes which entries of the maps they fall on; the second adds those entries up, two
-indices in each 64-bit load. Maps are bytes that hold 255 (1 - p)² already. Each is followed by two entries for
-samples that fall on no pixel: NOTHING_SEEN costs the most that a sample can, NOT_COUNTED costs nothing and is
-left out of N.
+a multiple of sixteen, found for sixteen poses at a time. The first pass steps along the lines of a limb and writes
+which entries of the maps the samples fall on, a row of sixteen poses for each sample; the second adds those entries up,
+two indices in each 64-bit load. Sixteen poses of a cloud have a limb in nearly the same place, so what one of them has
+loaded into the cache the others find there, however the map is laid out. Maps are bytes that hold 255 (1 - p)²
+already. Each is followed by two entries for samples that fall on no pixel: NOTHING_SEEN costs the most that a sample
+can, NOT_COUNTED costs nothing and is left out of N.
 """
 
 import numpy as np
@@ -19,31 +20,33 @@ from studio.numba_in_threads import FAST, FAST_INLINED, njit
 
 CHUNK = 16
 EDGE_LINES, REGION_LINES = 2, 3
-LINE_ROWS = 4 * (EDGE_LINES + REGION_LINES)
+LINE = 4 * LANES
 # Across a limb: the middles of three equal strips.
 FIRST_STRIP, SECOND_STRIP, THIRD_STRIP = np.float32(1.0 / 6.0), np.float32(0.5), np.float32(5.0 / 6.0)
 NOTHING_SEEN, NOT_COUNTED = 0, 1
 PADDING = 2
 WORST = 255
 UPPER, LOW = np.uint64(32), np.uint64(0xFFFFFFFF)
+# Words from one to the next, to the next sample's, to those of the sample after it.
+ONE_ON, ROW_ON, TWO_ROWS_ON = np.uint64(1), np.uint64(8), np.uint64(16)
 
 
 @njit(**FAST_INLINED)
-def store_line(row, number, lane, a, b, fraction, samples):
-    """Keep the line at a fraction of the way from side a to side b (x, y, dx, dy) as a limb's line `number`:
-    the place of its first sample and the step to the next; samples lie at (j + 1/2) / samples."""
+def store_line(lines, number, lane, a, b, fraction, samples):
+    """Keep the line at a fraction of the way from side a to side b (x, y, dx, dy) as line `number`: the place of its
+    first sample and the step to the next; samples lie at (j + 1/2) / samples."""
     step_x, step_y = (a[2] + fraction * (b[2] - a[2])) / samples, (a[3] + fraction * (b[3] - a[3])) / samples
-    row[4 * number * LANES + lane] = a[0] + fraction * (b[0] - a[0]) + HALF * step_x
-    row[(4 * number + 1) * LANES + lane] = a[1] + fraction * (b[1] - a[1]) + HALF * step_y
-    row[(4 * number + 2) * LANES + lane] = step_x
-    row[(4 * number + 3) * LANES + lane] = step_y
+    lines[number * LINE + lane] = a[0] + fraction * (b[0] - a[0]) + HALF * step_x
+    lines[number * LINE + LANES + lane] = a[1] + fraction * (b[1] - a[1]) + HALF * step_y
+    lines[number * LINE + 2 * LANES + lane] = step_x
+    lines[number * LINE + 3 * LANES + lane] = step_y
 
 
-@njit(**FAST_INLINED)
-def limb_lines(outline, row, edge_samples, region_samples):
+@njit(**FAST)
+def limb_lines(outline, lines, edge_samples, region_samples):
     """The five lines of a limb of sixteen poses, from its outlines (160,) in one view.
 
-    row : (320,): four rows of sixteen lanes a line, pixels, half a pixel on so that truncation rounds.
+    lines : (320,): four rows of sixteen lanes a line, pixels, half a pixel on so that flooring rounds.
     """
     for lane in range(LANES):
         ax, ay = outline[lane] + HALF, outline[LANES + lane] + HALF
@@ -51,121 +54,135 @@ def limb_lines(outline, row, edge_samples, region_samples):
         bx, by = outline[2 * LANES + lane] + HALF - ax, outline[3 * LANES + lane] + HALF - ay
         cx, cy = outline[4 * LANES + lane] + HALF - ex, outline[5 * LANES + lane] + HALF - ey
         a, b = (ax, ay, bx, by), (ex, ey, cx, cy)
-        store_line(row, 0, lane, a, b, ZERO, edge_samples)
-        store_line(row, 1, lane, a, b, ONE, edge_samples)
-        store_line(row, 2, lane, a, b, FIRST_STRIP, region_samples)
-        store_line(row, 3, lane, a, b, SECOND_STRIP, region_samples)
-        store_line(row, 4, lane, a, b, THIRD_STRIP, region_samples)
-
-
-@njit(**FAST)
-def view_lines(outlines, block, view, lines, edge_samples, region_samples):
-    """The lines (L, 320) of all limbs of sixteen poses in one view."""
-    for limb in range(lines.shape[0]):
-        limb_lines(outlines[block, view, limb], lines[limb], edge_samples, region_samples)
+        store_line(lines, 0, lane, a, b, ZERO, edge_samples)
+        store_line(lines, 1, lane, a, b, ONE, edge_samples)
+        store_line(lines, 2, lane, a, b, FIRST_STRIP, region_samples)
+        store_line(lines, 3, lane, a, b, SECOND_STRIP, region_samples)
+        store_line(lines, 4, lane, a, b, THIRD_STRIP, region_samples)
 
 
 @njit(**FAST_INLINED)
-def line_at(lines, limb, number, lane):
-    """One line of one pose: place of its first sample and step, x, y, dx, dy."""
+def sample_place(line, number, lane):
+    """Where a sample of one pose's line lies."""
     return (
-        lines[limb, 4 * number * LANES + lane],
-        lines[limb, (4 * number + 1) * LANES + lane],
-        lines[limb, (4 * number + 2) * LANES + lane],
-        lines[limb, (4 * number + 3) * LANES + lane],
+        line[lane] + number * line[2 * LANES + lane],
+        line[LANES + lane] + number * line[3 * LANES + lane],
     )
 
 
 @njit(**FAST_INLINED)
-def pixel(line, sample, width):
-    """Number of the pixel nearest to a sample of a line (first place and step) inside the picture."""
-    number = np.float32(sample)
-    x, y = line[0] + number * line[2], line[1] + number * line[3]
-    return np.uint32(np.int32(np.floor(y) * width + np.floor(x)))
-
-
-@njit(**FAST_INLINED)
-def fill_edges(lines, limb, lane, width, edges):
-    """Indices of both sides of a limb that is wholly inside the picture."""
-    a, b = line_at(lines, limb, 0, lane), line_at(lines, limb, 1, lane)
-    for chunk in range(edges.shape[1]):
-        for j in range(CHUNK):
-            edges[limb, chunk, 0, j] = pixel(a, chunk * CHUNK + j, width)
-            edges[limb, chunk, 1, j] = pixel(b, chunk * CHUNK + j, width)
-
-
-@njit(**FAST_INLINED)
-def fill_region(lines, limb, lane, width, region):
-    """Indices of the three inner lines of a limb that is wholly inside the picture."""
-    a, b, c = line_at(lines, limb, 2, lane), line_at(lines, limb, 3, lane), line_at(lines, limb, 4, lane)
-    for chunk in range(region.shape[1]):
-        for j in range(CHUNK):
-            region[limb, chunk, 0, j] = pixel(a, chunk * CHUNK + j, width)
-            region[limb, chunk, 1, j] = pixel(b, chunk * CHUNK + j, width)
-            region[limb, chunk, 2, j] = pixel(c, chunk * CHUNK + j, width)
+def pixel(place, width):
+    """Number of the pixel at a place inside the picture."""
+    return np.uint32(np.int32(np.floor(place[1]) * width + np.floor(place[0])))
 
 
 @njit(**FAST)
-def fill_clipped(line, view, unseen, indices, limb, number):
-    """Indices of a limb's line that may leave the picture: samples outside it cost the most."""
-    width, height = view[2], view[3]
-    nothing = np.uint32(width * height + NOTHING_SEEN)
-    for chunk in range(indices.shape[1]):
-        for j in range(CHUNK):
-            sample = np.float32(chunk * CHUNK + j)
-            x, y = line[0] + sample * line[2], line[1] + sample * line[3]
-            inside = (x >= 0.0) & (x < width) & (y >= 0.0) & (y < height)
-            index = nothing
-            if inside and not unseen:
-                index = np.uint32(np.int64(y) * width + np.int64(x))
-            indices[limb, chunk, number, j] = index
+def fill_whole(lines, samples, width, indices):
+    """Indices (K samples, 16) of lines (K, 64) of a limb that is wholly inside the picture in all sixteen poses.
 
-
-@njit(**FAST)
-def fill_limb_clipped(lines, limb, lane, view, unseen, edges, region):
-    """Indices of a limb that is not wholly inside the picture, or not seen at all."""
-    for side in range(EDGE_LINES):
-        fill_clipped(line_at(lines, limb, side, lane), view, unseen, edges, limb, side)
-    for strip in range(REGION_LINES):
-        fill_clipped(line_at(lines, limb, EDGE_LINES + strip, lane), view, unseen, region, limb, strip)
-
-
-@njit(**FAST)
-def hide(bits, not_counted, edges, limb, side):
-    """Replace the indices of one side's hidden samples (a bit each); returns how many there were."""
-    count = 0
-    for chunk in range(edges.shape[1]):
-        for j in range(CHUNK):
-            if bits & np.uint64(1):
-                edges[limb, chunk, side, j] = not_counted
-                count += 1
-            bits >>= np.uint64(1)
-    return count
-
-
-@njit(**FAST_INLINED)
-def fill_view(outlines, lines, hidden, block, view, lane, views, edges, region):
-    """Indices of all samples of one pose in one view.
-
-    lines : of this block and view. hidden : (B, V, L, 2, 16) bits of edge samples, of no blocks where none are
-    looked for. edges, region :     (L, chunks, lines, 16), filled. Returns how many edge samples are hidden.
+    Two samples at once, so that the lanes are vectorised and not written out one by one.
     """
-    width = np.float32(views[view, 2])
-    count = 0
-    for limb in range(outlines.shape[2]):
-        state = outlines[block, view, limb, 8 * LANES + lane]
-        if state > HALF:
-            fill_edges(lines, limb, lane, width, edges)
-            fill_region(lines, limb, lane, width, region)
-        else:
-            fill_limb_clipped(lines, limb, lane, views[view], state < -HALF, edges, region)
-        if hidden.shape[0]:
-            not_counted = np.uint32(views[view, 2] * views[view, 3] + NOT_COUNTED)
-            for side in range(EDGE_LINES):
-                bits = hidden[block, view, limb, side, lane]
-                if bits:
-                    count += hide(bits, not_counted, edges, limb, side)
-    return count
+    row = indices.ravel()
+    at = np.uint64(0)
+    for number in range(lines.shape[0]):
+        line = lines[number]
+        for sample in range(0, samples, 2):
+            one, two = np.float32(np.int32(sample)), np.float32(np.int32(sample + 1))
+            for lane in range(np.uint64(LANES)):
+                row[at + lane] = pixel(sample_place(line, one, lane), width)
+                row[at + np.uint64(LANES) + lane] = pixel(sample_place(line, two, lane), width)
+            at += np.uint64(2 * LANES)
+
+
+@njit(**FAST)
+def fill_clipped(lines, outline, samples, width, height, nothing, indices):
+    """Indices of lines (K, 64) of a limb that may leave the picture: samples outside it, and all of a pose that does
+    not see the limb, read `nothing`."""
+    for number in range(lines.shape[0]):
+        line = lines[number]
+        for sample in range(samples):
+            step, row = np.float32(np.int32(sample)), indices[number * samples + sample]
+            for lane in range(LANES):
+                place = sample_place(line, step, lane)
+                x, y = place
+                inside = (
+                    (x >= ZERO)
+                    & (x < width)
+                    & (y >= ZERO)
+                    & (y < height)
+                    & (outline[8 * LANES + lane] > -HALF)
+                )
+                row[lane] = pixel(place, width) if inside else nothing
+
+
+@njit(**FAST_INLINED)
+def fill_lines(outline, lines, samples, view, indices):
+    """Indices (K samples, 16) of lines (K, 64) of a limb of sixteen poses, whose outlines (160,) say how it is seen."""
+    inside = np.int32(0)
+    for lane in range(LANES):
+        inside += np.int32(outline[8 * LANES + lane] > HALF)
+    width = np.float32(view[2])
+    if inside == LANES:
+        fill_whole(lines, samples, width, indices)
+    else:
+        nothing = np.uint32(view[2] * view[3] + NOTHING_SEEN)
+        fill_clipped(lines, outline, samples, width, np.float32(view[3]), nothing, indices)
+
+
+@njit(**FAST)
+def hide(hidden, samples, view, indices, lost):
+    """Replace the indices of hidden samples, a bit each in hidden (K, 16). lost : (16,), their number is added."""
+    not_counted = np.uint32(view[2] * view[3] + NOT_COUNTED)
+    for number in range(hidden.shape[0]):
+        for lane in range(LANES):
+            bits = hidden[number, lane]
+            if not bits:
+                continue
+            for sample in range(samples):
+                if (bits >> np.uint64(sample)) & np.uint64(1):
+                    indices[number * samples + sample, lane] = not_counted
+                    lost[lane] += 1
+
+
+@njit(**FAST)
+def add_lanes(values, base, pairs, sums):
+    """Add the entries of a map that begins at `base` to the sums (16,) of sixteen poses. pairs : flat, eight words of
+    two indices for each sample, of four samples at least.
+
+    As in `add_up` the test never stops the loop. All sixteen in one call: references to arrays are counted at each.
+    """
+    end, stop = np.uint64(values.shape[0]), np.uint64(pairs.shape[0])
+    for quarter in range(LANES // 4):
+        a = b = c = d = np.uint64(0)
+        k = np.uint64(2 * quarter)
+        while k < stop:
+            p, q, r, s = pairs[k], pairs[k + ONE_ON], pairs[k + ROW_ON], pairs[k + ROW_ON + ONE_ON]
+            if (p & LOW) >= end:
+                break
+            a += values[(p & LOW) + base]
+            b += values[(p >> UPPER) + base]
+            c += values[(q & LOW) + base]
+            d += values[(q >> UPPER) + base]
+            a += values[(r & LOW) + base]
+            b += values[(r >> UPPER) + base]
+            c += values[(s & LOW) + base]
+            d += values[(s >> UPPER) + base]
+            p, q = pairs[k + TWO_ROWS_ON], pairs[k + TWO_ROWS_ON + ONE_ON]
+            r, s = pairs[k + TWO_ROWS_ON + ROW_ON], pairs[k + TWO_ROWS_ON + ROW_ON + ONE_ON]
+            a += values[(p & LOW) + base]
+            b += values[(p >> UPPER) + base]
+            c += values[(q & LOW) + base]
+            d += values[(q >> UPPER) + base]
+            a += values[(r & LOW) + base]
+            b += values[(r >> UPPER) + base]
+            c += values[(s & LOW) + base]
+            d += values[(s >> UPPER) + base]
+            k += TWO_ROWS_ON + TWO_ROWS_ON
+        at = np.uint64(4 * quarter)
+        sums[at] += np.int64(a)
+        sums[at + np.uint64(1)] += np.int64(b)
+        sums[at + np.uint64(2)] += np.int64(c)
+        sums[at + np.uint64(3)] += np.int64(d)
 
 
 @njit(**FAST_INLINED)
@@ -227,24 +244,48 @@ def weight_blocks(
     """
     values, views = maps.values, maps.views
     limbs = outlines.shape[2]
-    edges = np.zeros((limbs, edge_chunks, EDGE_LINES, CHUNK), np.uint32)
-    region = np.zeros((limbs, region_chunks, REGION_LINES, CHUNK), np.uint32)
-    edge_pairs, region_pairs = as_pairs(edges), as_pairs(region)
-    lines = np.zeros((limbs, LINE_ROWS * LANES), np.float32)
-    edge_samples, region_samples = np.float32(edge_chunks * CHUNK), np.float32(region_chunks * CHUNK)
+    edge_samples, region_samples = edge_chunks * CHUNK, region_chunks * CHUNK
+    edges = np.zeros((EDGE_LINES * edge_samples, LANES), np.uint32)
+    region = np.zeros((REGION_LINES * region_samples, LANES), np.uint32)
+    edge_pairs, region_pairs = as_pairs(edges).ravel(), as_pairs(region).ravel()
+    lines = np.zeros((EDGE_LINES + REGION_LINES) * LINE, np.float32)
+    sides = lines[: EDGE_LINES * LINE].reshape((EDGE_LINES, LINE))
+    strips = lines[EDGE_LINES * LINE :].reshape((REGION_LINES, LINE))
+    edge_sums, region_sums, lost = (
+        np.zeros(LANES, np.int64),
+        np.zeros(LANES, np.int64),
+        np.zeros(LANES, np.int64),
+    )
+    edge_count, region_count = limbs * edges.shape[0], limbs * region.shape[0]
     for block in range(first, last):
         log_weights[block] = 0.0
         for view in range(outlines.shape[1]):
-            edge_base, region_base = np.uint64(views[view, 0]), np.uint64(views[view, 1])
-            view_lines(outlines, block, view, lines, edge_samples, region_samples)
+            edge_sums[:], region_sums[:], lost[:] = 0, 0, 0
+            for limb in range(limbs):
+                outline = outlines[block, view, limb]
+                limb_lines(outline, lines, np.float32(edge_samples), np.float32(region_samples))
+                fill_lines(outline, sides, edge_samples, views[view], edges)
+                fill_lines(outline, strips, region_samples, views[view], region)
+                if hidden.shape[0]:
+                    hide(hidden[block, view, limb], edge_samples, views[view], edges, lost)
+                add_lanes(values, np.uint64(views[view, 0]), edge_pairs, edge_sums)
+                add_lanes(values, np.uint64(views[view, 1]), region_pairs, region_sums)
             for lane in range(min(LANES, count - block * LANES)):
-                lost = fill_view(outlines, lines, hidden, block, view, lane, views, edges, region)
-                edge, region_term = 1.0, add_up(values, region_base, region_pairs) / (WORST * region.size)
-                if lost < edges.size:
-                    edge = add_up(values, edge_base, edge_pairs) / (WORST * (edges.size - lost))
+                edge, region_term = 1.0, region_sums[lane] / (WORST * region_count)
+                if lost[lane] < edge_count:
+                    edge = edge_sums[lane] / (WORST * (edge_count - lost[lane]))
                 terms[block, lane, view, 0] = edge
                 terms[block, lane, view, 1] = region_term
                 log_weights[block, lane] -= weights[0] * edge + weights[1] * region_term
+
+
+@njit(**FAST)
+def record_lines(indices, samples, found):
+    """Fill found (16, chunks, K, 16), pose by pose, from the indices (K samples, 16) of a limb's lines."""
+    for row in range(indices.shape[0]):
+        number, sample = row // samples, row % samples
+        for lane in range(LANES):
+            found[lane, sample // CHUNK, number, sample % CHUNK] = indices[row, lane]
 
 
 @njit(**FAST)
@@ -255,16 +296,25 @@ def record_indices(
     edges: NDArray[np.uint32],
     region: NDArray[np.uint32],
 ) -> None:
-    """The index stream of `weight_blocks`: (B, V, 16, L, chunks, lines, 16) each. For benchmark and tests."""
-    lines = np.zeros((outlines.shape[2], LINE_ROWS * LANES), np.float32)
-    edge_samples, region_samples = np.float32(edges.shape[4] * CHUNK), np.float32(region.shape[4] * CHUNK)
+    """The index stream of `weight_blocks`, pose by pose, (B, V, 16, L, chunks, lines, 16): for benchmark and tests."""
+    edge_samples, region_samples = edges.shape[4] * CHUNK, region.shape[4] * CHUNK
+    side_indices = np.zeros((EDGE_LINES * edge_samples, LANES), np.uint32)
+    strip_indices = np.zeros((REGION_LINES * region_samples, LANES), np.uint32)
+    lines = np.zeros((EDGE_LINES + REGION_LINES) * LINE, np.float32)
+    sides = lines[: EDGE_LINES * LINE].reshape((EDGE_LINES, LINE))
+    strips = lines[EDGE_LINES * LINE :].reshape((REGION_LINES, LINE))
+    lost = np.zeros(LANES, np.int64)
     for block in range(edges.shape[0]):
         for view in range(edges.shape[1]):
-            view_lines(outlines, block, view, lines, edge_samples, region_samples)
-            for lane in range(LANES):
-                fill_view(outlines, lines, hidden, block, view, lane, views,
-                    edges[block, view, lane], region[block, view, lane],
-                )  # fmt: skip
+            for limb in range(edges.shape[3]):
+                outline = outlines[block, view, limb]
+                limb_lines(outline, lines, np.float32(edge_samples), np.float32(region_samples))
+                fill_lines(outline, sides, edge_samples, views[view], side_indices)
+                fill_lines(outline, strips, region_samples, views[view], strip_indices)
+                if hidden.shape[0]:
+                    hide(hidden[block, view, limb], edge_samples, views[view], side_indices, lost)
+                record_lines(side_indices, edge_samples, edges[block, view, :, limb])
+                record_lines(strip_indices, region_samples, region[block, view, :, limb])
 
 
 @njit(**FAST)

@@ -2,88 +2,46 @@
 """The mean of the edge map along visible edges, for many poses (Fleischmann et al. 2012, section 2.2).
 
 An edge is a straight line of n samples, n a multiple of sixteen, from one corner of a limb's outline to another.
-As for Eq. 14 the first pass writes which entries of the map the samples fall on, the second adds those up. Maps are
-bytes, 255 on an edge, followed by two entries that add nothing: NOTHING_SEEN for a sample that falls on no pixel,
-which is counted all the same, and NOT_COUNTED for a hidden one.
+As for Eq. 14 the first pass writes which entries of the map the samples of sixteen poses fall on, the second adds those
+up. Maps are bytes, 255 on an edge, followed by two entries that add nothing: NOTHING_SEEN for a sample that falls on no
+pixel, which is counted all the same, and NOT_COUNTED for a hidden one.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
 from studio.arrays import Array, Floats, Indices
-from studio.likelihood.area_kernels import bit_count
 from studio.likelihood.edge_region_kernels import (
     CHUNK,
-    NOT_COUNTED,
-    add_up,
+    LINE,
+    add_lanes,
     as_pairs,
-    fill_clipped,
+    fill_lines,
     hide,
-    line_at,
-    pixel,
+    record_lines,
     store_line,
 )
 from studio.likelihood.outline_kernels import HALF, LANES, ZERO
 from studio.likelihood.picture_maps import Maps
-from studio.numba_in_threads import FAST, FAST_INLINED, njit
+from studio.numba_in_threads import FAST, njit
 
 BRIGHTEST = 255
 
 
 @njit(**FAST)
-def edge_lines(outlines, block, view, corners, lines, samples):
-    """Fill lines (K, 64), four rows of sixteen lanes each, of all edges of sixteen poses in one view; pixels, half a
-    pixel on so that truncation rounds."""
-    ends = np.zeros(4 * LANES, np.float32)
-    for number in range(corners.shape[0]):
-        limb = corners[number, 0]
-        first = np.uint64(2 * LANES) * np.uint64(corners[number, 1])
-        last = np.uint64(2 * LANES) * np.uint64(corners[number, 2])
-        for i in range(2 * LANES):
-            ends[i] = outlines[block, view, limb, first + np.uint64(i)]
-            ends[2 * LANES + i] = outlines[block, view, limb, last + np.uint64(i)]
-        line = lines[number]
-        for lane in range(LANES):
-            x, y = ends[lane] + HALF, ends[LANES + lane] + HALF
-            edge = x, y, ends[2 * LANES + lane] + HALF - x, ends[3 * LANES + lane] + HALF - y
-            store_line(line, 0, lane, edge, edge, ZERO, samples)
-
-
-@njit(**FAST_INLINED)
-def fill_edge(line, bits, not_counted, width, indices, number):
-    """Indices of the samples of an edge of a limb that is wholly inside the picture."""
-    for chunk in range(indices.shape[1]):
-        dropped = np.uint32(bits & np.uint64(0xFFFF))
-        for j in range(CHUNK):
-            index = pixel(line, chunk * CHUNK + j, width)
-            indices[number, chunk, 0, j] = not_counted if (dropped >> np.uint32(j)) & np.uint32(1) else index
-        bits >>= np.uint64(CHUNK)
-
-
-@njit(**FAST)
-def fill_edge_clipped(line, bits, not_counted, view, unseen, indices, number):
-    """Indices of the samples of an edge of a limb that may leave the picture, or is not seen at all."""
-    fill_clipped(line, view, unseen, indices, number, 0)
-    if bits:
-        hide(bits, not_counted, indices, number, 0)
-
-
-@njit(**FAST_INLINED)
-def fill_edges(outlines, corners, hidden, block, view, lane, lines, views, indices):
-    """Indices (K, chunks, 1, 16) of all samples of one pose in one view; returns how many are hidden."""
-    width = np.float32(views[view, 2])
-    not_counted = np.uint32(views[view, 2] * views[view, 3] + NOT_COUNTED)
-    lost = 0
-    for number in range(corners.shape[0]):
-        seen = outlines[block, view, corners[number, 0], 8 * LANES + lane]
-        bits = hidden[block, view, number, lane]
-        line = line_at(lines, number, 0, lane)
-        if seen > HALF:
-            fill_edge(line, bits, not_counted, width, indices, number)
-        else:
-            fill_edge_clipped(line, bits, not_counted, views[view], seen < -HALF, indices, number)
-        lost += bit_count(bits)  # pyright: ignore[reportCallIssue] - Numba gives the context
-    return lost
+def fill_edge(outline, corners, hidden, samples, view, line, indices, lost):
+    """Indices (samples, 16) of an edge (limb, corner where it begins, corner where it ends) of sixteen poses, from its
+    limb's outlines (160,). hidden : (1, 16) bits of its samples. line : (1, 64), scratch. lost : (16,), how many are
+    hidden is added."""
+    first, last = np.uint64(2 * LANES) * np.uint64(corners[1]), np.uint64(2 * LANES) * np.uint64(corners[2])
+    begin, end = outline[first : first + np.uint64(2 * LANES)], outline[last : last + np.uint64(2 * LANES)]
+    kept, count = line[0], np.float32(samples)
+    for lane in range(LANES):
+        x, y = begin[lane] + HALF, begin[LANES + lane] + HALF
+        edge = x, y, end[lane] + HALF - x, end[LANES + lane] + HALF - y
+        store_line(kept, 0, lane, edge, edge, ZERO, count)
+    fill_lines(outline, line, samples, view, indices)
+    hide(hidden, samples, view, indices, lost)
 
 
 @njit(**FAST)
@@ -103,18 +61,26 @@ def edge_blocks(
     samples. chunks : how many times sixteen samples an edge has. found : (B, V, 16).
     """
     values, views = maps.values, maps.views
-    indices = np.zeros((corners.shape[0], chunks, 1, CHUNK), np.uint32)
-    pairs = as_pairs(indices)
-    lines = np.zeros((corners.shape[0], 4 * LANES), np.float32)
+    samples = chunks * CHUNK
+    indices = np.zeros((samples, LANES), np.uint32)
+    pairs = as_pairs(indices).ravel()
+    line = np.zeros((1, LINE), np.float32)
+    sums, lost = np.zeros(LANES, np.int64), np.zeros(LANES, np.int64)
+    size = corners.shape[0] * samples
     for block in range(first, last):
         for view in range(outlines.shape[1]):
-            edge_lines(outlines, block, view, corners, lines, np.float32(chunks * CHUNK))
-            base = np.uint64(views[view, 0])
+            sums[:], lost[:] = 0, 0
+            for number in range(corners.shape[0]):
+                outline, bits = (
+                    outlines[block, view, corners[number, 0]],
+                    hidden[block, view, number : number + 1],
+                )
+                fill_edge(outline, corners[number], bits, samples, views[view], line, indices, lost)
+                add_lanes(values, np.uint64(views[view, 0]), pairs, sums)
             for lane in range(LANES):
-                lost = fill_edges(outlines, corners, hidden, block, view, lane, lines, views, indices)
                 mean = 0.0
-                if lost < indices.size:
-                    mean = add_up(values, base, pairs) / (BRIGHTEST * (indices.size - lost))
+                if lost[lane] < size:
+                    mean = sums[lane] / (BRIGHTEST * (size - lost[lane]))
                 found[block, view, lane] = mean
 
 
@@ -124,15 +90,18 @@ def record_edges(
     corners: Indices,
     hidden: NDArray[np.uint64],
     views: Indices,
-    indices: NDArray[np.uint32],
+    found: NDArray[np.uint32],
 ) -> None:
     """The index stream of `edge_blocks`: (B, V, 16, K, chunks, 1, 16). For tests."""
-    lines = np.zeros((corners.shape[0], 4 * LANES), np.float32)
-    samples = np.float32(indices.shape[4] * CHUNK)
-    for block in range(indices.shape[0]):
-        for view in range(indices.shape[1]):
-            edge_lines(outlines, block, view, corners, lines, samples)
-            for lane in range(LANES):
-                fill_edges(
-                    outlines, corners, hidden, block, view, lane, lines, views, indices[block, view, lane]
+    samples = found.shape[4] * CHUNK
+    indices = np.zeros((samples, LANES), np.uint32)
+    line, lost = np.zeros((1, LINE), np.float32), np.zeros(LANES, np.int64)
+    for block in range(found.shape[0]):
+        for view in range(found.shape[1]):
+            for number in range(corners.shape[0]):
+                outline, bits = (
+                    outlines[block, view, corners[number, 0]],
+                    hidden[block, view, number : number + 1],
                 )
+                fill_edge(outline, corners[number], bits, samples, views[view], line, indices, lost)
+                record_lines(indices, samples, found[block, view, :, number])
