@@ -10,7 +10,59 @@ from studio.arrays import Array
 from studio.inspection.reading import InspectedFrame, no_value
 from studio.inspection.reference import true_pose
 from studio.inspection.schedule import effective_number
-from studio.inspection.tables import Row, Selection
+from studio.inspection.tables import LAYER, LIMB, PARAMETER, UNIT, Row, Selection, TableKind, View, columns
+
+VIEW = View(
+    "clouds",
+    "First and last cloud",
+    "What did the frame learn?",
+    ("parameter", "limb", "track"),
+    (
+        TableKind(
+            "summary",
+            "Clouds by parameter and layer",
+            columns(
+                PARAMETER,
+                LIMB,
+                UNIT,
+                LAYER,
+                ("weighted", "Weighted (else as drawn)"),
+                ("mean", "Mean"),
+                ("deviation", "Deviation"),
+                ("q05", "5 %"),
+                ("q25", "25 %"),
+                ("median", "Median"),
+                ("q75", "75 %"),
+                ("q95", "95 %"),
+            ),
+        ),
+        TableKind(
+            "ridges",
+            "Densities by parameter and layer",
+            columns(
+                PARAMETER,
+                LAYER,
+                ("weighted", "Weighted (else as drawn)"),
+                ("value", "Value"),
+                ("density", "Density"),
+            ),
+        ),
+        TableKind(
+            "marks",
+            "Limits, estimate and truth",
+            columns(
+                PARAMETER,
+                LIMB,
+                UNIT,
+                ("lower", "Lower limit"),
+                ("upper", "Upper limit"),
+                ("estimate", "Estimate"),
+                ("truth", "Truth"),
+            ),
+        ),
+    ),
+)
+
 
 POINTS = 49
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)

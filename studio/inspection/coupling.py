@@ -4,8 +4,46 @@ import numpy as np
 
 from studio.arrays import Array, Indices
 from studio.inspection.reading import InspectedFrame
-from studio.inspection.tables import Row, Selection
+from studio.inspection.tables import (
+    LAYER,
+    LIMB,
+    PARAMETER,
+    PARTICLE,
+    UNIT,
+    Row,
+    Selection,
+    TableKind,
+    View,
+    columns,
+)
 from studio.inspection.variance import settling
+
+VIEW = View(
+    "coupling",
+    "Coupling",
+    "Which parameters trade off?",
+    ("layer", "parameter"),
+    (
+        TableKind(
+            "matrix",
+            "Correlations, in the order of settling",
+            columns(("first", "Parameter"), ("second", "Other parameter"), ("correlation", "Correlation")),
+        ),
+        TableKind(
+            "order",
+            "Order of settling",
+            columns(
+                ("place", "Place"), PARAMETER, LIMB, UNIT, LAYER, ("deviation", "Deviation in this layer")
+            ),
+        ),
+        TableKind(
+            "particles",
+            "Particles of the layer",
+            columns(PARTICLE, ("weight", "Weight")),
+            each="parameter",
+        ),
+    ),
+)
 
 
 def correlations(poses: Array, weights: Array) -> Array:

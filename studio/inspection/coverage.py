@@ -13,7 +13,47 @@ from studio.inspection.limbs import errors_of
 from studio.inspection.over_frames import spread_by_limb, summaries
 from studio.inspection.reading import InspectedFrame, InspectedRun, no_value
 from studio.inspection.reference import limbs_of_points
-from studio.inspection.tables import Found, Row, Selection
+from studio.inspection.tables import FRAME, LIMB, Found, Row, Selection, TableKind, View, columns
+
+VIEW = View(
+    "coverage",
+    "Coverage",
+    "Does spread predict error?",
+    ("limb", "track"),
+    (
+        TableKind(
+            "frames",
+            "Spread and error by frame and limb",
+            columns(
+                FRAME,
+                LIMB,
+                ("spread", "Spread of the last set", "mm"),
+                ("error", "Error", "mm"),
+            ),
+            of_run=True,
+        ),
+        TableKind(
+            "correlation",
+            "Does spread rank as error does?",
+            columns(LIMB, ("frames", "Frames"), ("rho", "Spearman's ρ"), ("p_value", "p")),
+            of_run=True,
+        ),
+        TableKind(
+            "pit",
+            "Rank of the truth in the last set",
+            columns(
+                LIMB,
+                ("bin", "Bin"),
+                ("count", "Share"),
+                ("expected", "Expected"),
+                ("lower", "Band, lower"),
+                ("upper", "Band, upper"),
+            ),
+            of_run=True,
+        ),
+    ),
+)
+
 
 BINS = 10
 BAND = 0.95

@@ -11,8 +11,53 @@ import numpy as np
 
 from studio.arrays import Array, Indices, Mask
 from studio.inspection.reading import InspectedFrame
-from studio.inspection.tables import Found, Row, Selection
+from studio.inspection.tables import (
+    LAYER,
+    LOG_WEIGHT,
+    PARTICLE,
+    Found,
+    Row,
+    Selection,
+    TableKind,
+    View,
+    columns,
+)
 from studio.trackers.tracker import NO_PARENT
+
+VIEW = View(
+    "genealogy",
+    "Genealogy",
+    "Which ancestors survive?",
+    ("layer", "particle"),
+    (
+        TableKind(
+            "particles",
+            "Particles and their parents",
+            columns(
+                LAYER,
+                PARTICLE,
+                ("parent", "Parent"),
+                ("second_parent", "Second parent"),
+                ("ancestor", "First ancestor"),
+                ("children", "Children"),
+                ("survives", "Has descendants in the last layer"),
+                LOG_WEIGHT,
+                ("weight", "Weight"),
+            ),
+        ),
+        TableKind(
+            "ancestors",
+            "Distinct ancestors by layer",
+            columns(
+                LAYER,
+                ("particles", "Particles"),
+                ("ancestors", "Distinct ancestors in the first set"),
+                ("with_descendants", "Particles with descendants in the last set"),
+                ("crossed", "Children of two"),
+            ),
+        ),
+    ),
+)
 
 
 def living(parents: Sequence[Indices], sizes: Sequence[int]) -> list[Mask]:

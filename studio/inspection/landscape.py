@@ -15,7 +15,67 @@ from studio.inspection.likelihoods import FrameEvaluation, evaluation_of, in_bat
 from studio.inspection.modes import modes_of
 from studio.inspection.reading import InspectedFrame, no_value
 from studio.inspection.reference import true_pose
-from studio.inspection.tables import Found, Row, Selection
+from studio.inspection.tables import (
+    CAMERA,
+    LAYER,
+    LOG_WEIGHT,
+    PARAMETER,
+    PARTICLE,
+    TERM,
+    UNIT,
+    Found,
+    Row,
+    Selection,
+    TableKind,
+    View,
+    columns,
+)
+
+VIEW = View(
+    "landscape",
+    "Landscape",
+    "What does the likelihood look like here?",
+    ("layer", "parameter", "second", "towards", "particle", "track"),
+    (
+        TableKind(
+            "slice",
+            "Log weight along the line",
+            columns(("at", "Place"), UNIT, LOG_WEIGHT, ("possible", "Within the limits")),
+        ),
+        TableKind(
+            "terms",
+            "Terms along the line",
+            columns(("at", "Place"), CAMERA, TERM, ("value", "Log-likelihood", "nats")),
+        ),
+        TableKind(
+            "tempered",
+            "Density at each layer's β",
+            columns(LAYER, ("beta", "β"), ("at", "Place"), ("density", "Density")),
+        ),
+        TableKind(
+            "plane",
+            "Log weight over two parameters",
+            columns(("at", "Place"), ("second", "Second parameter"), LOG_WEIGHT),
+        ),
+        TableKind(
+            "rug",
+            "Particles on the line",
+            columns(LAYER, PARTICLE, ("at", "Place"), ("second", "Second parameter"), LOG_WEIGHT),
+        ),
+        TableKind(
+            "marks",
+            "Estimate, truth and best particle",
+            columns(("name", "Name"), ("at", "Place"), ("second", "Second parameter"), LOG_WEIGHT),
+        ),
+        TableKind(
+            "ends",
+            "Poses at the line's ends (place 0 and 1, or the first and last value)",
+            columns(PARAMETER, UNIT, ("from", "First"), ("to", "Last")),
+        ),
+    ),
+    evaluates=True,
+)
+
 
 PLACES, PLANE = 81, 33
 BEFORE, AFTER = -0.5, 1.5

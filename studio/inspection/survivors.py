@@ -8,7 +8,55 @@ from scipy import stats
 from studio.arrays import Mask
 from studio.inspection.genealogy import children_of
 from studio.inspection.reading import InspectedFrame, no_value
-from studio.inspection.tables import Found, Row, Selection
+from studio.inspection.tables import (
+    LIMB,
+    LOG_WEIGHT,
+    PARAMETER,
+    PARTICLE,
+    UNIT,
+    Found,
+    Row,
+    Selection,
+    TableKind,
+    View,
+    columns,
+)
+
+VIEW = View(
+    "survivors",
+    "Survivors and dead",
+    "What did the dead have wrong?",
+    ("layer",),
+    (
+        TableKind(
+            "particles",
+            "Particles of the layer",
+            columns(
+                PARTICLE,
+                ("rank", "Rank"),
+                LOG_WEIGHT,
+                ("weight", "Weight"),
+                ("children", "Children"),
+                ("survives", "Survives"),
+            ),
+            each="parameter",
+        ),
+        TableKind(
+            "difference",
+            "Survivors against dead",
+            columns(
+                PARAMETER,
+                LIMB,
+                UNIT,
+                ("survivors", "Mean of the survivors"),
+                ("dead", "Mean of the dead"),
+                ("difference", "Difference in deviations"),
+                ("p_value", "Kolmogorov-Smirnov p"),
+            ),
+        ),
+    ),
+)
+
 
 FEWEST = 2
 

@@ -14,7 +14,7 @@ SHOWN_ROWS = 40
 """In a notebook."""
 
 
-LAYER = "layer"
+LAYER_KEY = "layer"
 """Key of the columns that hold a layer's index, from 0 as in the arrays of Python and in addresses."""
 
 
@@ -33,6 +33,17 @@ class Column:
     unit: str = ""
 
 
+FRAME, LAYER = Column("frame", "Frame"), Column(LAYER_KEY, "Layer")
+PARAMETER, LIMB, UNIT = Column("parameter", "Parameter"), Column("limb", "Limb"), Column("unit", "Unit")
+PARTICLE, CAMERA, TERM = Column("particle", "Particle"), Column("camera", "Camera"), Column("term", "Term")
+LOG_WEIGHT = Column("log_weight", "Log weight", "nats")
+
+
+def columns(*entries: Column | tuple[str, ...]) -> tuple[Column, ...]:
+    """Columns, those that no other view has as (key, label) or (key, label, unit)."""
+    return tuple(entry if isinstance(entry, Column) else Column(*entry) for entry in entries)
+
+
 @dataclass(frozen=True, slots=True)
 class TableKind:
     """A table that a view has. of_run : it belongs to the run, not to one frame. each : what further columns there is
@@ -44,6 +55,33 @@ class TableKind:
     columns: tuple[Column, ...]
     of_run: bool = False
     each: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """One way of looking into a run. question : what it answers. uses : entries of the selection that it reads.
+
+    tables : those of a frame and, `of_run`, those of the whole run. evaluates : it evaluates the likelihood again.
+    is_job : its numbers are computed by a job (verb `seeds`); until one has ended its tables are empty.
+    """
+
+    name: str
+    title: str
+    question: str
+    uses: tuple[str, ...]
+    tables: tuple[TableKind, ...]
+    evaluates: bool = False
+    is_job: bool = False
+
+    @property
+    def frame_tables(self) -> tuple[TableKind, ...]:
+        """The tables of one frame."""
+        return tuple(kind for kind in self.tables if not kind.of_run)
+
+    @property
+    def run_tables(self) -> tuple[TableKind, ...]:
+        """The tables of the whole run."""
+        return tuple(kind for kind in self.tables if kind.of_run)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +100,7 @@ class Table:
 
     def for_readers(self) -> list[list[Cell]]:
         """The rows as people read them: layers, whose numbers are indices here, are counted from 1."""
-        layers = {at for at, entry in enumerate(self.columns) if entry.key == LAYER}
+        layers = {at for at, entry in enumerate(self.columns) if entry.key == LAYER_KEY}
         return [
             [cell + 1 if at in layers and isinstance(cell, int) else cell for at, cell in enumerate(row)]
             for row in self.rows

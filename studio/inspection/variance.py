@@ -5,7 +5,71 @@ noise).
 import numpy as np
 
 from studio.inspection.reading import InspectedFrame
-from studio.inspection.tables import Row, Selection
+from studio.inspection.tables import (
+    FRAME,
+    LAYER,
+    LIMB,
+    PARAMETER,
+    UNIT,
+    Row,
+    Selection,
+    TableKind,
+    View,
+    columns,
+)
+
+VIEW = View(
+    "variance",
+    "Variance reduction",
+    "Which parameter did which layer settle?",
+    ("parameter",),
+    (
+        TableKind(
+            "layers",
+            "Variance of every parameter in every layer",
+            columns(
+                PARAMETER,
+                LIMB,
+                UNIT,
+                LAYER,
+                ("weighed", "As weighed"),
+                ("before", "Before noise"),
+                ("after", "After noise"),
+            ),
+        ),
+        TableKind(
+            "settled",
+            "Layer that settled each parameter",
+            columns(
+                PARAMETER,
+                LIMB,
+                UNIT,
+                LAYER,
+                ("first", "First variance"),
+                ("last", "Last variance"),
+                ("reduction", "First / last"),
+            ),
+        ),
+        TableKind(
+            "first", "Variance of the first set, by frame", columns(FRAME), of_run=True, each="parameter"
+        ),
+        TableKind(
+            "last", "Variance of the last set, by frame", columns(FRAME), of_run=True, each="parameter"
+        ),
+        TableKind(
+            "parameter",
+            "One parameter by layer and frame",
+            columns(
+                FRAME,
+                LAYER,
+                ("weighed", "As weighed"),
+                ("before", "Before noise"),
+                ("after", "After noise"),
+            ),
+            of_run=True,
+        ),
+    ),
+)
 
 
 def settling(frame: InspectedFrame) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

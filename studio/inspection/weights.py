@@ -12,7 +12,41 @@ import numpy as np
 from studio.arrays import Array
 from studio.inspection.reading import InspectedFrame, no_value
 from studio.inspection.schedule import effective_number
-from studio.inspection.tables import Row, Selection
+from studio.inspection.tables import LAYER, LOG_WEIGHT, PARTICLE, Row, Selection, TableKind, View, columns
+
+VIEW = View(
+    "weights",
+    "Weight concentration",
+    "Is the estimate one lucky particle?",
+    ("layer",),
+    (
+        TableKind(
+            "sorted",
+            "Weights of a layer, largest first",
+            columns(
+                LAYER,
+                ("rank", "Rank"),
+                PARTICLE,
+                ("weight", "Weight"),
+                ("cumulated", "Cumulated"),
+                LOG_WEIGHT,
+            ),
+        ),
+        TableKind(
+            "layers",
+            "Concentration by layer",
+            columns(
+                LAYER,
+                ("largest", "Largest weight"),
+                ("k_hat", "Pareto k̂"),
+                ("effective", "Effective number"),
+                ("particles", "Particles"),
+                ("for_90", "Particles that hold 90 %"),
+            ),
+        ),
+    ),
+)
+
 
 LEAST_TAIL = 5
 PRIOR_WEIGHT, PRIOR_SHAPE = 10.0, 0.5
