@@ -15,19 +15,7 @@ from studio.evidence.distance_maps import silhouettes_by_camera
 from studio.inspection.likelihoods import FrameEvaluation, evaluation_of, limbs_swapped
 from studio.inspection.reading import InspectedFrame
 from studio.inspection.reference import true_pose
-from studio.inspection.tables import (
-    CAMERA,
-    LIMB,
-    PARAMETER,
-    TERM,
-    UNIT,
-    Found,
-    Row,
-    Selection,
-    TableKind,
-    View,
-    columns,
-)
+from studio.inspection.tables import Found, Row, Selection, View, table
 from studio.likelihood.edge_region import EdgeRegionSettings
 from studio.likelihood.overlay import sample_points
 from studio.likelihood.problem import Shares
@@ -40,51 +28,55 @@ VIEW = View(
     "Which camera and term pulls where?",
     ("limb", "camera", "track"),
     (
-        TableKind(
+        table(
             "matrix",
             "Log-likelihood by camera, term and limb",
-            columns(
-                CAMERA,
-                TERM,
-                LIMB,
-                ("value", "At the pose", "nats"),
-                ("reference", "At the reference pose", "nats"),
-                ("difference", "Pose less reference", "nats"),
-            ),
+            "camera",
+            "term",
+            "limb",
+            ("value", "At the pose", "nats"),
+            ("reference", "At the reference pose", "nats"),
+            ("difference", "Pose less reference", "nats"),
         ),
-        TableKind(
+        table(
             "left_out",
             "Change when one camera or term counts less",
-            columns(
-                CAMERA,
-                TERM,
-                ("factor", "Counts"),
-                ("log_weight", "At the pose", "nats"),
-                ("reference", "At the reference pose", "nats"),
-                ("preference", "Preference of the pose", "nats"),
-                ("change", "Change of preference", "nats"),
-            ),
+            "camera",
+            "term",
+            ("factor", "Counts"),
+            ("log_weight", "At the pose", "nats"),
+            ("reference", "At the reference pose", "nats"),
+            ("preference", "Preference of the pose", "nats"),
+            ("change", "Change of preference", "nats"),
         ),
-        TableKind(
+        table(
             "pulls",
             "Where each camera and term pulls each parameter",
-            columns(PARAMETER, LIMB, UNIT, CAMERA, TERM, ("pull", "Log-likelihood a deviation", "nats")),
+            "parameter",
+            "limb",
+            "unit",
+            "camera",
+            "term",
+            ("pull", "Log-likelihood a deviation", "nats"),
         ),
-        TableKind(
+        table(
             "areas",
             "Areas of silhouette and body",
-            columns(
-                CAMERA,
-                LIMB,
-                ("outside", "Body outside the silhouette (B)", "mm²"),
-                ("bare", "Silhouette without body (R)", "mm²"),
-                ("area", "Area of the limb", "mm²"),
-            ),
+            "camera",
+            "limb",
+            ("outside", "Body outside the silhouette (B)", "mm²"),
+            ("bare", "Silhouette without body (R)", "mm²"),
+            ("area", "Area of the limb", "mm²"),
         ),
-        TableKind(
+        table(
             "samples",
             "Samples of one camera",
-            columns(CAMERA, LIMB, TERM, ("x", "x", "px"), ("y", "y", "px"), ("cost", "Cost, 0 to 1")),
+            "camera",
+            "limb",
+            "term",
+            ("x", "x", "px"),
+            ("y", "y", "px"),
+            ("cost", "Cost, 0 to 1"),
         ),
     ),
     evaluates=True,

@@ -10,7 +10,7 @@ from studio.arrays import Array
 from studio.inspection.reading import InspectedFrame, no_value
 from studio.inspection.reference import true_pose
 from studio.inspection.schedule import effective_number
-from studio.inspection.tables import LAYER, LIMB, PARAMETER, UNIT, Row, Selection, TableKind, View, columns
+from studio.inspection.tables import Row, Selection, View, table
 
 VIEW = View(
     "clouds",
@@ -18,47 +18,41 @@ VIEW = View(
     "What did the frame learn?",
     ("parameter", "limb", "track"),
     (
-        TableKind(
+        table(
             "summary",
             "Clouds by parameter and layer",
-            columns(
-                PARAMETER,
-                LIMB,
-                UNIT,
-                LAYER,
-                ("weighted", "Weighted (else as drawn)"),
-                ("mean", "Mean"),
-                ("deviation", "Deviation"),
-                ("q05", "5 %"),
-                ("q25", "25 %"),
-                ("median", "Median"),
-                ("q75", "75 %"),
-                ("q95", "95 %"),
-            ),
+            "parameter",
+            "limb",
+            "unit",
+            "layer",
+            ("weighted", "Weighted (else as drawn)"),
+            ("mean", "Mean"),
+            ("deviation", "Deviation"),
+            ("q05", "5 %"),
+            ("q25", "25 %"),
+            ("median", "Median"),
+            ("q75", "75 %"),
+            ("q95", "95 %"),
         ),
-        TableKind(
+        table(
             "ridges",
             "Densities by parameter and layer",
-            columns(
-                PARAMETER,
-                LAYER,
-                ("weighted", "Weighted (else as drawn)"),
-                ("value", "Value"),
-                ("density", "Density"),
-            ),
+            "parameter",
+            "layer",
+            ("weighted", "Weighted (else as drawn)"),
+            ("value", "Value"),
+            ("density", "Density"),
         ),
-        TableKind(
+        table(
             "marks",
             "Limits, estimate and truth",
-            columns(
-                PARAMETER,
-                LIMB,
-                UNIT,
-                ("lower", "Lower limit"),
-                ("upper", "Upper limit"),
-                ("estimate", "Estimate"),
-                ("truth", "Truth"),
-            ),
+            "parameter",
+            "limb",
+            "unit",
+            ("lower", "Lower limit"),
+            ("upper", "Upper limit"),
+            ("estimate", "Estimate"),
+            ("truth", "Truth"),
         ),
     ),
 )

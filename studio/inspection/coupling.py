@@ -4,18 +4,7 @@ import numpy as np
 
 from studio.arrays import Array, Indices
 from studio.inspection.reading import InspectedFrame
-from studio.inspection.tables import (
-    LAYER,
-    LIMB,
-    PARAMETER,
-    PARTICLE,
-    UNIT,
-    Row,
-    Selection,
-    TableKind,
-    View,
-    columns,
-)
+from studio.inspection.tables import Row, Selection, View, table
 from studio.inspection.variance import settling
 
 VIEW = View(
@@ -24,24 +13,24 @@ VIEW = View(
     "Which parameters trade off?",
     ("layer", "parameter"),
     (
-        TableKind(
+        table(
             "matrix",
             "Correlations, in the order of settling",
-            columns(("first", "Parameter"), ("second", "Other parameter"), ("correlation", "Correlation")),
+            ("first", "Parameter"),
+            ("second", "Other parameter"),
+            ("correlation", "Correlation"),
         ),
-        TableKind(
+        table(
             "order",
             "Order of settling",
-            columns(
-                ("place", "Place"), PARAMETER, LIMB, UNIT, LAYER, ("deviation", "Deviation in this layer")
-            ),
+            ("place", "Place"),
+            "parameter",
+            "limb",
+            "unit",
+            "layer",
+            ("deviation", "Deviation in this layer"),
         ),
-        TableKind(
-            "particles",
-            "Particles of the layer",
-            columns(PARTICLE, ("weight", "Weight")),
-            each="parameter",
-        ),
+        table("particles", "Particles of the layer", "particle", ("weight", "Weight"), each="parameter"),
     ),
 )
 

@@ -13,7 +13,7 @@ from studio.inspection.limbs import errors_of
 from studio.inspection.over_frames import spread_by_limb, summaries
 from studio.inspection.reading import InspectedFrame, InspectedRun, no_value
 from studio.inspection.reference import limbs_of_points
-from studio.inspection.tables import FRAME, LIMB, Found, Row, Selection, TableKind, View, columns
+from studio.inspection.tables import Found, Row, Selection, View, table
 
 VIEW = View(
     "coverage",
@@ -21,34 +21,33 @@ VIEW = View(
     "Does spread predict error?",
     ("limb", "track"),
     (
-        TableKind(
+        table(
             "frames",
             "Spread and error by frame and limb",
-            columns(
-                FRAME,
-                LIMB,
-                ("spread", "Spread of the last set", "mm"),
-                ("error", "Error", "mm"),
-            ),
+            "frame",
+            "limb",
+            ("spread", "Spread of the last set", "mm"),
+            ("error", "Error", "mm"),
             of_run=True,
         ),
-        TableKind(
+        table(
             "correlation",
             "Does spread rank as error does?",
-            columns(LIMB, ("frames", "Frames"), ("rho", "Spearman's ρ"), ("p_value", "p")),
+            "limb",
+            ("frames", "Frames"),
+            ("rho", "Spearman's ρ"),
+            ("p_value", "p"),
             of_run=True,
         ),
-        TableKind(
+        table(
             "pit",
             "Rank of the truth in the last set",
-            columns(
-                LIMB,
-                ("bin", "Bin"),
-                ("count", "Share"),
-                ("expected", "Expected"),
-                ("lower", "Band, lower"),
-                ("upper", "Band, upper"),
-            ),
+            "limb",
+            ("bin", "Bin"),
+            ("count", "Share"),
+            ("expected", "Expected"),
+            ("lower", "Band, lower"),
+            ("upper", "Band, upper"),
             of_run=True,
         ),
     ),

@@ -11,17 +11,7 @@ import numpy as np
 
 from studio.arrays import Array, Indices, Mask
 from studio.inspection.reading import InspectedFrame
-from studio.inspection.tables import (
-    LAYER,
-    LOG_WEIGHT,
-    PARTICLE,
-    Found,
-    Row,
-    Selection,
-    TableKind,
-    View,
-    columns,
-)
+from studio.inspection.tables import Found, Row, Selection, View, table
 from studio.trackers.tracker import NO_PARENT
 
 VIEW = View(
@@ -30,31 +20,27 @@ VIEW = View(
     "Which ancestors survive?",
     ("layer", "particle"),
     (
-        TableKind(
+        table(
             "particles",
             "Particles and their parents",
-            columns(
-                LAYER,
-                PARTICLE,
-                ("parent", "Parent"),
-                ("second_parent", "Second parent"),
-                ("ancestor", "First ancestor"),
-                ("children", "Children"),
-                ("survives", "Has descendants in the last layer"),
-                LOG_WEIGHT,
-                ("weight", "Weight"),
-            ),
+            "layer",
+            "particle",
+            ("parent", "Parent"),
+            ("second_parent", "Second parent"),
+            ("ancestor", "First ancestor"),
+            ("children", "Children"),
+            ("survives", "Has descendants in the last layer"),
+            "log_weight",
+            ("weight", "Weight"),
         ),
-        TableKind(
+        table(
             "ancestors",
             "Distinct ancestors by layer",
-            columns(
-                LAYER,
-                ("particles", "Particles"),
-                ("ancestors", "Distinct ancestors in the first set"),
-                ("with_descendants", "Particles with descendants in the last set"),
-                ("crossed", "Children of two"),
-            ),
+            "layer",
+            ("particles", "Particles"),
+            ("ancestors", "Distinct ancestors in the first set"),
+            ("with_descendants", "Particles with descendants in the last set"),
+            ("crossed", "Children of two"),
         ),
     ),
 )

@@ -15,21 +15,7 @@ from studio.inspection.likelihoods import FrameEvaluation, evaluation_of, in_bat
 from studio.inspection.modes import modes_of
 from studio.inspection.reading import InspectedFrame, no_value
 from studio.inspection.reference import true_pose
-from studio.inspection.tables import (
-    CAMERA,
-    LAYER,
-    LOG_WEIGHT,
-    PARAMETER,
-    PARTICLE,
-    TERM,
-    UNIT,
-    Found,
-    Row,
-    Selection,
-    TableKind,
-    View,
-    columns,
-)
+from studio.inspection.tables import Found, Row, Selection, View, table
 
 VIEW = View(
     "landscape",
@@ -37,40 +23,61 @@ VIEW = View(
     "What does the likelihood look like here?",
     ("layer", "parameter", "second", "towards", "particle", "track"),
     (
-        TableKind(
+        table(
             "slice",
             "Log weight along the line",
-            columns(("at", "Place"), UNIT, LOG_WEIGHT, ("possible", "Within the limits")),
+            ("at", "Place"),
+            "unit",
+            "log_weight",
+            ("possible", "Within the limits"),
         ),
-        TableKind(
+        table(
             "terms",
             "Terms along the line",
-            columns(("at", "Place"), CAMERA, TERM, ("value", "Log-likelihood", "nats")),
+            ("at", "Place"),
+            "camera",
+            "term",
+            ("value", "Log-likelihood", "nats"),
         ),
-        TableKind(
+        table(
             "tempered",
             "Density at each layer's β",
-            columns(LAYER, ("beta", "β"), ("at", "Place"), ("density", "Density")),
+            "layer",
+            ("beta", "β"),
+            ("at", "Place"),
+            ("density", "Density"),
         ),
-        TableKind(
+        table(
             "plane",
             "Log weight over two parameters",
-            columns(("at", "Place"), ("second", "Second parameter"), LOG_WEIGHT),
+            ("at", "Place"),
+            ("second", "Second parameter"),
+            "log_weight",
         ),
-        TableKind(
+        table(
             "rug",
             "Particles on the line",
-            columns(LAYER, PARTICLE, ("at", "Place"), ("second", "Second parameter"), LOG_WEIGHT),
+            "layer",
+            "particle",
+            ("at", "Place"),
+            ("second", "Second parameter"),
+            "log_weight",
         ),
-        TableKind(
+        table(
             "marks",
             "Estimate, truth and best particle",
-            columns(("name", "Name"), ("at", "Place"), ("second", "Second parameter"), LOG_WEIGHT),
+            ("name", "Name"),
+            ("at", "Place"),
+            ("second", "Second parameter"),
+            "log_weight",
         ),
-        TableKind(
+        table(
             "ends",
             "Poses at the line's ends (place 0 and 1, or the first and last value)",
-            columns(PARAMETER, UNIT, ("from", "First"), ("to", "Last")),
+            "parameter",
+            "unit",
+            ("from", "First"),
+            ("to", "Last"),
         ),
     ),
     evaluates=True,

@@ -20,7 +20,7 @@ from studio.evaluation.errors import lost_mm
 from studio.inspection.over_frames import stamps_of
 from studio.inspection.reading import InspectedFrame, InspectedRun, no_value
 from studio.inspection.reference import body_points, by_limb, true_points
-from studio.inspection.tables import FRAME, LAYER, Found, Row, Selection, TableKind, View, columns
+from studio.inspection.tables import Found, Row, Selection, View, table
 from studio.sessions.results_reader import ResultsReader
 from studio.trackers.side_exchange import kinds_of
 
@@ -30,41 +30,35 @@ VIEW = View(
     "Is there a second answer?",
     ("layer",),
     (
-        TableKind(
+        table(
             "modes",
             "Clusters of the layer",
-            columns(
-                ("mode", "Mode"),
-                ("mass", "Share of the weight"),
-                ("particles", "Particles"),
-                ("best_log_weight", "Best log weight", "nats"),
-                ("distance", "Distance from the heaviest mode", "mm"),
-                ("farthest", "Farthest limb"),
-                ("exchanged", "Limbs exchanged with the heaviest mode"),
-                ("error", "Distance from the truth", "mm"),
-            ),
+            ("mode", "Mode"),
+            ("mass", "Share of the weight"),
+            ("particles", "Particles"),
+            ("best_log_weight", "Best log weight", "nats"),
+            ("distance", "Distance from the heaviest mode", "mm"),
+            ("farthest", "Farthest limb"),
+            ("exchanged", "Limbs exchanged with the heaviest mode"),
+            ("error", "Distance from the truth", "mm"),
         ),
-        TableKind(
+        table(
             "layers",
             "Share of the weight by layer",
-            columns(LAYER, ("mode", "Mode"), ("mass", "Share of the weight"), ("particles", "Particles")),
+            "layer",
+            ("mode", "Mode"),
+            ("mass", "Share of the weight"),
+            ("particles", "Particles"),
         ),
-        TableKind(
-            "poses",
-            "Mean pose of each mode",
-            columns(("mode", "Mode")),
-            each="parameter",
-        ),
-        TableKind(
+        table("poses", "Mean pose of each mode", ("mode", "Mode"), each="parameter"),
+        table(
             "frames",
             "Modes by frame",
-            columns(
-                FRAME,
-                ("modes", "Modes"),
-                ("first_mass", "Share of the heaviest"),
-                ("distance", "Distance of the two heaviest", "mm"),
-                ("farthest", "Farthest limb"),
-            ),
+            "frame",
+            ("modes", "Modes"),
+            ("first_mass", "Share of the heaviest"),
+            ("distance", "Distance of the two heaviest", "mm"),
+            ("farthest", "Farthest limb"),
             of_run=True,
         ),
     ),

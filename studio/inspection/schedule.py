@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from studio.inspection.reading import InspectedFrame, no_value
-from studio.inspection.tables import FRAME, LAYER, Row, Selection, TableKind, View, columns
+from studio.inspection.tables import Row, Selection, View, table
 
 VIEW = View(
     "schedule",
@@ -15,34 +15,30 @@ VIEW = View(
     "Did annealing proceed as asked?",
     ("layer",),
     (
-        TableKind(
+        table(
             "layers",
             "Exponent and survival of every layer",
-            columns(
-                LAYER,
-                ("beta", "β"),
-                ("alpha_wanted", "α wanted"),
-                ("alpha_reached", "α reached"),
-                ("effective", "Effective number"),
-                ("particles", "Particles"),
-                ("largest", "Largest weight"),
-                ("best_log_weight", "Best log weight", "nats"),
-                ("milliseconds", "Time", "ms"),
-                ("settings_version", "Settings version"),
-                ("alarm", "Alarm"),
-            ),
+            "layer",
+            ("beta", "β"),
+            ("alpha_wanted", "α wanted"),
+            ("alpha_reached", "α reached"),
+            ("effective", "Effective number"),
+            ("particles", "Particles"),
+            ("largest", "Largest weight"),
+            ("best_log_weight", "Best log weight", "nats"),
+            ("milliseconds", "Time", "ms"),
+            ("settings_version", "Settings version"),
+            ("alarm", "Alarm"),
         ),
-        TableKind(
+        table(
             "frames",
             "Schedule by frame",
-            columns(
-                FRAME,
-                ("beta_first", "β of the first layer"),
-                ("beta_last", "β of the last layer"),
-                ("least_alpha", "Least α reached"),
-                ("least_effective", "Least effective number"),
-                ("alarms", "Layers with an alarm"),
-            ),
+            "frame",
+            ("beta_first", "β of the first layer"),
+            ("beta_last", "β of the last layer"),
+            ("least_alpha", "Least α reached"),
+            ("least_effective", "Least effective number"),
+            ("alarms", "Layers with an alarm"),
             of_run=True,
         ),
     ),

@@ -20,17 +20,7 @@ from studio.errors import NotFoundError
 from studio.inspection.reading import InspectedFrame, InspectedRun, no_value
 from studio.inspection.reference import body_points, by_limb, true_points
 from studio.inspection.retracking import Change, Retracking
-from studio.inspection.tables import (
-    LIMB,
-    LOG_WEIGHT,
-    PARAMETER,
-    Found,
-    Row,
-    Selection,
-    TableKind,
-    View,
-    columns,
-)
+from studio.inspection.tables import Found, Row, Selection, View, table
 from studio.progress import Progress
 from studio.trackers.tracker import FrameResult, ParticleSet
 
@@ -40,35 +30,33 @@ VIEW = View(
     "Would another seed agree?",
     ("limb",),
     (
-        TableKind(
+        table(
             "limbs",
             "Spread within and between seeds",
-            columns(
-                LIMB,
-                ("within", "Within a seed", "mm"),
-                ("between", "Between seeds: Monte-Carlo error of one", "mm"),
-                ("error", "Monte-Carlo error of their mean", "mm"),
-                ("r_hat", "R̂"),
-            ),
+            "limb",
+            ("within", "Within a seed", "mm"),
+            ("between", "Between seeds: Monte-Carlo error of one", "mm"),
+            ("error", "Monte-Carlo error of their mean", "mm"),
+            ("r_hat", "R̂"),
         ),
-        TableKind(
+        table(
             "seeds",
             "Each seed's result",
-            columns(("seed", "Seed"), LOG_WEIGHT, ("evaluations", "Evaluations"), ("error", "Error", "mm")),
+            ("seed", "Seed"),
+            "log_weight",
+            ("evaluations", "Evaluations"),
+            ("error", "Error", "mm"),
         ),
-        TableKind(
+        table(
             "ranks",
             "Ranks of each seed's particles among all",
-            columns(
-                PARAMETER, ("seed", "Seed"), ("bin", "Bin"), ("count", "Weight"), ("expected", "Expected")
-            ),
+            "parameter",
+            ("seed", "Seed"),
+            ("bin", "Bin"),
+            ("count", "Weight"),
+            ("expected", "Expected"),
         ),
-        TableKind(
-            "poses",
-            "Each seed's estimate",
-            columns(("seed", "Seed")),
-            each="parameter",
-        ),
+        table("poses", "Each seed's estimate", ("seed", "Seed"), each="parameter"),
     ),
     is_job=True,
 )

@@ -8,19 +8,7 @@ from scipy import stats
 from studio.arrays import Mask
 from studio.inspection.genealogy import children_of
 from studio.inspection.reading import InspectedFrame, no_value
-from studio.inspection.tables import (
-    LIMB,
-    LOG_WEIGHT,
-    PARAMETER,
-    PARTICLE,
-    UNIT,
-    Found,
-    Row,
-    Selection,
-    TableKind,
-    View,
-    columns,
-)
+from studio.inspection.tables import Found, Row, Selection, View, table
 
 VIEW = View(
     "survivors",
@@ -28,31 +16,27 @@ VIEW = View(
     "What did the dead have wrong?",
     ("layer",),
     (
-        TableKind(
+        table(
             "particles",
             "Particles of the layer",
-            columns(
-                PARTICLE,
-                ("rank", "Rank"),
-                LOG_WEIGHT,
-                ("weight", "Weight"),
-                ("children", "Children"),
-                ("survives", "Survives"),
-            ),
+            "particle",
+            ("rank", "Rank"),
+            "log_weight",
+            ("weight", "Weight"),
+            ("children", "Children"),
+            ("survives", "Survives"),
             each="parameter",
         ),
-        TableKind(
+        table(
             "difference",
             "Survivors against dead",
-            columns(
-                PARAMETER,
-                LIMB,
-                UNIT,
-                ("survivors", "Mean of the survivors"),
-                ("dead", "Mean of the dead"),
-                ("difference", "Difference in deviations"),
-                ("p_value", "Kolmogorov-Smirnov p"),
-            ),
+            "parameter",
+            "limb",
+            "unit",
+            ("survivors", "Mean of the survivors"),
+            ("dead", "Mean of the dead"),
+            ("difference", "Difference in deviations"),
+            ("p_value", "Kolmogorov-Smirnov p"),
         ),
     ),
 )

@@ -14,7 +14,7 @@ SHOWN_ROWS = 40
 """In a notebook."""
 
 
-LAYER_KEY = "layer"
+LAYER = "layer"
 """Key of the columns that hold a layer's index, from 0 as in the arrays of Python and in addresses."""
 
 
@@ -33,15 +33,21 @@ class Column:
     unit: str = ""
 
 
-FRAME, LAYER = Column("frame", "Frame"), Column(LAYER_KEY, "Layer")
-PARAMETER, LIMB, UNIT = Column("parameter", "Parameter"), Column("limb", "Limb"), Column("unit", "Unit")
-PARTICLE, CAMERA, TERM = Column("particle", "Particle"), Column("camera", "Camera"), Column("term", "Term")
-LOG_WEIGHT = Column("log_weight", "Log weight", "nats")
-
-
-def columns(*entries: Column | tuple[str, ...]) -> tuple[Column, ...]:
-    """Columns, those that no other view has as (key, label) or (key, label, unit)."""
-    return tuple(entry if isinstance(entry, Column) else Column(*entry) for entry in entries)
+COMMON = {
+    column.key: column
+    for column in (
+        Column("frame", "Frame"),
+        Column(LAYER, "Layer"),
+        Column("parameter", "Parameter"),
+        Column("limb", "Limb"),
+        Column("unit", "Unit"),
+        Column("particle", "Particle"),
+        Column("camera", "Camera"),
+        Column("term", "Term"),
+        Column("log_weight", "Log weight", "nats"),
+    )
+}
+"""Columns that many tables have, by key."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +61,14 @@ class TableKind:
     columns: tuple[Column, ...]
     of_run: bool = False
     each: str = ""
+
+
+def table(
+    name: str, title: str, *columns: str | tuple[str, ...], of_run: bool = False, each: str = ""
+) -> TableKind:
+    """A table of a view. columns : common ones by key, others as (key, label) or (key, label, unit)."""
+    made = tuple(COMMON[entry] if isinstance(entry, str) else Column(*entry) for entry in columns)
+    return TableKind(name, title, made, of_run, each)
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +114,7 @@ class Table:
 
     def for_readers(self) -> list[list[Cell]]:
         """The rows as people read them: layers, whose numbers are indices here, are counted from 1."""
-        layers = {at for at, entry in enumerate(self.columns) if entry.key == LAYER_KEY}
+        layers = {at for at, entry in enumerate(self.columns) if entry.key == LAYER}
         return [
             [cell + 1 if at in layers and isinstance(cell, int) else cell for at, cell in enumerate(row)]
             for row in self.rows

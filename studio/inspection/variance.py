@@ -5,18 +5,7 @@ noise).
 import numpy as np
 
 from studio.inspection.reading import InspectedFrame
-from studio.inspection.tables import (
-    FRAME,
-    LAYER,
-    LIMB,
-    PARAMETER,
-    UNIT,
-    Row,
-    Selection,
-    TableKind,
-    View,
-    columns,
-)
+from studio.inspection.tables import Row, Selection, View, table
 
 VIEW = View(
     "variance",
@@ -24,48 +13,38 @@ VIEW = View(
     "Which parameter did which layer settle?",
     ("parameter",),
     (
-        TableKind(
+        table(
             "layers",
             "Variance of every parameter in every layer",
-            columns(
-                PARAMETER,
-                LIMB,
-                UNIT,
-                LAYER,
-                ("weighed", "As weighed"),
-                ("before", "Before noise"),
-                ("after", "After noise"),
-            ),
+            "parameter",
+            "limb",
+            "unit",
+            "layer",
+            ("weighed", "As weighed"),
+            ("before", "Before noise"),
+            ("after", "After noise"),
         ),
-        TableKind(
+        table(
             "settled",
             "Layer that settled each parameter",
-            columns(
-                PARAMETER,
-                LIMB,
-                UNIT,
-                LAYER,
-                ("first", "First variance"),
-                ("last", "Last variance"),
-                ("reduction", "First / last"),
-            ),
+            "parameter",
+            "limb",
+            "unit",
+            "layer",
+            ("first", "First variance"),
+            ("last", "Last variance"),
+            ("reduction", "First / last"),
         ),
-        TableKind(
-            "first", "Variance of the first set, by frame", columns(FRAME), of_run=True, each="parameter"
-        ),
-        TableKind(
-            "last", "Variance of the last set, by frame", columns(FRAME), of_run=True, each="parameter"
-        ),
-        TableKind(
+        table("first", "Variance of the first set, by frame", "frame", of_run=True, each="parameter"),
+        table("last", "Variance of the last set, by frame", "frame", of_run=True, each="parameter"),
+        table(
             "parameter",
             "One parameter by layer and frame",
-            columns(
-                FRAME,
-                LAYER,
-                ("weighed", "As weighed"),
-                ("before", "Before noise"),
-                ("after", "After noise"),
-            ),
+            "frame",
+            "layer",
+            ("weighed", "As weighed"),
+            ("before", "Before noise"),
+            ("after", "After noise"),
             of_run=True,
         ),
     ),

@@ -12,7 +12,7 @@ import numpy as np
 from studio.arrays import Array
 from studio.inspection.reading import InspectedFrame, no_value
 from studio.inspection.schedule import effective_number
-from studio.inspection.tables import LAYER, LOG_WEIGHT, PARTICLE, Row, Selection, TableKind, View, columns
+from studio.inspection.tables import Row, Selection, View, table
 
 VIEW = View(
     "weights",
@@ -20,29 +20,25 @@ VIEW = View(
     "Is the estimate one lucky particle?",
     ("layer",),
     (
-        TableKind(
+        table(
             "sorted",
             "Weights of a layer, largest first",
-            columns(
-                LAYER,
-                ("rank", "Rank"),
-                PARTICLE,
-                ("weight", "Weight"),
-                ("cumulated", "Cumulated"),
-                LOG_WEIGHT,
-            ),
+            "layer",
+            ("rank", "Rank"),
+            "particle",
+            ("weight", "Weight"),
+            ("cumulated", "Cumulated"),
+            "log_weight",
         ),
-        TableKind(
+        table(
             "layers",
             "Concentration by layer",
-            columns(
-                LAYER,
-                ("largest", "Largest weight"),
-                ("k_hat", "Pareto k̂"),
-                ("effective", "Effective number"),
-                ("particles", "Particles"),
-                ("for_90", "Particles that hold 90 %"),
-            ),
+            "layer",
+            ("largest", "Largest weight"),
+            ("k_hat", "Pareto k̂"),
+            ("effective", "Effective number"),
+            ("particles", "Particles"),
+            ("for_90", "Particles that hold 90 %"),
         ),
     ),
 )

@@ -38,21 +38,7 @@ from studio.inspection.reading import InspectedFrame, no_value
 from studio.inspection.reference import body_points, by_limb, refined_pose, true_points
 from studio.inspection.retracking import Change, Retracking, more_evaluations
 from studio.inspection.schedule import effective_number
-from studio.inspection.tables import (
-    CAMERA,
-    FRAME,
-    LAYER,
-    LIMB,
-    TERM,
-    Finding,
-    Found,
-    Remedy,
-    Row,
-    Selection,
-    TableKind,
-    View,
-    columns,
-)
+from studio.inspection.tables import Finding, Found, Remedy, Row, Selection, View, table
 from studio.knobs import Value, knobs_of
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.runs.tracks import RAW
@@ -66,33 +52,34 @@ VIEW = View(
     "Why did this frame fail?",
     ("track",),
     (
-        TableKind(
+        table(
             "findings",
             "What was found",
-            columns(("kind", "Kind"), ("words", "In words"), LIMB, LAYER, CAMERA, TERM),
+            ("kind", "Kind"),
+            ("words", "In words"),
+            "limb",
+            "layer",
+            "camera",
+            "term",
         ),
-        TableKind(
+        table(
             "nearest",
             "Distance of the nearest particle from the reference pose",
-            columns(
-                LAYER,
-                LIMB,
-                ("nearest", "Nearest particle", "mm"),
-                ("median", "Median particle", "mm"),
-                ("reach", "Noise of the layer", "mm"),
-                ("inside", "Reference inside the cloud"),
-            ),
+            "layer",
+            "limb",
+            ("nearest", "Nearest particle", "mm"),
+            ("median", "Median particle", "mm"),
+            ("reach", "Noise of the layer", "mm"),
+            ("inside", "Reference inside the cloud"),
         ),
-        TableKind(
+        table(
             "limbs",
             "Error or disagreement by frame and limb",
-            columns(
-                FRAME,
-                LIMB,
-                ("error", "Error", "mm"),
-                ("disagreement", "Disagreement with the silhouettes"),
-                ("lost", "Lost"),
-            ),
+            "frame",
+            "limb",
+            ("error", "Error", "mm"),
+            ("disagreement", "Disagreement with the silhouettes"),
+            ("lost", "Lost"),
             of_run=True,
         ),
     ),
