@@ -15,12 +15,73 @@ from studio.evidence.distance_maps import silhouettes_by_camera
 from studio.inspection.likelihoods import FrameEvaluation, evaluation_of, limbs_swapped
 from studio.inspection.reading import InspectedFrame
 from studio.inspection.reference import true_pose
-from studio.inspection.tables import Found, Row, Selection
+from studio.inspection.tables import Found, Row, Selection, View, table
 from studio.likelihood.edge_region import EdgeRegionSettings
 from studio.likelihood.overlay import sample_points
 from studio.likelihood.problem import Shares
 from studio.runs.tracks import RAW, best_track, pose_in_track
 from studio.trackers.agreement import Agreement, limb_names
+
+VIEW = View(
+    "blame",
+    "Blame",
+    "Which camera and term pulls where?",
+    ("limb", "camera", "track"),
+    (
+        table(
+            "matrix",
+            "Log-likelihood by camera, term and limb",
+            "camera",
+            "term",
+            "limb",
+            ("value", "At the pose", "nats"),
+            ("reference", "At the reference pose", "nats"),
+            ("difference", "Pose less reference", "nats"),
+        ),
+        table(
+            "left_out",
+            "Change when one camera or term counts less",
+            "camera",
+            "term",
+            ("factor", "Counts"),
+            ("log_weight", "At the pose", "nats"),
+            ("reference", "At the reference pose", "nats"),
+            ("preference", "Preference of the pose", "nats"),
+            ("change", "Change of preference", "nats"),
+        ),
+        table(
+            "pulls",
+            "Where each camera and term pulls each parameter",
+            "parameter",
+            "limb",
+            "unit",
+            "camera",
+            "term",
+            ("pull", "Log-likelihood a deviation", "nats"),
+        ),
+        table(
+            "areas",
+            "Areas of silhouette and body",
+            "camera",
+            "limb",
+            ("outside", "Body outside the silhouette (B)", "mm²"),
+            ("bare", "Silhouette without body (R)", "mm²"),
+            ("area", "Area of the limb", "mm²"),
+        ),
+        table(
+            "samples",
+            "Samples of one camera",
+            "camera",
+            "limb",
+            "term",
+            ("x", "x", "px"),
+            ("y", "y", "px"),
+            ("cost", "Cost, 0 to 1"),
+        ),
+    ),
+    evaluates=True,
+)
+
 
 STEP = 0.25
 """Deviations to either side at which a pull is measured."""

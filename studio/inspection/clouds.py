@@ -10,7 +10,53 @@ from studio.arrays import Array
 from studio.inspection.reading import InspectedFrame, no_value
 from studio.inspection.reference import true_pose
 from studio.inspection.schedule import effective_number
-from studio.inspection.tables import Row, Selection
+from studio.inspection.tables import Row, Selection, View, table
+
+VIEW = View(
+    "clouds",
+    "First and last cloud",
+    "What did the frame learn?",
+    ("parameter", "limb", "track"),
+    (
+        table(
+            "summary",
+            "Clouds by parameter and layer",
+            "parameter",
+            "limb",
+            "unit",
+            "layer",
+            ("weighted", "Weighted (else as drawn)"),
+            ("mean", "Mean"),
+            ("deviation", "Deviation"),
+            ("q05", "5 %"),
+            ("q25", "25 %"),
+            ("median", "Median"),
+            ("q75", "75 %"),
+            ("q95", "95 %"),
+        ),
+        table(
+            "ridges",
+            "Densities by parameter and layer",
+            "parameter",
+            "layer",
+            ("weighted", "Weighted (else as drawn)"),
+            ("value", "Value"),
+            ("density", "Density"),
+        ),
+        table(
+            "marks",
+            "Limits, estimate and truth",
+            "parameter",
+            "limb",
+            "unit",
+            ("lower", "Lower limit"),
+            ("upper", "Upper limit"),
+            ("estimate", "Estimate"),
+            ("truth", "Truth"),
+        ),
+    ),
+)
+
 
 POINTS = 49
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)

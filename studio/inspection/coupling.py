@@ -4,8 +4,35 @@ import numpy as np
 
 from studio.arrays import Array, Indices
 from studio.inspection.reading import InspectedFrame
-from studio.inspection.tables import Row, Selection
+from studio.inspection.tables import Row, Selection, View, table
 from studio.inspection.variance import settling
+
+VIEW = View(
+    "coupling",
+    "Coupling",
+    "Which parameters trade off?",
+    ("layer", "parameter"),
+    (
+        table(
+            "matrix",
+            "Correlations, in the order of settling",
+            ("first", "Parameter"),
+            ("second", "Other parameter"),
+            ("correlation", "Correlation"),
+        ),
+        table(
+            "order",
+            "Order of settling",
+            ("place", "Place"),
+            "parameter",
+            "limb",
+            "unit",
+            "layer",
+            ("deviation", "Deviation in this layer"),
+        ),
+        table("particles", "Particles of the layer", "particle", ("weight", "Weight"), each="parameter"),
+    ),
+)
 
 
 def correlations(poses: Array, weights: Array) -> Array:

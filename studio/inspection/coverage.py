@@ -13,7 +13,46 @@ from studio.inspection.limbs import errors_of
 from studio.inspection.over_frames import spread_by_limb, summaries
 from studio.inspection.reading import InspectedFrame, InspectedRun, no_value
 from studio.inspection.reference import limbs_of_points
-from studio.inspection.tables import Found, Row, Selection
+from studio.inspection.tables import Found, Row, Selection, View, table
+
+VIEW = View(
+    "coverage",
+    "Coverage",
+    "Does spread predict error?",
+    ("limb", "track"),
+    (
+        table(
+            "frames",
+            "Spread and error by frame and limb",
+            "frame",
+            "limb",
+            ("spread", "Spread of the last set", "mm"),
+            ("error", "Error", "mm"),
+            of_run=True,
+        ),
+        table(
+            "correlation",
+            "Does spread rank as error does?",
+            "limb",
+            ("frames", "Frames"),
+            ("rho", "Spearman's ρ"),
+            ("p_value", "p"),
+            of_run=True,
+        ),
+        table(
+            "pit",
+            "Rank of the truth in the last set",
+            "limb",
+            ("bin", "Bin"),
+            ("count", "Share"),
+            ("expected", "Expected"),
+            ("lower", "Band, lower"),
+            ("upper", "Band, upper"),
+            of_run=True,
+        ),
+    ),
+)
+
 
 BINS = 10
 BAND = 0.95

@@ -11,8 +11,39 @@ import numpy as np
 
 from studio.arrays import Array, Indices, Mask
 from studio.inspection.reading import InspectedFrame
-from studio.inspection.tables import Found, Row, Selection
+from studio.inspection.tables import Found, Row, Selection, View, table
 from studio.trackers.tracker import NO_PARENT
+
+VIEW = View(
+    "genealogy",
+    "Genealogy",
+    "Which ancestors survive?",
+    ("layer", "particle"),
+    (
+        table(
+            "particles",
+            "Particles and their parents",
+            "layer",
+            "particle",
+            ("parent", "Parent"),
+            ("second_parent", "Second parent"),
+            ("ancestor", "First ancestor"),
+            ("children", "Children"),
+            ("survives", "Has descendants in the last layer"),
+            "log_weight",
+            ("weight", "Weight"),
+        ),
+        table(
+            "ancestors",
+            "Distinct ancestors by layer",
+            "layer",
+            ("particles", "Particles"),
+            ("ancestors", "Distinct ancestors in the first set"),
+            ("with_descendants", "Particles with descendants in the last set"),
+            ("crossed", "Children of two"),
+        ),
+    ),
+)
 
 
 def living(parents: Sequence[Indices], sizes: Sequence[int]) -> list[Mask]:

@@ -15,7 +15,74 @@ from studio.inspection.likelihoods import FrameEvaluation, evaluation_of, in_bat
 from studio.inspection.modes import modes_of
 from studio.inspection.reading import InspectedFrame, no_value
 from studio.inspection.reference import true_pose
-from studio.inspection.tables import Found, Row, Selection
+from studio.inspection.tables import Found, Row, Selection, View, table
+
+VIEW = View(
+    "landscape",
+    "Landscape",
+    "What does the likelihood look like here?",
+    ("layer", "parameter", "second", "towards", "particle", "track"),
+    (
+        table(
+            "slice",
+            "Log weight along the line",
+            ("at", "Place"),
+            "unit",
+            "log_weight",
+            ("possible", "Within the limits"),
+        ),
+        table(
+            "terms",
+            "Terms along the line",
+            ("at", "Place"),
+            "camera",
+            "term",
+            ("value", "Log-likelihood", "nats"),
+        ),
+        table(
+            "tempered",
+            "Density at each layer's β",
+            "layer",
+            ("beta", "β"),
+            ("at", "Place"),
+            ("density", "Density"),
+        ),
+        table(
+            "plane",
+            "Log weight over two parameters",
+            ("at", "Place"),
+            ("second", "Second parameter"),
+            "log_weight",
+        ),
+        table(
+            "rug",
+            "Particles on the line",
+            "layer",
+            "particle",
+            ("at", "Place"),
+            ("second", "Second parameter"),
+            "log_weight",
+        ),
+        table(
+            "marks",
+            "Estimate, truth and best particle",
+            ("name", "Name"),
+            ("at", "Place"),
+            ("second", "Second parameter"),
+            "log_weight",
+        ),
+        table(
+            "ends",
+            "Poses at the line's ends (place 0 and 1, or the first and last value)",
+            "parameter",
+            "unit",
+            ("from", "First"),
+            ("to", "Last"),
+        ),
+    ),
+    evaluates=True,
+)
+
 
 PLACES, PLANE = 81, 33
 BEFORE, AFTER = -0.5, 1.5

@@ -20,9 +20,50 @@ from studio.evaluation.errors import lost_mm
 from studio.inspection.over_frames import stamps_of
 from studio.inspection.reading import InspectedFrame, InspectedRun, no_value
 from studio.inspection.reference import body_points, by_limb, true_points
-from studio.inspection.tables import Found, Row, Selection
+from studio.inspection.tables import Found, Row, Selection, View, table
 from studio.sessions.results_reader import ResultsReader
 from studio.trackers.side_exchange import kinds_of
+
+VIEW = View(
+    "modes",
+    "Modes",
+    "Is there a second answer?",
+    ("layer",),
+    (
+        table(
+            "modes",
+            "Clusters of the layer",
+            ("mode", "Mode"),
+            ("mass", "Share of the weight"),
+            ("particles", "Particles"),
+            ("best_log_weight", "Best log weight", "nats"),
+            ("distance", "Distance from the heaviest mode", "mm"),
+            ("farthest", "Farthest limb"),
+            ("exchanged", "Limbs exchanged with the heaviest mode"),
+            ("error", "Distance from the truth", "mm"),
+        ),
+        table(
+            "layers",
+            "Share of the weight by layer",
+            "layer",
+            ("mode", "Mode"),
+            ("mass", "Share of the weight"),
+            ("particles", "Particles"),
+        ),
+        table("poses", "Mean pose of each mode", ("mode", "Mode"), each="parameter"),
+        table(
+            "frames",
+            "Modes by frame",
+            "frame",
+            ("modes", "Modes"),
+            ("first_mass", "Share of the heaviest"),
+            ("distance", "Distance of the two heaviest", "mm"),
+            ("farthest", "Farthest limb"),
+            of_run=True,
+        ),
+    ),
+)
+
 
 APART = 4.0
 MOST = 600

@@ -7,7 +7,43 @@ import math
 import numpy as np
 
 from studio.inspection.reading import InspectedFrame, no_value
-from studio.inspection.tables import Row, Selection
+from studio.inspection.tables import Row, Selection, View, table
+
+VIEW = View(
+    "schedule",
+    "Schedule",
+    "Did annealing proceed as asked?",
+    ("layer",),
+    (
+        table(
+            "layers",
+            "Exponent and survival of every layer",
+            "layer",
+            ("beta", "β"),
+            ("alpha_wanted", "α wanted"),
+            ("alpha_reached", "α reached"),
+            ("effective", "Effective number"),
+            ("particles", "Particles"),
+            ("largest", "Largest weight"),
+            ("best_log_weight", "Best log weight", "nats"),
+            ("milliseconds", "Time", "ms"),
+            ("settings_version", "Settings version"),
+            ("alarm", "Alarm"),
+        ),
+        table(
+            "frames",
+            "Schedule by frame",
+            "frame",
+            ("beta_first", "β of the first layer"),
+            ("beta_last", "β of the last layer"),
+            ("least_alpha", "Least α reached"),
+            ("least_effective", "Least effective number"),
+            ("alarms", "Layers with an alarm"),
+            of_run=True,
+        ),
+    ),
+)
+
 
 SATURATED = 0.02
 """Difference of α asked and reached beyond which no β reaches what was asked (`annealing.anneal`)."""

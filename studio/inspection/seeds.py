@@ -20,9 +20,47 @@ from studio.errors import NotFoundError
 from studio.inspection.reading import InspectedFrame, InspectedRun, no_value
 from studio.inspection.reference import body_points, by_limb, true_points
 from studio.inspection.retracking import Change, Retracking
-from studio.inspection.tables import Found, Row, Selection
+from studio.inspection.tables import Found, Row, Selection, View, table
 from studio.progress import Progress
 from studio.trackers.tracker import FrameResult, ParticleSet
+
+VIEW = View(
+    "seeds",
+    "Seeds",
+    "Would another seed agree?",
+    ("limb",),
+    (
+        table(
+            "limbs",
+            "Spread within and between seeds",
+            "limb",
+            ("within", "Within a seed", "mm"),
+            ("between", "Between seeds: Monte-Carlo error of one", "mm"),
+            ("error", "Monte-Carlo error of their mean", "mm"),
+            ("r_hat", "R̂"),
+        ),
+        table(
+            "seeds",
+            "Each seed's result",
+            ("seed", "Seed"),
+            "log_weight",
+            ("evaluations", "Evaluations"),
+            ("error", "Error", "mm"),
+        ),
+        table(
+            "ranks",
+            "Ranks of each seed's particles among all",
+            "parameter",
+            ("seed", "Seed"),
+            ("bin", "Bin"),
+            ("count", "Weight"),
+            ("expected", "Expected"),
+        ),
+        table("poses", "Each seed's estimate", ("seed", "Seed"), each="parameter"),
+    ),
+    is_job=True,
+)
+
 
 BINS = 10
 KEPT = 32

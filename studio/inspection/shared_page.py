@@ -17,10 +17,9 @@ from studio.body.forward_kinematics import limb_ends
 from studio.errors import NotFoundError, RunError, StudioError
 from studio.evaluation.errors import Evaluation, evaluate
 from studio.geometry.camera import Camera
-from studio.inspection.catalogue import view_named
 from studio.inspection.reading import InspectedRun, no_value
 from studio.inspection.tables import Selection, Table, Viewed
-from studio.inspection.views import look, look_over
+from studio.inspection.views import look, look_over, view_named
 from studio.motion_files.trc import read_trc
 from studio.progress import Progress, unheard
 from studio.runs.new_run import software_version

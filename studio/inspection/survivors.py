@@ -8,7 +8,39 @@ import scipy  # stats, half a second, are loaded once they are used
 from studio.arrays import Mask
 from studio.inspection.genealogy import children_of
 from studio.inspection.reading import InspectedFrame, no_value
-from studio.inspection.tables import Found, Row, Selection
+from studio.inspection.tables import Found, Row, Selection, View, table
+
+VIEW = View(
+    "survivors",
+    "Survivors and dead",
+    "What did the dead have wrong?",
+    ("layer",),
+    (
+        table(
+            "particles",
+            "Particles of the layer",
+            "particle",
+            ("rank", "Rank"),
+            "log_weight",
+            ("weight", "Weight"),
+            ("children", "Children"),
+            ("survives", "Survives"),
+            each="parameter",
+        ),
+        table(
+            "difference",
+            "Survivors against dead",
+            "parameter",
+            "limb",
+            "unit",
+            ("survivors", "Mean of the survivors"),
+            ("dead", "Mean of the dead"),
+            ("difference", "Difference in deviations"),
+            ("p_value", "Kolmogorov-Smirnov p"),
+        ),
+    ),
+)
+
 
 FEWEST = 2
 

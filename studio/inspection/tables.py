@@ -33,6 +33,23 @@ class Column:
     unit: str = ""
 
 
+COMMON = {
+    column.key: column
+    for column in (
+        Column("frame", "Frame"),
+        Column(LAYER, "Layer"),
+        Column("parameter", "Parameter"),
+        Column("limb", "Limb"),
+        Column("unit", "Unit"),
+        Column("particle", "Particle"),
+        Column("camera", "Camera"),
+        Column("term", "Term"),
+        Column("log_weight", "Log weight", "nats"),
+    )
+}
+"""Columns that many tables have, by key."""
+
+
 @dataclass(frozen=True, slots=True)
 class TableKind:
     """A table that a view has. of_run : it belongs to the run, not to one frame. each : what further columns there is
@@ -44,6 +61,41 @@ class TableKind:
     columns: tuple[Column, ...]
     of_run: bool = False
     each: str = ""
+
+
+def table(
+    name: str, title: str, *columns: str | tuple[str, ...], of_run: bool = False, each: str = ""
+) -> TableKind:
+    """A table of a view. columns : common ones by key, others as (key, label) or (key, label, unit)."""
+    made = tuple(COMMON[entry] if isinstance(entry, str) else Column(*entry) for entry in columns)
+    return TableKind(name, title, made, of_run, each)
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """One way of looking into a run. question : what it answers. uses : entries of the selection that it reads.
+
+    tables : those of a frame and, `of_run`, those of the whole run. evaluates : it evaluates the likelihood again.
+    is_job : its numbers are computed by a job (verb `seeds`); until one has ended its tables are empty.
+    """
+
+    name: str
+    title: str
+    question: str
+    uses: tuple[str, ...]
+    tables: tuple[TableKind, ...]
+    evaluates: bool = False
+    is_job: bool = False
+
+    @property
+    def frame_tables(self) -> tuple[TableKind, ...]:
+        """The tables of one frame."""
+        return tuple(kind for kind in self.tables if not kind.of_run)
+
+    @property
+    def run_tables(self) -> tuple[TableKind, ...]:
+        """The tables of the whole run."""
+        return tuple(kind for kind in self.tables if kind.of_run)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,50 @@ noise).
 import numpy as np
 
 from studio.inspection.reading import InspectedFrame
-from studio.inspection.tables import Row, Selection
+from studio.inspection.tables import Row, Selection, View, table
+
+VIEW = View(
+    "variance",
+    "Variance reduction",
+    "Which parameter did which layer settle?",
+    ("parameter",),
+    (
+        table(
+            "layers",
+            "Variance of every parameter in every layer",
+            "parameter",
+            "limb",
+            "unit",
+            "layer",
+            ("weighed", "As weighed"),
+            ("before", "Before noise"),
+            ("after", "After noise"),
+        ),
+        table(
+            "settled",
+            "Layer that settled each parameter",
+            "parameter",
+            "limb",
+            "unit",
+            "layer",
+            ("first", "First variance"),
+            ("last", "Last variance"),
+            ("reduction", "First / last"),
+        ),
+        table("first", "Variance of the first set, by frame", "frame", of_run=True, each="parameter"),
+        table("last", "Variance of the last set, by frame", "frame", of_run=True, each="parameter"),
+        table(
+            "parameter",
+            "One parameter by layer and frame",
+            "frame",
+            "layer",
+            ("weighed", "As weighed"),
+            ("before", "Before noise"),
+            ("after", "After noise"),
+            of_run=True,
+        ),
+    ),
+)
 
 
 def settling(frame: InspectedFrame) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1,6 +1,7 @@
-"""A view's tables for a frame or for a whole run."""
+"""The views by name, and their tables for a frame or for a whole run: what each shows is declared in its module."""
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 from studio.errors import NotFoundError
 from studio.inspection import (
@@ -20,52 +21,65 @@ from studio.inspection import (
     weights,
     why,
 )
-from studio.inspection.catalogue import View, view_named
 from studio.inspection.reading import InspectedFrame, InspectedRun
-from studio.inspection.tables import Column, Found, Rows, Selection, Table, TableKind, Viewed
+from studio.inspection.tables import Column, Found, Rows, Selection, Table, TableKind, View, Viewed
 
 OfFrame = Callable[[InspectedFrame, Selection], Found | Rows]
 OfRun = Callable[[InspectedRun, Selection], Found | Rows]
 
-_OF_FRAME: dict[str, OfFrame] = {
-    "variance": variance.rows,
-    "schedule": schedule.rows,
-    "genealogy": genealogy.rows,
-    "weights": weights.rows,
-    "clouds": clouds.rows,
-    "coupling": coupling.rows,
-    "survivors": survivors.rows,
-    "modes": modes.rows,
-    "coverage": coverage.of_frame,
-    "landscape": landscape.rows,
-    "blame": blame.rows,
-    "seeds": seeds.rows,
-    "why": why.rows,
+
+class _Entry(NamedTuple):
+    """A view with what finds its rows in a frame, and in the whole run; None where it has no tables of it."""
+
+    view: View
+    of_frame: OfFrame
+    of_run: OfRun | None = None
+
+
+_ENTRIES = {
+    entry.view.name: entry
+    for entry in (
+        _Entry(variance.VIEW, variance.rows, over_frames.variance_rows),
+        _Entry(schedule.VIEW, schedule.rows, over_frames.schedule_rows),
+        _Entry(genealogy.VIEW, genealogy.rows),
+        _Entry(weights.VIEW, weights.rows),
+        _Entry(clouds.VIEW, clouds.rows),
+        _Entry(coupling.VIEW, coupling.rows),
+        _Entry(survivors.VIEW, survivors.rows),
+        _Entry(landscape.VIEW, landscape.rows),
+        _Entry(blame.VIEW, blame.rows),
+        _Entry(modes.VIEW, modes.rows, modes.over_run),
+        _Entry(seeds.VIEW, seeds.rows),
+        _Entry(coverage.VIEW, coverage.of_frame, coverage.over_run),
+        _Entry(why.VIEW, why.rows, limbs.limb_rows),
+    )
 }
-_OF_RUN: dict[str, OfRun] = {
-    "variance": over_frames.variance_rows,
-    "schedule": over_frames.schedule_rows,
-    "modes": modes.over_run,
-    "coverage": coverage.over_run,
-    "why": limbs.limb_rows,
-}
+VIEWS = {name: entry.view for name, entry in _ENTRIES.items()}
 
 
 def look(run: InspectedRun, frame: int, name: str, selection: Selection) -> Viewed:
     """A view's tables of a frame. Raises NotFoundError for a frame, layer, parameter … that is none."""
-    view = view_named(name)
-    if name not in _OF_FRAME:
-        raise NotFoundError(f"View '{name}' shows whole runs, not frames.", "Ask for it without a frame.")
-    opened = run.frame(frame)
-    found = _OF_FRAME[name](opened, selection)
-    return _viewed(run, view, view.frame_tables, found, opened.notes())
+    entry, opened = _entry(name), run.frame(frame)
+    found = entry.of_frame(opened, selection)
+    return _viewed(run, entry.view, entry.view.frame_tables, found, opened.notes())
 
 
 def look_over(run: InspectedRun, name: str, selection: Selection) -> Viewed:
     """A view's tables of the whole run; none for a view that shows single frames only."""
-    view = view_named(name)
-    found = _OF_RUN[name](run, selection) if name in _OF_RUN else Found({})
-    return _viewed(run, view, view.run_tables, found, ())
+    entry = _entry(name)
+    found = entry.of_run(run, selection) if entry.of_run else Found({})
+    return _viewed(run, entry.view, entry.view.run_tables, found, ())
+
+
+def view_named(name: str) -> View:
+    """A view. Raises NotFoundError."""
+    return _entry(name).view
+
+
+def _entry(name: str) -> _Entry:
+    if name not in _ENTRIES:
+        raise NotFoundError(f"There is no view '{name[:40]}'.", f"There are: {', '.join(_ENTRIES)}.")
+    return _ENTRIES[name]
 
 
 def _viewed(

@@ -12,7 +12,37 @@ import numpy as np
 from studio.arrays import Array
 from studio.inspection.reading import InspectedFrame, no_value
 from studio.inspection.schedule import effective_number
-from studio.inspection.tables import Row, Selection
+from studio.inspection.tables import Row, Selection, View, table
+
+VIEW = View(
+    "weights",
+    "Weight concentration",
+    "Is the estimate one lucky particle?",
+    ("layer",),
+    (
+        table(
+            "sorted",
+            "Weights of a layer, largest first",
+            "layer",
+            ("rank", "Rank"),
+            "particle",
+            ("weight", "Weight"),
+            ("cumulated", "Cumulated"),
+            "log_weight",
+        ),
+        table(
+            "layers",
+            "Concentration by layer",
+            "layer",
+            ("largest", "Largest weight"),
+            ("k_hat", "Pareto k̂"),
+            ("effective", "Effective number"),
+            ("particles", "Particles"),
+            ("for_90", "Particles that hold 90 %"),
+        ),
+    ),
+)
+
 
 LEAST_TAIL = 5
 PRIOR_WEIGHT, PRIOR_SHAPE = 10.0, 0.5

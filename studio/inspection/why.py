@@ -38,13 +38,54 @@ from studio.inspection.reading import InspectedFrame, no_value
 from studio.inspection.reference import body_points, by_limb, refined_pose, true_points
 from studio.inspection.retracking import Change, Retracking, more_evaluations
 from studio.inspection.schedule import effective_number
-from studio.inspection.tables import Finding, Found, Remedy, Row, Selection
+from studio.inspection.tables import Finding, Found, Remedy, Row, Selection, View, table
 from studio.knobs import Value, knobs_of
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.runs.tracks import RAW
 from studio.settings import RunSettings
 from studio.trackers.tracker import LIMB_LOST_SHARE
 from studio.words import enumerated
+
+VIEW = View(
+    "why",
+    "Why",
+    "Why did this frame fail?",
+    ("track",),
+    (
+        table(
+            "findings",
+            "What was found",
+            ("kind", "Kind"),
+            ("words", "In words"),
+            "limb",
+            "layer",
+            "camera",
+            "term",
+        ),
+        table(
+            "nearest",
+            "Distance of the nearest particle from the reference pose",
+            "layer",
+            "limb",
+            ("nearest", "Nearest particle", "mm"),
+            ("median", "Median particle", "mm"),
+            ("reach", "Noise of the layer", "mm"),
+            ("inside", "Reference inside the cloud"),
+        ),
+        table(
+            "limbs",
+            "Error or disagreement by frame and limb",
+            "frame",
+            "limb",
+            ("error", "Error", "mm"),
+            ("disagreement", "Disagreement with the silhouettes"),
+            ("lost", "Lost"),
+            of_run=True,
+        ),
+    ),
+    evaluates=True,
+)
+
 
 WRONG_MM, RIGHT_MM, NEAR_MM = 80.0, 45.0, 60.0
 """Mean distance of a limb's points from the reference: from here on it is wrong; below this it was right; nearer than

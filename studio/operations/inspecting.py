@@ -7,13 +7,12 @@ from pydantic import Field
 
 from studio.declaring import Terminal, Web, operation
 from studio.errors import RunError
-from studio.inspection.catalogue import VIEWS
 from studio.inspection.comparing import RunsCompared, compare_stored
 from studio.inspection.limbs import disagreements_of, errors_of
 from studio.inspection.reading import InspectedRun
 from studio.inspection.seeds import search_seeds
 from studio.inspection.tables import Selection, Viewed
-from studio.inspection.views import look, look_over
+from studio.inspection.views import VIEWS, look, look_over
 from studio.operations.opening import RunName, open_run, session_of
 from studio.operations.progress import Reporting, reporting
 

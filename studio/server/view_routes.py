@@ -6,12 +6,11 @@ from fastapi import APIRouter, Depends, Query, Response
 from pydantic import BeforeValidator, Field
 
 from studio.errors import RunError
-from studio.inspection.catalogue import VIEWS, View, view_named
 from studio.inspection.comparing import compare_stored
 from studio.inspection.reading import InspectedRun
 from studio.inspection.shared_page import shared_page
-from studio.inspection.tables import Column, Remedy, Selection, Viewed
-from studio.inspection.views import look, look_over
+from studio.inspection.tables import Column, Remedy, Selection, View, Viewed
+from studio.inspection.views import VIEWS, look, look_over, view_named
 from studio.jobs.job_runner import Job, JobKind, NumberedJob
 from studio.operations.inspecting import seeds, worst_frame
 from studio.server import files

@@ -18,7 +18,7 @@ from studio.comparison.folders import (
     throw_away,
     unfinished_like,
 )
-from studio.comparison.kept_comparison import LOCK_NAME, KeptComparison, trial_key
+from studio.comparison.kept_comparison import LOCK_NAME, RECORD_NAME, KeptComparison, trial_key
 from studio.comparison.plan import conclude, trials
 from studio.errors import NotFoundError, SessionError
 from studio.sessions.process_lock import ProcessLock
@@ -47,6 +47,15 @@ def test_the_request_is_read_back(walk: Session, kept: KeptComparison) -> None:
     assert kept.result() is None
     assert comparison_count(walk) == 1
     assert place_of(walk).name == "comparison-2"
+
+
+def test_a_record_of_version_1_is_read(kept: KeptComparison) -> None:
+    """Version 1 calls the candidates entrants."""
+    path = kept.folder / RECORD_NAME
+    written = json.loads(path.read_text())
+    written["plan"]["entrants"] = written["plan"].pop("candidates")
+    path.write_text(json.dumps(written | {"schema": 1}))
+    assert kept.record().plan == plan("annealed", "condensation")
 
 
 def test_nothing_is_overwritten(walk: Session, kept: KeptComparison) -> None:

@@ -7,11 +7,10 @@ from drawn_people import ring_of_cameras
 from planted_runs import drawn_session, person_poses, planted
 from tracked_runs import finish
 
-from studio.inspection.catalogue import VIEWS
 from studio.inspection.limbs import errors_of
 from studio.inspection.reading import InspectedRun
 from studio.inspection.tables import Selection
-from studio.inspection.views import look, look_over
+from studio.inspection.views import VIEWS, look, look_over
 from studio.inspection.why import WRONG_MM, Case, rows
 from studio.runs.new_run import prepare_run
 from studio.sessions.session import Session

@@ -13,7 +13,6 @@ from scipy import stats
 from studio.body.forward_kinematics import marker_points
 from studio.cli.inspection_commands import tables_csv
 from studio.errors import NotFoundError, RunError, WorkCancelledError
-from studio.inspection.catalogue import VIEWS
 from studio.inspection.clouds import density, weighted_quantiles
 from studio.inspection.comparing import compare_stored
 from studio.inspection.genealogy import first_lines, living
@@ -25,7 +24,7 @@ from studio.inspection.reference import body_points, limbs_of_points, true_point
 from studio.inspection.retracking import Change, Retracking
 from studio.inspection.seeds import search_seeds
 from studio.inspection.tables import Cell, Selection, Viewed
-from studio.inspection.views import look, look_over
+from studio.inspection.views import VIEWS, look, look_over
 from studio.inspection.weights import fitted_shape, pareto_k
 from studio.runs.problem_source import ProblemSource
 from studio.runs.tracks import RAW, read_track

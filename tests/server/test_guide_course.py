@@ -8,7 +8,7 @@ import pytest
 from web_doubles import Studio
 
 import studio
-from studio.inspection.catalogue import VIEWS
+from studio.inspection.views import VIEWS
 from studio.operations import course as room
 from studio.operations.course import FRAMES, RUNS, SAMPLE, CourseRun, make_course
 from studio.server.guide_routes import COURSE, TEXTS

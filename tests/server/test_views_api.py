@@ -5,7 +5,7 @@ import pytest
 from waiting import until
 from web_doubles import Studio
 
-from studio.inspection.catalogue import VIEWS
+from studio.inspection.views import VIEWS
 from studio.runs.new_run import prepare_run
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
