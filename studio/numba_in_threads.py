@@ -1,9 +1,9 @@
 """Numba as a program of several threads uses it: kernels, their options and their threads come from here.
 
-**Types known.** Numba loads seventy of its modules when a kernel is first called. One of them that adds to the table in
-which another thread, on its way to Numba's own lock with a kernel of its own, is looking up the type of a number ends in
-"dictionary changed size during iteration" (numba 0.68, where two threads make a frame's masks). So those that add to it
-are loaded here, before there is a kernel to call; the rest, a third of a second, waits for the first kernel.
+**Types known.** Numba loads seventy of its modules when a kernel is first called. One of them that adds to the table
+in which another thread, on its way to Numba's own lock with a kernel of its own, is looking up the type of a number
+ends in "dictionary changed size during iteration" (numba 0.68, where two threads make a frame's masks). So those that
+add to it are loaded here, before there is a kernel to call; the rest, a third of a second, waits for the first kernel.
 
 **Plain threads.** `parallel_blocks` runs a kernel on Python's threads, which it lets go of the interpreter for. Numba's
 own parallel kernels would have to be compiled a second time, abort the process when two threads launch them at once,
