@@ -1,9 +1,9 @@
 """Numba as a program of several threads uses it: kernels, their options and their threads come from here.
 
-**Loaded whole.** Numba loads seventy of its modules when a kernel is first called. One of them adds to the table in
-which another thread, on its way to Numba's own lock with a kernel of its own, may be looking up the type of a number:
-"dictionary changed size during iteration" (numba 0.68, where two threads make a frame's masks). So they are loaded
-here, before there is a kernel to call.
+**Types known.** Numba loads seventy of its modules when a kernel is first called. One of them that adds to the table
+in which another thread, on its way to Numba's own lock with a kernel of its own, is looking up the type of a number
+ends in "dictionary changed size during iteration" (numba 0.68, where two threads make a frame's masks). So those that
+add to it are loaded here, before there is a kernel to call; the rest, a third of a second, waits for the first kernel.
 
 **Plain threads.** `parallel_blocks` runs a kernel on Python's threads, which it lets go of the interpreter for. Numba's
 own parallel kernels would have to be compiled a second time, abort the process when two threads launch them at once,
@@ -11,6 +11,7 @@ and wait for a thread that a busy machine has no core for.
 """
 
 import functools
+import importlib
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
@@ -19,7 +20,6 @@ import numba
 from numba import prange
 from numba.core import types
 from numba.core.dispatcher import Dispatcher
-from numba.core.registry import cpu_target
 from numba.extending import intrinsic
 
 from studio.kernel_cache import KernelCache
@@ -42,8 +42,8 @@ __all__ = [
 
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
-_everything_numba_loads: Any = cpu_target.target_context
-_everything_numba_loads.refresh()
+for _place in ("function_type", "jitclass.boxing"):
+    importlib.import_module(f"numba.experimental.{_place}")
 
 KERNEL: dict[str, Any] = {"nogil": True}
 """Options of every kernel: other threads go on meanwhile."""

@@ -4,56 +4,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_up_humanoid import humanoid
 from scipy.spatial.transform import Rotation
 
 from studio.body.person import SIDES, PersonMotion, joint_points
 from studio.body.retargeting import above_floor, lowest_of_sole, on_skeleton
 from studio.errors import StudioError
-from studio.geometry.rotations import axis_turn
 from studio.motion_files.reading import read_recording
-from studio.motion_files.recorded_motion import RecordedMotion, moved_skeleton
+from studio.motion_files.recorded_motion import RecordedMotion
 from studio.synthesis.person import skeleton_of_height
 
 BONES = skeleton_of_height(1760.0, np.random.default_rng(1))
 FILES = ("05_01.amc", "05_03.amc", "CMU_01_01.bvh", "amp_humanoid_run.npz", "amp_humanoid_cartwheel.npz")
-
-PARTS = ("upper_arm", "lower_arm", "hand", "thigh", "shin", "foot")
-NAMES = ("pelvis", "torso", "head", *(f"{side}_{part}" for side in ("right", "left") for part in PARTS))
-PARENTS = (-1, 0, 1, 1, 3, 4, 0, 6, 7, 1, 9, 10, 0, 12, 13)
-
-
-def humanoid(frames: int, turned: dict[str, Rotation], height: float = 900.0) -> RecordedMotion:
-    """A made-up humanoid, facing x, some joints turned against their parents."""
-    offsets = np.zeros((15, 3))
-    offsets[1:3] = [[0, 0, 240], [0, 0, 220]]
-    for first, side in ((3, -1.0), (9, 1.0)):
-        offsets[first : first + 6] = [
-            [0, 180 * side, 240],
-            [0, 0, -270],
-            [0, 0, -260],
-            [0, 85 * side, 0],
-            [0, 0, -420],
-            [0, 0, -410],
-        ]
-    local = np.tile(np.eye(3), (frames, 15, 1, 1))
-    for name, turn in turned.items():
-        local[:, NAMES.index(name)] = turn.as_matrix()
-    root = np.tile([0.0, 0.0, height], (frames, 1))
-    return moved_skeleton(NAMES, PARENTS, offsets, local, root, fps=60.0, source="made up")
-
-
-def turned(recorded: RecordedMotion, heading: float, fps: float, source: str) -> RecordedMotion:
-    """The same movement, turned about the vertical."""
-    turn = axis_turn(2, np.array(heading))
-    return RecordedMotion(
-        recorded.names,
-        recorded.parents,
-        recorded.rest,
-        turn @ recorded.rotations,
-        recorded.positions @ turn.T,
-        fps,
-        source,
-    )
 
 
 def test_a_known_pose_is_reproduced() -> None:

@@ -80,8 +80,8 @@ class SceneWire:
 
 def until(page: Page, condition: Callable[[], object], patience: float = 60.0) -> None:
     """Wait for a state that only Python can see, letting the browser's events in meanwhile."""
-    for _ in range(round(patience * 10)):
+    for _ in range(round(patience * 25)):
         if condition():
             return
-        page.wait_for_timeout(100)
+        page.wait_for_timeout(40)
     raise AssertionError("it never came about")

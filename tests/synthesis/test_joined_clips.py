@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_retargeting import humanoid, turned
+from made_up_humanoid import humanoid, turned
 
 from studio.body.person import joint_points, marker_motion
 from studio.errors import StudioError

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_retargeting import humanoid, turned
+from made_up_humanoid import humanoid, turned
 
 from studio.body.person import PersonMotion, joint_points, sampled
 from studio.body.retargeting import on_skeleton

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_recipes import small
+from small_recipes import small
 
 from studio.body.catalogue import load_body
 from studio.body.dimensions import with_dimensions
