@@ -42,6 +42,8 @@ FLOORS = (0.0, 0.003, 0.01, 0.02, 0.03, 0.05, 0.1)
 QUICK_FLOORS = (0.0, 0.02)
 MEMORIES = (1, 10, 20, 30)
 MEMORY, FRAMES = 20, 150
+LEARNT_SEEDS = 2
+"""Seeds of what is learnt (a minute each); runs have all seeds, and track with what the first has learnt."""
 EXERCISES = {"first exercise": TEST, "second exercise": TEST_2}
 PARTICLES = 200
 PRINTED, OURS = "printed", "guided"
@@ -60,7 +62,7 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
         base = training_with(MEMORY, scale.quick, knobs)
         found += each_seed(
             f"learnt, {_name(floor)}",
-            scale.seeds,
+            scale.seeds[:LEARNT_SEEDS],
             # The last frame as of the tracked trials: no more is to be rendered.
             lambda seed, base=base: {
                 "learnt": dataclasses.replace(base, seed=seed).plain(),

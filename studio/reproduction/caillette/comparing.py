@@ -91,7 +91,7 @@ def curves(title: str, groups: Groups, measure: str = LIMB) -> Chart:
 
 SIDE_BY_SIDE = "Verdicts: the tracker as printed, and ours"
 TWO_TRACKERS = (
-    "The claims are judged by the paper's tracker as printed; ours ('guided') has four additions, is shown beside it, "
+    "The claims are judged by the paper's tracker as printed; ours ('guided') has five additions, is shown beside it, "
     "and no claim of the paper rests on it."
 )
 

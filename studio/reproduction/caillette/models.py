@@ -152,8 +152,8 @@ def _fig_13(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     def longer(kind: str, evidence: str, of: Error = limb, claim: str = LOWER) -> Number:
         words = {limb: "limb direction", angle: "joint angle", position: "joint position"}[of]
         name = f"{kind}, {evidence}: memory {longest} over memory 1, {words}"
-        runs = [groups[_group(kind, evidence, memory)] for memory in (longest, 1)]
-        return ratio(name, *runs, claim, of)
+        ours, theirs = (groups[_group(kind, evidence, memory)] for memory in (longest, 1))
+        return ratio(name, ours, theirs, claim, of)
 
     rows = [(evidence, longer(PRINTED, evidence), longer(OURS, evidence)) for evidence in (WHOLE, COVERED)]
     yield from (number for _, number, _ in rows)

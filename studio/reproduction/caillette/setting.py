@@ -43,8 +43,8 @@ AS_PRINTED: Mapping[str, Any] = {
     "selection": "weights",
     **SIGMA,
 }
-LEARNT_AS_PRINTED: Mapping[str, Any] = {"back_off": 0.0}
-"""Only labels that were seen after a history are possible."""
+LEARNT_AS_PRINTED: Mapping[str, Any] = {"back_off": 0.0, "cluster_floor": 0.0}
+"""Only labels that were seen after a history are possible, and clusters have no floor."""
 GUIDED = "behaviour"
 # The annealing of the paper's time: planned noise (Eq. 13 of Deutscher & Reid), half surviving, no crossover.
 PLANNED: Mapping[str, Any] = {"adaptive_diffusion": False, "crossover": 0.0, "survival": 0.5}
@@ -69,7 +69,8 @@ def guided(particles: int, name: str = "", **changes: Any) -> Learner:  # noqa: 
     """The studio's tracker on the paper's ground, with some number of particles. changes : further knobs.
 
     It is not the printed one: most particles change cluster by the automaton alone, the root moves as it did in
-    training, survivors are drawn so that a share of 0.4 survives, and histories back off to shorter ones.
+    training, survivors are drawn so that a share of 0.4 survives, histories back off to shorter ones, and clusters have
+    a floor.
     """
     words = name or f"guided, {particles}"
     return Learner(words, GUIDED, BLOBS, {"particles": particles, **AS_PAPER, **changes})

@@ -58,19 +58,19 @@ SETTINGS: Mapping[str, Any] = {"layers": 6, "particles": 1000, "survival": 0.1, 
 NEVER = f"Layers are counted from 1; {SETTINGS['layers'] + 1} stands for a joint that does not fall."
 WITH, WITHOUT, WITH_LOUD = "adaptive (Eq. 18)", "planned (Eq. 13)", "planned with five times the noise"
 CROSSING = "adaptive with crossover"
-KINDS: dict[str, Mapping[str, Any]] = {
+MILDER = (0.3, 0.4, 0.5)
+"""Survival rates beside 0.1, of Fig. 14: 0.5 is that of section 3.1."""
+KINDS: Mapping[str, Mapping[str, Any]] = {
     WITH: {"adaptive_diffusion": True},
     WITHOUT: {"adaptive_diffusion": False},
     # Noise that outweighs selection in every joint.
     WITH_LOUD: {"adaptive_diffusion": False, "diffusion_scale": 5.0, "constraints": "ignore"},
     CROSSING: {"adaptive_diffusion": True, "crossover": 1.0, "crossover_by": "parameters"},
-}
-MILDER = (0.3, 0.4, 0.5)
-"""Survival rates beside 0.1, of Fig. 14: 0.5 is that of section 3.1."""
-KINDS |= {
-    f"{kind}, α {survival:g}": {**KINDS[kind], "survival": survival}
-    for survival in MILDER
-    for kind in (WITH, WITHOUT)
+    **{
+        f"{kind}, α {survival:g}": {"adaptive_diffusion": kind == WITH, "survival": survival}
+        for survival in MILDER
+        for kind in (WITH, WITHOUT)
+    },
 }
 
 
@@ -239,8 +239,8 @@ def slopes(shares: Array) -> Array:
     squares, powers of ten a layer.
     """
     logs = np.log10(np.maximum(shares, 1e-12))
-    layers = np.arange(shares.shape[1]) - (shares.shape[1] - 1) / 2.0
-    return np.einsum("m,smd->sd", layers, logs) / float((layers**2).sum())
+    layers: Array = np.arange(shares.shape[1], dtype=np.float64) - (shares.shape[1] - 1) / 2.0
+    return np.tensordot(logs, layers, axes=(1, 0)) / float((layers**2).sum())
 
 
 def _slope_spread(found: Reduction) -> Array:
