@@ -22,6 +22,7 @@ from studio.benchmarks.live_stages import (
     measure_stages,
     stage_rows,
 )
+from studio.benchmarks.timing import IdleShare
 from studio.capture.frame_clock import ReplayClock
 from studio.errors import RunError
 from studio.jobs.control import StudioControl
@@ -45,11 +46,18 @@ PATIENCE_SECONDS = 120.0
 
 @dataclass(frozen=True, slots=True)
 class Watched:
-    """live : summary of the run. viewer_messages, viewer_bytes : sent to the viewer a second, NaN without one."""
+    """live : summary of the run. viewer_messages, viewer_bytes : sent to the viewer a second, NaN without one. idle :
+    share of all cores' time while it was tracked (`IdleShare`).
+    """
 
     live: LiveSummary
     viewer_messages: float
     viewer_bytes: float
+    idle: float
+
+    def figures(self) -> dict[str, object]:
+        """The run's figures, and the idle share."""
+        return live_figures(self.live) | {"idle_share": round(self.idle, 3)}
 
 
 def track_watched(
@@ -71,8 +79,9 @@ def track_watched(
         control.track(session.name, run.name)
         _until(events, lambda state: state.live is not None and state.done > 0, report)
         before, began = (viewer.messages, viewer.size) if viewer else (0, 0), time.monotonic()
+        idle = IdleShare()
         _until(events, lambda state: state.state == "finished", report)
-        spent = time.monotonic() - began
+        spent, idle_share = time.monotonic() - began, idle.so_far()
         if viewer:
             messages, size = (viewer.messages - before[0]) / spent, (viewer.size - before[1]) / spent
     finally:
@@ -81,7 +90,7 @@ def track_watched(
         if stage is not None:
             stage.stop()
         control.close()
-    return Watched(summary_of(run), messages, size)
+    return Watched(summary_of(run), messages, size, idle_share)
 
 
 def _until(events: Subscription[Event], is_reached: Callable[[StateChanged], bool], report: Progress) -> None:
@@ -134,13 +143,14 @@ def run_live_benchmark(report: Progress, seconds: float = SECONDS) -> dict[str, 
         "setting": f"five 320x240 views at {WANTED:g} Hz, {seconds:g} s of video, hulls of depth "
         f"{CHANGES['hull_depth']}, blob fitting, {CHANGES['particles']} particles, {os.cpu_count()} cores",
         "stages": stage_rows(stages),
-        "scene_open": live_figures(watched.live),
-        "scene_open_pressed": live_figures(pressed.live),
+        "frame_ms": round(stages["whole frame"], 2),
+        "scene_open": watched.figures(),
+        "scene_open_pressed": pressed.figures(),
         "scene_viewer": {
             "messages_per_second": round(watched.viewer_messages, 1),
             "megabytes_per_second": round(watched.viewer_bytes / 1e6, 2),
         },
-        "alone": live_figures(alone.live),
+        "alone": alone.figures(),
         "at_60_hz": live_figures(fast),
         "sustained": watched.live.frames_per_second >= WANTED * ENOUGH
         or pressed.live.frames_per_second >= WANTED,

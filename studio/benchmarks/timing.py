@@ -1,7 +1,10 @@
-"""Comparable timings of tasks on a machine that other programs use, too."""
+"""Comparable timings of tasks on a machine that other programs use, too, and how much of it was idle meanwhile."""
 
+import contextlib
+import os
 import time
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import TypeVar
 
 from studio.numba_in_threads import numba
@@ -33,3 +36,25 @@ def quickest(
     finally:
         numba.set_num_threads(before)
     return best
+
+
+class IdleShare:
+    """The share of all cores' time since this was made in which nothing ran, whatever else the machine does; NaN where
+    the system does not say (Linux does).
+    """
+
+    def __init__(self) -> None:
+        self._began, self._idle = time.monotonic(), _idle_seconds()
+
+    def so_far(self) -> float:
+        """0 to 1."""
+        spent = (time.monotonic() - self._began) * (os.cpu_count() or 1)
+        return min(1.0, max(0.0, (_idle_seconds() - self._idle) / spent))
+
+
+def _idle_seconds() -> float:
+    """Seconds that all cores together were idle or waited for a disk since the system began."""
+    with contextlib.suppress(OSError, ValueError, IndexError):
+        fields = Path("/proc/stat").read_text(encoding="ascii").splitlines()[0].split()
+        return (int(fields[4]) + int(fields[5])) / os.sysconf("SC_CLK_TCK")
+    return float("nan")

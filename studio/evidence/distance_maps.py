@@ -126,7 +126,7 @@ def box_of(picture: Bytes, least: np.uint8) -> tuple[int, int, int, int]:
 
 @njit(**EXACT)
 def signed_of(inside: Bytes, within: Floats, beyond: Floats) -> Floats:
-    """(H, W) pixels to the border between pixels, negative where inside (H, W) is not 0, from the distances `within` and
+    """(H, W) pixels to the border between pixels, negative where inside (H, W) is not 0, of distances `within` and
     `beyond` to pixels' centres. Overwrites `beyond`.
     """
     half = np.float32(0.5)

@@ -2,7 +2,8 @@
 
 Evidence is cached by frame and evidence settings, problems by frame and all settings that they depend on, so that
 annealing or displaying a frame again decodes and computes nothing twice. With an executor the next frame is prepared
-while this one is searched; a request for a cached frame never waits for one in preparation.
+while this one is searched; a request for a cached frame never waits for one in preparation. Prepared are also the
+distances that a refinement needs and the silhouettes that a pose is compared with after its search.
 """
 
 import threading
@@ -19,9 +20,11 @@ from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.pipeline import EvidenceMaker
 from studio.geometry.camera import Camera
 from studio.likelihood.catalogue import WEIGHTINGS
+from studio.likelihood.silhouette_areas import HALF, silhouettes_of
 from studio.sessions.session import Session
 from studio.settings import RunSettings
 from studio.tracing import span
+from studio.trackers.recovery_settings import OFF
 from studio.trackers.tracker import FrameLikelihood
 
 KEPT_FRAMES = 4
@@ -122,6 +125,9 @@ class ProblemSource:
         if settings.refinement.refine_frames:
             with span("distances", frame):
                 silhouettes_by_camera(evidence, settings.refinement.refine_frame_points)
+        if settings.recovery.recovery != OFF and any(view.background is None for view in evidence.views):
+            with span("silhouettes", frame):
+                silhouettes_of(evidence, HALF)
         with self._making, span("maps", frame):
             weigher = self._weigher(settings, self.cameras_in(frame))
             return self._keep(self._problems, key, weigher.problem(evidence), KEPT_FRAMES)

@@ -190,7 +190,11 @@ class Refiner:
             diagonal = matrix.reshape(-1)[:: size + 1]
             diagonal += pull
             diagonal += self.stiffness
-            return loss + pull * float(away @ away) + float(self.stiffness @ np.square(bent)), gradient, matrix
+            return (
+                loss + pull * float(away @ away) + float(self.stiffness @ np.square(bent)),
+                gradient,
+                matrix,
+            )
 
         return equations
 

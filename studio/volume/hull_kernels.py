@@ -77,7 +77,9 @@ def row_distances(first, end, picture, gaussians, shadow, deepest, distances):
     `YuvBackground.squared_distances`.
     """
     one = np.float32(1.0)
-    for at in range(first, end):
+    for number in range(end - first):
+        # Without a sign, so that no place counts from the end and the loop vectorises.
+        at = np.uint64(first) + np.uint64(number)
         b, g, r = np.float32(picture[at, 0]), np.float32(picture[at, 1]), np.float32(picture[at, 2])
         y = np.float32(0.114) * b + np.float32(0.587) * g + np.float32(0.299) * r
         u, v = np.float32(0.492) * (b - y), np.float32(0.877) * (r - y)

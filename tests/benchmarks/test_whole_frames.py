@@ -7,7 +7,8 @@ import pytest
 from click.testing import CliRunner
 
 from studio.benchmarks.results_table import in_lines, remember, rows_of, this_machine
-from studio.benchmarks.whole_frames import BODYTRACK, DEFAULT, measure_frames
+from studio.benchmarks.timing import IdleShare
+from studio.benchmarks.whole_frames import BODYTRACK, DEFAULT, IMPROVED, SWARM, measure_frames
 from studio.cli.bench_commands import bench_command
 from studio.progress import unheard
 
@@ -27,6 +28,21 @@ def test_a_whole_frame_has_all_its_stages() -> None:
     assert {("next-frame", "prepare"), ("next-frame", "distances"), ("storing", "store")} <= stages(figures)
     assert 0.0 < figures["quickest_ms"] <= figures["ms"]
     assert figures["refinement_ms"] > 0.0
+
+
+@pytest.mark.parametrize(("workload", "evaluations"), [(IMPROVED, 2000), (SWARM, 1000)])
+def test_the_papers_searches_refine_nothing(workload: str, evaluations: int) -> None:
+    figures = measure_frames(workload, unheard, frames=2).figures()
+    assert figures["evaluations"] == evaluations
+    assert not any(stage in ("refine", "distances") for _, stage in stages(figures))
+
+
+def test_the_idle_share_is_of_all_cores(monkeypatch: pytest.MonkeyPatch) -> None:
+    idle, now = iter((100.0, 103.0)), iter((10.0, 12.0))
+    monkeypatch.setattr("studio.benchmarks.timing._idle_seconds", lambda: next(idle))
+    monkeypatch.setattr("studio.benchmarks.timing.time.monotonic", lambda: next(now))
+    monkeypatch.setattr("studio.benchmarks.timing.os.cpu_count", lambda: 2)
+    assert IdleShare().so_far() == 0.75
 
 
 def test_the_trace_and_the_history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -65,6 +81,14 @@ def test_bars_are_full_where_the_aim_is_reached() -> None:
     assert frame.endswith("█" * 20)
     assert "≤ 25 ms" in frame
     assert refinement.endswith("█" * 10 + "░" * 10)
+
+
+def test_a_live_runs_rows() -> None:
+    run = {"frames_per_second": 30.0, "dropped_share": 0.0, "latency_ms": {"p95": 40.0}, "idle_share": 0.5}
+    rows = {row["name"]: row for row in rows_of({"live": {"scene_open": run, "frame_ms": 24.0}})}
+    assert rows["live, picture to pose, 95 % of frames"]["reached"] == 1.0
+    assert rows["live, idle share of all cores"]["value"] == 50.0
+    assert rows["a live frame on one core"]["reached"] == 0.5
 
 
 def test_the_history_grows(tmp_path: Path) -> None:

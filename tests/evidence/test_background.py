@@ -137,3 +137,20 @@ def test_opencvs_masks_depend_on_the_frame_alone(kind: str) -> None:
     for number in (5, 11, 0, 3, 3, 7, 1, 10, 2, 4, 6, 8, 9):
         other.foreground(frames[number], touched)
         np.testing.assert_array_equal(other.foreground(frames[number], SETTINGS), first[number])
+
+
+@pytest.mark.parametrize(("threshold", "noise"), [(4.0, 4.0), (1.0, 2.0), (0.5, 0.5)])
+def test_differences_are_those_of_every_pixel(threshold: float, noise: float) -> None:
+    rng = np.random.default_rng(3)
+    mean = rng.uniform(20.0, 230.0, (40, 53, 3)).astype(np.float32)
+    deviation = rng.uniform(0.0, 6.0, mean.shape).astype(np.float32)
+    picture = np.clip(mean + rng.normal(0.0, 8.0, mean.shape), 0.0, 255.0).astype(np.uint8)
+    settings = dataclasses.replace(
+        EvidenceSettings(), mask_threshold=threshold, mask_noise=noise, mask_gain_fit=False,
+        mask_shadow_test=False,
+    )  # fmt: skip
+    away = picture.astype(np.float32) - mean
+    limit = np.float32(threshold**2) * np.maximum(deviation**2, np.float32(noise**2))
+    expected = np.where((away * away > limit).any(axis=2), 255, 0)
+    assert 0.02 < np.mean(expected > 0) <= 1.0
+    np.testing.assert_array_equal(GaussianBackground(mean, deviation).foreground(picture, settings), expected)

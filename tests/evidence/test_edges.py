@@ -1,10 +1,13 @@
 """Edge maps against plain NumPy and SciPy."""
 
+import math
+
+import cv2
 import numpy as np
 import pytest
 from scipy import ndimage, special
 
-from studio.evidence.edges import bodytrack_edges, grey, proximity_edges
+from studio.evidence.edges import EDGE_WIDTH, blurred, bodytrack_edges, grey, proximity_edges, whole_taps
 
 RNG = np.random.default_rng(4)
 
@@ -94,3 +97,16 @@ def test_edges_far_from_the_mask_are_forgotten() -> None:
     np.testing.assert_array_equal(found[:, :40], everything[:, :40])
     assert found[:, 50:].max() == 0
     assert everything[:, 50:].max() > 140
+
+
+@pytest.mark.parametrize("smoothing", [0.5, 1.3, 2.0, 5.0, 20.0])
+@pytest.mark.parametrize("share", [0.02, 0.5])
+def test_the_blur_is_opencvs_followed_by_a_table(smoothing: float, share: float) -> None:
+    edges = np.where(RNG.random((61, 83)) < share, np.uint8(255), np.uint8(0))
+    count = 2 * round(2.0 * smoothing) + 1
+    factor = 1.0 / math.erf(0.5 * EDGE_WIDTH / (smoothing * math.sqrt(2.0)))
+    table = np.minimum(255.0, np.round(np.arange(256) * factor)).astype(np.uint8)
+    smooth = cv2.GaussianBlur(edges, (count, count), smoothing, borderType=cv2.BORDER_CONSTANT)
+    np.testing.assert_array_equal(
+        blurred(edges, whole_taps(smoothing, count), factor), table[np.asarray(smooth)]
+    )

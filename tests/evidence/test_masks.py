@@ -2,7 +2,9 @@
 
 import dataclasses
 
+import cv2
 import numpy as np
+import pytest
 from scipy import ndimage
 
 from studio.evidence.masks import cleaned
@@ -66,3 +68,16 @@ def test_opening_removes_specks_and_closing_closes_gaps() -> None:
     found = cleaned(mask, dataclasses.replace(OFF, mask_opening=3, mask_closing=5))
     assert found[:15].max() == 0
     assert found[25:35, 28:31].min() == 255
+
+
+@pytest.mark.parametrize("closing", [1, 4, 9])
+def test_a_closing_reaches_as_far_beside_the_picture_as_within(closing: int) -> None:
+    rng = np.random.default_rng(closing)
+    for _ in range(40):
+        mask = np.zeros((40, 50), np.uint8)
+        left, top = rng.integers(0, 40, 2)
+        part = mask[top : top + 12, left : left + 12]
+        part[rng.random(part.shape) < 0.4] = 255
+        kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (closing | 1, closing | 1))
+        whole = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, kernel)
+        np.testing.assert_array_equal(cleaned(mask, dataclasses.replace(OFF, mask_closing=closing)), whole)
