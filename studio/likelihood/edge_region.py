@@ -17,19 +17,26 @@ any finite pose. Leaving such samples out instead, as the benchmark does, reward
 doing so is small: with all four Lee-walk pictures cut off below the hips the best root position moves by 20
 mm.
 
+**On a device.** `device` has the sums of Eq. 14 and 15 found on a graphics card (`edge_region_device`, which also says
+how equal they are); occlusion-aware edges are the processor's alone.
+
 **Occlusion-aware edges.** A side that passes behind a nearer limb makes no edge in the picture. With the
 option on, such samples are left out of Eq. 14 and its N (of that view and pose) counts the others; if none is
 left, Σe = 1.
 """
 
+import importlib
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from studio.arrays import Array
+from studio.body.model import BodyModel
+from studio.errors import SettingsError, StudioError
 from studio.evidence.frame_evidence import FrameEvidence
+from studio.geometry.camera import Camera
 from studio.knobs import next_frame_knob
 from studio.likelihood.edge_region_kernels import (
     CHUNK,
@@ -46,10 +53,18 @@ from studio.likelihood.problem import Preparation, PreparedProblem, Shares
 from studio.likelihood.visible_edges import hidden_samples, limb_sides
 from studio.numba_in_threads import parallel_blocks
 
+if TYPE_CHECKING:
+    from studio.likelihood.edge_region_device import DeviceLimbs, EdgeRegionDevice
+
 IntArray = NDArray[np.int64]
 Words = NDArray[np.uint32]
 
-
+CPU, AUTO, GPU = "cpu", "auto", "gpu"
+DEVICE_MODULE = "studio.likelihood.edge_region_device"
+NO_DEVICE_HINT = (
+    "It needs an NVIDIA card, its driver and the extra `gpu` (pip install 'capture-studio[gpu]'); set device to cpu, or"
+    " to auto, which takes a card only where there is one."
+)
 # About half a millisecond of a four-camera frame.
 BLOCKS_A_THREAD = 24
 
@@ -87,6 +102,13 @@ class EdgeRegionSettings:
         help="Leave out edge samples that nearer limbs hide; takes two to three times as long.",
     )
 
+    device: str = next_frame_knob(
+        CPU,
+        choices=(CPU, AUTO, GPU),
+        help="What evaluates edges and region: the processor, or an NVIDIA card with CUDA (extra `gpu`), which agrees"
+        " but for a sample in thousands; auto takes a card where there is one.",
+    )
+
     @property
     def edge_chunks(self) -> int:
         """Samples on each side, in units of sixteen."""
@@ -99,7 +121,11 @@ class EdgeRegionSettings:
 
 
 class EdgeRegionWeigher(Preparation):
-    """Makes the problem of any frame."""
+    """Makes the problem of any frame. device : what finds the sums in place of the processor, and all limbs there."""
+
+    def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: EdgeRegionSettings) -> None:
+        super().__init__(body, cameras, settings)
+        self.device = device_for(settings, self)
 
     @property
     def samples_per_evaluation(self) -> int:
@@ -119,14 +145,19 @@ class EdgeRegionProblem(PreparedProblem):
 
     def __init__(self, weigher: EdgeRegionWeigher, maps: Maps) -> None:
         self.weigher, self.priors, self.maps = weigher, weigher.priors, maps
+        self._there = None if weigher.device is None else weigher.device.maps(maps)
 
     def weigh(self, poses: Array, stage: int = 0) -> Array:
         """(N, D) poses to (N,) log-weights, Eq. 17. Raises BodyError for poses that are no finite (N, D)."""
+        if self._there is not None:
+            return self.shares(poses).values.sum(axis=(1, 2))
         outlines = self.weigher.projector.blocks(poses)
         return self._evaluated(outlines, self.hidden(outlines), len(poses))[1]
 
     def terms(self, poses: Array) -> tuple[Array, Array]:
         """Σe and Σr, each (N, V), of poses (N, D)."""
+        if self.weigher.device is not None:
+            return self.terms_there(poses, self.weigher.device.all_limbs)
         outlines = self.weigher.projector.blocks(poses)
         return self.terms_of(outlines, self.hidden(outlines), len(poses))
 
@@ -144,6 +175,19 @@ class EdgeRegionProblem(PreparedProblem):
         limbs.
         """
         terms = self._evaluated(outlines, hidden, count)[0]
+        return terms[..., 0], terms[..., 1]
+
+    def terms_there(self, poses: Array, limbs: "DeviceLimbs") -> tuple[Array, Array]:
+        """Σe and Σr, each (N, V), of poses (N, D) over some limbs, found on the device.
+
+        Raises BodyError for poses that are no finite (N, D).
+        """
+        device, settings = self.weigher.device, self.weigher.settings
+        assert device is not None
+        assert self._there is not None
+        sums = device.sums(self.weigher.projector.checked(poses), self._there, limbs)
+        samples = CHUNK * np.array([EDGE_LINES * settings.edge_chunks, REGION_LINES * settings.region_chunks])
+        terms = sums / (WORST * samples * len(limbs.frame))
         return terms[..., 0], terms[..., 1]
 
     def _evaluated(
@@ -180,6 +224,35 @@ class EdgeRegionProblem(PreparedProblem):
         samples = self.weigher.settings.edge_chunks * CHUNK
         hidden = hidden_samples(outlines, limb_sides(limbs), samples)
         return hidden.reshape(blocks, views, limbs, EDGE_LINES, LANES)
+
+
+def device_for(settings: EdgeRegionSettings, weigher: Preparation) -> "EdgeRegionDevice | None":
+    """What the setting `device` asks for; None is the processor.
+
+    Raises SettingsError for what is not computed there, StudioError where there is no device, both for GPU alone.
+    """
+    if settings.device == CPU:
+        return None
+    projector = weigher.projector
+    try:
+        if settings.occlusion_aware:
+            raise SettingsError(
+                "Occlusion-aware edges are not found on a GPU.",
+                "Set device to cpu, or occlusion_aware to false.",
+            )
+        try:
+            module = importlib.import_module(DEVICE_MODULE)
+        except ImportError as error:
+            raise StudioError(f"A GPU cannot be used: {error}.", NO_DEVICE_HINT) from error
+        why = module.missing()
+        if why:
+            raise StudioError(f"A GPU cannot be used: {why}.", NO_DEVICE_HINT)
+        samples = settings.edge_chunks * CHUNK, settings.region_chunks * CHUNK
+        return module.EdgeRegionDevice(projector.program, projector.camera_table, samples)
+    except StudioError:
+        if settings.device == GPU:
+            raise
+        return None
 
 
 def weighting_maps(evidence: FrameEvidence) -> Maps:

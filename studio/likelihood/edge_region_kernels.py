@@ -32,12 +32,28 @@ ONE_ON, ROW_ON, TWO_ROWS_ON = np.uint64(1), np.uint64(8), np.uint64(16)
 
 
 @njit(**FAST_INLINED)
-def store_line(lines, number, lane, a, b, fraction, samples):
-    """Keep the line at a fraction of the way from side a to side b (x, y, dx, dy) as line `number`: the place of its
-    first sample and the step to the next; samples lie at (j + 1/2) / samples."""
+def line_between(a, b, fraction, samples):
+    """The line at a fraction of the way from side a to side b (x, y, dx, dy): the place of its first sample and the
+    step to the next; samples lie at (j + 1/2) / samples."""
     step_x, step_y = (a[2] + fraction * (b[2] - a[2])) / samples, (a[3] + fraction * (b[3] - a[3])) / samples
-    lines[number * LINE + lane] = a[0] + fraction * (b[0] - a[0]) + HALF * step_x
-    lines[number * LINE + LANES + lane] = a[1] + fraction * (b[1] - a[1]) + HALF * step_y
+    x, y = a[0] + fraction * (b[0] - a[0]) + HALF * step_x, a[1] + fraction * (b[1] - a[1]) + HALF * step_y
+    return x, y, step_x, step_y
+
+
+@njit(**FAST_INLINED)
+def sides_of(corners):
+    """Both sides (x, y, dx, dy) of a limb from its corners A0, A1, B1, B0, half a pixel on so that flooring rounds."""
+    ax, ay, ex, ey = corners[0] + HALF, corners[1] + HALF, corners[6] + HALF, corners[7] + HALF
+    a = ax, ay, corners[2] + HALF - ax, corners[3] + HALF - ay
+    return a, (ex, ey, corners[4] + HALF - ex, corners[5] + HALF - ey)
+
+
+@njit(**FAST_INLINED)
+def store_line(lines, number, lane, a, b, fraction, samples):
+    """Keep the line between two sides as line `number`."""
+    x, y, step_x, step_y = line_between(a, b, fraction, samples)
+    lines[number * LINE + lane] = x
+    lines[number * LINE + LANES + lane] = y
     lines[number * LINE + 2 * LANES + lane] = step_x
     lines[number * LINE + 3 * LANES + lane] = step_y
 
@@ -49,11 +65,11 @@ def limb_lines(outline, lines, edge_samples, region_samples):
     lines : (320,): four rows of sixteen lanes a line, pixels, half a pixel on so that flooring rounds.
     """
     for lane in range(LANES):
-        ax, ay = outline[lane] + HALF, outline[LANES + lane] + HALF
-        ex, ey = outline[6 * LANES + lane] + HALF, outline[7 * LANES + lane] + HALF
-        bx, by = outline[2 * LANES + lane] + HALF - ax, outline[3 * LANES + lane] + HALF - ay
-        cx, cy = outline[4 * LANES + lane] + HALF - ex, outline[5 * LANES + lane] + HALF - ey
-        a, b = (ax, ay, bx, by), (ex, ey, cx, cy)
+        corners = (
+            outline[lane], outline[LANES + lane], outline[2 * LANES + lane], outline[3 * LANES + lane],
+            outline[4 * LANES + lane], outline[5 * LANES + lane], outline[6 * LANES + lane], outline[7 * LANES + lane],
+        )  # fmt: skip
+        a, b = sides_of(corners)
         store_line(lines, 0, lane, a, b, ZERO, edge_samples)
         store_line(lines, 1, lane, a, b, ONE, edge_samples)
         store_line(lines, 2, lane, a, b, FIRST_STRIP, region_samples)
@@ -62,12 +78,15 @@ def limb_lines(outline, lines, edge_samples, region_samples):
 
 
 @njit(**FAST_INLINED)
+def stepped(line, number):
+    """Where a sample of a line (first place and step) lies."""
+    return line[0] + number * line[2], line[1] + number * line[3]
+
+
+@njit(**FAST_INLINED)
 def sample_place(line, number, lane):
     """Where a sample of one pose's line lies."""
-    return (
-        line[lane] + number * line[2 * LANES + lane],
-        line[LANES + lane] + number * line[3 * LANES + lane],
-    )
+    return stepped((line[lane], line[LANES + lane], line[2 * LANES + lane], line[3 * LANES + lane]), number)
 
 
 @njit(**FAST_INLINED)

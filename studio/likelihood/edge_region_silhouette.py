@@ -7,7 +7,8 @@ Fleischmann et al.
 Σe and Σr are those of `edge_region` (Eq. 14 and 15 of Deutscher & Reid 2005), f_s that of `edge_silhouette`
 (Fleischmann et al. 2012, section 2.2); the log-weight is Eq. 16 and 17 with a third term. The region compares inside
 the model only, f_s in both directions; together, 1 : 1 : 1, they lost the fewest limbs in the prototypes. In the first
-stage of a search only the trunk's edges count, the other two terms use the whole body.
+stage of a search only the trunk's edges count, the other two terms use the whole body. With a GPU, edges and region
+are found there, silhouettes on the processor.
 """
 
 from dataclasses import dataclass
@@ -47,6 +48,8 @@ class EdgeRegionSilhouetteWeigher:
         self.settings, self.cameras = settings, cameras
         self.edge_region = EdgeRegionWeigher(body, cameras, settings)
         self.trunk = np.unique(body_edges(body).trunk[:, 0])
+        device = self.edge_region.device
+        self.trunk_there = None if device is None else device.limbs(self.trunk)
 
     def problem(self, evidence: FrameEvidence) -> "EdgeRegionSilhouetteProblem":
         """One frame as a function of poses. Raises FootageError where views do not fit the cameras."""
@@ -70,12 +73,18 @@ class EdgeRegionSilhouetteProblem(PreparedProblem):
         Raises BodyError for poses that are no finite (N, D).
         """
         outlines = self.weigher.edge_region.projector.blocks(poses)
-        hidden = self.edge_region.hidden(outlines)
-        edge, region = self.edge_region.terms_of(outlines, hidden, len(poses))
-        trunk = self.weigher.trunk
-        if stage == TRUNK_FIRST and len(trunk) < outlines.shape[2]:
-            parts = np.ascontiguousarray(outlines[:, :, trunk]), np.ascontiguousarray(hidden[:, :, trunk])
-            edge = self.edge_region.terms_of(*parts, len(poses))[0]
+        trunk, there = self.weigher.trunk, self.weigher.trunk_there
+        trunk_alone = stage == TRUNK_FIRST and len(trunk) < outlines.shape[2]
+        if there is not None:
+            edge, region = self.edge_region.terms(poses)
+            if trunk_alone:
+                edge = self.edge_region.terms_there(poses, there)[0]
+        else:
+            hidden = self.edge_region.hidden(outlines)
+            edge, region = self.edge_region.terms_of(outlines, hidden, len(poses))
+            if trunk_alone:
+                parts = np.ascontiguousarray(outlines[:, :, trunk]), np.ascontiguousarray(hidden[:, :, trunk])
+                edge = self.edge_region.terms_of(*parts, len(poses))[0]
         return 1.0 - edge, 1.0 - region, self.silhouettes.areas(outlines, len(poses)).fitness()
 
     def shares(self, poses: Array) -> Shares:

@@ -10,6 +10,7 @@ flat array: distances between rows that the compiler knows are what lets it vect
 overlap.
 """
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -55,6 +56,14 @@ class View(NamedTuple):
 
 
 @njit(**FAST_INLINED)
+def sine_cosine(x):
+    """Sine and cosine of an angle within half a turn."""
+    q = x * x
+    sine = x * (ONE + q * (S1 + q * (S2 + q * (S3 + q * (S4 + q * (S5 + q * S6))))))
+    return sine, ONE + q * (-HALF + q * (C2 + q * (C3 + q * (C4 + q * (C5 + q * (C6 + q * C7))))))
+
+
+@njit(**FAST_INLINED)
 def pose_motions(entries, program, motions):
     """Rows 2k and 2k + 1 of `motions`: cosine and sine of operation k's angle, or its distance."""
     kinds, parameters, values = program.kind, program.parameter, program.value
@@ -65,12 +74,21 @@ def pose_motions(entries, program, motions):
         parameter, value = parameters[k], np.float64(values[k])
         for lane in range(LANES):
             amount = value * entries[parameter, lane]
-            x = np.float32(amount - FULL_TURN * np.floor(amount * TURNS + 0.5))
-            q = x * x
-            sine = x * (ONE + q * (S1 + q * (S2 + q * (S3 + q * (S4 + q * (S5 + q * S6))))))
-            cosine = ONE + q * (-HALF + q * (C2 + q * (C3 + q * (C4 + q * (C5 + q * (C6 + q * C7))))))
+            sine, cosine = sine_cosine(np.float32(amount - FULL_TURN * np.floor(amount * TURNS + 0.5)))
             motions[k, lane] = cosine if kind < 3 else np.float32(amount)
             motions[k, LANES + lane] = sine
+
+
+@njit(**FAST_INLINED)
+def rotated(cosine, sine, a, b):
+    """One row of two columns of a frame that turns: they mix."""
+    return cosine * a + sine * b, cosine * b - sine * a
+
+
+@njit(**FAST_INLINED)
+def combined(a, b, c, x, y, z):
+    """One row of a frame's three axes times a column of a constant motion."""
+    return a * x + b * y + c * z
 
 
 @njit(**FAST_INLINED)
@@ -78,15 +96,12 @@ def turn(frame, second, third, motions, k):
     """Turn frames about the axis before `second` in the cycle x, y, z: two columns mix."""
     for lane in range(LANES):
         c, s = motions[k, lane], motions[k, LANES + lane]
-        a0, b0 = frame[second * LANES + lane], frame[third * LANES + lane]
-        a1, b1 = frame[(4 + second) * LANES + lane], frame[(4 + third) * LANES + lane]
-        a2, b2 = frame[(8 + second) * LANES + lane], frame[(8 + third) * LANES + lane]
-        frame[second * LANES + lane] = c * a0 + s * b0
-        frame[third * LANES + lane] = c * b0 - s * a0
-        frame[(4 + second) * LANES + lane] = c * a1 + s * b1
-        frame[(4 + third) * LANES + lane] = c * b1 - s * a1
-        frame[(8 + second) * LANES + lane] = c * a2 + s * b2
-        frame[(8 + third) * LANES + lane] = c * b2 - s * a2
+        a0, b0 = rotated(c, s, frame[second * LANES + lane], frame[third * LANES + lane])
+        a1, b1 = rotated(c, s, frame[(4 + second) * LANES + lane], frame[(4 + third) * LANES + lane])
+        a2, b2 = rotated(c, s, frame[(8 + second) * LANES + lane], frame[(8 + third) * LANES + lane])
+        frame[second * LANES + lane], frame[third * LANES + lane] = a0, b0
+        frame[(4 + second) * LANES + lane], frame[(4 + third) * LANES + lane] = a1, b1
+        frame[(8 + second) * LANES + lane], frame[(8 + third) * LANES + lane] = a2, b2
 
 
 @njit(**FAST_INLINED)
@@ -104,10 +119,10 @@ def fixed_row(frame, row, lane, m):
     """One row of frames times a constant motion, given as its twelve numbers."""
     a, b = frame[row * LANES + lane], frame[(row + 1) * LANES + lane]
     c, d = frame[(row + 2) * LANES + lane], frame[(row + 3) * LANES + lane]
-    frame[row * LANES + lane] = a * m[0] + b * m[4] + c * m[8]
-    frame[(row + 1) * LANES + lane] = a * m[1] + b * m[5] + c * m[9]
-    frame[(row + 2) * LANES + lane] = a * m[2] + b * m[6] + c * m[10]
-    frame[(row + 3) * LANES + lane] = a * m[3] + b * m[7] + c * m[11] + d
+    frame[row * LANES + lane] = combined(a, b, c, m[0], m[4], m[8])
+    frame[(row + 1) * LANES + lane] = combined(a, b, c, m[1], m[5], m[9])
+    frame[(row + 2) * LANES + lane] = combined(a, b, c, m[2], m[6], m[10])
+    frame[(row + 3) * LANES + lane] = combined(a, b, c, m[3], m[7], m[11]) + d
 
 
 @njit(**FAST_INLINED)
@@ -129,9 +144,9 @@ def fixed_move(frame, fixed, k):
     """Frames moved by one constant vector in their own axes: the last column of fixed[k]."""
     x, y, z = fixed[k, 0, 3], fixed[k, 1, 3], fixed[k, 2, 3]
     for lane in range(LANES):
-        px = frame[lane] * x + frame[LANES + lane] * y + frame[2 * LANES + lane] * z
-        py = frame[4 * LANES + lane] * x + frame[5 * LANES + lane] * y + frame[6 * LANES + lane] * z
-        pz = frame[8 * LANES + lane] * x + frame[9 * LANES + lane] * y + frame[10 * LANES + lane] * z
+        px = combined(frame[lane], frame[LANES + lane], frame[2 * LANES + lane], x, y, z)
+        py = combined(frame[4 * LANES + lane], frame[5 * LANES + lane], frame[6 * LANES + lane], x, y, z)
+        pz = combined(frame[8 * LANES + lane], frame[9 * LANES + lane], frame[10 * LANES + lane], x, y, z)
         frame[3 * LANES + lane] += px
         frame[7 * LANES + lane] += py
         frame[11 * LANES + lane] += pz
@@ -182,7 +197,7 @@ def pose_frames(program, motions, frames):
 @njit(**FAST_INLINED)
 def view_of(camera):
     """A row of a `CameraTable` as a View."""
-    r, m, k, eye, size = camera.rotation, camera.matrix, camera.lens, camera.centre, camera.size
+    r, m, k, eye, size = camera.rotation, camera.matrix, camera.lens, camera.centre, camera["size"]
     return View(
         (r[0, 0], r[0, 1], r[0, 2], r[1, 0], r[1, 1], r[1, 2], r[2, 0], r[2, 1], r[2, 2]),
         (m[0, 0], m[0, 1], m[0, 2], m[1, 1], m[1, 2]),
@@ -236,36 +251,46 @@ def sideways(x, y, scale_x, scale_y):
     x /= scale_x
     y /= scale_y
     square = x * x + y * y
-    inverse = ONE / np.sqrt(max(square, TINY))
+    inverse = ONE / math.sqrt(max(square, TINY))
     on_axis = square < TINY
     return (ONE if on_axis else y * inverse) * scale_x, (ZERO if on_axis else -x * inverse) * scale_y
 
 
 @njit(**FAST_INLINED)
+def outline_of(frame, shape, view):
+    """The ten numbers of a limb's outline in one view, from its frame (rows of (3, 4)) and its five measures."""
+    x0, x1, x2, x3, y0, y1, y2, y3, z0, z1, z2, z3 = frame
+    length, r0, r1, scale_x, scale_y = shape
+    dx, dy, dz = view.eye[0] - x3, view.eye[1] - y3, view.eye[2] - z3
+    ux, uy = sideways(x0 * dx + y0 * dy + z0 * dz, x1 * dx + y1 * dy + z1 * dz, scale_x, scale_y)
+    across = turned(view.rotation, x0 * ux + x1 * uy, y0 * ux + y1 * uy, z0 * ux + z1 * uy)
+    axis = turned(view.rotation, x2 * length, y2 * length, z2 * length)
+    start = turned(view.rotation, -dx, -dy, -dz)
+    ax, ay, a_state = projected(view, start, axis, across, ZERO, -r0)
+    bx, by, b_state = projected(view, start, axis, across, ONE, -r1)
+    cx, cy, c_state = projected(view, start, axis, across, ONE, r1)
+    ex, ey, e_state = projected(view, start, axis, across, ZERO, r0)
+    state = min(min(a_state, b_state), min(c_state, e_state))
+    return ax, ay, bx, by, cx, cy, ex, ey, state, start[2] + HALF * axis[2]
+
+
+@njit(**FAST_INLINED)
 def limb_outline(frame, shape, view, outline):
     """Outlines (160,) of one limb in one view, from its frames (192,)."""
-    length, r0, r1, scale_x, scale_y = shape[0], shape[1], shape[2], shape[3], shape[4]
-    eye_x, eye_y, eye_z = view.eye
+    measures = shape[0], shape[1], shape[2], shape[3], shape[4]
     for lane in range(LANES):
-        x0, x1, x2 = frame[lane], frame[LANES + lane], frame[2 * LANES + lane]
-        y0, y1, y2 = frame[4 * LANES + lane], frame[5 * LANES + lane], frame[6 * LANES + lane]
-        z0, z1, z2 = frame[8 * LANES + lane], frame[9 * LANES + lane], frame[10 * LANES + lane]
-        x3, y3, z3 = frame[3 * LANES + lane], frame[7 * LANES + lane], frame[11 * LANES + lane]
-        dx, dy, dz = eye_x - x3, eye_y - y3, eye_z - z3
-        ux, uy = sideways(x0 * dx + y0 * dy + z0 * dz, x1 * dx + y1 * dy + z1 * dz, scale_x, scale_y)
-        across = turned(view.rotation, x0 * ux + x1 * uy, y0 * ux + y1 * uy, z0 * ux + z1 * uy)
-        axis = turned(view.rotation, x2 * length, y2 * length, z2 * length)
-        start = turned(view.rotation, -dx, -dy, -dz)
-        ax, ay, a_state = projected(view, start, axis, across, ZERO, -r0)
-        bx, by, b_state = projected(view, start, axis, across, ONE, -r1)
-        cx, cy, c_state = projected(view, start, axis, across, ONE, r1)
-        ex, ey, e_state = projected(view, start, axis, across, ZERO, r0)
+        numbers = (
+            frame[lane], frame[LANES + lane], frame[2 * LANES + lane], frame[3 * LANES + lane],
+            frame[4 * LANES + lane], frame[5 * LANES + lane], frame[6 * LANES + lane], frame[7 * LANES + lane],
+            frame[8 * LANES + lane], frame[9 * LANES + lane], frame[10 * LANES + lane], frame[11 * LANES + lane],
+        )  # fmt: skip
+        ax, ay, bx, by, cx, cy, ex, ey, state, depth = outline_of(numbers, measures, view)
         outline[lane], outline[LANES + lane] = ax, ay
         outline[2 * LANES + lane], outline[3 * LANES + lane] = bx, by
         outline[4 * LANES + lane], outline[5 * LANES + lane] = cx, cy
         outline[6 * LANES + lane], outline[7 * LANES + lane] = ex, ey
-        outline[8 * LANES + lane] = min(min(a_state, b_state), min(c_state, e_state))
-        outline[9 * LANES + lane] = start[2] + HALF * axis[2]
+        outline[SEEN_ROW * LANES + lane] = state
+        outline[DEPTH_ROW * LANES + lane] = depth
 
 
 @njit(**FAST_INLINED)

@@ -30,7 +30,7 @@ class OutlineProjector:
     def __init__(self, tables: KinematicTables, cameras: tuple[Camera, ...]) -> None:
         self.program = compile_program(tables)
         self.cameras = cameras
-        self._camera_table = camera_table(cameras, outward_limit, np.float32)
+        self.camera_table = camera_table(cameras, outward_limit, np.float32)
 
     @classmethod
     def of_body(cls, body: BodyModel, cameras: tuple[Camera, ...]) -> "OutlineProjector":
@@ -48,11 +48,8 @@ class OutlineProjector:
         """Number of drawn limbs."""
         return len(self.program.limb_frame)
 
-    def blocks(self, poses: Array) -> Floats:
-        """(B, V, L, 160) outlines of poses (N, D) in blocks of sixteen: ten rows of sixteen lanes.
-
-        Raises BodyError where poses are not (N, D) with enough parameters, or not finite.
-        """
+    def checked(self, poses: Array) -> Array:
+        """Poses (N, D) in a row. Raises BodyError where they are not (N, D) with enough parameters, or not finite."""
         poses = np.ascontiguousarray(poses, dtype=np.float64)
         if poses.ndim != 2 or poses.shape[1] < self.program.dimension:
             need = f"(N, {self.program.dimension})"
@@ -65,9 +62,17 @@ class OutlineProjector:
                 f"Parameter {column} of pose {row} is {poses[row, column]}, which is not finite.",
                 "Give finite poses.",
             )
+        return poses
+
+    def blocks(self, poses: Array) -> Floats:
+        """(B, V, L, 160) outlines of poses (N, D) in blocks of sixteen: ten rows of sixteen lanes.
+
+        Raises BodyError where poses are not (N, D) with enough parameters, or not finite.
+        """
+        poses = self.checked(poses)
         count = -(-len(poses) // LANES)
         out = np.empty((count, len(self.cameras), self.limb_count, ROWS * LANES), dtype=np.float32)
-        parallel_blocks(outline_blocks, count, BLOCKS_A_THREAD, poses, self.program, self._camera_table, out)
+        parallel_blocks(outline_blocks, count, BLOCKS_A_THREAD, poses, self.program, self.camera_table, out)
         return out
 
     def corners(self, poses: Array) -> tuple[Array, NDArray[np.int8]]:

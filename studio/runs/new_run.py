@@ -43,7 +43,7 @@ DESPITE = "Tracked despite: "
 """Prefix of a run's note on an accepted fault of the calibration."""
 
 
-OPTION_KNOBS = ("particles", "layers", "survival", "crossover")
+OPTION_KNOBS = ("particles", "layers", "survival", "crossover", "device")
 
 
 def own_knobs() -> list[Knob]:

@@ -1,0 +1,146 @@
+"""Edge and region on a device: in Numba's simulator against the processor, as PTX, and where there is none."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numba
+import numpy as np
+import pytest
+from simulated_device import SAMPLES, scene_of, terms_of
+from weighting_scene import four_cameras
+
+from studio.body.catalogue import load_body
+from studio.errors import SettingsError, StudioError
+from studio.geometry.camera_table import camera_table, outward_limit
+from studio.likelihood import edge_region
+from studio.likelihood.edge_region import EdgeRegionSettings, EdgeRegionWeigher
+
+HERE = Path(__file__).parent
+BODIES = ("human31", "planar_arm4")
+
+
+@pytest.fixture(scope="module")
+def simulated(tmp_path_factory):
+    """What the device's kernels give, in a process whose device is simulated."""
+    place = tmp_path_factory.mktemp("device") / "terms.npz"
+    simulator = {"NUMBA_ENABLE_CUDASIM": "1", "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(HERE)}
+    script = [sys.executable, "-W", "error", str(HERE / "simulated_device.py"), str(place), *BODIES]
+    done = subprocess.run(script, env={**os.environ, **simulator}, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    with np.load(place) as found:
+        return dict(found)
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_the_devices_terms_are_the_processors(simulated, name):
+    """But for samples that the last bit of a place carries into the next pixel, whose value differs by little here."""
+    expected = terms_of(name, "cpu")
+    assert {"edge", "region", "weights"} <= {key.split(".")[1] for key in simulated if key.startswith(name)}
+    samples = {"edge": SAMPLES["edge_samples"], "region": SAMPLES["region_samples"]}
+    limbs = len(load_body(name).drawn)
+    for key, value in expected.items():
+        if f"{name}.{key}" not in simulated:
+            continue
+        found = simulated[f"{name}.{key}"]
+        np.testing.assert_allclose(found, value, atol=1e-3)
+        if key in samples:
+            whole = 255 * samples[key] * limbs * found
+            np.testing.assert_allclose(whole, np.round(whole), atol=1e-6)
+            assert (np.abs(whole - 255 * samples[key] * limbs * value) > 0.5).mean() < 0.3, (
+                "nearly all are equal"
+            )
+    assert np.ptp(expected["weights"]) > 0.1
+    if name == "human31":
+        assert "human31.trunk" in simulated
+        assert np.abs(expected["trunk"] - expected["edge"]).max() > 0.01
+        assert (expected["edge"] == 1.0).any(), "some cameras see nothing of a pose"
+
+
+def test_every_kernel_compiles_for_a_device(monkeypatch):
+    """PTX is made without a card, where the extra `gpu` and NVIDIA's compiler are installed."""
+    pytest.importorskip("numba_cuda", reason="the extra `gpu` is not installed")
+    pathfinder = pytest.importorskip("cuda.pathfinder")
+    for library in ("nvvm", "nvrtc"):
+        try:
+            pathfinder.load_nvidia_dynamic_lib(library)
+        except pathfinder.DynamicLibNotFoundError:
+            pytest.skip(f"NVIDIA's compiler is not installed: there is no {library}")
+    dispatching = pytest.importorskip("numba.cuda.dispatcher")
+    device = pytest.importorskip("studio.likelihood.edge_region_device")
+    from studio.numba_on_devices import cuda  # noqa: PLC0415
+
+    capability = (8, 0)
+    monkeypatch.setattr(
+        dispatching, "get_current_device", lambda: SimpleNamespace(compute_capability=capability)
+    )
+    table = camera_table(four_cameras(), outward_limit, np.float32)
+    f8, f4, i8, i4, u1 = (numba.typeof(np.zeros(1, t)).dtype for t in ("f8", "f4", "i8", "i4", "u1"))
+
+    def array(of, dimensions):
+        return numba.types.Array(of, dimensions, "C")
+
+    tables = array(i8, 1), array(i8, 1), array(i8, 1), array(i8, 1), array(f4, 1), array(f4, 3)
+    signatures = {
+        device.find_frames: (array(f8, 2), *tables, array(f4, 3)),
+        device.add_samples: (
+            *(array(f4, 3), array(i8, 1), array(f4, 2), numba.typeof(table), array(u1, 1), array(i8, 2)),
+            *(i8, i8, array(i4, 3)),
+        ),
+    }
+    for kernel, arguments in signatures.items():
+        ptx = cuda.compile_ptx(kernel, numba.types.void(*arguments), cc=capability)[0]
+        assert ".entry" in ptx
+        assert "fma.rn.f32" in ptx
+        assert "call" not in ptx, "every helper is compiled into its kernel"
+
+
+def settings(**knobs):
+    return EdgeRegionSettings(**knobs)
+
+
+@pytest.fixture
+def no_device(monkeypatch):
+    """A machine without a card, whatever this one has."""
+    import importlib  # noqa: PLC0415
+
+    module = importlib.import_module(edge_region.DEVICE_MODULE)
+    monkeypatch.setattr(module, "missing", lambda: "no card here")
+
+
+def test_without_a_card_the_gpu_is_refused_and_auto_is_the_processor(no_device):
+    body, cameras, evidence, poses = scene_of("human31")
+    with pytest.raises(StudioError, match="no card here") as caught:
+        EdgeRegionWeigher(body, cameras, settings(device="gpu"))
+    assert "capture-studio[gpu]" in caught.value.hint
+    assert "device to cpu" in caught.value.hint
+    weighed = [
+        EdgeRegionWeigher(body, cameras, settings(device=device)).problem(evidence).weigh(poses)
+        for device in ("auto", "cpu")
+    ]
+    np.testing.assert_array_equal(*weighed)
+
+
+def test_without_numbas_target_the_gpu_is_refused(monkeypatch):
+    body, cameras = load_body("human31"), four_cameras()
+    monkeypatch.setattr(edge_region, "DEVICE_MODULE", "studio.likelihood.no_such_device")
+    with pytest.raises(StudioError, match="No module named"):
+        EdgeRegionWeigher(body, cameras, settings(device="gpu"))
+    assert EdgeRegionWeigher(body, cameras, settings(device="auto")).device is None
+
+
+def test_occlusion_is_the_processors_alone():
+    body, cameras = load_body("human31"), four_cameras()
+    with pytest.raises(SettingsError, match="Occlusion-aware"):
+        EdgeRegionWeigher(body, cameras, settings(device="gpu", occlusion_aware=True))
+    assert EdgeRegionWeigher(body, cameras, settings(device="auto", occlusion_aware=True)).device is None
+
+
+def test_a_machines_missing_device_is_named():
+    """On a machine with a card there is nothing missing; on another the reason stands in one line."""
+    from studio.numba_on_devices import cuda, missing  # noqa: PLC0415
+
+    assert (missing() == "") == cuda.is_available()
+    assert "\n" not in missing()
