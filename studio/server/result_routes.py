@@ -144,7 +144,7 @@ class FrameDetail(Answer):
     disagreement: dict[str, float] = Field(
         {}, description="Of each limb, the share of its area that silhouettes and pose do not agree about."
     )
-    limbs_lost: list[str] = Field([], description="Limbs that the silhouettes deny.")
+    limbs_lost: list[str] = Field([], description="Limbs that are probably not where the pose has them.")
     notes: list[str] = Field(
         [],
         description="What its numbers do not say: weights that chose nothing, cameras that showed nothing.",

@@ -138,6 +138,9 @@ def pack_result(result: FrameResult) -> bytes:
     if result.disagreement:
         arrays["limbs"] = np.array(list(result.disagreement))
         arrays["disagreement"] = np.array(list(result.disagreement.values()))
+    if result.limb_loss:
+        arrays["limbs_judged"] = np.array(list(result.limb_loss))
+        arrays["limb_loss"] = np.array(list(result.limb_loss.values()))
     if result.notes:
         arrays["notes"] = np.array(result.notes)
     vectors = [estimate.pose, estimate.mean, estimate.mode]
@@ -164,11 +167,17 @@ def unpack_result(blob: bytes) -> FrameResult:
         tracking=TRACKING_STATES[int(state)],
         overlap=overlap,
         doubts=int(doubts),
-        disagreement=dict(zip(map(str, arrays["limbs"]), map(float, arrays["disagreement"]), strict=True))
-        if "limbs" in arrays
-        else {},
+        disagreement=_by_limb(arrays, "limbs", "disagreement"),
+        limb_loss=_by_limb(arrays, "limbs_judged", "limb_loss"),
         notes=tuple(map(str, arrays["notes"])) if "notes" in arrays else (),
     )
+
+
+def _by_limb(arrays: dict[str, Array], names: str, values: str) -> dict[str, float]:
+    """Values by limb; empty where none are stored."""
+    if names not in arrays:
+        return {}
+    return dict(zip(map(str, arrays[names]), map(float, arrays[values]), strict=True))
 
 
 def carried_arrays(carried: FilterState) -> dict[str, Array]:

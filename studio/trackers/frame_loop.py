@@ -20,6 +20,7 @@ from studio.likelihood.problem import FittedToPoses
 from studio.trackers.particles import WeightError
 from studio.trackers.tracker import (
     HIDDEN,
+    MOVED,
     Array,
     FilterState,
     FrameLikelihood,
@@ -199,7 +200,10 @@ class FrameSearch:
         if not isinstance(informed, FittedToPoses):
             return before
         found = informed.remembered(self.tracker.end_frame(particles, self.space, settings).pose)
-        return {**{name: values for name, values in before.items() if name.startswith(HIDDEN)}, **found}
+        return {
+            **{name: values for name, values in before.items() if name.startswith((HIDDEN, MOVED))},
+            **found,
+        }
 
 
 def search_frame(

@@ -10,6 +10,7 @@ stands in front of the body are left out (`hidden_areas`).
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from studio.geometry.camera import Camera
 from studio.knobs import knob
 from studio.trackers.agreement import Agreement, Disagreement
 from studio.trackers.hidden_areas import learnt, without_hidden
+from studio.trackers.limb_certainty import CertaintyOfLimbs
 from studio.trackers.refinement import Distances, RefinementSettings, Refiner
 from studio.trackers.tracker import LIMB_LOST_SHARE, FilterState, FrameLikelihood, FrameResult, SearchSpace
 
@@ -88,7 +90,7 @@ class FrameRefiner:
     def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], seed: int) -> None:
         self._body, self._cameras = body, {camera.name: camera for camera in cameras}
         self._seed = seed
-        self._refiners: dict[tuple[object, ...], tuple[Refiner, Refiner, Agreement]] = {}
+        self._refiners: dict[tuple[object, ...], _Prepared] = {}
 
     def refined(
         self,
@@ -107,7 +109,7 @@ class FrameRefiner:
         )
         if not any(len(view.border) for view in seen.values()):
             return result
-        refiner, redrawing, agreement = self._prepared(tuple(seen), settings)
+        refiner, redrawing, agreement, certainty_of = self._prepared(tuple(seen), settings)
         start, masks, memory = result.estimate.pose, tuple(seen.values()), result.carried.memory
         silhouettes = without_hidden(masks, agreement.cameras, agreement.mm_per_pixel(start), memory)
         pose, evaluations = refiner.refine(start, silhouettes).pose, 0
@@ -124,17 +126,18 @@ class FrameRefiner:
         weight = float(problem.weigh(pose[None])[0])
         estimate = dataclasses.replace(result.estimate, pose=pose, searched=start, log_weight=weight)
         carried = _carried(result, pose, settings.next_frame_from, refiner)
+        certainty = certainty_of.of(pose, refiner.loss(pose, silhouettes)[2], memory)
+        memory = {**learnt(memory, pose, off, agreement, masks), **certainty.moved}
         return dataclasses.replace(
             result,
             estimate=estimate,
-            carried=dataclasses.replace(carried, memory=learnt(memory, pose, off, agreement, masks)),
+            carried=dataclasses.replace(carried, memory=memory),
             evaluations=result.evaluations + evaluations,
             disagreement=off.shares(),
+            limb_loss=certainty.lost(off),
         )
 
-    def _prepared(
-        self, names: tuple[str, ...], settings: FrameRefinementSettings
-    ) -> tuple[Refiner, Refiner, Agreement]:
+    def _prepared(self, names: tuple[str, ...], settings: FrameRefinementSettings) -> "_Prepared":
         key = (names, settings.refine_frame_steps)
         if key not in self._refiners:
             cameras = tuple(self._cameras[name] for name in names)
@@ -142,8 +145,19 @@ class FrameRefiner:
             ending, redrawing = (
                 Refiner(self._body, cameras, RefinementSettings(refinement_steps=most)) for most in steps
             )
-            self._refiners[key] = ending, redrawing, Agreement(self._body, cameras)
+            self._refiners[key] = _Prepared(
+                ending, redrawing, Agreement(self._body, cameras), CertaintyOfLimbs(ending)
+            )
         return self._refiners[key]
+
+
+class _Prepared(NamedTuple):
+    """What judges and refines poses in some cameras."""
+
+    refiner: Refiner
+    redrawing: Refiner
+    agreement: Agreement
+    certainty_of: CertaintyOfLimbs
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -26,13 +26,13 @@ TRACKED, LOST, NO_EVIDENCE, RECOVERED = "tracked", "lost", "no evidence", "recov
 LIMB_LOST = "limb lost"
 TRACKING_STATES = (TRACKED, LOST, NO_EVIDENCE, RECOVERED, LIMB_LOST)
 """State of a frame. Lost: its pose does not explain the pictures. No evidence: no body is visible, the pose is held.
-Recovered: tracked again by a search for the body, having been lost. Limb lost: the body is followed, but the
-silhouettes contradict one of its limbs (`FrameResult.limbs_lost`)."""
+Recovered: tracked again by a search for the body, having been lost. Limb lost: the body is followed, but one of its
+limbs is probably elsewhere (`FrameResult.limbs_lost`)."""
 
 LIMB_LOST_SHARE = 0.06
-"""Disagreeing share of a limb's area beyond which it is lost. On the validation half of the suite (eleven clips; lost:
-a marker of the limb more than 150 mm off) it finds 18 of 18 lost frames of the default tracker and 85 of 92 of one
-reduced to twenty evaluations, and flags 2.2 and 1.6 % of the others."""
+"""Disagreeing share of a limb's area beyond which the silhouettes contradict it."""
+LIMB_LOST_PROBABILITY = 0.091
+"""Probability beyond which a limb is reported lost (`limb_certainty`)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,6 +93,8 @@ NO_PARENT = -1
 """In place of a parent that there is none of."""
 HIDDEN = "hidden "
 """Prefix of the names of a camera's hidden areas in `FilterState.memory`."""
+MOVED = "moved "
+"""The same of how the limbs moved (`limb_certainty`)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,7 +104,7 @@ class FilterState:
     particles : the weighted set at the end of the frame; None = start uniformly over the space's limits.
     estimate, previous_estimate : (D,) the last two reported poses (dynamics, Eq. 10); None where there is none yet.
     memory : the likelihood's state (`likelihood.problem.FittedToPoses`), and under names that begin with HIDDEN the
-    occluded areas (`hidden_areas`); trackers pass both on unread.
+    occluded areas (`hidden_areas`), with MOVED the limbs' movement (`limb_certainty`); trackers pass them on unread.
     """
 
     particles: ParticleSet | None
@@ -176,8 +178,9 @@ class FrameResult:
     """The result of one frame. evaluations : poses weighed. carried : what the next frame starts from. tracking : one
     of TRACKING_STATES. overlap : how well the silhouettes of pose and masks agree (f_s, 0 to 1), NaN where unknown.
     doubts : frames in a row, this one included, that looked lost. disagreement : by limb the share of its area in which
-    silhouettes and pose disagree (`agreement.Disagreement.shares`); empty where nothing was compared. notes : what
-    the frame's numbers do not say, in sentences: weights that choose nothing, cameras that show nothing.
+    silhouettes and pose disagree (`agreement.Disagreement.shares`); empty where nothing was compared. limb_loss : by
+    limb the probability that it is lost (`limb_certainty`); empty also in results stored before there was one. notes :
+    what the frame's numbers do not say, in sentences: weights that choose nothing, cameras that show nothing.
     """
 
     frame: int
@@ -191,11 +194,14 @@ class FrameResult:
     overlap: float = math.nan
     doubts: int = 0
     disagreement: Mapping[str, float] = field(default_factory=dict[str, float])
+    limb_loss: Mapping[str, float] = field(default_factory=dict[str, float])
     notes: tuple[str, ...] = ()
 
     @property
     def limbs_lost(self) -> tuple[str, ...]:
-        """Limbs that the silhouettes contradict."""
+        """Limbs that are probably elsewhere; where that is not known, those that the silhouettes contradict."""
+        if self.limb_loss:
+            return tuple(name for name, value in self.limb_loss.items() if value > LIMB_LOST_PROBABILITY)
         return tuple(name for name, share in self.disagreement.items() if share > LIMB_LOST_SHARE)
 
 

@@ -35,7 +35,7 @@ def body() -> BodyModel:
 
 @pytest.fixture(scope="module")
 def truth(body: BodyModel) -> np.ndarray:
-    return standing(body, left_shoulder_rx=0.5, right_shoulder_rx=-0.5, left_hip_ry=0.3)
+    return standing(body, left_shoulder_rx=0.5, right_shoulder_rx=0.5, left_hip_ry=0.3)
 
 
 @pytest.fixture(scope="module")
@@ -176,6 +176,8 @@ def test_a_refined_result_is_stored_completely(truth: np.ndarray, refined) -> No
     stored = unpack_result(pack_result(found))
     assert np.array_equal(stored.estimate.searched, found.estimate.searched)
     assert stored.disagreement == dict(found.disagreement)
+    assert stored.limb_loss == dict(found.limb_loss)
+    assert set(stored.limb_loss) == set(found.disagreement)
     assert unpack_result(pack_result(searched(truth))).estimate.searched is None
 
 
