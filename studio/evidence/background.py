@@ -59,7 +59,10 @@ class GaussianBackground:
             self.variance = np.zeros((1, *self.mean.shape[1:]), np.float32)
         else:
             self.variance = np.ascontiguousarray(deviation, dtype=np.float32) ** 2
-        self._rough = self.mean if self.mean.dtype == np.uint8 else np.rint(self.mean).astype(np.uint8)
+        # A picture's own bytes, not another array of them.
+        self._rough: Bytes = (
+            np.rint(self.mean).astype(np.uint8) if mean.dtype != np.uint8 else self.mean.view(np.uint8)
+        )
         self._samples = self.mean[::GAIN_STRIDE, ::GAIN_STRIDE].astype(np.float32)
         self.is_grey = float(np.ptp(self._samples, axis=2).mean()) < GREY_SPREAD
 

@@ -87,14 +87,16 @@ def distances_of(
     signed = signed_of(inside, measure(inside), measure(1 - inside))
     unknown = None if hidden is None else np.ascontiguousarray(hidden[top:bottom, left:right])
     contours, _ = cv2.findContours(inside, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
-    points = np.concatenate([np.zeros((0, 2), np.int32), *(contour[:, 0] for contour in contours)])
+    points = np.concatenate([np.zeros((0, 2), np.int64), *(contour[:, 0] for contour in contours)]).astype(
+        np.int64
+    )
     x, y = points[:, 0] + left, points[:, 1] + top
     kept = (x > 0) & (y > 0) & (x < size[0] - 1) & (y < size[1] - 1)
     if unknown is not None:
         side = 2 * BESIDE_HIDDEN + 1
         near = np.asarray(cv2.dilate(unknown, np.ones((side, side), np.uint8)))
         kept &= near[points[:, 1], points[:, 0]] == 0
-    points = points[kept][:: max(1, -(-int(kept.sum()) // most))].astype(np.int64)
+    points = points[kept][:: max(1, -(-int(kept.sum()) // most))]
     outward = slopes_at(points, np.asarray(cv2.GaussianBlur(signed, (0, 0), SMOOTHED), np.float32))
     if unknown is not None:
         signed = np.where(unknown > 0, np.float32(0.0), signed)

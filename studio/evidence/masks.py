@@ -127,11 +127,11 @@ def _pieces(mask: Bytes, settings: EvidenceSettings) -> Bytes:
     is_kept = np.zeros(len(contours), np.bool_)
     is_kept[kept] = True
     filled = holes[is_kept[parent[holes]] & (area[holes] < settings.mask_fill_holes)]
-    dropped = np.flatnonzero(~is_kept[np.where(parent < 0, np.arange(len(contours)), parent)])
-    if len(filled) == 0 and len(dropped) == 0:
+    dropped = np.flatnonzero(~is_kept[np.where(parent < 0, np.arange(len(contours)), parent)]).tolist()
+    if len(filled) == 0 and not dropped:
         return mask
     out = mask.copy()
-    if len(dropped):
+    if dropped:
         cv2.drawContours(out, [contours[k] for k in dropped], -1, 0, cv2.FILLED)
     for index in filled:
         cv2.drawContours(out, contours, int(index), 255, cv2.FILLED)
