@@ -107,7 +107,12 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
         axes = ("evaluations a frame", "mean error (mm)")
         title = f"Error over evaluations, {clip} (bars: 95 % intervals over seeds)"
         yield Chart(title, "lines", *axes, tuple(series), log_x=True, log_y=True)
-    yield f"More than {MANY} evaluations a frame are measured with {SEEDS_OF_MANY} seeds, all else with {SEEDS}."
+    if counts[-1] > MANY:
+        yield f"More than {MANY} evaluations a frame are measured with {SEEDS_OF_MANY} seeds, all else with {SEEDS}."
+    yield (
+        f"The tracker {GUIDED} was learnt from {', '.join(TRAINING.sources)}: the motion of the walk is among them, "
+        "that of the turns is not."
+    )
     heads = ("clip", "tracker", *(f"{count} evaluations" for count in counts))
     yield Table("Mean error (mm) / frames with a limb lost (%)", heads, tuple(rows))
     yield {
