@@ -214,10 +214,12 @@ def spans_contest(
     tables = np.zeros((*outlines.shape[:3], FIELDS * LANES))
     record_tables(outlines, silhouettes.scale, silhouettes.maps.views, tables)
     sums = np.zeros((*outlines.shape[:2], LANES))
-    evaluations = len(outlines) * LANES * LIMIT_PASSES
-    return Contest(
-        f"spans_{resolution}", lambda: spans_only(tables, silhouettes.maps, LIMIT_PASSES, sums), evaluations
-    )
+
+    def spans() -> Array:
+        spans_only(tables, silhouettes.maps, LIMIT_PASSES, sums)
+        return sums
+
+    return Contest(f"spans_{resolution}", spans, len(outlines) * LANES * LIMIT_PASSES)
 
 
 def some_blocks(outlines: NDArray[np.float32]) -> NDArray[np.float32]:
