@@ -1,11 +1,16 @@
-"""Speed of pose evaluation, compared with the limit set by memory.
+"""Speed of pose evaluation, compared with the limit set by memory and by arithmetic that cannot be left out.
 
 The scene is generated: four 640 × 480 cameras like those of the Lee walk around the default body, a
-silhouette and a noisy picture. The limit is the edge and region weighting's own loads alone: the
-map reads of the index stream that it produced for some of the same poses, in the same run. The stream is
-replayed sixteen poses at a time, so that it comes from the cache as it does in the weighting: read from memory
-as a whole the loads alone would take half as long again, and flatter the weighting. Everything is repeated in
-turns and the best of each counts, so that other processes change little."""
+silhouette and a noisy picture. Limits are measured in the same run, on the same poses:
+
+* of map reads, the edge and region weighting's own loads alone, a pose after the other: the index stream that it
+  produced, replayed sixteen poses at a time, so that it comes from the cache (read from memory as a whole the loads
+  alone would take half as long again, and flatter the weighting). Weightings that read a different number of samples
+  are given as much time for each. A weighting may beat it: sixteen poses that read a limb one after the other share
+  what they load.
+* of areas, the spans of the limbs' rows and the counting of bits alone.
+
+Everything is repeated in turns and the best of each counts, so that other processes change little."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,16 +26,18 @@ from studio.body.model import BodyModel
 from studio.evidence.edges import bodytrack_edges, proximity_edges
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.geometry.camera import Camera
+from studio.likelihood.area_kernels import FIELDS, record_tables, spans_only
 from studio.likelihood.bodytrack import BodytrackSettings, BodytrackWeigher
 from studio.likelihood.edge_region import EdgeRegionProblem, EdgeRegionSettings, EdgeRegionWeigher
-from studio.likelihood.edge_region_kernels import loads_only
+from studio.likelihood.edge_region_kernels import CHUNK, loads_only
 from studio.likelihood.edge_region_silhouette import EdgeRegionSilhouetteSettings, EdgeRegionSilhouetteWeigher
 from studio.likelihood.edge_silhouette import EdgeSilhouetteSettings, EdgeSilhouetteWeigher
 from studio.likelihood.outline_kernels import LANES
 from studio.likelihood.outlines import OutlineProjector
 from studio.likelihood.problem import FrameLikelihood
-from studio.likelihood.silhouette_areas import FULL, HALF
+from studio.likelihood.silhouette_areas import FULL, HALF, silhouettes_of
 from studio.likelihood.template import TemplateSettings, TemplateWeigher
+from studio.likelihood.visible_edges import body_edges
 from studio.numba_in_threads import numba
 from studio.progress import Progress
 from studio.synthesis.arm_footage import filled
@@ -58,28 +65,37 @@ class Contest:
 def run_benchmark(
     body_name: str = "human31", repeats: int = 80, progress: Progress | None = None
 ) -> dict[str, object]:
-    """Evaluations a second of every weighting, on one thread unless noted, and the limit of
-    edge-region's; "fractions": of bare loads, of as many samples as another weighting reads.
+    """Evaluations a second of every weighting, on one thread unless noted, the limit of each, and the fraction of it
+    that is reached.
 
     repeats : of every measurement. progress : called with (step, done, total). Changes the number of Numba's threads
     while it runs, and sets it back."""
     body = load_body(body_name)
     cameras = ring_of_cameras(body)
     rng = np.random.default_rng(0)
-    sigma = np.array([entry.max_step for entry in body.parameters]) / (2.0 * FRAMES_PER_SECOND)
-    poses = body.neutral + sigma * rng.normal(size=(POSES, len(sigma)))
+    poses = poses_around(body, POSES, rng)
     evidence = made_evidence(body, cameras, rng)
     weigher = EdgeRegionWeigher(body, cameras, EdgeRegionSettings())
     problem = weigher.problem(evidence["proximity"])
     limit = limit_contest(problem, poses)
-    contests = [*weighing_contests(body, cameras, evidence, problem, poses), limit]
+    spans = [spans_contest(problem, evidence["proximity"], poses, resolution) for resolution in (HALF, FULL)]
+    contests = [*weighing_contests(body, cameras, evidence, problem, poses), limit, *spans]
     best = timed(contests, repeats, progress)
     rates = {contest.name: contest.evaluations / best[contest.name] for contest in contests}
-    most = rates.pop(limit.name)
+    most, half, full = (rates.pop(contest.name) for contest in (limit, *spans))
     rate, two = rates["edge_region"], rates.get("edge_region_two_threads")
     samples = weigher.samples_per_evaluation
     bodytrack = BodytrackWeigher(body, cameras, BodytrackSettings()).problem(evidence["bodytrack"])
     bodytrack_samples = float(bodytrack.terms(poses)[2].sum(axis=1).mean())
+    areas = ((HALF, half), (FULL, full))
+    edge_samples = CHUNK * len(body_edges(body).whole) * len(cameras)
+    limits = {
+        "edge_region_occlusion_aware": most,
+        "bodytrack": most * samples / bodytrack_samples,
+        "template": full,
+        **{f"edge_silhouette_{name}": one_after(most * samples / edge_samples, area) for name, area in areas},
+        **{f"edge_region_silhouette_{name}": one_after(most, area) for name, area in areas},
+    }
     return {
         "edge_region": {
             "evaluations_per_second": round(rate),
@@ -88,7 +104,8 @@ def run_benchmark(
             "fraction_of_load_limit": round(rate / most, 3),
             **({"two_threads": round(two / rate, 3)} if two else {}),
         },
-        "fractions": {"bodytrack": round(rates["bodytrack"] * bodytrack_samples / (most * samples), 3)},
+        "limits_per_second": {name: round(limit) for name, limit in limits.items()},
+        "fractions": {name: round(rates[name] / limit, 3) for name, limit in limits.items()},
         "others_evaluations_per_second": {
             name: round(found) for name, found in rates.items() if name != "edge_region"
         },
@@ -97,6 +114,12 @@ def run_benchmark(
         "poses": POSES,
         "repeats": repeats,
     }
+
+
+def poses_around(body: BodyModel, count: int, rng: np.random.Generator) -> Array:
+    """(N, D) poses around the neutral one, as far apart as a frame's particles."""
+    sigma = np.array([entry.max_step for entry in body.parameters]) / (2.0 * FRAMES_PER_SECOND)
+    return body.neutral + sigma * rng.normal(size=(count, len(sigma)))
 
 
 def ring_of_cameras(body: BodyModel) -> tuple[Camera, ...]:
@@ -165,8 +188,7 @@ def silhouette_problems(
 
 def limit_contest(problem: EdgeRegionProblem, poses: Array) -> Contest:
     """The loads alone, of up to LIMIT_BLOCKS blocks of sixteen poses spread over all."""
-    outlines, maps = problem.weigher.projector.blocks(poses), problem.maps
-    outlines = np.ascontiguousarray(outlines[:: max(1, len(outlines) // LIMIT_BLOCKS)][:LIMIT_BLOCKS])
+    outlines, maps = some_blocks(problem.weigher.projector.blocks(poses)), problem.maps
     blocks, views = outlines.shape[:2]
     edge_pairs, region_pairs = (
         stream.reshape(blocks, views, LANES, -1, LANES).view(np.uint64)
@@ -181,6 +203,33 @@ def limit_contest(problem: EdgeRegionProblem, poses: Array) -> Contest:
         return sums
 
     return Contest("limit", load, blocks * LANES * LIMIT_PASSES)
+
+
+def spans_contest(
+    problem: EdgeRegionProblem, evidence: FrameEvidence, poses: Array, resolution: str
+) -> Contest:
+    """The spans and counts of areas alone, of the poses of `limit_contest`."""
+    silhouettes = silhouettes_of(evidence, resolution)
+    outlines = some_blocks(problem.weigher.projector.blocks(poses))
+    tables = np.zeros((*outlines.shape[:3], FIELDS * LANES))
+    record_tables(outlines, silhouettes.scale, silhouettes.maps.views, tables)
+    sums = np.zeros((*outlines.shape[:2], LANES))
+
+    def spans() -> Array:
+        spans_only(tables, silhouettes.maps, LIMIT_PASSES, sums)
+        return sums
+
+    return Contest(f"spans_{resolution}", spans, len(outlines) * LANES * LIMIT_PASSES)
+
+
+def some_blocks(outlines: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Up to LIMIT_BLOCKS blocks of sixteen poses, spread over all."""
+    return np.ascontiguousarray(outlines[:: max(1, len(outlines) // LIMIT_BLOCKS)][:LIMIT_BLOCKS])
+
+
+def one_after(first: float, second: float) -> float:
+    """Evaluations a second of two parts, one after the other, of which each reaches so many alone."""
+    return 1.0 / (1.0 / first + 1.0 / second)
 
 
 def timed(contests: list[Contest], repeats: int, progress: Progress | None) -> dict[str, float]:

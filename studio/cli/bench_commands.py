@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from studio.benchmarks.devices import run_device_benchmark
 from studio.benchmarks.hulls import run_hull_benchmark
 from studio.benchmarks.kernels import run_benchmark
 from studio.benchmarks.live import run_live_benchmark
@@ -32,6 +33,10 @@ def _hulls(report: Progress) -> dict[str, object]:
     return {"hull": run_hull_benchmark(progress=report)}
 
 
+def _gpu(report: Progress) -> dict[str, object]:
+    return {"gpu": run_device_benchmark(progress=report)}
+
+
 def _slider(report: Progress) -> dict[str, object]:
     report("re-annealing", 0, 1)
     with tempfile.TemporaryDirectory() as folder:
@@ -53,6 +58,7 @@ def _live(report: Progress) -> dict[str, object]:
 FRAMES = "frames"
 PARTS: dict[str, Callable[[Progress], dict[str, object]]] = {
     "kernels": _kernels,
+    "gpu": _gpu,
     "hulls": _hulls,
     "slider": _slider,
     "live": _live,

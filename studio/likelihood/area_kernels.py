@@ -254,6 +254,56 @@ def area_blocks(
                 outside[block, view, lane] = beyond
 
 
+@njit(**CONTRACTED)
+def record_tables(outlines: Floats, scale: float, views: Indices, tables: Array) -> None:
+    """The tables of `area_blocks`: fill (B, V, L, 336). For the benchmark."""
+    for block in range(tables.shape[0]):
+        for view in range(tables.shape[1]):
+            width, height = float(views[view, 2]), float(views[view, 3])
+            for limb in range(tables.shape[2]):
+                limb_table(outlines[block, view, limb], tables[block, view, limb], scale, width, height)
+
+
+@njit(**CONTRACTED)
+def spans_only(tables: Array, silhouettes: Maps, passes: int, sums: Array) -> None:
+    """Nothing but the spans and the counting of `area_blocks`, from recorded tables (B, V, L, 336), `passes` times
+    over: its limit. sums : (B, V, 16), lengths of spans and bits are added.
+    """
+    views, values = silhouettes.views, silhouettes.values
+    columns = (views[:, 2].max() - 1) // WORD + 2
+    words = np.full(columns * (views[:, 3].max() + 2 * ROWS), ALL_BITS)
+    for _ in range(passes):
+        for block in range(tables.shape[0]):
+            for view in range(tables.shape[1]):
+                for lane in range(LANES):
+                    total = 0.0
+                    for limb in range(tables.shape[2]):
+                        table = tables[block, view, limb]
+                        first, last = (
+                            int(table[FIRST_ROW * LANES + lane]),
+                            int(table[LAST_ROW * LANES + lane]),
+                        )
+                        if last < first:
+                            continue
+                        edges = limb_edges(table, lane)
+                        for chunk in range((last - first) // ROWS + 1):
+                            for i in range(ROWS):
+                                begin, after = span(edges, np.float64(chunk * ROWS) + np.float64(i))
+                                total += max(after - begin, 0.0)
+                    top, bottom, left, right = body_box(tables[block, view], lane)
+                    if bottom >= top:
+                        window, rows = left // WINDOW_STEP * WINDOW_STEP, (bottom - top) // ROWS * ROWS + ROWS
+                        for column in range((right - window) // WORD + 1):
+                            base = (
+                                views[view, 0]
+                                + (window + column * WORD) // WINDOW_STEP * views[view, 1]
+                                + top
+                            )
+                            drawn, shared = count_bits(words, column * (rows + ROWS), values, base, rows)
+                            total += drawn + shared
+                    sums[block, view, lane] += total
+
+
 @njit(**KERNEL)
 def halve(mask: Mask, found: Mask) -> None:
     """Fill found (ceil(H / 2), ceil(W / 2)) from a mask (H, W): the majority of each square of four; of two and two,

@@ -68,14 +68,14 @@ class Silhouettes:
             masks = [halved(mask) for mask in masks]
         self.sizes = np.array([mask.shape[::-1] for mask in masks], dtype=np.int64)
         self.pixels = np.array([np.count_nonzero(mask) for mask in masks], dtype=np.int64)
-        self._maps = packed_windows(masks)
+        self.maps = packed_windows(masks)
 
     def areas(self, outlines: Floats, count: int) -> Areas:
         """The areas of the first `count` poses of outlines (B, V, L, 160)."""
         blocks, views = outlines.shape[:2]
         counts = np.empty((blocks, views, LANES, 2), dtype=np.int64)
         outside = np.empty((blocks, views, LANES))
-        given = count, outlines, self.scale, self._maps
+        given = count, outlines, self.scale, self.maps
         parallel_blocks(area_blocks, blocks, BLOCKS_A_THREAD, *given, counts, outside)
         counts = counts.transpose(0, 2, 1, 3).reshape(-1, views, 2)[:count]
         beyond = outside.transpose(0, 2, 1).reshape(-1, views)[:count]

@@ -1,5 +1,6 @@
 """The benchmark measures the right quantities; speeds are printed by `studio bench`, never asserted in a test."""
 
+import importlib
 import json
 
 import numba
@@ -7,15 +8,19 @@ import numpy as np
 import pytest
 from scipy.ndimage import label
 
+from studio.benchmarks.devices import run_device_benchmark
 from studio.benchmarks.kernels import (
     LIMIT_PASSES,
     limit_contest,
     made_evidence,
     ring_of_cameras,
     run_benchmark,
+    spans_contest,
 )
+from studio.benchmarks.results_table import in_lines, rows_of
 from studio.body.catalogue import load_body
-from studio.likelihood.edge_region import EdgeRegionSettings, EdgeRegionWeigher
+from studio.likelihood.edge_region import DEVICE_MODULE, EdgeRegionSettings, EdgeRegionWeigher
+from studio.likelihood.silhouette_areas import FULL, silhouettes_of
 
 
 @pytest.fixture(scope="module")
@@ -78,3 +83,53 @@ def test_the_limit_reads_the_weightings_entries():
     assert sums.shape == (2, 4, 16, 2)
     np.testing.assert_allclose(sums[..., 0].transpose(0, 2, 1).reshape(32, 4) / (255 * 320), edge)
     np.testing.assert_allclose(sums[..., 1].transpose(0, 2, 1).reshape(32, 4) / (255 * 480), region)
+
+
+def test_every_kernel_has_its_limit(result):
+    """Rows give figure, limit of the same run, their ratio and the aim."""
+    others, limits = result["others_evaluations_per_second"], result["limits_per_second"]
+    assert set(limits) == set(others) - {"edge_region_two_threads"}
+    rows = rows_of(result)
+    with_limits = [row for row in rows if row["limit"] is not None]
+    assert len(with_limits) == 1 + len(limits)
+    for row in with_limits:
+        assert row["of_limit"] == pytest.approx(row["value"] / row["limit"], rel=0.02)
+        if row["aim_of_limit"]:
+            assert row["reached"] == pytest.approx(min(row["of_limit"] / row["aim"], 1.0), abs=0.002)
+    lines = in_lines(rows)
+    assert sum("of limit" in line for line in lines) == 1 + sum(bool(row["aim_of_limit"]) for row in rows)
+
+
+def test_the_limit_of_areas_counts_the_bodys_spans():
+    """The lengths of the spans add up to the areas of the limbs, overlaps counted for each."""
+    body = load_body("human31")
+    cameras = ring_of_cameras(body)
+    evidence = made_evidence(body, cameras, np.random.default_rng(0))["proximity"]
+    weigher = EdgeRegionWeigher(body, cameras, EdgeRegionSettings())
+    poses = np.repeat(body.neutral[None], 16, axis=0)
+    contest = spans_contest(weigher.problem(evidence), evidence, poses, FULL)
+    assert contest.evaluations == 16 * LIMIT_PASSES
+    sums = contest.run() / LIMIT_PASSES
+    areas = silhouettes_of(evidence, FULL).areas(weigher.projector.blocks(poses), 16)
+    # Where limbs overlap spans count again, and so do the full words of the window that are counted.
+    bare = areas.projected.T[None]
+    assert (sums > bare).all()
+    assert (sums < 20 * bare).all()
+
+
+def test_without_a_card_the_bench_says_so(monkeypatch):
+    monkeypatch.setattr(importlib.import_module(DEVICE_MODULE), "missing", lambda: "no card here")
+    found = run_device_benchmark()
+    assert list(found) == ["none"]
+    assert "no card here" in str(found["none"])
+    assert rows_of({"gpu": found}) == []
+
+
+def test_a_cards_evaluations_are_of_every_size(monkeypatch):
+    """The processor in the card's place."""
+    monkeypatch.setattr("studio.benchmarks.devices.GPU", "cpu")
+    found = json.loads(json.dumps(run_device_benchmark(sizes=(16, 20), repeats=1)))
+    assert list(found["evaluations_per_second"]) == ["16", "20"]
+    assert found["largest_difference"] == 0.0
+    row = rows_of({"gpu": {"evaluations_per_second": {"1000000": 12e6}}})[0]
+    assert (row["value"], row["reached"]) == (12.0, 1.0)
