@@ -20,9 +20,9 @@ clips of that half, and by a disagreeing share of 0.06 alone:
     20 evaluations                   17            88 %      43 %         4.7 %        4.8 %
     and no limb redrawn             104            95 %      99 %        11.2 %       13.3 %
 
-In four clips of the reporting half (seed 0) it names 88 % of 42 frames, as the share does, and 1.6 % of 253 others instead
-of 5.5 %. To ask more of a redrawn pose that jumps costs: a dance goes from 4 to 12 lost frames where such a pose needs
-0.7 of the loss instead of 0.85.
+In four clips of the reporting half (seed 0) it names 88 % of 42 frames, as the share does, and 1.6 % of 253 others, the
+share 5.5 %. To ask more of a redrawn pose that jumps costs: a dance goes from 4 to 12 lost frames where such a pose
+needs 0.7 of the loss instead of 0.85.
 
 The standard deviations rank limbs; they are not calibrated. Scaled so that 68 % of the joints lie within one of them,
 83 % lie within two instead of 95 %, and by clip between 49 and 96 % within one: most of an error is not noise but where
