@@ -112,7 +112,8 @@ class FrameRefiner:
         refiner, redrawing, agreement, certainty_of = self._prepared(tuple(seen), settings)
         start, masks, memory = result.estimate.pose, tuple(seen.values()), result.carried.memory
         silhouettes = without_hidden(masks, agreement.cameras, agreement.mm_per_pixel(start), memory)
-        pose, evaluations = refiner.refine(start, silhouettes).pose, 0
+        ended, evaluations = refiner.refine(start, silhouettes), 0
+        pose, matrix = ended.pose, ended.matrix
         off = agreement.of(pose, silhouettes)
         if settings.redraw_limbs and max(off.shares().values()) >= DOUBTFUL_SHARE:
             rng = np.random.Generator(
@@ -126,7 +127,9 @@ class FrameRefiner:
         weight = float(problem.weigh(pose[None])[0])
         estimate = dataclasses.replace(result.estimate, pose=pose, searched=start, log_weight=weight)
         carried = _carried(result, pose, settings.next_frame_from, refiner)
-        certainty = certainty_of.of(pose, refiner.loss(pose, silhouettes)[2], memory)
+        if matrix is None or pose is not ended.pose:
+            matrix = refiner.loss(pose, silhouettes)[2]
+        certainty = certainty_of.of(pose, matrix, memory)
         memory = {**learnt(memory, pose, off, agreement, masks), **certainty.moved}
         return dataclasses.replace(
             result,

@@ -118,13 +118,15 @@ class RefinementSettings:
 @dataclass(frozen=True, slots=True, eq=False)
 class Refined:
     """A refined pose. pose : (D,). moved : False where the start was kept because the weighting would have lost.
-    gain : of the log-weight. steps : that were taken.
+    gain : of the log-weight. steps : that were taken. matrix : (D, D) of the silhouettes' equations at `pose`
+    (`Refiner.loss`), None where a likelihood had its say or there are no silhouettes.
     """
 
     pose: Array
     moved: bool
     gain: float
     steps: int
+    matrix: Array | None = None
 
 
 class Refiner:
@@ -153,9 +155,9 @@ class Refiner:
         start = np.asarray(pose, dtype=np.float64)
         if not any(len(view.border) for view in silhouettes):
             return Refined(start.copy(), False, 0.0, 0)
-        found, steps = self._descended(start, silhouettes)
+        found, steps, matrix = self._descended(start, silhouettes)
         if problem is None:
-            return Refined(found, True, 0.0, steps)
+            return Refined(found, True, 0.0, steps, matrix)
         offered = np.stack([start, found, start + HALFWAY * (found - start)])
         weights = problem.weigh(offered)
         for candidate, weight in zip(offered[1:], weights[1:], strict=True):
@@ -198,8 +200,8 @@ class Refiner:
 
         return equations
 
-    def _descended(self, start: Array, silhouettes: Sequence[Distances]) -> tuple[Array, int]:
-        """The pose that Levenberg-Marquardt ends at, and the steps taken."""
+    def _descended(self, start: Array, silhouettes: Sequence[Distances]) -> tuple[Array, int, Array]:
+        """The pose that Levenberg-Marquardt ends at, the steps taken, and the silhouettes' matrix (D, D) there."""
         of_frame = self.frame_loss(start, silhouettes)
         pose, steps, damping = start.copy(), 0, DAMPING
         loss, gradient, matrix = of_frame(pose)
@@ -215,7 +217,8 @@ class Refiner:
                 damping *= TIGHTENED
             if moved < SETTLED:
                 break
-        return pose, steps
+        pulls = self.settings.refinement_pull**2 + self.stiffness
+        return pose, steps, matrix - np.diag(pulls)
 
     def _stepped(self, pose: Array, gradient: Array, matrix: Array, damping: float) -> Array:
         """One damped step inside the limits; parameters that press against a limit stay there."""
