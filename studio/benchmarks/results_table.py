@@ -135,7 +135,7 @@ def rows_of(document: Mapping[str, Any]) -> list[dict[str, object]]:
 
 def in_lines(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """The rows for a person, with a bar that is full where the aim is reached."""
-    lines = [f"{'':46}{'now':>10}{'limit':>10}{'of limit':>10}{'aim':>15}"]
+    lines = [f"{'':46}{'now':>10}{'limit':>10}{'of limit':>10}{'aim':>18}"]
     for row in rows:
         full = round(BAR * row["reached"])
         unit = "of limit" if row["aim_of_limit"] else row["unit"]
@@ -143,7 +143,7 @@ def in_lines(rows: Sequence[Mapping[str, Any]]) -> list[str]:
         limit, ratio = ("", "") if row["limit"] is None else (f"{row['limit']:.3g}", f"{row['of_limit']:.2f}")
         value = f"{row['value']:.3g} {row['unit']}".strip()
         bar = f"{'█' * full}{'░' * (BAR - full)}"
-        lines.append(f"{row['name']:46}{value:>10}{limit:>10}{ratio:>10}{aim:>15}  {bar}")
+        lines.append(f"{row['name']:46}{value:>10}{limit:>10}{ratio:>10}{aim:>18}  {bar}")
     return lines
 
 
