@@ -82,6 +82,16 @@ def test_the_root_moves_as_many_steps_as_the_space_has() -> None:
     assert np.allclose(moved.poses[:, :ROOT] - past.poses[:, :ROOT], [0.15, 0.0, 0.0], atol=1e-4)
 
 
+def test_learnt_root_motion_is_spread_by_its_knob() -> None:
+    def spread(times: float) -> np.ndarray:
+        past, rules = walkers(), BehaviourSettings(global_scale=0.0, root_spread=times)
+        moved = walked(np.random.default_rng(7), past, walking_space(), rules, SPACE.sigma)
+        return (moved.poses[:, :ROOT] - past.poses[:, :ROOT]).std(axis=0)
+
+    assert (spread(1.0) > 0.0).all()
+    assert spread(3.0) == pytest.approx(3.0 * spread(1.0), rel=1e-6)
+
+
 def test_noise_of_those_that_stay_has_the_clusters_covariance_times_lambda_squared() -> None:
     past = guided()
     moved = propagated(np.random.default_rng(1), past, SPACE, BehaviourSettings(attenuation=0.5), SPACE.sigma)
