@@ -49,6 +49,8 @@ from studio.trackers.tracker import start_of
 TRACKER, WEIGHTING = "annealed", "edge-region-silhouette"
 FIRST_FRAMES, FEWEST_FRAMES, FITTED_FRAMES = 30, 8, 8
 """Frames tracked before the fit (with fewer there is none), and the number of most different ones it uses."""
+KEY_DIGITS = 6
+"""Decimals of mm and radians in a fit's key."""
 FEWEST_CAMERAS = 2
 """One camera cannot separate a larger body from a nearer one."""
 LEAST_OVERLAP = 0.6
@@ -242,16 +244,16 @@ def _words(found: FittedShape, frames: range) -> str:
 
 def _key(session: Session, body: BodyModel, settings: RunSettings, start: Array, frames: range) -> str:
     """A digest of all that the fit depends on; of the evidence's knobs those that are not at their defaults, so that
-    another knob leaves the fits that are kept.
+    another knob leaves the fits that are kept. Sizes and start pose are rounded: their last bits are a processor's own.
     """
     evidence, usual = msgspec.to_builtins(settings.evidence), msgspec.to_builtins(EvidenceSettings())
     made_of = (
         SCHEMA_VERSION,
         digests(session, ("footage", "calibration", "masks")),
         body.name,
-        dict(body.dimensions),
+        {name: round(value, KEY_DIGITS) for name, value in body.dimensions.items()},
         {name: value for name, value in evidence.items() if value != usual[name]},
-        start.tolist(),
+        (np.round(start, KEY_DIGITS) + 0.0).tolist(),  # no negative zero
         (frames.start, frames.stop),
     )
     return hashlib.sha256(msgspec.json.encode(made_of)).hexdigest()[:32]

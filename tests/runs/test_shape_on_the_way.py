@@ -90,6 +90,18 @@ def test_the_shape_that_comes_with_the_walk_is_the_one_that_is_fitted(
     assert bundled.start_pose == pytest.approx(fitted.start_pose, abs=5.0)
 
 
+def test_a_fit_is_found_again_whatever_the_last_bits_are(
+    walk: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Sizes and start pose are computed anew each time, and another processor rounds otherwise."""
+    start = walk.start_pose()
+    assert start is not None
+    first = prepare_run(walk, last=20, start_pose=start).record
+    monkeypatch.setattr(shape_on_the_way, "shaped_body", lambda *_, **__: pytest.fail("fitted again"))
+    nudged = np.nextafter(start, np.inf)
+    assert prepare_run(walk, last=20, start_pose=nudged).record.dimensions == first.dimensions
+
+
 def test_few_frames_or_one_camera_give_no_shape(walk: Session, session_on_disk: Session) -> None:
     late = prepare_run(walk, first=145, start_pose=walk.start_pose())
     assert late.record.dimensions == dict(walk.body().dimensions)

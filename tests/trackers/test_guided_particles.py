@@ -84,8 +84,8 @@ def test_the_root_moves_as_many_steps_as_the_space_has() -> None:
 
 def test_learnt_root_motion_is_spread_by_its_knob() -> None:
     def spread(times: float) -> np.ndarray:
-        past, rules = walkers(), BehaviourSettings(global_scale=0.0, root_spread=times)
-        moved = walked(np.random.default_rng(7), past, walking_space(), rules, SPACE.sigma)
+        past, rules = guided(), BehaviourSettings(global_scale=0.0, root_spread=times)
+        moved = propagated(np.random.default_rng(7), past, walking_space(), rules, SPACE.sigma)
         return (moved.poses[:, :ROOT] - past.poses[:, :ROOT]).std(axis=0)
 
     assert (spread(1.0) > 0.0).all()
