@@ -107,6 +107,8 @@ def _packages() -> str:
         try:
             there = importlib.metadata.version(name)
         except importlib.metadata.PackageNotFoundError:
+            if "extra ==" in entry.string:
+                continue
             raise _Fault(f"{name} is missing", f"Install it: pip install '{name}>={least}'.") from None
         if _numbers(there) < _numbers(least):
             raise _Fault(

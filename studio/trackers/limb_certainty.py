@@ -49,6 +49,8 @@ STEP = 1e-3
 """Units of the parameters, for slopes."""
 KEPT = 0.8
 """Share of a jump that counts in the next frame."""
+LEAST_DEVIATION_MM = 0.1
+"""mm: a limb that nothing moves, as a robot's foot, has none."""
 MOST_OUTSIDE, LEAST_OUTSIDE, LEAST_BARE, JUMP_MM = 0.05, 0.005, 0.003, 100.0
 CONSTANT, WEIGHTS = -4.64, np.array([0.98, 0.90, 2.61, 2.08])
 """Log-odds of a lost limb: of no sign, and per logarithm of outside, bare, deviation (mm) and jump."""
@@ -81,7 +83,7 @@ class Certainty:
         logarithms = (
             np.log(np.minimum(outside, MOST_OUTSIDE) + LEAST_OUTSIDE),
             np.log(bare + LEAST_BARE),
-            np.log(self.deviation),
+            np.log(np.maximum(self.deviation, LEAST_DEVIATION_MM)),
             np.log1p(self.jump / JUMP_MM),
         )
         return np.stack(logarithms, axis=1), bare

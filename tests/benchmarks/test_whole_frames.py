@@ -70,7 +70,7 @@ def _short(kind: str):
 
 def test_bars_are_full_where_the_aim_is_reached() -> None:
     document = {
-        "edge_region": {"fraction_of_load_limit": 0.425},
+        "edge_region": {"evaluations_per_second": 0.425e6, "load_limit_per_second": 1e6},
         "frames": {"default": {"ms": 20.0, "refinement_ms": 10.0}},
     }
     rows = {row["name"]: row for row in rows_of(document)}

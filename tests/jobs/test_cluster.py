@@ -187,15 +187,20 @@ def test_what_ends_the_caller_cancels_what_waits(address: str, tmp_path: Path) -
 def test_a_folder_that_workers_do_not_see(
     address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "elsewhere").mkdir()
     made = cluster._marked
-    monkeypatch.setattr(cluster, "_marked", lambda _folder: made(tmp_path / "elsewhere"))
+
+    def unseen(folder: Path | str) -> cluster._Marker:
+        marker = made(folder)
+        marker.remove()
+        return marker
+
+    monkeypatch.setattr(cluster, "_marked", unseen)
     with pytest.raises(
         RunError, match=r"A worker on .* does not see the folder .* as this machine does"
     ) as no:
         ClusterExecutor(address, tmp_path)
     assert "Mount one file system" in no.value.hint
-    assert not list((tmp_path / "elsewhere").iterdir())
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_worker_that_comes_later_without_the_folder_ends_the_work(address: str, tmp_path: Path) -> None:

@@ -33,6 +33,7 @@ OWN_WORDS = {
     "background": {"source", "plates", "exclude", "exclude_unused"},
     "compare": {"trackers", "first", "last", "changes"},
     "sweep": {"vary", "first", "last"},
+    "batch": {"first", "last"},
     "view": {"layer"},
 }
 """Parameters that the terminal writes in another way: --frames A:B, --exclude CAMERA=…, layers counted from 1."""

@@ -41,7 +41,9 @@ def test_the_store_keeps_what_was_learnt(session_on_disk: Session) -> None:
     finish(session_on_disk, run)
     poses, memories = outcome(run)
     assert [int(memory["blob_frames"][0]) for memory in memories[:2]] == [1, 2]
-    assert [sorted(memory) for memory in memories[2:]] == [["blobs", "hidden front"]] * 4
+    assert [sorted(memory) for memory in memories[2:]] == [
+        ["blobs", "hidden front", "moved ends", "moved jumps"]
+    ] * 4
     assert np.abs(poses - true_poses()[:6]).max() < 0.3
 
 
