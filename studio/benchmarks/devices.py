@@ -8,7 +8,7 @@ from studio.benchmarks.kernels import made_evidence, poses_around, ring_of_camer
 from studio.benchmarks.timing import quickest
 from studio.body.catalogue import load_body
 from studio.errors import StudioError
-from studio.likelihood.edge_region import GPU, EdgeRegionSettings, EdgeRegionWeigher
+from studio.likelihood.edge_region import GPU, EdgeRegionLikelihood, EdgeRegionSettings
 from studio.progress import Progress
 
 SIZES = (1_000, 10_000, 100_000, 1_000_000)
@@ -24,20 +24,22 @@ def run_device_benchmark(
     body = load_body("human31")
     cameras = ring_of_cameras(body)
     try:
-        there = EdgeRegionWeigher(body, cameras, EdgeRegionSettings(device=GPU))
+        there = EdgeRegionLikelihood(body, cameras, EdgeRegionSettings(device=GPU))
     except StudioError as error:
         return {"none": f"{error.message} {error.hint}"}
     rng = np.random.default_rng(0)
     poses = poses_around(body, max(*sizes, COMPARED), rng)
     evidence = made_evidence(body, cameras, rng)["proximity"]
     problem = there.problem(evidence)
-    here = EdgeRegionWeigher(body, cameras, EdgeRegionSettings()).problem(evidence)
+    here = EdgeRegionLikelihood(body, cameras, EdgeRegionSettings()).problem(evidence)
     best = quickest(
-        {size: lambda size=size: problem.weigh(poses[:size]) for size in sizes},
+        {size: lambda size=size: problem.log_likelihood(poses[:size]) for size in sizes},
         repeats,
         on_round=lambda done: progress("Weighing on the card", done, repeats) if progress else None,
     )
-    difference = np.abs(problem.weigh(poses[:COMPARED]) - here.weigh(poses[:COMPARED])).max()
+    difference = np.abs(
+        problem.log_likelihood(poses[:COMPARED]) - here.log_likelihood(poses[:COMPARED])
+    ).max()
     return {
         "evaluations_per_second": {str(size): round(size / best[size]) for size in sizes},
         "samples": there.samples_per_evaluation,

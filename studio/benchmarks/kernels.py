@@ -27,16 +27,19 @@ from studio.evidence.edges import bodytrack_edges, proximity_edges
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.geometry.camera import Camera
 from studio.likelihood.area_kernels import FIELDS, record_tables, spans_only
-from studio.likelihood.bodytrack import BodytrackSettings, BodytrackWeigher
-from studio.likelihood.edge_region import EdgeRegionProblem, EdgeRegionSettings, EdgeRegionWeigher
+from studio.likelihood.bodytrack import BodytrackLikelihood, BodytrackSettings
+from studio.likelihood.edge_region import EdgeRegionLikelihood, EdgeRegionProblem, EdgeRegionSettings
 from studio.likelihood.edge_region_kernels import CHUNK, loads_only
-from studio.likelihood.edge_region_silhouette import EdgeRegionSilhouetteSettings, EdgeRegionSilhouetteWeigher
-from studio.likelihood.edge_silhouette import EdgeSilhouetteSettings, EdgeSilhouetteWeigher
+from studio.likelihood.edge_region_silhouette import (
+    EdgeRegionSilhouetteLikelihood,
+    EdgeRegionSilhouetteSettings,
+)
+from studio.likelihood.edge_silhouette import EdgeSilhouetteLikelihood, EdgeSilhouetteSettings
 from studio.likelihood.outline_kernels import LANES
 from studio.likelihood.outlines import OutlineProjector
 from studio.likelihood.problem import FrameLikelihood
 from studio.likelihood.silhouette_areas import FULL, HALF, silhouettes_of
-from studio.likelihood.template import TemplateSettings, TemplateWeigher
+from studio.likelihood.template import TemplateLikelihood, TemplateSettings
 from studio.likelihood.visible_edges import body_edges
 from studio.numba_in_threads import numba
 from studio.progress import Progress
@@ -75,8 +78,8 @@ def run_benchmark(
     rng = np.random.default_rng(0)
     poses = poses_around(body, POSES, rng)
     evidence = made_evidence(body, cameras, rng)
-    weigher = EdgeRegionWeigher(body, cameras, EdgeRegionSettings())
-    problem = weigher.problem(evidence["proximity"])
+    likelihood = EdgeRegionLikelihood(body, cameras, EdgeRegionSettings())
+    problem = likelihood.problem(evidence["proximity"])
     limit = limit_contest(problem, poses)
     spans = [spans_contest(problem, evidence["proximity"], poses, resolution) for resolution in (HALF, FULL)]
     contests = [*weighing_contests(body, cameras, evidence, problem, poses), limit, *spans]
@@ -84,8 +87,8 @@ def run_benchmark(
     rates = {contest.name: contest.evaluations / best[contest.name] for contest in contests}
     most, half, full = (rates.pop(contest.name) for contest in (limit, *spans))
     rate, two = rates["edge_region"], rates.get("edge_region_two_threads")
-    samples = weigher.samples_per_evaluation
-    bodytrack = BodytrackWeigher(body, cameras, BodytrackSettings()).problem(evidence["bodytrack"])
+    samples = likelihood.samples_per_evaluation
+    bodytrack = BodytrackLikelihood(body, cameras, BodytrackSettings()).problem(evidence["bodytrack"])
     bodytrack_samples = float(bodytrack.terms(poses)[2].sum(axis=1).mean())
     areas = ((HALF, half), (FULL, full))
     edge_samples = CHUNK * len(body_edges(body).whole) * len(cameras)
@@ -156,12 +159,12 @@ def weighing_contests(
     poses: Array,
 ) -> list[Contest]:
     """Every weighting on one thread, edge-region on two as well."""
-    aware = EdgeRegionWeigher(body, cameras, EdgeRegionSettings(occlusion_aware=True))
+    aware = EdgeRegionLikelihood(body, cameras, EdgeRegionSettings(occlusion_aware=True))
     problems: dict[str, FrameLikelihood] = {
         "edge_region": problem,
         "edge_region_occlusion_aware": aware.problem(evidence["proximity"]),
-        "bodytrack": BodytrackWeigher(body, cameras, BodytrackSettings()).problem(evidence["bodytrack"]),
-        "template": TemplateWeigher(body, cameras, TemplateSettings()).problem(evidence["proximity"]),
+        "bodytrack": BodytrackLikelihood(body, cameras, BodytrackSettings()).problem(evidence["bodytrack"]),
+        "template": TemplateLikelihood(body, cameras, TemplateSettings()).problem(evidence["proximity"]),
         **silhouette_problems(body, cameras, evidence["proximity"]),
     }
     found = [Contest(name, _weighing(entry, poses), len(poses)) for name, entry in problems.items()]
@@ -179,8 +182,10 @@ def silhouette_problems(
     for resolution in (HALF, FULL):
         edges = EdgeSilhouetteSettings(silhouette_resolution=resolution)
         three = EdgeRegionSilhouetteSettings(silhouette_resolution=resolution)
-        found[f"edge_silhouette_{resolution}"] = EdgeSilhouetteWeigher(body, cameras, edges).problem(evidence)
-        found[f"edge_region_silhouette_{resolution}"] = EdgeRegionSilhouetteWeigher(
+        found[f"edge_silhouette_{resolution}"] = EdgeSilhouetteLikelihood(body, cameras, edges).problem(
+            evidence
+        )
+        found[f"edge_region_silhouette_{resolution}"] = EdgeRegionSilhouetteLikelihood(
             body, cameras, three
         ).problem(evidence)
     return found
@@ -188,7 +193,7 @@ def silhouette_problems(
 
 def limit_contest(problem: EdgeRegionProblem, poses: Array) -> Contest:
     """The loads alone, of up to LIMIT_BLOCKS blocks of sixteen poses spread over all."""
-    outlines, maps = some_blocks(problem.weigher.projector.blocks(poses)), problem.maps
+    outlines, maps = some_blocks(problem.likelihood.projector.blocks(poses)), problem.maps
     blocks, views = outlines.shape[:2]
     edge_pairs, region_pairs = (
         stream.reshape(blocks, views, LANES, -1, LANES).view(np.uint64)
@@ -210,7 +215,7 @@ def spans_contest(
 ) -> Contest:
     """The spans and counts of areas alone, of the poses of `limit_contest`."""
     silhouettes = silhouettes_of(evidence, resolution)
-    outlines = some_blocks(problem.weigher.projector.blocks(poses))
+    outlines = some_blocks(problem.likelihood.projector.blocks(poses))
     tables = np.zeros((*outlines.shape[:3], FIELDS * LANES))
     record_tables(outlines, silhouettes.scale, silhouettes.maps.views, tables)
     sums = np.zeros((*outlines.shape[:2], LANES))
@@ -243,4 +248,4 @@ def timed(contests: list[Contest], repeats: int, progress: Progress | None) -> d
 
 
 def _weighing(problem: FrameLikelihood, poses: Array) -> Callable[[], object]:
-    return lambda: problem.weigh(poses)
+    return lambda: problem.log_likelihood(poses)

@@ -17,7 +17,7 @@ import numpy as np
 from studio.behaviour.model_file import read_model
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.pipeline import EvidenceMaker
-from studio.likelihood.blobs import BlobWeigher
+from studio.likelihood.blobs import BlobLikelihood
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.numba_in_threads import numba
 from studio.progress import Progress
@@ -108,7 +108,7 @@ def _measured(session: Session, model: Path, progress: Progress | None) -> dict[
         cameras, footage, Backgrounds(footage), settings.evidence, WEIGHTINGS[WEIGHTING].edge_kind
     )
     maker.evidence(0)
-    weigher, clock = BlobWeigher(body, cameras, settings.weighting), StageClock()
+    likelihood, clock = BlobLikelihood(body, cameras, settings.weighting), StageClock()
     start = session.start_pose(body)
     carried = start_of(None if start is None else tuple(start.tolist()))
     frames = min(LEARNING + MEASURED, footage.frame_count)
@@ -116,7 +116,7 @@ def _measured(session: Session, model: Path, progress: Progress | None) -> dict[
         clock.start()
         footage.pictures(frame)
         clock.lap("decoding")
-        problem = weigher.problem(maker.evidence(frame))
+        problem = likelihood.problem(maker.evidence(frame))
         clock.lap("reconstruction")
         particles = tracker.begin_frame(generator(0, frame, -1), carried, space, settings.tracker)
         clock.lap("prediction and evaluation")

@@ -169,12 +169,12 @@ def track(
         FrameRefiner(body, seen_with, trial.seed),
         on_layer,
     )
-    weigher = WEIGHTINGS[trial.weighting].prepare(body, seen_with, settings.weighting)
+    likelihood = WEIGHTINGS[trial.weighting].prepare(body, seen_with, settings.weighting)
     seconds, evaluations, named = 0.0, 0, list[list[str]]()
     for number, frame in enumerate(frames):
         seen = evidence(frame)
         began = time.perf_counter()
-        result = following.step(frame, weigher.problem(seen), seen)
+        result = following.step(frame, likelihood.problem(seen), seen)
         evaluations = result.evaluations
         named.append(list(result.limbs_lost))
         seconds += time.perf_counter() - began if number else 0.0

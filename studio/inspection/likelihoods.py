@@ -37,13 +37,13 @@ class FrameEvaluation:
 
     def log_weights(self, poses: Array) -> Array:
         """(N,) of poses (N, D)."""
-        return self.problem.weigh(poses)
+        return self.problem.log_likelihood(poses)
 
     def shares(self, poses: Array) -> Shares:
         """What each camera and term adds to the log-weights of poses (N, D)."""
         if isinstance(self.problem, PreparedProblem):
             return self.problem.shares(poses)
-        return Shares((POOLED,), (WHOLE,), self.problem.weigh(poses)[:, None, None])
+        return Shares((POOLED,), (WHOLE,), self.problem.log_likelihood(poses)[:, None, None])
 
 
 _lock = threading.RLock()

@@ -134,7 +134,7 @@ class OpenRun:
         problem = self._problems.problem(frame, self.mailbox.latest()[1])
         start = self.stored.record.start_pose
         pose = np.array(start) if start is not None else self.stored.body().neutral
-        problem.weigh(pose[None])
+        problem.log_likelihood(pose[None])
 
     def step_layer(self) -> Stepped | None:
         """Do the next layer of the run; None where a live run has no picture yet."""

@@ -52,7 +52,7 @@ NOTHING_SEEN = 1e4
 TRUNK = "trunk"
 
 
-class BlobWeigher:
+class BlobLikelihood:
     """Makes the problem of any frame; learnt blobs are in the frames' memory, not here."""
 
     def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: BlobSettings) -> None:
@@ -91,27 +91,27 @@ class BlobWeigher:
 class BlobProblem(PreparedProblem):
     """One frame as a function of poses, before expected poses are given."""
 
-    def __init__(self, weigher: BlobWeigher, hull: Hull) -> None:
-        self.weigher, self.hull, self.priors = weigher, hull, weigher.priors
+    def __init__(self, likelihood: BlobLikelihood, hull: Hull) -> None:
+        self.likelihood, self.hull, self.priors = likelihood, hull, likelihood.priors
 
     def expecting(self, poses: Array, memory: Mapping[str, Array]) -> "ExpectedBlobs":
         """The frame with blobs fitted from expected poses (S, D), of which the first `blob_starts` are used. Raises
         BodyError for poses that are no finite (S, D).
         """
-        return ExpectedBlobs(self.weigher, self.hull, _finite(self.weigher.body, poses), memory)
+        return ExpectedBlobs(self.likelihood, self.hull, _finite(self.likelihood.body, poses), memory)
 
     def remembered(self, pose: Array) -> Mapping[str, Array]:
         """Memory that a run's first frame passes to the second."""
         return self.expecting(pose[None], {}).remembered(pose)
 
-    def weigh(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
+    def log_likelihood(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
         """(N, D) poses to (N,) log-weights, the body being expected at the mean of these poses. Raises BodyError for
         poses that are no finite (N, D).
         """
-        checked = _finite(self.weigher.body, poses)
+        checked = _finite(self.likelihood.body, poses)
         if not len(checked):
             return np.zeros(0)
-        return self.expecting(checked.mean(axis=0)[None], {}).weigh(checked, stage)
+        return self.expecting(checked.mean(axis=0)[None], {}).log_likelihood(checked, stage)
 
 
 class ExpectedBlobs(BlobProblem):
@@ -121,17 +121,22 @@ class ExpectedBlobs(BlobProblem):
     """
 
     def __init__(
-        self, weigher: BlobWeigher, hull: Hull, expected: Array, memory: Mapping[str, Array]
+        self, likelihood: BlobLikelihood, hull: Hull, expected: Array, memory: Mapping[str, Array]
     ) -> None:
-        super().__init__(weigher, hull)
-        settings = weigher.settings
+        super().__init__(likelihood, hull)
+        settings = likelihood.settings
         self.memory = memory
-        self.model = weigher.model(memory)
+        self.model = likelihood.model(memory)
         self.starts = expected[: settings.blob_starts]
         self.fitted: Fitted | None = None
         if len(hull.centres):
             self.fitted = fit_blobs(
-                hull, self.model, weigher.body, self.starts, settings.blob_iterations, moved=weigher.moves
+                hull,
+                self.model,
+                likelihood.body,
+                self.starts,
+                settings.blob_iterations,
+                moved=likelihood.moves,
             )
         self._divergences: dict[int, DivergenceOfPoses] = {}
 
@@ -139,31 +144,31 @@ class ExpectedBlobs(BlobProblem):
         """(N, D) poses to (N,) D(F||G), nats; NOTHING_SEEN for an empty hull. Raises BodyError for poses that are no
         finite (N, D).
         """
-        checked = _finite(self.weigher.body, poses)
+        checked = _finite(self.likelihood.body, poses)
         if self.fitted is None:
             return np.full(len(checked), NOTHING_SEEN)
         if stage not in self._divergences:
             self._divergences[stage] = DivergenceOfPoses.against(
-                self.weigher.body, self.model, self.fitted.mixture, self._counted(stage)
+                self.likelihood.body, self.model, self.fitted.mixture, self._counted(stage)
             )
         return self._divergences[stage](checked)
 
-    def weigh(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
+    def log_likelihood(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
         """(N, D) poses to (N,) log-weights, -s ln D. Raises BodyError for poses that are no finite (N, D)."""
-        sharpness = self.weigher.settings.blob_sharpness
+        sharpness = self.likelihood.settings.blob_sharpness
         return -sharpness * np.log(np.maximum(self.divergences(poses, stage), FLOOR))
 
     def remembered(self, pose: Array) -> Mapping[str, Array]:
         """The memory with this frame's hull added, if it is usable for learning; the finished blobs once there are
         enough frames.
         """
-        weigher = self.weigher
-        wanted = weigher.settings.blob_learning
+        likelihood = self.likelihood
+        wanted = likelihood.settings.blob_learning
         if "blobs" in self.memory or wanted == 0 or self.lost_evidence:
             return self.memory
-        profiles = weigher.profiles(self.memory).with_frame(weigher.body, self.model, self.hull, pose)
+        profiles = likelihood.profiles(self.memory).with_frame(likelihood.body, self.model, self.hull, pose)
         memory = {"blob_profiles": profiles.sums, "blob_frames": np.array([float(profiles.frames)])}
-        return memory if profiles.frames < wanted else {"blobs": _table_of(weigher.model(memory))}
+        return memory if profiles.frames < wanted else {"blobs": _table_of(likelihood.model(memory))}
 
     @property
     def quality(self) -> float:
@@ -177,13 +182,13 @@ class ExpectedBlobs(BlobProblem):
         """
         if self.fitted is None or not self.memory:
             return self.fitted is None
-        return self.quality < -self.weigher.settings.blob_lost
+        return self.quality < -self.likelihood.settings.blob_lost
 
     def _counted(self, stage: int) -> NDArray[np.int64] | None:
         """The blobs that a stage uses; None for all."""
         if stage != TRUNK_FIRST:
             return None
-        drawn = self.weigher.body.drawn
+        drawn = self.likelihood.body.drawn
         trunk = [index for index, limb in enumerate(self.model.limb) if drawn[int(limb)].part == TRUNK]
         return np.array(trunk, dtype=np.int64) if trunk else None
 

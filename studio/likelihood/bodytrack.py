@@ -70,7 +70,7 @@ class Score:
     inside_samples: int
 
 
-class BodytrackWeigher(Preparation):
+class BodytrackLikelihood(Preparation):
     """Makes the problem of any frame."""
 
     def problem(self, evidence: FrameEvidence) -> "BodytrackProblem":
@@ -85,19 +85,19 @@ class BodytrackWeigher(Preparation):
 class BodytrackProblem(PreparedProblem):
     """One frame as a function of poses."""
 
-    def __init__(self, weigher: BodytrackWeigher, maps: Maps) -> None:
-        self.weigher, self.priors, self.maps = weigher, weigher.priors, maps
+    def __init__(self, likelihood: BodytrackLikelihood, maps: Maps) -> None:
+        self.likelihood, self.priors, self.maps = likelihood, likelihood.priors, maps
 
-    def weigh(self, poses: Array, stage: int = 0) -> Array:
+    def log_likelihood(self, poses: Array, stage: int = 0) -> Array:
         """(N, D) poses to (N,) log-weights. Raises BodyError for poses that are no finite (N, D)."""
         edge, inside, _ = self.terms(np.asarray(poses, dtype=np.float64))
-        settings = self.weigher.settings
+        settings = self.likelihood.settings
         return -(settings.score_edge_weight * edge + settings.score_inside_weight * inside)
 
     def shares(self, poses: Array) -> Shares:
         """-a E_edge and -b E_inside; their samples are pooled over the cameras."""
         edge, inside, _ = self.terms(np.asarray(poses, dtype=np.float64))
-        settings = self.weigher.settings
+        settings = self.likelihood.settings
         values = np.stack(
             [-settings.score_edge_weight * edge, -settings.score_inside_weight * inside], axis=1
         )
@@ -105,7 +105,7 @@ class BodytrackProblem(PreparedProblem):
 
     def terms(self, poses: Array) -> tuple[Array, Array, IntArray]:
         """E_edge (N,), E_inside (N,) and the samples counted of each (N, 2), of poses (N, D)."""
-        outlines = self.weigher.projector.blocks(poses)
+        outlines = self.likelihood.projector.blocks(poses)
         sums = np.zeros((len(outlines), LANES, 4), dtype=np.int64)
         blocks, capacity = len(outlines), self._capacity
         given = outlines, self.maps, capacity, MOST_ROWS
@@ -126,13 +126,13 @@ class BodytrackProblem(PreparedProblem):
     def _capacity(self) -> int:
         """Room for every limb running across its picture, and a grid over it."""
         longest = int(np.hypot(*self.maps.views[:, 2:].T).max() / EDGE_STEP)
-        limbs = self.weigher.projector.limb_count
+        limbs = self.likelihood.projector.limb_count
         return (max(LEAST_CAPACITY, 2 * limbs * longest) + CHUNK) // CHUNK * CHUNK
 
 
 def score(body: BodyModel, cameras: tuple[Camera, ...], evidence: FrameEvidence, pose: Array) -> Score:
     """The benchmark's score of one pose (D,) in one frame, whose edge maps are the benchmark's."""
-    return BodytrackWeigher(body, cameras, BodytrackSettings()).problem(evidence).score(pose)
+    return BodytrackLikelihood(body, cameras, BodytrackSettings()).problem(evidence).score(pose)
 
 
 def score_maps(evidence: FrameEvidence) -> Maps:

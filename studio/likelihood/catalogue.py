@@ -10,17 +10,20 @@ from studio.evidence.frame_evidence import EDGE_KINDS, FrameEvidence
 from studio.geometry.camera import Camera
 from studio.knobs import knobs_of
 from studio.likelihood.blob_settings import BlobSettings
-from studio.likelihood.blobs import BlobWeigher
-from studio.likelihood.bodytrack import BodytrackSettings, BodytrackWeigher
-from studio.likelihood.edge_region import EdgeRegionSettings, EdgeRegionWeigher
-from studio.likelihood.edge_region_silhouette import EdgeRegionSilhouetteSettings, EdgeRegionSilhouetteWeigher
-from studio.likelihood.edge_silhouette import EdgeSilhouetteSettings, EdgeSilhouetteWeigher
+from studio.likelihood.blobs import BlobLikelihood
+from studio.likelihood.bodytrack import BodytrackLikelihood, BodytrackSettings
+from studio.likelihood.edge_region import EdgeRegionLikelihood, EdgeRegionSettings
+from studio.likelihood.edge_region_silhouette import (
+    EdgeRegionSilhouetteLikelihood,
+    EdgeRegionSilhouetteSettings,
+)
+from studio.likelihood.edge_silhouette import EdgeSilhouetteLikelihood, EdgeSilhouetteSettings
 from studio.likelihood.problem import FrameLikelihood
-from studio.likelihood.template import TemplateSettings, TemplateWeigher
+from studio.likelihood.template import TemplateLikelihood, TemplateSettings
 from studio.registry import Registry
 
 
-class Weigher(Protocol):
+class Likelihood(Protocol):
     """A weighting prepared for one body, some cameras and some settings."""
 
     def problem(self, evidence: FrameEvidence) -> FrameLikelihood:
@@ -45,15 +48,15 @@ class Weighting:
     """One way of weighing poses. edge_kind : the edge map it reads, or "hull" where it carves one
     (`evidence.pipeline`). reads_pictures : whether it uses the pictures themselves, not only masks and edges.
 
-    settings_type : its knobs. prepare : (body, cameras, settings of that type) to a `Weigher`. loss : when a frame is
-    lost.
+    settings_type : its knobs. prepare : (body, cameras, settings of that type) to a `Likelihood`. loss : when a frame
+    is lost.
     """
 
     name: str
     label: str
     settings_type: type
     edge_kind: str
-    prepare: Callable[[BodyModel, tuple[Camera, ...], Any], Weigher]
+    prepare: Callable[[BodyModel, tuple[Camera, ...], Any], Likelihood]
     loss: LossLimit = LossLimit()
     reads_pictures: bool = False
 
@@ -71,7 +74,7 @@ _OWN = (
         "Edges and region",
         EdgeRegionSettings,
         "proximity",
-        EdgeRegionWeigher,
+        EdgeRegionLikelihood,
         LossLimit(0.09, 5.0),
     ),
     Weighting(
@@ -79,7 +82,7 @@ _OWN = (
         "Edges and silhouette",
         EdgeSilhouetteSettings,
         "proximity",
-        EdgeSilhouetteWeigher,
+        EdgeSilhouetteLikelihood,
         LossLimit(0.6, 4.5),
     ),
     Weighting(
@@ -87,7 +90,7 @@ _OWN = (
         "Edges, region and silhouette",
         EdgeRegionSilhouetteSettings,
         "proximity",
-        EdgeRegionSilhouetteWeigher,
+        EdgeRegionSilhouetteLikelihood,
         LossLimit(0.1, 5.5),
     ),
     Weighting(
@@ -95,7 +98,7 @@ _OWN = (
         "Benchmark's score",
         BodytrackSettings,
         "bodytrack",
-        BodytrackWeigher,
+        BodytrackLikelihood,
         LossLimit(0.02, 5.5),
     ),
     Weighting(
@@ -103,7 +106,7 @@ _OWN = (
         "Template and silhouette",
         TemplateSettings,
         "none",
-        TemplateWeigher,
+        TemplateLikelihood,
         LossLimit(0.001, 5.0),
     ),
     Weighting(
@@ -111,7 +114,7 @@ _OWN = (
         "Blobs of the visual hull",
         BlobSettings,
         "hull",
-        BlobWeigher,
+        BlobLikelihood,
         LossLimit(0.12, 4.5),
         reads_pictures=True,
     ),

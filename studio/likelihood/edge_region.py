@@ -120,7 +120,7 @@ class EdgeRegionSettings:
         return max(1, round(self.region_samples / (REGION_LINES * CHUNK)))
 
 
-class EdgeRegionWeigher(Preparation):
+class EdgeRegionLikelihood(Preparation):
     """Makes the problem of any frame. device : what finds the sums in place of the processor, and all limbs there."""
 
     def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: EdgeRegionSettings) -> None:
@@ -143,28 +143,28 @@ class EdgeRegionWeigher(Preparation):
 class EdgeRegionProblem(PreparedProblem):
     """One frame as a function of poses."""
 
-    def __init__(self, weigher: EdgeRegionWeigher, maps: Maps) -> None:
-        self.weigher, self.priors, self.maps = weigher, weigher.priors, maps
-        self._there = None if weigher.device is None else weigher.device.maps(maps)
+    def __init__(self, likelihood: EdgeRegionLikelihood, maps: Maps) -> None:
+        self.likelihood, self.priors, self.maps = likelihood, likelihood.priors, maps
+        self._there = None if likelihood.device is None else likelihood.device.maps(maps)
 
-    def weigh(self, poses: Array, stage: int = 0) -> Array:
+    def log_likelihood(self, poses: Array, stage: int = 0) -> Array:
         """(N, D) poses to (N,) log-weights, Eq. 17. Raises BodyError for poses that are no finite (N, D)."""
         if self._there is not None:
             return self.shares(poses).values.sum(axis=(1, 2))
-        outlines = self.weigher.projector.blocks(poses)
+        outlines = self.likelihood.projector.blocks(poses)
         return self._evaluated(outlines, self.hidden(outlines), len(poses))[1]
 
     def terms(self, poses: Array) -> tuple[Array, Array]:
         """Σe and Σr, each (N, V), of poses (N, D)."""
-        if self.weigher.device is not None:
-            return self.terms_there(poses, self.weigher.device.all_limbs)
-        outlines = self.weigher.projector.blocks(poses)
+        if self.likelihood.device is not None:
+            return self.terms_there(poses, self.likelihood.device.all_limbs)
+        outlines = self.likelihood.projector.blocks(poses)
         return self.terms_of(outlines, self.hidden(outlines), len(poses))
 
     def shares(self, poses: Array) -> Shares:
         """-a Σe and -b Σr of every camera."""
         edge, region = self.terms(poses)
-        settings, names = self.weigher.settings, tuple(camera.name for camera in self.weigher.cameras)
+        settings, names = self.likelihood.settings, tuple(camera.name for camera in self.likelihood.cameras)
         values = np.stack([-settings.edge_weight * edge, -settings.region_weight * region], axis=2)
         return Shares(names, ("edge", "region"), values)
 
@@ -182,10 +182,10 @@ class EdgeRegionProblem(PreparedProblem):
 
         Raises BodyError for poses that are no finite (N, D).
         """
-        device, settings = self.weigher.device, self.weigher.settings
+        device, settings = self.likelihood.device, self.likelihood.settings
         assert device is not None
         assert self._there is not None
-        sums = device.sums(self.weigher.projector.checked(poses), self._there, limbs)
+        sums = device.sums(self.likelihood.projector.checked(poses), self._there, limbs)
         samples = CHUNK * np.array([EDGE_LINES * settings.edge_chunks, REGION_LINES * settings.region_chunks])
         terms = sums / (WORST * samples * len(limbs.frame))
         return terms[..., 0], terms[..., 1]
@@ -194,7 +194,7 @@ class EdgeRegionProblem(PreparedProblem):
         self, outlines: NDArray[np.float32], hidden: NDArray[np.uint64], count: int
     ) -> tuple[Array, Array]:
         """Terms (N, V, 2) and log-weights (N,)."""
-        settings = self.weigher.settings
+        settings = self.likelihood.settings
         blocks, views = outlines.shape[:2]
         terms = np.empty((blocks, LANES, views, 2))
         log_weights = np.empty((blocks, LANES))
@@ -208,7 +208,7 @@ class EdgeRegionProblem(PreparedProblem):
         """The pixels that the kernel reads, for the benchmark and for tests: (B, V, 16, L, chunks, lines, 16) of
         edges and of regions, numbered from 0 in each picture; see `edge_region_kernels` for numbers beyond it.
         """
-        settings = self.weigher.settings
+        settings = self.likelihood.settings
         blocks, views, limbs = outlines.shape[:3]
         shape = (blocks, views, LANES, limbs)
         edges = np.zeros((*shape, settings.edge_chunks, EDGE_LINES, CHUNK), dtype=np.uint32)
@@ -219,21 +219,21 @@ class EdgeRegionProblem(PreparedProblem):
     def hidden(self, outlines: NDArray[np.float32]) -> NDArray[np.uint64]:
         """(B, V, L, 2, 16) a bit for each hidden edge sample; of no blocks where the option is off."""
         blocks, views, limbs = outlines.shape[:3]
-        if not self.weigher.settings.occlusion_aware:
+        if not self.likelihood.settings.occlusion_aware:
             return np.zeros((0, views, limbs, EDGE_LINES, LANES), dtype=np.uint64)
-        samples = self.weigher.settings.edge_chunks * CHUNK
+        samples = self.likelihood.settings.edge_chunks * CHUNK
         hidden = hidden_samples(outlines, limb_sides(limbs), samples)
         return hidden.reshape(blocks, views, limbs, EDGE_LINES, LANES)
 
 
-def device_for(settings: EdgeRegionSettings, weigher: Preparation) -> "EdgeRegionDevice | None":
+def device_for(settings: EdgeRegionSettings, likelihood: Preparation) -> "EdgeRegionDevice | None":
     """What the setting `device` asks for; None is the processor.
 
     Raises SettingsError for what is not computed there, StudioError where there is no device, both for GPU alone.
     """
     if settings.device == CPU:
         return None
-    projector = weigher.projector
+    projector = likelihood.projector
     try:
         if settings.occlusion_aware:
             raise SettingsError(

@@ -21,7 +21,7 @@ from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
 from studio.knobs import next_frame_knob
-from studio.likelihood.edge_region import EdgeRegionProblem, EdgeRegionSettings, EdgeRegionWeigher
+from studio.likelihood.edge_region import EdgeRegionLikelihood, EdgeRegionProblem, EdgeRegionSettings
 from studio.likelihood.problem import TRUNK_FIRST, WHOLE_BODY, PreparedProblem, Shares
 from studio.likelihood.silhouette_areas import Silhouettes, resolution_knob, silhouettes_of
 from studio.likelihood.visible_edges import body_edges
@@ -39,14 +39,14 @@ class EdgeRegionSilhouetteSettings(EdgeRegionSettings):
     silhouette_resolution: str = resolution_knob()
 
 
-class EdgeRegionSilhouetteWeigher:
+class EdgeRegionSilhouetteLikelihood:
     """Makes the problem of any frame; immutable."""
 
     def __init__(
         self, body: BodyModel, cameras: tuple[Camera, ...], settings: EdgeRegionSilhouetteSettings
     ) -> None:
         self.settings, self.cameras = settings, cameras
-        self.edge_region = EdgeRegionWeigher(body, cameras, settings)
+        self.edge_region = EdgeRegionLikelihood(body, cameras, settings)
         self.trunk = np.unique(body_edges(body).trunk[:, 0])
         device = self.edge_region.device
         self.trunk_there = None if device is None else device.limbs(self.trunk)
@@ -62,9 +62,12 @@ class EdgeRegionSilhouetteProblem(PreparedProblem):
     """One frame as a function of poses."""
 
     def __init__(
-        self, weigher: EdgeRegionSilhouetteWeigher, edge_region: EdgeRegionProblem, silhouettes: Silhouettes
+        self,
+        likelihood: EdgeRegionSilhouetteLikelihood,
+        edge_region: EdgeRegionProblem,
+        silhouettes: Silhouettes,
     ) -> None:
-        self.weigher, self.edge_region, self.silhouettes = weigher, edge_region, silhouettes
+        self.likelihood, self.edge_region, self.silhouettes = likelihood, edge_region, silhouettes
         self.priors = edge_region.priors
 
     def terms(self, poses: Array, stage: int = WHOLE_BODY) -> tuple[Array, Array, Array]:
@@ -72,8 +75,8 @@ class EdgeRegionSilhouetteProblem(PreparedProblem):
 
         Raises BodyError for poses that are no finite (N, D).
         """
-        outlines = self.weigher.edge_region.projector.blocks(poses)
-        trunk, there = self.weigher.trunk, self.weigher.trunk_there
+        outlines = self.likelihood.edge_region.projector.blocks(poses)
+        trunk, there = self.likelihood.trunk, self.likelihood.trunk_there
         trunk_alone = stage == TRUNK_FIRST and len(trunk) < outlines.shape[2]
         if there is not None:
             edge, region = self.edge_region.terms(poses)
@@ -89,14 +92,14 @@ class EdgeRegionSilhouetteProblem(PreparedProblem):
 
     def shares(self, poses: Array) -> Shares:
         """-a Σe, -b Σr and -c (1 - f_s) of every camera."""
-        settings, names = self.weigher.settings, tuple(camera.name for camera in self.weigher.cameras)
+        settings, names = self.likelihood.settings, tuple(camera.name for camera in self.likelihood.cameras)
         factors = settings.edge_weight, settings.region_weight, settings.silhouette_weight
         values = [factor * (term - 1.0) for factor, term in zip(factors, self.terms(poses), strict=True)]
         return Shares(names, ("edge", "region", "silhouette"), np.stack(values, axis=2))
 
     def fitness(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
         """(N,) f of poses (N, D), between 0 and the sum of the weights."""
-        settings = self.weigher.settings
+        settings = self.likelihood.settings
         edge, region, silhouette = (term.mean(axis=1) for term in self.terms(poses, stage))
         return (
             settings.edge_weight * edge
@@ -104,8 +107,8 @@ class EdgeRegionSilhouetteProblem(PreparedProblem):
             + settings.silhouette_weight * silhouette
         )
 
-    def weigh(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
+    def log_likelihood(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
         """(N,) log-weights of poses (N, D). Raises BodyError for poses that are no finite (N, D)."""
-        settings = self.weigher.settings
+        settings = self.likelihood.settings
         best = settings.edge_weight + settings.region_weight + settings.silhouette_weight
-        return len(self.weigher.cameras) * (self.fitness(poses, stage) - best)
+        return len(self.likelihood.cameras) * (self.fitness(poses, stage) - best)

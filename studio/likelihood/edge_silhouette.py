@@ -61,7 +61,7 @@ class EdgeSilhouetteSettings:
         return max(1, round(self.samples_per_edge / CHUNK))
 
 
-class EdgeSilhouetteWeigher(Preparation):
+class EdgeSilhouetteLikelihood(Preparation):
     """Makes the problem of any frame."""
 
     def __init__(
@@ -80,23 +80,27 @@ class EdgeSilhouetteWeigher(Preparation):
 class EdgeSilhouetteProblem(PreparedProblem):
     """One frame as a function of poses."""
 
-    def __init__(self, weigher: EdgeSilhouetteWeigher, silhouettes: Silhouettes, edges: EdgeMaps) -> None:
-        self.weigher, self.silhouettes, self.edges = weigher, silhouettes, edges
-        self.priors = weigher.priors
+    def __init__(
+        self, likelihood: EdgeSilhouetteLikelihood, silhouettes: Silhouettes, edges: EdgeMaps
+    ) -> None:
+        self.likelihood, self.silhouettes, self.edges = likelihood, silhouettes, edges
+        self.priors = likelihood.priors
 
     def terms(self, poses: Array, stage: int = WHOLE_BODY) -> tuple[Array, Array]:
         """f_s and f_e, each (N, V), of poses (N, D). Raises BodyError for poses that are no finite (N, D)."""
-        weigher = self.weigher
-        outlines = weigher.projector.blocks(poses)
+        likelihood = self.likelihood
+        outlines = likelihood.projector.blocks(poses)
         areas = self.silhouettes.areas(outlines, len(poses))
-        edges = weigher.edges.of_stage(stage)
-        return areas.fitness(), self.edges.fitness(outlines, edges, weigher.settings.edge_chunks, len(poses))
+        edges = likelihood.edges.of_stage(stage)
+        return areas.fitness(), self.edges.fitness(
+            outlines, edges, likelihood.settings.edge_chunks, len(poses)
+        )
 
     def shares(self, poses: Array) -> Shares:
         """scale / V · f_e and scale / V · f_s of each of the V cameras."""
         silhouette, edge = self.terms(poses)
-        names = tuple(camera.name for camera in self.weigher.cameras)
-        factor = self.weigher.settings.fitness_scale / len(names)
+        names = tuple(camera.name for camera in self.likelihood.cameras)
+        factor = self.likelihood.settings.fitness_scale / len(names)
         return Shares(names, ("edge", "silhouette"), factor * np.stack([edge, silhouette], axis=2))
 
     def fitness(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
@@ -104,6 +108,6 @@ class EdgeSilhouetteProblem(PreparedProblem):
         silhouette, edge = self.terms(poses, stage)
         return silhouette.mean(axis=1) + edge.mean(axis=1)
 
-    def weigh(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
+    def log_likelihood(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
         """(N,) log-weights scale · f of poses (N, D). Raises BodyError for poses that are no finite (N, D)."""
-        return self.weigher.settings.fitness_scale * self.fitness(poses, stage)
+        return self.likelihood.settings.fitness_scale * self.fitness(poses, stage)

@@ -37,7 +37,7 @@ class Shares:
 class FrameLikelihood(Protocol):
     """One frame as a function of poses. stage : WHOLE_BODY, or TRUNK_FIRST where only root and trunk are searched."""
 
-    def weigh(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
+    def log_likelihood(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
         """(N, D) poses to (N,) log-weights; -inf never, NaN never."""
         ...
 
@@ -69,18 +69,18 @@ class PreparedProblem(ABC):
     priors: HardPriors
 
     @abstractmethod
-    def weigh(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
+    def log_likelihood(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
         """(N, D) poses to (N,) log-weights. Raises BodyError for poses that are no finite (N, D)."""
 
     def fitness(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
         """(N,) the log-weights of poses (N, D), where the weighting defines no other fitness."""
-        return self.weigh(poses, stage)
+        return self.log_likelihood(poses, stage)
 
     def shares(self, poses: Array) -> Shares:
         """What each camera and term adds to the log-weights of poses (N, D); in one piece where the weighting says no
         more.
         """
-        return Shares((POOLED,), (WHOLE,), self.weigh(poses)[:, None, None])
+        return Shares((POOLED,), (WHOLE,), self.log_likelihood(poses)[:, None, None])
 
     def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
         """(N, D) poses to (N,) whether the body can take them."""

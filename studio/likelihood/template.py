@@ -32,7 +32,7 @@ class TemplateSettings:
     title: ClassVar[str] = "Template"
 
 
-class TemplateWeigher(Preparation):
+class TemplateLikelihood(Preparation):
     """Makes the problem of any frame."""
 
     def problem(self, evidence: FrameEvidence) -> "TemplateProblem":
@@ -44,21 +44,21 @@ class TemplateWeigher(Preparation):
 class TemplateProblem(PreparedProblem):
     """One frame as a function of poses."""
 
-    def __init__(self, weigher: TemplateWeigher, silhouettes: Silhouettes) -> None:
-        self.weigher, self.priors, self.silhouettes = weigher, weigher.priors, silhouettes
+    def __init__(self, likelihood: TemplateLikelihood, silhouettes: Silhouettes) -> None:
+        self.likelihood, self.priors, self.silhouettes = likelihood, likelihood.priors, silhouettes
 
-    def weigh(self, poses: Array, stage: int = 0) -> Array:
+    def log_likelihood(self, poses: Array, stage: int = 0) -> Array:
         """(N, D) poses to (N,) log-weights. Raises BodyError for poses that are no finite (N, D)."""
         return -self.differences(np.asarray(poses, dtype=np.float64)).sum(axis=1)
 
     def shares(self, poses: Array) -> Shares:
         """Minus the mean squared difference in every camera."""
-        names = tuple(camera.name for camera in self.weigher.cameras)
+        names = tuple(camera.name for camera in self.likelihood.cameras)
         return Shares(names, ("silhouette",), -self.differences(poses)[:, :, None])
 
     def differences(self, poses: Array) -> Array:
         """(N, V) mean squared difference over all pixels of poses (N, D)."""
-        outlines = self.weigher.projector.blocks(poses)
+        outlines = self.likelihood.projector.blocks(poses)
         areas = self.silhouettes.areas(outlines, len(poses))
         differing = areas.projected + areas.observed - 2 * areas.both
         return differing / self.silhouettes.sizes.prod(axis=1)

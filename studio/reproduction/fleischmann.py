@@ -537,9 +537,9 @@ class TimedProblem:
         self.fitness_seconds, self.priors_seconds = 0.0, 0.0
         self.batches: list[Array] = []
 
-    def weigh(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
+    def log_likelihood(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
         """Log-weights, not timed: the swarm uses the fitness."""
-        return self.problem.weigh(poses, stage)
+        return self.problem.log_likelihood(poses, stage)
 
     def fitness(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
         """The fitness, timed."""
@@ -571,7 +571,7 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
     space = search_space(body, session_sigma(session, body, fps))
     wanted = {**knobs_for_evaluations(SWARM.tracker, EVALUATIONS), **SWARM.changes}
     settings = changed_settings(default_settings(SWARM.tracker, SWARM.weighting), wanted)
-    weigher = WEIGHTINGS[SWARM.weighting].prepare(body, session.cameras(), settings.weighting)
+    likelihood = WEIGHTINGS[SWARM.weighting].prepare(body, session.cameras(), settings.weighting)
     projector = OutlineProjector.of_body(body, session.cameras())
     pose = session.start_pose(body)
     carried = start_of(None if pose is None else tuple(pose))
@@ -582,7 +582,7 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
         for frame in range(WARM_FRAMES + frames):
             began = time.perf_counter()
             evidence = problems.evidence(frame, settings)
-            timed = TimedProblem(weigher.problem(evidence))
+            timed = TimedProblem(likelihood.problem(evidence))
             prepared = time.perf_counter()
             result = search_frame(
                 TRACKERS[SWARM.tracker],

@@ -256,8 +256,8 @@ def whole_problem(
     distinguishes front from back.
     """
     whole = with_usual_feet(body)
-    weigher = WEIGHTINGS[settings.weighting_name].prepare(whole, cameras, settings.weighting)
-    return weigher.problem(evidence)
+    likelihood = WEIGHTINGS[settings.weighting_name].prepare(whole, cameras, settings.weighting)
+    return likelihood.problem(evidence)
 
 
 def seek(

@@ -94,10 +94,10 @@ def better_pose(
         on_layer=checked,
     )
     searched = np.stack([given, found.estimate.pose, found.estimate.mode])
-    begin = searched[int(np.argmax(problem.weigh(searched)))]
+    begin = searched[int(np.argmax(problem.log_likelihood(searched)))]
     refiner = Refiner(body, problems.cameras, RefinementSettings())
     refined = refiner.refine(begin, silhouette_distances(evidence), problem).pose
-    weights = problem.weigh(np.stack([given, begin, refined]))
+    weights = problem.log_likelihood(np.stack([given, begin, refined]))
     best = [given, begin, refined][int(np.argmax(weights))]
     onlooker = Onlooker(body, problems.cameras)
     progress(STEP, layers + 1, layers + 1)

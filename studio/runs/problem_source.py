@@ -29,7 +29,7 @@ from studio.trackers.tracker import FrameLikelihood
 
 KEPT_FRAMES = 4
 """Evidence kept: the current frame, the prepared one, and two earlier ones."""
-KEPT_WEIGHERS = 4
+KEPT_LIKELIHOODS = 4
 """For two settings, each with all cameras and without one that has stopped."""
 
 T = TypeVar("T")
@@ -65,7 +65,7 @@ class ProblemSource:
         self._coming: tuple[Hashable, Future[FrameLikelihood]] | None = None
         self._evidence: OrderedDict[Hashable, FrameEvidence] = OrderedDict()
         self._problems: OrderedDict[Hashable, FrameLikelihood] = OrderedDict()
-        self._weighers: OrderedDict[Hashable, Any] = OrderedDict()
+        self._likelihoods: OrderedDict[Hashable, Any] = OrderedDict()
 
     def problem(self, frame: int, settings: RunSettings) -> FrameLikelihood:
         """The frame as a function of poses. Raises FootageError, NotFoundError."""
@@ -109,7 +109,7 @@ class ProblemSource:
         with self._making, self._keeping:
             self._problems.clear()
             self._evidence.clear()
-            self._weighers.clear()
+            self._likelihoods.clear()
             self.footage.close()
 
     def _problem(self, frame: int, settings: RunSettings) -> FrameLikelihood:
@@ -129,16 +129,16 @@ class ProblemSource:
             with span("silhouettes", frame):
                 silhouettes_of(evidence, HALF)
         with self._making, span("maps", frame):
-            weigher = self._weigher(settings, self.cameras_in(frame))
-            return self._keep(self._problems, key, weigher.problem(evidence), KEPT_FRAMES)
+            likelihood = self._likelihood(settings, self.cameras_in(frame))
+            return self._keep(self._problems, key, likelihood.problem(evidence), KEPT_FRAMES)
 
-    def _weigher(self, settings: RunSettings, cameras: tuple[Camera, ...]) -> Any:  # noqa: ANN401 - as weightings are
+    def _likelihood(self, settings: RunSettings, cameras: tuple[Camera, ...]) -> Any:  # noqa: ANN401 - as weightings are
         key = (settings.weighting_name, settings.weighting, tuple(camera.name for camera in cameras))
-        found = self._kept(self._weighers, key)
+        found = self._kept(self._likelihoods, key)
         if found is None:
             weighting = WEIGHTINGS[settings.weighting_name]
             made = weighting.prepare(self.body, cameras, settings.weighting)
-            found = self._keep(self._weighers, key, made, KEPT_WEIGHERS)
+            found = self._keep(self._likelihoods, key, made, KEPT_LIKELIHOODS)
         return found
 
     def _prepare(self, frame: int, settings: RunSettings, executor: Executor) -> None:

@@ -231,7 +231,7 @@ class RunWatch:
             rng = np.random.default_rng(seed)
             spread = start_candidates(rng, body, hull, box, PER_FAMILY, prototypes).poses
             # The best comes first, where a swarm looks for the pose to start from.
-            weights = problem.weigh(spread)
+            weights = problem.log_likelihood(spread)
             return unweighted(spread[np.argsort(-weights, kind="stable")])
         found = seek(
             problem,

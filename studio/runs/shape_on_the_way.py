@@ -170,7 +170,7 @@ def shaped_body(
     the first of `frames`. sigma : (D,) σ0 from frame to frame.
     """
     rules = default_settings(TRACKER, WEIGHTING)
-    weigher = WEIGHTINGS[WEIGHTING].prepare(body, cameras, rules.weighting)
+    likelihood = WEIGHTINGS[WEIGHTING].prepare(body, cameras, rules.weighting)
     following = Following(
         rules, search_space(body, sigma), start_of(tuple(start.tolist())), 0, FrameRefiner(body, cameras, 0)
     )
@@ -180,7 +180,7 @@ def shaped_body(
         seen = evidence(frame)
         if not anything_seen(seen):
             break
-        following.step(frame, weigher.problem(seen), seen)
+        following.step(frame, likelihood.problem(seen), seen)
     if not following.poses:
         return FittedShape(body, start, {}, (0.0, 0.0))
     followed = np.array(following.poses)

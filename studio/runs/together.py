@@ -230,8 +230,8 @@ class _Body:
         """Search a frame in its part of the masks."""
         names = {view.camera for view in evidence.views}
         cameras = tuple(camera for camera in self._cameras if camera.name in names)
-        weigher = WEIGHTINGS[WEIGHTING].prepare(self.body, cameras, self._settings.weighting)
-        self.following.step(frame, weigher.problem(evidence), evidence)
+        likelihood = WEIGHTINGS[WEIGHTING].prepare(self.body, cameras, self._settings.weighting)
+        self.following.step(frame, likelihood.problem(evidence), evidence)
 
 
 def _checked(sessions: Sequence[Session]) -> int:

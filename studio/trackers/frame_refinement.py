@@ -124,7 +124,7 @@ class FrameRefiner:
                 rng, seen_frame.hypothesis(pose), seen_frame, result.carried.previous_estimate
             )
             pose, off = found.pose, found.off
-        weight = float(problem.weigh(pose[None])[0])
+        weight = float(problem.log_likelihood(pose[None])[0])
         estimate = dataclasses.replace(result.estimate, pose=pose, searched=start, log_weight=weight)
         carried = _carried(result, pose, settings.next_frame_from, refiner)
         if matrix is None or pose is not ended.pose:

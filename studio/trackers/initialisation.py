@@ -195,7 +195,7 @@ class StartSearch:
         margin = best.value - away[0].value if away else math.inf
         return FoundStart(
             pose=best.pose,
-            log_weight=float(self._steps.problem.problem.weigh(best.pose[None])[0]),
+            log_weight=float(self._steps.problem.problem.log_likelihood(best.pose[None])[0]),
             confidence=confidence(facing_odds(margin, self._cameras)),
             margin=margin,
             rival=away[0].pose if away else None,

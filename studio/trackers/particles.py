@@ -49,7 +49,7 @@ def weigh(problem: FrameLikelihood, poses: Array, rules: Rules) -> tuple[Array, 
     Where the body can take none of them, or constraints are ignored, all may survive. Raises WeightError for a
     weight that is not finite.
     """
-    raw = checked_values(problem.weigh(poses), len(poses))
+    raw = checked_values(problem.log_likelihood(poses), len(poses))
     if rules.constraints == "ignore":
         return raw, raw
     taken = possible(problem, poses, rules)

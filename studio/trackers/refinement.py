@@ -159,7 +159,7 @@ class Refiner:
         if problem is None:
             return Refined(found, True, 0.0, steps, matrix)
         offered = np.stack([start, found, start + HALFWAY * (found - start)])
-        weights = problem.weigh(offered)
+        weights = problem.log_likelihood(offered)
         for candidate, weight in zip(offered[1:], weights[1:], strict=True):
             if weight >= weights[0]:
                 return Refined(candidate, True, float(weight - weights[0]), steps)

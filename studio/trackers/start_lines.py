@@ -88,13 +88,13 @@ class AtEase:
         """(N,) penalty on the log weights of poses (N, D)."""
         return self.strength * ((poses - self.rest) ** 2 @ self.scale)
 
-    def weigh(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
+    def log_likelihood(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
         """(N,) log weights."""
-        return self.problem.weigh(poses, stage) - self.penalty(poses)
+        return self.problem.log_likelihood(poses, stage) - self.penalty(poses)
 
     def fitness(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
         """(N,) the same."""
-        return self.weigh(poses, stage)
+        return self.log_likelihood(poses, stage)
 
     def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
         """(N,) whether the body can take them."""
@@ -147,7 +147,7 @@ class LineSteps:
     def values(self, poses: Array) -> Array:
         """(N,) log weights of poses (N, D), those of impossible ones lower by IMPOSSIBLE."""
         self._count(len(poses))
-        return self.problem.weigh(poses) - self._impossible(poses)
+        return self.problem.log_likelihood(poses) - self._impossible(poses)
 
     def _with_limb(
         self, rng: np.random.Generator, line: Line, limb: IntArray, others: Sequence[Line], count: int

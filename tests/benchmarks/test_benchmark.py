@@ -19,7 +19,7 @@ from studio.benchmarks.kernels import (
 )
 from studio.benchmarks.results_table import in_lines, rows_of
 from studio.body.catalogue import load_body
-from studio.likelihood.edge_region import DEVICE_MODULE, EdgeRegionSettings, EdgeRegionWeigher
+from studio.likelihood.edge_region import DEVICE_MODULE, EdgeRegionLikelihood, EdgeRegionSettings
 from studio.likelihood.silhouette_areas import FULL, silhouettes_of
 
 
@@ -72,8 +72,8 @@ def test_the_limit_reads_the_weightings_entries():
     body = load_body("human31")
     cameras = ring_of_cameras(body)
     rng = np.random.default_rng(0)
-    weigher = EdgeRegionWeigher(body, cameras, EdgeRegionSettings())
-    problem = weigher.problem(made_evidence(body, cameras, rng)["proximity"])
+    likelihood = EdgeRegionLikelihood(body, cameras, EdgeRegionSettings())
+    problem = likelihood.problem(made_evidence(body, cameras, rng)["proximity"])
     step = np.array([entry.max_step for entry in body.parameters]) / 60.0
     poses = body.neutral + step * rng.normal(size=(32, 31))
     contest = limit_contest(problem, poses)
@@ -105,12 +105,12 @@ def test_the_limit_of_areas_counts_the_bodys_spans():
     body = load_body("human31")
     cameras = ring_of_cameras(body)
     evidence = made_evidence(body, cameras, np.random.default_rng(0))["proximity"]
-    weigher = EdgeRegionWeigher(body, cameras, EdgeRegionSettings())
+    likelihood = EdgeRegionLikelihood(body, cameras, EdgeRegionSettings())
     poses = np.repeat(body.neutral[None], 16, axis=0)
-    contest = spans_contest(weigher.problem(evidence), evidence, poses, FULL)
+    contest = spans_contest(likelihood.problem(evidence), evidence, poses, FULL)
     assert contest.evaluations == 16 * LIMIT_PASSES
     sums = contest.run() / LIMIT_PASSES
-    areas = silhouettes_of(evidence, FULL).areas(weigher.projector.blocks(poses), 16)
+    areas = silhouettes_of(evidence, FULL).areas(likelihood.projector.blocks(poses), 16)
     # Where limbs overlap spans count again, and so do the full words of the window that are counted.
     bare = areas.projected.T[None]
     assert (sums > bare).all()

@@ -65,4 +65,4 @@ def test_shares_add_up_to_the_log_weight(evidence: FrameEvidence, name: str) -> 
     poses = BODY.neutral + 0.05 * rng.standard_normal((5, len(BODY.parameters)))
     shares = problem.shares(poses)
     assert shares.values.shape == (5, len(shares.cameras), len(shares.terms))
-    assert np.allclose(shares.values.sum(axis=(1, 2)), problem.weigh(poses), atol=1e-9)
+    assert np.allclose(shares.values.sum(axis=(1, 2)), problem.log_likelihood(poses), atol=1e-9)

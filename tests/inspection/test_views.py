@@ -172,7 +172,7 @@ def test_the_landscape_is_the_likelihood(run: InspectedRun, frame: InspectedFram
             poses[:, run.parameter("left_hip_ry")] = [float(str(row["at"])) for row in rows]
             if name == "plane":
                 poses[:, run.parameter("right_knee_ry")] = [float(str(row["second"])) for row in rows]
-            known = problem.weigh(poses)
+            known = problem.log_likelihood(poses)
             assert np.allclose([float(str(row["log_weight"])) for row in rows], known, atol=1e-12)
     sums: dict[Cell, float] = {}
     for row in records(viewed, "terms"):

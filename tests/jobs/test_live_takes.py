@@ -114,7 +114,7 @@ def _evidence_has_only_the_others(take: Session, frame: int) -> None:
     settings = default_settings("annealed", "edge-region")
     assert [view.camera for view in problems.evidence(frame, settings).views] == ["cam1"]
     assert [view.camera for view in problems.evidence(0, settings).views] == ["cam1", "cam2"]
-    weights = problems.problem(frame, settings).weigh(take.body().neutral[None])
+    weights = problems.problem(frame, settings).log_likelihood(take.body().neutral[None])
     assert np.isfinite(weights).all()
     problems.close()
 

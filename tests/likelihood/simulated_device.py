@@ -7,8 +7,11 @@ import numpy as np
 from weighting_scene import four_cameras, scattered, smooth_evidence
 
 from studio.body.catalogue import load_body
-from studio.likelihood.edge_region import EdgeRegionSettings, EdgeRegionWeigher
-from studio.likelihood.edge_region_silhouette import EdgeRegionSilhouetteSettings, EdgeRegionSilhouetteWeigher
+from studio.likelihood.edge_region import EdgeRegionLikelihood, EdgeRegionSettings
+from studio.likelihood.edge_region_silhouette import (
+    EdgeRegionSilhouetteLikelihood,
+    EdgeRegionSilhouetteSettings,
+)
 from studio.likelihood.problem import TRUNK_FIRST
 
 SAMPLES = {"edge_samples": 64, "region_samples": 48}
@@ -27,17 +30,19 @@ def scene_of(name):
 def terms_of(name, device):
     """Σe and Σr of the poses, the trunk's Σe, and log-weights."""
     body, cameras, evidence, poses = scene_of(name)
-    problem = EdgeRegionWeigher(body, cameras, EdgeRegionSettings(device=device, **SAMPLES)).problem(evidence)
+    problem = EdgeRegionLikelihood(body, cameras, EdgeRegionSettings(device=device, **SAMPLES)).problem(
+        evidence
+    )
     edge, region = problem.terms(poses)
-    found = {"edge": edge, "region": region, "weights": problem.weigh(poses)}
+    found = {"edge": edge, "region": region, "weights": problem.log_likelihood(poses)}
     if device == "cpu" or name == "human31":
         settings = EdgeRegionSilhouetteSettings(device=device, **SAMPLES)
-        weigher = EdgeRegionSilhouetteWeigher(body, cameras, settings)
-        three = weigher.problem(evidence)
+        likelihood = EdgeRegionSilhouetteLikelihood(body, cameras, settings)
+        three = likelihood.problem(evidence)
         if device == "cpu":
             found["trunk"] = 1.0 - three.terms(poses, TRUNK_FIRST)[0]
         else:
-            found["trunk"] = three.edge_region.terms_there(poses, weigher.trunk_there)[0]
+            found["trunk"] = three.edge_region.terms_there(poses, likelihood.trunk_there)[0]
     return found
 
 

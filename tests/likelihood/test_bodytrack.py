@@ -11,7 +11,7 @@ from studio.capture.calibration_files import read_calibration
 from studio.evidence.edges import bodytrack_edges
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.geometry.camera import Camera
-from studio.likelihood.bodytrack import BLOCKS_A_THREAD, BodytrackSettings, BodytrackWeigher, score
+from studio.likelihood.bodytrack import BLOCKS_A_THREAD, BodytrackLikelihood, BodytrackSettings, score
 from studio.likelihood.bodytrack_kernels import MOST_ROWS, score_blocks
 from studio.likelihood.outline_kernels import LANES
 
@@ -72,43 +72,43 @@ def test_terms_equal_the_twins(human, ring, smooth, spread):
     )
     evidence = FrameEvidence(0, views)
     poses = scattered(human, 20, spread=spread)
-    problem = BodytrackWeigher(human, ring, BodytrackSettings()).problem(evidence)
+    problem = BodytrackLikelihood(human, ring, BodytrackSettings()).problem(evidence)
     edge, inside, counts = problem.terms(poses)
     if spread > 10:
-        assert (problem.weigher.projector.corners(poses)[1] < 1).sum() > 20
+        assert (problem.likelihood.projector.corners(poses)[1] < 1).sum() > 20
     for n, pose in enumerate(poses):
         expected_edge, expected_inside, *expected_counts = twin(human, ring, evidence, pose)
         # A length may round to one interval more or less where it lies within 0.01 px of half a step.
         np.testing.assert_allclose(counts[n], expected_counts, atol=12)
         assert edge[n] == pytest.approx(expected_edge, abs=0.003)
         assert inside[n] == pytest.approx(expected_inside, abs=0.005)
-    np.testing.assert_allclose(problem.weigh(poses), -(edge + inside), rtol=1e-12)
+    np.testing.assert_allclose(problem.log_likelihood(poses), -(edge + inside), rtol=1e-12)
 
 
 def test_weights_of_the_terms(human, ring, smooth):
     poses = scattered(human, 3)
-    edge, inside, _ = BodytrackWeigher(human, ring, BodytrackSettings()).problem(smooth).terms(poses)
+    edge, inside, _ = BodytrackLikelihood(human, ring, BodytrackSettings()).problem(smooth).terms(poses)
     settings = BodytrackSettings(score_edge_weight=2.0, score_inside_weight=0.5)
-    weights = BodytrackWeigher(human, ring, settings).problem(smooth).weigh(poses)
+    weights = BodytrackLikelihood(human, ring, settings).problem(smooth).log_likelihood(poses)
     np.testing.assert_allclose(weights, -(2.0 * edge + 0.5 * inside), rtol=1e-12)
 
 
 def test_a_pose_weighs_the_same_on_any_number_of_threads(human, ring, smooth):
-    problem = BodytrackWeigher(human, ring, BodytrackSettings()).problem(smooth)
+    problem = BodytrackLikelihood(human, ring, BodytrackSettings()).problem(smooth)
     poses = scattered(human, 2 * 16 * BLOCKS_A_THREAD + 3)
     numba.set_num_threads(1)
-    weights = problem.weigh(poses)
-    np.testing.assert_array_equal(problem.weigh(poses[100:101]), weights[100:101])
+    weights = problem.log_likelihood(poses)
+    np.testing.assert_array_equal(problem.log_likelihood(poses[100:101]), weights[100:101])
     numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
-    np.testing.assert_array_equal(problem.weigh(poses), weights)
+    np.testing.assert_array_equal(problem.log_likelihood(poses), weights)
 
 
 def test_seen_by_no_camera_is_the_worst(human, ring):
-    problem = BodytrackWeigher(human, ring, BodytrackSettings()).problem(plain_evidence(ring, 255, 255))
-    assert problem.weigh(human.neutral[None])[0] == 0.0
+    problem = BodytrackLikelihood(human, ring, BodytrackSettings()).problem(plain_evidence(ring, 255, 255))
+    assert problem.log_likelihood(human.neutral[None])[0] == 0.0
     away = human.neutral.copy()
     away[5] += 20000.0
-    assert problem.weigh(away[None])[0] == -2.0
+    assert problem.log_likelihood(away[None])[0] == -2.0
     found = problem.score(away)
     assert (found.edge_samples, found.inside_samples) == (0, 0)
 
@@ -133,8 +133,10 @@ def close_cameras(*factors: int) -> tuple[Camera, ...]:
 def test_a_camera_within_reach_of_the_body_breaks_nothing(human):
     """Limbs that fill many pictures: more samples than there is room for are left out, not written."""
     cameras = close_cameras(1, 30, 1000)
-    problem = BodytrackWeigher(human, cameras, BodytrackSettings()).problem(plain_evidence(cameras, 255, 0))
-    weights = problem.weigh(scattered(human, 40))
+    problem = BodytrackLikelihood(human, cameras, BodytrackSettings()).problem(
+        plain_evidence(cameras, 255, 0)
+    )
+    weights = problem.log_likelihood(scattered(human, 40))
     assert ((weights >= -2.0) & (weights <= 0.0)).all()
 
 
@@ -154,7 +156,7 @@ def test_a_pose_weighs_the_same_beside_fifteen_others(human, ring):
             for camera in cameras
         ),
     )
-    problem = BodytrackWeigher(human, cameras, BodytrackSettings()).problem(evidence)
+    problem = BodytrackLikelihood(human, cameras, BodytrackSettings()).problem(evidence)
     poses = scattered(human, 32, spread=30.0)
     together = problem.terms(poses)
     assert together[2].max() > 2 * together[2].min()
@@ -162,7 +164,7 @@ def test_a_pose_weighs_the_same_beside_fifteen_others(human, ring):
         for found, alone in zip(together, problem.terms(poses[n : n + 1]), strict=True):
             np.testing.assert_array_equal(found[n], alone[0])
     # Without any room in the common buffer.
-    outlines = problem.weigher.projector.blocks(poses)
+    outlines = problem.likelihood.projector.blocks(poses)
     common, own = (np.zeros((len(outlines), LANES, 4), np.int64) for _ in range(2))
     score_blocks(0, len(outlines), outlines, problem.maps, problem._capacity, MOST_ROWS, common)
     score_blocks(0, len(outlines), outlines, problem.maps, problem._capacity, 8, own)

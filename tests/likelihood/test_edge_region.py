@@ -19,7 +19,7 @@ from studio.body.catalogue import load_body
 from studio.errors import BodyError, FootageError
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.geometry.camera import Camera
-from studio.likelihood.edge_region import BLOCKS_A_THREAD, EdgeRegionSettings, EdgeRegionWeigher
+from studio.likelihood.edge_region import BLOCKS_A_THREAD, EdgeRegionLikelihood, EdgeRegionSettings
 
 STRIPS = np.array([1, 3, 5]) / 6.0
 # The maps hold whole numbers of 255ths (1 - p)², each off by half at most; averages are off by less.
@@ -53,7 +53,7 @@ def twin(body, cameras, evidence, poses, edge_samples=32, region_samples=48, hid
 
 
 def problem_of(body, cameras, evidence, **settings):
-    return EdgeRegionWeigher(body, cameras, EdgeRegionSettings(**settings)).problem(evidence)
+    return EdgeRegionLikelihood(body, cameras, EdgeRegionSettings(**settings)).problem(evidence)
 
 
 @pytest.mark.parametrize(("edge_samples", "region_samples"), [(32, 48), (96, 48), (32, 144), (128, 192)])
@@ -64,7 +64,7 @@ def test_terms_equal_the_twins(human, ring, smooth, edge_samples, region_samples
     expected_edge, expected_region = twin(human, ring, smooth, poses, edge_samples, region_samples)
     np.testing.assert_allclose(edge, expected_edge, atol=QUANTISED + ROUNDED)
     np.testing.assert_allclose(region, expected_region, atol=QUANTISED + ROUNDED)
-    np.testing.assert_allclose(problem.weigh(poses), -(edge + region).sum(axis=1), rtol=1e-12)
+    np.testing.assert_allclose(problem.log_likelihood(poses), -(edge + region).sum(axis=1), rtol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["human29", "dog", "planar_arm4"])
@@ -82,7 +82,7 @@ def test_other_bodies_equal_the_twin(name):
 def test_weights_of_the_terms(human, ring, smooth):
     poses = scattered(human, 4)
     edge, region = problem_of(human, ring, smooth).terms(poses)
-    weighed = problem_of(human, ring, smooth, edge_weight=0.25, region_weight=3.0).weigh(poses)
+    weighed = problem_of(human, ring, smooth, edge_weight=0.25, region_weight=3.0).log_likelihood(poses)
     np.testing.assert_allclose(weighed, -(0.25 * edge + 3.0 * region).sum(axis=1), rtol=1e-12)
 
 
@@ -101,17 +101,17 @@ def test_the_pose_that_made_the_silhouette_weighs_most(human, ring):
         views.append(ViewEvidence(camera.name, np.repeat(whole[:, :, None], 3, axis=2), whole, edges))
     problem = problem_of(human, ring, FrameEvidence(0, tuple(views)))
     others = scattered(human, 60, spread=4.0)
-    weights = problem.weigh(np.concatenate([human.neutral[None], others]))
+    weights = problem.log_likelihood(np.concatenate([human.neutral[None], others]))
     assert weights[0] > weights[1:].max()
 
 
 def test_leaving_the_pictures_is_never_rewarded(human, ring):
     """Where the pictures match everywhere, only the visible part of a pose gains weight."""
     problem = problem_of(human, ring, plain_evidence(ring, 255, 255))
-    assert problem.weigh(human.neutral[None])[0] == 0.0
+    assert problem.log_likelihood(human.neutral[None])[0] == 0.0
     rising = np.repeat(human.neutral[None], 40, axis=0)
     rising[:, 5] += np.linspace(0, 20000, 40)
-    weights = problem.weigh(rising)
+    weights = problem.log_likelihood(rising)
     edge, region = problem.terms(rising)
     assert (np.diff(edge, axis=0)[:, 0] >= 0).all(), "the further out, the worse, in the first camera"
     assert (np.diff(region, axis=0)[:, 0] >= 0).all()
@@ -123,7 +123,7 @@ def test_partly_outside_equals_the_twin(human, ring, smooth):
     poses = scattered(human, 30)
     poses[:, 3:6] += np.random.default_rng(4).uniform(-1500, 1500, (30, 3))
     problem = problem_of(human, ring, smooth)
-    seen = problem.weigher.projector.corners(poses)[1]
+    seen = problem.likelihood.projector.corners(poses)[1]
     assert (seen == 0).sum() > 100, "many limbs are partly outside"
     edge, region = problem.terms(poses)
     expected_edge, expected_region = twin(human, ring, smooth, poses)
@@ -146,10 +146,10 @@ def test_any_finite_pose_has_a_finite_weight(human, ring, smooth):
     poses[np.arange(12), np.arange(12)] = 10.0 ** np.arange(0, 300, 25)
     poses[:, 5] *= -(10.0 ** np.arange(12))
     for occlusion_aware in (False, True):
-        weights = problem_of(human, ring, smooth, occlusion_aware=occlusion_aware).weigh(poses)
+        weights = problem_of(human, ring, smooth, occlusion_aware=occlusion_aware).log_likelihood(poses)
         assert ((weights >= -8.0) & (weights <= 0.0)).all()
     with pytest.raises(BodyError):
-        problem_of(human, ring, smooth).weigh(np.full((1, 31), np.nan))
+        problem_of(human, ring, smooth).log_likelihood(np.full((1, 31), np.nan))
 
 
 def test_a_weight_depends_neither_on_other_poses_nor_on_threads(human, ring, smooth):
@@ -157,12 +157,12 @@ def test_a_weight_depends_neither_on_other_poses_nor_on_threads(human, ring, smo
     for occlusion_aware in (False, True):
         problem = problem_of(human, ring, smooth, occlusion_aware=occlusion_aware)
         numba.set_num_threads(1)
-        together = problem.weigh(poses)
-        np.testing.assert_array_equal(problem.weigh(poses[40:41]), together[40:41])
-        np.testing.assert_array_equal(problem.weigh(poses[::-1]), together[::-1])
+        together = problem.log_likelihood(poses)
+        np.testing.assert_array_equal(problem.log_likelihood(poses[40:41]), together[40:41])
+        np.testing.assert_array_equal(problem.log_likelihood(poses[::-1]), together[::-1])
         numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
-        np.testing.assert_array_equal(problem.weigh(poses), together)
-    assert problem.weigh(poses[:0]).shape == (0,)
+        np.testing.assert_array_equal(problem.log_likelihood(poses), together)
+    assert problem.log_likelihood(poses[:0]).shape == (0,)
 
 
 def hidden_by_nearer(points, limb, corners, depth):
@@ -192,7 +192,7 @@ def test_which_samples_are_hidden(human, ring, smooth):
     """Sample by sample; those within 0.02 px of an outline are left to rounding."""
     poses = scattered(human, 6)
     problem = problem_of(human, ring, smooth, occlusion_aware=True, edge_samples=64)
-    bits = problem.hidden(problem.weigher.projector.blocks(poses))
+    bits = problem.hidden(problem.likelihood.projector.blocks(poses))
     assert bits.shape == (1, 4, 10, 2, 16)
     along = (np.arange(32) + 0.5) / 32
     compared = hidden = 0
@@ -214,23 +214,23 @@ def test_which_samples_are_hidden(human, ring, smooth):
 
 
 def test_evidence_of_other_cameras_is_refused(human, ring, smooth):
-    weigher = EdgeRegionWeigher(human, ring, EdgeRegionSettings())
+    likelihood = EdgeRegionLikelihood(human, ring, EdgeRegionSettings())
     with pytest.raises(FootageError, match="has views c0, c1, c2"):
-        weigher.problem(FrameEvidence(0, smooth.views[:3]))
+        likelihood.problem(FrameEvidence(0, smooth.views[:3]))
     swapped = (smooth.views[1], smooth.views[0], *smooth.views[2:])
     with pytest.raises(FootageError, match="has views c1, c0"):
-        weigher.problem(FrameEvidence(0, swapped))
+        likelihood.problem(FrameEvidence(0, swapped))
     first = smooth.views[0]
     small = ViewEvidence(first.camera, first.picture, first.mask, first.edges[:100])
     with pytest.raises(FootageError, match="edge map of camera 'c0' in frame 0 is 320 × 100"):
-        weigher.problem(FrameEvidence(0, (small, *smooth.views[1:])))
+        likelihood.problem(FrameEvidence(0, (small, *smooth.views[1:])))
 
 
 def test_pictures_that_are_too_large_are_refused(human, ring):
     one = ring[0]
     huge = Camera("huge", 5000, 4000, one.matrix, one.distortion, one.rotation, one.translation)
     with pytest.raises(FootageError, match="5000 × 4000"):
-        EdgeRegionWeigher(human, (huge,), EdgeRegionSettings())
+        EdgeRegionLikelihood(human, (huge,), EdgeRegionSettings())
 
 
 def test_feasible_is_within_the_limits(human, ring, smooth):
@@ -244,6 +244,6 @@ def test_feasible_is_within_the_limits(human, ring, smooth):
 
 
 def test_samples_an_evaluation(human, ring):
-    assert EdgeRegionWeigher(human, ring, EdgeRegionSettings()).samples_per_evaluation == 3200
+    assert EdgeRegionLikelihood(human, ring, EdgeRegionSettings()).samples_per_evaluation == 3200
     settings = EdgeRegionSettings(edge_samples=70, region_samples=150)
-    assert EdgeRegionWeigher(human, ring, settings).samples_per_evaluation == 40 * (64 + 144)
+    assert EdgeRegionLikelihood(human, ring, settings).samples_per_evaluation == 40 * (64 + 144)

@@ -16,7 +16,7 @@ from studio.body.catalogue import load_body
 from studio.errors import SettingsError, StudioError
 from studio.geometry.camera_table import camera_table, outward_limit
 from studio.likelihood import edge_region
-from studio.likelihood.edge_region import EdgeRegionSettings, EdgeRegionWeigher
+from studio.likelihood.edge_region import EdgeRegionLikelihood, EdgeRegionSettings
 
 HERE = Path(__file__).parent
 BODIES = ("human31", "planar_arm4")
@@ -113,11 +113,11 @@ def no_device(monkeypatch):
 def test_without_a_card_the_gpu_is_refused_and_auto_is_the_processor(no_device):
     body, cameras, evidence, poses = scene_of("human31")
     with pytest.raises(StudioError, match="no card here") as caught:
-        EdgeRegionWeigher(body, cameras, settings(device="gpu"))
+        EdgeRegionLikelihood(body, cameras, settings(device="gpu"))
     assert "capture-studio[gpu]" in caught.value.hint
     assert "device to cpu" in caught.value.hint
     weighed = [
-        EdgeRegionWeigher(body, cameras, settings(device=device)).problem(evidence).weigh(poses)
+        EdgeRegionLikelihood(body, cameras, settings(device=device)).problem(evidence).log_likelihood(poses)
         for device in ("auto", "cpu")
     ]
     np.testing.assert_array_equal(*weighed)
@@ -127,15 +127,15 @@ def test_without_numbas_target_the_gpu_is_refused(monkeypatch):
     body, cameras = load_body("human31"), four_cameras()
     monkeypatch.setattr(edge_region, "DEVICE_MODULE", "studio.likelihood.no_such_device")
     with pytest.raises(StudioError, match="No module named"):
-        EdgeRegionWeigher(body, cameras, settings(device="gpu"))
-    assert EdgeRegionWeigher(body, cameras, settings(device="auto")).device is None
+        EdgeRegionLikelihood(body, cameras, settings(device="gpu"))
+    assert EdgeRegionLikelihood(body, cameras, settings(device="auto")).device is None
 
 
 def test_occlusion_is_the_processors_alone():
     body, cameras = load_body("human31"), four_cameras()
     with pytest.raises(SettingsError, match="Occlusion-aware"):
-        EdgeRegionWeigher(body, cameras, settings(device="gpu", occlusion_aware=True))
-    assert EdgeRegionWeigher(body, cameras, settings(device="auto", occlusion_aware=True)).device is None
+        EdgeRegionLikelihood(body, cameras, settings(device="gpu", occlusion_aware=True))
+    assert EdgeRegionLikelihood(body, cameras, settings(device="auto", occlusion_aware=True)).device is None
 
 
 def test_a_machines_missing_device_is_named():

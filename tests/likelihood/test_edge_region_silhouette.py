@@ -10,18 +10,18 @@ from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_ends
 from studio.errors import BodyError, FootageError
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
-from studio.likelihood.edge_region import EdgeRegionSettings, EdgeRegionWeigher
+from studio.likelihood.edge_region import EdgeRegionLikelihood, EdgeRegionSettings
 from studio.likelihood.edge_region_silhouette import (
+    EdgeRegionSilhouetteLikelihood,
     EdgeRegionSilhouetteSettings,
-    EdgeRegionSilhouetteWeigher,
 )
-from studio.likelihood.edge_silhouette import EdgeSilhouetteSettings, EdgeSilhouetteWeigher
+from studio.likelihood.edge_silhouette import EdgeSilhouetteLikelihood, EdgeSilhouetteSettings
 from studio.likelihood.problem import TRUNK_FIRST
 
 
 def problem_of(body, cameras, evidence, **knobs):
     settings = EdgeRegionSilhouetteSettings(**knobs)
-    return EdgeRegionSilhouetteWeigher(body, cameras, settings).problem(evidence)
+    return EdgeRegionSilhouetteLikelihood(body, cameras, settings).problem(evidence)
 
 
 @pytest.mark.parametrize("aware", [False, True])
@@ -30,15 +30,15 @@ def test_the_terms_are_those_of_the_other_weightings(human, ring, smooth, resolu
     poses = scattered(human, 21)
     knobs = {"occlusion_aware": aware, "edge_samples": 64}
     problem = problem_of(human, ring, smooth, silhouette_resolution=resolution, **knobs)
-    edge, region = EdgeRegionWeigher(human, ring, EdgeRegionSettings(**knobs)).problem(smooth).terms(poses)
-    other = EdgeSilhouetteWeigher(human, ring, EdgeSilhouetteSettings(silhouette_resolution=resolution))
+    edge, region = EdgeRegionLikelihood(human, ring, EdgeRegionSettings(**knobs)).problem(smooth).terms(poses)
+    other = EdgeSilhouetteLikelihood(human, ring, EdgeSilhouetteSettings(silhouette_resolution=resolution))
     silhouette, _ = other.problem(smooth).terms(poses)
     found = problem.terms(poses)
     np.testing.assert_array_equal(found[0], 1.0 - edge)
     np.testing.assert_array_equal(found[1], 1.0 - region)
     np.testing.assert_array_equal(found[2], silhouette)
     np.testing.assert_allclose(problem.fitness(poses), (2.0 - edge - region + silhouette).mean(axis=1))
-    np.testing.assert_allclose(problem.weigh(poses), -(edge + region + 1.0 - silhouette).sum(axis=1))
+    np.testing.assert_allclose(problem.log_likelihood(poses), -(edge + region + 1.0 - silhouette).sum(axis=1))
 
 
 def test_weights_of_the_terms(human, ring, smooth):
@@ -47,10 +47,10 @@ def test_weights_of_the_terms(human, ring, smooth):
     weighed = problem_of(human, ring, smooth, edge_weight=0.25, region_weight=2.0, silhouette_weight=3.0)
     expected = (0.25 * edge + 2.0 * region + 3.0 * silhouette).mean(axis=1)
     np.testing.assert_allclose(weighed.fitness(poses), expected)
-    np.testing.assert_allclose(weighed.weigh(poses), 4 * (expected - 5.25))
-    without = problem_of(human, ring, smooth, silhouette_weight=0.0).weigh(poses)
+    np.testing.assert_allclose(weighed.log_likelihood(poses), 4 * (expected - 5.25))
+    without = problem_of(human, ring, smooth, silhouette_weight=0.0).log_likelihood(poses)
     np.testing.assert_allclose(
-        without, EdgeRegionWeigher(human, ring, EdgeRegionSettings()).problem(smooth).weigh(poses)
+        without, EdgeRegionLikelihood(human, ring, EdgeRegionSettings()).problem(smooth).log_likelihood(poses)
     )
 
 
@@ -82,7 +82,9 @@ def test_a_body_without_a_trunk_is_the_same_in_both_stages():
 
 
 def test_the_pose_that_made_the_silhouettes_fits_best(human, ring):
-    corners, _ = EdgeRegionWeigher(human, ring, EdgeRegionSettings()).projector.corners(human.neutral[None])
+    corners, _ = EdgeRegionLikelihood(human, ring, EdgeRegionSettings()).projector.corners(
+        human.neutral[None]
+    )
     views = []
     for camera, outlines in zip(ring, corners[0], strict=True):
         mask = np.where(union(outlines, camera.width, camera.height)[0], 255, 0).astype(np.uint8)
@@ -101,7 +103,7 @@ def test_nothing_is_gained_by_leaving(human, ring):
     assert (edge[1] == 0).all()
     assert (region[1] == 0).all()
     assert (silhouette[1] == 0).all()
-    np.testing.assert_allclose(problem.weigh(poses)[1], -12.0)
+    np.testing.assert_allclose(problem.log_likelihood(poses)[1], -12.0)
 
 
 def test_any_finite_pose_is_a_number_on_any_number_of_threads(human, ring, smooth):
@@ -110,15 +112,15 @@ def test_any_finite_pose_is_a_number_on_any_number_of_threads(human, ring, smoot
     for evidence in (smooth, plain_evidence(ring, 0, 0)):
         problem = problem_of(human, ring, evidence)
         numba.set_num_threads(1)
-        weights = problem.weigh(poses)
+        weights = problem.log_likelihood(poses)
         assert ((weights >= -12.0) & (weights <= 0.0)).all()
-        np.testing.assert_array_equal(problem.weigh(poses[40:41]), weights[40:41])
+        np.testing.assert_array_equal(problem.log_likelihood(poses[40:41]), weights[40:41])
         numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
-        np.testing.assert_array_equal(problem.weigh(poses), weights)
+        np.testing.assert_array_equal(problem.log_likelihood(poses), weights)
 
 
 def test_wrong_evidence_is_refused(human, ring, smooth):
     with pytest.raises(BodyError):
-        problem_of(human, ring, smooth).weigh(np.full((1, 31), np.nan))
+        problem_of(human, ring, smooth).log_likelihood(np.full((1, 31), np.nan))
     with pytest.raises(FootageError, match="has views c0, c1, c2"):
         problem_of(human, ring, FrameEvidence(0, smooth.views[:3]))

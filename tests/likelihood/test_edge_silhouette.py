@@ -23,7 +23,7 @@ from studio.errors import BodyError
 from studio.evidence.edges import proximity_edges
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.evidence.settings import EvidenceSettings
-from studio.likelihood.edge_silhouette import EdgeSilhouetteSettings, EdgeSilhouetteWeigher
+from studio.likelihood.edge_silhouette import EdgeSilhouetteLikelihood, EdgeSilhouetteSettings
 from studio.likelihood.outline_kernels import DEPTH_ROW, LANES, ROWS
 from studio.likelihood.problem import TRUNK_FIRST, WHOLE_BODY
 from studio.likelihood.visible_edges import BLOCKS_A_THREAD, body_edges
@@ -33,7 +33,7 @@ ONE_SAMPLE = 1 / 100
 
 
 def problem_of(body, cameras, evidence, **knobs):
-    return EdgeSilhouetteWeigher(body, cameras, EdgeSilhouetteSettings(**knobs)).problem(evidence)
+    return EdgeSilhouetteLikelihood(body, cameras, EdgeSilhouetteSettings(**knobs)).problem(evidence)
 
 
 def edges_by_name(body, stage):
@@ -48,7 +48,7 @@ def edges_by_name(body, stage):
 
 def twin(body, cameras, evidence, poses, stage=WHOLE_BODY, samples=16):
     """(N, V) f_e, sample by sample; limbs are ordered by the kernel's depth of their middle."""
-    projector = EdgeSilhouetteWeigher(body, cameras, EdgeSilhouetteSettings()).projector
+    projector = EdgeSilhouetteLikelihood(body, cameras, EdgeSilhouetteSettings()).projector
     corners, seen = projector.corners(poses)
     blocks = projector.blocks(poses)
     rows = blocks.reshape(*blocks.shape[:3], ROWS, LANES)[..., DEPTH_ROW, :]
@@ -98,7 +98,7 @@ def test_partly_outside_equals_the_twin(human, ring, smooth):
     poses = scattered(human, 30)
     poses[:, 3:6] += np.random.default_rng(4).uniform(-1500, 1500, (30, 3))
     problem = problem_of(human, ring, smooth)
-    assert (problem.weigher.projector.corners(poses)[1] == 0).sum() > 100, "many limbs are partly outside"
+    assert (problem.likelihood.projector.corners(poses)[1] == 0).sum() > 100, "many limbs are partly outside"
     _, edge = problem.terms(poses)
     np.testing.assert_allclose(edge, twin(human, ring, smooth, poses), atol=2 * ONE_SAMPLE)
 
@@ -124,7 +124,7 @@ def test_every_body_has_edges_in_both_stages(name):
 
 def test_the_upper_edge_is_the_shoulders(human, ring):
     """The far end of the torso's cone is its upper one, so the sample points lie above its middle."""
-    corners = EdgeSilhouetteWeigher(human, ring, EdgeSilhouetteSettings()).projector.corners(
+    corners = EdgeSilhouetteLikelihood(human, ring, EdgeSilhouetteSettings()).projector.corners(
         human.neutral[None]
     )[0][0]
     limb, first, last = body_edges(human).trunk[-1]
@@ -142,7 +142,9 @@ def test_the_first_stage_uses_the_whole_silhouette(human, ring, smooth):
 
 def silhouettes_of(body, cameras, pose):
     """Evidence whose masks are the body's own pixels, with edges on their border."""
-    corners, _ = EdgeSilhouetteWeigher(body, cameras, EdgeSilhouetteSettings()).projector.corners(pose[None])
+    corners, _ = EdgeSilhouetteLikelihood(body, cameras, EdgeSilhouetteSettings()).projector.corners(
+        pose[None]
+    )
     views = []
     for camera, outlines in zip(cameras, corners[0], strict=True):
         mask = union(outlines, camera.width, camera.height)[0]
@@ -170,8 +172,8 @@ def test_fitness_is_the_sum_of_the_means_and_the_log_weight_its_multiple(human, 
     silhouette, edge = problem.terms(poses)
     fitness = problem.fitness(poses)
     np.testing.assert_allclose(fitness, silhouette.mean(axis=1) + edge.mean(axis=1))
-    np.testing.assert_allclose(problem.weigh(poses), 3.5 * fitness)
-    assert dataclasses.replace(problem.weigher.settings).fitness_scale == 3.5
+    np.testing.assert_allclose(problem.log_likelihood(poses), 3.5 * fitness)
+    assert dataclasses.replace(problem.likelihood.settings).fitness_scale == 3.5
 
 
 def test_leaving_the_pictures_is_never_rewarded(human, ring):
@@ -208,7 +210,9 @@ def test_empty_pictures_and_wild_poses_are_numbers(human, ring, smooth):
         for stage in (WHOLE_BODY, TRUNK_FIRST):
             fitness = problem_of(human, ring, evidence).fitness(poses, stage)
             assert ((fitness >= 0.0) & (fitness <= 2.0)).all()
-    assert (problem_of(human, ring, plain_evidence(ring, 0, 0)).weigh(scattered(human, 5)) == 0.0).all()
+    assert (
+        problem_of(human, ring, plain_evidence(ring, 0, 0)).log_likelihood(scattered(human, 5)) == 0.0
+    ).all()
     with pytest.raises(BodyError):
         problem_of(human, ring, smooth).fitness(np.full((1, 31), np.nan))
 

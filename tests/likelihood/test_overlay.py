@@ -7,10 +7,10 @@ from weighting_scene import CENTRE, looking_at, plain_evidence, scattered
 from studio.body.forward_kinematics import limb_frames
 from studio.body.model import kinematic_tables
 from studio.geometry.projection import project
-from studio.likelihood.bodytrack import BodytrackSettings, BodytrackWeigher
-from studio.likelihood.edge_region import EdgeRegionSettings, EdgeRegionWeigher
+from studio.likelihood.bodytrack import BodytrackLikelihood, BodytrackSettings
+from studio.likelihood.edge_region import EdgeRegionLikelihood, EdgeRegionSettings
 from studio.likelihood.edge_region_silhouette import EdgeRegionSilhouetteSettings
-from studio.likelihood.edge_silhouette import EdgeSilhouetteSettings, EdgeSilhouetteWeigher
+from studio.likelihood.edge_silhouette import EdgeSilhouetteLikelihood, EdgeSilhouetteSettings
 from studio.likelihood.overlay import overlay_points
 from studio.likelihood.template import TemplateSettings
 
@@ -26,11 +26,11 @@ def test_sample_points_are_the_pixels_that_the_kernel_reads(
     settings = EdgeRegionSettings(
         edge_samples=edge_samples, region_samples=region_samples, occlusion_aware=aware
     )
-    weigher = EdgeRegionWeigher(human, ring, settings)
-    problem = weigher.problem(plain_evidence(ring, 0, 0))
+    likelihood = EdgeRegionLikelihood(human, ring, settings)
+    problem = likelihood.problem(plain_evidence(ring, 0, 0))
     pose = scattered(human, 1)[0]
     pose[3:5] += move
-    outlines = weigher.projector.blocks(pose[None])
+    outlines = likelihood.projector.blocks(pose[None])
     edges, region = problem.recorded_indices(outlines)
     for v, (camera, seen) in enumerate(zip(ring, overlay_points(human, ring, pose, settings), strict=True)):
         for points, stream in (
@@ -46,7 +46,7 @@ def test_sample_points_are_the_pixels_that_the_kernel_reads(
 
 
 def test_the_benchmarks_sample_points_are_as_many_as_its_kernel_counts(human, ring):
-    problem = BodytrackWeigher(human, ring, BodytrackSettings()).problem(plain_evidence(ring, 0, 0))
+    problem = BodytrackLikelihood(human, ring, BodytrackSettings()).problem(plain_evidence(ring, 0, 0))
     for pose in scattered(human, 10, spread=20.0):
         views = overlay_points(human, ring, pose, BodytrackSettings())
         counts = problem.terms(pose[None])[2][0]
@@ -112,12 +112,12 @@ def test_the_template_has_no_sample_points(human, ring):
 @pytest.mark.parametrize("samples", [16, 48])
 def test_visible_edge_points_are_the_pixels_that_the_kernel_reads(human, ring, move, samples):
     settings = EdgeSilhouetteSettings(samples_per_edge=samples)
-    weigher = EdgeSilhouetteWeigher(human, ring, settings)
-    problem = weigher.problem(plain_evidence(ring, 0, 0))
+    likelihood = EdgeSilhouetteLikelihood(human, ring, settings)
+    problem = likelihood.problem(plain_evidence(ring, 0, 0))
     pose = scattered(human, 1)[0]
     pose[3:5] += move
-    outlines = weigher.projector.blocks(pose[None])
-    stream = problem.edges.recorded_indices(outlines, weigher.edges.whole, settings.edge_chunks)
+    outlines = likelihood.projector.blocks(pose[None])
+    stream = problem.edges.recorded_indices(outlines, likelihood.edges.whole, settings.edge_chunks)
     total = 0
     for v, (camera, seen) in enumerate(zip(ring, overlay_points(human, ring, pose, settings), strict=True)):
         drawn = np.floor(seen.edge_samples + 0.5).astype(int) @ [1, camera.width]

@@ -34,12 +34,12 @@ def test_every_weighting_keeps_the_contract(name, human, ring, smooth):
     problem = weighting.prepare(human, ring, weighting.settings_type()).problem(smooth)
     poses = scattered(human, 33)
     before = poses.copy()
-    weights = problem.weigh(poses)
+    weights = problem.log_likelihood(poses)
     assert weights.shape == (33,)
     assert weights.dtype == np.float64
     assert np.isfinite(weights).all()
     assert len(np.unique(weights)) > 25
-    trunk_first = problem.weigh(poses, stage=TRUNK_FIRST)
+    trunk_first = problem.log_likelihood(poses, stage=TRUNK_FIRST)
     assert np.isfinite(trunk_first).all()
     assert np.array_equal(trunk_first, weights) == (name not in STAGED)
     fitness = problem.fitness(poses)
@@ -48,7 +48,7 @@ def test_every_weighting_keeps_the_contract(name, human, ring, smooth):
     np.testing.assert_array_equal(np.argsort(fitness), np.argsort(weights))
     np.testing.assert_array_equal(poses, before)
     assert problem.feasible(poses).shape == (33,)
-    assert problem.weigh(np.zeros((0, 31))).shape == (0,)
+    assert problem.log_likelihood(np.zeros((0, 31))).shape == (0,)
 
 
 def test_settings_are_frozen_hashable_and_have_flat_names_of_their_own():

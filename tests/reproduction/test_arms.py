@@ -60,9 +60,9 @@ def test_the_true_pose_explains_its_picture_best(arm: TemplateArm, seed: int) ->
     truth = true_pose(arm.space, seed)
     problem = arm.observed(truth)
     around = truth + 0.1 * np.random.default_rng(seed).standard_normal((200, len(truth)))
-    there = problem.weigh(truth[None])[0]
+    there = problem.log_likelihood(truth[None])[0]
     assert there == pytest.approx(0.0, abs=1e-3)
-    assert np.all(problem.weigh(around) < there)
+    assert np.all(problem.log_likelihood(around) < there)
 
 
 def test_true_poses_keep_away_from_the_limits(arm: TemplateArm) -> None:
@@ -94,7 +94,7 @@ def test_absolute_angles_keep_the_links_beyond_a_cut_where_they_point(body: str,
     frame = arms.AbsoluteAngles(arm.observed(pose), places)
     turned = arms.absolute(pose, places)
     assert frame.relative(turned[None])[0] == pytest.approx(pose)
-    assert frame.weigh(turned[None]) == pytest.approx(arm.observed(pose).weigh(pose[None]))
+    assert frame.log_likelihood(turned[None]) == pytest.approx(arm.observed(pose).log_likelihood(pose[None]))
     turned[0] += 0.2
     moved = limb_ends(arm.body, frame.relative(turned[None]))[0] - limb_ends(arm.body, pose[None])[0]
     beyond = [column for column in range(1, len(before)) if before[column] >= 0]

@@ -306,14 +306,16 @@ def test_occluded_evidence_leaves_one_side_out_in_every_other_second() -> None:
     body = load_body("human25")
     cones = cone_blobs(body)
     mixture = cones.mixture(body, body.neutral[None]).at(0)
-    weigher = SimpleNamespace(settings=SimpleNamespace(blob_sharpness=1.0))
+    likelihood = SimpleNamespace(settings=SimpleNamespace(blob_sharpness=1.0))
     informed = object.__new__(ExpectedBlobs)
-    informed.fitted, informed.model, informed.weigher = SimpleNamespace(mixture=mixture), cones, weigher
+    informed.fitted, informed.model, informed.likelihood = SimpleNamespace(mixture=mixture), cones, likelihood
     columns = [index for index, entry in enumerate(body.parameters) if entry.name.startswith("left_knee")]
     bent = body.neutral.copy()
     bent[columns] += 0.8
     poses = np.array([body.neutral, bent])
-    seen, hidden = (following.occluded(body, frame, informed).weigh(poses) for frame in (0, following.SPELL))
+    seen, hidden = (
+        following.occluded(body, frame, informed).log_likelihood(poses) for frame in (0, following.SPELL)
+    )
     assert seen[0] > seen[1] + 0.1
     assert hidden[0] == pytest.approx(hidden[1])
 

@@ -194,7 +194,7 @@ def test_frames_are_given_the_truth_once(cache) -> None:
     assert isinstance(problems(cache, session, settings, LAST)(1), FittedToPoses)
     assert known_problems(cache, session, settings, truth)(1) is of_frame(1)
     away = truth[1] + np.where(np.arange(truth.shape[1]) < 3, 150.0, 0.0)
-    near, far = of_frame(1).weigh(np.stack([truth[1], away]))
+    near, far = of_frame(1).log_likelihood(np.stack([truth[1], away]))
     assert near > far
     edges = default_settings("condensation", "edge-region")
     with pytest.raises(SettingsError, match="edge-region"):

@@ -67,8 +67,8 @@ def test_a_pair_moves_a_person_towards_the_pictures(
         default_settings(tracker, weighting), knobs_for_evaluations(tracker, EVALUATIONS)
     ).tracker
     chosen = WEIGHTINGS[weighting]
-    weigher = chosen.prepare(body, ring_of_cameras(body), chosen.settings_type())
-    problem = weigher.problem(evidence["bodytrack" if chosen.edge_kind == "bodytrack" else "proximity"])
+    likelihood = chosen.prepare(body, ring_of_cameras(body), chosen.settings_type())
+    problem = likelihood.problem(evidence["bodytrack" if chosen.edge_kind == "bodytrack" else "proximity"])
 
     def searched() -> FrameResult:
         return search_frame(

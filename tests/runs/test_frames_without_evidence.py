@@ -106,10 +106,12 @@ def test_a_frame_without_a_finite_weight_ends_the_run_with_its_number(
     """What was tracked before stays, and the run goes on once its frames can be weighed."""
     run = prepare_run(session_on_disk, name="a", start_pose=true_poses()[0], seed=2, last=4, knobs=QUICK)
     finish(session_on_disk, run, layers=2 * QUICK["layers"] + 1 * QUICK["layers"] + 1)
-    whole = EdgeRegionProblem.weigh
+    whole = EdgeRegionProblem.log_likelihood
     with monkeypatch.context() as patched:
         patched.setattr(
-            EdgeRegionProblem, "weigh", lambda self, poses, stage=0: whole(self, poses, stage) * np.nan
+            EdgeRegionProblem,
+            "log_likelihood",
+            lambda self, poses, stage=0: whole(self, poses, stage) * np.nan,
         )
         with pytest.raises(RunError, match=r"^Frame 2, layer 2: The weighting gave nan for a pose\."):
             finish(session_on_disk, run)

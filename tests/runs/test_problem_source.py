@@ -36,7 +36,7 @@ def test_the_truth_weighs_more_than_poses_beside_it(session_on_disk: Session) ->
     for frame in (0, 5):
         problem = source.problem(frame, SETTINGS)
         beside = truth[frame] + np.array([[0.0] * 4, [0.5] * 4, [-0.5] * 4, [0.5, -0.5, 0.5, -0.5]])
-        assert np.argmax(problem.weigh(beside)) == 0
+        assert np.argmax(problem.log_likelihood(beside)) == 0
     source.close()
 
 
@@ -68,13 +68,13 @@ def test_only_the_last_few_are_held(session_on_disk: Session, made: list[int]) -
 def test_the_next_frame_is_made_ready_and_is_the_same(session_on_disk: Session, made: list[int]) -> None:
     poses = true_poses()[:3] + 0.1
     plain = ProblemSource(session_on_disk, session_on_disk.body())
-    wanted = [plain.problem(frame, SETTINGS).weigh(poses) for frame in range(8)]
+    wanted = [plain.problem(frame, SETTINGS).log_likelihood(poses) for frame in range(8)]
     plain.close()
     made.clear()
     with ThreadPoolExecutor(1) as executor:
         source = ProblemSource(session_on_disk, session_on_disk.body(), last=7, executor=executor)
         for frame in range(7):
-            assert np.array_equal(source.problem(frame, SETTINGS).weigh(poses), wanted[frame])
+            assert np.array_equal(source.problem(frame, SETTINGS).log_likelihood(poses), wanted[frame])
         source.close()
     assert sorted(made) == list(range(7))
 

@@ -47,7 +47,7 @@ def test_refining_comes_nearer_and_the_weighting_agrees(session_on_disk: Session
         settings = tracking.latest_settings()[1]
         for frame in range(8):
             problem = tracking.problems.problem(frame, settings)
-            old, new = problem.weigh(np.stack([shaken.poses[frame], made.track.poses[frame]]))
+            old, new = problem.log_likelihood(np.stack([shaken.poses[frame], made.track.poses[frame]]))
             assert new >= old
     back = read_track(run, "refined")
     assert np.array_equal(back.poses, made.track.poses)

@@ -124,7 +124,7 @@ def test_last_layer_returns_the_weighted_set_and_estimates() -> None:
     problem = Bowl(np.full(6, 0.5))
     weighted, record = FILTER.step_layer(generator(4, 0, 0), particles, 0, problem, SPACE, settings)
     assert np.array_equal(weighted.poses, particles.poses)
-    assert np.array_equal(weighted.raw_log_weights, problem.weigh(particles.poses))
+    assert np.array_equal(weighted.raw_log_weights, problem.log_likelihood(particles.poses))
     by_hand = np.exp(record.beta * weighted.raw_log_weights)
     mean = np.average(particles.poses, axis=0, weights=by_hand)
     variance = np.average((particles.poses - mean) ** 2, axis=0, weights=by_hand)
@@ -135,7 +135,7 @@ def test_last_layer_returns_the_weighted_set_and_estimates() -> None:
     best = particles.poses[np.argmax(by_hand)]
     assert np.allclose(reported.pose, mean)
     assert np.array_equal(reported.mode, best)
-    assert reported.log_weight == pytest.approx(problem.weigh(best[None])[0])
+    assert reported.log_weight == pytest.approx(problem.log_likelihood(best[None])[0])
     mode = FILTER.end_frame(weighted, SPACE, dataclasses.replace(settings, estimate="mode"))
     assert np.array_equal(mode.pose, best)
 
@@ -157,7 +157,7 @@ def test_impossible_poses_do_not_survive() -> None:
 
 def test_a_weight_that_is_not_finite_is_an_error() -> None:
     class Broken(Bowl):
-        def weigh(self, poses: np.ndarray, stage: int = 0) -> np.ndarray:
+        def log_likelihood(self, poses: np.ndarray, stage: int = 0) -> np.ndarray:
             return np.full(len(poses), np.nan)
 
     settings = AnnealedSettings()

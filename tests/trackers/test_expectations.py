@@ -47,7 +47,7 @@ class Informable(Bowl):
     def remembered(self, pose: Array) -> Mapping[str, Array]:
         return self.expecting(pose[None], {}).remembered(pose)
 
-    def weigh(self, poses: Array, stage: int = 0) -> Array:
+    def log_likelihood(self, poses: Array, stage: int = 0) -> Array:
         raise AssertionError("weighed before it was informed")
 
 

@@ -29,12 +29,12 @@ class NearMarkers:
     def __init__(self, pose: Array) -> None:
         self.wanted, self.priors = marker_points(BODY, pose)[0], HardPriors(BODY)
 
-    def weigh(self, poses: Array, stage: int = 0) -> Array:
+    def log_likelihood(self, poses: Array, stage: int = 0) -> Array:
         apart = np.linalg.norm(marker_points(BODY, poses) - self.wanted, axis=2)
         return -np.mean((apart / 100.0) ** 2, axis=1)
 
     def fitness(self, poses: Array, stage: int = 0) -> Array:
-        return self.weigh(poses, stage)
+        return self.log_likelihood(poses, stage)
 
     def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
         return self.priors.hold(poses, limbs_apart)
@@ -79,7 +79,7 @@ def test_an_attitude_far_from_rest_is_found_and_faces_the_right_way() -> None:
     problem = NearMarkers(truth)
     found = search(problem).run(candidates((400.0, -300.0, 900.0)))
     assert problem.error(found.pose) < 40.0
-    assert found.log_weight == pytest.approx(problem.weigh(found.pose[None])[0])
+    assert found.log_weight == pytest.approx(problem.log_likelihood(found.pose[None])[0])
     assert facing(BODY, found.pose[None])[0] @ facing(BODY, truth[None])[0] > 0.9
     assert found.rival is not None
     assert facing(BODY, found.rival[None])[0] @ facing(BODY, found.pose[None])[0] < 0.0
@@ -155,7 +155,9 @@ def test_the_penalty_of_attitudes_far_from_rest() -> None:
     expected = 4.0 * (77.5 / 155.0) ** 2 / np.count_nonzero(joints)
     assert eased.penalty(bent[None])[0] == pytest.approx(expected)
     assert eased.penalty(pose_with(heading=90, pelvis_x=4000)[None])[0] == 0.0
-    assert eased.weigh(bent[None])[0] == pytest.approx(problem.weigh(bent[None])[0] - expected)
+    assert eased.log_likelihood(bent[None])[0] == pytest.approx(
+        problem.log_likelihood(bent[None])[0] - expected
+    )
 
 
 def test_confidence_is_one_half_without_a_margin_and_grows_with_it() -> None:

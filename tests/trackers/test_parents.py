@@ -16,11 +16,11 @@ from studio.trackers.tracker import NO_PARENT, SearchSpace
 class Hill:
     """A weight that every pose has in another amount."""
 
-    def weigh(self, poses: np.ndarray, stage: int = 0) -> np.ndarray:
+    def log_likelihood(self, poses: np.ndarray, stage: int = 0) -> np.ndarray:
         return -np.sum(poses**2, axis=1)
 
     def fitness(self, poses: np.ndarray, stage: int = 0) -> np.ndarray:
-        return self.weigh(poses)
+        return self.log_likelihood(poses)
 
     def feasible(self, poses: np.ndarray, limbs_apart: bool = False) -> np.ndarray:
         return np.ones(len(poses), dtype=bool)

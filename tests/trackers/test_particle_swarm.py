@@ -193,7 +193,7 @@ def test_bests_never_get_worse_within_a_stage() -> None:
     _, records, sets = searched()
     bowl = Bowl(np.zeros(6))
     for stage in (range(4), range(5, 12)):
-        leaders = [float(bowl.weigh(sets[layer].extra[LEADER][None])[0]) for layer in stage]
+        leaders = [float(bowl.log_likelihood(sets[layer].extra[LEADER][None])[0]) for layer in stage]
         assert all(later >= earlier for earlier, later in itertools.pairwise(leaders))
     best = max(record.best_log_weight for record in records[5:])
     assert leaders[-1] == pytest.approx(best, abs=1e-12)

@@ -61,10 +61,10 @@ class Judge:
     def __init__(self, liked: np.ndarray) -> None:
         self.liked = liked
 
-    def weigh(self, poses: np.ndarray, stage: int = 0) -> np.ndarray:
+    def log_likelihood(self, poses: np.ndarray, stage: int = 0) -> np.ndarray:
         return -np.linalg.norm(poses - self.liked, axis=1)
 
-    fitness = weigh
+    fitness = log_likelihood
 
     def feasible(self, poses: np.ndarray, limbs_apart: bool = False) -> np.ndarray:
         return np.ones(len(poses), dtype=bool)

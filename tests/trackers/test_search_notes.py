@@ -41,7 +41,7 @@ def searched(tracker: Tracker, problem: Bowl, space: SearchSpace, **knobs: objec
 class Spike(Bowl):
     """One pose weighs, the others as good as nothing."""
 
-    def weigh(self, poses: np.ndarray, stage: int = 0) -> np.ndarray:
+    def log_likelihood(self, poses: np.ndarray, stage: int = 0) -> np.ndarray:
         return np.where(np.arange(len(poses)) == 2, 0.0, -1e6)
 
 

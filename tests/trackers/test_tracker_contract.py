@@ -180,8 +180,8 @@ def test_same_seed_same_result(name: str) -> None:
 def test_never_worse_than_its_start_on_a_bowl(name: str, seed: int) -> None:
     results, _ = run(name, 3, seed=seed)
     bowl = Bowl(np.zeros(COUNT))
-    start = float(bowl.weigh(START_POSE[None])[0])
-    reached = [float(bowl.weigh(result.estimate.pose[None])[0]) for result in results]
+    start = float(bowl.log_likelihood(START_POSE[None])[0])
+    reached = [float(bowl.log_likelihood(result.estimate.pose[None])[0]) for result in results]
     assert min(reached) > start
     # A swarm is resampled around its last estimate: where that was good already, it ends about as good.
     assert reached[-1] > reached[0] or reached[-1] > 0.1 * start
@@ -279,7 +279,7 @@ def test_weights_that_say_little_leave_a_defined_answer(name: str, kind: str) ->
     """And whatever is drawn around them: a set whose covariance is singular is one of these."""
 
     class Little(Bowl):
-        def weigh(self, poses: np.ndarray, stage: int = 0) -> np.ndarray:
+        def log_likelihood(self, poses: np.ndarray, stage: int = 0) -> np.ndarray:
             return weights_gone_wrong(kind, poses)
 
     results, records = run(name, 3, problem=Little(np.zeros(COUNT)), **sizes(name, 12))
@@ -307,7 +307,7 @@ def test_a_usual_search_has_no_notes(name: str) -> None:
 @pytest.mark.parametrize("kind", ["none possible", "no number"])
 def test_without_a_finite_weight_the_frame_is_refused_in_words(name: str, kind: str) -> None:
     class Nothing(Bowl):
-        def weigh(self, poses: np.ndarray, stage: int = 0) -> np.ndarray:
+        def log_likelihood(self, poses: np.ndarray, stage: int = 0) -> np.ndarray:
             return weights_gone_wrong(kind, poses)
 
     with pytest.raises(RunError) as caught:

@@ -12,14 +12,14 @@ class Bowl:
         self.centre, self.width = centre, width
         self.weighed = 0
 
-    def weigh(self, poses: np.ndarray, stage: int = 0) -> np.ndarray:
+    def log_likelihood(self, poses: np.ndarray, stage: int = 0) -> np.ndarray:
         """Log-weights, counting the poses."""
         self.weighed += len(poses)
         return -np.sum(((poses - self.centre) / self.width) ** 2, axis=1)
 
     def fitness(self, poses: np.ndarray, stage: int = 0) -> np.ndarray:
         """The log-weights."""
-        return self.weigh(poses, stage)
+        return self.log_likelihood(poses, stage)
 
     def feasible(self, poses: np.ndarray, limbs_apart: bool = False) -> np.ndarray:
         """Every pose is possible."""

@@ -47,9 +47,9 @@ class Known:
 
     informed: FrameLikelihood
 
-    def weigh(self, poses: Array, stage: int = 0) -> Array:
+    def log_likelihood(self, poses: Array, stage: int = 0) -> Array:
         """(N, D) poses to (N,) log-weights."""
-        return self.informed.weigh(poses, stage)
+        return self.informed.log_likelihood(poses, stage)
 
     def fitness(self, poses: Array, stage: int = 0) -> Array:
         """(N, D) poses to (N,) the fitness that a swarm maximises."""
@@ -73,7 +73,7 @@ class Occluded(Known):
     seen: DivergenceOfPoses
     sharpness: float
 
-    def weigh(self, poses: Array, stage: int = 0) -> Array:
+    def log_likelihood(self, poses: Array, stage: int = 0) -> Array:
         """(N, D) poses to (N,) log-weights by the blobs that are there, at any stage."""
         del stage
         return -self.sharpness * np.log(np.maximum(self.seen(poses), FLOOR))
@@ -89,7 +89,7 @@ def occluded(body: BodyModel, frame: int, informed: FrameLikelihood) -> Known:
     there = np.flatnonzero(~np.array(hidden))
     moved = dataclasses.replace(image, means=image.means + noise)
     seen = DivergenceOfPoses.against(body, informed.model, moved, there)
-    return Occluded(informed, seen, informed.weigher.settings.blob_sharpness)
+    return Occluded(informed, seen, informed.likelihood.settings.blob_sharpness)
 
 
 NOISE_KEY = 0xB10B
@@ -100,13 +100,13 @@ def problems(
 ) -> Callable[[int], FrameLikelihood]:
     """Frame number to problem, for the first `last` frames. Those of hulls are kept, as carving takes longest."""
     weighting, cameras = WEIGHTINGS[settings.weighting_name], session.cameras()
-    weigher = weighting.prepare(session.body(), cameras, settings.weighting)
+    likelihood = weighting.prepare(session.body(), cameras, settings.weighting)
 
     def made(frame: int) -> FrameLikelihood:
         seen = cache.evidence(
             session, cameras, frame, settings.evidence, weighting.edge_kind, weighting.reads_pictures
         )
-        return weigher.problem(seen)
+        return likelihood.problem(seen)
 
     if weighting.edge_kind != "hull":
         return made
@@ -288,9 +288,9 @@ def _fitted_from_many(problem: FrameLikelihood) -> FrameLikelihood:
     """A frame whose blobs are fitted from FITTED_AGAIN expected poses."""
     if not isinstance(problem, BlobProblem):
         return problem
-    weigher = copy.copy(problem.weigher)
-    weigher.settings = dataclasses.replace(weigher.settings, blob_starts=FITTED_AGAIN)
-    return BlobProblem(weigher, problem.hull)
+    likelihood = copy.copy(problem.likelihood)
+    likelihood.settings = dataclasses.replace(likelihood.settings, blob_starts=FITTED_AGAIN)
+    return BlobProblem(likelihood, problem.hull)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

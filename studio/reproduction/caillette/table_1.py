@@ -19,7 +19,7 @@ from studio.comparison.footage_cache import FootageCache
 from studio.comparison.statistics import number
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.evidence.frame_evidence import FrameEvidence
-from studio.likelihood.blobs import BlobProblem, BlobWeigher
+from studio.likelihood.blobs import BlobLikelihood, BlobProblem
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.numba_in_threads import numba
 from studio.reproduction.caillette.following import Known
@@ -130,11 +130,11 @@ def blob_fitting(session: Session, hulls: Sequence[Hull], truth: Array) -> float
     """Milliseconds of a fit from one prediction, the true pose (F, D) of the frame before, with blobs learnt from the
     frames themselves.
     """
-    weigher, body = _weigher(session), session.body()
+    likelihood, body = _likelihood(session), session.body()
     memory: Mapping[str, Array] = {}
     for hull, pose in zip(hulls, truth, strict=True):
-        memory = BlobProblem(weigher, hull).expecting(pose[None], memory).remembered(pose)
-    model = weigher.model(memory)
+        memory = BlobProblem(likelihood, hull).expecting(pose[None], memory).remembered(pose)
+    model = likelihood.model(memory)
     starts = truth[[max(0, frame - 1) for frame in range(len(hulls))]]
     return _milliseconds(
         [
@@ -157,7 +157,7 @@ def searching(
     space = search_space(body, session_sigma(session, body, fps), fitting(model, body, fps))
     contender = guided(particles)
     settings = changed_settings(default_settings(contender.tracker, BLOBS), contender.changes).tracker
-    weigher = _weigher(session)
+    likelihood = _likelihood(session)
 
     def search(informed: Known, before: FilterState, frame: int) -> FrameResult:
         return search_frame(
@@ -172,7 +172,7 @@ def searching(
 
     carried, frames = start_of(tuple(float(value) for value in truth[0])), list[Callable[[], FrameResult]]()
     for frame, (hull, pose) in enumerate(zip(hulls, truth, strict=True)):
-        informed = Known(BlobProblem(weigher, hull).expecting(pose[None], {}))
+        informed = Known(BlobProblem(likelihood, hull).expecting(pose[None], {}))
         if frame:
             frames.append(
                 lambda informed=informed, before=carried, frame=frame: search(informed, before, frame)
@@ -186,9 +186,9 @@ def _milliseconds(works: Sequence[Callable[[], Any]]) -> float:
     return 1000.0 * float(np.mean(list(quickest(dict(enumerate(works)), ROUNDS).values())))
 
 
-def _weigher(session: Session) -> BlobWeigher:
+def _likelihood(session: Session) -> BlobLikelihood:
     settings = default_settings(GUIDED, BLOBS)
-    return BlobWeigher(session.body(), session.cameras(), settings.weighting)
+    return BlobLikelihood(session.body(), session.cameras(), settings.weighting)
 
 
 def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:

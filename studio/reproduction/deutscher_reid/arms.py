@@ -40,14 +40,14 @@ class TemplateArm:
     body: BodyModel
     camera: Camera
     space: SearchSpace
-    weigher: Any
+    likelihood: Any
 
     def observed(self, pose: Array) -> FrameLikelihood:
         """The silhouette of pose (D,), as a function of poses."""
         mask = silhouette(self.body, self.camera, pose)
         picture = np.repeat(mask[:, :, None], 3, axis=2)
         view = ViewEvidence(self.camera.name, picture, mask, np.zeros_like(mask))
-        return self.weigher.problem(FrameEvidence(0, (view,)))
+        return self.likelihood.problem(FrameEvidence(0, (view,)))
 
 
 def template_arm(body_name: str) -> TemplateArm:
@@ -55,9 +55,9 @@ def template_arm(body_name: str) -> TemplateArm:
     body = load_body(body_name)
     camera = facing_camera(body)
     weighting = WEIGHTINGS["template"]
-    weigher = weighting.prepare(body, (camera,), weighting.settings_type())
+    likelihood = weighting.prepare(body, (camera,), weighting.settings_type())
     half_range = np.array([(entry.upper - entry.lower) / 2.0 for entry in body.parameters])
-    return TemplateArm(body_name, body, camera, search_space(body, half_range), weigher)
+    return TemplateArm(body_name, body, camera, search_space(body, half_range), likelihood)
 
 
 def facing_camera(body: BodyModel) -> Camera:
@@ -111,9 +111,9 @@ class AbsoluteAngles:
         """(N, D) absolute angles to the body's own."""
         return poses - np.where(self.before >= 0, poses[:, self.before], 0.0)
 
-    def weigh(self, poses: Array, stage: int = 0) -> Array:
+    def log_likelihood(self, poses: Array, stage: int = 0) -> Array:
         """(N, D) poses to (N,) log-weights."""
-        return self.problem.weigh(self.relative(poses), stage)
+        return self.problem.log_likelihood(self.relative(poses), stage)
 
     def fitness(self, poses: Array, stage: int = 0) -> Array:
         """(N, D) poses to (N,) log-weights."""

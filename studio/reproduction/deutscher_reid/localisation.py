@@ -350,7 +350,7 @@ def measure_fig_16(arguments: Mapping[str, Any], cache: FootageCache) -> dict[st
             else:
                 pose = localise(arm, int(picture), **knobs)[0].estimate.pose
             observed = arm.observed(true_pose(arm.space, int(picture)))
-            found.append(float(-observed.weigh(pose[None])[0]))
+            found.append(float(-observed.log_likelihood(pose[None])[0]))
         ssd.append(float(np.mean(found)))
     return {"ssd": ssd}
 

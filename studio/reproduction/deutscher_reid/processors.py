@@ -78,7 +78,7 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
     return {
         "threads": threads,
         "frame": milliseconds(frame),
-        "weighing": milliseconds(lambda: problem.weigh(poses)),
+        "weighing": milliseconds(lambda: problem.log_likelihood(poses)),
     }
 
 

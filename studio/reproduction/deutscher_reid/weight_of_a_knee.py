@@ -81,8 +81,8 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
         weighting = WEIGHTINGS[weighting_name]
         settings = changed_settings(default_settings("annealed", weighting_name), knobs)
         seen = cache.evidence(session, cameras, frame, settings.evidence, weighting.edge_kind)
-        weigher = weighting.prepare(body, cameras, settings.weighting)
-        curves[name] = weigher.problem(seen).weigh(poses).tolist()
+        likelihood = weighting.prepare(body, cameras, settings.weighting)
+        curves[name] = likelihood.problem(seen).log_likelihood(poses).tolist()
     return {
         "angles": np.rad2deg(angles).tolist(),
         "truth": float(np.rad2deg(pose[column])),
