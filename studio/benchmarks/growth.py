@@ -17,7 +17,7 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -98,7 +98,7 @@ class Sizes:
     """What is measured. pictures : factors of 640 × 480. frames : stored. runs : of a workspace's session."""
 
     particles: tuple[int, ...] = (50, 200, 800, 3200)
-    samples: tuple[int, ...] = (32, 64, 128, 256)
+    samples: tuple[int, ...] = (32, 64, 96, 128)
     cameras: tuple[int, ...] = (1, 2, 4, 8, 16)
     limbs: tuple[int, ...] = (4, 8, 16, 32, 64)
     pictures: tuple[float, ...] = (0.5, 1.0, 2.0, 4.0, 6.0)
@@ -136,7 +136,7 @@ def measure_growth(sizes: Sizes, progress: Progress) -> tuple[list[Curve], dict[
 
 
 @contextmanager
-def _opened(session: Session, last: int, knobs: Mapping[str, Any]) -> Iterator[OpenRun]:
+def _opened(session: Session, last: int, knobs: Mapping[str, Any]) -> Generator[OpenRun]:
     run = prepare_run(session, last=last, knobs=knobs, fit_shape=False, despite_findings=True)
     opened = OpenRun(str(session.path), str(run.folder))
     try:

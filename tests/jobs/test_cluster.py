@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import wait
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -189,13 +190,14 @@ def test_a_folder_that_workers_do_not_see(
 ) -> None:
     (tmp_path / "elsewhere").mkdir()
     made = cluster._marked
-    monkeypatch.setattr(cluster, "_marked", lambda _folder: made(tmp_path / "elsewhere"))
+    monkeypatch.setattr(
+        cluster, "_marked", lambda _: replace(made(tmp_path / "elsewhere"), folder=str(tmp_path))
+    )
     with pytest.raises(
         RunError, match=r"A worker on .* does not see the folder .* as this machine does"
     ) as no:
         ClusterExecutor(address, tmp_path)
     assert "Mount one file system" in no.value.hint
-    assert not list((tmp_path / "elsewhere").iterdir())
 
 
 def test_a_worker_that_comes_later_without_the_folder_ends_the_work(address: str, tmp_path: Path) -> None:
@@ -210,6 +212,7 @@ def test_other_versions_are_named(address: str, tmp_path: Path, monkeypatch: pyt
     with pytest.raises(RunError, match=r"A worker on .* has numpy .*, this machine has 1\.0\.") as no:
         ClusterExecutor(address, tmp_path)
     assert "same versions" in no.value.hint
+    assert not list(tmp_path.iterdir())
 
 
 software = cluster._software()

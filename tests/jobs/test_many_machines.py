@@ -20,13 +20,16 @@ import s3fs
 from distributed import LocalCluster
 from s3_server import BUCKET, s3_server
 from sample_walk import copy_of_walk
+from toy_experiments import toy
 from waiting import until
 
 import studio
 from studio.comparison.folders import new_comparison, place_of
 from studio.comparison.sweep import plan_sweep
+from studio.comparison.trials import Scale
 from studio.errors import SessionError
 from studio.jobs.comparison_run import run_sweep
+from studio.reproduction.runner import reproduce
 from studio.sessions import remote_sessions
 from studio.sessions.object_stores import Store
 from studio.sessions.remote_sessions import address_of, remote_runs, remote_session, sessions_at
@@ -200,6 +203,21 @@ def test_an_interrupted_run_goes_on_from_its_store(store: str, tmp_path: Path) -
     studio.go_on(copy.run("broken"))
     back = studio.download(address, tmp_path / "back" / "walk")
     same_search(back.run("broken"), studio.track(walk, **options).run)
+
+
+def test_a_reproduction_is_kept_at_an_address(
+    store: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    experiment, place = toy("toy", tmp_path / "log"), f"{store}/papers"
+    options = {"scale": Scale((0, 1)), "report": lambda *_: None, "processes": 1}
+    first = reproduce((experiment,), place, **options)
+    assert (first.measured, first.kept) == (4, 0)
+    names = Store(place).listed()
+    assert {"results.json", "report.html"} <= set(names)
+    assert sum(name.startswith("trials/") for name in names) == 4
+    monkeypatch.setenv("STUDIO_CACHE", str(tmp_path / "cache of another machine"))
+    again = reproduce((experiment,), place, **options)
+    assert (again.measured, again.kept) == (0, 4)
 
 
 @pytest.mark.slow
