@@ -10,7 +10,7 @@ TOOLS := node_modules/.package-lock.json
 # Compiled modules are kept: every process that a test starts would compile some 500 of them anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: env browser demo test test-fast test-slow faults fuzz soak watching audit test-opencv-4 check check-types check-style check-pages bench lock guide pictures wheel-test clean
+.PHONY: env browser demo test test-fast test-slow faults fuzz soak watching audit test-opencv-4 check check-types check-style check-pages bench growth lock guide pictures wheel-test clean
 
 env: $(READY)
 
@@ -102,6 +102,11 @@ $(TOOLS): package-lock.json $(READY)
 
 bench: env
 	$(BIN)/studio bench
+
+# How cost grows with particles, cameras, limbs, pixels, frames, runs; makes studio/SCALE.md. About ten minutes.
+growth: env
+	mkdir -p build
+	$(BIN)/python -m studio.benchmarks.growth --json build/growth.json --document studio/SCALE.md
 
 # Lock with hashes and without download addresses; run after changing the dependencies in pyproject.toml.
 lock:

@@ -13,16 +13,20 @@ from studio.comparison.trials import Scale
 from studio.jobs.cluster import CLUSTER_HELP
 from studio.reproduction.catalogue import EXPERIMENTS, find_experiments
 from studio.reproduction.experiment import Experiment
-from studio.reproduction.findings_files import number_in_words, read_findings
+from studio.reproduction.findings_files import FOOTAGE, number_in_words, read_findings
 from studio.reproduction.guide_findings import guide_folder, write_into_guide
 from studio.reproduction.plan import FULL_SEEDS, QUICK_SEEDS, scale_of
 from studio.reproduction.runner import Reproduction, reproduce
+from studio.sessions.object_stores import folder_of, is_address
+from studio.sessions.remote_sessions import bring_work
 from studio.sessions.workspace import workspace_root
 
 NOT_CONCLUDED = 1
 NOT_RUN = "not run yet"
 
-OUT_HELP = f"Folder of everything that is kept; default: '{REPRODUCTIONS}' in the workspace."
+OUT_HELP = (
+    f"Folder, or address of a store, of everything that is kept; default: '{REPRODUCTIONS}' in the workspace."
+)
 SEEDS_HELP = f"Seeds of every setting; default {FULL_SEEDS}, with --quick {QUICK_SEEDS}."
 QUICK_HELP = "A look in minutes: fewer seeds, frames and settings."
 PROCESSES_HELP = "How many at once; default: one a core."
@@ -35,7 +39,7 @@ JSON_HELP = "Print one JSON object and nothing else on standard output."
 
 @click.command("reproduce")
 @click.argument("name")
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), help=OUT_HELP)
+@click.option("--out", metavar="FOLDER", help=OUT_HELP)
 @click.option("--quick", is_flag=True, help=QUICK_HELP)
 @click.option("--seeds", type=click.IntRange(1, 1000), metavar="N", help=SEEDS_HELP)
 @click.option("--processes", type=click.IntRange(1, 1024), metavar="N", help=PROCESSES_HELP)
@@ -44,7 +48,7 @@ JSON_HELP = "Print one JSON object and nothing else on standard output."
 @click.option("--json", "as_json", is_flag=True, help=JSON_HELP)
 def reproduce_command(
     name: str,
-    out: Path | None,
+    out: str | None,
     quick: bool,
     seeds: int | None,
     processes: int | None,
@@ -59,31 +63,34 @@ def reproduce_command(
     says that an experiment could not be concluded; a claim that is not reproduced is a result like any other.
     """
     with errors_in_words():
-        folder = (out or workspace_root() / REPRODUCTIONS).expanduser().absolute()
+        place = folder_of(out) if out else str(workspace_root() / REPRODUCTIONS)
+        if not is_address(place):
+            place = str(Path(place).expanduser().absolute())
         if name == "list":
+            folder = bring_work(place, FOOTAGE) if is_address(place) else Path(place)
             print_result(_listed(folder), as_json)
             return
-        found = _run(find_experiments(name), folder, scale_of(seeds, quick), processes, cluster)
+        found = _run(find_experiments(name), place, scale_of(seeds, quick), processes, cluster)
         concluded = [document for document in found.documents if document["verdict"] != FAILED]
         for document in concluded if into_guide else ():
             note(f"The guide: {write_into_guide(guide_folder(), document)}")
-        print_result(_answer(found, folder), as_json)
+        print_result(_answer(found, place), as_json)
         if any(document["verdict"] == FAILED for document in found.documents):
             sys.exit(NOT_CONCLUDED)
 
 
 def _run(
-    experiments: tuple[Experiment, ...], folder: Path, scale: Scale, processes: int | None, cluster: str
+    experiments: tuple[Experiment, ...], place: str, scale: Scale, processes: int | None, cluster: str
 ) -> Reproduction:
     try:
         with progress("reproducing") as report:
             catalogue = tuple(EXPERIMENTS.values())
             return reproduce(
-                experiments, folder, scale, report, catalogue=catalogue, processes=processes, cluster=cluster
+                experiments, place, scale, report, catalogue=catalogue, processes=processes, cluster=cluster
             )
     except KeyboardInterrupt:
         typed = shlex.join(["studio", *sys.argv[1:]])
-        note(f"Every finished trial is kept in '{folder}'. Go on with: {typed}")
+        note(f"Every finished trial is kept in '{place}'. Go on with: {typed}")
         raise
 
 
@@ -109,18 +116,18 @@ def _listed(folder: Path) -> Document:
     return {"experiments": lines, "text": text}
 
 
-def _answer(found: Reproduction, folder: Path) -> Document:
+def _answer(found: Reproduction, place: str) -> Document:
     lines: list[str] = []
     for document in found.documents:
         lines.append(f"{document['name']}: {_verdict(document)}")
         lines += [f"  {number_in_words(number)}" for number in document["numbers"]]
         lines += [f"  {words}" for words in (document["words"], *document["notes"]) if words]
     lines.append(f"{found.measured} trials run, {found.kept} kept from before, {found.failed} failed.")
-    lines.append(f"Report: {folder / REPORT}")
+    lines.append(f"Report: {place}/{REPORT}")
     return {
-        "out": str(folder),
-        "report": str(folder / REPORT),
-        "summary": str(folder / SUMMARY),
+        "out": place,
+        "report": f"{place}/{REPORT}",
+        "summary": f"{place}/{SUMMARY}",
         "trials": {"measured": found.measured, "kept": found.kept, "failed": found.failed},
         "experiments": list(found.documents),
         "text": "\n".join(lines),

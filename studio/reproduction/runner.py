@@ -25,7 +25,10 @@ from studio.reproduction.provenance import commit
 from studio.sessions.atomic_files import PARTIAL_PREFIX, discard, move_into_place, new_folder_beside
 from studio.sessions.manifest import FILE_NAME as MANIFEST
 from studio.sessions.manifest import now
+from studio.sessions.object_stores import below, is_address
 from studio.sessions.process_lock import ProcessLock
+from studio.sessions.remote_sessions import bring_work, put_work, upload_unless_there
+from studio.sessions.session import Session
 from studio.synthesis.recipes import synthesize
 
 LOCK = "reproduction.lock"
@@ -49,7 +52,7 @@ class Reproduction:
 
 def reproduce(
     experiments: Sequence[Experiment],
-    out: Path,
+    out: Path | str,
     scale: Scale,
     report: Progress,
     *,
@@ -60,21 +63,26 @@ def reproduce(
 ) -> Reproduction:
     """Run the missing trials of some experiments and write the folder `out`.
 
-    catalogue : experiments whose findings the report shows, by default the experiments. processes, executor : see
-    `jobs.trials.run_jobs`. cluster : where no executor is given, see `jobs.cluster.chosen_executor`. A trial or a
-    conclusion that fails makes its experiment "failed" and no other. Raises SessionError for a folder that cannot be
-    used, RunError while another process works in it and for a cluster that cannot be used, KeyboardInterrupt with all
-    results stored.
+    out : a folder, or an address of a store: then all but footage is worked at in a folder of this machine and put
+    there at the end; footage is put there before it is tracked. catalogue : experiments whose findings the report
+    shows, by default the experiments. processes, executor : see `jobs.trials.run_jobs`. cluster : where no executor is
+    given, see `jobs.cluster.chosen_executor`. A trial or a conclusion that fails makes its experiment "failed" and no
+    other. Raises SessionError for a folder that cannot be used, RunError while another process works in it and for a
+    cluster that cannot be used, KeyboardInterrupt with all results stored.
     """
+    address = str(out) if is_address(out) else ""
+    out = bring_work(address, FOOTAGE) if address else Path(out)
     lock = _taken(out)
     try:
         planned = [plan(experiment, scale) for experiment in experiments]
-        work = _Work(out, planned, tuple(catalogue or experiments), report)
+        work = _Work(out, planned, tuple(catalogue or experiments), report, address)
         try:
-            with nullcontext(executor) if executor else chosen_executor(cluster, out) as chosen:
+            with nullcontext(executor) if executor else chosen_executor(cluster, address or out) as chosen:
                 work.run(processes, chosen)
         finally:
             results = work.write_overview()
+            if address:
+                put_work(address, FOOTAGE)
         documents = tuple(work.documents[entry.experiment.name] for entry in planned)
         return Reproduction(documents, results, work.measured, work.found, work.failed)
     finally:
@@ -90,10 +98,11 @@ class _Work:
         planned: list[PlannedExperiment],
         catalogue: tuple[Experiment, ...],
         report: Progress,
+        address: str,
     ) -> None:
         self.documents: dict[str, Document] = {}
         self._out, self._planned, self._catalogue = out, planned, catalogue
-        self._report = report
+        self._report, self._address = report, address
         self._folder = KeptTrials(out / TRIALS)
         self._jobs = each_once(planned)
         self._kept: dict[str, KeptOutcome] = {}
@@ -120,7 +129,8 @@ class _Work:
         self._conclude_what_is_done()
         if runnable:
             self._report_step("starting")
-            run_jobs(runnable, self._out / FOOTAGE, self._done, processes, executor=executor)
+            footage = below(self._address, FOOTAGE) if self._address else self._out / FOOTAGE
+            run_jobs(runnable, footage, self._done, processes, executor=executor)
 
     def write_overview(self) -> Document:
         """The files of all experiments together."""
@@ -136,6 +146,9 @@ class _Work:
             try:
                 if not is_rendered(name, self._out / FOOTAGE, frames):
                     self._render_one(name, frames)
+                if self._address:
+                    place = below(self._address, FOOTAGE, name)
+                    upload_unless_there(Session(self._out / FOOTAGE / name), place)
             except StudioError as error:
                 problems[name] = f"The footage '{name}' cannot be made. {error}"
         return problems

@@ -35,6 +35,7 @@ from studio.sessions.atomic_files import (
     write_bytes,
     writing,
 )
+from studio.sessions.file_checksums import NAME as CHECKSUMS
 from studio.sessions.file_checksums import check_files
 from studio.sessions.manifest import FILE_NAME as MANIFEST
 from studio.sessions.names import checked_name, free_name, name_from
@@ -253,6 +254,39 @@ def sessions_at(address: str) -> tuple[RemoteSession, ...]:
         for name in names
     ]
     return tuple(one for one in found if one.whole or one.bytes)
+
+
+def upload_unless_there(session: Session, address: str) -> None:
+    """Put a session at an address, in place of another one there; files of the same names and sizes are the same."""
+    store = Store(address)
+    there, here = store.listed(), dict(_own_files(session.path))
+    # These say when it was made.
+    dated = {MANIFEST, CHECKSUMS}
+    sizes = {name: path.stat().st_size for name, path in here.items() if name not in dated}
+    if MANIFEST in there and sizes == {name: one.size for name, one in there.items() if name not in dated}:
+        return
+    store.remove([MANIFEST, *there])
+    upload(session, address)
+
+
+def bring_work(address: str, *left_out: str) -> Path:
+    """The folder of this machine for what is kept at an address, with all of it that it lacked. left_out : folders."""
+    folder, store = work_folder(address), Store(address)
+    files = {
+        name: one
+        for name, one in store.listed().items()
+        if name.split("/")[0] not in left_out and not (folder / name).is_file()
+    }
+    store.bring(files, folder, lambda _: None)
+    return folder
+
+
+def put_work(address: str, *left_out: str) -> None:
+    """Put all that the folder has to the address."""
+    files = {
+        name: path for name, path in _own_files(work_folder(address)) if name.split("/")[0] not in left_out
+    }
+    Store(address).put(files, lambda _: None)
 
 
 def remote_file(address: str) -> str:

@@ -215,6 +215,7 @@ def test_other_versions_are_named(address: str, tmp_path: Path, monkeypatch: pyt
     with pytest.raises(RunError, match=r"A worker on .* has numpy .*, this machine has 1\.0\.") as no:
         ClusterExecutor(address, tmp_path)
     assert "same versions" in no.value.hint
+    assert not list(tmp_path.iterdir())
 
 
 software = cluster._software()

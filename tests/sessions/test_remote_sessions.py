@@ -30,6 +30,7 @@ from studio.sessions.remote_sessions import (
     remote_session,
     sessions_at,
     upload,
+    upload_unless_there,
 )
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session
@@ -362,6 +363,19 @@ def test_footage_that_lies_elsewhere_and_a_taken_place(address: str, toy: Sessio
     with pytest.raises(SessionError, match="lies elsewhere") as no:
         upload(Session(toy.path), f"{address}-other")
     assert "--copy" in no.value.hint
+
+
+def test_rendered_footage_is_put_once_and_again_where_it_is_other(address: str, toy: Session) -> None:
+    upload_unless_there(toy, address)
+    stamps = Store(address).listed()
+    (toy.path / "session.json").touch()
+    upload_unless_there(toy, address)
+    assert Store(address).listed() == stamps
+    (toy.path / "pictures" / "front" / "0003.png").unlink()
+    Store(address).write("left.over", b"x")
+    upload_unless_there(toy, address)
+    assert set(stamps) - set(Store(address).listed()) == {"pictures/front/0003.png"}
+    assert "left.over" not in Store(address).listed()
 
 
 def test_the_workspace_takes_folders_by_address_and_refuses_to_change_what_is_far(
