@@ -153,7 +153,8 @@ def before_and_after() -> str:
     before = json.loads((assets_folder() / "guide" / REPRODUCTION / BEFORE).read_text(encoding="utf-8"))
     found = findings_of_the_guide()
     rows: list[str] = []
-    for name in dict.fromkeys((*before["rows"], *found)):
+    measured_first = sorted(dict.fromkeys((*before["rows"], *found)), key=lambda name: name not in found)
+    for name in measured_first:
         was, now = before["rows"].get(name), found.get(name)
         known = now or was
         head = f"{html.escape(known['title'])}<br><code>{name}</code><br>{html.escape(known['source'])}"
