@@ -30,6 +30,7 @@ OF_ANOTHER = {
 """Verbs that are options of another one's command: --undo, --quality, --resume, --replay."""
 OWN_WORDS = {
     "track": {"first", "last"},
+    "batch": {"first", "last"},
     "background": {"source", "plates", "exclude", "exclude_unused"},
     "compare": {"trackers", "first", "last", "changes"},
     "sweep": {"vary", "first", "last"},
