@@ -30,10 +30,10 @@ OF_ANOTHER = {
 """Verbs that are options of another one's command: --undo, --quality, --resume, --replay."""
 OWN_WORDS = {
     "track": {"first", "last"},
+    "batch": {"first", "last"},
     "background": {"source", "plates", "exclude", "exclude_unused"},
     "compare": {"trackers", "first", "last", "changes"},
     "sweep": {"vary", "first", "last"},
-    "batch": {"first", "last"},
     "view": {"layer"},
 }
 """Parameters that the terminal writes in another way: --frames A:B, --exclude CAMERA=…, layers counted from 1."""
