@@ -25,10 +25,10 @@ from waiting import until
 
 import studio
 from studio.comparison.folders import new_comparison, place_of
-from studio.comparison.sweep import plan_sweep
+from studio.comparison.sweep import conclude_sweep, plan_sweep
 from studio.comparison.trials import Scale
 from studio.errors import SessionError
-from studio.jobs.comparison_run import run_sweep
+from studio.jobs.comparison_run import run_comparison
 from studio.reproduction.runner import reproduce
 from studio.sessions import remote_sessions
 from studio.sessions.object_stores import Store
@@ -124,7 +124,7 @@ def test_a_sweep_of_a_session_in_a_store_with_a_machine_lost(
     plan = plan_sweep(walk, GRID, range(2), knobs=KNOBS, last=2, fit_shape=False)
     kept = new_comparison(place_of(walk, sweep=True), plan)
     with ThreadPoolExecutor(1) as here:
-        serial = run_sweep(kept, walk, lambda *_: None, executor=here)
+        serial = run_comparison(kept, walk, lambda *_: None, conclude_sweep, executor=here)
     assert [replace(run, milliseconds=0) for run in found.sweep.runs] == [
         replace(run, milliseconds=0) for run in serial.runs
     ]
