@@ -100,7 +100,7 @@ def root_prediction() -> Any:  # noqa: ANN401
 
 
 def root_spread() -> Any:  # noqa: ANN401
-    """See `guided_particles.walked`; what it was chosen by stands in `reproduce caillette-root-spread`."""
+    """See `guided_particles.propagated`; what it was chosen by stands in `reproduce caillette-root-spread`."""
     return next_frame_knob(
         2.0, 0.1, 5.0, 0.1, label="spread of learnt root motion",
         help="Multiplies the standard deviations of the root's learnt movement in a motion cluster, because other "
