@@ -1,4 +1,4 @@
-"""Array types, and named arrays from npz archives, one archive at a time.
+"""Array types, what is often asked of arrays, and named arrays from npz archives, one archive at a time.
 
 NumPy reads the head of each array with Python's own parser (`ast`), which counts its depth for the whole process: two
 threads that parse at the same moment may both end in "AST constructor recursion depth mismatch" (seen with Python 3.11,
@@ -19,6 +19,23 @@ Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 _one_at_a_time = threading.Lock()
+
+
+def runs_of(mask: Mask) -> list[tuple[int, int]]:
+    """The runs of True in a mask (K,), each as its first row and one past its last."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return [(int(first), int(last)) for first, last in edges.reshape(-1, 2)]
+
+
+def median_and_spread(values: Array) -> tuple[float, float]:
+    """The median of values (K,), and their standard deviation by the median distance from it, were they normal."""
+    median = float(np.median(values))
+    return median, 1.4826 * float(np.median(np.abs(values - median)))
+
+
+def evenly_spread(count: int, most: int) -> Indices:
+    """Up to `most` of `count` rows, evenly spread, both ends included."""
+    return np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(np.int64))
 
 
 def read_archive(source: Path | IO[bytes]) -> dict[str, NDArray[Any]]:

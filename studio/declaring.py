@@ -286,6 +286,10 @@ Body = Annotated[
     ),
     Terminal(metavar="NAME"),
 ]
+First = Annotated[int | None, Field(ge=0, description="Default: the frame of the start pose.")]
+Last = Annotated[int | None, Field(ge=1, description="The frame after the last one; default: all.")]
 Model = Annotated[str, Field(description="Behaviour model, by name or file."), Terminal(metavar="MODEL")]
-Despite = Annotated[bool, Field(description="Track although the footage speaks against the calibration.")]
+AllowInconsistent = Annotated[
+    bool, Field(description="Track although the footage speaks against the calibration.")
+]
 Values = Annotated[Mapping[str, object] | None, Field(description="Knobs, by name."), Web(name="settings")]

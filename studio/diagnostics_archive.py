@@ -29,12 +29,11 @@ from studio.declaring import Terminal
 from studio.errors import StudioError
 from studio.launch import LOG_NAME, served_at
 from studio.self_check import PACKAGE, doctor
-from studio.server.app_state import STATE_NAME
 from studio.sessions.atomic_files import taken, write_bytes
 from studio.sessions.run_log import read_log
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.sessions.workspace import Workspace
+from studio.sessions.workspace import STATE_NAME, Workspace
 from studio.typed_decoding import is_list, is_table
 
 USUAL_NAME = Path("studio-diagnostics.zip")

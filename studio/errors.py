@@ -1,7 +1,8 @@
 """Errors with a cause and a remedy.
 
 Every error that a user can cause is a `StudioError`: `message` says what is wrong and where (naming the thing
-and the value), `hint` says what to do. Commands print both and exit with 2; the server answers with `status`.
+and the value), `hint` says what to do. Commands print both and exit with 2; the server answers with `status`, which a
+class names with its `code`, or has of its base.
 """
 
 
@@ -14,6 +15,9 @@ class StudioError(Exception):
     status = 400
     code = "error"
 
+    def __init_subclass__(cls, status: int | None = None, code: str = "") -> None:
+        cls.status, cls.code = status or cls.status, code or cls.code
+
     def __init__(self, message: str, hint: str = "") -> None:
         super().__init__(message, hint)
         self.message = message
@@ -23,85 +27,57 @@ class StudioError(Exception):
         return f"{self.message} {self.hint}".strip()
 
 
-class SettingsError(StudioError):
+class SettingsError(StudioError, status=422, code="settings"):
     """An unknown setting, or a value outside its range."""
 
-    status, code = 422, "settings"
 
-
-class BodyError(StudioError):
+class BodyError(StudioError, status=422, code="body"):
     """A body file, subject file or pose that does not describe a body."""
 
-    status, code = 422, "body"
 
-
-class CalibrationError(StudioError):
+class CalibrationError(StudioError, status=422, code="calibration"):
     """A calibration that cannot be read or would place cameras wrongly."""
 
-    status, code = 422, "calibration"
 
-
-class FootageError(StudioError):
+class FootageError(StudioError, status=422, code="footage"):
     """Pictures or videos that are missing, damaged or do not fit their calibration."""
 
-    status, code = 422, "footage"
 
-
-class SessionError(StudioError):
+class SessionError(StudioError, status=409, code="session"):
     """A session, run or result that cannot be found, read or written."""
 
-    status, code = 409, "session"
 
-
-class NotFoundError(SessionError):
+class NotFoundError(SessionError, status=404, code="not-found"):
     """A session, run, frame or layer that does not exist."""
 
-    status, code = 404, "not-found"
 
-
-class DamagedError(NotFoundError):
+class DamagedError(NotFoundError, code="damaged"):
     """A damaged stored frame: a gap, until it is tracked again."""
 
-    code = "damaged"
 
-
-class TruthError(StudioError):
+class TruthError(StudioError, status=422, code="truth"):
     """A TRC or other reference motion that cannot be used."""
 
-    status, code = 422, "truth"
 
-
-class RunError(StudioError):
+class RunError(StudioError, status=409, code="run"):
     """A run that cannot start or go on."""
 
-    status, code = 409, "run"
 
-
-class AccessError(StudioError):
+class AccessError(StudioError, status=403, code="access"):
     """A request without the token's cookie, from a foreign host or origin."""
 
-    status, code = 403, "access"
 
-
-class BehaviourError(StudioError):
+class BehaviourError(StudioError, status=422, code="behaviour"):
     """A behaviour model that cannot be learnt, read or used with this body."""
 
-    status, code = 422, "behaviour"
 
-
-class UnforeseenError(StudioError):
+class UnforeseenError(StudioError, status=500, code="unforeseen"):
     """A fault of the studio itself."""
 
-    status, code = 500, "unforeseen"
 
-
-class WorkCancelledError(StudioError):
+class WorkCancelledError(StudioError, status=409, code="cancelled"):
     """Long work that the caller cancelled; nothing of it is kept."""
 
-    status, code = 409, "cancelled"
 
-
-class ExportError(StudioError):
+class ExportError(StudioError, status=422, code="export"):
     """An export that cannot be made, or that differs when it is read back."""
-
-    status, code = 422, "export"

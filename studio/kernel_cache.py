@@ -8,13 +8,14 @@ the kernel's file alone), and one that none reaches is found: by another process
 
 import contextlib
 import functools
+import gc
 import hashlib
 import os
 import pickle
 import sqlite3
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Generator, Iterator
 from enum import Enum
 from pathlib import Path
 from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
@@ -22,6 +23,7 @@ from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
 import numba
 import numpy as np
 import platformdirs
+from numba.core import event
 from numba.core.codegen import CPUCodegen
 from numba.core.compiler import CompileResult
 from numba.core.cpu import CPUContext
@@ -38,6 +40,8 @@ KNOWN_BY_NAME = ("numpy", "numba", "math", "builtins")
 """Packages whose functions are what their name and version say."""
 PATIENCE_S = 60.0
 """How long a process that compiles a kernel is waited for."""
+MOST_BYTES = 256 << 20
+"""Size of the folder, some thirty times that of all kernels; beyond it those go that were not used for longest."""
 
 
 class UnkeyedError(TypeError):
@@ -89,6 +93,8 @@ class KernelCache:
             data = _kept(place)  # by the process that had its turn before
             if data is not None:
                 self._give_up_turn(place)
+        if data is None:
+            _compiling()
         return CompileResult._rebuild(target_context, *pickle.loads(data)) if data else None
 
     def save_overload(self, sig: Signature | tuple[Type, ...], data: CompileResult) -> None:
@@ -124,6 +130,46 @@ class KernelCache:
             turn.close()
             with contextlib.suppress(OSError):
                 place.with_suffix(".turn").unlink(missing_ok=True)
+
+
+_waiting: list[Callable[[], None]] = []
+"""What is done once something has to be compiled."""
+
+
+@contextlib.contextmanager
+def when_compiling(action: Callable[[], None]) -> Generator[None]:
+    """Do something before the first kernel that has to be compiled within; nothing where all are found."""
+    _waiting.append(action)
+    try:
+        yield
+    finally:
+        if action in _waiting:
+            _waiting.remove(action)
+
+
+def _compiling() -> None:
+    while _waiting:
+        _waiting.pop()()
+
+
+class _NotCollecting(event.Listener):
+    """Python's collector of garbage rests while Numba compiles, which it makes a sixth slower: there is much to look at
+    and nothing to free. Numba compiles one kernel at a time, those that it calls within.
+    """
+
+    def __init__(self) -> None:
+        self._collected = list[bool]()
+
+    def on_start(self, event: event.Event) -> None:
+        self._collected.append(gc.isenabled())
+        gc.disable()
+
+    def on_end(self, event: event.Event) -> None:
+        if self._collected.pop():
+            gc.enable()
+
+
+event.register("numba:compile", _NotCollecting())
 
 
 @functools.cache
@@ -198,6 +244,8 @@ def _kept(place: Path) -> bytes | None:
         data = place.read_bytes()
     except OSError:
         return None
+    with contextlib.suppress(OSError):
+        os.utime(place)
     return data[CHECKSUM:] if hashlib.sha256(data[CHECKSUM:]).digest() == data[:CHECKSUM] else None
 
 
@@ -210,5 +258,20 @@ def _keep(place: Path, content: bytes) -> None:
             os.replace(name, place)
         except OSError:
             Path(name).unlink(missing_ok=True)
+        _forget_unused(place.parent)
     except OSError:
         return
+
+
+def _forget_unused(room: Path) -> None:
+    """Remove what was not used for longest, until the rest is not larger than MOST_BYTES."""
+    kept: list[tuple[int, int, Path]] = []
+    for place in room.glob("*.kernel"):
+        with contextlib.suppress(OSError):  # another process removed it
+            found = place.stat()
+            kept.append((found.st_mtime_ns, found.st_size, place))
+    size = 0
+    for _, bytes_here, place in sorted(kept, reverse=True):
+        size += bytes_here
+        if size > MOST_BYTES:
+            place.unlink(missing_ok=True)

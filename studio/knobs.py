@@ -6,6 +6,7 @@ the JSON schema, the range check and the guide's table are all made from that on
 
 import dataclasses
 import functools
+import inspect
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -62,11 +63,19 @@ def knob(
 
 next_frame_knob = functools.partial(knob, takes_effect="next frame")
 """A knob that takes effect with the next frame."""
+new_run_knob = functools.partial(knob, takes_effect="new run")
+"""A knob that a run keeps."""
+
+
+def with_default(owner: type["DataclassInstance"], name: str, default: Value) -> Any:  # noqa: ANN401
+    """A knob of a settings class declared again for a subclass, with another default."""
+    declared: Knob = owner.__dataclass_fields__[name].metadata["knob"]
+    return field(default=default, metadata={"knob": dataclasses.replace(declared, default=default)})
 
 
 def knobs_of(settings: object) -> tuple[Knob, ...]:
-    """The knobs of a settings class, or of a value of one, in the order of their lines; `group` is the class's `title`
-    attribute.
+    """The knobs of a settings class, or of a value of one, in the order of their lines, a class's own before those
+    that it inherits; `group` is the class's `title` attribute.
     """
     return _knobs_of_class(settings if isinstance(settings, type) else type(settings))
 
@@ -74,8 +83,12 @@ def knobs_of(settings: object) -> tuple[Knob, ...]:
 @functools.cache
 def _knobs_of_class(settings_type: type[Any]) -> tuple[Knob, ...]:
     group = getattr(settings_type, "title", settings_type.__name__)
+    fields = {entry.name: entry for entry in dataclasses.fields(settings_type)}
+    names = dict.fromkeys(
+        name for owner in settings_type.__mro__ for name in inspect.get_annotations(owner) if name in fields
+    )
     found: list[Knob] = []
-    for entry in dataclasses.fields(settings_type):
+    for entry in map(fields.__getitem__, names):
         declared = entry.metadata.get("knob")
         if declared is not None:
             label = declared.label or entry.name.replace("_", " ")

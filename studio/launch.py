@@ -16,15 +16,12 @@ from studio.jobs.commands import Start, about
 from studio.jobs.control import StudioControl
 from studio.runs.new_run import prepare_run
 from studio.runs.samples import install_sample
-from studio.scene.window_scenes import WindowScenes
-from studio.server.access import binding_rule, new_token
-from studio.server.app import build_app
-from studio.server.app_state import STATE_NAME
-from studio.server.safe_paths import default_footage_roots
+from studio.server.access import HostRule, binding_rule, new_token
 from studio.sessions.atomic_files import write_text
 from studio.sessions.process_lock import ProcessLock
 from studio.sessions.session import Session
-from studio.sessions.workspace import Workspace
+from studio.sessions.stored_run import StoredRun
+from studio.sessions.workspace import STATE_NAME, Workspace
 
 Announce = Callable[[str], None]
 
@@ -54,19 +51,17 @@ def serve(
     host: str = "127.0.0.1",
     port: int = PORT,
     allow_remote: bool = False,
-    open_session: str | None = None,
     *,
-    open_run: str | None = None,
-    track: bool = False,
+    first: Callable[[], StoredRun] | None = None,
     name: str = "",
     announce: Announce = click.echo,
 ) -> None:
     """Serve the studio on a workspace until Ctrl-C.
 
-    port : 0 takes a free one. open_session, open_run : what the printed address shows first; with `track`
-    the run is tracked at once. announce : called once with the addresses (`printed`). name : the host name of a
-    proxy with TLS before the studio, which is served at https://NAME/ then. Raises StudioError for a host that
-    needs `allow_remote`, a port that is taken, or a workspace that cannot be written.
+    port : 0 takes a free one. first : makes a run that is tracked at once, and that the printed address shows.
+    announce : called once with the addresses (`printed`). name : the host name of a proxy with TLS before the studio,
+    which is served at https://NAME/ then. Raises StudioError for a host that needs `allow_remote`, a port that is
+    taken, or a workspace that cannot be written.
     """
     hosts = binding_rule(host, allow_remote, name)
     workspace = Workspace(workspace_root)
@@ -76,20 +71,15 @@ def serve(
         show_address(f"http://{_named(host)}:{listener.getsockname()[1]}")
         control = StudioControl(workspace)
         try:
-            app = build_app(
-                workspace,
-                control,
-                WindowScenes(workspace, control),
-                token,
-                viewers_token=viewers_token,
-                hosts=hosts,
-                footage_roots=default_footage_roots(workspace.root),
-                log_path=log_path,
-            )
-            if track and open_session and open_run:
-                _track(control, workspace.session(open_session), open_run)
+            # The other process loads what it needs, and begins to track, while this one loads the server.
+            control.start()
+            run = None if first is None else first()
+            if run is not None:
+                control.send(Start(**about(run.folder)))
+            app = _app(workspace, control, (token, viewers_token), hosts, log_path)
             at = f"https://{name}" if name else f"http://{_named(host)}:{listener.getsockname()[1]}"
-            shown = (address(at, key, open_session, open_run) for key in (token, viewers_token))
+            place = (None, None) if run is None else (run.record.session, run.name)
+            shown = (address(at, key, *place) for key in (token, viewers_token))
             announce(printed(*shown, plainly=allow_remote and not name))
             _serve_until_stopped(app, listener)
         finally:
@@ -98,13 +88,15 @@ def serve(
 
 def demo(workspace_root: Path, port: int = 0, *, announce: Announce = click.echo) -> None:
     """The bundled walk in the browser, being tracked as the page opens; until Ctrl-C."""
+    serve(workspace_root, port=port, first=lambda: _demo_run(workspace_root), announce=announce)
+
+
+def _demo_run(workspace_root: Path) -> StoredRun:
+    """The newest run of the walk that is not finished, else a new one."""
     session = prepare_demo(workspace_root)
     runs = session.runs()
     unfinished = [run for run in runs if run.summary().status in ("new", "interrupted")]
-    run = unfinished[-1] if unfinished else prepare_run(session, seed=len(runs))
-    serve(
-        workspace_root, port=port, open_session=session.name, open_run=run.name, track=True, announce=announce
-    )
+    return unfinished[-1] if unfinished else prepare_run(session, seed=len(runs))
 
 
 def prepare_demo(workspace_root: Path) -> Session:
@@ -165,8 +157,24 @@ def _alone_on(root: Path) -> Generator[Callable[[str], None]]:
         lock.free()
 
 
-def _track(control: StudioControl, session: Session, run: str) -> None:
-    control.send(Start(**about(session.run(run).folder)))
+def _app(
+    workspace: Workspace, control: StudioControl, tokens: tuple[str, str], hosts: HostRule, log_path: Path
+) -> object:
+    """The server, which takes a second and more to load."""
+    from studio.scene.window_scenes import WindowScenes  # noqa: PLC0415
+    from studio.server.app import build_app  # noqa: PLC0415
+    from studio.server.safe_paths import default_footage_roots  # noqa: PLC0415
+
+    return build_app(
+        workspace,
+        control,
+        WindowScenes(workspace, control),
+        tokens[0],
+        viewers_token=tokens[1],
+        hosts=hosts,
+        footage_roots=default_footage_roots(workspace.root),
+        log_path=log_path,
+    )
 
 
 def _listening(host: str, port: int) -> socket.socket:

@@ -35,10 +35,8 @@ class UnknownMemberError(SettingsError, KeyError):
     __str__ = StudioError.__str__
 
 
-class PlugInError(UnknownMemberError):
+class PlugInError(UnknownMemberError, code="plug-in"):
     """A member that an installed package promises and does not give."""
-
-    code = "plug-in"
 
 
 class Registry(Mapping[str, Member], Generic[Member]):

@@ -2,6 +2,7 @@
 
 import cv2
 import numpy as np
+from looking_cameras import turned_to
 from numpy.typing import NDArray
 
 from studio.arrays import Array
@@ -22,11 +23,7 @@ def ring_of_cameras(
     for number in range(count):
         angle = 2.0 * np.pi * number / count + 0.4
         centre = np.array([distance * np.cos(angle), distance * np.sin(angle), 2000.0])
-        ahead = np.array([0.0, 0.0, 950.0]) - centre
-        ahead /= np.linalg.norm(ahead)
-        right = np.cross(ahead, [0.0, 0.0, 1.0])
-        right /= np.linalg.norm(right)
-        rotation = np.stack([right, np.cross(ahead, right), ahead])
+        rotation = turned_to(centre, (0.0, 0.0, 950.0))
         focal = 0.95 * width * distance / 3500.0
         matrix = np.array([[focal, 0.0, (width - 1) / 2], [0.0, focal, (height - 1) / 2], [0.0, 0.0, 1.0]])
         cameras.append(

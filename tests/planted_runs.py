@@ -139,7 +139,7 @@ def planted(
     session = drawn_session(folder, moved, cameras, calibrated, damage, start, seed)
     knobs: dict[str, object] = {"refine_frames": False, "particles": 100, "layers": 10}
     knobs |= {"particles": {"particles": 8}, "survival": {"survival": 0.02}}.get(cause, {})
-    run = prepare_run(session, seed=seed, knobs=knobs | settings, fit_shape=False, despite_findings=True)
+    run = prepare_run(session, seed=seed, knobs=knobs | settings, fit_shape=False, allow_inconsistent=True)
     finish(session, run)
     return session, run
 

@@ -2,9 +2,14 @@
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 
 import boto3
+import pytest
+import s3fs
 from moto.server import ThreadedMotoServer
+
+from studio.sessions import remote_sessions
 
 BUCKET = "footage"
 CREDENTIALS = {
@@ -32,3 +37,16 @@ def s3_server() -> Iterator[Mapping[str, str]]:
         yield {**CREDENTIALS, "AWS_ENDPOINT_URL": endpoint}
     finally:
         server.stop()
+
+
+@contextmanager
+def used_here(variables: Mapping[str, str], monkeypatch: pytest.MonkeyPatch, cache: Path) -> Iterator[None]:
+    """This process uses the server, with a cache of its own; at the end it holds no session of it."""
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setenv("STUDIO_CACHE", str(cache))
+    # Connections are kept by what they were opened with, which is not all of the environment.
+    s3fs.S3FileSystem.clear_instance_cache()
+    yield
+    while remote_sessions._holds:
+        remote_sessions._holds.popitem()[1].free()

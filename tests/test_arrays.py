@@ -1,4 +1,4 @@
-"""Archives are read one at a time, whichever threads want them: NumPy's reading of heads is not safe otherwise."""
+"""Archives are read one at a time: NumPy's reading of heads is not safe in several threads. Runs and rows."""
 
 import io
 import os
@@ -62,3 +62,11 @@ def test_a_damaged_archive_does_not_stay_open(tmp_path: Path) -> None:
     assert str(place) not in [
         os.path.realpath(f"/proc/self/fd/{number}") for number in os.listdir("/proc/self/fd")
     ]
+
+
+def test_runs_of_a_mask_and_rows_evenly_spread() -> None:
+    mask = np.array([True, True, False, True, False, False, True])
+    assert arrays.runs_of(mask) == [(0, 2), (3, 4), (6, 7)]
+    assert arrays.runs_of(np.zeros(4, dtype=bool)) == []
+    assert arrays.evenly_spread(10, 4).tolist() == [0, 3, 6, 9]
+    assert arrays.evenly_spread(3, 10).tolist() == [0, 1, 2]

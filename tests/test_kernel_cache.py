@@ -1,5 +1,6 @@
 """Compiled kernels are found again by what they are made of, in any checkout."""
 
+import gc
 import hashlib
 import importlib
 import os
@@ -215,3 +216,55 @@ def test_every_kernel_of_the_product_has_the_same_key_in_another_process() -> No
 def test_what_has_no_key_is_named() -> None:
     with pytest.raises(kernel_cache.UnkeyedError, match="object"):
         list(parts_of((1, np.float32(2.0), object())))
+
+
+def test_what_was_not_used_for_longest_goes_where_the_folder_is_full(
+    checkout: Callable[..., ModuleType],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(kernel_cache, "folder", lambda: tmp_path / "kept")
+    answer(checkout("one"))
+    room = tmp_path / "kept"
+    sizes = {place.name.partition("-")[0]: place.stat().st_size for place in room.glob("*.kernel")}
+    for place in room.glob("*.kernel"):
+        os.utime(place, (1.0, 1.0))
+    monkeypatch.setattr(kernel_cache, "MOST_BYTES", sum(sizes.values()) + 5000)
+    # Another that calls the same ones: of all that is there it has no use for `total` alone.
+    third = checkout("two", kernels=KERNELS.replace("def total", "def sum_of"))
+    third.sum_of(2.0, third.helpers.Sizes(10.0, 20.0))
+    left = {place.name.partition("-")[0] for place in room.glob("*.kernel")}
+    assert left == {*sizes, "kernels.sum_of"} - {"kernels.total"}
+
+
+def test_something_is_done_once_before_the_first_kernel_is_compiled(
+    compiled: list[str], checkout: Callable[..., ModuleType]
+) -> None:
+    before: list[int] = []
+    with kernel_cache.when_compiling(lambda: before.append(len(compiled))):
+        answer(checkout("one"))
+    assert before == [0]
+    with kernel_cache.when_compiling(lambda: before.append(-1)):
+        answer(checkout("two"))
+    answer(checkout("three", HELPERS.replace("x * x", "x + x")))
+    assert before == [0]
+
+
+def test_a_kernel_within_a_kernel_has_no_wrapper_and_can_be_called_as_well(
+    checkout: Callable[..., ModuleType],
+) -> None:
+    module = checkout("one")
+    answer(module)
+    assert not module.later.overloads  # compiled for `total`, and not to be called from Python
+    assert module.later(2.0) == 200.0
+    assert module.later.overloads
+
+
+def test_the_collector_rests_while_something_is_compiled() -> None:
+    assert gc.isenabled()
+    with event.trigger_event("numba:compile"):
+        assert not gc.isenabled()
+        with event.trigger_event("numba:compile"):
+            assert not gc.isenabled()
+        assert not gc.isenabled()
+    assert gc.isenabled()

@@ -3,7 +3,6 @@
 import logging
 import multiprocessing
 import os
-import queue
 import re
 import signal
 import socket
@@ -18,8 +17,10 @@ import pytest
 
 from studio import launch
 from studio.errors import AccessError, StudioError
+from studio.jobs.commands import Start
 from studio.launch import RedactedFormatter, address, prepare_demo, serve
 from studio.runs.samples import sample_folder
+from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
 
 SERVE = """
@@ -183,14 +184,36 @@ def test_something_in_the_sample_s_place_is_not_touched(tmp_path: Path) -> None:
 
 def test_the_demo_tracks_the_walk_as_it_opens(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A second demo goes on with the run that the first one left."""
-    asked: queue.SimpleQueue[dict[str, object]] = queue.SimpleQueue()
-    monkeypatch.setattr(launch, "serve", lambda root, **wish: asked.put(wish))
+    runs: list[StoredRun] = []
+    monkeypatch.setattr(launch, "serve", lambda root, first, **_: runs.append(first()))
     launch.demo(tmp_path)
     launch.demo(tmp_path)
-    one, two = asked.get(), asked.get()
-    assert (one["open_session"], one["track"]) == ("walk", True)
-    assert one["open_run"] == two["open_run"]
-    assert [run.name for run in Workspace(tmp_path).session("walk").runs()] == [one["open_run"]]
+    one, two = runs
+    assert one.folder == two.folder
+    assert [run.name for run in Workspace(tmp_path).session("walk").runs()] == [one.name]
+
+
+def test_the_run_is_tracked_before_the_server_is_loaded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done: list[object] = []
+
+    class Control:
+        def __init__(self, workspace: Workspace) -> None:
+            self.start, self.close = (lambda: done.append("start")), (lambda: done.append("close"))
+
+        def send(self, command: Start) -> None:
+            done.append(Path(command.run).name)
+
+    def loaded(*_: object) -> object:
+        done.append("server")
+        raise StudioError("Enough.", "")
+
+    monkeypatch.setattr(launch, "StudioControl", Control)
+    monkeypatch.setattr(launch, "_app", loaded)
+    with pytest.raises(StudioError, match="Enough"):
+        launch.demo(tmp_path)
+    assert done == ["start", "run-1", "server", "close"]
 
 
 def test_a_second_server_on_a_workspace_is_refused_with_the_first_ones_address(

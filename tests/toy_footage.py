@@ -5,6 +5,7 @@ from pathlib import Path
 import av
 import cv2
 import numpy as np
+from looking_cameras import turned_to
 
 from studio.geometry.camera import Camera
 
@@ -57,11 +58,7 @@ def looking_at(
 ) -> Camera:
     """A 128x96 camera at `centre` (mm) whose optical axis meets `target`, upright at roll 0 (radians)."""
     place = np.array(centre)
-    forward = np.array(target) - place
-    forward /= np.linalg.norm(forward)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    upright = np.stack([right, np.cross(forward, right), forward])
+    upright = turned_to(place, target)
     cos, sin = np.cos(roll), np.sin(roll)
     rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]) @ upright
     matrix = np.array([[120.0, 0.0, 63.0], [0.0, 121.0, 48.5], [0.0, 0.0, 1.0]])

@@ -26,7 +26,7 @@ from studio.arrays import Array
 from studio.behaviour.gaussian_mixture import GaussianMixture
 from studio.behaviour.mixture_kernels import losses_without, replace_component, shares_of
 from studio.errors import BehaviourError
-from studio.progress import Progress
+from studio.progress import Progress, unheard
 
 COVARIANCES = ("full", "diagonal")
 
@@ -71,7 +71,7 @@ class Search:
 
 
 def fit_mixture(
-    points: Array, rng: np.random.Generator, search: Search, progress: Progress | None = None
+    points: Array, rng: np.random.Generator, search: Search, progress: Progress = unheard
 ) -> tuple[GaussianMixture, tuple[Settled, ...]]:
     """The mixture of the shortest message for points (n, p), and what EM settled at on the way.
 
@@ -88,8 +88,7 @@ def fit_mixture(
         if best is None or settled.length < min(entry.length for entry in history):
             best, fruitless = state.mixture(), 0
         history.append(settled)
-        if progress is not None:
-            progress("finding clusters", search.most - state.size, search.most)
+        progress("finding clusters", search.most - state.size, search.most)
         if state.size <= search.least or (search.patience and fruitless >= search.patience):
             return best, tuple(history)
         state.remove_least_missed()

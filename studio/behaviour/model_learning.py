@@ -16,7 +16,7 @@ from studio.behaviour.root_motion import learn_root_motion
 from studio.behaviour.settings import LearningSettings
 from studio.body.model import BodyModel
 from studio.errors import BehaviourError
-from studio.progress import Progress
+from studio.progress import Progress, unheard
 
 IntArray = NDArray[np.int64]
 
@@ -27,7 +27,7 @@ def learn_model(
     fps: float,
     settings: LearningSettings,
     rng: np.random.Generator,
-    progress: Progress | None = None,
+    progress: Progress = unheard,
     sources: Sequence[str] = (),
 ) -> BehaviourModel:
     """The behaviour in recordings of poses (F, D) on one body, all at `fps`; recordings are independent.

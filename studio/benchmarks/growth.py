@@ -139,7 +139,7 @@ def measure_growth(sizes: Sizes, progress: Progress) -> tuple[list[Curve], dict[
 
 @contextmanager
 def _opened(session: Session, last: int, knobs: Mapping[str, Any]) -> Generator[OpenRun]:
-    run = prepare_run(session, last=last, knobs=knobs, fit_shape=False, despite_findings=True)
+    run = prepare_run(session, last=last, knobs=knobs, fit_shape=False, allow_inconsistent=True)
     opened = OpenRun(str(session.path), str(run.folder))
     try:
         opened.warm_up()

@@ -28,7 +28,7 @@ from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.geometry.camera import Camera
 from studio.likelihood.area_kernels import FIELDS, record_tables, spans_only
 from studio.likelihood.bodytrack import BodytrackLikelihood, BodytrackSettings
-from studio.likelihood.edge_region import EdgeRegionLikelihood, EdgeRegionProblem, EdgeRegionSettings
+from studio.likelihood.edge_region import EdgeRegionFrameLikelihood, EdgeRegionLikelihood, EdgeRegionSettings
 from studio.likelihood.edge_region_kernels import CHUNK, loads_only
 from studio.likelihood.edge_region_silhouette import (
     EdgeRegionSilhouetteLikelihood,
@@ -155,7 +155,7 @@ def weighing_contests(
     body: BodyModel,
     cameras: tuple[Camera, ...],
     evidence: dict[str, FrameEvidence],
-    problem: EdgeRegionProblem,
+    problem: EdgeRegionFrameLikelihood,
     poses: Array,
 ) -> list[Contest]:
     """Every weighting on one thread, edge-region on two as well."""
@@ -191,7 +191,7 @@ def silhouette_problems(
     return found
 
 
-def limit_contest(problem: EdgeRegionProblem, poses: Array) -> Contest:
+def limit_contest(problem: EdgeRegionFrameLikelihood, poses: Array) -> Contest:
     """The loads alone, of up to LIMIT_BLOCKS blocks of sixteen poses spread over all."""
     outlines, maps = some_blocks(problem.likelihood.projector.blocks(poses)), problem.maps
     blocks, views = outlines.shape[:2]
@@ -211,7 +211,7 @@ def limit_contest(problem: EdgeRegionProblem, poses: Array) -> Contest:
 
 
 def spans_contest(
-    problem: EdgeRegionProblem, evidence: FrameEvidence, poses: Array, resolution: str
+    problem: EdgeRegionFrameLikelihood, evidence: FrameEvidence, poses: Array, resolution: str
 ) -> Contest:
     """The spans and counts of areas alone, of the poses of `limit_contest`."""
     silhouettes = silhouettes_of(evidence, resolution)

@@ -171,7 +171,12 @@ def in_words(report: Mapping[str, Any]) -> str:
                 f"  {words}: {run['frames_per_second']:.1f} frames a second, {run['dropped']} of "
                 f"{run['tracked'] + run['dropped']} dropped, picture to pose {latency['median']:.0f} ms "
                 f"(95 %: {latency['p95']:.0f}, worst {latency['worst']:.0f})"
-                + (f", {run['idle_share']:.0%} of all cores idle" if "idle_share" in run else "")
+                + (
+                    f", {run['idle_share']:.0%} of all cores idle, memory {run['memory_mb']['early']:.0f} to "
+                    f"{run['memory_mb']['end']:.0f} MB"
+                    if "idle_share" in run
+                    else ""
+                )
             )
     return "\n".join(lines)
 

@@ -97,8 +97,11 @@ MEASURES = (
     Measure(
         "live, idle share of all cores", ("live", "scene_open", "idle_share"), "%", 33.0, MORE, scale=100.0
     ),
+    Measure("live, growth of memory", ("live", "scene_open", "memory_growth"), "%", 5.0, LESS, scale=100.0),
     Measure("a live frame on one core", ("live", "frame_ms"), "ms", 12.0, LESS),
     Measure("slider to new cloud, server", ("reannealing", "median_ms"), "ms", 20.0, LESS),
+    Measure("demo to first frame, all to be compiled", ("start", "cold_s"), "s", 15.0, LESS),
+    Measure("demo to first frame, compiled before", ("start", "warm_s"), "s", 4.0, LESS),
 )
 
 

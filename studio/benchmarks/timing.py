@@ -1,4 +1,6 @@
-"""Comparable timings of tasks on a machine that other programs use, too, and how much of it was idle meanwhile."""
+"""Comparable timings of tasks on a machine that other programs use, too, how much of it was idle meanwhile, and what
+memory they take.
+"""
 
 import contextlib
 import os
@@ -50,6 +52,14 @@ class IdleShare:
         """0 to 1."""
         spent = (time.monotonic() - self._began) * (os.cpu_count() or 1)
         return min(1.0, max(0.0, (_idle_seconds() - self._idle) / spent))
+
+
+def resident_megabytes(*processes: int) -> float:
+    """Memory that some processes have in use, NaN where the system does not say (Linux does) or one is gone."""
+    with contextlib.suppress(OSError, ValueError, IndexError):
+        pages = [int(Path(f"/proc/{one}/statm").read_text(encoding="ascii").split()[1]) for one in processes]
+        return sum(pages) * os.sysconf("SC_PAGE_SIZE") / 1e6
+    return float("nan")
 
 
 def _idle_seconds() -> float:

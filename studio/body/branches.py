@@ -90,11 +90,8 @@ def _hinge(joint: Joint) -> int:
 
 def _limits(body: BodyModel) -> tuple[Array, Array]:
     """(D,) lower and upper limits; lengths and angles limited on one side count as unbounded."""
-    angles = np.array([entry.kind == "angle" for entry in body.parameters])
-    lower = np.array([entry.lower for entry in body.parameters])
-    upper = np.array([entry.upper for entry in body.parameters])
-    limited = angles & np.isfinite(lower) & np.isfinite(upper)
-    return np.where(limited, lower, -BOUNDLESS), np.where(limited, upper, BOUNDLESS)
+    limited = body.bounded_angles
+    return np.where(limited, body.lower, -BOUNDLESS), np.where(limited, body.upper, BOUNDLESS)
 
 
 def _wound(pose: Array, lower: Array, upper: Array) -> Array:

@@ -15,6 +15,7 @@ from studio.arrays import Array, Indices
 from studio.body.branches import within_limits
 from studio.body.forward_kinematics import joint_frames, limb_ends
 from studio.body.inverse_kinematics import MM_PER_RADIAN
+from studio.body.least_squares import fitted_parameters, strictly_inside
 from studio.body.model import BodyModel, extremities
 from studio.errors import BodyError
 from studio.geometry.reach import within_reach
@@ -29,7 +30,6 @@ HOLD = 0.2
 """Weight of the other ends' places while the whole body follows."""
 BEND = 0.4
 """Share of the way to the middle of its limits by which a chain that did not reach is bent."""
-DIFFERENCE = 1e-5
 MOST_STEPS = 40
 
 
@@ -58,9 +58,8 @@ class Dragger:
 
     def __init__(self, body: BodyModel) -> None:
         self.body = body
-        self._lower = np.array([entry.lower for entry in body.parameters])
-        self._upper = np.array([entry.upper for entry in body.parameters])
-        self._scale = np.array([1.0 if entry.kind == "angle" else MM_PER_RADIAN for entry in body.parameters])
+        self._lower, self._upper = body.lower, body.upper
+        self._scale = np.where(body.angles, 1.0, MM_PER_RADIAN)
         self._ends = extremities(body)
         self._joint = root_joint(body)
         root = _moved_by(body, self._joint)
@@ -178,27 +177,23 @@ class Dragger:
         scale, lower, upper = self._scale[free], self._lower[free], self._upper[free]
         home = start[free] / scale
 
-        def offsets(values: Array) -> Array:
-            poses = np.repeat(pose[None], len(values), axis=0)
-            poses[:, free] = values * scale
+        def offsets(poses: Array) -> Array:
             ends = limb_ends(self.body, poses)[:, limbs, 1]
-            return ((ends - places) * weights).reshape(len(values), -1)
+            return ((ends - places) * weights).reshape(len(poses), -1)
 
-        def residuals(values: Array) -> Array:
-            return np.concatenate([offsets(values[None])[0], pull * (values - home)])
-
-        def slopes(values: Array) -> Array:
-            steps = DIFFERENCE * np.eye(len(free))
-            change = (offsets(values + steps) - offsets(values - steps)).T / (2.0 * DIFFERENCE)
-            return np.concatenate([change, np.diag(pull)])
-
-        # scipy wants the start strictly inside the limits.
-        inside = np.where(np.isfinite(upper - lower), 1e-9 * (upper - lower), 1e-9)
-        begin = np.clip(pose[free], lower + inside, upper - inside) / scale
-        limits = (lower / scale, upper / scale)
-        answer = least_squares(residuals, begin, slopes, limits, max_nfev=MOST_STEPS, xtol=1e-6, ftol=1e-6)
-        found = pose.copy()
-        found[free] = np.clip(answer.x * scale, lower, upper)
+        found, _ = fitted_parameters(
+            pose,
+            free,
+            scale,
+            strictly_inside(pose[free], lower, upper) / scale,
+            (lower / scale, upper / scale),
+            offsets,
+            lambda values: pull * (values - home),
+            pull,
+            most=MOST_STEPS,
+            tolerance=1e-6,
+        )
+        found[free] = np.clip(found[free], lower, upper)
         return found
 
     def _chain(self, joint: int) -> Indices:

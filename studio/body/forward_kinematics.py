@@ -89,7 +89,10 @@ def place_joints(
                 frame[1, 1] = 1.0
                 frame[2, 2] = 1.0
             else:
-                frame[:] = frames[n, parent[f]]
+                # Number by number: assigned as a whole it is checked, by texts that take a third of compiling all this.
+                for row in range(3):
+                    for column in range(4):
+                        frame[row, column] = frames[n, parent[f], row, column]
             for s in range(first_step[f], first_step[f + 1]):
                 amount = value[s] if parameter[s] < 0 else value[s] * poses[n, parameter[s]]
                 take_step(frame, kind[s], axis[s], amount)

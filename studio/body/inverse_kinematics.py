@@ -11,11 +11,11 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from studio.arrays import Array, Indices
 from studio.body.branches import within_limits
 from studio.body.forward_kinematics import marker_points
+from studio.body.least_squares import fitted_parameters, strictly_inside
 from studio.body.model import BodyModel
 from studio.errors import BodyError
 
@@ -26,9 +26,6 @@ FULL_FITS = 4
 # Fits of the perturbed best pose; standard deviation (radians) of the noise on its angles below the root.
 SHAKES = 12
 SHAKE = 0.7
-
-# Step of the central differences: radians, and mm when multiplied by MM_PER_RADIAN.
-DIFFERENCE = 1e-5
 
 # A length that counts like one radian: about a person's limb.
 MM_PER_RADIAN = 400.0
@@ -92,9 +89,8 @@ class _MarkerProblem:
         self.body = body
         self.places = np.array([known[name] for name in names])[present]
         self.points = points[present]
-        self.scale = np.array([1.0 if entry.kind == "angle" else MM_PER_RADIAN for entry in body.parameters])
-        self.lower = np.array([entry.lower for entry in body.parameters])
-        self.upper = np.array([entry.upper for entry in body.parameters])
+        self.scale = np.where(body.angles, 1.0, MM_PER_RADIAN)
+        self.lower, self.upper = body.lower, body.upper
         self.start = np.clip(within_limits(body, start), self.lower, self.upper)
         self.everything = np.arange(len(body.parameters))
         self.root, self.turns, self.moves = _root(body)
@@ -133,25 +129,17 @@ class _MarkerProblem:
         scale, lower, upper = self.scale[free], self.lower[free], self.upper[free]
         pull = PULL * (pose if free is not self.everything else self.start)[free] / scale
 
-        def full(values: Array) -> Array:
-            poses = np.repeat(pose[None], len(values), axis=0)
-            poses[:, free] = values * scale
-            return poses
-
-        def residuals(values: Array) -> Array:
-            return np.concatenate([self.offsets(full(values[None]))[0], PULL * values - pull])
-
-        def slopes(values: Array) -> Array:
-            steps = DIFFERENCE * np.eye(len(free))
-            ahead, behind = self.offsets(full(values + steps)), self.offsets(full(values - steps))
-            return np.concatenate([(ahead - behind).T / (2.0 * DIFFERENCE), PULL * np.eye(len(free))])
-
-        # scipy wants the start strictly inside the limits.
-        inside = np.where(np.isfinite(upper - lower), 1e-9 * (upper - lower), 1e-9)
-        begin = np.clip(pose[free], lower + inside, upper - inside) / scale
-        limits = (lower / scale, upper / scale)
-        answer = least_squares(residuals, begin, slopes, limits, max_nfev=200)
-        return full(answer.x[None])[0]
+        return fitted_parameters(
+            pose,
+            free,
+            scale,
+            strictly_inside(pose[free], lower, upper) / scale,
+            (lower / scale, upper / scale),
+            self.offsets,
+            lambda values: PULL * values - pull,
+            np.full(len(free), PULL),
+            most=200,
+        )[0]
 
     def offsets(self, poses: Array) -> Array:
         """(N, 3 M) from the points to the poses' markers, mm."""
@@ -164,9 +152,8 @@ class _MarkerProblem:
 
     def unwound(self, pose: Array) -> Array:
         """The pose with every angle as close to the start as whole turns within its limits allow."""
-        angles = np.array([entry.kind == "angle" for entry in self.body.parameters])
         turns = np.round((pose - self.start) / (2.0 * math.pi)) * 2.0 * math.pi
-        nearer = pose - np.where(angles, turns, 0.0)
+        nearer = pose - np.where(self.body.angles, turns, 0.0)
         return np.where((nearer >= self.lower) & (nearer <= self.upper), nearer, pose)
 
 

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from studio.arrays import Array
 from studio.body.person import SIDES, PersonMotion, joint_points
-from studio.body.retargeting import FLOOR_SHARE, above_floor
-from studio.geometry.rotations import axis_turn
+from studio.body.retargeting import FLOOR_SHARE, above_floor, smooth_above
+from studio.geometry.rotations import axis_turn, nearest_rotation
 
 SMOOTHING_S = 0.04
 TURNED_OVER = 1.0  # trace of a turn by 90 degrees
@@ -79,7 +79,7 @@ def _steps(turns: Array) -> Array:
 def smoothed(motion: PersonMotion, seconds: float) -> PersonMotion:
     """Places and turns smoothed over time by a Gaussian of that standard deviation."""
     width = seconds * motion.fps
-    turns = {name: _rotations(_smooth(turn, width)) for name, turn in motion.turns.items()}
+    turns = {name: nearest_rotation(_smooth(turn, width)) for name, turn in motion.turns.items()}
     return PersonMotion(motion.skeleton, motion.fps, _smooth(motion.root, width), turns)
 
 
@@ -121,8 +121,7 @@ def with_hands_above_floor(motion: PersonMotion) -> PersonMotion:
     for side in SIDES:
         arm = points[f"{side}_fingers"] - points[f"{side}_upper_arm"]
         below = np.maximum(HAND_CLEARANCE - points[f"{side}_fingers"][:, 2], 0.0)
-        held = scipy.ndimage.maximum_filter1d(below, 2 * spread + 1, mode="nearest")
-        lift = scipy.ndimage.gaussian_filter1d(held, spread / 3.0, radius=spread, mode="nearest")
+        lift = smooth_above(below, spread)
         length = np.maximum(np.linalg.norm(arm, axis=1), 1e-9)
         now = np.arcsin(np.clip(arm[:, 2] / length, -1.0, 1.0))
         angle = np.arcsin(np.clip((arm[:, 2] + lift) / length, -1.0, 1.0)) - now
@@ -143,10 +142,3 @@ def _levelled(motion: PersonMotion) -> PersonMotion:
     lift = motion.skeleton.ankle_height - float(np.quantile(lower, FLOOR_SHARE))
     root = motion.root + np.array([0.0, 0.0, lift])
     return PersonMotion(motion.skeleton, motion.fps, root, motion.turns)
-
-
-def _rotations(matrices: Array) -> Array:
-    """(F, 3, 3) the rotations nearest to matrices (F, 3, 3)."""
-    left, _, right = np.linalg.svd(matrices)
-    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
-    return left @ right

@@ -7,13 +7,13 @@ parameter makes at rest, mirrored, is its twin's or its inverse. A body without 
 import math
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from studio.arrays import Array, Indices
 from studio.body.branches import within_limits
 from studio.body.dragging import root_joint
 from studio.body.forward_kinematics import joint_frames, limb_ends
-from studio.body.inverse_kinematics import DIFFERENCE, MM_PER_RADIAN
+from studio.body.inverse_kinematics import MM_PER_RADIAN
+from studio.body.least_squares import fitted_parameters, strictly_inside
 from studio.body.model import BodyModel
 from studio.errors import BodyError
 from studio.geometry.rotations import vector_from_rotation
@@ -134,37 +134,27 @@ class Mirror:
         """The pose with its `free` parameters where the limbs are nearest to `target`, limits kept, and half the sum of
         squares that remains. limbs : which drawn ones, None for all.
         """
-        entries = [self.body.parameters[int(at)] for at in free]
-        scale = np.array([1.0 if entry.kind == "angle" else MM_PER_RADIAN for entry in entries])
-        lower = np.array([entry.lower for entry in entries]) / scale
-        upper = np.array([entry.upper for entry in entries]) / scale
-        inside = np.where(np.isfinite(upper - lower), 1e-9 * (upper - lower), 1e-9)
-        begin = np.clip(pose[free] / scale, lower + inside, upper - inside)
-
-        which = slice(None) if limbs is None else limbs
-
-        def placed(values: Array) -> Array:
-            moved = np.repeat(pose[None], len(values), axis=0)
-            moved[:, free] = values * scale
-            return moved
-
-        def offsets(values: Array) -> Array:
-            ends = limb_ends(self.body, placed(values))[:, which]
-            return (ends - target).reshape(len(values), -1)
-
-        def residuals(values: Array) -> Array:
-            return np.concatenate([offsets(values[None])[0], PULL * (values - begin)])
-
-        def slopes(values: Array) -> Array:
-            steps = DIFFERENCE * np.eye(len(free))
-            ahead, behind = offsets(values + steps), offsets(values - steps)
-            return np.concatenate([(ahead - behind).T / (2.0 * DIFFERENCE), PULL * np.eye(len(free))])
-
         if not len(free):
             return pose.copy(), 0.0
-        limits = (lower, upper)
-        answer = least_squares(residuals, begin, slopes, limits, max_nfev=60)
-        return placed(answer.x[None])[0], float(answer.cost)
+        scale = np.where(self.body.angles[free], 1.0, MM_PER_RADIAN)
+        lower, upper = self.body.lower[free] / scale, self.body.upper[free] / scale
+        begin = strictly_inside(pose[free] / scale, lower, upper)
+        which = slice(None) if limbs is None else limbs
+
+        def offsets(poses: Array) -> Array:
+            return (limb_ends(self.body, poses)[:, which] - target).reshape(len(poses), -1)
+
+        return fitted_parameters(
+            pose,
+            free,
+            scale,
+            begin,
+            (lower, upper),
+            offsets,
+            lambda values: PULL * (values - begin),
+            np.full(len(free), PULL),
+            most=60,
+        )
 
     def _beginnings(self, pose: Array) -> list[Array]:
         """The pose, and the pose with half a turn about each of the root's axes."""

@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from studio.arrays import Array, Indices
+from studio.arrays import Array, Indices, Mask
 from studio.body.definition import BodyDefinition
 from studio.errors import StudioError
 from studio.geometry.reach import within_reach
@@ -135,6 +135,26 @@ class BodyModel:
     def neutral(self) -> Array:
         """(D,) the rest pose."""
         return np.array([entry.neutral for entry in self.parameters])
+
+    @property
+    def lower(self) -> Array:
+        """(D,) least values, -inf where there is none."""
+        return np.array([entry.lower for entry in self.parameters])
+
+    @property
+    def upper(self) -> Array:
+        """(D,) greatest values, inf where there is none."""
+        return np.array([entry.upper for entry in self.parameters])
+
+    @property
+    def angles(self) -> Mask:
+        """(D,) which parameters are angles."""
+        return np.array([entry.kind == "angle" for entry in self.parameters], dtype=np.bool_)
+
+    @property
+    def bounded_angles(self) -> Mask:
+        """(D,) which parameters are angles with limits on both sides."""
+        return self.angles & np.isfinite(self.lower) & np.isfinite(self.upper)
 
 
 @lru_cache(maxsize=64)

@@ -14,6 +14,7 @@ import scipy
 from studio.arrays import Array
 from studio.body.person import SIDES, PersonMotion, Skeleton, joint_points
 from studio.errors import StudioError
+from studio.geometry.rotations import frames_along
 from studio.motion_files.recorded_motion import RecordedMotion
 
 Vector = tuple[float, float, float]
@@ -151,11 +152,15 @@ def on_floor(motion: PersonMotion) -> PersonMotion:
 def above_floor(motion: PersonMotion) -> PersonMotion:
     """The motion raised smoothly while a foot would be in the floor; poses are unchanged."""
     below = np.max([-lowest_of_sole(motion, side) for side in SIDES], axis=0)
-    spread = max(1, round(SPREAD_S * motion.fps))
-    # The largest depth is held as far as the smoothing reaches, so that it never undercuts.
-    held = scipy.ndimage.maximum_filter1d(np.maximum(below, 0.0), 2 * spread + 1, mode="nearest")
-    lift = scipy.ndimage.gaussian_filter1d(held, spread / 3.0, radius=spread, mode="nearest")
+    lift = smooth_above(np.maximum(below, 0.0), max(1, round(SPREAD_S * motion.fps)))
     return PersonMotion(motion.skeleton, motion.fps, motion.root + lift[:, None] * UP, motion.turns)
+
+
+def smooth_above(heights: Array, spread: int) -> Array:
+    """(F,) a smooth curve that is nowhere below heights (F,). spread : frames on each side that it begins to rise."""
+    # The greatest is held as far as the smoothing reaches, so that it never undercuts.
+    held = scipy.ndimage.maximum_filter1d(heights, 2 * spread + 1, mode="nearest")
+    return scipy.ndimage.gaussian_filter1d(held, spread / 3.0, radius=spread, mode="nearest")
 
 
 def lowest_of_sole(motion: PersonMotion, side: str) -> Array:
@@ -198,9 +203,9 @@ def _trunk(recorded: RecordedMotion, family: Family) -> dict[str, Array]:
     else:
         up = turns[:, head] @ np.array([0.0, 0.0, 1.0])
     return {
-        "pelvis": turns[:, pelvis] @ _frames(rest_up[None], left[None])[0],
-        "thorax": _frames(shoulders - hips, turns[:, thorax] @ left),
-        "head": _frames(up, turns[:, head] @ left),
+        "pelvis": turns[:, pelvis] @ frames_along(rest_up[None], left[None])[0],
+        "thorax": frames_along(shoulders - hips, turns[:, thorax] @ left),
+        "head": frames_along(up, turns[:, head] @ left),
     }
 
 
@@ -217,18 +222,10 @@ def _followed(recorded: RecordedMotion, family: Family, bone: Bone, side: int) -
         recorded.index(family.named(name, side)) for name in (bone.joint, bone.begin, bone.end)
     )
     z = recorded.rest[begin] - recorded.rest[end]
-    return recorded.rotations[:, joint] @ _frames(z[None], np.cross(z, np.array(bone.front))[None])[0]
+    return recorded.rotations[:, joint] @ frames_along(z[None], np.cross(z, np.array(bone.front))[None])[0]
 
 
 def _rest_length(recorded: RecordedMotion, family: Family, segment: str, side: int) -> float:
     bone = family.bone(segment)
     begin, end = (recorded.index(family.named(name, side)) for name in (bone.begin, bone.end))
     return float(np.linalg.norm(recorded.rest[end] - recorded.rest[begin]))
-
-
-def _frames(up: Array, left: Array) -> Array:
-    """(F, 3, 3) frames with z along `up` and y as close to `left` as that allows; (F, 3) each."""
-    z: Array = up / np.linalg.norm(up, axis=1, keepdims=True)
-    x: Array = np.cross(left, z)
-    x /= np.linalg.norm(x, axis=1, keepdims=True)
-    return np.stack([x, np.cross(z, x), z], axis=-1)

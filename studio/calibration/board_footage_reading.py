@@ -15,7 +15,7 @@ from studio.capture.naming import match_names, natural_key
 from studio.capture.pictures import is_picture, list_pictures, read_picture
 from studio.capture.video import VIDEO_SUFFIXES, VideoReader, measure_video
 from studio.errors import CalibrationError
-from studio.progress import Progress
+from studio.progress import Progress, unheard
 
 LENS_FRAMES, RIG_FRAMES = 60, 120
 LENS_PICTURES = 30
@@ -108,7 +108,7 @@ def look_for_lens(
     finder: BoardFinder,
     camera: str,
     footage: BoardFootage,
-    progress: Progress | None = None,
+    progress: Progress = unheard,
     taken: HowTaken = AS_IT_IS,
 ) -> list[Seen]:
     """The board in one camera's pictures, or in up to 60 frames of its video spread over all of it; frames count as
@@ -122,7 +122,7 @@ def look_for_lens(
 def look_together(
     finder: BoardFinder,
     footage: dict[str, BoardFootage],
-    progress: Progress | None = None,
+    progress: Progress = unheard,
     also: Sequence[int] = (),
     taken: HowTaken = AS_IT_IS,
 ) -> list[Seen]:
@@ -197,14 +197,13 @@ def _examined(
     footage: BoardFootage,
     count: int,
     frames: Indices,
-    progress: Progress | None,
+    progress: Progress,
     taken: HowTaken,
     begin: int = 0,
 ) -> list[Seen]:
     found: list[Seen] = []
     for done, (frame, name, raw) in enumerate(_pictures(footage, count, frames + begin)):
-        if progress is not None:
-            progress(f"Looking for the board, camera {camera}", done, len(frames))
+        progress(f"Looking for the board, camera {camera}", done, len(frames))
         picture = taken.upright(camera, raw)
         sighting = finder.find(picture, camera, frame - begin, name)
         if sighting is not None:

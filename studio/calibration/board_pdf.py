@@ -6,7 +6,7 @@ from pathlib import Path
 import cv2.aruco
 import numpy as np
 
-from studio.arrays import Array, Bytes
+from studio.arrays import Array, Bytes, runs_of
 from studio.calibration.boards import DEFAULT_DICTIONARY, Board
 from studio.errors import CalibrationError
 
@@ -63,8 +63,7 @@ def _marker(board: Board, number: int, corner: Array) -> Array:
     side = board.marker_mm / cells
     found: list[tuple[float, float, float, float]] = []
     for row in range(cells):
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], bits[row].astype(int), [0]])))
-        for first, last in edges.reshape(-1, 2):
+        for first, last in runs_of(bits[row]):
             found.append((corner[0] + first * side, corner[1] + row * side, (last - first) * side, side))
     return np.array(found)
 

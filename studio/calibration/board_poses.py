@@ -11,6 +11,7 @@ from studio.arrays import Array
 from studio.calibration.boards import Board, Sighting
 from studio.calibration.intrinsics import Lens
 from studio.geometry.rigid import compose, inverse, rigid
+from studio.geometry.rotations import nearest_rotation
 
 NEAR_ANGLE, NEAR_SHARE = np.radians(6.0), 0.06
 """Two votes for the pose of a camera agree within this turn and this share of the board's distance."""
@@ -107,9 +108,7 @@ def pair_pose(first: str, second: str, views: Mapping[str, Mapping[int, BoardVie
     support = np.array([len(set(owner[row])) for row in near])
     best = int(np.argmax(support + 0.5 * near.sum(axis=1) / len(owner)))
     chosen = stack[near[best]]
-    left, _, right = np.linalg.svd(chosen[:, :, :3].sum(axis=0))
-    signs = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
-    mean = rigid((left * signs) @ right, np.median(chosen[:, :, 3], axis=0))
+    mean = rigid(nearest_rotation(chosen[:, :, :3].sum(axis=0)), np.median(chosen[:, :, 3], axis=0))
     return PairPose(first, second, mean, int(support[best]), len(frames))
 
 

@@ -12,6 +12,8 @@ from studio.calibration.boards import Sighting
 CELLS_ACROSS = 10
 ENOUGH = 8
 """So many corners in a cell are drawn as full coverage."""
+WIDTH = 480
+"""Pixels of the picture."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,13 +56,13 @@ def coverage_of(sightings: Sequence[Sighting], size: tuple[int, int]) -> Coverag
 
 
 def coverage_picture(
-    coverage: Coverage, sightings: Sequence[Sighting], dropped: Sequence[Sighting] = (), width: int = 480
+    coverage: Coverage, sightings: Sequence[Sighting], dropped: Sequence[Sighting] = ()
 ) -> Bytes:
     """(H, W, 3) BGR: cells from dark (none) to green (enough), used corners as white dots, dropped ones red."""
-    scale = width / coverage.size[0]
+    scale = WIDTH / coverage.size[0]
     height = max(1, round(coverage.size[1] * scale))
     full = np.clip(coverage.counts / ENOUGH, 0.0, 1.0).astype(np.float32)
-    shade = cv2.resize(full, (width, height), interpolation=cv2.INTER_NEAREST)[..., None]
+    shade = cv2.resize(full, (WIDTH, height), interpolation=cv2.INTER_NEAREST)[..., None]
     low, high = np.array([46.0, 38.0, 34.0]), np.array([96.0, 150.0, 60.0])
     picture = np.ascontiguousarray((low + shade * (high - low)).astype(np.uint8))
     for group, colour in ((sightings, (245, 245, 245)), (dropped, (60, 60, 230))):

@@ -61,26 +61,25 @@ def solve_rig(
     lenses: Mapping[str, Lens],
     *,
     refine_lenses: bool = False,
-    progress: Progress | None = None,
+    progress: Progress = unheard,
 ) -> Rig:
     """The cameras named by `lenses`, from their sightings at the same frame numbers.
 
     Raises CalibrationError naming the cameras that share no board view with the others.
     """
     names = tuple(sorted(lenses, key=natural_key))
-    report = progress or unheard
     seen = _Seen(board, names, lenses, views_by_camera(board, sightings, lenses))
     pairs: list[PairPose] = []
     couples = list(combinations(names, 2))
     for number, (first, second) in enumerate(couples):
-        report("Comparing cameras", number, len(couples))
+        progress("Comparing cameras", number, len(couples))
         pair = pair_pose(first, second, seen.views)
         if pair is not None:
             pairs.append(pair)
     poses = _tree(names, pairs)
     frames = _chosen_frames(seen)
     boards, turned = _board_poses(seen, frames, poses)
-    report("Adjusting all together", 0, 2)
+    progress("Adjusting all together", 0, 2)
     bundle, observed = _bundle(seen, frames, poses, boards, turned)
     bundle = adjusted(bundle, observed)
     errors = errors_of(bundle, observed)
@@ -92,9 +91,9 @@ def solve_rig(
             f"No board view of camera {listed(missing)} agrees with the other cameras.",
             "Check that its footage runs in step with the others', is not mirrored and has its own lens's calibration.",
         )
-    report("Adjusting all together", 1, 2)
+    progress("Adjusting all together", 1, 2)
     bundle = adjusted(bundle, kept, refine_lenses)
-    report("Adjusting all together", 2, 2)
+    progress("Adjusting all together", 2, 2)
     return replace(_rig(seen, frames, bundle, kept), turned=turned, dropped=dropped, pairs=tuple(pairs))
 
 

@@ -19,7 +19,7 @@ from scipy.optimize import least_squares
 
 from studio.arrays import Array, Indices
 from studio.calibration.boards import rays_of
-from studio.calibration.silhouette_checks import WIDEST
+from studio.calibration.silhouette_checks import WIDEST, angles_about
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
 from studio.geometry.rotations import rotation_from_vector
@@ -125,14 +125,8 @@ def _tangents(one: Camera, two: Camera, first: Array, second: Array) -> tuple[fl
     """Pixels by which the lower and the upper tangent plane of two outlines miss."""
     baseline = two.centre - one.centre
     axis = baseline / max(float(np.linalg.norm(baseline)), 1e-9)
-    middle = first.mean(axis=0)
-    ahead = middle - (middle @ axis) * axis
-    if np.linalg.norm(ahead) < 1e-6:
-        return float("nan"), float("nan")
-    ahead /= np.linalg.norm(ahead)
-    aside = np.cross(axis, ahead)
-    angles = [np.arctan2(ray @ aside, ray @ ahead) for ray in (first, second)]
-    if max(float(np.ptp(each)) for each in angles) > WIDEST:
+    angles = angles_about(axis, (first, second))
+    if angles is None or max(float(np.ptp(each)) for each in angles) > WIDEST:
         return float("nan"), float("nan")
     missed: list[float] = []
     for pick in (np.argmin, np.argmax):

@@ -117,6 +117,17 @@ def silhouette_disagreement(cameras: Sequence[Camera], outlines: Mapping[int, Ma
     return float(np.mean(values)) if values else float("nan")
 
 
+def angles_about(axis: Array, rays: Sequence[Array]) -> list[Array] | None:
+    """The angles of rays (K, 3) of each view about an axis (3,), from the first view's middle; None along the axis."""
+    middle = rays[0].mean(axis=0)
+    ahead = middle - (middle @ axis) * axis
+    if np.linalg.norm(ahead) < 1e-6:
+        return None
+    ahead = ahead / np.linalg.norm(ahead)
+    aside = np.cross(axis, ahead)
+    return [np.arctan2(ray @ aside, ray @ ahead) for ray in rays]
+
+
 def _miss(one: Camera, two: Camera, first: Array, second: Array) -> float:
     """By how much of the person's extent the tangent planes of two outlines miss; NaN if undetermined."""
     baseline = two.centre - one.centre
@@ -125,16 +136,12 @@ def _miss(one: Camera, two: Camera, first: Array, second: Array) -> float:
         return CLIPPED
     axis = baseline / length
     rays = rays_of(one, first), rays_of(two, second)
-    middle = rays[0].mean(axis=0)
-    middle = middle - (middle @ axis) * axis
-    if np.linalg.norm(middle) < 1e-6:
+    angles = angles_about(axis, rays)
+    if angles is None:
         return float("nan")
-    ahead = middle / np.linalg.norm(middle)
-    aside = np.cross(axis, ahead)
-    angles = [np.arctan2(ray @ aside, ray @ ahead) for ray in rays]
     # The second camera's angles may lie across the cut at half a turn; a full range means that it looks along the line.
     turn = np.angle(np.mean(np.exp(1j * angles[1])))
-    angles[1] = np.angle(np.exp(1j * (angles[1] - turn))) + turn
+    angles[1] = np.asarray(np.angle(np.exp(1j * (angles[1] - turn))) + turn, dtype=np.float64)
     low, high = [float(each.min()) for each in angles], [float(each.max()) for each in angles]
     extents = [top - bottom for top, bottom in zip(high, low, strict=True)]
     if max(extents) > WIDEST:

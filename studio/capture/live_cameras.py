@@ -134,8 +134,8 @@ Open = Callable[[CameraAddress, Wait], Iterator[Shot]]
 @dataclass(frozen=True, slots=True)
 class CameraStanding:
     """A camera at this moment. state : "connecting" (no picture yet), "running", "stopped" (it ran, now nothing comes),
-    "ended" (a replayed video is over). seconds : for how long. age : of its last picture, seconds, NaN before the
-    first. fps : as measured. pictures : that came. width, height : pixels, 0 before the first. message : the
+    "ended" (a replayed video is over). seconds : for how long. age : of its last picture, seconds, None before
+    the first. fps : as measured. pictures : that came. width, height : pixels, 0 before the first. message : the
     error. attempts : failed ones since it last ran.
     """
 
@@ -143,7 +143,7 @@ class CameraStanding:
     shown: str
     state: State
     seconds: float
-    age: float
+    age: float | None
     fps: float
     pictures: int
     width: int
@@ -157,7 +157,7 @@ class CameraStanding:
         if self.state == "running":
             return f"{self.name}: {self.fps:.1f} fps"
         words = f"{self.name}: {self.state} for {self.seconds:.1f} s"
-        return f"{words}, last picture {self.age:.1f} s old" if self.age == self.age else words
+        return f"{words}, last picture {self.age:.1f} s old" if self.age is not None else words
 
 
 class LiveCamera:
@@ -246,7 +246,7 @@ class LiveCamera:
         """The camera's state."""
         with self._lock:
             now, last = self._clock(), self._recent[-1] if self._recent else None
-            age = now - last.came if last else float("nan")
+            age = now - last.came if last else 0.0
             state: State = "running"
             if self._over:
                 state = "ended"
@@ -260,8 +260,8 @@ class LiveCamera:
             if state == "stopped" and not message:
                 message = f"Camera {self.name} gave no picture for {age:.1f} s."
             return CameraStanding(
-                self.name, self.address.shown, state, seconds, age, self._rate(), self._count, width, height,
-                message, 0 if state == "running" else self._attempts,
+                self.name, self.address.shown, state, seconds, age if last else None, self._rate(), self._count,
+                width, height, message, 0 if state == "running" else self._attempts,
             )  # fmt: skip
 
     def _rate(self) -> float:
@@ -336,7 +336,8 @@ class LiveCameras:
         left_out = tuple(
             one.name
             for one in self.standings
-            if one.state in ("stopped", "ended") or (one.state == "running" and one.age > BEHIND_SECONDS)
+            if one.state in ("stopped", "ended")
+            or (one.state == "running" and (one.age or 0.0) > BEHIND_SECONDS)
         )
         recent = {camera.name: camera.recent for camera in self.cameras if camera.name not in left_out}
         frame_seconds = 1.0 / (fps or self.fps)

@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from studio.benchmarks.devices import run_device_benchmark
+from studio.benchmarks.first_frame import measure_starts
 from studio.benchmarks.hulls import run_hull_benchmark
 from studio.benchmarks.kernels import run_benchmark
 from studio.benchmarks.live import run_live_benchmark
@@ -51,17 +52,22 @@ def _slider(report: Progress) -> dict[str, object]:
     return {"reannealing": dataclasses.asdict(latency)}
 
 
-def _live(report: Progress) -> dict[str, object]:
-    return {"live": run_live_benchmark(report)}
+def _start(report: Progress) -> dict[str, object]:
+    return {"start": measure_starts(report)}
 
 
-FRAMES = "frames"
+def _live(report: Progress, minutes: float | None = None) -> dict[str, object]:
+    return {"live": run_live_benchmark(report, minutes)}
+
+
+FRAMES, LIVE = "frames", "live"
 PARTS: dict[str, Callable[[Progress], dict[str, object]]] = {
     "kernels": _kernels,
     "gpu": _gpu,
     "hulls": _hulls,
     "slider": _slider,
-    "live": _live,
+    "start": _start,
+    LIVE: _live,
 }
 
 
@@ -84,19 +90,31 @@ PARTS: dict[str, Callable[[Progress], dict[str, object]]] = {
     type=click.Path(dir_okay=False, path_type=Path),
     help="Write the stages of whole frames, thread by thread, for a viewer of Chrome traces.",
 )
+@click.option(
+    "--minutes",
+    type=click.FloatRange(0.1, 600.0),
+    help="Track live with the scene open for so long, and measure nothing else.",
+)
 @command
-def bench_command(only: tuple[str, ...], workload: tuple[str, ...], trace: Path | None) -> dict[str, object]:
-    """Measure kernels against bare memory loads, whole frames, hulls beside the paper's, a slider's answer, live
-    tracking: a table beside what is aimed at, and every figure below it. Each call is added to a history.
+def bench_command(
+    only: tuple[str, ...], workload: tuple[str, ...], trace: Path | None, minutes: float | None
+) -> dict[str, object]:
+    """Measure kernels against bare memory loads, whole frames, hulls beside the paper's, a slider's answer, the demo's
+    start, live tracking: a table beside what is aimed at, and every figure below it. Each call is added to a history.
     """
     if trace is not None and len(workload) != 1:
         workload = (DEFAULT,)
     # Who asks for a workload or a trace asks for whole frames.
     parts = only or ((FRAMES,) if workload else (*PARTS, FRAMES))
+    if minutes is not None:
+        parts = (LIVE,)
     result: dict[str, Any] = {}
     machine = this_machine()
     with progress("Measuring") as report:
         for name in parts:
+            if name == LIVE:
+                result |= _live(report, minutes)
+                continue
             if name != FRAMES:
                 result |= PARTS[name](report)
                 continue

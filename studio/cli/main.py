@@ -18,7 +18,7 @@ COMMANDS = {
     "import": ("footage_commands", "operations.footage.import_footage"),
     "new": ("footage_commands", "operations.footage.new_session"),
     "add-footage": ("footage_commands", "operations.footage.add_footage"),
-    "way": ("session_commands", "operations.opening.way"),
+    "workflow": ("session_commands", "operations.opening.workflow"),
     "synchronise": ("footage_commands", "operations.footage.synchronise"),
     "calibrate": ("camera_commands", "operations.cameras.calibrate"),
     "board": ("camera_commands", "operations.cameras.board"),

@@ -36,6 +36,8 @@ REFUSED_BY_THE_DISK = frozenset((errno.EACCES, errno.EPERM, errno.EROFS, errno.E
 TRACEBACK_VARIABLE = "STUDIO_TRACEBACK"
 SAID = ".notes-said.json"
 """In a session's folder: notes that commands have said of it."""
+SECONDS_BETWEEN = 10.0
+"""Least between two lines of progress, where no bar can be drawn."""
 
 messages = Console(stderr=True, highlight=False, soft_wrap=True)
 
@@ -193,16 +195,14 @@ def progress(title: str) -> Generator[Progress]:
         yield report
 
 
-def progress_lines(
-    title: str, seconds_between: float = 10.0, clock: Callable[[], float] = time.monotonic
-) -> Progress:
-    """A reporter that prints a line at most every so many seconds."""
+def progress_lines(title: str, clock: Callable[[], float] = time.monotonic) -> Progress:
+    """A reporter that prints a line at most every SECONDS_BETWEEN."""
     said, left = clock(), TimeLeft(clock)
 
     def report(step: str, done: int, total: int) -> None:
         nonlocal said
         estimate, now = left.after(step, done, total), clock()
-        if now - said < seconds_between:
+        if now - said < SECONDS_BETWEEN:
             return
         said = now
         note(", ".join(filter(None, (f"{step or title}: {done} of {total}", left_in_words(estimate)))))

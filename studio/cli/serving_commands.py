@@ -10,7 +10,7 @@ from studio.launch import PORT, Announce, demo, serve
 from studio.sessions.workspace import workspace_root
 
 PORT_HELP = "Port to listen on; 0 takes a free one."
-PREPARING = "The walk is made ready; the first start compiles the kernels once (about a minute) ..."
+PREPARING = "The walk is made ready; the first start compiles the kernels once (about half a minute) ..."
 JSON_HELP = "Print the addresses as one JSON object and nothing else on standard output."
 
 

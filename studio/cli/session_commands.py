@@ -1,4 +1,4 @@
-"""What there is and how it stands: `gallery`, `bodies`, `edit-body`, `runs`, `way`."""
+"""What there is and how it stands: `gallery`, `bodies`, `edit-body`, `runs`, `workflow`."""
 
 from dataclasses import asdict
 
@@ -7,7 +7,7 @@ import click
 from studio.cli.deriving import Call, command_of
 from studio.cli.output import command
 from studio.operations.gallery import Gallery, gallery
-from studio.operations.opening import bodies, way
+from studio.operations.opening import bodies, workflow
 from studio.operations.own_bodies import EditedBody, edit_body
 from studio.runs.workflow import Workflow
 from studio.sessions.object_stores import is_address
@@ -127,8 +127,8 @@ def _runs_at(address: str) -> dict[str, object]:
     }
 
 
-@command_of(way)
-def way_command(call: Call) -> dict[str, object]:
+@command_of(workflow)
+def workflow_command(call: Call) -> dict[str, object]:
     found: Workflow = call()
     lines = [
         f"{MARKS[step.state]} {step.step:12} {step.words}{f'  ({step.why})' if step.why else ''}"

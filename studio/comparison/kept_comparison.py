@@ -7,6 +7,7 @@ and once all are done `result.json` (numbers, findings, every frame) and `frames
 
 import hashlib
 import json
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ from studio.sessions import atomic_files
 from studio.sessions.manifest import now
 from studio.sessions.object_stores import below, is_address
 from studio.sessions.process_lock import ProcessLock
-from studio.sessions.record_files import RecordFile, renamed
+from studio.sessions.record_files import Entries, RecordFile, renamed
 from studio.sessions.remote_sessions import place_in_words
 from studio.sessions.session import Session
 from studio.typed_decoding import decode_json
@@ -32,7 +33,7 @@ from studio.typed_decoding import decode_json
 RECORD_NAME, RESULT_NAME, FRAMES_NAME = "comparison.json", "result.json", "frames.csv"
 BEHAVIOUR_NAME = "behaviour.model"
 LOCK_NAME, TRIALS_NAME = "comparison.lock", "trials"
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 
 
 class ComparisonRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -51,13 +52,21 @@ class ComparisonRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, 
     problem: str = ""
 
 
+def _plan_renamed(**names: str) -> Callable[[Entries], Entries]:
+    """A migration that gives entries of the plan other names."""
+    return lambda entries: entries | {"plan": renamed(**names)(entries["plan"])}
+
+
 RECORD = RecordFile(
     ComparisonRecord,
     "a comparison's record",
     "Start a new one.",
     ("There is no comparison '{name}'.", "Start one with 'studio compare'."),
     SCHEMA_VERSION,
-    {1: lambda entries: entries | {"plan": renamed(entrants="candidates")(entries["plan"])}},
+    {
+        1: _plan_renamed(entrants="candidates"),
+        2: _plan_renamed(despite_findings="allow_inconsistent"),
+    },
 )
 
 

@@ -35,7 +35,7 @@ class Plan:
     fps : of the footage. body : a name, "" for the session's own. behaviour : name of the model of those that need one,
     "" for none; behaviour_digest : of its file; behaviour_path : its present path. vary : of a sweep the values of each
     knob, whose combinations are the candidates, and evaluations are then the most of any; empty where trackers are
-    compared. fit_shape, despite_findings : of a sweep's runs.
+    compared. fit_shape, allow_inconsistent : of a sweep's runs.
     """
 
     footage: str
@@ -52,7 +52,7 @@ class Plan:
     behaviour_path: str = ""
     vary: Mapping[str, tuple[Value, ...]] = field(default_factory=dict[str, tuple[Value, ...]])
     fit_shape: bool = False
-    despite_findings: bool = False
+    allow_inconsistent: bool = False
 
     @property
     def frame_count(self) -> int:

@@ -16,7 +16,7 @@ from studio.comparison.candidates import Candidate
 from studio.comparison.kept_trials import measured_by
 from studio.comparison.plan import Plan, check_seeds, plan_of, tracking_trial_of
 from studio.comparison.statistics import bootstrap_interval
-from studio.comparison.trials import Outcome, Trial
+from studio.comparison.trials import ALLOW_INCONSISTENT, Outcome, Trial
 from studio.errors import RunError, SettingsError, TruthError
 from studio.evaluation.errors import evaluate
 from studio.knobs import Knob, checked
@@ -140,14 +140,14 @@ def plan_sweep(
     first: int | None = None,
     last: int | None = None,
     fit_shape: bool = True,
-    despite_findings: bool = False,
+    allow_inconsistent: bool = False,
 ) -> Plan:
     """A checked plan. vary : values by knob. knobs : of all runs.
 
     Raises SettingsError for an unknown knob, a value out of its range or too many of them; CalibrationError where the
-    footage contradicts it, unless `despite_findings`; RunError, BodyError, BehaviourError for what cannot be tracked.
+    footage contradicts it, unless `allow_inconsistent`; RunError, BodyError, BehaviourError for what cannot be tracked.
     """
-    accepted_doubts(session, despite_findings)
+    accepted_doubts(session, allow_inconsistent)
     _check_size(vary, knobs or {}, seeds)
     tracker = tracker or session.manifest.tracker or DEFAULT_TRACKER
     weighting = weighting or session.manifest.weighting or DEFAULT_WEIGHTING
@@ -167,7 +167,7 @@ def plan_sweep(
     chosen = chosen_model(session, model, guided, behaviour) if guided else None
     evaluations = max(one.evaluations for one in points)
     plan = plan_of(session, tuple(points), evaluations, seeds, (begin, end), body, chosen)
-    return replace(plan, vary=grid, fit_shape=fit_shape, despite_findings=despite_findings)
+    return replace(plan, vary=grid, fit_shape=fit_shape, allow_inconsistent=allow_inconsistent)
 
 
 def point_name(point: Mapping[str, Value]) -> str:
@@ -199,7 +199,7 @@ def sweep_trials(plan: Plan) -> tuple[Trial, ...]:
             {
                 **tracking_trial_of(plan, candidate, seed).plain(),
                 "fit_shape": plan.fit_shape,
-                "despite_findings": plan.despite_findings,
+                ALLOW_INCONSISTENT: plan.allow_inconsistent,
             },
         )
         for seed in plan.seeds

@@ -98,7 +98,7 @@ def _made(
         knobs={**values(settings), **dict(candidate.changes), "recovery": "off"},
         name=free_name(wanted, {run.name for run in session.runs()}),
         # A comparison takes the calibration as it is.
-        despite_findings=True,
+        allow_inconsistent=True,
         fit_shape=False,
         note=note,
     )

@@ -21,6 +21,10 @@ def is_mapping(value: Plain) -> TypeGuard[Mapping[str, Plain]]:
 Measure = Callable[[Mapping[str, Plain], FootageCache], dict[str, Plain]]
 M = TypeVar("M", bound=Callable[..., Any])
 NAMED_BELOW = "studio.experiments"
+ALLOW_INCONSISTENT = "despite_findings"
+"""The entry of a trial's arguments for `allow_inconsistent`: names of kept trials and batches are made of it, so it
+stays as it first was.
+"""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Bytes
+from studio.arrays import Bytes, evenly_spread
 from studio.capture.footage import Footage
 from studio.capture.pictures import is_picture, read_picture
 from studio.capture.video import VideoReader, measure_video
@@ -125,7 +125,7 @@ class Backgrounds:
         check_frame_count(camera, count)
         first = self._footage.picture(camera, 0)
         most = max(FEWEST_FRAMES, min(most, count, MEDIAN_BYTES // first.nbytes))
-        chosen = np.unique(np.linspace(0, count - 1, most).round().astype(int))
+        chosen = evenly_spread(count, most)
         stack = np.empty((len(chosen), *first.shape), np.uint8)
         for row, frame in enumerate(chosen):
             stack[row] = self._footage.picture(camera, int(frame))
@@ -156,8 +156,7 @@ class Backgrounds:
         count = measure_video(path).frame_count
         reader = VideoReader(path, count)
         try:
-            chosen = np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int))
-            return [fitted(reader.read(int(number))) for number in chosen]
+            return [fitted(reader.read(int(number))) for number in evenly_spread(count, most)]
         finally:
             reader.close()
 

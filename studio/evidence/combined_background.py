@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from studio.arrays import Array, Bytes, Floats
 from studio.evidence.background import GaussianBackground
 from studio.evidence.colour_fit import fitted_line
+from studio.evidence.masks import disc
 from studio.numba_in_threads import KERNEL, njit
 
 AGREES = 16.0
@@ -134,7 +135,7 @@ def combination(
             mean[y, x][inside] = fitted[y, x][inside]
             deviation[y, x][inside] = 0.0
             origin[y, x][inside] = Origin.PLATE
-    doubtful = np.asarray(cv2.dilate(removed, _disc(_fewer(DOUBT, factor)))) > 0
+    doubtful = np.asarray(cv2.dilate(removed, disc(_fewer(DOUBT, factor)))) > 0
     model = GaussianBackground(mean, np.minimum(deviation, MOST_DEVIATION))
     return model, doubtful, Combination(origin, shares, gains, offsets)
 
@@ -148,15 +149,10 @@ def _fewer(pixels: int, factor: float) -> int:
     return max(1, round(pixels / factor))
 
 
-def _disc(reach: int) -> Bytes:
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
-    return np.asarray(kernel, dtype=np.uint8)
-
-
 def _regions(unsure: Bytes, rim: int, factor: float) -> list[Region]:
     """The connected regions of a map above the least size, each in a rectangle with a rim around it."""
     reach = _fewer(OPENED, factor)
-    opened = cv2.morphologyEx(unsure, cv2.MORPH_OPEN, _disc(reach))
+    opened = cv2.morphologyEx(unsure, cv2.MORPH_OPEN, disc(reach))
     count, labels, boxes, _ = cv2.connectedComponentsWithStats(opened)
     found: list[Region] = []
     for label in range(1, count):
@@ -272,14 +268,7 @@ def fill_from_most_alike(
                 votes[k] = shares[k, y // STRIDE, x // STRIDE] ** VOTE + 1e-4
                 for c in range(3):
                     values[k, c] = frames[k, y, x, c]
-            most, best = 0.0, 0
-            for k in range(count):
-                alike = 0.0
-                for j in range(count):
-                    if is_near(values, k, j):
-                        alike += votes[j]
-                if alike > most:
-                    most, best = alike, k
+            most, best = most_alike(values, votes)
             for c in range(3):
                 total, squares = 0.0, 0.0
                 for j in range(count):
@@ -347,20 +336,27 @@ def fill_finely(
             for k in range(count):
                 share = shares[k, y * shares.shape[1] // height, x * shares.shape[2] // width]
                 votes[k] = share**VOTE + 1e-4
-            most_votes, best = 0.0, 0
-            for k in range(count):
-                alike = 0.0
-                for j in range(count):
-                    if is_near(values, k, j):
-                        alike += votes[j]
-                if alike > most_votes:
-                    most_votes, best = alike, k
+            most_votes, best = most_alike(values, votes)
             for c in range(3):
                 mode = 0.0
                 for j in range(count):
                     if is_near(values, best, j):
                         mode += votes[j] * values[j, c]
                 out[y, x, c] = np.uint8(mode / most_votes + 0.5)
+
+
+@njit(**KERNEL, inline="always")
+def most_alike(values: Array, votes: Array) -> tuple[float, int]:
+    """The votes (K,) for the row of values (K, 3) that the most votes are near to, and which row that is."""
+    most, best = 0.0, 0
+    for k in range(len(votes)):
+        alike = 0.0
+        for j in range(len(votes)):
+            if is_near(values, k, j):
+                alike += votes[j]
+        if alike > most:
+            most, best = alike, k
+    return most, best
 
 
 @njit(**KERNEL, inline="always")

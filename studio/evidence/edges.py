@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.arrays import Bytes
+from studio.evidence.masks import disc
 from studio.numba_in_threads import EXACT, KERNEL, njit
 
 EDGE_WIDTH = 4.0
@@ -40,8 +41,7 @@ def proximity_edges(
     """
     edges = edge_pixels(grey(picture), 64.0 * threshold * threshold)
     if near is not None and reach > 0:
-        kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
-        edges = np.asarray(cv2.bitwise_and(edges, cv2.dilate(near, kernel)), dtype=np.uint8)
+        edges = np.asarray(cv2.bitwise_and(edges, cv2.dilate(near, disc(reach))), dtype=np.uint8)
     # The blurred middle of a straight edge of EDGE_WIDTH pixels is to reach 255.
     peak = math.erf(0.5 * EDGE_WIDTH / (smoothing * math.sqrt(2.0)))
     return blurred(edges, whole_taps(smoothing, 2 * round(REACH * smoothing) + 1), 255.0 / (255.0 * peak))

@@ -103,10 +103,15 @@ class PackedMasks(Mapping[str, Bytes]):
         return len(self._packed)
 
 
+def disc(reach: int) -> Bytes:
+    """The kernel of a morphology that reaches `reach` pixels around each."""
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
+    return np.asarray(kernel, dtype=np.uint8)
+
+
 def _morphed(mask: Bytes, operation: int, size: int) -> Bytes:
     # Only odd kernels have a middle: an even one would shift the mask.
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size | 1, size | 1))
-    return np.asarray(cv2.morphologyEx(mask, operation, kernel), dtype=np.uint8)
+    return np.asarray(cv2.morphologyEx(mask, operation, disc(size // 2)), dtype=np.uint8)
 
 
 def _pieces(mask: Bytes, settings: EvidenceSettings) -> Bytes:

@@ -55,8 +55,13 @@ class EvidenceMaker:
         cv2.setNumThreads(1)
         self.cameras = tuple(camera.name for camera in cameras)
         self.settings, self.edge_kind = settings, edge_kind
-        self._footage, self._backgrounds, self._executor = footage, backgrounds, executor
+        self.footage, self._backgrounds, self._executor = footage, backgrounds, executor
         self.hull_of_pixels = edge_kind == "hull" and self._from_pixels()
+
+    def release(self, camera: str) -> None:
+        """Give a camera's video and background models back; they are opened again when needed."""
+        self.footage.release(camera)
+        self._backgrounds.release(camera)
 
     def evidence(self, frame: int) -> FrameEvidence:
         """The evidence of a frame, views in the order of the cameras. Raises FootageError, NotFoundError."""
@@ -69,7 +74,7 @@ class EvidenceMaker:
     def view(self, camera: str, frame: int) -> ViewEvidence:
         """One camera's evidence."""
         with span("decode", frame):
-            picture = self._footage.picture(camera, frame)
+            picture = self.footage.picture(camera, frame)
         if self.hull_of_pixels:
             nothing = _nothing(picture.shape[0], picture.shape[1])
             background = self._backgrounds.yuv(camera, self.settings.hull_noise)
@@ -77,13 +82,13 @@ class EvidenceMaker:
         with span("mask", frame):
             mask = self.finished_mask(camera, self.raw_mask(camera, frame, picture))
         given = self.settings.background_model in ("auto", "mask")
-        return self.of_mask(camera, frame, mask, self._footage.hidden(camera, frame) if given else None)
+        return self.of_mask(camera, frame, mask, self.footage.hidden(camera, frame) if given else None)
 
     def of_mask(self, camera: str, frame: int, mask: Bytes, hidden: Bytes | None) -> ViewEvidence:
         """One camera's evidence with a mask (H, W), 0 or 255, in place of the one that is made of its picture. hidden :
         as in `ViewEvidence`.
         """
-        picture = self._footage.picture(camera, frame)
+        picture = self.footage.picture(camera, frame)
         with span("edges", frame):
             return ViewEvidence(camera, picture, mask, self._edges(picture, mask), hidden=hidden)
 
@@ -92,8 +97,8 @@ class EvidenceMaker:
         if self.settings.hull_evidence != "auto":
             return self.settings.hull_evidence == "pixels"
         return self.settings.background_model in ("auto", "gaussian") and all(
-            self._footage.background_path(camera) is not None
-            and not self._footage.has_masks(camera)
+            self.footage.background_path(camera) is not None
+            and not self.footage.has_masks(camera)
             and self._backgrounds.exclusion(camera) is None
             for camera in self.cameras
         )
@@ -101,13 +106,13 @@ class EvidenceMaker:
     def raw_mask(self, camera: str, frame: int, picture: Bytes) -> RawMask:
         """The mask that came with the data, or the difference from a background model, before any clean-up."""
         choice = self.settings.background_model
-        given = self._footage.has_masks(camera)
+        given = self.footage.has_masks(camera)
         if choice == "mask" and not given:
             raise FootageError(
                 f"Camera {camera} has no masks.", "Choose another background model, such as 'gaussian'."
             )
         if choice == "mask" or (choice == "auto" and given):
-            mask = self._footage.mask(camera, frame)
+            mask = self.footage.mask(camera, frame)
             if mask is not None:
                 return RawMask(mask, self.settings.mask_clean_given)
         if choice == "threshold":

@@ -54,8 +54,10 @@ class EvidenceSettings:
         label="shadow test",
         help="Count pixels that are only darker than the background, in its own colour, as background.",
     )
+    # Ten drawn clips of the choosing half, one seed, mean error: 14.1 mm at 0.5, 13.3 at 0.4, as much at 0.35; at 0.25
+    # trousers become shadow. What is darker under the feet counts as body and pulls it down.
     mask_shadow_darkest: float = next_frame_knob(
-        0.5,
+        0.4,
         0.1,
         0.95,
         0.05,

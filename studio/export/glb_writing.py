@@ -25,24 +25,24 @@ from studio.runs.colour_tokens import colour_tokens
 SECTIONS = 24
 
 
-def cone(limb: Limb, sections: int = SECTIONS) -> tuple[Array, Array, Indices]:
+def cone(limb: Limb) -> tuple[Array, Array, Indices]:
     """Vertices (V, 3) mm and outward normals (V, 3) in the limb's frame, and faces (T, 3), counter-clockwise as seen
     from outside: a side with smooth normals and two flat caps with rims of their own.
     """
-    turn = np.linspace(0.0, 2.0 * np.pi, sections, endpoint=False)
-    rim = np.column_stack([limb.scale_x * np.cos(turn), limb.scale_y * np.sin(turn), np.zeros(sections)])
+    turn = np.linspace(0.0, 2.0 * np.pi, SECTIONS, endpoint=False)
+    rim = np.column_stack([limb.scale_x * np.cos(turn), limb.scale_y * np.sin(turn), np.zeros(SECTIONS)])
     top, up = np.array([0.0, 0.0, limb.length]), np.sign(limb.length)
     near, far = limb.radius_start * rim, limb.radius_end * rim + top
     vertices = np.concatenate([near, far, near, np.zeros((1, 3)), far, top[None]])
-    down = np.tile([0.0, 0.0, -up], (sections + 1, 1))
+    down = np.tile([0.0, 0.0, -up], (SECTIONS + 1, 1))
     normals = np.concatenate([_sides(limb, turn, 0.0), _sides(limb, turn, 1.0), down, -down])
-    here = np.arange(sections)
-    after, first, second = np.roll(here, -1), 2 * sections, 3 * sections + 1
-    near_hub, far_hub = np.full(sections, first + sections), np.full(sections, second + sections)
+    here = np.arange(SECTIONS)
+    after, first, second = np.roll(here, -1), 2 * SECTIONS, 3 * SECTIONS + 1
+    near_hub, far_hub = np.full(SECTIONS, first + SECTIONS), np.full(SECTIONS, second + SECTIONS)
     faces = np.concatenate(
         [
-            np.column_stack([here, after, after + sections]),
-            np.column_stack([here, after + sections, here + sections]),
+            np.column_stack([here, after, after + SECTIONS]),
+            np.column_stack([here, after + SECTIONS, here + SECTIONS]),
             np.column_stack([near_hub, first + after, first + here]),
             np.column_stack([far_hub, second + here, second + after]),
         ]

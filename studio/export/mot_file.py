@@ -33,7 +33,7 @@ class MotFile:
 def write_mot(task: ExportTask) -> Written:
     """The body's parameters as coordinates. Raises ExportError where the file does not read back."""
     motion = task.motion
-    angle = np.array([entry.kind == "angle" for entry in motion.body.parameters])
+    angle = motion.body.angles
     values = motion.poses.copy()
     values[:, angle] = np.degrees(np.unwrap(values[:, angle], axis=0))
     values[:, ~angle] /= MM_PER_M

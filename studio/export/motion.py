@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Array, Indices
+from studio.arrays import Array, Indices, runs_of
 from studio.body.model import BodyModel
 from studio.errors import ExportError
 from studio.export.options import ExportOptions
@@ -51,8 +51,7 @@ class Motion:
     @property
     def gaps(self) -> tuple[tuple[int, int], ...]:
         """Rows without a known pose, as half-open ranges."""
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], ~self.known, [False]]).astype(np.int8)))
-        return tuple((int(first), int(last)) for first, last in edges.reshape(-1, 2))
+        return tuple(runs_of(~self.known))
 
 
 def motion_of(run: StoredRun, options: ExportOptions) -> Motion:
@@ -143,7 +142,7 @@ def _between(body: BodyModel, places: Array, poses: Array, wanted: Array) -> tup
     low = np.maximum(high - 1, 0)
     span = np.where(high > low, places[high] - places[low], 1.0)
     share = ((held - places[low]) / span)[:, None]
-    angle = np.array([entry.kind == "angle" for entry in body.parameters])
+    angle = body.angles
     step = poses[high] - poses[low]
     step[:, angle] -= 2.0 * math.pi * np.round(step[:, angle] / (2.0 * math.pi))
     made = np.where(share >= 1.0, poses[high], poses[low] + share * step)

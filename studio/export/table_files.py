@@ -28,7 +28,7 @@ def write_csv(task: ExportTask) -> Written:
     points, places = marked_points(task)
     motion, options = task.motion, task.options
     poses = np.where(motion.known[:, None], motion.poses, np.nan)
-    angle = np.array([entry.kind == "angle" for entry in motion.body.parameters])
+    angle = motion.body.angles
     shown = poses.copy()
     shown[:, angle] *= 180.0 / math.pi if options.angles == "degrees" else 1.0
     shown[:, ~angle] /= task.axes.mm

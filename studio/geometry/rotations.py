@@ -78,7 +78,15 @@ def orthonormality_error(matrix: ArrayLike) -> float:
 
 
 def nearest_rotation(matrix: ArrayLike) -> Array:
-    """The rotation closest to a (3, 3) matrix in the sum of squares (orthogonal Procrustes)."""
+    """The rotations closest to (..., 3, 3) matrices in the sum of squares (orthogonal Procrustes)."""
     left, _, right = np.linalg.svd(np.asarray(matrix, dtype=float))
-    mirrored = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
-    return (left * mirrored) @ right
+    left[..., 2] *= np.sign(np.linalg.det(left @ right))[..., None]
+    return left @ right
+
+
+def frames_along(up: Array, left: Array) -> Array:
+    """(F, 3, 3) frames with z along `up` and y as close to `left` as that allows; (F, 3) each."""
+    z: Array = up / np.linalg.norm(up, axis=1, keepdims=True)
+    x: Array = np.cross(left, z)
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    return np.stack([x, np.cross(z, x), z], axis=-1)

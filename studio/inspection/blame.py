@@ -1,8 +1,8 @@
 """Which camera and which term of the likelihood prefers a pose to another, limb by limb, and where each pulls.
 
-Where a log-weight is a sum over cameras and terms (`PreparedProblem.shares`), so is its difference between two poses.
-A limb's part of it is what is lost when that limb alone is put as in the reference pose; limbs that hide one another
-share theirs, so parts need not add up to the whole.
+Where a log-weight is a sum over cameras and terms (`BaseFrameLikelihood.shares`), so is its difference between two
+poses. A limb's part of it is what is lost when that limb alone is put as in the reference pose; limbs that hide one
+another share theirs, so parts need not add up to the whole.
 """
 
 from dataclasses import dataclass

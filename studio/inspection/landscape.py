@@ -11,7 +11,7 @@ import numpy as np
 
 from studio.arrays import Array
 from studio.errors import NotFoundError
-from studio.inspection.likelihoods import FrameEvaluation, evaluation_of, in_batches, named_pose
+from studio.inspection.likelihoods import FrameEvaluation, evaluation_of, named_pose
 from studio.inspection.modes import modes_of
 from studio.inspection.reading import InspectedFrame, no_value
 from studio.inspection.reference import true_pose
@@ -255,7 +255,7 @@ def _plane(
     poses = np.repeat(line.base[None], PLANE * PLANE, axis=0)
     grid = np.stack(np.meshgrid(first, across, indexing="ij"), axis=2).reshape(-1, 2)
     poses[:, line.parameter], poses[:, second] = grid[:, 0], grid[:, 1]
-    values = in_batches(evaluation.log_weights, poses)
+    values = evaluation.log_weights(poses)
     return [
         (float(one), float(other), float(value)) for (one, other), value in zip(grid, values, strict=True)
     ]

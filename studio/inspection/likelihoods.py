@@ -3,7 +3,6 @@
 import threading
 import time
 from collections import OrderedDict
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +12,14 @@ from studio.arrays import Array
 from studio.errors import NotFoundError
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.inspection.reading import InspectedFrame, InspectedRun
-from studio.likelihood.problem import POOLED, WHOLE, FittedToPoses, FrameLikelihood, PreparedProblem, Shares
+from studio.likelihood.problem import (
+    POOLED,
+    WHOLE,
+    BaseFrameLikelihood,
+    FittedToPoses,
+    FrameLikelihood,
+    Shares,
+)
 from studio.runs.problem_source import ProblemSource
 from studio.runs.run_footage import footage_of
 
@@ -41,7 +47,7 @@ class FrameEvaluation:
 
     def shares(self, poses: Array) -> Shares:
         """What each camera and term adds to the log-weights of poses (N, D)."""
-        if isinstance(self.problem, PreparedProblem):
+        if isinstance(self.problem, BaseFrameLikelihood):
             return self.problem.shares(poses)
         return Shares((POOLED,), (WHOLE,), self.problem.log_likelihood(poses)[:, None, None])
 
@@ -106,11 +112,6 @@ def limbs_swapped(run: InspectedRun, pose: Array, other: Array) -> tuple[tuple[s
     groups = np.array(run.limbs)
     names = tuple(dict.fromkeys(run.limbs))
     return names, np.stack([np.where(groups == name, other, pose) for name in names])
-
-
-def in_batches(evaluate: Callable[[Array], Array], poses: Array, size: int = 4096) -> Array:
-    """Values of many poses, so many at a time."""
-    return np.concatenate([evaluate(poses[at : at + size]) for at in range(0, len(poses), size)])
 
 
 def named_pose(frame: InspectedFrame, name: str, particle: int | None, layer: int) -> Array:

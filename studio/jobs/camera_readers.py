@@ -15,6 +15,7 @@ SECONDS_TO_END = 8.0
 LOOK_SECONDS = 0.05
 USUAL_RATES = (10.0, 12.5, 15.0, 20.0, 24.0, 25.0, 30.0, 50.0, 60.0, 90.0, 100.0, 120.0)
 NEAR_RATE = 0.06
+RATED_PICTURES, RATED_SECONDS = 40, 2.0
 """A measured rate is taken for a usual one that is so near, in parts: what is measured in a second is not exact."""
 
 
@@ -56,13 +57,13 @@ class CameraReaders:
             "Check that it is switched on and its address, or leave that camera out.",
         )
 
-    def await_rate(self, pictures: int = 40, patience: float = 2.0) -> float:
-        """Pictures a second of the slowest camera, once each gave some, or after so many seconds.
+    def await_rate(self) -> float:
+        """Pictures a second of the slowest camera, once each gave RATED_PICTURES, or after RATED_SECONDS.
 
         The usual rate that is near, if one is.
         """
-        until = self._clock() + patience
-        while min(one.pictures for one in self.cameras.standings) < pictures and self._clock() < until:
+        until = self._clock() + RATED_SECONDS
+        while min(one.pictures for one in self.cameras.standings) < RATED_PICTURES and self._clock() < until:
             self.cameras.wait(LOOK_SECONDS)
         measured = self.cameras.fps
         usual = min(USUAL_RATES, key=lambda rate: abs(rate - measured))

@@ -78,15 +78,13 @@ def track_cameras(
     request: LiveRecordingRequest,
     run: Mapping[str, Any],
     report: Progress,
-    *,
-    readers: CameraReaders | None = None,
 ) -> TrackedCameras:
     """Track what cameras see with a session's calibration, empty room and person, and keep it as a session of its own.
 
-    run : of the live run, as `prepare_run` takes it. report : how it goes. readers : of cameras that are open
-    already; they are closed at the end. Raises StudioError; KeyboardInterrupt is passed on, what was tracked is kept.
+    run : of the live run, as `prepare_run` takes it. report : how it goes. Raises StudioError;
+    KeyboardInterrupt is passed on, what was tracked is kept.
     """
-    with readers or CameraReaders(addresses) as opened:
+    with CameraReaders(addresses) as opened:
         report("waiting for the cameras", 0, 1)
         recording = open_recording(base, opened, request)
         try:

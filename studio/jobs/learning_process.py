@@ -3,7 +3,7 @@
 import dataclasses
 import os
 from collections.abc import Callable, Mapping
-from concurrent.futures import Executor, wait
+from concurrent.futures import wait
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -53,18 +53,13 @@ class LearningOrder:
 
 
 def learn_in_process(
-    order: LearningOrder,
-    report: Progress,
-    check: Callable[[], None] = lambda: None,
-    executor: Executor | None = None,
+    order: LearningOrder, report: Progress, check: Callable[[], None] = lambda: None
 ) -> dict[str, object]:
     """Learn and keep a model in a process of its own; its numbers. Nothing is written before the model is whole.
 
-    check : called often; what it raises ends the work. executor : runs it instead of a process of this call's own; it
-    is left open, and the progress stays there. Raises StudioError.
+    check : called often; what it raises ends the work. Raises StudioError.
     """
-    own = executor is None
-    running = ProcessExecutor(1, on_report=report, niceness=NICENESS) if executor is None else executor
+    running = ProcessExecutor(1, on_report=report, niceness=NICENESS)
     process = running.submit(os.getpid)
     learning = running.submit(learn_to_order, order)
     try:
@@ -76,11 +71,10 @@ def learn_in_process(
         raise BehaviourError(lost.message, "Try again with fewer frames.") from None
     finally:
         learning.cancel()
-        if own:
-            running.shutdown(cancel_futures=True)
-            if process.done() and not process.cancelled():
-                for left in models_folder(order.root).glob(f"*.{process.result()}.partial"):
-                    left.unlink(missing_ok=True)
+        running.shutdown(cancel_futures=True)
+        if process.done() and not process.cancelled():
+            for left in models_folder(order.root).glob(f"*.{process.result()}.partial"):
+                left.unlink(missing_ok=True)
 
 
 def learn_to_order(order: LearningOrder) -> dict[str, object]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from studio.errors import SessionError, SettingsError, StudioError
 from studio.runs.behaviour_models import check_prediction
+from studio.runs.compiling_beside import compiling_beside
 from studio.runs.moved_knobs import keep_moved, moved_between, with_moved
 from studio.runs.problem_source import ProblemSource
 from studio.runs.reannealing import Reannealing
@@ -131,10 +132,10 @@ class OpenRun:
     def warm_up(self) -> None:
         """Weigh one pose, so that what has to be compiled is compiled before a frame's time is taken."""
         frame = min(self.tracking.next_frame, self.stored.record.last - 1)
-        problem = self._problems.problem(frame, self.mailbox.latest()[1])
         start = self.stored.record.start_pose
         pose = np.array(start) if start is not None else self.stored.body().neutral
-        problem.log_likelihood(pose[None])
+        with compiling_beside(self.stored):
+            self._problems.problem(frame, self.mailbox.latest()[1]).log_likelihood(pose[None])
 
     def step_layer(self) -> Stepped | None:
         """Do the next layer of the run; None where a live run has no picture yet."""

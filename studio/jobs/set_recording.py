@@ -19,6 +19,7 @@ from studio.words import counted
 
 LONGEST_SILENCE = 10.0
 """With no camera left for so long, a recording ends."""
+SECONDS_TO_COME = 10.0
 LOOK_SECONDS = 0.02
 FULL = frozenset((errno.ENOSPC, errno.EDQUOT))
 
@@ -106,9 +107,9 @@ class SetRecording:
             self._ended,
         )
 
-    def await_first(self, patience: float = 10.0) -> None:
+    def await_first(self) -> None:
         """Return when the set is there that one gets ready with. Raises FootageError where none comes."""
-        self._first_there.wait(patience)
+        self._first_there.wait(SECONDS_TO_COME)
         if not self._sets:
             raise FootageError(self._ended or "The cameras gave no complete set.", "Look at their pictures.")
 
@@ -169,7 +170,7 @@ class SetRecording:
             before = self._states.get(one.name)
             self._states[one.name] = one.state
             if before not in (None, "connecting", one.state) and self._went is not None:
-                self._notices.append(CameraNotice(one.name, one.state, now - self._went, one.age))
+                self._notices.append(CameraNotice(one.name, one.state, now - self._went, one.age or 0.0))
         return list(self._states.values())
 
     def _go(self) -> None:

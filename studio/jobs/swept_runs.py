@@ -6,7 +6,7 @@ from typing import Any
 
 from studio.comparison.footage_cache import FootageCache
 from studio.comparison.sweep import measured_run
-from studio.comparison.trials import kept_as
+from studio.comparison.trials import ALLOW_INCONSISTENT, kept_as
 from studio.jobs.batch import track_to_end
 from studio.progress import report
 from studio.runs.new_run import checked_frames, prepare_run
@@ -83,7 +83,7 @@ def _new(session: Session, arguments: Mapping[str, Any]) -> StoredRun:
         seed=arguments["seed"],
         knobs=arguments["changes"],
         fit_shape=arguments["fit_shape"],
-        despite_findings=arguments.get("despite_findings", False),
+        allow_inconsistent=arguments.get(ALLOW_INCONSISTENT, False),
         note=arguments.get("note", ""),
         name=free_name(arguments["run"], taken),
     )

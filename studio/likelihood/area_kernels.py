@@ -12,17 +12,22 @@ precision is no faster.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from studio.arrays import Array, Floats, Indices, Mask
 from studio.likelihood.outline_kernels import LANES
 from studio.likelihood.picture_maps import Maps
-from studio.numba_in_threads import CONTRACTED, CONTRACTED_INLINED, KERNEL, intrinsic, njit, types
+from studio.numba_in_threads import CONTRACTED, CONTRACTED_INLINED, EXACT, KERNEL, intrinsic, njit, types
 
 ROWS = 8
+PARTS = 8
+"""Sums that NumPy makes side by side."""
 WORD = 64
 WINDOW_STEP = 16
 """Pixels between the places where a window may begin."""
 ALL_BITS, NO_BITS = np.uint64(0xFFFFFFFFFFFFFFFF), np.uint64(0)
+GATHERING = np.uint64(0x0102040810204080)
+"""Times a word of eight bytes, each 0 or 1: its last byte has a bit of each."""
 FAR = 1.0e9
 # Rows of a limb's table: slope and crossing of each edge as a left one, then as a right one; first and last row of
 # pixels; first and last column; area.
@@ -214,6 +219,15 @@ def pose_areas(tables, lane, view, silhouettes, words):
 
 
 @njit(**CONTRACTED)
+def most_words(views):
+    """Words that a union may take in any of the views (V, 4) of `Maps`."""
+    width, height = 0, 0
+    for view in range(views.shape[0]):
+        width, height = max(width, views[view, 2]), max(height, views[view, 3])
+    return ((width - 1) // WORD + 2) * (height + 2 * ROWS)
+
+
+@njit(**CONTRACTED)
 def area_blocks(
     first: int,
     last: int,
@@ -233,8 +247,7 @@ def area_blocks(
     """
     tables = np.zeros((outlines.shape[2], FIELDS * LANES))
     views = silhouettes.views
-    columns = (views[:, 2].max() - 1) // WORD + 2
-    words = np.zeros(columns * (views[:, 3].max() + 2 * ROWS), np.uint64)
+    words = np.zeros(most_words(views), np.uint64)
     for block in range(first, last):
         for view in range(outlines.shape[1]):
             width, height = views[view, 2], views[view, 3]
@@ -270,8 +283,7 @@ def spans_only(tables: Array, silhouettes: Maps, passes: int, sums: Array) -> No
     over: its limit. sums : (B, V, 16), lengths of spans and bits are added.
     """
     views, values = silhouettes.views, silhouettes.values
-    columns = (views[:, 2].max() - 1) // WORD + 2
-    words = np.full(columns * (views[:, 3].max() + 2 * ROWS), ALL_BITS)
+    words = np.full(most_words(views), ALL_BITS)
     for _ in range(passes):
         for block in range(tables.shape[0]):
             for view in range(tables.shape[1]):
@@ -310,14 +322,109 @@ def halve(mask: Mask, found: Mask) -> None:
     every second one. A last row or column without a neighbour counts twice, which changes no majority.
     """
     height, width = mask.shape
+    pairs, last = width // 2, width - 1
     for y in range(found.shape[0]):
-        above, below = mask[2 * y], mask[min(2 * y + 1, height - 1)]
-        for x in range(found.shape[1]):
-            left, right = 2 * x, min(2 * x + 1, width - 1)
-            count = (
-                np.int64(above[left])
-                + np.int64(above[right])
-                + np.int64(below[left])
-                + np.int64(below[right])
-            )
-            found[y, x] = count > 2 or (count == 2 and (x + y) % 2 == 0)
+        above, below, row = mask[2 * y], mask[min(2 * y + 1, height - 1)], found[y]
+        for x in range(pairs):
+            left, right = 2 * x, 2 * x + 1
+            row[x] = is_most(above[left], above[right], below[left], below[right], x + y)
+        if pairs < found.shape[1]:
+            row[pairs] = is_most(above[last], above[last], below[last], below[last], pairs + y)
+
+
+@njit(**KERNEL)
+def is_most(a, b, c, d, place):
+    """Whether more than two of four are true, or two of them at an even place."""
+    count = np.uint8(a) + np.uint8(b) + np.uint8(c) + np.uint8(d)
+    return (count > 2) | ((count == 2) & (place & 1 == 0))
+
+
+@njit(**KERNEL)
+def pack_windows(mask: Mask, words: int, out: NDArray[np.uint64]) -> None:
+    """Fill out (columns * words,) with a mask (H, W) as `silhouette_areas.packed_windows` describes."""
+    height, width = mask.shape
+    columns = -(-width // WINDOW_STEP)
+    row = np.zeros(columns * WINDOW_STEP, np.uint8)
+    eighths, parts = row.view(np.uint64), np.zeros(columns + WORD // WINDOW_STEP, np.uint64)
+    out[:] = NO_BITS
+    for y in range(height):
+        for x in range(width):
+            row[x] = mask[y, x]
+        for c in range(columns):
+            low = (eighths[2 * c] * GATHERING) >> np.uint64(56)
+            high = (eighths[2 * c + 1] * GATHERING) >> np.uint64(56)
+            parts[c] = low | (high << np.uint64(8))
+        for c in range(columns):
+            both = parts[c] | (parts[c + 1] << np.uint64(16))
+            out[c * words + y] = both | (parts[c + 2] << np.uint64(32)) | (parts[c + 3] << np.uint64(48))
+
+
+@njit(**EXACT)
+def mean_in_order(values: Array, in_parts: bool) -> float:
+    """Mean of (K,) numbers, summed one by one, or `in_parts`, as NumPy sums a row of up to 128."""
+    count = values.shape[0]
+    total, first = 0.0, 0
+    if in_parts and count >= PARTS:
+        parts = values[:PARTS].copy()
+        first = count // PARTS * PARTS
+        for k in range(PARTS, first):
+            parts[k % PARTS] += values[k]
+        total = ((parts[0] + parts[1]) + (parts[2] + parts[3])) + (
+            (parts[4] + parts[5]) + (parts[6] + parts[7])
+        )
+    for k in range(first, count):
+        total += values[k]
+    return total / count
+
+
+@njit(**EXACT)
+def is_in_parts(count):
+    """Whether NumPy would sum the views of each of `count` poses in parts: what is found for one block of poses lies
+    view by view in memory, and is summed so.
+    """
+    return count == 1 or count > LANES
+
+
+@njit(**EXACT)
+def areas_fitness(both, projected, observed, outside, found):
+    """Fill found (V,) with the fitness (`Areas`) of one pose's areas."""
+    for v in range(found.shape[0]):
+        own = np.float64(both[v]) / max(np.float64(projected[v]) + outside[v], 1.0)
+        seen = np.float64(both[v]) / max(np.float64(observed[v]), 1.0)
+        found[v] = 0.5 * own + 0.5 * seen
+
+
+@njit(**EXACT)
+def two_terms(edge: Array, both: Indices, projected: Indices, observed: Indices, outside: Array) -> Array:
+    """(N,) of N poses the mean over the views of the areas' fitness plus that of edge (N, V); see `three_terms`."""
+    found, covered, in_parts = np.empty(edge.shape[0]), np.empty(edge.shape[1]), is_in_parts(edge.shape[0])
+    for n in range(edge.shape[0]):
+        areas_fitness(both[n], projected[n], observed, outside[n], covered)
+        found[n] = mean_in_order(covered, in_parts) + mean_in_order(edge[n], in_parts)
+    return found
+
+
+@njit(**EXACT)
+def three_terms(
+    edge: Array,
+    region: Array,
+    both: Indices,
+    projected: Indices,
+    observed: Indices,
+    outside: Array,
+    weights: Array,
+) -> Array:
+    """(N,) of N poses the means over the views of 1 - edge, 1 - region and the areas' fitness (`Areas`), times weights
+    (3,) and summed. edge, region : (N, V). In one pass, as NumPy's several calls cost more than the work itself, and
+    bit for bit theirs.
+    """
+    found = np.empty(edge.shape[0])
+    views = edge.shape[1]
+    sides, within, covered = np.empty(views), np.empty(views), np.empty(views)
+    for n in range(edge.shape[0]):
+        for v in range(views):
+            sides[v], within[v] = 1.0 - edge[n, v], 1.0 - region[n, v]
+        areas_fitness(both[n], projected[n], observed, outside[n], covered)
+        found[n] = weights[0] * mean_in_order(sides, True) + weights[1] * mean_in_order(within, True)
+        found[n] += weights[2] * mean_in_order(covered, is_in_parts(edge.shape[0]))
+    return found

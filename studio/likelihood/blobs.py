@@ -35,7 +35,7 @@ from studio.geometry.camera import Camera
 from studio.likelihood.blob_settings import BlobSettings
 from studio.likelihood.evidence_check import check_views
 from studio.likelihood.hard_priors import HardPriors
-from studio.likelihood.problem import TRUNK_FIRST, WHOLE_BODY, PreparedProblem
+from studio.likelihood.problem import TRUNK_FIRST, WHOLE_BODY, BaseFrameLikelihood
 from studio.volume.alignment import root_parameters
 from studio.volume.blob_acquisition import Profiles, blobs_of
 from studio.volume.blob_fitting import Fitted, fit_blobs
@@ -53,7 +53,7 @@ TRUNK = "trunk"
 
 
 class BlobLikelihood:
-    """Makes the problem of any frame; learnt blobs are in the frames' memory, not here."""
+    """Makes the likelihood of any frame; learnt blobs are in the frames' memory, not here."""
 
     def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: BlobSettings) -> None:
         self.body, self.cameras, self.settings = body, cameras, settings
@@ -63,10 +63,10 @@ class BlobLikelihood:
         self.moves = len(root_parameters(body)) > 0
         self._last: tuple[Array, BlobModel] | None = None
 
-    def problem(self, evidence: FrameEvidence) -> "BlobProblem":
+    def problem(self, evidence: FrameEvidence) -> "BlobFrameLikelihood":
         """One frame as a function of poses. Raises FootageError where views do not fit the cameras."""
         check_views(self.cameras, evidence, edges=False)
-        return BlobProblem(self, self.reconstructor.hull(evidence))
+        return BlobFrameLikelihood(self, self.reconstructor.hull(evidence))
 
     def model(self, memory: Mapping[str, Array]) -> BlobModel:
         """The blobs in a frame's memory, else the cones'; the last result is cached."""
@@ -88,7 +88,7 @@ class BlobLikelihood:
         return Profiles(memory["blob_profiles"], int(memory["blob_frames"][0]))
 
 
-class BlobProblem(PreparedProblem):
+class BlobFrameLikelihood(BaseFrameLikelihood):
     """One frame as a function of poses, before expected poses are given."""
 
     def __init__(self, likelihood: BlobLikelihood, hull: Hull) -> None:
@@ -114,7 +114,7 @@ class BlobProblem(PreparedProblem):
         return self.expecting(checked.mean(axis=0)[None], {}).log_likelihood(checked, stage)
 
 
-class ExpectedBlobs(BlobProblem):
+class ExpectedBlobs(BlobFrameLikelihood):
     """One frame as a function of poses, with the blobs fitted.
 
     model : the blobs known so far. fitted : to the hull, None where nothing is seen. starts : (S, D) fitted from.

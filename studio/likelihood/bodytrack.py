@@ -30,7 +30,7 @@ from studio.likelihood.edge_region_kernels import CHUNK
 from studio.likelihood.evidence_check import check_views
 from studio.likelihood.outline_kernels import LANES
 from studio.likelihood.picture_maps import Maps, joined_maps
-from studio.likelihood.problem import POOLED, Preparation, PreparedProblem, Shares
+from studio.likelihood.problem import POOLED, BaseFrameLikelihood, Preparation, Shares
 from studio.numba_in_threads import parallel_blocks
 
 IntArray = NDArray[np.int64]
@@ -71,18 +71,18 @@ class Score:
 
 
 class BodytrackLikelihood(Preparation):
-    """Makes the problem of any frame."""
+    """Makes the likelihood of any frame."""
 
-    def problem(self, evidence: FrameEvidence) -> "BodytrackProblem":
+    def problem(self, evidence: FrameEvidence) -> "BodytrackFrameLikelihood":
         """One frame as a function of poses; its edge maps are the benchmark's.
 
         Raises FootageError where views do not fit the cameras.
         """
         check_views(self.cameras, evidence)
-        return BodytrackProblem(self, score_maps(evidence))
+        return BodytrackFrameLikelihood(self, score_maps(evidence))
 
 
-class BodytrackProblem(PreparedProblem):
+class BodytrackFrameLikelihood(BaseFrameLikelihood):
     """One frame as a function of poses."""
 
     def __init__(self, likelihood: BodytrackLikelihood, maps: Maps) -> None:

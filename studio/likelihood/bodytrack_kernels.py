@@ -12,7 +12,7 @@ exact, whatever their order.
 import numpy as np
 
 from studio.arrays import Floats, Indices
-from studio.likelihood.edge_region_kernels import CHUNK, LOW, UPPER, add_up, as_pairs
+from studio.likelihood.edge_region_kernels import CHUNK, add_lanes, add_up, as_pairs
 from studio.likelihood.outline_kernels import HALF, LANES, ONE, ZERO
 from studio.likelihood.picture_maps import Maps
 from studio.numba_in_threads import FAST, FAST_INLINED, njit
@@ -21,8 +21,8 @@ LEAST, MOST = 4, np.float32(1.0e6)
 EDGE_STEP, INSIDE_STEP = np.float32(5.0), np.float32(10.0)
 MOST_ROWS = 4096
 """Rows of the buffer: of ten limbs about 200 are used."""
-ROOM = 3
-"""Rows that stay free: for one more after an odd number of them."""
+AT_ONCE = 4
+"""Rows that `add_lanes` reads at once; the last ones are filled up."""
 # Rows of sixteen lanes of the lines at hand: place of the first sample (pixels, half a pixel on), way to the last,
 # 1 / intervals, number of the last sample (-1: none).
 X, Y, ACROSS, DOWN, STEP, LAST, LINE_ROWS = 0, LANES, 2 * LANES, 3 * LANES, 4 * LANES, 5 * LANES, 6
@@ -144,7 +144,7 @@ def lane_intervals(x, y, step):
     return np.int32(max(np.float32(LEAST), np.floor(min(np.sqrt(x * x + y * y) / step, MOST) + HALF)))
 
 
-@njit(**FAST)
+@njit(**FAST_INLINED)
 def side_lines(corners, seen, begin, end, lines):
     """Fill the lines (96,) of one side of a limb, from one corner to another; the largest number of a sample."""
     most = np.int32(-1)
@@ -168,7 +168,7 @@ def lane_of(corners, lane):
     )  # fmt: skip
 
 
-@njit(**FAST)
+@njit(**FAST_INLINED)
 def grid_sizes(corners, seen, columns, rows, lines):
     """Fill columns (16,) and rows (16,) of the grid within a limb, and the lines' steps; returns the most columns, and
     the largest number of a row.
@@ -186,7 +186,7 @@ def grid_sizes(corners, seen, columns, rows, lines):
     return most_columns, most
 
 
-@njit(**FAST)
+@njit(**FAST_INLINED)
 def column_lines(corners, column, columns, rows, lines):
     """Fill the lines (96,) of one column of the grid within a limb."""
     number = np.float32(column)
@@ -234,12 +234,12 @@ def fill_clipped_rows(lines, most, across, down, nothing, buffer, at, counts):
             counts[lane] += np.int32(inside)
 
 
-@njit(**FAST)
+@njit(**FAST_INLINED)
 def fill_rows(whole, lines, most, size, nothing, buffer, at, counts):
     """Rows of samples 0 to `most` of sixteen lines; returns the row after them, -1 where the buffer cannot hold them.
     counts : (16,), the samples that count are added.
     """
-    if at < 0 or at + most + ROOM > buffer.shape[0]:
+    if at < 0 or at + most + AT_ONCE > buffer.shape[0]:
         return -1
     if whole:
         fill_whole_rows(lines, most, size[0], nothing, buffer, at, counts)
@@ -248,7 +248,7 @@ def fill_rows(whole, lines, most, size, nothing, buffer, at, counts):
     return at + most + 1
 
 
-@njit(**FAST)
+@njit(**FAST_INLINED)
 def fill_sides(limbs, size, nothing, scratch, buffer, counts):
     """Rows of both sides of all limbs (L, 160); returns how many, -1 where there is no room."""
     corners, seen, lines, _, _ = scratch
@@ -262,7 +262,7 @@ def fill_sides(limbs, size, nothing, scratch, buffer, counts):
     return at
 
 
-@njit(**FAST)
+@njit(**FAST_INLINED)
 def fill_grids(limbs, size, nothing, scratch, buffer, counts):
     """Rows of the grids within all limbs (L, 160); returns how many, -1 where there is no room."""
     corners, seen, lines, columns, rows = scratch
@@ -276,33 +276,6 @@ def fill_grids(limbs, size, nothing, scratch, buffer, counts):
             column_lines(corners, column, columns, rows, lines)
             at = fill_rows(whole, lines, most, size, nothing, buffer, at, counts)
     return at
-
-
-@njit(**FAST)
-def add_four(values, base, pairs, rows, quarter, sums):
-    """Add the entries of a map at rows (K, 8) of pairs of indices to the sums (16, ...) of four of the poses. An odd K
-    reads one row more.
-    """
-    a = b = c = d = np.uint64(0)
-    end = np.uint64(values.shape[0])
-    first, second = np.uint64(2 * quarter), np.uint64(2 * quarter + 1)
-    for k in range(0, rows, 2):
-        p, q, r, s = pairs[k, first], pairs[k, second], pairs[k + 1, first], pairs[k + 1, second]
-        # As in `edge_region_kernels.add_up`: never so.
-        if (p & LOW) >= end:
-            break
-        a += values[(p & LOW) + base]
-        b += values[(p >> UPPER) + base]
-        c += values[(q & LOW) + base]
-        d += values[(q >> UPPER) + base]
-        a += values[(r & LOW) + base]
-        b += values[(r >> UPPER) + base]
-        c += values[(s & LOW) + base]
-        d += values[(s >> UPPER) + base]
-    sums[4 * quarter] += np.int64(a)
-    sums[4 * quarter + 1] += np.int64(b)
-    sums[4 * quarter + 2] += np.int64(c)
-    sums[4 * quarter + 3] += np.int64(d)
 
 
 @njit(**FAST)
@@ -322,7 +295,7 @@ def score_blocks(
     """
     values, views = maps.values, maps.views
     buffer = np.zeros((most_rows, LANES), np.uint32)
-    rows_of_pairs = as_pairs(buffer)
+    rows_of_pairs = as_pairs(buffer).ravel()
     scratch = (
         np.zeros(8 * LANES, np.float32),
         np.zeros(LANES, np.bool_),
@@ -330,7 +303,7 @@ def score_blocks(
         np.zeros(LANES, np.int32),
         np.zeros(LANES, np.int32),
     )
-    counts = np.zeros(LANES, np.int32)
+    counts, found = np.zeros(LANES, np.int32), np.zeros(LANES, np.int64)
     indices = np.zeros(capacity, np.uint32)
     pairs = as_pairs(indices)
     for block in range(first, last):
@@ -347,10 +320,11 @@ def score_blocks(
                 else:
                     rows = fill_grids(limbs, size, nothing, scratch, buffer, counts)
                 if rows >= 0:
-                    buffer[rows] = nothing
-                    for quarter in range(4):
-                        add_four(values, base, rows_of_pairs, rows, quarter, sums[block, :, 2 * kind])
+                    end = -(-rows // AT_ONCE) * AT_ONCE
+                    buffer[rows:end], found[:] = nothing, 0
+                    add_lanes(values, base, rows_of_pairs[: end * LANES // 2], found)
                     for lane in range(LANES):
+                        sums[block, lane, 2 * kind] += found[lane]
                         sums[block, lane, 2 * kind + 1] += counts[lane]
                     continue
                 for lane in range(LANES):

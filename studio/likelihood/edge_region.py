@@ -49,7 +49,7 @@ from studio.likelihood.edge_region_kernels import (
 from studio.likelihood.evidence_check import check_views
 from studio.likelihood.outline_kernels import LANES
 from studio.likelihood.picture_maps import Maps, joined_maps
-from studio.likelihood.problem import Preparation, PreparedProblem, Shares
+from studio.likelihood.problem import BaseFrameLikelihood, Preparation, Shares
 from studio.likelihood.visible_edges import hidden_samples, limb_sides
 from studio.numba_in_threads import parallel_blocks
 
@@ -121,7 +121,7 @@ class EdgeRegionSettings:
 
 
 class EdgeRegionLikelihood(Preparation):
-    """Makes the problem of any frame. device : what finds the sums in place of the processor, and all limbs there."""
+    """Makes that of any frame. device : what finds the sums in place of the processor, and all limbs there."""
 
     def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: EdgeRegionSettings) -> None:
         super().__init__(body, cameras, settings)
@@ -134,13 +134,13 @@ class EdgeRegionLikelihood(Preparation):
         chunks = EDGE_LINES * settings.edge_chunks + REGION_LINES * settings.region_chunks
         return chunks * CHUNK * self.projector.limb_count * len(self.cameras)
 
-    def problem(self, evidence: FrameEvidence) -> "EdgeRegionProblem":
+    def problem(self, evidence: FrameEvidence) -> "EdgeRegionFrameLikelihood":
         """One frame as a function of poses. Raises FootageError where views do not fit the cameras."""
         check_views(self.cameras, evidence)
-        return EdgeRegionProblem(self, weighting_maps(evidence))
+        return EdgeRegionFrameLikelihood(self, weighting_maps(evidence))
 
 
-class EdgeRegionProblem(PreparedProblem):
+class EdgeRegionFrameLikelihood(BaseFrameLikelihood):
     """One frame as a function of poses."""
 
     def __init__(self, likelihood: EdgeRegionLikelihood, maps: Maps) -> None:

@@ -21,9 +21,10 @@ from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
 from studio.knobs import next_frame_knob
-from studio.likelihood.edge_region import EdgeRegionLikelihood, EdgeRegionProblem, EdgeRegionSettings
-from studio.likelihood.problem import TRUNK_FIRST, WHOLE_BODY, PreparedProblem, Shares
-from studio.likelihood.silhouette_areas import Silhouettes, resolution_knob, silhouettes_of
+from studio.likelihood.area_kernels import three_terms
+from studio.likelihood.edge_region import EdgeRegionFrameLikelihood, EdgeRegionLikelihood, EdgeRegionSettings
+from studio.likelihood.problem import TRUNK_FIRST, WHOLE_BODY, BaseFrameLikelihood, Shares
+from studio.likelihood.silhouette_areas import Areas, Silhouettes, resolution_knob, silhouettes_of
 from studio.likelihood.visible_edges import body_edges
 
 
@@ -40,7 +41,7 @@ class EdgeRegionSilhouetteSettings(EdgeRegionSettings):
 
 
 class EdgeRegionSilhouetteLikelihood:
-    """Makes the problem of any frame; immutable."""
+    """Makes the likelihood of any frame; immutable."""
 
     def __init__(
         self, body: BodyModel, cameras: tuple[Camera, ...], settings: EdgeRegionSilhouetteSettings
@@ -51,20 +52,20 @@ class EdgeRegionSilhouetteLikelihood:
         device = self.edge_region.device
         self.trunk_there = None if device is None else device.limbs(self.trunk)
 
-    def problem(self, evidence: FrameEvidence) -> "EdgeRegionSilhouetteProblem":
+    def problem(self, evidence: FrameEvidence) -> "EdgeRegionSilhouetteFrameLikelihood":
         """One frame as a function of poses. Raises FootageError where views do not fit the cameras."""
         edge_region = self.edge_region.problem(evidence)
         silhouettes = silhouettes_of(evidence, self.settings.silhouette_resolution)
-        return EdgeRegionSilhouetteProblem(self, edge_region, silhouettes)
+        return EdgeRegionSilhouetteFrameLikelihood(self, edge_region, silhouettes)
 
 
-class EdgeRegionSilhouetteProblem(PreparedProblem):
+class EdgeRegionSilhouetteFrameLikelihood(BaseFrameLikelihood):
     """One frame as a function of poses."""
 
     def __init__(
         self,
         likelihood: EdgeRegionSilhouetteLikelihood,
-        edge_region: EdgeRegionProblem,
+        edge_region: EdgeRegionFrameLikelihood,
         silhouettes: Silhouettes,
     ) -> None:
         self.likelihood, self.edge_region, self.silhouettes = likelihood, edge_region, silhouettes
@@ -75,6 +76,11 @@ class EdgeRegionSilhouetteProblem(PreparedProblem):
 
         Raises BodyError for poses that are no finite (N, D).
         """
+        edge, region, areas = self._found(poses, stage)
+        return 1.0 - edge, 1.0 - region, areas.fitness()
+
+    def _found(self, poses: Array, stage: int) -> tuple[Array, Array, Areas]:
+        """Σe and Σr, each (N, V), and the areas of poses (N, D)."""
         outlines = self.likelihood.edge_region.projector.blocks(poses)
         trunk, there = self.likelihood.trunk, self.likelihood.trunk_there
         trunk_alone = stage == TRUNK_FIRST and len(trunk) < outlines.shape[2]
@@ -88,7 +94,7 @@ class EdgeRegionSilhouetteProblem(PreparedProblem):
             if trunk_alone:
                 parts = np.ascontiguousarray(outlines[:, :, trunk]), np.ascontiguousarray(hidden[:, :, trunk])
                 edge = self.edge_region.terms_of(*parts, len(poses))[0]
-        return 1.0 - edge, 1.0 - region, self.silhouettes.areas(outlines, len(poses)).fitness()
+        return edge, region, self.silhouettes.areas(outlines, len(poses))
 
     def shares(self, poses: Array) -> Shares:
         """-a Σe, -b Σr and -c (1 - f_s) of every camera."""
@@ -100,12 +106,11 @@ class EdgeRegionSilhouetteProblem(PreparedProblem):
     def fitness(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
         """(N,) f of poses (N, D), between 0 and the sum of the weights."""
         settings = self.likelihood.settings
-        edge, region, silhouette = (term.mean(axis=1) for term in self.terms(poses, stage))
-        return (
-            settings.edge_weight * edge
-            + settings.region_weight * region
-            + settings.silhouette_weight * silhouette
-        )
+        weights = np.array([settings.edge_weight, settings.region_weight, settings.silhouette_weight])
+        edge, region, areas = self._found(poses, stage)
+        outside = np.ascontiguousarray(areas.outside)  # one form of the kernel, not two
+        found = areas.both, areas.projected, areas.observed, outside
+        return three_terms(edge, region, *found, weights)
 
     def log_likelihood(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
         """(N,) log-weights of poses (N, D). Raises BodyError for poses that are no finite (N, D)."""

@@ -23,10 +23,11 @@ from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
 from studio.knobs import next_frame_knob
+from studio.likelihood.area_kernels import two_terms
 from studio.likelihood.edge_region_kernels import CHUNK
 from studio.likelihood.evidence_check import check_views
-from studio.likelihood.problem import WHOLE_BODY, Preparation, PreparedProblem, Shares
-from studio.likelihood.silhouette_areas import Silhouettes, resolution_knob, silhouettes_of
+from studio.likelihood.problem import WHOLE_BODY, BaseFrameLikelihood, Preparation, Shares
+from studio.likelihood.silhouette_areas import Areas, Silhouettes, resolution_knob, silhouettes_of
 from studio.likelihood.visible_edges import EdgeMaps, body_edges
 
 
@@ -62,7 +63,7 @@ class EdgeSilhouetteSettings:
 
 
 class EdgeSilhouetteLikelihood(Preparation):
-    """Makes the problem of any frame."""
+    """Makes the likelihood of any frame."""
 
     def __init__(
         self, body: BodyModel, cameras: tuple[Camera, ...], settings: EdgeSilhouetteSettings
@@ -70,14 +71,14 @@ class EdgeSilhouetteLikelihood(Preparation):
         super().__init__(body, cameras, settings)
         self.edges = body_edges(body)
 
-    def problem(self, evidence: FrameEvidence) -> "EdgeSilhouetteProblem":
+    def problem(self, evidence: FrameEvidence) -> "EdgeSilhouetteFrameLikelihood":
         """One frame as a function of poses. Raises FootageError where views do not fit the cameras."""
         check_views(self.cameras, evidence)
         silhouettes = silhouettes_of(evidence, self.settings.silhouette_resolution)
-        return EdgeSilhouetteProblem(self, silhouettes, EdgeMaps(evidence))
+        return EdgeSilhouetteFrameLikelihood(self, silhouettes, EdgeMaps(evidence))
 
 
-class EdgeSilhouetteProblem(PreparedProblem):
+class EdgeSilhouetteFrameLikelihood(BaseFrameLikelihood):
     """One frame as a function of poses."""
 
     def __init__(
@@ -88,13 +89,16 @@ class EdgeSilhouetteProblem(PreparedProblem):
 
     def terms(self, poses: Array, stage: int = WHOLE_BODY) -> tuple[Array, Array]:
         """f_s and f_e, each (N, V), of poses (N, D). Raises BodyError for poses that are no finite (N, D)."""
+        edge, areas = self._found(poses, stage)
+        return areas.fitness(), edge
+
+    def _found(self, poses: Array, stage: int) -> tuple[Array, Areas]:
+        """f_e (N, V) and the areas of poses (N, D)."""
         likelihood = self.likelihood
         outlines = likelihood.projector.blocks(poses)
+        edges, chunks = likelihood.edges.of_stage(stage), likelihood.settings.edge_chunks
         areas = self.silhouettes.areas(outlines, len(poses))
-        edges = likelihood.edges.of_stage(stage)
-        return areas.fitness(), self.edges.fitness(
-            outlines, edges, likelihood.settings.edge_chunks, len(poses)
-        )
+        return self.edges.fitness(outlines, edges, chunks, len(poses)), areas
 
     def shares(self, poses: Array) -> Shares:
         """scale / V · f_e and scale / V · f_s of each of the V cameras."""
@@ -105,8 +109,9 @@ class EdgeSilhouetteProblem(PreparedProblem):
 
     def fitness(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
         """(N,) f = f_s + f_e of poses (N, D), 0...2. Raises BodyError for poses that are no finite (N, D)."""
-        silhouette, edge = self.terms(poses, stage)
-        return silhouette.mean(axis=1) + edge.mean(axis=1)
+        edge, areas = self._found(poses, stage)
+        outside = np.ascontiguousarray(areas.outside)  # one form of the kernel, not two
+        return two_terms(edge, areas.both, areas.projected, areas.observed, outside)
 
     def log_likelihood(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
         """(N,) log-weights scale · f of poses (N, D). Raises BodyError for poses that are no finite (N, D)."""

@@ -111,3 +111,13 @@ def within_limits(poses: Array, lower: Array, upper: Array) -> Mask:
             value = poses[n, d]
             held[n] &= lower[d] <= value <= upper[d] and np.isfinite(value)
     return held
+
+
+@njit(**EXACT)
+def all_at_least(ratios: Floats, least: Floats, count: int) -> Mask:
+    """(N,) whether all ratios (B, P, 16) of each of the first `count` poses are at least those of the pairs (P,)."""
+    held = np.ones(count, np.bool_)
+    for n in range(count):
+        for pair in range(len(least)):
+            held[n] &= ratios[n // LANES, pair, n % LANES] >= least[pair]
+    return held

@@ -25,7 +25,7 @@ from studio.arrays import Array, Floats
 from studio.body.forward_kinematics import checked_poses, limb_frames
 from studio.body.model import BodyModel, kinematic_tables
 from studio.errors import BodyError
-from studio.likelihood.hard_prior_kernels import ratio_blocks, within_limits
+from studio.likelihood.hard_prior_kernels import all_at_least, ratio_blocks, within_limits
 from studio.likelihood.kinematic_program import KinematicProgram, compile_program
 from studio.likelihood.outline_kernels import LANES
 from studio.numba_in_threads import parallel_blocks
@@ -54,10 +54,19 @@ class LimbPairs:
 
     def shares(self, poses: Array) -> Floats:
         """(N, P) distance of each pair's axes in poses (N, D), as a share of the radii between them."""
+        ratios = self._ratios(poses)
+        return ratios.transpose(0, 2, 1).reshape(-1, len(self.limbs))[: len(poses)]
+
+    def apart(self, poses: Array) -> NDArray[np.bool_]:
+        """(N,) whether all pairs keep their least share in poses (N, D)."""
+        return all_at_least(self._ratios(poses), self.least, len(poses))
+
+    def _ratios(self, poses: Array) -> Floats:
+        """(B, P, 16) `shares` in blocks of sixteen poses."""
         count = -(-len(poses) // LANES)
         out = np.empty((count, len(self.limbs), LANES), dtype=np.float32)
         parallel_blocks(ratio_blocks, count, BLOCKS_A_THREAD, poses, self.program, self.limbs, out)
-        return out.transpose(0, 2, 1).reshape(count * LANES, len(self.limbs))[: len(poses)]
+        return out
 
 
 class HardPriors:
@@ -65,8 +74,7 @@ class HardPriors:
 
     def __init__(self, body: BodyModel) -> None:
         self.body = body
-        self.lower = np.array([entry.lower for entry in body.parameters])
-        self.upper = np.array([entry.upper for entry in body.parameters])
+        self.lower, self.upper = body.lower, body.upper
 
     def hold(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
         """(N, D) poses to (N,) whether every parameter lies within its limits, both included, and, if
@@ -77,14 +85,17 @@ class HardPriors:
         """
         poses = checked_poses(self.body, poses)
         held = within_limits(poses, self.lower, self.upper)
-        if limbs_apart and held.any():
-            held[held] = self.apart(poses[held])
+        if limbs_apart:
+            within = np.count_nonzero(held)
+            if within == len(held):
+                return self.apart(poses)
+            if within:
+                held[held] = self.apart(poses[held])
         return held
 
     def apart(self, poses: Array) -> NDArray[np.bool_]:
         """(N, D) finite poses to (N,) whether no limb is inside another, whatever the joints' limits."""
-        pairs = limb_pairs(self.body)
-        return np.all(pairs.shares(poses) >= pairs.least, axis=1)
+        return limb_pairs(self.body).apart(poses)
 
 
 @lru_cache(maxsize=64)

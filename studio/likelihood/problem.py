@@ -1,4 +1,4 @@
-"""The interface of every weighting's problem, and its optional extensions."""
+"""The interface of a frame's likelihood, and its optional extensions."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -53,7 +53,7 @@ class FrameLikelihood(Protocol):
 
 
 class Preparation:
-    """A weighting prepared for one body, some cameras and some settings; makes the problem of any frame; immutable."""
+    """A weighting prepared for one body, some cameras and some settings; makes that of any frame; immutable."""
 
     def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: Any) -> None:  # noqa: ANN401
         """settings : the weighting's own. Raises FootageError for a camera whose pictures are too large."""
@@ -63,8 +63,8 @@ class Preparation:
         self.priors = HardPriors(body)
 
 
-class PreparedProblem(ABC):
-    """Base of most weightings' problems: the fitness is the log-weight, and the body has its hard priors."""
+class BaseFrameLikelihood(ABC):
+    """Base of most likelihoods of a frame: the fitness is the log-weight, and the body has its hard priors."""
 
     priors: HardPriors
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from studio.arrays import Array, Floats, Mask
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.knobs import next_frame_knob
-from studio.likelihood.area_kernels import ROWS, WINDOW_STEP, WORD, area_blocks, halve
+from studio.likelihood.area_kernels import ROWS, WINDOW_STEP, area_blocks, halve, pack_windows
 from studio.likelihood.outline_kernels import LANES
 from studio.likelihood.picture_maps import Maps
 from studio.numba_in_threads import parallel_blocks
@@ -104,21 +104,16 @@ def packed_windows(masks: list[Mask]) -> Maps:
     """All masks as columns of 64-bit words, one column for every WINDOW_STEP pixels: bit k of the word in column c
     and row y is pixel (16 c + k, y). The second number of a view is that of words a column.
     """
-    parts: list[Words] = []
     views = np.zeros((len(masks), 4), dtype=np.int64)
-    start = 0
     for row, mask in zip(views, masks, strict=True):
-        height, width = mask.shape
-        columns, words = -(-width // WINDOW_STEP), height + ROWS
-        padded = np.zeros((words, (columns - 1) * WINDOW_STEP + WORD), dtype=np.bool_)
-        padded[:height, :width] = mask
-        packed = np.packbits(padded, axis=1, bitorder="little")
-        windows = np.lib.stride_tricks.sliding_window_view(packed, WORD // 8, axis=1)
-        chosen = np.ascontiguousarray(windows[:, :: WINDOW_STEP // 8].transpose(1, 0, 2))
-        parts.append(chosen.view("<u8").astype(np.uint64).ravel())
-        row[:] = start, words, width, height
-        start += columns * words
-    return Maps(np.concatenate(parts), views)
+        row[1:] = mask.shape[0] + ROWS, mask.shape[1], mask.shape[0]
+    sizes = -(-views[:, 2] // WINDOW_STEP) * views[:, 1]
+    views[1:, 0] = np.cumsum(sizes)[:-1]
+    words: Words = np.empty(int(sizes.sum()), np.uint64)
+    for view, size, mask in zip(views, sizes, masks, strict=True):
+        start = int(view[0])
+        pack_windows(mask, int(view[1]), words[start : start + int(size)])
+    return Maps(words, views)
 
 
 def _share(part: NDArray[Any], whole: NDArray[Any]) -> Array:

@@ -21,7 +21,7 @@ import numpy as np
 from studio.arrays import Array
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.likelihood.evidence_check import check_views
-from studio.likelihood.problem import Preparation, PreparedProblem, Shares
+from studio.likelihood.problem import BaseFrameLikelihood, Preparation, Shares
 from studio.likelihood.silhouette_areas import Silhouettes
 
 
@@ -33,15 +33,15 @@ class TemplateSettings:
 
 
 class TemplateLikelihood(Preparation):
-    """Makes the problem of any frame."""
+    """Makes the likelihood of any frame."""
 
-    def problem(self, evidence: FrameEvidence) -> "TemplateProblem":
+    def problem(self, evidence: FrameEvidence) -> "TemplateFrameLikelihood":
         """One frame as a function of poses. Raises FootageError where masks do not fit the cameras."""
         check_views(self.cameras, evidence, edges=False)
-        return TemplateProblem(self, Silhouettes(evidence))
+        return TemplateFrameLikelihood(self, Silhouettes(evidence))
 
 
-class TemplateProblem(PreparedProblem):
+class TemplateFrameLikelihood(BaseFrameLikelihood):
     """One frame as a function of poses."""
 
     def __init__(self, likelihood: TemplateLikelihood, silhouettes: Silhouettes) -> None:

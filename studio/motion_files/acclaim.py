@@ -53,11 +53,11 @@ class _Skeleton:
     parents: dict[str, str] = field(default_factory=dict[str, str])
 
 
-def read_acclaim(motion: Path, skeleton: Path | None = None, fps: float = CMU_RATE) -> RecordedMotion:
+def read_acclaim(motion: Path, skeleton: Path | None = None) -> RecordedMotion:
     """The motion in an AMC file on the skeleton of an ASF file.
 
-    skeleton : by default the one beside it that is named after the subject ("05_01.amc": "05.asf"). fps : AMC files
-    hold none; CMU's are 120. Raises StudioError naming file, line and remedy.
+    skeleton : by default the one beside it that is named after the subject ("05_01.amc": "05.asf"). AMC files
+    hold no rate; CMU's is 120. Raises StudioError naming file, line and remedy.
     """
     beside = skeleton or motion.with_name(f"{motion.stem.split('_')[0]}.asf")
     if not beside.is_file():
@@ -82,7 +82,7 @@ def read_acclaim(motion: Path, skeleton: Path | None = None, fps: float = CMU_RA
         offsets,
         local,
         root[:, :3],
-        fps=fps,
+        fps=CMU_RATE,
         source=motion.name,
         axes=UP_FROM_Y_UP,
         scale=tree.unit,

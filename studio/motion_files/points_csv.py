@@ -20,7 +20,7 @@ import numpy as np
 
 from studio.errors import TruthError
 from studio.foreign_files import foreign_file
-from studio.motion_files.trc import MM_PER_UNIT, MarkerMotion, check_reach
+from studio.motion_files.trc import MM_PER_UNIT, MarkerMotion, check_reach, number_or_nan
 
 FRAME = ("frame", "frames", "frame_number", "fnum", "frame_index")
 TIME = ("time", "time_s", "seconds")
@@ -150,7 +150,7 @@ def _columns(path: Path, header: Sequence[str]) -> _Columns:
 
 
 def _frame(path: Path, number: int, text: str, timed: bool, fps: float) -> int:
-    value = _number(text)
+    value = number_or_nan(text)
     at = round(value * fps) if timed and math.isfinite(value) else value
     if not (math.isfinite(at) and at == int(at) and 0 <= at <= LAST_FRAME):
         kind = "time (seconds from the first frame on)" if timed else "frame (a whole number from 0 on)"
@@ -165,7 +165,7 @@ def _place(path: Path, number: int, point: str, cells: Sequence[str]) -> tuple[f
     missing = [cell.lower() in MISSING for cell in cells]
     if all(missing):
         return math.nan, math.nan, math.nan
-    values = [_number(cell) for cell in cells]
+    values = [number_or_nan(cell) for cell in cells]
     for axis, value, cell in zip("xyz", values, cells, strict=True):
         if not math.isfinite(value):
             raise TruthError(
@@ -173,10 +173,3 @@ def _place(path: Path, number: int, point: str, cells: Sequence[str]) -> tuple[f
                 "Leave all three cells of a missing point blank.",
             )
     return values[0], values[1], values[2]
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan

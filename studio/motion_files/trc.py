@@ -148,11 +148,16 @@ def _header(path: Path, lines: list[str]) -> _Header:
     return _Header(tuple(names), unit, rate, int(_header_number(path, fields, "NumFrames")))
 
 
-def _header_number(path: Path, fields: dict[str, str], name: str) -> float:
+def number_or_nan(text: str) -> float:
+    """A number as a file writes it, NaN where it is none."""
     try:
-        value = float(fields[name])
-    except (KeyError, ValueError):
-        value = math.nan
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def _header_number(path: Path, fields: dict[str, str], name: str) -> float:
+    value = number_or_nan(fields.get(name, ""))
     if not math.isfinite(value):
         raise TruthError(
             f"'{path.name}' line 3 gives no {name}.",
@@ -187,10 +192,7 @@ def _row(path: Path, number: int, line: str, names: tuple[str, ...]) -> list[flo
 
 
 def _cell(path: Path, number: int, column: int, labels: list[str], text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
+    value = number_or_nan(text)
     if not math.isfinite(value):
         raise TruthError(
             f"'{path.name}' line {number}, column {column} ({labels[column - 2]}) is '{text}', not a number.",

@@ -1,6 +1,7 @@
 """Trackers compared fairly on a session with a truth; knobs swept over a grid of values."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -12,10 +13,23 @@ from studio.comparison.folders import differences, new_comparison, place_of, unf
 from studio.comparison.kept_comparison import RECORD_NAME, KeptComparison
 from studio.comparison.plan import Comparison, Plan, conclude, plan_comparison
 from studio.comparison.sweep import Sweep, conclude_sweep, expected, plan_sweep, run_name
-from studio.declaring import Body, Despite, Knobs, Model, OneOf, Terminal, Values, Web, operation
+from studio.comparison.trials import Outcome
+from studio.declaring import (
+    AllowInconsistent,
+    Body,
+    First,
+    Knobs,
+    Last,
+    Model,
+    OneOf,
+    Terminal,
+    Values,
+    Web,
+    operation,
+)
 from studio.errors import RunError, SessionError
 from studio.jobs.cluster import Cluster, chosen_executor
-from studio.jobs.comparison_run import done_before, run_comparison
+from studio.jobs.comparison_run import Found, done_before, run_comparison
 from studio.jobs.process_executor import cores
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.operations.opening import AnySession, open_session
@@ -68,10 +82,8 @@ def compare(
     behaviour: Annotated[
         Model, Field(description="Behaviour model of those that need one, by name or file.")
     ] = "",
-    first: Annotated[int | None, Field(ge=0, description="Default: the frame of the start pose.")] = None,
-    last: Annotated[
-        int | None, Field(ge=1, description="The frame after the last one; default: all.")
-    ] = None,
+    first: First = None,
+    last: Last = None,
     layers: Annotated[
         int, Field(ge=1, le=60, description="Of trackers whose layers can be chosen.")
     ] = DEFAULT_LAYERS,
@@ -122,15 +134,7 @@ def compare(
         lines = [executor.in_words] if executor else []
         if before:
             lines.append(f"{before} of {seeds * len(plan.candidates)} trials are there already.")
-        say(progress, lines)
-        with (
-            comparison_put_back(opened, kept.folder),
-            reporting(progress, f"{opened.name} / {kept.name}") as report,
-        ):
-            comparison = run_comparison(
-                kept, opened, report, conclude, processes=processes, executor=executor
-            )
-    say(progress, [f"Kept in {_where(opened, kept)}"])
+        comparison = _measured(kept, opened, conclude, processes, executor, lines, progress)
     return Compared(comparison, kept)
 
 
@@ -161,10 +165,8 @@ def sweep(
     ] = "",
     body: Body = "",
     behaviour: Model = "",
-    first: Annotated[int | None, Field(ge=0, description="Default: the frame of the start pose.")] = None,
-    last: Annotated[
-        int | None, Field(ge=1, description="The frame after the last one; default: all.")
-    ] = None,
+    first: First = None,
+    last: Last = None,
     knobs: Annotated[
         Values,
         Field(description="Any other knob, of all runs."),
@@ -175,7 +177,7 @@ def sweep(
         Field(description="Each run begins with the radii, hands, feet and head that its first frames show."),
         Terminal("--fit-shape/--keep-shape"),
     ] = True,
-    despite_findings: Despite = False,
+    allow_inconsistent: AllowInconsistent = False,
     name: Annotated[
         str, Field(description="Of the sweep, with which its runs' names begin; default: numbered.")
     ] = "",
@@ -207,7 +209,7 @@ def sweep(
         first=first,
         last=last,
         fit_shape=fit_shape,
-        despite_findings=despite_findings,
+        allow_inconsistent=allow_inconsistent,
     )
     with chosen_executor(cluster, place_in_words(opened)) as executor:
         kept = kept_sweep(opened, plan, name)
@@ -216,23 +218,31 @@ def sweep(
         lines = [*([executor.in_words] if executor else []), wait.in_words]
         if before := done_before(kept, plan):
             lines.append(f"{before} of {wait.runs} runs are there already.")
-        say(progress, lines)
-        with (
-            comparison_put_back(opened, kept.folder),
-            reporting(progress, f"{opened.name} / {kept.name}") as report,
-        ):
-            found = run_comparison(
-                kept, opened, report, conclude_sweep, processes=processes, executor=executor
-            )
-    say(progress, [f"Kept in {_where(opened, kept)}"])
+        found = _measured(kept, opened, conclude_sweep, processes, executor, lines, progress)
     return SweptGrid(found, kept)
 
 
-def _where(session: Session, kept: KeptComparison) -> str:
-    """Where a comparison lies for a person: at the session's address, or in a folder."""
+def _measured(
+    kept: KeptComparison,
+    session: Session,
+    conclude: Callable[[Plan, Sequence[Outcome]], Found],
+    processes: int | None,
+    executor: Executor | None,
+    lines: list[str],
+    progress: Reporting,
+) -> Found:
+    """What comes of all trials, put back where the session lies. lines : said before, and then where it is kept."""
+    say(progress, lines)
+    with (
+        comparison_put_back(session, kept.folder),
+        reporting(progress, f"{session.name} / {kept.name}") as report,
+    ):
+        found = run_comparison(kept, session, report, conclude, processes=processes, executor=executor)
     address = address_of(session)
     inside = address and kept.folder.is_relative_to(session.path)
-    return below(address, COMPARISONS, kept.name) if inside else str(kept.folder)
+    place = below(address, COMPARISONS, kept.name) if inside else str(kept.folder)
+    say(progress, [f"Kept in {place}"])
+    return found
 
 
 def kept_sweep(session: Session, plan: Plan, name: str = "") -> KeptComparison:

@@ -109,8 +109,8 @@ def bodies() -> tuple[BodyModel, ...]:
 
 
 @operation
-def way(session: SessionName) -> Workflow:
-    """Say how far a session is on the way from footage to an exported motion, and what is next."""
+def workflow(session: SessionName) -> Workflow:
+    """Say how far a session is, step by step from footage to an exported motion, and what is next."""
     opened = open_session(session)
     run = newest_run(opened)
     return workflow_of(opened, exports=exported_files(run) if run else ())

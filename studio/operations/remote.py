@@ -11,7 +11,7 @@ from pydantic import Field
 
 from studio.comparison.kept_trials import plain
 from studio.comparison.sweep import Swept
-from studio.comparison.trials import TrialJob
+from studio.comparison.trials import ALLOW_INCONSISTENT, TrialJob
 from studio.declaring import Terminal, Web, operation, taking
 from studio.errors import RunError
 from studio.jobs.cluster import Cluster, chosen_executor
@@ -160,8 +160,9 @@ def _job(place: str, name: str, options: dict[str, Any]) -> TrialJob:
         "last": None,
         "seed": 0,
     }
-    wanted = {**usual, "fit_shape": True, "despite_findings": False}
+    wanted = {**usual, "fit_shape": True, "allow_inconsistent": False}
     wanted |= {key: value for key, value in options.items() if key != "knobs"}
+    wanted[ALLOW_INCONSISTENT] = wanted.pop("allow_inconsistent")
     arguments = plain({**wanted, "changes": dict(options.get("knobs") or {})})
     digest = hashlib.sha256(json.dumps(arguments, sort_keys=True).encode()).hexdigest()[:12]
     return TrialJob(

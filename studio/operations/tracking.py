@@ -9,8 +9,8 @@ from typing import Annotated, Concatenate, ParamSpec, TypeVar
 from pydantic import Field
 
 from studio.declaring import (
+    AllowInconsistent,
     Body,
-    Despite,
     Knobs,
     Model,
     OneOf,
@@ -155,7 +155,7 @@ def live(
         Values, Field(description="Any other knob."), Knobs(own_knobs, others=True, with_defaults=False)
     ] = None,
     name: Annotated[str, Field(description="Of the run; default: numbered.")] = "",
-    despite_findings: Despite = False,
+    allow_inconsistent: AllowInconsistent = False,
     cameras: Annotated[Cameras, Web(left_out=True)] = (),
     into: Annotated[
         str | Path | None,
@@ -189,7 +189,7 @@ def live(
         "seed": seed,
         "knobs": knobs,
         "name": name,
-        "despite_findings": despite_findings,
+        "allow_inconsistent": allow_inconsistent,
         "live": True,
     }
     if cameras:

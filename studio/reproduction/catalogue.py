@@ -23,8 +23,9 @@ from studio.reproduction.deutscher_reid import (
     tracked_people,
     weight_of_a_knee,
 )
-from studio.reproduction.experiment import Experiment
+from studio.reproduction.experiment import TABLE, Experiment
 from studio.reproduction.open_questions import (
+    defaults,
     effort,
     evaluations,
     generalisation,
@@ -33,43 +34,29 @@ from studio.reproduction.open_questions import (
     start_poses,
 )
 
-# New experiments are added here.
-LISTED: tuple[Experiment, ...] = (
-    layers_of_a_body.FIG_3,
-    weight_of_a_knee.FIG_7,
-    tracked_people.FIG_8,
-    *tracked_people.THREE_CAMERAS,
-    *carried_and_crossed.EXPERIMENTS,
-    particles_needed.MORE_LAYERS,
-    tracked_people.ENOUGH_PARTICLES,
-    *localisation.EXPERIMENTS,
-    particles_needed.DIFFUSION,
-    localisation.FIG_16,
-    *localisation.EXPERIMENTS_ON_BRANCHES,
-    particles_needed.CROSSOVER,
-    layers_of_a_body.FIG_19,
-    layers_of_a_body.FIG_20,
-    particles_needed.BOTH_IMPROVEMENTS,
-    processors.EXPERIMENT,
-    *fleischmann.EXPERIMENTS,
-    fleischmann.COMPUTATION_TIME,
-    clusters_and_states.EXPERIMENT,
-    cluster_floor.EXPERIMENT,
-    table_1.EXPERIMENT,
-    dynamics.FIG_11_EXPERIMENT,
-    *dynamics.FIG_12_EXPERIMENTS,
-    dynamics.AS_PRINTED_EXPERIMENT,
-    dynamics.ROOT_SPREAD_EXPERIMENT,
-    models.FIG_13,
-    scalability.EXPERIMENT,
-    models.ONLINE_LEARNING,
-    dynamics.BEST_TRACKER,
-    *robustness.EXPERIMENTS,
-    generalisation.EXPERIMENT,
-    evaluations.EXPERIMENT,
-    effort.EXPERIMENT,
-    posterior.EXPERIMENT,
-    start_poses.EXPERIMENT,
+# New experiments are added here, and to the table.
+MODULES = (
+    layers_of_a_body,
+    weight_of_a_knee,
+    tracked_people,
+    carried_and_crossed,
+    particles_needed,
+    localisation,
+    processors,
+    fleischmann,
+    clusters_and_states,
+    cluster_floor,
+    table_1,
+    dynamics,
+    models,
+    scalability,
+    robustness,
+    generalisation,
+    evaluations,
+    effort,
+    posterior,
+    start_poses,
+    defaults,
 )
 
 ALL = "all"
@@ -87,7 +74,8 @@ def by_name(experiments: Iterable[Experiment]) -> dict[str, Experiment]:
     return found
 
 
-EXPERIMENTS = MappingProxyType(by_name(LISTED))
+_LISTED = by_name(experiment for module in MODULES for experiment in module.EXPERIMENTS)
+EXPERIMENTS = MappingProxyType({name: _LISTED[name] for name in TABLE})
 
 
 def find_experiments(

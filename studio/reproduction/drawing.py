@@ -86,12 +86,11 @@ def table_over(
     head: str,
     columns: Mapping[str, Callable[[Sequence[T]], Any]],
     groups: Mapping[str, Sequence[T]],
-    digits: int = 1,
 ) -> Table:
     """A line a group, a column a reading of its seeds. head : of the groups' names."""
 
     def cell(value: Any) -> Any:  # noqa: ANN401
-        return round(value, digits) if isinstance(value, float) else value
+        return round(value, 1) if isinstance(value, float) else value
 
     rows = ((name, *(cell(of(found)) for of in columns.values())) for name, found in groups.items())
     return Table(title, (head, *columns), tuple(rows))

@@ -1,12 +1,13 @@
 """A reproduced figure or table: trials that are run and stored one by one, and their conclusion.
 
-An experiment declares its trials (each a few plain values, so that it can run in any process and be found
-again after the program was killed), the measurement of a trial, and the conclusion on the paper's claim.
-Running, storing and showing them is the same for all.
+What each is called and claims is in one table, `experiments.toml`. Beside it an experiment declares its trials (each a
+few plain values, so that it can run in any process and be found again after the program was killed), the measurement of
+a trial, and the conclusion on the claim. Running, storing and showing them is the same for all.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -15,9 +16,12 @@ from numpy.typing import NDArray
 from studio.comparison.findings import Chart, Findings, Heading, Number, Table
 from studio.comparison.statistics import overall
 from studio.comparison.trials import Measure, Outcome, Scale, Trial
+from studio.typed_decoding import decode_toml
 
 T = TypeVar("T")
 Part = Number | Table | Chart | Mapping[str, Any] | str
+TABLE = decode_toml((Path(__file__).parent / "experiments.toml").read_bytes(), dict[str, dict[str, str]])
+"""Title, source and claim of every experiment by its name, in the order of the report."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,15 +73,36 @@ class Experiment(Heading):
         )
 
 
+def listed(
+    name: str,
+    trials: Callable[[Scale], tuple[Trial, ...]],
+    measure: Measure,
+    shown: Callable[[Sequence[Outcome]], Iterable[Part]],
+    *,
+    footage: tuple[str, ...] = (),
+    alone: bool = False,
+) -> Experiment:
+    """The experiment that the table lists under a name."""
+    return Experiment(
+        **TABLE[name],
+        name=name,
+        trials=trials,
+        measure=measure,
+        shown=shown,
+        footage=footage,
+        alone=alone,
+    )
+
+
 def each_seed(
     label: str, seeds: Iterable[int], arguments: Callable[[int], Mapping[str, Any]]
 ) -> Iterator[Trial]:
-    """A trial a seed. label : contender and setting as text, the same for all. arguments : of a seed's trial."""
+    """A trial a seed. label : candidate and setting as text, the same for all. arguments : of a seed's trial."""
     return (Trial(f"{label}, seed {seed}", arguments(seed)) for seed in seeds)
 
 
 def group_of(trial: Trial) -> str:
-    """The contender and setting of a trial of `each_seed`."""
+    """The candidate and setting of a trial of `each_seed`."""
     return trial.label.rpartition(", seed ")[0]
 
 

@@ -27,7 +27,7 @@ from studio.likelihood.outlines import OutlineProjector
 from studio.likelihood.problem import WHOLE_BODY
 from studio.reproduction.claims import EQUAL, HALF, HIGHER, LOWER, beside, beyond, ratio
 from studio.reproduction.drawing import bar_chart, floats, places, seed_range
-from studio.reproduction.experiment import Experiment, Part, each_seed
+from studio.reproduction.experiment import Part, each_seed, listed
 from studio.reproduction.tracking import (
     Candidate,
     Groups,
@@ -60,7 +60,6 @@ from studio.trackers.tracker import FrameLikelihood, start_of
 # forearms and shins slide over hands and feet (Table 2 shows the cost of that).
 
 
-SOURCE = "Fleischmann, Austvoll & Kwolek 2012"
 TWIN, TWIN_20 = "lee-walk-twin", "lee-walk-twin-20hz"
 FRAMES = 450
 QUICK_FRAMES = 90
@@ -96,18 +95,18 @@ NOTHING: Mapping[str, Any] = {}
 SEED_BARS = "bars: lowest and highest seed"
 
 
-def _at_both_rates(contenders: Mapping[str, Candidate], quick: bool) -> Iterable[Line]:
-    """Every contender by name at 60 and 20 frames a second, 1000 evaluations each. The rate ends the line's name."""
+def _at_both_rates(candidates: Mapping[str, Candidate], quick: bool) -> Iterable[Line]:
+    """Every candidate by name at 60 and 20 frames a second, 1000 evaluations each. The rate ends the line's name."""
     for fps, footage in RATES.items():
-        for name, contender in contenders.items():
+        for name, candidate in candidates.items():
             last = {"last": last_frame(fps, quick)}
-            yield Line(name.replace("{fps}", f"{fps}"), contender, footage, EVALUATIONS, last)
+            yield Line(name.replace("{fps}", f"{fps}"), candidate, footage, EVALUATIONS, last)
 
 
 def _on_the_twin(
-    name: str, contender: Candidate, evaluations: int, quick: bool, wanted: Mapping[str, Any] = NOTHING
+    name: str, candidate: Candidate, evaluations: int, quick: bool, wanted: Mapping[str, Any] = NOTHING
 ) -> Line:
-    return Line(name, contender, TWIN, evaluations, {"last": last_frame(60, quick), **wanted})
+    return Line(name, candidate, TWIN, evaluations, {"last": last_frame(60, quick), **wanted})
 
 
 def _bars(title: str, x: str, names: Iterable[str], rows: Mapping[str, Iterable[Runs]]) -> Chart:
@@ -173,17 +172,6 @@ def _fig_3(groups: Groups) -> Iterator[Part]:
     yield SETTINGS
 
 
-FIG_3 = tracked_experiment(
-    "fleischmann-fig-3",
-    "Error of single runs at 60 and 20 frames a second",
-    f"{SOURCE}, Fig. 3",
-    "The mean error is a little smaller at 60 frames a second and tracking more stable; at 20 the largest errors are "
-    "much higher. Tracking is always very good while the person stands still (frames 330 to 430).",
-    lines=_rates,
-    shown=_fig_3,
-)
-
-
 def _lasting(found: Iterable[Spell], fps: int) -> tuple[float, float]:
     """The median and the longest time of spells, ms."""
     times = [1000.0 * spell.frames / fps for spell in found]
@@ -228,16 +216,6 @@ def _figs_4_5(groups: Groups) -> Iterator[Part]:
     yield {**SETTINGS, "lost beyond (mm)": 150}
 
 
-FIGS_4_5 = tracked_experiment(
-    "fleischmann-figs-4-5",
-    "Limbs lost and found again",
-    f"{SOURCE}, Figs. 4 and 5",
-    "At 20 frames a second legs and arms are lost for a while and found again after some frames; at 60 tracking is "
-    "accurate enough.",
-    lines=_rates,
-    shown=_figs_4_5,
-)
-
 # Fig. 6: the swarm against the filter.
 
 
@@ -257,16 +235,6 @@ def _fig_6(groups: Groups) -> Iterator[Part]:
     yield error_tests(groups, pairs)
     yield {**SETTINGS, "Eq. 13": dict(EQ13.changes)}
 
-
-FIG_6 = tracked_experiment(
-    "fleischmann-fig-6",
-    "Swarm against annealed particle filter",
-    f"{SOURCE}, Fig. 6",
-    "With the same body, fitness, Σ and 1000 evaluations the swarm is significantly better at 20 frames a second and "
-    "equally good at 60.",
-    lines=lambda quick: _at_both_rates({f"{one.name}, {{fps}} Hz": one for one in COMPARED}, quick),
-    shown=_fig_6,
-)
 
 # Table 2: more evaluations, at 60 frames a second.
 
@@ -311,16 +279,6 @@ def _table_2(groups: Groups) -> Iterator[Part]:
     yield {"weighting": SWARM.weighting, **PRIORS}
 
 
-TABLE_2_EXPERIMENT = tracked_experiment(
-    "fleischmann-table-2",
-    "Error and evaluations a frame",
-    f"{SOURCE}, Table 2",
-    "More evaluations help a little: 38.0, 37.3 and 35.7 mm with 1000, 2000 and 4000 a frame; the largest error falls "
-    "from 86.4 to 56.7 mm.",
-    lines=_table_2_lines,
-    shown=_table_2,
-)
-
 # Section 2.4: partitions of the search.
 
 SOFT = "soft, two stages"
@@ -347,17 +305,17 @@ SIGMAS = (0.5, 1.5)
 
 
 def _partitions(quick: bool) -> Iterable[Line]:
-    contenders = {
+    candidates = {
         words: replace(SWARM, changes={**SWARM.changes, "partition": partition})
         for words, partition in PARTITIONS.items()
     }
-    yield from _at_both_rates({f"{words}, {{fps}} Hz": one for words, one in contenders.items()}, quick)
+    yield from _at_both_rates({f"{words}, {{fps}} Hz": one for words, one in candidates.items()}, quick)
     for fps, footage in RATES.items():
         for scale in SIGMAS:
             wanted = {"last": last_frame(fps, quick), "sigma_scale": scale}
             for words in (SOFT, *COMPARED_BY_SIGMA):
                 name = f"{words}, {fps} Hz, σ0 × {scale:g}"
-                yield Line(name, contenders[words], footage, EVALUATIONS, wanted)
+                yield Line(name, candidates[words], footage, EVALUATIONS, wanted)
 
 
 COMPARED_BY_SIGMA = ("hard, two stages", "global")
@@ -391,16 +349,6 @@ def _partition_claims(groups: Groups) -> Iterator[Part]:
     yield SETTINGS
 
 
-PARTITION_EXPERIMENT = tracked_experiment(
-    "fleischmann-partitions",
-    "Soft, hard, global–local and global partitions",
-    f"{SOURCE}, section 2.4 and Fig. 2",
-    "Soft partitioning performs much better than global search or hard partitioning; three soft stages bring no "
-    "significant gain over two.",
-    lines=_partitions,
-    shown=_partition_claims,
-)
-
 # Section 2.3: hard priors (joint limits, no limb inside another).
 
 FREE = {"constraints": "ignore", "limbs_apart": False}
@@ -408,11 +356,11 @@ WITH, WITHOUT = "with priors", "without priors"
 
 
 def _priors(quick: bool) -> Iterable[Line]:
-    contenders: dict[str, Candidate] = {}
+    candidates: dict[str, Candidate] = {}
     for one in COMPARED:
-        contenders[f"{one.name}, {{fps}} Hz, {WITH}"] = one
-        contenders[f"{one.name}, {{fps}} Hz, {WITHOUT}"] = replace(one, changes={**one.changes, **FREE})
-    return _at_both_rates(contenders, quick)
+        candidates[f"{one.name}, {{fps}} Hz, {WITH}"] = one
+        candidates[f"{one.name}, {{fps}} Hz, {WITHOUT}"] = replace(one, changes={**one.changes, **FREE})
+    return _at_both_rates(candidates, quick)
 
 
 def _prior_claims(groups: Groups) -> Iterator[Part]:
@@ -440,16 +388,6 @@ def _prior_claims(groups: Groups) -> Iterator[Part]:
         "without": FREE,
     }
 
-
-PRIOR_EXPERIMENT = tracked_experiment(
-    "fleischmann-constraints",
-    "With and without hard priors",
-    f"{SOURCE}, section 2.3 (after Balan et al. 2005)",
-    "Joint limits and the ban on limbs inside each other improve tracking significantly, because they reduce the "
-    "search space.",
-    lines=_priors,
-    shown=_prior_claims,
-)
 
 # Best accuracy on the twin: our choices added one by one.
 
@@ -484,31 +422,8 @@ def _best_figure(groups: Groups) -> Iterator[Part]:
     shown = dict.fromkeys((*list(CHOICES)[:2], best))
     yield curves("Error over the walk", {name: groups[name] for name in shown})
     yield {
-        words: {"evaluations": count, **contender.changes} for words, (contender, count, _) in CHOICES.items()
+        words: {"evaluations": count, **candidate.changes} for words, (candidate, count, _) in CHOICES.items()
     }
-
-
-BEST_FIGURE = tracked_experiment(
-    "fleischmann-best-figure",
-    "The smallest error that can be had",
-    f"{SOURCE}, section 3",
-    "The minimal obtainable error is about 35 mm, limited by the truth's accuracy and the coarse body model.",
-    lines=lambda quick: (
-        _on_the_twin(words, contender, count, quick, wanted)
-        for words, (contender, count, wanted) in CHOICES.items()
-    ),
-    shown=_best_figure,
-)
-
-EXPERIMENTS = (
-    TABLE_2_EXPERIMENT,
-    FIG_3,
-    FIGS_4_5,
-    FIG_6,
-    PARTITION_EXPERIMENT,
-    PRIOR_EXPERIMENT,
-    BEST_FIGURE,
-)
 
 
 # Section 3.2: where the time of a frame goes, the swarm with 1000 evaluations.
@@ -529,7 +444,7 @@ LABELS = (
 WEIGHING = "rendering and fitness, share of a frame's time"
 
 
-class TimedProblem:
+class TimedFrameLikelihood:
     """A problem that records the time of its calls, and the weighed poses."""
 
     def __init__(self, problem: FrameLikelihood) -> None:
@@ -582,7 +497,7 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
         for frame in range(WARM_FRAMES + frames):
             began = time.perf_counter()
             evidence = problems.evidence(frame, settings)
-            timed = TimedProblem(likelihood.problem(evidence))
+            timed = TimedFrameLikelihood(likelihood.problem(evidence))
             prepared = time.perf_counter()
             result = search_frame(
                 TRACKERS[SWARM.tracker],
@@ -634,15 +549,24 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield {"weighting": SWARM.weighting, "evaluations": EVALUATIONS, **SWARM.changes}
 
 
-COMPUTATION_TIME = Experiment(
-    name="fleischmann-computation-time",
-    title="Where the time of a frame goes",
-    source=f"{SOURCE}, section 3.2",
-    claim="A frame of 1000 evaluations takes 20 s; rendering the model takes 50 % and evaluating the "
-    "fitness 39 % of it.",
-    trials=trials,
-    measure=measure,
-    shown=shown,
-    footage=(TWIN,),
-    alone=True,
+EXPERIMENTS = (
+    tracked_experiment("fleischmann-fig-3", lines=_rates, shown=_fig_3),
+    tracked_experiment("fleischmann-figs-4-5", lines=_rates, shown=_figs_4_5),
+    tracked_experiment(
+        "fleischmann-fig-6",
+        lines=lambda quick: _at_both_rates({f"{one.name}, {{fps}} Hz": one for one in COMPARED}, quick),
+        shown=_fig_6,
+    ),
+    tracked_experiment("fleischmann-table-2", lines=_table_2_lines, shown=_table_2),
+    tracked_experiment("fleischmann-partitions", lines=_partitions, shown=_partition_claims),
+    tracked_experiment("fleischmann-constraints", lines=_priors, shown=_prior_claims),
+    tracked_experiment(
+        "fleischmann-best-figure",
+        lines=lambda quick: (
+            _on_the_twin(words, candidate, count, quick, wanted)
+            for words, (candidate, count, wanted) in CHOICES.items()
+        ),
+        shown=_best_figure,
+    ),
+    listed("fleischmann-computation-time", trials, measure, shown, footage=(TWIN,), alone=True),
 )

@@ -1,4 +1,4 @@
-"""Experiments whose trials are tracked footage: contenders, lines of settings, and figures of their runs.
+"""Experiments whose trials are tracked footage: candidates, lines of settings, and figures of their runs.
 
 Trials of the same attempt are the same trial in every experiment, so figures on one set of runs share them.
 """
@@ -16,7 +16,7 @@ from studio.comparison.tracked import Tracked, TrackingTrial, measure_tracking, 
 from studio.comparison.trials import Outcome, Scale, Trial
 from studio.reproduction.claims import ratio, sign_tests
 from studio.reproduction.drawing import seeds_and_mean, table_over
-from studio.reproduction.experiment import Experiment, Part, grouped
+from studio.reproduction.experiment import Experiment, Part, grouped, listed
 from studio.trackers.catalogue import knobs_for_evaluations
 
 Runs = Sequence[Tracked]
@@ -43,12 +43,12 @@ class Candidate:
 class Line:
     """A line of an experiment's table of settings, tracked with every seed.
 
-    evaluations : a frame, 0 where the contender's knobs give them. wanted : other fields of `TrackingTrial`, by seed
+    evaluations : a frame, 0 where the candidate's knobs give them. wanted : other fields of `TrackingTrial`, by seed
     where it is a function.
     """
 
     name: str
-    contender: Candidate
+    candidate: Candidate
     footage: str
     evaluations: int = 0
     wanted: Mapping[str, Any] | Callable[[int], Mapping[str, Any]] = field(default_factory=dict[str, Any])
@@ -56,39 +56,24 @@ class Line:
     def trial(self, seed: int) -> Trial:
         """The trial of a seed."""
         wanted = self.wanted(seed) if callable(self.wanted) else self.wanted
-        attempt = self.contender.attempt(self.footage, seed, self.evaluations, **wanted)
+        attempt = self.candidate.attempt(self.footage, seed, self.evaluations, **wanted)
         return tracking_trial(self.name, attempt)
 
 
 def tracked_experiment(
     name: str,
-    title: str,
-    source: str,
-    claim: str,
-    *,
     lines: Callable[[bool], Iterable[Line]],
     shown: Callable[[dict[str, list[Tracked]]], Iterable[Part]],
-    long: str = "",
 ) -> Experiment:
-    """An experiment of tracked footage. lines : the settings, for a preview or in full. shown : the results of
-    the runs by line.
+    """The experiment of tracked footage that the table lists under a name. lines : the settings, for a preview or in
+    full. shown : the results of the runs by line.
     """
 
     def trials(scale: Scale) -> tuple[Trial, ...]:
         return tuple(line.trial(seed) for line in lines(scale.quick) for seed in scale.seeds)
 
     footage = tuple(dict.fromkeys(line.footage for line in lines(False)))
-    return Experiment(
-        name,
-        title,
-        source,
-        claim,
-        trials,
-        measure_tracking,
-        lambda found: shown(by_group(found)),
-        footage,
-        long=long,
-    )
+    return listed(name, trials, measure_tracking, lambda found: shown(by_group(found)), footage=footage)
 
 
 def by_group(outcomes: Sequence[Outcome]) -> dict[str, list[Tracked]]:

@@ -3,18 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from studio.arrays import Bytes
 from studio.calibration.silhouette_alignment import AlignedCameras, aligned_cameras
 from studio.calibration.silhouette_checks import outlines_of
 from studio.errors import CalibrationError
-from studio.evidence.backgrounds import Backgrounds
-from studio.evidence.pipeline import EvidenceMaker
-from studio.progress import Progress
+from studio.progress import Progress, unheard
 from studio.runs.mask_quality import spread_frames
-from studio.runs.session_settings import session_settings
+from studio.runs.session_settings import masks_of
+from studio.runs.silhouette_doubts import person_alone
 from studio.sessions.calibration_changes import CalibrationChange, NewCalibration, replace_calibration
 from studio.sessions.session import Session
 
@@ -54,7 +52,7 @@ class SessionAlignment:
 
 
 def align_cameras(
-    session: Session, frames: Sequence[int] = (), *, progress: Progress | None = None
+    session: Session, frames: Sequence[int] = (), *, progress: Progress = unheard
 ) -> SessionAlignment:
     """The turns that make a session's silhouettes agree; nothing is written (see `keep_alignment`).
 
@@ -67,21 +65,14 @@ def align_cameras(
             f"Session '{session.name}' has one camera: there is nothing to align it with.",
             "Check the outlines instead.",
         )
-    footage = session.footage()
-    try:
-        chosen = tuple(frames) or spread_frames(footage.frame_count, FRAMES)
-        settings = session_settings(session).evidence
-        maker = EvidenceMaker(cameras, footage, Backgrounds(footage), settings, "none")
+    with masks_of(session) as maker:
+        chosen = tuple(frames) or spread_frames(maker.footage.frame_count, FRAMES)
         masks: dict[int, dict[str, Bytes]] = {}
         for done, frame in enumerate(chosen):
-            if progress is not None:
-                progress("reading silhouettes", done, len(chosen))
-            masks[frame] = {view.camera: largest_piece(view.mask) for view in maker.evidence(frame).views}
-    finally:
-        footage.close()
+            progress("reading silhouettes", done, len(chosen))
+            masks[frame] = {view.camera: person_alone(view.mask) for view in maker.evidence(frame).views}
     found = aligned_cameras(cameras, outlines_of(cameras, masks))
-    if progress is not None:
-        progress("reading silhouettes", len(chosen), len(chosen))
+    progress("reading silhouettes", len(chosen), len(chosen))
     return SessionAlignment(tuple(camera.name for camera in cameras), found)
 
 
@@ -94,12 +85,3 @@ def keep_alignment(session: Session, aligned: SessionAlignment) -> CalibrationCh
     note = f"Cameras turned by their silhouettes: {turned}."
     new = NewCalibration(aligned.found.cameras, f"{source}, aligned by silhouettes", notes=(note,))
     return replace_calibration(session, new)
-
-
-def largest_piece(mask: Bytes) -> Bytes:
-    """(H, W) the largest connected piece of a mask, so that no tangent touches a speck."""
-    count, labels, stats, _ = cv2.connectedComponentsWithStats((mask > 0).astype(np.uint8))
-    if count < 2:
-        return mask
-    largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
-    return np.asarray(255 * (labels == largest), dtype=np.uint8)

@@ -14,6 +14,7 @@ import dataclasses
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -52,7 +53,7 @@ from studio.runs.mask_quality import (
 )
 from studio.runs.person_masks import person_masks
 from studio.runs.projected_masks import projected_masks
-from studio.runs.session_settings import session_settings
+from studio.runs.session_settings import masks_of, session_settings
 from studio.runs.stroke_masks import check_all_cameras, make_stroke_masks
 from studio.runs.subject_masks import Place, make_subject_masks
 from studio.sessions.background_files import (
@@ -248,16 +249,12 @@ def _make_person_masks(session: Session, progress: Progress) -> list[str]:
     """Masks of a person for all frames and cameras, which the session then uses; notes on who was not seen."""
     session.check_idle()
     unseen: dict[str, list[int]] = {}
-    footage = session.footage()
-    try:
-        with made_masks(session, PERSON_MASKS) as made:
-            for found in person_masks(session.cameras(), footage, progress):
-                for camera, mask in found.masks.items():
-                    made.put(camera, found.frame, mask)
-                for camera in found.unseen:
-                    unseen.setdefault(camera, []).append(found.frame)
-    finally:
-        footage.close()
+    with closing(session.footage()) as footage, made_masks(session, PERSON_MASKS) as made:
+        for found in person_masks(session.cameras(), footage, progress):
+            for camera, mask in found.masks.items():
+                made.put(camera, found.frame, mask)
+            for camera in found.unseen:
+                unseen.setdefault(camera, []).append(found.frame)
     names = [source.name for source in session.manifest.footage.cameras if source.name in unseen]
     return [f"{name}: nobody was seen in {frames_in_words(unseen[name])}." for name in names]
 
@@ -381,19 +378,13 @@ def _views_of(
     session: Session, frames: Iterable[int], cameras: Sequence[str], progress: Progress
 ) -> Iterator[tuple[int, ViewEvidence]]:
     """Pictures and the masks that the session makes of them, of some cameras and frames."""
-    footage, chosen = session.footage(), list(frames)
-    try:
-        backgrounds = Backgrounds(footage)
-        settings = session_settings(session).evidence
-        maker = EvidenceMaker(session.cameras(), footage, backgrounds, settings, "none")
+    chosen = list(frames)
+    with masks_of(session) as maker:
         for done, name in enumerate(cameras):
             for at, frame in enumerate(chosen):
                 progress("writing the masks", done * len(chosen) + at, len(cameras) * len(chosen))
                 yield frame, maker.view(name, frame)
-            footage.release(name)
-            backgrounds.release(name)
-    finally:
-        footage.close()
+            maker.release(name)
 
 
 def frames_in_words(frames: Sequence[int]) -> str:

@@ -5,6 +5,7 @@ replayed when the model changes. A model fits any body with the same parameters,
 """
 
 import contextlib
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -25,19 +26,24 @@ MODELS_NAME, SUFFIX = "models", ".behaviour"
 
 
 @dataclass(frozen=True, slots=True)
-class ModelLine:
-    """A model in a list. parameters : of its body's pose. fps : of the training data. frames : of training.
-    problem : why it cannot be read, "" if it can.
+class ModelSummary:
+    """A model as a line of a list. parameters : of its body's pose. fps, frames, sources : of its learning, each
+    recording once. problem : why it cannot be read (the rest is empty then), else "".
     """
 
     name: str
     path: Path
     body: str = ""
     parameters: tuple[str, ...] = ()
+    fps: float = 0.0
+    frames: int = 0
     clusters: int = 0
     states: int = 0
-    frames: int = 0
-    fps: float = 0.0
+    memory: int = 0
+    epsilon: float = 0.0
+    entropy_train: float = math.nan
+    entropy_test: float = math.nan
+    sources: tuple[str, ...] = ()
     problem: str = ""
 
 
@@ -60,9 +66,9 @@ def model_folders(session: Session) -> tuple[Path, ...]:
     return tuple(dict.fromkeys(folder for folder in folders if folder.is_dir()))
 
 
-def models_in(folders: Sequence[Path]) -> tuple[ModelLine, ...]:
+def models_in(folders: Sequence[Path]) -> tuple[ModelSummary, ...]:
     """The models in some folders by name; of two with one name, the first folder's."""
-    found: dict[str, ModelLine] = {}
+    found: dict[str, ModelSummary] = {}
     for folder in folders:
         for path in sorted(folder.glob(f"*{SUFFIX}")):
             # A file deleted meanwhile is skipped.
@@ -152,26 +158,37 @@ def chosen_model(
     )
 
 
-@lru_cache(maxsize=256)
-def _line(path: Path, _written: int, _size: int) -> ModelLine:
-    """The list entry of a model's file; cached by write time and size."""
-    try:
-        model = read_model(path)
-    except StudioError as error:
-        return ModelLine(path.stem, path, problem=error.message)
-    return ModelLine(
+def summary_of(path: Path) -> ModelSummary:
+    """The line of a model's file. Raises BehaviourError for one that cannot be read."""
+    model = read_model(path)
+    making = model.making
+    return ModelSummary(
         name=path.stem,
         path=path,
         body=model.space.body,
         parameters=model.space.parameters,
+        fps=making.learnt_fps,
+        frames=making.frames,
         clusters=model.clusters,
         states=model.states,
-        frames=model.making.frames,
-        fps=model.making.learnt_fps,
+        memory=making.settings.memory,
+        epsilon=making.settings.epsilon,
+        entropy_train=making.entropy_train,
+        entropy_test=making.entropy_test,
+        sources=tuple(dict.fromkeys(making.sources)),
     )
 
 
-def _known(models: Sequence[ModelLine]) -> str:
+@lru_cache(maxsize=256)
+def _line(path: Path, _written: int, _size: int) -> ModelSummary:
+    """The list entry of a model's file; cached by write time and size."""
+    try:
+        return summary_of(path)
+    except StudioError as error:
+        return ModelSummary(path.stem, path, problem=error.message)
+
+
+def _known(models: Sequence[ModelSummary]) -> str:
     if not models:
         return "There are no models yet; 'studio learn' makes them."
     words = (f"'{line.name}' ({line.problem or f'of {line.body}'})" for line in models)

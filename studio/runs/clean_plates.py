@@ -13,6 +13,7 @@ for the backgrounds, whose frames are spooled to disk.
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -21,7 +22,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Bytes
+from studio.arrays import Bytes, evenly_spread
 from studio.body.scale import scale_of
 from studio.capture.footage import Footage
 from studio.capture.frame_spool import FrameSpool
@@ -29,7 +30,7 @@ from studio.errors import RunError
 from studio.evidence.background import GaussianBackground, gaussian_from_median
 from studio.evidence.backgrounds import Backgrounds, check_frame_count
 from studio.evidence.combined_background import Combination, combination
-from studio.evidence.masks import cleaned, reduced, reduced_cleaning
+from studio.evidence.masks import cleaned, disc, reduced, reduced_cleaning
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
 from studio.numba_in_threads import KERNEL, njit
@@ -43,6 +44,7 @@ from studio.volume.tracking_space import Box, box_of
 Part = TypeVar("Part")
 
 FRAMES = 20
+"""Read from the footage, evenly spread."""
 ROUNDS = 2
 CARVING = HullSettings(hull_depth=7, hull_edge_share=0.05, hull_least_views=2)
 """Coarse on purpose: a place is empty only where no hull comes near."""
@@ -81,13 +83,12 @@ def clean_plates(
     session: Session,
     settings: EvidenceSettings,
     *,
-    frames: int = FRAMES,
     progress: Progress = unheard,
 ) -> Mapping[str, CleanPlate]:
     """Clean backgrounds by camera, from the session's plates, clips or medians.
 
-    settings : of the masks. frames : number read from the footage, evenly spread. Raises RunError for fewer than
-    three cameras (too few for a hull without one of them), FootageError.
+    settings : of the masks. Raises RunError for fewer than three cameras (too few for a hull without one of them),
+    FootageError.
     """
     cameras = session.cameras()
     if len(cameras) < 3:
@@ -95,19 +96,15 @@ def clean_plates(
             f"Session '{session.name}' has {len(cameras)} cameras: backgrounds are cleaned with three or more.",
             "Use a plate, an empty clip or the median instead.",
         )
-    footage = session.footage()
-    try:
+    with closing(session.footage()) as footage:
         cleaning = _Cleaning(
             cameras,
             footage,
             dataclasses.replace(settings, **CLEARED),
-            frames,
             progress,
             scale_of(session.body()),
         )
         return cleaning.run(session.path)
-    finally:
-        footage.close()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,7 +126,6 @@ class _Cleaning:
         cameras: tuple[Camera, ...],
         footage: Footage,
         settings: EvidenceSettings,
-        frames: int,
         report: Progress,
         scale: float,
     ) -> None:
@@ -138,8 +134,7 @@ class _Cleaning:
         self.middle = tuple(camera.reduced(COMBINED_SIDE) for camera in cameras)
         self.small = tuple(camera.reduced(COVER_SIDE) for camera in cameras)
         self.settings = settings
-        count = footage.frame_count
-        self.frames = np.unique(np.linspace(0, count - 1, min(frames, count)).round().astype(int)).tolist()
+        self.frames = evenly_spread(footage.frame_count, FRAMES).tolist()
         self.done, self.total = 0, 2 * len(cameras) * len(self.frames) + ROUNDS * len(self.frames)
 
     def run(self, folder: Path) -> Mapping[str, CleanPlate]:
@@ -219,7 +214,7 @@ class _Cleaning:
             for left_out, (camera, small) in enumerate(zip(self.cameras, self.small, strict=True)):
                 hull = carvers[left_out].shape(_without(seen, left_out))
                 reach = max(1, round(REACH * small.width / camera.width - BLUR))
-                found[left_out][row] = cv2.dilate(silhouette(hull, small), _disc(reach)) > 0
+                found[left_out][row] = cv2.dilate(silhouette(hull, small), disc(reach)) > 0
         return found
 
     def _plate(self, camera: Camera, first: _First, taken: Bytes, folder: Path) -> CleanPlate:
@@ -239,7 +234,7 @@ class _Cleaning:
                     first.combination.fill(plate, band, top, unseen, picture)
         never = empty < FEWEST_EMPTY
         reach = round(WIDE_REACH * taken.shape[2] / camera.width)
-        near = np.asarray(cv2.dilate(taken.max(axis=0), _disc(reach)), dtype=np.uint8)
+        near = np.asarray(cv2.dilate(taken.max(axis=0), disc(reach)), dtype=np.uint8)
         unused = cv2.resize(255 * (1 - near), picture.shape[1::-1], interpolation=cv2.INTER_NEAREST)
         filled = _filled_in(picture, never & (_enlarged(first.doubtful, camera) > 0), FILLING)
         return CleanPlate(filled, float(np.mean(never)), np.asarray(unused, dtype=np.uint8))
@@ -251,11 +246,6 @@ class _Cleaning:
 
 def _without(those: Sequence[Part], left_out: int) -> tuple[Part, ...]:
     return (*those[:left_out], *those[left_out + 1 :])
-
-
-def _disc(reach: int) -> Bytes:
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
-    return np.asarray(kernel, dtype=np.uint8)
 
 
 def _resized(picture: Bytes, camera: Camera) -> Bytes:

@@ -12,6 +12,7 @@ frames done so far.
 
 import shutil
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import msgspec
@@ -20,7 +21,7 @@ from studio.arrays import Array
 from studio.body.branches import within_limits
 from studio.body.model import checked_pose
 from studio.errors import RunError, SessionError
-from studio.progress import Progress
+from studio.progress import Progress, unheard
 from studio.runs.new_run import software_version
 from studio.runs.problem_source import ProblemSource
 from studio.runs.reannealing import Reannealing
@@ -79,7 +80,7 @@ def prepare_correction(
 def track_backwards(
     session: Session,
     run: StoredRun,
-    progress: Progress | None = None,
+    progress: Progress = unheard,
     cancelled: Callable[[], bool] | None = None,
 ) -> int:
     """Track a prepared correction backwards; returns the number of frames with new poses.
@@ -91,19 +92,14 @@ def track_backwards(
     if record.corrected is None or record.backwards_to is None:
         raise RunError(f"Run '{run.name}' was not prepared for tracking backwards.", "Resume it instead.")
     total = record.corrected - record.backwards_to + 1
-    problems = ProblemSource(session, run.body(), run.cameras())
-    try:
-        tracking = TrackingRun(run, problems)
-        try:
-            for done, frame in enumerate(range(record.corrected, record.backwards_to - 1, -1)):
-                if not _track_again(tracking, frame, cancelled):
-                    return done
-                if progress is not None:
-                    progress(f"{session.name} / {run.name}, backwards", done + 1, total)
-        finally:
-            tracking.close()
-    finally:
-        problems.close()
+    with (
+        closing(ProblemSource(session, run.body(), run.cameras())) as problems,
+        closing(TrackingRun(run, problems)) as tracking,
+    ):
+        for done, frame in enumerate(range(record.corrected, record.backwards_to - 1, -1)):
+            if not _track_again(tracking, frame, cancelled):
+                return done
+            progress(f"{session.name} / {run.name}, backwards", done + 1, total)
     return total
 
 

@@ -1,6 +1,7 @@
 """Pictures of a session's footage, also before there is a calibration."""
 
 import dataclasses
+from contextlib import closing
 
 import cv2
 import numpy as np
@@ -24,11 +25,9 @@ def bare_picture(session: Session, camera: str, frame: int, height: int | None =
             f"Session '{session.name}' has no frame {frame} of camera '{camera[:64]}'.",
             f"It has {source.frame_count} frames of {names}.",
         )
-    footage = open_footage(dataclasses.replace(source, cameras=(found[0],)), session.path)
-    try:
+    one = dataclasses.replace(source, cameras=(found[0],))
+    with closing(open_footage(one, session.path)) as footage:
         picture = footage.picture(camera, frame)
-    finally:
-        footage.close()
     if height is None or height >= picture.shape[0]:
         return picture
     width = max(1, round(picture.shape[1] * height / picture.shape[0]))

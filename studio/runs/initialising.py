@@ -7,6 +7,7 @@ function of the frame's pictures, the body, the settings and the seed.
 
 import dataclasses
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,7 +18,6 @@ from studio.behaviour.model_file import read_model
 from studio.body.dimensions import with_usual_feet
 from studio.body.model import BodyModel
 from studio.body.scale import scale_of
-from studio.errors import RunError
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
 from studio.likelihood.catalogue import WEIGHTINGS
@@ -25,7 +25,7 @@ from studio.progress import Progress, unheard
 from studio.runs.behaviour_models import fitting, model_folders, model_path
 from studio.runs.initial_limbs import limbs_put_right
 from studio.runs.person_facing import NETWORK_ODDS, facing_agreement
-from studio.runs.problem_source import ProblemSource
+from studio.runs.problem_source import ProblemSource, check_seen
 from studio.runs.search_space import parameter_names, search_space, session_sigma
 from studio.runs.session_settings import session_settings
 from studio.sessions.named_rows import write_pose
@@ -42,7 +42,7 @@ from studio.trackers.initialisation import (
     confidence,
     facing_odds,
 )
-from studio.trackers.loss_detection import Onlooker, anything_seen
+from studio.trackers.loss_detection import Onlooker
 from studio.trackers.start_candidates import facing, start_candidates
 from studio.trackers.tracker import LIMB_LOST_SHARE, FrameLikelihood, SearchSpace
 from studio.volume.alignment import root_parameters
@@ -118,20 +118,13 @@ def initialise(
     if behaviour:
         model = read_model(model_path(model_folders(session), behaviour))
         prototypes = fitting(model, tree, session.manifest.fps).prototypes.poses
-    problems = ProblemSource(session, tree)
-    try:
+    with closing(ProblemSource(session, tree)) as problems:
         progress("reading the frame", 0, 1)
         evidence = problems.evidence(frame, settings)
         masks = problems.evidence(frame, session_settings(session, DEFAULT_TRACKER, WEIGHTING))
         cameras = problems.cameras_in(frame)
         pictures = {camera.name: problems.footage.picture(camera.name, frame) for camera in cameras}
-    finally:
-        problems.close()
-    if not anything_seen(masks):
-        raise RunError(
-            f"Frame {frame} of session '{session.name}' shows no body.",
-            "Choose a frame in which the person is in view, or check the masks.",
-        )
+    check_seen(session, masks)
     hull, box, note = hull_of(tree, cameras, masks)
     space = search_space(tree, session_sigma(session, tree, session.manifest.fps))
     found = seek(

@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Array
+from studio.arrays import Array, median_and_spread, runs_of
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
 from studio.body.scale import scale_of
@@ -24,8 +24,6 @@ TIMES = 4.0
 """Factor above the median of the frames around: a punch is quick for longer than a frame."""
 AROUND = 12
 """Frames before and after that count as around it."""
-DEVIATION = 1.4826
-"""Standard deviations in a median absolute deviation, of a normal distribution."""
 ABOUT = 0.8
 WHOLE = "whole body"
 
@@ -78,49 +76,35 @@ def marker_limbs(body: BodyModel) -> tuple[str, ...]:
 def _limb_jumps(limb: str, frames: NDArray[np.int64], points: Array, least: float) -> list[Jump]:
     """The jumps of one limb. points : (K, M, 3) its markers. least : mm, of any jump."""
     bends = np.full(len(frames), np.nan)
-    parts = [part for part in stretches(frames) if part.stop - part.start > 2]
-    for part in parts:
+    for part in (part for part in stretches(frames) if part.stop - part.start > 2):
         second = np.linalg.norm(np.diff(points[part], n=2, axis=0), axis=-1).max(axis=1)
         bends[part.start + 1 : part.stop - 1] = second
     known = bends[np.isfinite(bends)]
     if not known.size:
         return []
-    usual = float(np.median(known))
-    spread = DEVIATION * float(np.median(np.abs(known - usual)))
+    usual, spread = median_and_spread(known)
     level = max(least, usual + SPREADS * spread)
-    jumps: list[Jump] = []
-    for part in parts:
-        high = [row for row in range(part.start + 1, part.stop - 1) if bends[row] > level]
-        for run in _runs(high):
-            if bends[run].max() > TIMES * _usual_around(bends, run):
-                jumps.append(_jump(limb, frames, points, bends, run, usual))
-    return jumps
+    return [
+        _jump(limb, frames, points, bends, run, usual)
+        for run in runs_of(bends > level)
+        if bends[slice(*run)].max() > TIMES * _usual_around(bends, run)
+    ]
 
 
-def _runs(rows: list[int]) -> list[list[int]]:
-    """Groups of consecutive rows."""
-    found: list[list[int]] = []
-    for row in rows:
-        if found and row == found[-1][-1] + 1:
-            found[-1].append(row)
-        else:
-            found.append([row])
-    return found
-
-
-def _usual_around(bends: Array, run: list[int]) -> float:
-    before, after = bends[max(0, run[0] - AROUND) : run[0]], bends[run[-1] + 1 : run[-1] + 1 + AROUND]
-    near = np.concatenate([before, after])
+def _usual_around(bends: Array, run: tuple[int, int]) -> float:
+    first, after = run
+    near = np.concatenate([bends[max(0, first - AROUND) : first], bends[after : after + AROUND]])
     near = near[np.isfinite(near)]
     return float(np.median(near)) if near.size else 0.0
 
 
 def _jump(
-    limb: str, frames: NDArray[np.int64], points: Array, bends: Array, run: list[int], usual: float
+    limb: str, frames: NDArray[np.int64], points: Array, bends: Array, run: tuple[int, int], usual: float
 ) -> Jump:
     """The jump in a run of high second differences: into the frame with the longest step, or the first of two about
     equal steps (there and back).
     """
-    steps = np.linalg.norm(np.diff(points[run[0] - 1 : run[-1] + 2], axis=0), axis=-1).max(axis=1)
-    row = run[0] + int(np.argmax(steps >= ABOUT * steps.max()))
-    return Jump(int(frames[row]), limb, float(bends[run].max()), usual)
+    first, after = run
+    steps = np.linalg.norm(np.diff(points[first - 1 : after + 1], axis=0), axis=-1).max(axis=1)
+    row = first + int(np.argmax(steps >= ABOUT * steps.max()))
+    return Jump(int(frames[row]), limb, float(bends[first:after].max()), usual)

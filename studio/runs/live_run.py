@@ -21,7 +21,7 @@ from studio.runs.tracking_run import TrackingRun
 from studio.sessions.stored_run import StoredRun
 from studio.settings import RunSettings
 from studio.trackers.frame_loop import FrameSearch
-from studio.trackers.tracker import FrameResult, LayerRecord
+from studio.trackers.tracker import FrameResult
 
 OVER = "finished"
 REHEARSALS = 3
@@ -45,7 +45,6 @@ class LiveRun(TrackingRun):
         self.latency_ms = float("nan")
         super().__init__(run, problems, storing)
         self._measure_again()
-        self._over = self._reader.ended() == OVER
 
     @property
     def standing(self) -> LiveStanding:
@@ -133,26 +132,13 @@ class LiveRun(TrackingRun):
         self.latency_ms = 1e3 * (times[1] - times[0]) if times else float("nan")
         super()._store(result, settings, times)
 
-    def keep(
-        self,
-        result: FrameResult,
-        layers: list[LayerRecord],
-        version: int,
-        settings: RunSettings,
-        *,
-        alone: bool = False,
-    ) -> None:
-        """As `TrackingRun.keep`; a finished run continues from there."""
-        super().keep(result, layers, version, settings, alone=alone)
-        self._over = False
-
     def _load_again(self) -> None:
         super()._load_again()
         self._measure_again()
 
     def _measure_again(self) -> None:
-        with self.run.results() as results:
-            self.meter = LiveMeter(results.frames(), SetNumbers(self.run.folder.parents[1]))
+        self.meter = LiveMeter(self._reader.frames(), SetNumbers(self.run.folder.parents[1]))
+        self._over = self._reader.ended() == OVER
 
 
 def without_particles(result: FrameResult) -> FrameResult:

@@ -17,13 +17,11 @@ from studio.arrays import Bytes
 from studio.body.scale import scale_of
 from studio.calibration.findings import Finding, blocking
 from studio.errors import RunError
-from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.masks import PackedMasks, reduced
-from studio.evidence.pipeline import EvidenceMaker
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
-from studio.progress import Progress
-from studio.runs.session_settings import session_settings
+from studio.progress import Progress, unheard
+from studio.runs.session_settings import masks_of, session_settings
 from studio.runs.silhouette_doubts import MEASURED, height_of, person_alone, silhouette_doubts
 from studio.runs.subject_masks import count_subjects
 from studio.sessions.provenance import note
@@ -144,7 +142,7 @@ def mask_quality(
     frames: Sequence[int] = (),
     *,
     blame: bool = True,
-    progress: Progress | None = None,
+    progress: Progress = unheard,
 ) -> MaskQuality:
     """The quality of a session's masks in some frames (default: five, evenly spread).
 
@@ -160,42 +158,32 @@ def mask_quality(
         )
     small = tuple(camera.reduced(JUDGED_SIDE) for camera in cameras)
     scale = scale_of(session.body())
-    footage = session.footage()
-    try:
-        chosen = tuple(frames) or spread_frames(footage.frame_count, FRAMES)
+    with masks_of(session, settings) as maker:
+        chosen = tuple(frames) or spread_frames(maker.footage.frame_count, FRAMES)
         masks: dict[int, list[Bytes]] = {frame: [] for frame in chosen}
         people = {frame: PackedMasks() for frame in chosen}
-        backgrounds = Backgrounds(footage)
-        maker = EvidenceMaker(cameras, footage, backgrounds, settings, "none")
         total = (len(cameras) + 1) * len(masks)
         for camera, lens in zip(cameras, small, strict=True):
             for frame in sorted(masks):
-                if progress is not None:
-                    progress("comparing masks", len(masks[frame]) * len(masks), total)
+                progress("comparing masks", len(masks[frame]) * len(masks), total)
                 mask = maker.view(camera.name, frame).mask
                 masks[frame].append(reduced(mask, lens))
                 if blame:
                     people[frame].put(camera.name, person_alone(mask))
-            footage.release(camera.name)
-            backgrounds.release(camera.name)
+            maker.release(camera.name)
         counted: list[FrameCounts] = []
         seen: list[int] = []
         for done, frame in enumerate(chosen):
-            if progress is not None:
-                progress("comparing masks", len(cameras) * len(masks) + done, total)
+            progress("comparing masks", len(cameras) * len(masks) + done, total)
             seen += [count_subjects(masks[frame], small, scale)] if blame else []
             counted.append(count_frame(masks[frame], small, blame, scale=scale))
-    finally:
-        footage.close()
     found = summed(chosen, tuple(camera.name for camera in cameras), counted)
     doubts = silhouette_doubts(cameras, people, height_of(session), scale) if blame else ()
     subjects = sorted(seen, reverse=True)[:2][-1] if seen else 0
     return dataclasses.replace(found, doubts=doubts, subjects=subjects)
 
 
-def measure_masks(
-    session: Session, frames: Sequence[int] = (), progress: Progress | None = None
-) -> MaskQuality:
+def measure_masks(session: Session, frames: Sequence[int] = (), progress: Progress = unheard) -> MaskQuality:
     """The quality of the session's masks. For the default frames it is stored: a blocking finding then refuses new runs
     (`silhouette_doubts.accepted_doubts`). Raises as `mask_quality` does.
     """

@@ -17,7 +17,20 @@ from studio.body.branches import within_limits
 from studio.body.catalogue import body_file_text
 from studio.body.model import BodyModel
 from studio.body.subject import Subject, read_subject
-from studio.declaring import Body, Despite, Knobs, Model, OneOf, Seed, Target, Terminal, Values, Web
+from studio.declaring import (
+    AllowInconsistent,
+    Body,
+    First,
+    Knobs,
+    Last,
+    Model,
+    OneOf,
+    Seed,
+    Target,
+    Terminal,
+    Values,
+    Web,
+)
 from studio.errors import BodyError, RunError, StudioError
 from studio.geometry.reach import within_reach
 from studio.knobs import Knob
@@ -95,12 +108,8 @@ def prepare_run(
             " only one that fits, where one is needed."
         ),
     ] = "",
-    first: Annotated[
-        int | None, Field(ge=0, description="Default: the frame that the start pose is of.")
-    ] = None,
-    last: Annotated[
-        int | None, Field(ge=1, description="The frame after the last one; default: all.")
-    ] = None,
+    first: First = None,
+    last: Last = None,
     seed: Seed = 0,
     knobs: Annotated[
         Values,
@@ -108,7 +117,7 @@ def prepare_run(
         Knobs(own_knobs, others=True, with_defaults=False),
     ] = None,
     name: Annotated[str, Field(description="Of the run (letters, digits, - and _); default: numbered.")] = "",
-    despite_findings: Despite = False,
+    allow_inconsistent: AllowInconsistent = False,
     fit_shape: Annotated[
         bool,
         Field(
@@ -144,7 +153,7 @@ def prepare_run(
 
     Raises StudioError; then nothing was made.
     """
-    doubts = accepted_doubts(session, despite_findings)
+    doubts = accepted_doubts(session, allow_inconsistent)
     tracker = tracker or session.manifest.tracker or DEFAULT_TRACKER
     weighting = weighting or session.manifest.weighting or DEFAULT_WEIGHTING
     settings = session_settings(session, tracker, weighting, live_changes(knobs or {}) if live else knobs)

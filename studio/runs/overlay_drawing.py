@@ -17,6 +17,7 @@ from studio.runs.colour_tokens import Colour, ColourTokens
 
 OVERLAYS = ("outline", "filled", "truth", "mask", "edges", "samples", "cost", "particles")
 
+JPEG_QUALITY = 85
 _SHIFT = 4
 _MASK_SHARE = 0.5
 _FILLED_SHARE = 0.45
@@ -102,9 +103,9 @@ def projected_silhouette(contours: tuple[Array, ...], height: int, width: int, s
     return filled
 
 
-def encode_jpeg(picture: Bytes, quality: int = 85) -> bytes:
+def encode_jpeg(picture: Bytes) -> bytes:
     """A BGR picture as a JPEG file."""
-    _, encoded = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    _, encoded = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     return encoded.tobytes()
 
 

@@ -3,6 +3,7 @@
 The result never has a lower likelihood than the given pose.
 """
 
+from contextlib import closing
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +15,7 @@ from studio.errors import RunError
 from studio.evidence.distance_maps import silhouette_distances
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.progress import Progress, unheard
-from studio.runs.problem_source import ProblemSource
+from studio.runs.problem_source import ProblemSource, check_seen
 from studio.runs.refined_frames import JUDGE
 from studio.runs.search_space import search_space, session_sigma
 from studio.runs.session_settings import session_settings
@@ -23,7 +24,7 @@ from studio.sessions.stored_run import StoredRun
 from studio.settings import RunSettings, settings_from_values
 from studio.trackers.catalogue import TRACKERS
 from studio.trackers.frame_loop import search_frame
-from studio.trackers.loss_detection import Onlooker, anything_seen
+from studio.trackers.loss_detection import Onlooker
 from studio.trackers.refinement import RefinementSettings, Refiner
 from studio.trackers.tracker import FilterState, ParticleSet
 
@@ -64,16 +65,9 @@ def better_pose(
     body = run.body() if run else session.body()
     given = within_limits(body, checked_pose(body, pose, RunError))
     settings = _short_settings(session, run)
-    problems = ProblemSource(session, body, run.cameras() if run else None)
-    try:
+    with closing(ProblemSource(session, body, run.cameras() if run else None)) as problems:
         evidence, problem = problems.evidence(frame, settings), problems.problem(frame, settings)
-    finally:
-        problems.close()
-    if not anything_seen(evidence):
-        raise RunError(
-            f"Frame {frame} of session '{session.name}' shows no body.",
-            "Choose a frame in which the person is in view, or check the masks.",
-        )
+    check_seen(session, evidence)
     layers, done = int(SHORT["layers"]), 0
 
     def checked(_: object) -> None:

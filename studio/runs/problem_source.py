@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 
 from studio.body.model import BodyModel
 from studio.capture.footage import Footage
+from studio.errors import RunError
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.distance_maps import silhouettes_by_camera
 from studio.evidence.frame_evidence import FrameEvidence
@@ -24,6 +25,7 @@ from studio.likelihood.silhouette_areas import HALF, silhouettes_of
 from studio.sessions.session import Session
 from studio.settings import RunSettings
 from studio.tracing import span
+from studio.trackers.loss_detection import anything_seen, shown_by
 from studio.trackers.recovery_settings import OFF
 from studio.trackers.tracker import FrameLikelihood
 
@@ -63,16 +65,23 @@ class ProblemSource:
         self._views = views
         self._keeping, self._making = threading.Lock(), threading.Lock()
         self._coming: tuple[Hashable, Future[FrameLikelihood]] | None = None
+        self._latest: tuple[int, RunSettings, FrameLikelihood] | None = None
+        """Asked for again by every layer of a search; the frame after it is on its way."""
         self._evidence: OrderedDict[Hashable, FrameEvidence] = OrderedDict()
         self._problems: OrderedDict[Hashable, FrameLikelihood] = OrderedDict()
         self._likelihoods: OrderedDict[Hashable, Any] = OrderedDict()
 
     def problem(self, frame: int, settings: RunSettings) -> FrameLikelihood:
         """The frame as a function of poses. Raises FootageError, NotFoundError."""
-        self._await(problem_key(frame, settings))
-        problem = self._problem(frame, settings)
-        if self._executor is not None and frame + 1 < self._last:
-            self._prepare(frame + 1, settings, self._executor)
+        latest = self._latest
+        if latest is not None and latest[0] == frame and latest[1] is settings:
+            return latest[2]
+        key = problem_key(frame, settings)
+        self._await(key)
+        problem = self._problem(frame, settings, key)
+        executor = self._executor if frame + 1 < self._last else None
+        if executor is None or self._prepare(frame + 1, settings, executor):
+            self._latest = frame, settings, problem
         return problem
 
     def evidence(self, frame: int, settings: RunSettings) -> FrameEvidence:
@@ -105,15 +114,14 @@ class ProblemSource:
         if self._coming is not None and not self._coming[1].cancel():
             # The preparing thread must be done with the files before they close.
             self._coming[1].exception()
-        self._coming = None
+        self._coming = self._latest = None
         with self._making, self._keeping:
             self._problems.clear()
             self._evidence.clear()
             self._likelihoods.clear()
             self.footage.close()
 
-    def _problem(self, frame: int, settings: RunSettings) -> FrameLikelihood:
-        key = problem_key(frame, settings)
+    def _problem(self, frame: int, settings: RunSettings, key: Hashable) -> FrameLikelihood:
         found = self._kept(self._problems, key)
         if found is not None:
             return found
@@ -125,9 +133,11 @@ class ProblemSource:
         if settings.refinement.refine_frames:
             with span("distances", frame):
                 silhouettes_by_camera(evidence, settings.refinement.refine_frame_points)
-        if settings.recovery.recovery != OFF and any(view.background is None for view in evidence.views):
+        if settings.recovery.recovery != OFF:
             with span("silhouettes", frame):
-                silhouettes_of(evidence, HALF)
+                shown_by(evidence)
+                if any(view.background is None for view in evidence.views):
+                    silhouettes_of(evidence, HALF)
         with self._making, span("maps", frame):
             likelihood = self._likelihood(settings, self.cameras_in(frame))
             return self._keep(self._problems, key, likelihood.problem(evidence), KEPT_FRAMES)
@@ -141,13 +151,15 @@ class ProblemSource:
             found = self._keep(self._likelihoods, key, made, KEPT_LIKELIHOODS)
         return found
 
-    def _prepare(self, frame: int, settings: RunSettings, executor: Executor) -> None:
+    def _prepare(self, frame: int, settings: RunSettings, executor: Executor) -> bool:
+        """Begin to prepare a frame; whether it is ready or on its way."""
         key = problem_key(frame, settings)
         if key in self._problems or (self._coming is not None and self._coming[0] == key):
-            return
+            return True
         if self._coming is not None and not self._coming[1].done():
-            return
-        self._coming = (key, executor.submit(self._problem, frame, settings))
+            return False
+        self._coming = (key, executor.submit(self._problem, frame, settings, key))
+        return True
 
     def _await(self, key: Hashable) -> None:
         """Wait for this frame if it is in preparation; its error is raised again where the frame is used."""
@@ -172,6 +184,15 @@ class ProblemSource:
             while len(store) > limit:
                 store.popitem(last=False)
             return value
+
+
+def check_seen(session: Session, evidence: FrameEvidence) -> None:
+    """Raise RunError for a frame that shows no body."""
+    if not anything_seen(evidence):
+        raise RunError(
+            f"Frame {evidence.frame} of session '{session.name}' shows no body.",
+            "Choose a frame in which the person is in view, or check the masks.",
+        )
 
 
 def evidence_key(frame: int, settings: RunSettings) -> Hashable:

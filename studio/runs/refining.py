@@ -114,14 +114,13 @@ def smooth_run(
     chosen = source or best_track(run, (SIDES,) if into == REFINED else (REFINED, SIDES)).name
     track = _begun(run, chosen, into, replace)
     body, record = run.body(), run.record
-    angles = np.array([entry.kind == "angle" for entry in body.parameters])
     found = smooth(
         track.frames,
         track.poses,
         track.confidence,
         track.states,
         search_space(body, np.array(record.sigma)),
-        angles,
+        body.angles,
         record.fps,
         knobs,
     )

@@ -34,8 +34,8 @@ def search_space(body: BodyModel, sigma: Array, behaviour: BehaviourModel | None
     number = {limb: index for index, limb in enumerate(dict.fromkeys(limbs))}
     return SearchSpace(
         names=parameter_names(body),
-        lower=np.array([entry.lower for entry in body.parameters]),
-        upper=np.array([entry.upper for entry in body.parameters]),
+        lower=body.lower,
+        upper=body.upper,
         sigma=sigma,
         limb=np.array([number[limb] for limb in limbs], dtype=np.int64),
         hierarchy=hierarchy_of(body),

@@ -1,7 +1,11 @@
-"""The initial settings of a session: the studio's defaults with the session's mask knobs."""
+"""The initial settings of a session: the studio's defaults with the session's mask knobs; masks made with them."""
 
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
+from contextlib import closing, contextmanager
 
+from studio.evidence.backgrounds import Backgrounds
+from studio.evidence.pipeline import EvidenceMaker
+from studio.evidence.settings import EvidenceSettings
 from studio.sessions.background_files import SessionEvidence, read_evidence
 from studio.sessions.session import Session
 from studio.settings import (
@@ -27,3 +31,14 @@ def session_settings(
     known = values(settings)
     own = {name: value for name, value in evidence.knobs.items() if name in known}
     return changed_settings(settings, {**own, **(changes or {})})
+
+
+@contextmanager
+def masks_of(session: Session, settings: EvidenceSettings | None = None) -> Generator[EvidenceMaker]:
+    """What makes a session's masks, without edges; its footage is closed at the end. settings : default: the session's.
+
+    Raises FootageError.
+    """
+    knobs = settings or session_settings(session).evidence
+    with closing(session.footage()) as footage:
+        yield EvidenceMaker(session.cameras(), footage, Backgrounds(footage), knobs, "none")

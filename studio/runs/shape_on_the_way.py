@@ -31,7 +31,7 @@ from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.likelihood.shape_silhouettes import ShapePrograms
-from studio.progress import Progress
+from studio.progress import Progress, unheard
 from studio.runs.following import Following
 from studio.runs.problem_source import ProblemSource
 from studio.runs.search_space import search_space, session_sigma
@@ -95,7 +95,7 @@ def session_shape(
     settings: RunSettings,
     start: Array,
     first: int,
-    progress: Progress | None = None,
+    progress: Progress = unheard,
 ) -> tuple[BodyModel, Array, str]:
     """The body with the shape of a session's frames from `first` on, its pose there (D,), and a text for the notes.
 
@@ -129,7 +129,7 @@ def _fitted_now(
     settings: RunSettings,
     start: Array,
     frames: range,
-    progress: Progress | None,
+    progress: Progress,
 ) -> _Kept:
     with closing(ProblemSource(session, body)) as problems:
         wanted = _judging(settings)
@@ -164,7 +164,7 @@ def shaped_body(
     start: Array,
     sigma: Array,
     *,
-    progress: Progress | None = None,
+    progress: Progress = unheard,
 ) -> FittedShape:
     """The shape of a body in the first frames. evidence : of a frame, with edge proximity maps. start : (D,) of
     the first of `frames`. sigma : (D,) σ0 from frame to frame.
@@ -175,8 +175,7 @@ def shaped_body(
         rules, search_space(body, sigma), start_of(tuple(start.tolist())), 0, FrameRefiner(body, cameras, 0)
     )
     for number, frame in enumerate(frames):
-        if progress is not None:
-            progress(STEP, number, len(frames) + 1)
+        progress(STEP, number, len(frames) + 1)
         seen = evidence(frame)
         if not anything_seen(seen):
             break
@@ -188,8 +187,7 @@ def shaped_body(
     chosen = varied_frames(body, numbers, followed, FITTED_FRAMES)
     rows = np.searchsorted(numbers, chosen)
     found = fitted_shape(body, cameras, [evidence(frame) for frame in chosen], followed[rows])
-    if progress is not None:
-        progress(STEP, len(frames) + 1, len(frames) + 1)
+    progress(STEP, len(frames) + 1, len(frames) + 1)
     return FittedShape(found.body, followed[0], found.sizes, found.overlap)
 
 
@@ -243,8 +241,8 @@ def _words(found: FittedShape, frames: range) -> str:
 
 
 def _key(session: Session, body: BodyModel, settings: RunSettings, start: Array, frames: range) -> str:
-    """A digest of all that the fit depends on; of the evidence's knobs those that are not at their defaults, so that
-    another knob leaves the fits that are kept. Sizes and start pose are rounded: their last bits are a processor's own.
+    """A digest of all that the fit depends on: of the evidence the masks' knobs, whose defaults may change, and others
+    that are not at their defaults. Sizes and start pose are rounded: their last bits are a processor's own.
     """
     evidence, usual = msgspec.to_builtins(settings.evidence), msgspec.to_builtins(EvidenceSettings())
     made_of = (
@@ -252,7 +250,7 @@ def _key(session: Session, body: BodyModel, settings: RunSettings, start: Array,
         digests(session, ("footage", "calibration", "masks")),
         body.name,
         {name: round(value, KEY_DIGITS) for name, value in body.dimensions.items()},
-        {name: value for name, value in evidence.items() if value != usual[name]},
+        {name: value for name, value in evidence.items() if name.startswith("mask_") or value != usual[name]},
         (np.round(start, KEY_DIGITS) + 0.0).tolist(),  # no negative zero
         (frames.start, frames.stop),
     )

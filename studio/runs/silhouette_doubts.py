@@ -60,13 +60,13 @@ def standing_doubts(session: Session) -> tuple[str, ...]:
     return measured.stops
 
 
-def accepted_doubts(session: Session, despite: bool) -> tuple[str, ...]:
-    """The standing doubts, for a run's notes. Raises CalibrationError where there are any, unless `despite`."""
+def accepted_doubts(session: Session, allow_inconsistent: bool) -> tuple[str, ...]:
+    """The standing doubts, for a run's notes. Raises CalibrationError for any, unless `allow_inconsistent`."""
     doubts = standing_doubts(session)
-    if doubts and not despite:
+    if doubts and not allow_inconsistent:
         raise CalibrationError(
             f"The footage of '{session.name}' contradicts its calibration: {doubts[0]}",
-            "Correct it and measure the masks again, or track anyway (--despite-findings; a checkbox in the forms).",
+            "Correct it and measure the masks again, or track anyway (--allow-inconsistent; a checkbox in the forms).",
         )
     return doubts
 

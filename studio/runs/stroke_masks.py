@@ -10,6 +10,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 
 import cv2
 import numpy as np
@@ -251,8 +252,7 @@ def preview_mask(session: Session, camera: str, frame: int, strokes: Sequence[St
     first = first_frame(own)
     if first is None:
         return None
-    footage = session.footage()
-    try:
+    with closing(session.footage()) as footage:
         earlier = made_of_strokes(session)
         here = own.get(frame, ())
         if frame == first:
@@ -270,5 +270,3 @@ def preview_mask(session: Session, camera: str, frame: int, strokes: Sequence[St
         if any(stroke.kind == "inside" for stroke in here):
             return StrokeCut().begin(footage.picture(camera, frame), here)
         return None
-    finally:
-        footage.close()

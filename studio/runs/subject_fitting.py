@@ -24,21 +24,19 @@ from studio.body.shape_space import ShapeSpace, levelled, shape_space
 from studio.body.subject import SHORTEST_MM, TALLEST_MM, Subject, fit_subject, write_subject
 from studio.declaring import Body, Seed, Terminal
 from studio.errors import RunError
-from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
-from studio.evidence.pipeline import EvidenceMaker
 from studio.likelihood.shape_silhouettes import ShapeSilhouettes
 from studio.progress import Progress, unheard
 from studio.runs.initialising import initialise
+from studio.runs.problem_source import check_seen
 from studio.runs.search_space import parameter_names
-from studio.runs.session_settings import session_settings
+from studio.runs.session_settings import masks_of
 from studio.runs.subject_frames import varied_frames
 from studio.runs.tracks import REFINED, SIDES, best_track, read_track
 from studio.sessions.calibration_changes import stale_runs
 from studio.sessions.names import free_name
 from studio.sessions.session import SUBJECT_NAME, Session
-from studio.trackers.loss_detection import anything_seen
 from studio.trackers.shape_prior import ShapePrior, ShapeSpreads
 from studio.trackers.shape_refinement import RefinedShape, ShapeRefiner
 from studio.trackers.shape_search import ShapeSearch, ShapeSearchSettings
@@ -139,8 +137,8 @@ def fit_session_subject(
     silhouettes = ShapeSilhouettes(space, session.cameras(), evidence)
     search = ShapeSearch(
         silhouettes,
-        np.array([[entry.lower for entry in body.parameters], [entry.upper for entry in body.parameters]]),
-        np.array([ANGLE_SPREAD if entry.kind == "angle" else PLACE_SPREAD for entry in body.parameters]),
+        np.stack([body.lower, body.upper]),
+        np.where(body.angles, ANGLE_SPREAD, PLACE_SPREAD),
         np.array([limbs[entry.limb] for entry in body.parameters]),
         prior,
         settings=ShapeSearchSettings(particles=request.particles, layers=request.layers),
@@ -259,22 +257,13 @@ def _stored_poses(
 
 def _evidence(session: Session, frames: Sequence[int], report: Progress) -> tuple[FrameEvidence, ...]:
     """The masks of the frames. Raises RunError for a frame that shows no body."""
-    footage = session.footage()
-    try:
-        settings = session_settings(session).evidence
-        maker = EvidenceMaker(session.cameras(), footage, Backgrounds(footage), settings, "none")
+    with masks_of(session) as maker:
         found: list[FrameEvidence] = []
         for done, frame in enumerate(frames):
             report("reading the frames", done, len(frames))
             evidence = maker.evidence(frame)
-            if not anything_seen(evidence):
-                raise RunError(
-                    f"Frame {frame} of session '{session.name}' shows no body.",
-                    "Choose other frames, or check the masks.",
-                )
+            check_seen(session, evidence)
             found.append(evidence)
-    finally:
-        footage.close()
     return tuple(found)
 
 

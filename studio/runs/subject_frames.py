@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Array
+from studio.arrays import Array, evenly_spread
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
 
@@ -22,7 +22,7 @@ def varied_frames(
     if poses is None:
         parts = (np.arange(count) + 0.5) * len(frames) / count
         return tuple(int(frames[int(part)]) for part in parts)
-    rows = np.unique(np.linspace(0, len(frames) - 1, min(MOST_LOOKED_AT, len(frames))).round().astype(int))
+    rows = evenly_spread(len(frames), MOST_LOOKED_AT)
     ends = limb_ends(body, poses[rows]).reshape(len(rows), -1, 3)
     ends = (ends - ends.mean(axis=1, keepdims=True)).reshape(len(rows), -1)
     chosen = [int(np.argmin(np.linalg.norm(ends - ends.mean(axis=0), axis=1)))]

@@ -80,8 +80,12 @@ class TrackingRun:
             fps=self.record.fps,
             anew=self.record.is_anew,
         )
-        seen = isinstance(problems, Sightings)
-        self._refiner = FrameRefiner(problems.body, problems.cameras, self.record.seed) if seen else None
+        self._seen = problems if isinstance(problems, Sightings) else None
+        self._refiner = (
+            None
+            if self._seen is None
+            else FrameRefiner(self._seen.body, self._seen.cameras, self.record.seed)
+        )
         self._writer = ResultsWriter(run.folder)
         self._pace = Pace()
         self._seconds, self._frames = 0.0, 0
@@ -235,9 +239,8 @@ class TrackingRun:
         found = dataclasses.replace(search.result(settings.tracker), notes=search_notes(layers))
         held = self._held_in(search.frame, settings)
         problem = search.problem or self.problems.problem(search.frame, held)
-        seen = self.problems if isinstance(self.problems, Sightings) else None
-        if self._refiner is not None and seen is not None and settings.refinement.refine_frames:
-            evidence = seen.evidence(search.frame, held)
+        if self._refiner is not None and self._seen is not None and settings.refinement.refine_frames:
+            evidence = self._seen.evidence(search.frame, held)
             with span("refine", search.frame):
                 found = self._refiner.refined(
                     found, partial(silhouettes_by_camera, evidence), problem, settings.refinement

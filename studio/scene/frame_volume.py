@@ -18,7 +18,7 @@ from studio.arrays import Array
 from studio.capture.video import give_back_freed_memory
 from studio.errors import StudioError
 from studio.likelihood.blob_settings import BlobSettings
-from studio.likelihood.blobs import BlobProblem, blob_mixture
+from studio.likelihood.blobs import BlobFrameLikelihood, blob_mixture
 from studio.numba_in_threads import numba
 from studio.runs.problem_source import ProblemSource
 from studio.scene.opened_run import Moment, OpenedRun
@@ -163,7 +163,7 @@ class FrameVolumes:
 def _volume(problems: ProblemSource, request: _Request) -> FrameVolume:
     """Raises FootageError, NotFoundError, CalibrationError."""
     problem = problems.problem(request.frame, request.settings)
-    assert isinstance(problem, BlobProblem)
+    assert isinstance(problem, BlobFrameLikelihood)
     if request.pose is None:
         return FrameVolume(request.frame, problem.hull)
     expected = problem.expecting(request.pose[None], request.memory)

@@ -21,10 +21,8 @@ GRACE_SECONDS = 60.0
 _LOG = logging.getLogger(__name__)
 
 
-class TooManyScenesError(StudioError):
+class TooManyScenesError(StudioError, status=503, code="windows"):
     """Raised when too many windows show a scene."""
-
-    status, code = 503, "windows"
 
 
 @dataclass(slots=True)

@@ -54,10 +54,8 @@ VIEWERS_WINDOW = "view-"
 WINDOW_HEADER = b"x-studio-window"
 
 
-class ReadOnlyError(AccessError):
+class ReadOnlyError(AccessError, code="read-only"):
     """A viewer wanted to change something."""
-
-    code = "read-only"
 
 
 def new_token() -> str:

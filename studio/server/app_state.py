@@ -19,9 +19,7 @@ from studio.server.calibration_proposals import Proposals
 from studio.server.event_stream import EventStream
 from studio.server.windows import Window
 from studio.sessions.session import RUNS_NAME
-from studio.sessions.workspace import Workspace
-
-STATE_NAME = ".studio"
+from studio.sessions.workspace import STATE_NAME, Workspace
 
 
 @dataclass(slots=True)

@@ -22,16 +22,15 @@ from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel, extremities
 from studio.errors import BehaviourError, BodyError
+from studio.runs.behaviour_models import ModelSummary, summary_of
 from studio.server.app_state import App, AppState
 from studio.server.schemas import Answer, Request, RunName
 from studio.server.session_routes import TrashEntry, trash_entry
 from studio.sessions.session import BODIES_NAME
 from studio.training.model_repository import (
-    ModelSummary,
     list_models,
     rename_model,
     stored_model,
-    summary_of,
     throw_away_model,
 )
 

@@ -6,7 +6,7 @@ be taken from.
 
 import asyncio
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Query
 from fastapi import Request as HttpRequest
@@ -14,6 +14,7 @@ from fastapi.responses import Response
 from pydantic import Field
 
 from studio.capture.camera_addresses import CameraAddress, camera_address, without_own
+from studio.capture.live_cameras import CameraStanding
 from studio.capture.stream_files import preview_jpeg
 from studio.errors import NotFoundError
 from studio.jobs.camera_service import RecordingState
@@ -51,22 +52,6 @@ class CamerasRequest(Request):
     cameras: list[CameraRequest] = Field(max_length=16)
 
 
-class LiveCameraView(Answer):
-    """A camera now. state: connecting, running, stopped, ended. age: seconds since its last picture."""
-
-    name: str
-    shown: str
-    state: Literal["connecting", "running", "stopped", "ended"]
-    seconds: float
-    age: Number
-    fps: float
-    pictures: int
-    width: int
-    height: int
-    message: str
-    attempts: int
-
-
 class SpreadView(Answer):
     """How far apart the pictures of the last sets came, ms. apart: sets of more than half a frame, of `sets`."""
 
@@ -81,7 +66,7 @@ class SpreadView(Answer):
 class CamerasView(Answer):
     """The cameras that are open, and the last recording."""
 
-    cameras: list[LiveCameraView]
+    cameras: tuple[CameraStanding, ...]
     spread: SpreadView
     fps: float
     recording: RecordingState | None
@@ -186,7 +171,7 @@ def _open(app: AppState, addresses: list[CameraAddress], ports: set[int]) -> Non
 def _view(app: AppState) -> CamerasView:
     standing = app.cameras.standing
     return CamerasView(
-        cameras=[LiveCameraView.model_validate(one) for one in standing.cameras],
+        cameras=standing.cameras,
         spread=SpreadView.model_validate(standing.spreads),
         fps=standing.fps,
         recording=standing.recording,

@@ -39,10 +39,8 @@ HINTS = {
 }
 
 
-class TooLargeError(StudioError):
+class TooLargeError(StudioError, status=413, code="too-large"):
     """A body or an upload beyond its limit."""
-
-    status, code = 413, "too-large"
 
 
 def error_response(error: StudioError, page: bool = False) -> Response:

@@ -37,10 +37,8 @@ mimetypes.add_type("image/svg+xml", ".svg")
 mimetypes.add_type("font/woff2", ".woff2")
 
 
-class PreferencesError(StudioError):
+class PreferencesError(StudioError, status=422, code="preferences"):
     """View preferences that cannot be kept."""
-
-    status, code = 422, "preferences"
 
 
 @router.get("/", include_in_schema=False)

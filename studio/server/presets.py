@@ -32,10 +32,8 @@ MOST = 100
 _lock = threading.Lock()
 
 
-class PresetError(StudioError):
+class PresetError(StudioError, status=422, code="preset"):
     """A preset that cannot be kept."""
-
-    status, code = 422, "preset"
 
 
 class _Kept(msgspec.Struct):

@@ -32,10 +32,8 @@ VIEWERS_MESSAGES = frozenset(("ViewerCameraMessage",))
 """What a viewer's client may send on."""
 
 
-class SceneMissingError(StudioError):
+class SceneMissingError(StudioError, status=500, code="scene"):
     """viser's client is not where its wheel puts it."""
-
-    status, code = 500, "scene"
 
 
 @cache

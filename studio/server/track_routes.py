@@ -165,12 +165,14 @@ async def begin_refining(
 ) -> TrackJobState:
     """Refine a track on the silhouettes. Ask for the state, or wait for `track` events."""
     changed(RefinementSettings(), arguments["knobs"])
-    check_making(run, arguments.get("source", ""), arguments.get("into", REFINED), arguments["replace"])
-
-    def work(job: Job) -> dict[str, Any]:
-        return _answer(refine(run, **arguments, progress=job.report_or_stop))
-
-    return begin_job(app, "refine", session, run, work)
+    _check(run, arguments, REFINED)
+    return begin_job(
+        app,
+        "refine",
+        session,
+        run,
+        lambda job: _answer(refine(run, **arguments, progress=job.report_or_stop)),
+    )
 
 
 @router.post(RUN + "/smooth", status_code=202)
@@ -182,12 +184,8 @@ async def begin_smoothing(
 ) -> TrackJobState:
     """Smooth a track in time."""
     changed(SmoothingSettings(), arguments["knobs"])
-    check_making(run, arguments.get("source", ""), arguments.get("into", SMOOTHED), arguments["replace"])
-
-    def work(_job: Job) -> dict[str, Any]:
-        return _answer(smooth(run, **arguments))
-
-    return begin_job(app, "smooth", session, run, work)
+    _check(run, arguments, SMOOTHED)
+    return begin_job(app, "smooth", session, run, lambda _: _answer(smooth(run, **arguments)))
 
 
 @router.post(RUN + "/correct", status_code=202)
@@ -228,6 +226,11 @@ def _line(session: Session, run: StoredRun, name: str) -> TrackLine:
         line.mean_mm, line.worst_mm = found.mean_mm, found.worst_mm
         line.mean_angle_deg, line.mean_direction_deg = found.mean_angle_deg, found.mean_direction_deg
     return line
+
+
+def _check(run: StoredRun, arguments: Arguments, usual: str) -> None:
+    """Raises what making the track would, before a job is begun. usual : the name of the track."""
+    check_making(run, arguments.get("source", ""), arguments.get("into", usual), arguments["replace"])
 
 
 def _answer(made: MadeTrack) -> dict[str, Any]:

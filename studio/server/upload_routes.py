@@ -47,10 +47,8 @@ STALE_SECONDS = 7 * 24 * 3600
 UPLOADS_NAME = "uploads"
 
 
-class DiskFullError(StudioError):
+class DiskFullError(StudioError, status=507, code="disk-full"):
     """Too little room on the disk."""
-
-    status, code = 507, "disk-full"
 
 
 def uploads_folder(app: AppState) -> Path:

@@ -22,7 +22,7 @@ from studio.server.track_routes import TRACK
 from studio.sessions.session import Session
 from studio.trackers.catalogue import knobs_for_evaluations
 
-router = APIRouter(tags=["way"])
+router = APIRouter(tags=["workflow"])
 
 
 @router.get("/way", include_in_schema=False)
@@ -48,7 +48,7 @@ def evaluations(tracker: str, evaluations: Annotated[int, Query(ge=1, le=1_000_0
 
 
 @router.get("/api/sessions/{session}/way")
-async def way(session: OpenSession, app: App) -> Workflow:
+async def workflow(session: OpenSession, app: App) -> Workflow:
     """Every step of the guided set-up: done, ready, blocked, stale (and why) or running."""
     return await asyncio.to_thread(_workflow, session, running_steps(app, session))
 

@@ -30,10 +30,8 @@ FOOTAGE_PARTS = ("videos", "pictures", "calibration")
 LITTER = frozenset(("__MACOSX", "Thumbs.db", "desktop.ini"))
 
 
-class ArchiveError(StudioError):
+class ArchiveError(StudioError, status=422, code="archive"):
     """An archive that cannot be unpacked safely."""
-
-    status, code = 422, "archive"
 
 
 @dataclass(frozen=True, slots=True)

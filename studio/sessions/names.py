@@ -22,10 +22,8 @@ RESERVED = frozenset(
 )
 
 
-class NameRefused(SessionError):
+class NameRefused(SessionError, status=422, code="name"):
     """A name that cannot be the name of a session or run."""
-
-    status, code = 422, "name"
 
 
 def checked_name(name: str, kind: str = "session") -> str:
@@ -84,10 +82,8 @@ LONGEST_PART, LONGEST_PATH, DEEPEST = 200, 1000, 8
 FORBIDDEN = frozenset('\\:*?"<>|')
 
 
-class PathRefused(StudioError):
+class PathRefused(StudioError, status=422, code="path"):
     """A path that might lead out of where it belongs."""
-
-    status, code = 422, "path"
 
 
 def relative_path(text: str) -> PurePosixPath:

@@ -22,40 +22,15 @@ class ProcessLock:
         It needs no room on the disk but for the file's name. Raises SessionError where the file cannot be made or
         written.
         """
-        connection = None
-        try:
-            connection = sqlite3.connect(path, timeout=0.0, isolation_level=None, check_same_thread=False)
-            # Nothing is ever written, so nothing has to be undone from a file.
-            connection.execute("PRAGMA journal_mode = MEMORY")
-            connection.execute("BEGIN EXCLUSIVE")
-        except sqlite3.DatabaseError as error:
-            if connection is not None:
-                connection.close()
-            if _is_held(error):
-                return None
-            raise unwritable("The lock", path, error) from None
-        return ProcessLock(connection)
+        # Nothing is ever written, so nothing has to be undone from a file.
+        return _begun(path, 0.0, "PRAGMA journal_mode = MEMORY", "BEGIN EXCLUSIVE")
 
     @staticmethod
     def share(path: Path, patience: float = 0.0) -> "ProcessLock | None":
         """Keep others from taking the lock of the file `path` (created if missing), which many may do at once; None
         while another holds it, after so many seconds. Raises SessionError.
         """
-        try:
-            connection = sqlite3.connect(
-                path, timeout=patience, isolation_level=None, check_same_thread=False
-            )
-        except sqlite3.DatabaseError as error:
-            raise unwritable("The lock", path, error) from None
-        try:
-            connection.execute("BEGIN")
-            connection.execute("SELECT 1 FROM sqlite_master").fetchall()
-        except sqlite3.DatabaseError as error:
-            connection.close()
-            if _is_held(error):
-                return None
-            raise unwritable("The lock", path, error) from None
-        return ProcessLock(connection)
+        return _begun(path, patience, "BEGIN", "SELECT 1 FROM sqlite_master")
 
     @staticmethod
     def is_held(path: Path) -> bool:
@@ -78,6 +53,22 @@ class ProcessLock:
     def free(self) -> None:
         """Release the lock."""
         self.connection.close()
+
+
+def _begun(path: Path, patience: float, *statements: str) -> ProcessLock | None:
+    """The lock once statements were executed; None while another holds it."""
+    connection = None
+    try:
+        connection = sqlite3.connect(path, timeout=patience, isolation_level=None, check_same_thread=False)
+        for statement in statements:
+            connection.execute(statement).fetchall()
+    except sqlite3.DatabaseError as error:
+        if connection is not None:
+            connection.close()
+        if _is_held(error):
+            return None
+        raise unwritable("The lock", path, error) from None
+    return ProcessLock(connection)
 
 
 def _is_held(error: sqlite3.DatabaseError) -> bool:

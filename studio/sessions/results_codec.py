@@ -305,10 +305,6 @@ class Found:
         self._blobs.pop(frame, None)
         self._damage[frame] = hash(text), part
 
-    def whole(self) -> int:
-        """How many frames' blobs were found to fit."""
-        return len(self._blobs)
-
     def damage(self) -> dict[int, tuple[int, str]]:
         """The damaged blobs, by frame: the hash of the checksums, and the part as text."""
         return self._damage.copy()

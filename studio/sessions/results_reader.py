@@ -88,6 +88,26 @@ class Timeline:
     doubts: Indices
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Stand:
+    """What a reader knows of its store at a moment. stored : the store's version; while it is the same, nothing is read
+    again. rewritten : while it is the same, frames were only added after `last` (-1: there was none). of : whether
+    blobs were checked, and what was known of them. rows : of the intact frames. damaged : the damaged parts of the
+    others, as text. due : the checksums, as text, of frames that are not checked yet.
+    """
+
+    stored: object
+    rewritten: object
+    of: tuple[bool, Found, dict[int, tuple[int, str]]] | None
+    last: int
+    rows: list[Row]
+    damaged: dict[int, str]
+    due: dict[int, str]
+
+
+_NOTHING = _Stand(None, None, None, -1, [], {}, {})
+
+
 class ResultsReader:
     """Reads a run's store. Every call sees the newest finished transaction; a missing store reads as empty.
 
@@ -102,7 +122,7 @@ class ResultsReader:
         self._lock = threading.RLock()
         self._within = False
         self._connection: sqlite3.Connection | None = None
-        self._known: tuple[object, list[Row], dict[int, str], bool] | None = None
+        self._known = _NOTHING
 
     def __enter__(self) -> "ResultsReader":
         return self
@@ -116,11 +136,11 @@ class ResultsReader:
             if self._connection is not None:
                 self._connection.close()
                 self._connection = None
-            self._known = None
+            self._known = _NOTHING
 
     def frames(self, *, blobs: bool = True) -> list[int]:
         """The finished frames that are whole, ascending. blobs : as `damaged`."""
-        return [row[0] for row in self._state(blobs)[0]]
+        return [row[0] for row in self._state(blobs).rows]
 
     def damaged(self, *, blobs: bool = True) -> dict[int, str]:
         """The damaged finished frames, and the damaged parts of each as text.
@@ -128,11 +148,12 @@ class ResultsReader:
         blobs : also check results and layers that this process has not yet found intact; else only the numbers, and
         what this process found before is left out, too. Frames without checksums (of older stores) count as intact.
         """
-        return self._state(blobs)[1]
+        return self._state(blobs).damaged
 
     def is_checked(self) -> bool:
         """Whether this process found every finished frame intact, or knows all that is damaged."""
-        return self._state(False)[2]
+        due, known = self._state(False).due, VERIFIED.of(self._folder)
+        return all(known.holds(frame, text) for frame, text in due.items())
 
     def is_whole(self, frame: int) -> bool:
         """Whether a frame is finished and intact; nothing of other frames is read."""
@@ -151,7 +172,7 @@ class ResultsReader:
     def check_all_again(self) -> None:
         """Forget what was read, also what was found intact."""
         VERIFIED.forget(self._folder)
-        self._known = None
+        self._known = _NOTHING
 
     def check_again(self, frame: int) -> str:
         """The parts of a frame without checksums that cannot be unpacked, as text; "" if all can."""
@@ -206,7 +227,7 @@ class ResultsReader:
 
     def poses(self, *, blobs: bool = True) -> tuple[Indices, Array]:
         """The finished frames (K,) that are whole and their estimates (K, D), radians and mm. blobs : as `damaged`."""
-        rows = self._state(blobs)[0]
+        rows = self._state(blobs).rows
         frames = np.array([row[0] for row in rows], dtype=np.int64)
         if not rows:
             return frames, np.zeros((0, 0))
@@ -214,7 +235,7 @@ class ResultsReader:
 
     def timeline(self, *, blobs: bool = True) -> Timeline:
         """Weight, time and effort of every finished frame that is whole. blobs : as `damaged`."""
-        rows = self._state(blobs)[0]
+        rows = self._state(blobs).rows
         columns = list(zip(*rows, strict=True)) if rows else [()] * 12
         whole = [np.array(columns[index], dtype=np.int64) for index in (0, 3, 4, 5)]
         real = [np.array(columns[index], dtype=np.float64) for index in (1, 2)]
@@ -228,18 +249,28 @@ class ResultsReader:
 
     # ------------------------------------------------------------------ integrity
 
-    def _state(self, blobs: bool) -> tuple[list[Row], dict[int, str], bool]:
-        """The rows of the intact frames, the damage of the others, and whether all blobs are checked; cached until the
-        store changes or more is known of it.
+    def _state(self, blobs: bool) -> _Stand:
+        """The intact frames and the damage of the others, kept until the store changes or more is known of it. While a
+        run goes on, only the frames that are new are read.
         """
         with VERIFIED.reading(self._folder) if blobs else nullcontext():
             known = VERIFIED.of(self._folder)
-            stored = self._query("PRAGMA data_version")
-            if self._known is not None and self._known[0] == (stored, blobs, known.whole(), known.damage()):
-                return self._known[1:]
+            before, stored = self._known, self._query("PRAGMA data_version")
+            same = before.of == (blobs, known, known.damage())
+            if same and before.stored == stored:
+                return before
             with self._snapshot():
-                sums, rows = self._sums(FRAME), {row[0]: row for row in self._rows()}
-                parts = {frame: _damage(known, frame, text, rows.get(frame)) for frame, text in sums.items()}
+                rewritten = self._query("SELECT value FROM meta WHERE key = 'rewritten'")
+                if not same or before.rewritten != rewritten:
+                    before = _NOTHING
+                sums, rows = self._sums(FRAME, after=before.last), self._rows(after=before.last)
+                if not (sums or rows) and before is not _NOTHING:
+                    # Something else was written, which is rare.
+                    before, sums, rows = _NOTHING, self._sums(FRAME), self._rows()
+                by_frame = {row[0]: row for row in rows}
+                parts = {
+                    frame: _damage(known, frame, text, by_frame.get(frame)) for frame, text in sums.items()
+                }
                 # What was found damaged is checked again: it may have been mended.
                 due = {
                     frame: text
@@ -248,10 +279,16 @@ class ResultsReader:
                 }
                 found = self._check_blobs(known, due) if blobs else _known_damage(known, due)
             damaged = {frame: part for frame, part in sorted((parts | found).items()) if part}
-            whole = [row for frame, row in rows.items() if frame not in damaged]
-            version = (stored, blobs, known.whole(), known.damage())
-            self._known = (version, whole, damaged, all(frame in found for frame in due))
-            return self._known[1:]
+            self._known = _Stand(
+                stored,
+                rewritten,
+                (blobs, known, known.damage()),
+                last=max((before.last, *sums, *by_frame)),
+                rows=[*before.rows, *(row for row in rows if row[0] not in damaged)],
+                damaged=before.damaged | damaged,
+                due=before.due | {frame: text for frame, text in due.items() if frame not in found},
+            )
+            return self._known
 
     def _check_blobs(self, known: Found, due: Mapping[int, str]) -> dict[int, str]:
         """The damaged blobs of some frames, as text; "" of those that are intact. Some frames are read at a time."""
@@ -281,24 +318,28 @@ class ResultsReader:
                 known.add(frame, due[frame])
         return parts
 
-    def _rows(self, frame: int | None = None) -> list[Row]:
-        """Every finished frame's numbers and pose, or those of one, without blobs; columns missing in older stores are
-        NULL.
+    def _rows(self, frame: int | None = None, after: int = -1) -> list[Row]:
+        """Numbers and pose of every finished frame after one, or of one alone, without blobs; columns missing in older
+        stores are NULL.
         """
         columns, joined = ROWS, ""
         for table, names in LATER_TABLES:
             known = self._has_table(table)
             columns += "".join(f", {name if known else 'NULL'}" for name in names)
             joined += f" LEFT JOIN {table} USING (frame)" if known else ""
-        one = "" if frame is None else f" WHERE frames.frame = {int(frame)}"
-        return self._query(f"{columns} FROM frames{joined}{one} ORDER BY frames.frame")
+        which = f"> {int(after)}" if frame is None else f"= {int(frame)}"
+        return self._query(f"{columns} FROM frames{joined} WHERE frames.frame {which} ORDER BY frames.frame")
 
-    def _sums(self, what: str, number: int | None = None) -> dict[int, str]:
-        """The stored checksums; nothing in stores that are older than these."""
+    def _sums(self, what: str, number: int | None = None, after: int = -1) -> dict[int, str]:
+        """The stored checksums of what has a number above `after`, or this one; nothing in stores that are older than
+        these.
+        """
         if not self._has_table("checksums"):
             return {}
-        one = "" if number is None else f" AND number = {int(number)}"
-        return dict(self._query(f"SELECT number, sums FROM checksums WHERE what = '{what}'{one}"))
+        which = f"> {int(after)}" if number is None else f"= {int(number)}"
+        return dict(
+            self._query(f"SELECT number, sums FROM checksums WHERE what = '{what}' AND number {which}")
+        )
 
     def _damaged_blobs(self, frame: int, text: str) -> str:
         """The blobs of a frame that do not match their checksums, as text; "" if all do."""
@@ -336,7 +377,7 @@ class ResultsReader:
     def _is_damaged(self, frame: int, part: str) -> DamagedError:
         if frame not in VERIFIED.of(self._folder).damage():
             VERIFIED.forget(self._folder)
-        self._known = None
+        self._known = _NOTHING
         checked = frame in self._sums(FRAME)
         return DamagedError(
             f"Frame {frame} of run '{self._folder.name}' is damaged on the disk ({part}).",

@@ -66,6 +66,15 @@ CREATE TABLE IF NOT EXISTS checksums (
     what TEXT NOT NULL, number INTEGER NOT NULL, sums TEXT NOT NULL, PRIMARY KEY (what, number));
 """
 _NOTE_VERSION = f"INSERT OR REPLACE INTO meta VALUES ('schema', '{SCHEMA_VERSION}')"
+_REWRITTEN = (
+    "INSERT OR REPLACE INTO meta SELECT 'rewritten', 1 + COALESCE((SELECT CAST(value AS INTEGER) FROM meta WHERE key ="
+    " 'rewritten'), 0)"
+)
+"""Counts how often anything but a new last frame was stored: readers then read all again, else only what is new."""
+_REWRITTEN_FROM = (
+    f"{_REWRITTEN} WHERE EXISTS (SELECT 1 FROM frames WHERE frame >= ?)"
+    " OR EXISTS (SELECT 1 FROM checksums WHERE what = ? AND number >= ?)"
+)
 _SUMS = "INSERT OR REPLACE INTO checksums VALUES (?, ?, ?)"
 
 
@@ -187,6 +196,7 @@ class ResultsWriter:
         pose was ready, seconds of one clock.
         """
         statements: list[tuple[str, tuple[object, ...]]] = [
+            (_REWRITTEN_FROM, (result.frame, FRAME, result.frame)),
             ("DELETE FROM layers WHERE frame = ?", (result.frame,)),
             ("DELETE FROM tracking WHERE frame = ?", (result.frame,)),
             ("DELETE FROM arrivals WHERE frame = ?", (result.frame,)),
@@ -232,7 +242,7 @@ class ResultsWriter:
 
     def give_up(self, frame: int) -> None:
         """Mark a frame as damaged, so that it is tracked again; for frames without checksums, or lost ones."""
-        self._transaction([(_SUMS, (FRAME, frame, GIVEN_UP))])
+        self._transaction([(_REWRITTEN, ()), (_SUMS, (FRAME, frame, GIVEN_UP))])
 
     def forget_partial(self) -> None:
         """Drop where the search stopped inside a frame."""
@@ -245,6 +255,7 @@ class ResultsWriter:
         """
         self._transaction(
             [
+                (_REWRITTEN, ()),
                 ("DELETE FROM frames WHERE frame >= ?", (frame,)),
                 ("DELETE FROM layers WHERE frame >= ?", (frame,)),
                 ("DELETE FROM tracking WHERE frame >= ?", (frame,)),

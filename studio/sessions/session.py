@@ -8,7 +8,6 @@ Folder: `session.json`, `videos/` or `pictures/<camera>/`, `masks/<camera>/`, `b
 
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import av
 import numpy as np
@@ -30,9 +29,6 @@ from studio.sessions.names import checked_name, free_name, inside
 from studio.sessions.results_store import create_store
 from studio.sessions.run_record import BEHAVIOUR_NAME, CAMERAS_NAME, RunRecord, write_run_record
 from studio.sessions.stored_run import BODY_FOLDER, StoredRun
-
-if TYPE_CHECKING:
-    from studio.sessions.session import Session
 
 WIDTH = 320
 QUALITY = 5

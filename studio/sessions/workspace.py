@@ -32,6 +32,8 @@ from studio.sessions.stored_run import RunSummary, StoredRun
 
 VARIABLE = "STUDIO_WORKSPACE"
 TRASH_NAME = ".trash"
+STATE_NAME = ".studio"
+"""Folder of a served workspace for what the server keeps."""
 APPLICATION = "capture-studio"
 
 

@@ -13,7 +13,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from studio.arrays import Array
 from studio.body.person import Skeleton
-from studio.geometry.rotations import axis_turn
+from studio.geometry.rotations import axis_turn, frames_along
 from studio.synthesis.person import yaw_pitch_roll
 
 Path = Callable[[Array], tuple[Array, Array]]
@@ -57,13 +57,13 @@ def swung(share: Array) -> Array:
     return s * s * (3.0 - 2.0 * s)
 
 
-def circle_path(radius: float, start_angle: float = 0.0, turn: float = 1.0) -> Path:
-    """A circle about the origin: distance (mm) to position (F, 2) and heading (F,). turn : 1 left, -1 right."""
+def circle_path(radius: float, start_angle: float = 0.0) -> Path:
+    """A circle to the left about the origin: distance (mm) to position (F, 2) and heading (F,)."""
 
     def at(distance: Array) -> tuple[Array, Array]:
-        angle = start_angle + turn * distance / radius
+        angle = start_angle + distance / radius
         position = radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-        return position, angle + turn * np.pi / 2
+        return position, angle + np.pi / 2
 
     return at
 
@@ -178,15 +178,7 @@ def leg_to_ankle(hip: Array, ankle: Array, forward: Array, thigh: float, shin: f
     knee = hip + thigh * (np.cos(offset) * along + np.sin(offset) * ahead)
     end = hip + distance[:, None] * along
     lateral = np.cross(-along, ahead)
-    return _hanging_frame(knee - hip, lateral), _hanging_frame(end - knee, lateral)
-
-
-def _hanging_frame(down: Array, lateral: Array) -> Array:
-    """(F, 3, 3) frames whose -z runs along `down` and whose y is `lateral`."""
-    z: Array = -down / np.linalg.norm(down, axis=1, keepdims=True)
-    x: Array = np.cross(lateral, z)
-    x /= np.linalg.norm(x, axis=1, keepdims=True)
-    return np.stack([x, np.cross(z, x), z], axis=-1)
+    return frames_along(hip - knee, lateral), frames_along(knee - end, lateral)
 
 
 # Paths that change direction: straight stretches, bends and turns on the spot, one after the other.

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
-from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
 from studio.arrays import Array
 from studio.body.person import SIDES, PersonMotion, Skeleton, joint_points
+from studio.body.retargeting import smooth_above
 from studio.errors import StudioError
 from studio.geometry.rotations import axis_turn
 from studio.synthesis.circuit import circuit
@@ -420,6 +420,4 @@ def _risen(height: Array, allowed: Array, fps: float) -> Array:
     """(F,) the height raised where bent knees are needed elsewhere only: up to `allowed`, the margin smoothed over
     RISE_S seconds on both sides.
     """
-    reach = max(1, round(RISE_S * fps))
-    room = minimum_filter1d(allowed - height, 2 * reach + 1, mode="nearest")
-    return height + gaussian_filter1d(room, reach / 3.0, radius=reach, mode="nearest")
+    return height - smooth_above(height - allowed, max(1, round(RISE_S * fps)))

@@ -33,13 +33,16 @@ COARSE_GRID_MM = 25.0
 class Disagreement:
     """Of V views and L drawn limbs, mm² at the body. area : (V, L) that a limb covers. outside : (V, L) of it farther
     than FAR_MM from the silhouette. bare : (V, L) silhouette farther than FAR_MM from every limb, given to the nearest.
-    limbs : (L,) name of the limb that each drawn one belongs to, from the body's parameters.
+    limbs : (L,) name of the limb that each drawn one belongs to, from the body's parameters. corners : (V, L, 4, 2)
+    pixels of the pose's outlines. mm : (V,) size of a pixel at the body.
     """
 
     area: Array
     outside: Array
     bare: Array
     limbs: tuple[str, ...]
+    corners: Array
+    mm: Sequence[float]
 
     def shares(self) -> dict[str, float]:
         """Disagreeing area by limb (named as in the body's parameters), as a share of the limb's area."""
@@ -70,13 +73,13 @@ class Agreement:
 
     def of(self, pose: Array, silhouettes: Sequence[Distances]) -> Disagreement:
         """Where a pose (D,) and a frame's silhouettes, one a camera, disagree."""
-        corners = self.corners(pose)
+        corners, sizes = self.corners(pose), self.mm_per_pixel(pose)
         counts: Array = np.zeros((*corners.shape[:2], FIELDS))
-        for own, quads, view, mm in zip(counts, corners, silhouettes, self.mm_per_pixel(pose), strict=True):
+        for own, quads, view, mm in zip(counts, corners, silhouettes, sizes, strict=True):
             step = max(1, round(GRID_MM / mm))
             view_counts(quads, view.signed, view.corner, view.size, step, FAR_MM / mm, own)
             own *= (step * mm) ** 2
-        return Disagreement(counts[..., 0], counts[..., 1], counts[..., 2], self._limbs)
+        return Disagreement(counts[..., 0], counts[..., 1], counts[..., 2], self._limbs, corners, sizes)
 
     def of_places(self, poses: Array, silhouettes: Sequence[Distances], without: str | None = None) -> Array:
         """(N,) mm² by which poses (N, D) that differ in a limb or two disagree with a frame's silhouettes there, on a

@@ -5,7 +5,7 @@ import numpy as np
 
 from studio.arrays import Array, Floats
 from studio.numba_in_threads import EXACT, njit
-from studio.trackers.refinement_kernels import turning
+from studio.trackers.refinement_kernels import box_of, is_seen, turning
 
 NEARER = 1.0 + 1e-9
 """Leaves room for rounding where a box decides what is farther."""
@@ -48,12 +48,13 @@ def count_limbs(quads, turns, signed, corner, size, step, far, counts):
     height, width = signed.shape
     for limb in range(quads.shape[0]):
         quad = quads[limb]
-        if not np.isfinite(quad.sum()):
+        if not is_seen(quad):
             continue
-        first_x = max(0, int(np.ceil(quad[:, 0].min() / step)))
-        last_x = min((size[0] - 1) // step, int(np.floor(quad[:, 0].max() / step)))
-        first_y = max(0, int(np.ceil(quad[:, 1].min() / step)))
-        last_y = min((size[1] - 1) // step, int(np.floor(quad[:, 1].max() / step)))
+        lowest_x, lowest_y, highest_x, highest_y = box_of(quad)
+        first_x = max(0, int(np.ceil(lowest_x / step)))
+        last_x = min((size[0] - 1) // step, int(np.floor(highest_x / step)))
+        first_y = max(0, int(np.ceil(lowest_y / step)))
+        last_y = min((size[1] - 1) // step, int(np.floor(highest_y / step)))
         for row in range(first_y, last_y + 1):
             y = row * step
             for column in range(first_x, last_x + 1):
@@ -73,8 +74,7 @@ def count_uncovered(quads, turns, signed, corner, step, far, counts):
     height, width = signed.shape
     boxes = np.zeros((quads.shape[0], 4))
     for limb in range(quads.shape[0]):
-        boxes[limb, 0], boxes[limb, 2] = quads[limb, :, 0].min(), quads[limb, :, 0].max()
-        boxes[limb, 1], boxes[limb, 3] = quads[limb, :, 1].min(), quads[limb, :, 1].max()
+        boxes[limb, 0], boxes[limb, 1], boxes[limb, 2], boxes[limb, 3] = box_of(quads[limb])
     # Of the limb that covered the last point: it usually covers this one, too.
     usual = -1
     for row in range(-(-top // step), (top + height - 1) // step + 1):
@@ -180,10 +180,10 @@ def add_limb_counts(
 @njit(**EXACT)
 def mark_near(points, quad, turn, far, near):
     """Set near (K,) where points (K, 2), which are in the order of their rows, are within `far` of a quadrilateral."""
-    if not np.isfinite(quad.sum()):
+    if not is_seen(quad):
         return
-    left, right = quad[:, 0].min() - far, quad[:, 0].max() + far
-    top, bottom = quad[:, 1].min() - far, quad[:, 1].max() + far
+    left, top, right, bottom = box_of(quad)
+    left, top, right, bottom = left - far, top - far, right + far, bottom + far
     for k in range(np.searchsorted(points[:, 1], top), points.shape[0]):
         if points[k, 1] > bottom:
             break
@@ -229,13 +229,14 @@ def count_cells(
     covered = np.zeros(counts.shape, np.bool_)
     for limb in range(quads.shape[0]):
         quad = quads[limb]
-        if not np.isfinite(quad.sum()):
+        if not is_seen(quad):
             continue
         turn = turning(quad)
-        last_row = min(counts.shape[0] - 1.0, quad[:, 1].max() // cell)
-        last_column = min(counts.shape[1] - 1.0, quad[:, 0].max() // cell)
-        for row in range(max(0, int(quad[:, 1].min() // cell)), int(last_row) + 1):
-            for column in range(max(0, int(quad[:, 0].min() // cell)), int(last_column) + 1):
+        lowest_x, lowest_y, highest_x, highest_y = box_of(quad)
+        last_row = min(counts.shape[0] - 1.0, highest_y // cell)
+        last_column = min(counts.shape[1] - 1.0, highest_x // cell)
+        for row in range(max(0, int(lowest_y // cell)), int(last_row) + 1):
+            for column in range(max(0, int(lowest_x // cell)), int(last_column) + 1):
                 x, y = column * cell + cell // 2, row * cell + cell // 2
                 covered[row, column] |= is_inside(x, y, quad, turn)
     for row in range(counts.shape[0]):

@@ -30,16 +30,15 @@ from studio.trackers.diffusion import (
     shrunk_noise,
 )
 from studio.trackers.guided_particles import STATES, foreseen, is_guided
-from studio.trackers.guided_start import arrived, descended, guided_set, settled_walkers
+from studio.trackers.guided_start import arrived, descended, guided_set, settled_set
 from studio.trackers.layer_record import layer_record
 from studio.trackers.model_free import judged, share_in
 from studio.trackers.particle_kernels import Moments, moments
 from studio.trackers.particles import (
-    estimate,
+    ParticleFilter,
     expected,
-    first_draw,
+    first_set,
     settle,
-    settled_first,
     uniform_poses,
     unweighted,
     weigh,
@@ -49,17 +48,15 @@ from studio.trackers.resampling import draw, equal_draw
 from studio.trackers.settings import PRESETS, VARIANTS, AnnealedSettings, layer_survivals
 from studio.trackers.tracker import (
     NO_PARENT,
-    Estimate,
     FilterState,
     FrameLikelihood,
     LayerRecord,
     ParticleSet,
     SearchSpace,
-    Tracker,
 )
 
 
-class AnnealedParticleFilter(Tracker):
+class AnnealedParticleFilter(ParticleFilter):
     """One frame in M annealing layers; evaluations = layers × particles."""
 
     name = "annealed"
@@ -87,11 +84,10 @@ class AnnealedParticleFilter(Tracker):
         if previous.particles is None:
             return unweighted(uniform_poses(rng, settings.particles, space))
         carried = _carried(rng, previous.particles, settings)
-        if is_guided(space, settings):
+        if is_guided(space, settings.prediction):
             return guided_set(rng, previous, carried, space, settings)
         predicted = expected(previous.particles.poses[carried], previous, settings.dynamics)
-        spread = noise_about(predicted, space.sigma * settings.diffusion_scale)
-        return first_draw(spread, spread.draw(rng), space, settings)
+        return first_set(rng, predicted, space, settings)
 
     def step_layer(
         self,
@@ -104,11 +100,8 @@ class AnnealedParticleFilter(Tracker):
     ) -> tuple[ParticleSet, LayerRecord]:
         """Steps 3 to 5: weigh (Eq. 3, 6, 11, 12), draw, cross (Eq. 19) and spread (Eq. 7, 13 or 18)."""
         guided = STATES in particles.extra
-        if layer == 0 and guided:
-            particles = settled_walkers(rng, particles, problem, space, settings)
-        elif layer == 0:
-            sigma = space.sigma * settings.diffusion_scale
-            particles = settled_first(rng, particles, problem, space, sigma, settings)
+        if layer == 0:
+            particles = settled_set(rng, particles, problem, space, settings)
         raw, eligible = weigh(problem, particles.poses, settings)
         free, extra = share_in(particles.extra), judged(particles.extra, eligible)
         survival = layer_survivals(settings, layer + 1)[-1]
@@ -141,10 +134,6 @@ class AnnealedParticleFilter(Tracker):
     def expectations(self, particles: ParticleSet, space: SearchSpace, settings: AnnealedSettings) -> Array:
         """(S, D) poses that the first layer's set expects: one unless a behaviour model guides it (`foreseen`)."""
         return foreseen(particles, space)
-
-    def end_frame(self, particles: ParticleSet, space: SearchSpace, settings: AnnealedSettings) -> Estimate:
-        """Step 6: the mean (Eq. 8) or the mode of the last layer's weighted set."""
-        return estimate(particles, settings.estimate)
 
 
 def _carried(rng: np.random.Generator, last: ParticleSet, settings: AnnealedSettings) -> Indices:

@@ -45,26 +45,30 @@ def survival_rate(log_weights: Array) -> float:
     return float(1.0 / (np.sum(np.exp(2.0 * log_weights)) * len(log_weights)))
 
 
-def anneal(log_weights: Array, wanted: float, start: float | None = None) -> Annealed:
+def anneal(log_weights: Array, wanted: float) -> Annealed:
     """The layer's weights: β such that the survival rate α is `wanted`.
 
     log_weights : (N,) log w, finite, or -inf for particles that cannot survive (at least one is finite).
-    start : where the search for β begins (the last frame's value, say); any positive number leads to the same
-    root. Where no β reaches `wanted` (equal weights; one particle; more particles sharing the best weight
+    Where no β reaches `wanted` (equal weights; one particle; more particles sharing the best weight
     than may survive), the nearest rate is taken.
     """
     below = np.max(log_weights) - log_weights
     known = below[np.isfinite(below)]
     gaps = known[known > 0.0]
     if gaps.size == 0:
-        beta = start if start is not None and math.isfinite(start) and start > 0.0 else 1.0
+        beta = 1.0
     else:
-        beta = _root(known, float(np.min(gaps)), wanted * len(log_weights), start)
+        beta = _root(known, float(np.min(gaps)), wanted * len(log_weights))
+    return at_exponent(log_weights, beta)
+
+
+def at_exponent(log_weights: Array, beta: float) -> Annealed:
+    """The layer's weights at a given β; log_weights : (N,) log w."""
     weights = normalised(log_weights, beta)
     return Annealed(beta, survival_rate(weights), weights)
 
 
-def _root(below: Array, smallest_gap: float, effective: float, start: float | None) -> float:
+def _root(below: Array, smallest_gap: float, effective: float) -> float:
     """β at which D (Eq. 11) equals `effective`, or the nearest bound; below : (K,) max log w - log w."""
     negative = -below
     powers, squares = np.empty_like(negative), np.empty_like(negative)
@@ -78,7 +82,7 @@ def _root(below: Array, smallest_gap: float, effective: float, start: float | No
     lowest = max(math.log(1e-9) - math.log(float(np.max(below))), -LOG_BETA_BOUND)
     highest = min(math.log(FAR) - math.log(smallest_gap), LOG_BETA_BOUND)
     with np.errstate(over="ignore", under="ignore"):
-        low, high = _bracket(excess, lowest, highest, _first_guess(below, start))
+        low, high = _bracket(excess, lowest, highest, _first_guess(below))
         if low == lowest and excess(low) <= 0.0:
             return math.exp(low)
         if high == highest and excess(high) >= 0.0:
@@ -87,10 +91,8 @@ def _root(below: Array, smallest_gap: float, effective: float, start: float | No
     return math.exp(float(root))
 
 
-def _first_guess(below: Array, start: float | None) -> float:
-    """Initial log β: the given start, or the value that spreads the weights over about one e-fold."""
-    if start is not None and math.isfinite(start) and start > 0.0:
-        return math.log(start)
+def _first_guess(below: Array) -> float:
+    """The log β that spreads the weights over about one e-fold."""
     most = float(np.max(below))
     shares = below / most
     away = shares - np.add.reduce(shares) / len(shares)

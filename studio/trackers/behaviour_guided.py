@@ -15,47 +15,29 @@ Without a model in the search space the tracker is a particle filter with noise 
 (`runs.behaviour_models`).
 """
 
+import math
+
 import numpy as np
 
 from studio.arrays import Array
-from studio.trackers.annealing import Annealed, anneal, normalised, survival_rate
-from studio.trackers.behaviour_settings import BehaviourSettings
-from studio.trackers.diffusion import noise_about
-from studio.trackers.guided_particles import STATES, foreseen, spread_over_clusters
-from studio.trackers.guided_start import guided_set, settled_walkers, without_past
-from studio.trackers.layer_record import layer_record
-from studio.trackers.model_free import judged, share_in
-from studio.trackers.particles import (
-    estimate,
-    first_draw,
-    settled_first,
-    uniform_poses,
-    unweighted,
-    weigh,
-    weighted_variance,
-)
+from studio.trackers.annealing import Annealed, anneal, at_exponent
+from studio.trackers.guided_particles import foreseen, spread_over_clusters
+from studio.trackers.guided_start import guided_set, without_past
+from studio.trackers.model_free import judged
+from studio.trackers.one_layer_filter import OneLayerFilter
+from studio.trackers.particles import first_set, uniform_poses, unweighted
 from studio.trackers.resampling import draw
-from studio.trackers.tracker import (
-    Estimate,
-    FilterState,
-    FrameLikelihood,
-    LayerRecord,
-    ParticleSet,
-    SearchSpace,
-    Tracker,
-)
+from studio.trackers.settings import BehaviourSettings
+from studio.trackers.tracker import Arrays, FilterState, ParticleSet, SearchSpace
 
 
-class BehaviourGuided(Tracker):
-    """One frame in one layer; evaluations = particles."""
+class BehaviourGuided(OneLayerFilter):
+    """Particles moved by the model and weighed once."""
 
     name = "behaviour"
     label = "Guided by behaviour"
     settings_type = BehaviourSettings
     needs_behaviour = True
-
-    def layer_count(self, settings: BehaviourSettings) -> int:
-        return 1
 
     def begin_frame(
         self, rng: np.random.Generator, previous: FilterState, space: SearchSpace, settings: BehaviourSettings
@@ -65,55 +47,25 @@ class BehaviourGuided(Tracker):
         Without a set to start from, roots lie anywhere between the limits, and the angles in all clusters alike.
         """
         last, count = previous.particles, settings.particles
-        sigma = space.sigma * settings.diffusion_scale
         if last is None:
             anywhere = uniform_poses(rng, count, space)
             if space.behaviour is None:
                 return unweighted(anywhere)
-            return spread_over_clusters(rng, space, count, anywhere, np.zeros_like(sigma))
+            return spread_over_clusters(rng, space, count, anywhere, np.zeros_like(space.sigma))
         drawn = draw(rng, np.exp(last.log_weights), count, settings.resampling)
         if space.behaviour is not None:
             return guided_set(rng, previous, drawn, space, settings)
-        spread = noise_about(last.poses[drawn], sigma)
-        return first_draw(spread, spread.draw(rng), space, settings)
+        return first_set(rng, last.poses[drawn], space, settings)
 
     def expectations(self, particles: ParticleSet, space: SearchSpace, settings: BehaviourSettings) -> Array:
         """(S, D) means of the clusters that hold enough particles, at their mean root (section 6.3)."""
         return foreseen(particles, space, settings.expected_support, settings.expected_most)
 
-    def step_layer(
-        self,
-        rng: np.random.Generator,
-        particles: ParticleSet,
-        layer: int,
-        problem: FrameLikelihood,
-        space: SearchSpace,
-        settings: BehaviourSettings,
-    ) -> tuple[ParticleSet, LayerRecord]:
-        if STATES in particles.extra:
-            particles = settled_walkers(rng, particles, problem, space, settings)
-        else:
-            sigma = space.sigma * settings.diffusion_scale
-            particles = settled_first(rng, particles, problem, space, sigma, settings)
-        raw, eligible = weigh(problem, particles.poses, settings)
-        chosen = _selected(eligible, settings)
-        extra = without_past(judged(particles.extra, eligible))
-        weighted = ParticleSet(particles.poses, chosen.log_weights, raw, extra)
-        kept = weighted_variance(weighted)
-        wanted = settings.survival if settings.selection == "survival" else float("nan")
-        record = layer_record(
-            layer, weighted, chosen, wanted, resampled=kept, diffused=kept, free=share_in(extra)
-        )
-        return weighted, record
-
-    def end_frame(self, particles: ParticleSet, space: SearchSpace, settings: BehaviourSettings) -> Estimate:
-        """The particle with the highest weight (section 3.3), or the weighted mean."""
-        return estimate(particles, settings.estimate)
-
-
-def _selected(eligible: Array, settings: BehaviourSettings) -> Annealed:
-    """Normalised weights at the peakedness that the settings select."""
-    if settings.selection == "survival":
-        return anneal(eligible, settings.survival)
-    weights = normalised(eligible, 1.0)
-    return Annealed(1.0, survival_rate(weights), weights)
+    def selected(
+        self, log_weights: Array, extra: Arrays, settings: BehaviourSettings
+    ) -> tuple[Annealed, float, Arrays]:
+        """The weights at the peakedness that the settings select."""
+        extra = without_past(judged(extra, log_weights))
+        if settings.selection == "survival":
+            return anneal(log_weights, settings.survival), settings.survival, extra
+        return at_exponent(log_weights, 1.0), math.nan, extra

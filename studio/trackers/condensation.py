@@ -9,47 +9,28 @@ geometric mean is used from then on. The scale in use stands in every record as 
 particles as `extra["log_scales"]`.
 """
 
+import math
+
 import numpy as np
 
 from studio.arrays import Array
-from studio.trackers.annealing import Annealed, anneal, normalised, survival_rate
-from studio.trackers.diffusion import noise_about
-from studio.trackers.layer_record import layer_record
-from studio.trackers.particles import (
-    estimate,
-    expected,
-    first_draw,
-    settled_first,
-    uniform_poses,
-    unweighted,
-    weigh,
-    weighted_variance,
-)
+from studio.trackers.annealing import Annealed, anneal, at_exponent
+from studio.trackers.one_layer_filter import OneLayerFilter
+from studio.trackers.particles import expected, first_set, uniform_poses, unweighted
 from studio.trackers.resampling import draw
 from studio.trackers.settings import CondensationSettings
-from studio.trackers.tracker import (
-    Estimate,
-    FilterState,
-    FrameLikelihood,
-    LayerRecord,
-    ParticleSet,
-    SearchSpace,
-    Tracker,
-)
+from studio.trackers.tracker import Arrays, FilterState, ParticleSet, SearchSpace
 
 SCALES = "log_scales"
 
 
-class Condensation(Tracker):
-    """One frame in one layer; evaluations = particles."""
+class Condensation(OneLayerFilter):
+    """Survivors drawn by weight, moved, spread and weighed once."""
 
     name = "condensation"
     label = "Condensation"
     settings_type = CondensationSettings
     scales_likelihood = True
-
-    def layer_count(self, settings: CondensationSettings) -> int:
-        return 1
 
     def begin_frame(
         self,
@@ -64,43 +45,16 @@ class Condensation(Tracker):
             return unweighted(uniform_poses(rng, settings.particles, space))
         drawn = draw(rng, np.exp(last.log_weights), settings.particles, settings.resampling)
         predicted = expected(last.poses[drawn], previous, settings.dynamics)
-        spread = noise_about(predicted, space.sigma * settings.diffusion_scale)
-        first = first_draw(spread, spread.draw(rng), space, settings)
+        first = first_set(rng, predicted, space, settings)
         return ParticleSet(first.poses, first.log_weights, extra=last.extra | first.extra)
 
-    def step_layer(
-        self,
-        rng: np.random.Generator,
-        particles: ParticleSet,
-        layer: int,
-        problem: FrameLikelihood,
-        space: SearchSpace,
-        settings: CondensationSettings,
-    ) -> tuple[ParticleSet, LayerRecord]:
-        """Weigh every particle (section 2.1, step 3) with the likelihood's scale, or choose that scale."""
-        sigma = space.sigma * settings.diffusion_scale
-        particles = settled_first(rng, particles, problem, space, sigma, settings)
-        raw, eligible = weigh(problem, particles.poses, settings)
-        scales = particles.extra.get(SCALES, np.zeros(0))
-        wanted = float("nan")
-        if len(scales) < settings.scale_frames:
-            wanted = settings.scale_survival
-            chosen = anneal(eligible, wanted)
-            scales = np.append(scales, np.log(chosen.beta))
-        else:
-            chosen = _scaled(eligible, float(np.exp(np.mean(scales))))
-        weighted = ParticleSet(particles.poses, chosen.log_weights, raw, particles.extra | {SCALES: scales})
-        kept = weighted_variance(weighted)
-        return weighted, layer_record(layer, weighted, chosen, wanted, resampled=kept, diffused=kept)
-
-    def end_frame(
-        self, particles: ParticleSet, space: SearchSpace, settings: CondensationSettings
-    ) -> Estimate:
-        """The weighted mean (Eq. 1) or the mode (Eq. 2)."""
-        return estimate(particles, settings.estimate)
-
-
-def _scaled(log_weights: Array, scale: float) -> Annealed:
-    """Normalised weights w^scale and their survival rate."""
-    weights = normalised(log_weights, scale)
-    return Annealed(scale, survival_rate(weights), weights)
+    def selected(
+        self, log_weights: Array, extra: Arrays, settings: CondensationSettings
+    ) -> tuple[Annealed, float, Arrays]:
+        """Weights (section 2.1, step 3) with the likelihood's scale, or those that choose that scale."""
+        scales = extra.get(SCALES, np.zeros(0))
+        if len(scales) >= settings.scale_frames:
+            return at_exponent(log_weights, float(np.exp(np.mean(scales)))), math.nan, extra
+        chosen = anneal(log_weights, settings.scale_survival)
+        scales = np.append(scales, np.log(chosen.beta))
+        return chosen, settings.scale_survival, extra | {SCALES: scales}

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.arrays import Array, Mask
-from studio.trackers.particle_kernels import children
+from studio.trackers.particle_kernels import children, places
 from studio.trackers.tracker import SearchSpace
 
 
@@ -30,4 +30,4 @@ def cross(
 
 def limb_places(space: SearchSpace) -> NDArray[np.int64]:
     """(D,) 1, 2, … : the place of each parameter's limb in the pose vector."""
-    return 1 + np.concatenate([[0], np.cumsum(np.diff(space.limb) != 0)]).astype(np.int64)
+    return places(space.limb)

@@ -30,6 +30,7 @@ from studio.trackers.tracker import (
     SearchSpace,
     Tracker,
     generator,
+    keyed_generator,
 )
 
 # The current version of the settings and the tracker's own settings.
@@ -217,13 +218,10 @@ def search_frame(
     settings_source: SettingsSource,
     repeats: int = 1,
     on_layer: Callable[[LayerRecord], None] | None = None,
-    checkpoint: Callable[[SearchState], None] | None = None,
 ) -> FrameResult:
     """Search a frame to its end.
 
     settings_source : called before every layer, gives (version, tracker settings). on_layer : gets each record.
-    checkpoint : called after each layer with the state; it may wait, or raise to leave the frame (whose state
-    can then be given to a `FrameSearch`).
     """
     search = FrameSearch(tracker, previous, space, seed=seed, frame=frame, repeats=repeats)
     settings = None
@@ -232,8 +230,6 @@ def search_frame(
         record = search.step(problem, version, settings)
         if on_layer is not None:
             on_layer(record)
-        if checkpoint is not None:
-            checkpoint(search.state)
     return search.result(settings)
 
 
@@ -251,4 +247,4 @@ def beginning_generator(seed: int, frame: int, repeat: int) -> np.random.Generat
     """
     if repeat == 0:
         return generator(seed, frame, -1)
-    return np.random.Generator(np.random.Philox(np.random.SeedSequence((seed, frame, 0, repeat))))
+    return keyed_generator(seed, frame, 0, repeat)

@@ -8,6 +8,7 @@ stands in front of the body are left out (`hidden_areas`).
 """
 
 import dataclasses
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -18,12 +19,19 @@ from studio.arrays import Array
 from studio.body.mirroring import name_twins
 from studio.body.model import BodyModel
 from studio.geometry.camera import Camera
-from studio.knobs import knob
+from studio.knobs import next_frame_knob
 from studio.trackers.agreement import Agreement, Disagreement
 from studio.trackers.hidden_areas import learnt, without_hidden
 from studio.trackers.limb_certainty import CertaintyOfLimbs
 from studio.trackers.refinement import Distances, RefinementSettings, Refiner
-from studio.trackers.tracker import LIMB_LOST_SHARE, FilterState, FrameLikelihood, FrameResult, SearchSpace
+from studio.trackers.tracker import (
+    LIMB_LOST_SHARE,
+    FilterState,
+    FrameLikelihood,
+    FrameResult,
+    SearchSpace,
+    keyed_generator,
+)
 
 POSE, CLOUD = "pose", "cloud"
 DOUBTFUL_SHARE = 0.03
@@ -50,29 +58,29 @@ class FrameRefinementSettings:
 
     title = "Refinement of each frame"
 
-    refine_frames: bool = knob(
-        True, label="refine each frame", takes_effect="next frame",
+    refine_frames: bool = next_frame_knob(
+        True, label="refine each frame",
         help="Move each frame's pose onto the silhouettes after its search, and start the next frame from there.",
     )  # fmt: skip
     # Rendered clips of the validation half, two seeds: 6 steps are as accurate as 10 (within 0.3 mm, both ways).
-    refine_frame_steps: int = knob(
-        6, 1, 100, 1, label="refinement steps", unit="steps", takes_effect="next frame",
+    refine_frame_steps: int = next_frame_knob(
+        6, 1, 100, 1, label="refinement steps", unit="steps",
         help="Most steps of the local descent of a frame.",
     )  # fmt: skip
-    refine_frame_points: int = knob(
-        150, 20, 1000, 10, label="border points", takes_effect="next frame",
+    refine_frame_points: int = next_frame_knob(
+        150, 20, 1000, 10, label="border points",
         help="Points of each view's silhouette border that the descent uses.",
     )  # fmt: skip
-    redraw_limbs: bool = knob(
-        True, label="resample lost limbs", takes_effect="next frame",
+    redraw_limbs: bool = next_frame_knob(
+        True, label="resample lost limbs",
         help="Where the silhouettes show that a limb is off, sample it over its whole range and refine the best.",
     )  # fmt: skip
-    refined_spread: float = knob(
-        0.5, 0.05, 3.0, 0.05, label="spread after refinement", takes_effect="next frame",
+    refined_spread: float = next_frame_knob(
+        0.5, 0.05, 3.0, 0.05, label="spread after refinement",
         help="Multiplies σ0 where a frame starts from a refined pose, which is nearer to the body than a searched one.",
     )  # fmt: skip
-    next_frame_from: str = knob(
-        POSE, choices=(POSE, CLOUD), label="next frame starts from", takes_effect="next frame",
+    next_frame_from: str = next_frame_knob(
+        POSE, choices=(POSE, CLOUD), label="next frame starts from",
         help="Where every particle of the next frame starts: at the refined pose, or in the cloud moved with it.",
     )  # fmt: skip
 
@@ -90,7 +98,7 @@ class FrameRefiner:
     def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], seed: int) -> None:
         self._body, self._cameras = body, {camera.name: camera for camera in cameras}
         self._seed = seed
-        self._refiners: dict[tuple[object, ...], _Prepared] = {}
+        self._prepared = functools.cache(self._made_for)
 
     def refined(
         self,
@@ -109,16 +117,14 @@ class FrameRefiner:
         )
         if not any(len(view.border) for view in seen.values()):
             return result
-        refiner, redrawing, agreement, certainty_of = self._prepared(tuple(seen), settings)
+        refiner, redrawing, agreement, certainty_of = self._prepared(tuple(seen), settings.refine_frame_steps)
         start, masks, memory = result.estimate.pose, tuple(seen.values()), result.carried.memory
         silhouettes = without_hidden(masks, agreement.cameras, agreement.mm_per_pixel(start), memory)
         ended, evaluations = refiner.refine(start, silhouettes), 0
         pose, matrix = ended.pose, ended.matrix
         off = agreement.of(pose, silhouettes)
         if settings.redraw_limbs and max(off.shares().values()) >= DOUBTFUL_SHARE:
-            rng = np.random.Generator(
-                np.random.Philox(np.random.SeedSequence((self._seed, result.frame, 0, 0, REDRAWN)))
-            )
+            rng = keyed_generator(self._seed, result.frame, 0, 0, REDRAWN)
             seen_frame = SeenFrame(redrawing, agreement, silhouettes)
             found, evaluations = redrawn(
                 rng, seen_frame.hypothesis(pose), seen_frame, result.carried.previous_estimate
@@ -130,7 +136,7 @@ class FrameRefiner:
         if matrix is None or pose is not ended.pose:
             matrix = refiner.loss(pose, silhouettes)[2]
         certainty = certainty_of.of(pose, matrix, memory)
-        memory = {**learnt(memory, pose, off, agreement, masks), **certainty.moved}
+        memory = {**learnt(memory, off, agreement.cameras, masks), **certainty.moved}
         return dataclasses.replace(
             result,
             estimate=estimate,
@@ -140,18 +146,13 @@ class FrameRefiner:
             limb_loss=certainty.lost(off),
         )
 
-    def _prepared(self, names: tuple[str, ...], settings: FrameRefinementSettings) -> "_Prepared":
-        key = (names, settings.refine_frame_steps)
-        if key not in self._refiners:
-            cameras = tuple(self._cameras[name] for name in names)
-            steps = settings.refine_frame_steps, max(settings.refine_frame_steps, REDRAWN_STEPS)
-            ending, redrawing = (
-                Refiner(self._body, cameras, RefinementSettings(refinement_steps=most)) for most in steps
-            )
-            self._refiners[key] = _Prepared(
-                ending, redrawing, Agreement(self._body, cameras), CertaintyOfLimbs(ending)
-            )
-        return self._refiners[key]
+    def _made_for(self, names: tuple[str, ...], steps: int) -> "_Prepared":
+        cameras = tuple(self._cameras[name] for name in names)
+        ending, redrawing = (
+            Refiner(self._body, cameras, RefinementSettings(refinement_steps=most))
+            for most in (steps, max(steps, REDRAWN_STEPS))
+        )
+        return _Prepared(ending, redrawing, Agreement(self._body, cameras), CertaintyOfLimbs(ending))
 
 
 class _Prepared(NamedTuple):

@@ -15,7 +15,6 @@ the movement given cluster and angles. The state's history is then only that clu
 """
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -23,9 +22,8 @@ from studio.arrays import Array, Indices, Mask
 from studio.behaviour.gaussian_mixture import GaussianMixture
 from studio.behaviour.model import BehaviourModel
 from studio.behaviour.prediction import propagate, start_states, states_at
-from studio.trackers.hard_priors import Rules
 from studio.trackers.particles import unweighted
-from studio.trackers.shared_knobs import BEHAVIOUR, LEARNT
+from studio.trackers.shared_knobs import BEHAVIOUR, LEARNT, GuidedSettings
 from studio.trackers.tracker import Arrays, FilterState, ParticleSet, SearchSpace
 
 STATES, VELOCITY = "automaton_state", "velocity"
@@ -35,55 +33,6 @@ STATES, VELOCITY = "automaton_state", "velocity"
 NOT_BELIEVED = 3.0
 # Particles per block when states are sampled: the automaton has thousands of states, each with a probability.
 AT_ONCE = 4096
-
-
-class GuidedRules(Rules, Protocol):
-    """The knobs of every tracker that a behaviour model may guide."""
-
-    @property
-    def attenuation(self) -> float:
-        """λ of Eq. 4."""
-        ...
-
-    @property
-    def entering(self) -> str:
-        """How a particle enters another cluster: "resample" or "blend" (`behaviour.prediction.propagate`)."""
-        ...
-
-    @property
-    def model_free_share(self) -> float:
-        """Least share of the particles that no model moves."""
-        ...
-
-    @property
-    def model_free_grows(self) -> bool:
-        """Whether that share grows while the model's particles weigh less."""
-        ...
-
-    @property
-    def diffusion_scale(self) -> float:
-        """Multiplies σ0."""
-        ...
-
-    @property
-    def global_scale(self) -> float:
-        """Multiplies σ0 once more, for parameters that the model does not cover, of particles that it moves."""
-        ...
-
-    @property
-    def root_prediction(self) -> str:
-        """ "learnt" or "noise"."""
-        ...
-
-    @property
-    def root_spread(self) -> float:
-        """Multiplies the standard deviations of learnt root motion."""
-        ...
-
-    @property
-    def automaton_share(self) -> float:
-        """Share of the particles that change cluster by the automaton's probabilities alone."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,18 +51,9 @@ class GuidedParticles:
         return GuidedParticles(self.poses[rows], self.states[rows], self.velocity[rows], self.free[rows])
 
 
-class Guidable(Protocol):
-    """The knob of trackers that can ignore the run's behaviour model."""
-
-    @property
-    def prediction(self) -> str:
-        """ "noise" or "behaviour"."""
-        ...
-
-
-def is_guided(space: SearchSpace, settings: Guidable) -> bool:
-    """Whether there is a model and the settings use it."""
-    return space.behaviour is not None and settings.prediction == BEHAVIOUR
+def is_guided(space: SearchSpace, prediction: str) -> bool:
+    """Whether there is a model and the knob `prediction` says that it is used."""
+    return space.behaviour is not None and prediction == BEHAVIOUR
 
 
 def model_of(space: SearchSpace) -> BehaviourModel:
@@ -127,11 +67,6 @@ def columns_of(space: SearchSpace) -> Indices:
     return model_of(space).space.columns
 
 
-def known_of(particles: ParticleSet) -> Arrays:
-    """A set's extra arrays by name, of any type."""
-    return {**particles.extra}
-
-
 def walkers_from(
     rng: np.random.Generator, previous: FilterState, rows: Indices, free: Mask, space: SearchSpace
 ) -> GuidedParticles:
@@ -142,7 +77,7 @@ def walkers_from(
     """
     last = previous.particles
     assert last is not None
-    poses, carried = last.poses[rows], known_of(last)
+    poses, carried = last.poses[rows], last.extra
     if STATES in carried:
         return GuidedParticles(poses, carried[STATES][rows], carried[VELOCITY][rows], free)
     if previous.estimate is None or previous.previous_estimate is None:
@@ -156,7 +91,7 @@ def walkers_from(
 
 
 def propagated(
-    rng: np.random.Generator, guided: GuidedParticles, space: SearchSpace, rules: GuidedRules, sigma: Array
+    rng: np.random.Generator, guided: GuidedParticles, space: SearchSpace, rules: GuidedSettings, sigma: Array
 ) -> GuidedParticles:
     """The particles propagated one frame (Eq. 3 and 4), or `steps` of the space. sigma : (D,) noise, over all of these,
     of what the model does not cover or move.
@@ -259,7 +194,7 @@ def _labels_of(model: BehaviourModel, particles: ParticleSet) -> Indices:
     """(N,) cluster of each particle: the last symbol of its state, or the label of its pose and movement where the
     state has no history.
     """
-    labels = model.automaton.last_symbols[known_of(particles)[STATES]]
+    labels = model.automaton.last_symbols[particles.extra[STATES]]
     unknown = np.flatnonzero(labels < 0)
     if unknown.size:
         angles = particles.poses[np.ix_(unknown, model.space.columns)]

@@ -1,22 +1,21 @@
 """A frame's first set, predicted by a behaviour model, with a share of model-free particles.
 
 Whether a pose is possible for the body is known only with the frame's problem. So the set keeps what its particles
-came from, and `settled_walkers` then redraws impossible ones from the same past, each by its own rule: by the model, or
+came from, and `settled_set` then redraws impossible ones from the same past, each by its own rule: by the model, or
 by noise.
 """
+
+from dataclasses import replace
 
 import numpy as np
 
 from studio.arrays import Array, Indices
-from studio.trackers.diffusion import noise_about
 from studio.trackers.guided_particles import (
     STATES,
     VELOCITY,
     GuidedParticles,
-    GuidedRules,
     columns_of,
     followed,
-    known_of,
     model_of,
     near,
     propagated,
@@ -24,7 +23,8 @@ from studio.trackers.guided_particles import (
 )
 from studio.trackers.hard_priors import Proposals, settled
 from studio.trackers.model_free import BEATEN, FREE, chosen_free, share_of
-from studio.trackers.particles import CAME_FROM, first_draw, settle, unweighted
+from studio.trackers.particles import CAME_FROM, first_set, settled_first, unweighted
+from studio.trackers.shared_knobs import GuidedSettings
 from studio.trackers.tracker import Arrays, FilterState, FrameLikelihood, ParticleSet, SearchSpace
 
 CAME_FROM_STATES, CAME_FROM_VELOCITY = "came_from_state", "came_from_velocity"
@@ -33,43 +33,44 @@ PAST = (CAME_FROM, CAME_FROM_STATES, CAME_FROM_VELOCITY)
 
 
 def guided_set(
-    rng: np.random.Generator, previous: FilterState, rows: Indices, space: SearchSpace, rules: GuidedRules
+    rng: np.random.Generator, previous: FilterState, rows: Indices, space: SearchSpace, rules: GuidedSettings
 ) -> ParticleSet:
     """The unweighted set of a frame that starts from the particles `rows` (N,) of the last one's.
 
     In a run's first frame (nothing was reported yet) particles are spread by noise alone.
     """
     assert previous.particles is not None
-    sigma = space.sigma * rules.diffusion_scale
     if previous.estimate is None:
-        return _standing_set(rng, previous.particles.poses[rows], space, sigma, rules)
+        first = first_set(rng, previous.particles.poses[rows], space, rules)
+        return replace(first, extra=first.extra | _found_near(rng, first.poses, space))
     share = share_of(rules.model_free_share, rules.model_free_grows, previous.particles.extra)
     free = chosen_free(rng, len(rows), share)
     past = walkers_from(rng, previous, rows, free, space)
-    following = _walking_set(propagated(rng, past, space, rules, sigma), past, space, rules)
+    drawn = propagated(rng, past, space, rules, space.sigma * rules.diffusion_scale)
+    following = _walking_set(drawn, past, space, rules)
     if BEATEN in previous.particles.extra:
         following.extra[BEATEN] = previous.particles.extra[BEATEN]
     return following
 
 
-def settled_walkers(
+def settled_set(
     rng: np.random.Generator,
     particles: ParticleSet,
     problem: FrameLikelihood,
     space: SearchSpace,
-    rules: GuidedRules,
+    rules: GuidedSettings,
 ) -> ParticleSet:
-    """A guided first set with its impossible particles redrawn; what they came from stays with it.
+    """A first set, guided or not, with its impossible particles redrawn; what guided ones came from stays with it.
 
     A particle for which no possible pose is found stays where it came from, at rest.
     """
-    if rules.constraints != "redraw":
+    if rules.constraints != "redraw" or CAME_FROM not in particles.extra:
         return particles
-    extra, sigma = known_of(particles), space.sigma * rules.diffusion_scale
+    extra, sigma = particles.extra, space.sigma * rules.diffusion_scale
     if CAME_FROM_STATES not in extra:
-        spread = noise_about(extra[CAME_FROM], sigma)
-        poses = settle(rng, spread, particles.poses, spread.centres, problem, space, rules)
-        return ParticleSet(poses, particles.log_weights, extra=extra | _found_near(rng, poses, space))
+        first = settled_first(rng, particles, problem, space, rules)
+        found = _found_near(rng, first.poses, space) if STATES in extra else {}
+        return replace(first, extra=first.extra | found)
     past = GuidedParticles(extra[CAME_FROM], extra[CAME_FROM_STATES], extra[CAME_FROM_VELOCITY], extra[FREE])
     first = GuidedParticles(particles.poses, extra[STATES], extra[VELOCITY], extra[FREE])
 
@@ -113,22 +114,14 @@ def arrived(rng: np.random.Generator, poses: Array, extra: Arrays, space: Search
     return without_past(extra) | {STATES: states, VELOCITY: velocity}
 
 
-def _standing_set(
-    rng: np.random.Generator, poses: Array, space: SearchSpace, sigma: Array, rules: GuidedRules
-) -> ParticleSet:
-    """Poses (N, D) spread by noise; states and movements from the clusters near the result."""
-    spread = noise_about(poses, sigma)
-    first = first_draw(spread, spread.draw(rng), space, rules)
-    return unweighted(first.poses, first.extra | _found_near(rng, first.poses, space))
-
-
 def _found_near(rng: np.random.Generator, poses: Array, space: SearchSpace) -> Arrays:
+    """States and movements from the clusters near poses (N, D)."""
     states, velocity = near(rng, poses, space)
     return {STATES: states, VELOCITY: velocity}
 
 
 def _walking_set(
-    drawn: GuidedParticles, past: GuidedParticles, space: SearchSpace, rules: GuidedRules
+    drawn: GuidedParticles, past: GuidedParticles, space: SearchSpace, rules: GuidedSettings
 ) -> ParticleSet:
     poses, velocity = drawn.poses, drawn.velocity
     if rules.constraints == "clamp":

@@ -13,16 +13,15 @@ from studio.arrays import Array
 from studio.trackers.guided_particles import (
     STATES,
     VELOCITY,
-    GuidedRules,
     columns_of,
     followed,
-    known_of,
     model_of,
     near,
     propagated,
     walkers_from,
 )
 from studio.trackers.model_free import BEATEN, FREE, chosen_free, share_of
+from studio.trackers.shared_knobs import GuidedSettings
 from studio.trackers.tracker import Arrays, FilterState, ParticleSet, SearchSpace
 
 LEADER_STATE, LEADER_VELOCITY = "leader_state", "leader_velocity"
@@ -37,11 +36,11 @@ def predicted_starts(
     pose: Array,
     count: int,
     space: SearchSpace,
-    rules: GuidedRules,
+    rules: GuidedSettings,
 ) -> tuple[Array, Arrays]:
     """(count, D) predicted poses of a swarm's particles from the last pose (D,), and the swarm's arrays."""
     assert previous.particles is not None
-    carried = known_of(previous.particles)
+    carried = previous.particles.extra
     past = (
         {STATES: carried[LEADER_STATE], VELOCITY: carried[LEADER_VELOCITY]} if LEADER_STATE in carried else {}
     )

@@ -17,28 +17,14 @@ and the set stays as it was first drawn, so that the search can continue.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 
 from studio.arrays import Array, Indices, Mask
+from studio.trackers.shared_knobs import SearchSettings
 from studio.trackers.tracker import FrameLikelihood, SearchSpace
 
 MOST_REDRAWS = 10
-
-
-class Rules(Protocol):
-    """The two knobs that every tracker's settings have."""
-
-    @property
-    def constraints(self) -> str:
-        """One of "redraw", "reject", "clamp", "ignore"."""
-        ...
-
-    @property
-    def limbs_apart(self) -> bool:
-        """Whether poses with limbs inside one another count as impossible."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,7 +43,7 @@ class Proposals:
 def settled(
     problem: FrameLikelihood,
     space: SearchSpace,
-    rules: Rules,
+    rules: SearchSettings,
     proposed: Proposals,
     came_from: Array,
     again: Callable[[Indices], Proposals],
@@ -74,7 +60,7 @@ def settled(
     return proposed
 
 
-def possible(problem: FrameLikelihood, poses: Array, rules: Rules) -> Mask:
+def possible(problem: FrameLikelihood, poses: Array, rules: SearchSettings) -> Mask:
     """(N,) whether a particle counts."""
     if rules.constraints == "ignore":
         return np.ones(len(poses), dtype=bool)

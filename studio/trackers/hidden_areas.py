@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from studio.arrays import Array
 from studio.geometry.camera import Camera
-from studio.trackers.agreement import FAR_MM, Agreement, Disagreement
+from studio.trackers.agreement import FAR_MM, Disagreement
 from studio.trackers.agreement_kernels import count_cells
 from studio.trackers.refinement import Distances
 from studio.trackers.tracker import HIDDEN
@@ -107,17 +107,16 @@ def _with_room(view: Distances, near: NDArray[np.bool_], cell: int) -> tuple[int
 
 def learnt(
     memory: Mapping[str, Array],
-    pose: Array,
     disagreement: Disagreement,
-    agreement: Agreement,
+    cameras: Sequence[Camera],
     masks: Sequence[Distances],
 ) -> Mapping[str, Array]:
-    """The memory after a frame with pose (D,). masks : one a camera."""
+    """The memory after a frame. disagreement : of its pose. masks : one a camera."""
     if disagreement.bare.sum() > MOST_BARE * disagreement.area.sum():
         return memory
     found = dict(memory)
-    mm, corners = agreement.mm_per_pixel(pose), agreement.corners(pose)
-    for camera, quads, view, scale in zip(agreement.cameras, corners, masks, mm, strict=True):
+    views = zip(cameras, disagreement.corners, masks, disagreement.mm, strict=True)
+    for camera, quads, view, scale in views:
         counts = counts_of(memory, camera).copy()
         count_cells(quads, view.signed, view.corner, cell_size(camera), FAR_MM / scale, counts)
         found[HIDDEN + camera.name] = counts

@@ -23,14 +23,12 @@ def layer_record(
     free: float = math.nan,
     parents: Indices | None = None,
 ) -> LayerRecord:
-    """The record of a layer; the frame loop fills in frame, version and time. free : share of the particles that no
-    behaviour model moved. parents : as in the record; None: nothing was drawn.
+    """The record of a layer. free : share of the particles that no behaviour model moved. parents : as in the record;
+    None: nothing was drawn.
     """
     best = int(np.argmax(weighted.log_weights))
     return LayerRecord(
-        frame=-1,
         layer=layer,
-        settings_version=-1,
         beta=annealed.beta,
         alpha_wanted=wanted,
         alpha_reached=annealed.survival,
@@ -42,7 +40,6 @@ def layer_record(
         mean=weighted_mean(weighted),
         poses=weighted.poses,
         log_weights=weighted.raw_log_weights,
-        milliseconds=0.0,
         model_free_share=free,
         parents=np.zeros((2, 0), dtype=np.int64) if parents is None else parents,
     )

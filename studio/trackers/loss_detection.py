@@ -32,13 +32,15 @@ of 99 of 100 lost frames 6 and more below. A body that is tracked back to front 
 alone hardly shows it.
 """
 
+import functools
 from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from studio.arrays import Array
+from studio.arrays import Array, Mask, median_and_spread
 from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.geometry.camera import Camera
@@ -82,8 +84,12 @@ class Onlooker:
     """Compares poses with evidence from all or some of the cameras."""
 
     def __init__(self, body: BodyModel, cameras: tuple[Camera, ...]) -> None:
-        self._body, self._cameras = body, {camera.name: camera for camera in cameras}
-        self._projectors = {tuple(self._cameras): OutlineProjector.of_body(body, cameras)}
+        by_name = {camera.name: camera for camera in cameras}
+
+        def projector(names: tuple[str, ...]) -> OutlineProjector:
+            return OutlineProjector.of_body(body, tuple(by_name[name] for name in names))
+
+        self._projector = functools.cache(projector)
 
     def sight(self, evidence: FrameEvidence, pose: Array, problem: FrameLikelihood | None = None) -> Sight:
         """How a pose (D,) agrees with a frame's evidence. problem : the frame's, given the expected poses."""
@@ -94,10 +100,10 @@ class Onlooker:
     ) -> Callable[[Array], Sight]:
         """`sight` of one frame as a function of poses (D,). Holds only the evidence's silhouettes, a bit a pixel."""
         lost = isinstance(problem, QualityMeasured) and problem.lost_evidence
-        names = np.array([view.camera for view in evidence.views])
-        blank = np.array([is_blank(view) for view in evidence.views])
+        cameras = tuple(view.camera for view in evidence.views)
+        names = np.array(cameras)
+        blank, empty = shown_by(evidence)
         carved = all(view.background is not None for view in evidence.views)
-        empty = np.array([not view.mask.any() for view in evidence.views])
         notes = (*_noted("The picture of {} is blank.", names[blank]),)
         notes += (*_noted("Nothing stands out in {}.", names[empty & ~blank]),)
         if blank.all():
@@ -105,7 +111,7 @@ class Onlooker:
         if carved and empty.all():
             nothing = isinstance(problem, QualityMeasured) and problem.quality == -np.inf
             return lambda _: Sight(float("nan"), seen=not nothing, judged_lost=lost, notes=notes)
-        silhouettes, projector = silhouettes_of(evidence, HALF), self._projector(evidence)
+        silhouettes, projector = silhouettes_of(evidence, HALF), self._projector(cameras)
 
         def sight(pose: Array) -> Sight:
             outlines = projector.blocks(pose[None])
@@ -119,14 +125,6 @@ class Onlooker:
             return Sight(overlap, seen, judged_lost=lost, notes=said)
 
         return sight
-
-    def _projector(self, evidence: FrameEvidence) -> OutlineProjector:
-        names = tuple(view.camera for view in evidence.views)
-        found = self._projectors.get(names)
-        if found is None:
-            cameras = tuple(self._cameras[name] for name in names)
-            found = self._projectors[names] = OutlineProjector.of_body(self._body, cameras)
-        return found
 
 
 class WeightWatch:
@@ -154,10 +152,8 @@ class WeightWatch:
             return True
         if len(self._weights) < FEWEST:
             return False
-        weights = np.array(self._weights)
-        median = float(np.median(weights))
-        spread = max(limit.spread, 1.4826 * float(np.median(np.abs(weights - median))))
-        return log_weight < median - limit.spreads * spread
+        median, spread = median_and_spread(np.array(self._weights))
+        return log_weight < median - limit.spreads * max(limit.spread, spread)
 
 
 def _noted(sentence: str, cameras: Iterable[str]) -> tuple[str, ...]:
@@ -168,7 +164,23 @@ def _noted(sentence: str, cameras: Iterable[str]) -> tuple[str, ...]:
 
 def anything_seen(evidence: FrameEvidence) -> bool:
     """Whether any view that is not blank has foreground in its mask."""
-    return any(view.mask.any() and not is_blank(view) for view in evidence.views)
+    blank, empty = shown_by(evidence)
+    return bool((~blank & ~empty).any())
+
+
+_shown: WeakKeyDictionary[FrameEvidence, tuple[Mask, Mask]] = WeakKeyDictionary()
+
+
+def shown_by(evidence: FrameEvidence) -> tuple[Mask, Mask]:
+    """Whether the picture of each view is blank (V,), and whether its mask is empty (V,). Kept as long as the evidence
+    is, so that it can be made ready beforehand.
+    """
+    found = _shown.get(evidence)
+    if found is None:
+        blank = np.array([is_blank(view) for view in evidence.views], np.bool_)
+        empty = np.array([not view.mask.any() for view in evidence.views], np.bool_)
+        found = _shown[evidence] = blank, empty
+    return found
 
 
 def is_blank(view: ViewEvidence) -> bool:

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from studio.arrays import Array, Indices, Mask
+from studio.arrays import Array, Indices, Mask, median_and_spread, runs_of
 from studio.behaviour.automaton import Automaton
 from studio.behaviour.figueiredo_jain import FLOOR, Search, fit_mixture, parameters_of
 from studio.behaviour.gaussian_mixture import GaussianMixture
@@ -32,10 +32,10 @@ from studio.behaviour.model_learning import cluster_floor
 from studio.behaviour.prototypes import Prototypes
 from studio.behaviour.reduction import full_clusters
 from studio.behaviour.root_motion import RootMotion, gaussians_of
-from studio.trackers.guided_particles import STATES, known_of
+from studio.trackers.guided_particles import STATES
 from studio.trackers.guided_start import CAME_FROM_STATES
 from studio.trackers.guided_swarm import BEFORE_STATE, LEADER_STATE
-from studio.trackers.tracker import FilterState
+from studio.trackers.tracker import FilterState, keyed_generator
 
 # By K: poses (K, D), log-weights (K,) and overlaps with the masks (K,), NaN where unknown, of a run's first K frames.
 Tracked = Callable[[int], tuple[Array, Array, Array]]
@@ -48,15 +48,13 @@ TOO_LOW = 3.0
 # Mean squared deviation, in a cluster's variances, above which it does not explain a frame.
 NOT_EXPLAINED = 6.0
 MOST_NEW_CLUSTERS, PATIENCE = 20, 5
-MAD_TO_DEVIATION = 1.4826
 
 
 def well_tracked(log_weights: Array, overlaps: Array, least: float = 0.0) -> Mask:
     """(K,) frames whose log-weight (K,) is not far below the median, by the median absolute deviation, and whose
     overlap (K,) with the masks is not known to be below `least`.
     """
-    median = float(np.median(log_weights))
-    spread = MAD_TO_DEVIATION * float(np.median(np.abs(log_weights - median)))
+    median, spread = median_and_spread(log_weights)
     return (log_weights >= median - TOO_LOW * spread) & ~(overlaps < least)
 
 
@@ -66,10 +64,8 @@ def stretches(poses: Array, good: Mask, model: BehaviourModel) -> list[Array]:
     poses : (K, D) at the model's rate. good : (K,) frames that are well tracked. Stretches under `SHORTEST_S` are left
     out.
     """
-    good = np.concatenate([[False], good, [False]])
-    edges = np.flatnonzero(good[1:] != good[:-1])
     found: list[Array] = []
-    for begin, end in edges.reshape(-1, 2):
+    for begin, end in runs_of(good):
         if end - begin < max(2.0, SHORTEST_S * model.fps):
             continue
         smooth = np.array(poses[begin:end])
@@ -128,7 +124,7 @@ def translated(carried: FilterState, before: Automaton, after: Automaton) -> Fil
     particles = carried.particles
     if particles is None or before is after:
         return carried
-    extra = known_of(particles)
+    extra = dict(particles.extra)
     for name in (STATES, CAME_FROM_STATES, LEADER_STATE, BEFORE_STATE):
         if name in extra:
             extra[name] = _same_histories(before, after, extra[name])
@@ -156,7 +152,7 @@ class OnlineLearner:
         lesson = number // self.interval
         while len(self._models) <= lesson:
             held = len(self._models)
-            rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((self.seed, held, LESSON_KEY))))
+            rng = keyed_generator(self.seed, held, LESSON_KEY)
             poses, log_weights, overlaps = tracked(held * self.interval)
             good = well_tracked(log_weights, overlaps, self.overlap)
             self._models.append(updated_model(self.base, self._models[-1], poses, good, rng))

@@ -84,3 +84,12 @@ def children(first: Array, second: Array, place: Indices, chosen: Mask, cuts: Ar
                 made[n, d] = second[n, d]
                 crossed[n] = True
     return made, crossed
+
+
+@njit(**EXACT)
+def places(limb: Indices) -> Indices:
+    """(D,) 1, 2, … : how many runs of equal values `limb` (D,) has up to each."""
+    found = np.ones(len(limb), np.int64)
+    for d in range(1, len(limb)):
+        found[d] = found[d - 1] + (limb[d] != limb[d - 1])
+    return found

@@ -118,7 +118,7 @@ class ParticleSwarm(Tracker):
         pose = _last_pose(previous, last)
         sigma = space.sigma * settings.diffusion_scale * first.freedom
         starts, arrays = expected(pose[None], previous, settings.dynamics)[0], {}
-        if is_guided(space, settings) and previous.estimate is not None:
+        if is_guided(space, settings.prediction) and previous.estimate is not None:
             starts, arrays = predicted_starts(rng, previous, pose, first.particles, space, settings)
         drawn = _sampled(rng, starts, sigma, first.particles, settings)
         return _new_swarm(drawn, starts, first.freedom, arrays)
@@ -146,7 +146,7 @@ class ParticleSwarm(Tracker):
         if FREE in extra:
             extra = judged(extra, np.where(allowed, values, -np.inf) if allowed.any() else values)
             del extra[FREE]
-        weighed = ParticleSet(particles.poses, _equal(len(values)), values, extra)
+        weighed = ParticleSet(particles.poses, particles.log_weights, values, extra)
         if now.iteration < stage.iterations:
             c = acceleration(now.iteration + 1, stage.iterations, settings.c_first, settings.c_last)
             following = _moved(rng, weighed, c, problem, space, settings)
@@ -155,7 +155,7 @@ class ParticleSwarm(Tracker):
         else:
             following = weighed
         record = _record(layer, weighed, allowed, following, free)
-        if following is weighed and is_guided(space, settings):
+        if following is weighed and is_guided(space, settings.prediction):
             following = replace(weighed, extra=leader_arrived(rng, extra[LEADER], extra, space))
         return following, record
 
@@ -311,17 +311,12 @@ def _last_pose(previous: FilterState, last: ParticleSet) -> Array:
 def _record(
     layer: int, weighed: ParticleSet, allowed: Mask, following: ParticleSet, free: float
 ) -> LayerRecord:
-    """The record of a layer; the frame loop fills in frame, version and time. free : `share_in`."""
+    """The record of a layer. free : `share_in`."""
     values = weighed.raw_log_weights
     best = int(np.argmax(np.where(allowed, values, -np.inf) if allowed.any() else values))
     kept, own = moments(weighed.extra[BEST_POSES]).variance, moments(weighed.poses)
     return LayerRecord(
-        frame=-1,
         layer=layer,
-        settings_version=-1,
-        beta=math.nan,
-        alpha_wanted=math.nan,
-        alpha_reached=math.nan,
         variance_weighed=own.variance,
         variance_resampled=kept,
         variance_diffused=kept if following is weighed else moments(following.poses).variance,
@@ -330,10 +325,5 @@ def _record(
         mean=own.mean,
         poses=weighed.poses,
         log_weights=values,
-        milliseconds=0.0,
         model_free_share=free,
     )
-
-
-def _equal(count: int) -> Array:
-    return np.full(count, -np.log(count))

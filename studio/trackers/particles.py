@@ -5,8 +5,17 @@ import numpy as np
 from studio.arrays import Array
 from studio.errors import RunError
 from studio.trackers.diffusion import Spread, noise_about
-from studio.trackers.hard_priors import Proposals, Rules, possible, settled
-from studio.trackers.tracker import Arrays, Estimate, FilterState, FrameLikelihood, ParticleSet, SearchSpace
+from studio.trackers.hard_priors import Proposals, possible, settled
+from studio.trackers.shared_knobs import SearchSettings
+from studio.trackers.tracker import (
+    Arrays,
+    Estimate,
+    FilterState,
+    FrameLikelihood,
+    ParticleSet,
+    SearchSpace,
+    Tracker,
+)
 
 CAME_FROM = "came_from"
 
@@ -43,7 +52,7 @@ def expected(poses: Array, previous: FilterState, dynamics: str) -> Array:
     return poses + (previous.estimate - previous.previous_estimate)
 
 
-def weigh(problem: FrameLikelihood, poses: Array, rules: Rules) -> tuple[Array, Array]:
+def weigh(problem: FrameLikelihood, poses: Array, rules: SearchSettings) -> tuple[Array, Array]:
     """(N,) raw log w, and (N,) the same with -inf for particles that the body cannot take.
 
     Where the body can take none of them, or constraints are ignored, all may survive. Raises WeightError for a
@@ -68,15 +77,18 @@ def checked_values(values: Array, count: int) -> Array:
     return raw
 
 
-def first_draw(spread: Spread, drawn: Array, space: SearchSpace, rules: Rules) -> ParticleSet:
-    """The unweighted set that a filter's frame begins with, from the poses (N, D) `drawn` about predictions.
+def first_set(
+    rng: np.random.Generator, predicted: Array, space: SearchSpace, rules: SearchSettings
+) -> ParticleSet:
+    """The unweighted set that a filter's frame begins with: predicted poses (N, D) plus B_0 (Eq. 9, 10).
 
     Whether limbs are apart is known only with the frame's problem: with "redraw" the poses that the particles
     came from are kept in the set, for `settled_first`.
     """
+    drawn = noise_about(predicted, space.sigma * rules.diffusion_scale).draw(rng)
     if rules.constraints == "clamp":
         drawn = np.clip(drawn, space.lower, space.upper)
-    came_from = {CAME_FROM: spread.centres} if rules.constraints == "redraw" else {}
+    came_from = {CAME_FROM: predicted} if rules.constraints == "redraw" else {}
     return unweighted(drawn, came_from)
 
 
@@ -85,14 +97,13 @@ def settled_first(
     particles: ParticleSet,
     problem: FrameLikelihood,
     space: SearchSpace,
-    sigma: Array,
-    rules: Rules,
+    rules: SearchSettings,
 ) -> ParticleSet:
     """A frame's first set with its impossible particles redrawn; unchanged where it does not keep their origins."""
-    extra = {name: value for name, value in particles.extra.items() if name != CAME_FROM}
     if CAME_FROM not in particles.extra:
         return particles
-    spread = noise_about(particles.extra[CAME_FROM], sigma)
+    extra = {name: value for name, value in particles.extra.items() if name != CAME_FROM}
+    spread = noise_about(particles.extra[CAME_FROM], space.sigma * rules.diffusion_scale)
     first = settle(rng, spread, particles.poses, spread.centres, problem, space, rules)
     return ParticleSet(first, particles.log_weights, particles.raw_log_weights, extra)
 
@@ -104,7 +115,7 @@ def settle(
     came_from: Array,
     problem: FrameLikelihood,
     space: SearchSpace,
-    rules: Rules,
+    rules: SearchSettings,
 ) -> Array:
     """(N, D) poses `drawn` from a spread, after the rules."""
     done = settled(
@@ -134,3 +145,11 @@ def estimate(particles: ParticleSet, kind: str) -> Estimate:
     mean, mode = weighted_mean(particles), particles.poses[best]
     pose = mean if kind == "mean" else mode
     return Estimate(pose, mean, mode, float(particles.raw_log_weights[best]))
+
+
+class ParticleFilter(Tracker):
+    """A tracker that reports its last layer's weighted set."""
+
+    def end_frame(self, particles: ParticleSet, space: SearchSpace, settings: SearchSettings) -> Estimate:
+        """The weighted mean (Eq. 1, 8) or the mode (Eq. 2)."""
+        return estimate(particles, settings.estimate)

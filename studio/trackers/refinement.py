@@ -136,14 +136,13 @@ class Refiner:
         self.body, self.cameras, self.settings = body, cameras, settings
         self.projector = OutlineProjector.of_body(body, cameras)
         length = MM_PER_RADIAN * scale_of(body)
-        self.unit = np.array([1.0 if entry.kind == "angle" else length for entry in body.parameters])
-        self.lower = np.array([entry.lower for entry in body.parameters])
-        self.upper = np.array([entry.upper for entry in body.parameters])
+        self.unit = np.where(body.angles, 1.0, length)
+        self.lower, self.upper = body.lower, body.upper
         self.ends = free_ends(body)
         self.slack = np.where(rigid_limbs(body), SLACK_MM, 0.0)
         self.neutral = body.neutral
         self.stiffness = np.where(hidden_angles(body), HIDDEN_PULL**2, REST_PULL**2)
-        self.bounded = bounded_angles(body)
+        self.bounded = body.bounded_angles
         self.stiffness[~self.bounded] = 0.0
 
     def refine(
@@ -309,17 +308,6 @@ def hidden_angles(body: BodyModel) -> NDArray[np.bool_]:
     moves = [{s.parameter for s in joint.steps if s.parameter >= 0} for joint in body.joints]
     shown = set[int]().union(*(moves[number] for number in bearing)) if bearing else set[int]()
     return np.array([number not in shown for number in range(len(body.parameters))], dtype=np.bool_)
-
-
-def bounded_angles(body: BodyModel) -> NDArray[np.bool_]:
-    """(D,) whether a parameter is an angle with limits on both sides."""
-    return np.array(
-        [
-            entry.kind == "angle" and np.isfinite(entry.lower) and np.isfinite(entry.upper)
-            for entry in body.parameters
-        ],
-        dtype=np.bool_,
-    )
 
 
 def rigid_limbs(body: BodyModel) -> NDArray[np.bool_]:

@@ -31,6 +31,25 @@ def turning(quad):
 
 
 @njit(**EXACT)
+def is_seen(quad):
+    """Whether a quadrilateral (4, 2) has a place: NaN where its limb is not seen."""
+    seen = True
+    for corner in range(4):
+        seen &= np.isfinite(quad[corner, 0]) and np.isfinite(quad[corner, 1])
+    return seen
+
+
+@njit(**EXACT)
+def box_of(quad):
+    """Left, top, right and bottom of a quadrilateral (4, 2)."""
+    left, top, right, bottom = quad[0, 0], quad[0, 1], quad[0, 0], quad[0, 1]
+    for corner in range(1, 4):
+        left, right = min(left, quad[corner, 0]), max(right, quad[corner, 0])
+        top, bottom = min(top, quad[corner, 1]), max(bottom, quad[corner, 1])
+    return left, top, right, bottom
+
+
+@njit(**EXACT)
 def in_another(x, y, quads, usable, sides, boxes, own):
     """Whether a point lies inside (by MARGIN pixels) the quadrilateral of another limb than `own`."""
     for limb in range(quads.shape[0]):
@@ -261,10 +280,9 @@ def look_at_limbs(quads, slopes, usable, turns, sides, boxes):
     right, bottom.
     """
     for limb in range(quads.shape[0]):
-        usable[limb] = np.isfinite(quads[limb].sum()) and all_finite(slopes[limb].reshape(-1))
+        usable[limb] = is_seen(quads[limb]) and all_finite(slopes[limb].reshape(-1))
         turns[limb] = turning(quads[limb])
-        boxes[limb, 0], boxes[limb, 2] = quads[limb, :, 0].min(), quads[limb, :, 0].max()
-        boxes[limb, 1], boxes[limb, 3] = quads[limb, :, 1].min(), quads[limb, :, 1].max()
+        boxes[limb, 0], boxes[limb, 1], boxes[limb, 2], boxes[limb, 3] = box_of(quads[limb])
         for corner in range(4):
             following = (corner + 1) & 3
             ex = quads[limb, following, 0] - quads[limb, corner, 0]

@@ -3,13 +3,20 @@
 from dataclasses import dataclass
 
 from studio.errors import SettingsError
-from studio.knobs import knob, next_frame_knob
-from studio.trackers import shared_knobs
+from studio.knobs import knob, next_frame_knob, with_default
+from studio.trackers.shared_knobs import (
+    BEHAVIOUR,
+    GuidedSettings,
+    SearchSettings,
+    dynamics,
+    prediction,
+    resampling,
+)
 from studio.trackers.tracker import Preset, Value, Variant
 
 
 @dataclass(frozen=True, slots=True)
-class AnnealedSettings:
+class AnnealedSettings(GuidedSettings):
     """Knobs of the annealed particle filter (Deutscher & Reid 2005, sections 3 and 6)."""
 
     title = "Annealed particle filter"
@@ -49,7 +56,6 @@ class AnnealedSettings:
         "diagonal", choices=("diagonal", "full"), label="covariance",
         help="Whether adaptive noise follows each parameter on its own or all of them together.",
     )  # fmt: skip
-    diffusion_scale: float = shared_knobs.diffusion_scale()
     diffusion_decay: str = knob(
         "variance", choices=("variance", "deviation", "printed"), label="decay of Eq. 13",
         help="Without adaptive diffusion: what the survival rates of the layers so far multiply, σ0² or σ0; or, as the "
@@ -63,24 +69,9 @@ class AnnealedSettings:
         "weighted", choices=("weighted", "resampled", "mode"), label="carried over",
         help="Start of the next frame: every particle (Eq. 9), survivors by weight, or the best one.",
     )  # fmt: skip
-    dynamics: str = shared_knobs.dynamics()
-    prediction: str = shared_knobs.prediction()
-    attenuation: float = shared_knobs.attenuation(0.3)
-    entering: str = shared_knobs.entering()
-    root_prediction: str = shared_knobs.root_prediction()
-    root_spread: float = shared_knobs.root_spread()
-    global_scale: float = shared_knobs.global_scale(1.0)
-    automaton_share: float = shared_knobs.automaton_share()
-    model_free_share: float = shared_knobs.model_free_share(0.2)
-    model_free_grows: bool = shared_knobs.model_free_grows()
-    estimate: str = shared_knobs.estimate()
-    constraints: str = shared_knobs.constraints("clamp")
-    limbs_apart: bool = shared_knobs.limbs_apart(False)
-    resampling: str = shared_knobs.resampling()
-    online_learning: bool = shared_knobs.online_learning()
-    learning_overlap: float = shared_knobs.learning_overlap()
-    learning_interval: int = shared_knobs.learning_interval()
-    start_repeats: int = shared_knobs.start_repeats()
+    dynamics: str = dynamics()
+    prediction: str = prediction()
+    resampling: str = resampling()
 
     def __post_init__(self) -> None:
         """Raise SettingsError unless `survival_per_layer` is empty or a list of rates in range."""
@@ -88,7 +79,7 @@ class AnnealedSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class CondensationSettings:
+class CondensationSettings(SearchSettings):
     """Knobs of Condensation, the baseline (Isard & Blake 1996)."""
 
     title = "Condensation"
@@ -102,13 +93,42 @@ class CondensationSettings:
         5, 1, 100, 1, label="frames for the scale",
         help="How many weighings choose the likelihood's scale (their geometric mean), which then stays.",
     )  # fmt: skip
-    diffusion_scale: float = shared_knobs.diffusion_scale()
-    dynamics: str = shared_knobs.dynamics()
-    estimate: str = shared_knobs.estimate()
-    constraints: str = shared_knobs.constraints("clamp")
-    limbs_apart: bool = shared_knobs.limbs_apart(False)
-    resampling: str = shared_knobs.resampling()
-    start_repeats: int = shared_knobs.start_repeats()
+    dynamics: str = dynamics()
+    resampling: str = resampling()
+
+
+@dataclass(frozen=True, slots=True)
+class BehaviourSettings(GuidedSettings):
+    """Knobs of the tracker by behaviour (Caillette, Galata & Howard 2007, sections 3.3, 5.1, 5.2 and 6.3)."""
+
+    title = "Guided by behaviour"
+
+    particles: int = next_frame_knob(
+        1000, 2, 200000, 50, help="N: particles, each weighed once (section 7.3)."
+    )
+    attenuation: float = with_default(GuidedSettings, "attenuation", 0.5)
+    model_free_share: float = with_default(GuidedSettings, "model_free_share", 0.1)
+    selection: str = knob(
+        "survival", choices=("survival", "weights"),
+        help="How peaked the weights are: so that a chosen share survives, or as the likelihood gives them (3.3).",
+    )  # fmt: skip
+    survival: float = knob(
+        0.4, 0.005, 0.98, 0.005, label="survival rate",
+        help="Share of the particles that survive a frame, where the selection is by survival.",
+    )  # fmt: skip
+    expected_support: float = next_frame_knob(
+        0.05, 0.0, 0.5, 0.01, label="support of a cluster",
+        help="Least share of the particles in a motion cluster whose mean the blobs are fitted from (6.3).",
+    )  # fmt: skip
+    expected_most: int = next_frame_knob(
+        4, 1, 20, 1, label="clusters fitted",
+        help="From how many clusters' means the blobs are fitted at most (6.3).",
+    )  # fmt: skip
+    estimate: str = knob(
+        "mode", choices=("mode", "mean"),
+        help="The pose that is reported: the particle with the highest weight (3.3), or the weighted mean.",
+    )  # fmt: skip
+    resampling: str = resampling()
 
 
 def layer_survivals(settings: AnnealedSettings, layers: int) -> tuple[float, ...]:
@@ -181,7 +201,7 @@ PRESETS = (
 
 GUIDED = Variant(
     "first sets predicted by a behaviour model (Caillette et al.), a fifth of the particles without it",
-    {"prediction": shared_knobs.BEHAVIOUR},
+    {"prediction": BEHAVIOUR},
 )
 VARIANTS = {
     "improved": Variant(

@@ -36,7 +36,6 @@ from studio.trackers.refinement import (
     MOST_DAMPING,
     TIGHTENED,
     Distances,
-    bounded_angles,
     free_ends,
     hidden_angles,
     mm_at,
@@ -127,13 +126,12 @@ class ShapeRefiner:
         self._projector = OutlineProjector.of_body(body, cameras)
         self._body, self._ends = body, free_ends(body)
         self._still = rigid_limbs(body) & lengths_known
-        angle = np.array([entry.kind == "angle" for entry in body.parameters])
         scale = scale_of(body)
-        self._unit = np.where(angle, 1.0, MM_PER_RADIAN * scale)
-        self._shaken = np.where(angle, SHAKEN_POSE, SHAKEN_PLACE * scale)
-        self._limits = np.array([[e.lower, e.upper] for e in body.parameters]).T
+        self._unit = np.where(body.angles, 1.0, MM_PER_RADIAN * scale)
+        self._shaken = np.where(body.angles, SHAKEN_POSE, SHAKEN_PLACE * scale)
+        self._limits = np.stack([body.lower, body.upper])
         spread = np.where(hidden_angles(body), HIDDEN_SPREAD, ANGLE_SPREAD)
-        self.stiffness = np.where(bounded_angles(body), 1.0 / np.square(spread), 0.0)
+        self.stiffness = np.where(body.bounded_angles, 1.0 / np.square(spread), 0.0)
         self._variance = FIRST_VARIANCE
 
     def refine(

@@ -21,16 +21,16 @@ examined of twelve clips (-0.2 to -0.7 on the mean), in the one with clutter and
 -0.09 on the mean; arms are below -0.06, the body turned below -0.13.
 """
 
+import functools
 import heapq
 import itertools
-from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Array, Indices
+from studio.arrays import Array, Indices, runs_of
 from studio.body.forward_kinematics import limb_ends
 from studio.body.mirroring import Mirror, name_twins
 from studio.body.model import BodyModel
@@ -169,10 +169,14 @@ class _Work:
             kind: _Examined(np.full(len(frames), np.nan), poses.copy(), np.zeros(len(frames), np.bool_))
             for kind in kinds_of(body)
         }
-        self._cameras = {camera.name: camera for camera in cameras}
+        by_name = {camera.name: camera for camera in cameras}
+
+        def refiner(names: tuple[str, ...]) -> Refiner:
+            return Refiner(body, tuple(by_name[name] for name in names), RefinementSettings())
+
+        self._refiner = functools.cache(refiner)
         self._silhouettes_of = silhouettes_of
-        self._refiners: dict[tuple[str, ...], Refiner] = {}
-        self._seen: OrderedDict[int, tuple[Refiner, tuple[Distances, ...]]] = OrderedDict()
+        self._sight = functools.lru_cache(KEPT_SILHOUETTES)(self._seen_in)
         self._here: dict[int, tuple[Array, float]] = {}
         self._share = min(REFERENCE_FPS / fps, MOST_SHARE)
 
@@ -193,8 +197,8 @@ class _Work:
         if best is None:
             return False
         kind, exchanged = best
-        for rows in _segments(exchanged):
-            self._settle(rows, self._kinds[kind])
+        for first, after in runs_of(exchanged):
+            self._settle(np.arange(first, after), self._kinds[kind])
         self._kinds[kind].odd ^= exchanged
         for known in self._kinds.values():
             known.losses[exchanged], known.poses[exchanged] = np.nan, self.poses[exchanged]
@@ -206,9 +210,9 @@ class _Work:
         marked = {kind.what: examined.odd for kind, examined in self._kinds.items()}
         marked["refitted"] = changed & ~np.any([*marked.values(), np.zeros_like(changed)], axis=0)
         found = [
-            Exchange(int(self.frames[rows[0]]), int(self.frames[rows[-1]]), what)
+            Exchange(int(self.frames[first]), int(self.frames[after - 1]), what)
             for what, rows_marked in marked.items()
-            for rows in _segments(rows_marked)
+            for first, after in runs_of(rows_marked)
         ]
         return tuple(sorted(found, key=lambda change: change.first))
 
@@ -285,22 +289,13 @@ class _Work:
     def _refined(self, row: int, pose: Array) -> tuple[Array, float]:
         """A pose refined on a row's silhouettes, and its loss; 0 where nothing is seen."""
         refiner, silhouettes = self._sight(row)
-        if not any(len(view.border) for view in silhouettes):
-            return pose, 0.0
         found = refiner.refine(pose, silhouettes).pose
-        return found, refiner.settled_loss(found, silhouettes)
+        return found, self._loss(row, found)
 
-    def _sight(self, row: int) -> tuple[Refiner, tuple[Distances, ...]]:
-        if row not in self._seen:
-            seen = self._silhouettes_of(int(self.frames[row]))
-            names = tuple(seen)
-            if names not in self._refiners:
-                cameras = tuple(self._cameras[name] for name in names)
-                self._refiners[names] = Refiner(self.body, cameras, RefinementSettings())
-            self._seen[row] = self._refiners[names], tuple(seen.values())
-            if len(self._seen) > KEPT_SILHOUETTES:
-                self._seen.popitem(last=False)
-        return self._seen[row]
+    def _seen_in(self, row: int) -> tuple[Refiner, tuple[Distances, ...]]:
+        """A row's silhouettes, and what refines poses on them."""
+        seen = self._silhouettes_of(int(self.frames[row]))
+        return self._refiner(tuple(seen)), tuple(seen.values())
 
     # ------------------------------------------------------------------ movement
 
@@ -386,12 +381,6 @@ def best_path(gains: Array, movements: Array) -> tuple[NDArray[np.bool_], float]
     for row in range(len(gains) - 1, -1, -1):
         found[row], label = label == 1, int(came[row, label])
     return found, gained
-
-
-def _segments(exchanged: NDArray[np.bool_]) -> list[Indices]:
-    """The runs of rows that are exchanged."""
-    rows = np.flatnonzero(exchanged)
-    return [part for part in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1) if len(part)]
 
 
 def _moved(after: Array, before: Array) -> Array:

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 from studio.errors import SettingsError
-from studio.knobs import knob, next_frame_knob
-from studio.trackers import shared_knobs
+from studio.knobs import knob, next_frame_knob, with_default
 from studio.trackers.settings import GUIDED
+from studio.trackers.shared_knobs import GuidedSettings, dynamics, prediction
 from studio.trackers.tracker import Preset, Variant
 
 PARTITIONS = ("soft", "soft-three", "hard-two", "hard-twelve", "global-local", "global")
@@ -17,7 +17,7 @@ TWELVE, KINDS_OF_LIMBS = 12, 2
 
 
 @dataclass(frozen=True, slots=True)
-class SwarmSettings:
+class SwarmSettings(GuidedSettings):
     """Knobs of the soft-partitioning particle swarm."""
 
     title = "Particle swarm"
@@ -58,27 +58,14 @@ class SwarmSettings:
         10.0, 1.0, 100.0, 0.5, label="position divisor",
         help="Divisor of the root position's σ in the soft stages after the first (2.4).",
     )  # fmt: skip
-    diffusion_scale: float = shared_knobs.diffusion_scale()
-    dynamics: str = shared_knobs.dynamics()
-    prediction: str = shared_knobs.prediction()
-    attenuation: float = shared_knobs.attenuation(0.3)
-    entering: str = shared_knobs.entering()
-    root_prediction: str = shared_knobs.root_prediction()
-    root_spread: float = shared_knobs.root_spread()
-    global_scale: float = shared_knobs.global_scale(1.0)
-    automaton_share: float = shared_knobs.automaton_share()
-    model_free_share: float = shared_knobs.model_free_share(0.2)
-    model_free_grows: bool = shared_knobs.model_free_grows()
+    dynamics: str = dynamics()
+    prediction: str = prediction()
     estimate: str = knob(
-        "mode", choices=("mode", "mean"), takes_effect="next layer",
+        "mode", choices=("mode", "mean"),
         help="The pose that is reported: the best the swarm has found, or the mean of its particles' bests.",
     )  # fmt: skip
-    constraints: str = shared_knobs.constraints("redraw")
-    limbs_apart: bool = shared_knobs.limbs_apart(True)
-    online_learning: bool = shared_knobs.online_learning()
-    learning_overlap: float = shared_knobs.learning_overlap()
-    learning_interval: int = shared_knobs.learning_interval()
-    start_repeats: int = shared_knobs.start_repeats()
+    constraints: str = with_default(GuidedSettings, "constraints", "redraw")
+    limbs_apart: bool = with_default(GuidedSettings, "limbs_apart", True)
 
     def __post_init__(self) -> None:
         """Raise SettingsError for N <= 2 in any stage and for φ <= 4."""

@@ -31,7 +31,7 @@ limbs is probably elsewhere (`FrameResult.limbs_lost`)."""
 
 LIMB_LOST_SHARE = 0.06
 """Disagreeing share of a limb's area beyond which the silhouettes contradict it."""
-LIMB_LOST_PROBABILITY = 0.091
+LIMB_LOST_PROBABILITY = 0.15
 """Probability beyond which a limb is reported lost (`limb_certainty`)."""
 
 
@@ -136,9 +136,9 @@ class Estimate:
     searched: Array | None = None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LayerRecord:
-    """Diagnostics of one layer.
+    """Diagnostics of one layer; the frame loop fills in frame, settings_version and milliseconds.
 
     frame, layer : layer counts from 0. settings_version : of the settings in use. beta : exponent of Eq. 3.
     alpha_wanted, alpha_reached : survival rate (Eq. 12). All three are NaN for trackers without them (a swarm).
@@ -153,12 +153,12 @@ class LayerRecord:
     of `poses` in the set where not all were kept, else (0,).
     """
 
-    frame: int
+    frame: int = -1
     layer: int
-    settings_version: int
-    beta: float
-    alpha_wanted: float
-    alpha_reached: float
+    settings_version: int = -1
+    beta: float = math.nan
+    alpha_wanted: float = math.nan
+    alpha_reached: float = math.nan
     variance_weighed: Array
     variance_resampled: Array
     variance_diffused: Array
@@ -167,7 +167,7 @@ class LayerRecord:
     mean: Array
     poses: Array
     log_weights: Array
-    milliseconds: float
+    milliseconds: float = 0.0
     model_free_share: float = math.nan
     parents: Indices = field(default_factory=lambda: np.zeros((2, 0), dtype=np.int64))
     rows: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
@@ -279,10 +279,7 @@ class Tracker(ABC):
         space: SearchSpace,
         settings: Any,  # noqa: ANN401
     ) -> tuple[ParticleSet, LayerRecord]:
-        """Weigh the set, then make the next one (in the last layer: return the weighted set itself).
-
-        The record's frame, settings_version and milliseconds are filled in by the frame loop.
-        """
+        """Weigh the set, then make the next one (in the last layer: return the weighted set itself)."""
 
     @abstractmethod
     def end_frame(self, particles: ParticleSet, space: SearchSpace, settings: Any) -> Estimate:  # noqa: ANN401
@@ -299,4 +296,9 @@ def generator(seed: int, frame: int, layer: int) -> np.random.Generator:
     """The random numbers of one layer (layer -1: of `begin_frame`), keyed so that any frame replays bit for
     bit.
     """
-    return np.random.Generator(np.random.Philox(np.random.SeedSequence((seed, frame, layer + 1))))
+    return keyed_generator(seed, frame, layer + 1)
+
+
+def keyed_generator(*key: int) -> np.random.Generator:
+    """Random numbers that are a function of these whole numbers, none below 0."""
+    return np.random.Generator(np.random.Philox(np.random.SeedSequence(key)))

@@ -13,7 +13,7 @@ from studio.behaviour.model_learning import learn_model
 from studio.behaviour.settings import LearningSettings
 from studio.body.model import BodyModel
 from studio.errors import StudioError
-from studio.progress import Progress
+from studio.progress import Progress, unheard
 from studio.sessions.workspace import Workspace
 from studio.training.oversampling import OversamplingSettings, oversampled
 from studio.training.sources import FPS, Recording, expand, read_source
@@ -45,7 +45,7 @@ def read_sources(
     *,
     fps: float = FPS,
     workspace: Workspace | None = None,
-    progress: Progress | None = None,
+    progress: Progress = unheard,
 ) -> tuple[Recording, ...]:
     """The recordings of all sources in order, folders expanded. progress : called with the source's name. Raises
     StudioError.
@@ -58,8 +58,7 @@ def read_sources(
         words = f"{Path(name).name} ({number} of {len(names)})"
 
         def report(_step: str, done: int, total: int, words: str = words) -> None:
-            if progress is not None:
-                progress(words, done, total)
+            progress(words, done, total)
 
         found.append(read_source(name, body, skeleton, fps=fps, workspace=workspace, progress=report))
     return tuple(found)
@@ -86,7 +85,7 @@ def learn(
     test: Sequence[Recording] | None = None,
     *,
     seed: int = 0,
-    progress: Progress | None = None,
+    progress: Progress = unheard,
 ) -> tuple[BehaviourModel, Learnt]:
     """The behaviour of recordings on one body, all at one rate.
 

@@ -35,9 +35,9 @@ class MarkerProblem:
         self.body, self.names = body, tuple(targets.names[place] for place in kept)
         self.points = np.ascontiguousarray(targets.points[:, kept])
         self._fix([known[name] for name in self.names], targets)
-        self.scale = np.array([1.0 if entry.kind == "angle" else MM_PER_RADIAN for entry in body.parameters])
-        self.lower = np.array([entry.lower for entry in body.parameters]) / self.scale
-        self.upper = np.array([entry.upper for entry in body.parameters]) / self.scale
+        self.scale = np.where(body.angles, 1.0, MM_PER_RADIAN)
+        self.lower = body.lower / self.scale
+        self.upper = body.upper / self.scale
         self.rest = body.neutral / self.scale
         limbs = [entry.limb for entry in body.parameters]
         self.groups = [

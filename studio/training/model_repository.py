@@ -1,38 +1,15 @@
 """The behaviour models of the workspace."""
 
-import math
 import os
-from dataclasses import dataclass
 from pathlib import Path
 
 from studio.behaviour.model import BehaviourModel
-from studio.behaviour.model_file import read_model, write_model
+from studio.behaviour.model_file import write_model
 from studio.errors import BehaviourError, NotFoundError
-from studio.runs.behaviour_models import SUFFIX, models_folder, models_in
+from studio.runs.behaviour_models import SUFFIX, ModelSummary, models_folder, models_in
 from studio.sessions import atomic_files
 from studio.sessions.names import checked_name, free_name, inside
 from studio.sessions.workspace import TRASH_NAME, Workspace
-
-
-@dataclass(frozen=True, slots=True)
-class ModelSummary:
-    """A model as a line of a list. fps : of its learning. sources : its recordings, each once. problem : why it cannot
-    be read (the rest is empty then), else "".
-    """
-
-    name: str
-    path: Path
-    body: str = ""
-    fps: float = 0.0
-    frames: int = 0
-    clusters: int = 0
-    states: int = 0
-    memory: int = 0
-    epsilon: float = 0.0
-    entropy_train: float = math.nan
-    entropy_test: float = math.nan
-    sources: tuple[str, ...] = ()
-    problem: str = ""
 
 
 def place_for_model(name_or_path: str, workspace: Workspace, *, replace: bool = False) -> Path:
@@ -110,27 +87,4 @@ def bring_back_model(workspace: Workspace, trashed_name: str) -> Path:
 
 def list_models(workspace: Workspace) -> tuple[ModelSummary, ...]:
     """The workspace's models by name; with the reason for those that cannot be read."""
-    return tuple(
-        ModelSummary(line.name, line.path, problem=line.problem) if line.problem else summary_of(line.path)
-        for line in models_in((models_folder(workspace.root),))
-    )
-
-
-def summary_of(path: Path) -> ModelSummary:
-    """The line of a model's file. Raises BehaviourError for one that cannot be read."""
-    model = read_model(path)
-    making = model.making
-    return ModelSummary(
-        name=path.stem,
-        path=path,
-        body=model.space.body,
-        fps=making.learnt_fps,
-        frames=making.frames,
-        clusters=model.clusters,
-        states=model.states,
-        memory=making.settings.memory,
-        epsilon=making.settings.epsilon,
-        entropy_train=making.entropy_train,
-        entropy_test=making.entropy_test,
-        sources=tuple(dict.fromkeys(making.sources)),
-    )
+    return models_in((models_folder(workspace.root),))

@@ -39,8 +39,7 @@ def on_branch(body: BodyModel, path: Array, beyond: bool) -> Array:
     """The path (F, D), in radians, with every triple written so that its middle turn is beyond a right angle, or so
     that it never is; clamped to the limits where that branch lies outside.
     """
-    lower = np.array([entry.lower for entry in body.parameters])
-    upper = np.array([entry.upper for entry in body.parameters])
+    lower, upper = body.lower, body.upper
     found = path.copy()
     for triple in triples(body):
         first, second, third = triple

@@ -12,8 +12,8 @@ import scipy
 
 from studio.arrays import Array
 from studio.body.model import BodyModel
-from studio.knobs import knob
-from studio.training.resampling import poses_at
+from studio.knobs import new_run_knob
+from studio.training.resampling import clamped, poses_at
 
 REACH = 4.0  # standard deviations of the smoothing that count
 # Noise smoothed with a standard deviation of s swings about once in PERIODS * s.
@@ -57,25 +57,25 @@ class OversamplingSettings:
 
     title = "Training material"
 
-    performances: int = knob(
-        1, 1, 100, 1, takes_effect="new run",
+    performances: int = new_run_knob(
+        1, 1, 100, 1,
         help="Performances of every recording: the original, and others with slowly varied tempo and angles.",
     )  # fmt: skip
-    smoothings: int = knob(
-        5, 1, 50, 1, takes_effect="new run",
+    smoothings: int = new_run_knob(
+        5, 1, 50, 1,
         help="Copies of every performance, each smoothed more and sampled a part of a frame later; "
         "the paper varied the smoothing to have enough frames.",
     )  # fmt: skip
-    widest_smoothing: float = knob(
-        0.08, 0.0, 1.0, 0.01, unit="s", label="widest smoothing", takes_effect="new run",
+    widest_smoothing: float = new_run_knob(
+        0.08, 0.0, 1.0, 0.01, unit="s", label="widest smoothing",
         help="Standard deviation of the strongest smoothing (a Gaussian over time); the first is none.",
     )  # fmt: skip
-    tempo_change: float = knob(
-        0.10, 0.0, 1.0, 0.01, label="tempo change", takes_effect="new run",
+    tempo_change: float = new_run_knob(
+        0.10, 0.0, 1.0, 0.01, label="tempo change",
         help="How much faster or slower other performances are, a share of the tempo (standard deviation).",
     )  # fmt: skip
-    angle_change: float = knob(
-        4.0, 0.0, 45.0, 0.5, unit="degrees", label="angle change", takes_effect="new run",
+    angle_change: float = new_run_knob(
+        4.0, 0.0, 45.0, 0.5, unit="degrees", label="angle change",
         help="Change of the angles in other performances (standard deviation); joints that hardly move in the "
         "recording change less.",
     )  # fmt: skip
@@ -105,8 +105,7 @@ def performed(
     size = np.radians(settings.angle_change) * (0.25 + 0.75 * spread)
     slow = smooth_noise(rng, frames, poses.shape[1], fps, ANGLE_PERIOD_S)
     change: Array = np.sqrt(1.0 - LASTING**2) * slow + LASTING * rng.standard_normal(int(poses.shape[1]))
-    angles = np.array([entry.kind == "angle" for entry in body.parameters])
-    return _within(body, shown, shown + np.where(angles, size * change, 0.0))
+    return clamped(body, shown, shown + np.where(body.angles, size * change, 0.0))
 
 
 def smoothed_copies(body: BodyModel, poses: Array, fps: float, settings: OversamplingSettings) -> list[Array]:
@@ -122,10 +121,3 @@ def smoothed_copies(body: BodyModel, poses: Array, fps: float, settings: Oversam
             smooth = poses_at(body, times, smooth, times[:-1] + number / (count * fps))
         found.append(smooth)
     return found
-
-
-def _within(body: BodyModel, allowed: Array, poses: Array) -> Array:
-    """The poses clamped to the body's limits, widened where `allowed` goes beyond them."""
-    lower = np.minimum([entry.lower for entry in body.parameters], allowed.min(axis=0))
-    upper = np.maximum([entry.upper for entry in body.parameters], allowed.max(axis=0))
-    return np.clip(poses, lower, upper)

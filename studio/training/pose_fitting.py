@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from studio.arrays import Array
 from studio.body.model import BodyModel
-from studio.progress import Progress
+from studio.progress import Progress, unheard
 from studio.training.marker_problem import MarkerProblem
 from studio.training.other_spellings import on_branch
 from studio.training.path_splicing import spliced
@@ -42,7 +42,7 @@ class Fitted:
     rms_mm: Array
 
 
-def fit_poses(body: BodyModel, targets: Targets, fps: float, progress: Progress | None = None) -> Fitted:
+def fit_poses(body: BodyModel, targets: Targets, fps: float, progress: Progress = unheard) -> Fitted:
     """The poses of `body` whose markers and pointers come closest to the targets, steady over time.
 
     progress : called with (step, done, total). Raises StudioError where no frame has
@@ -57,8 +57,7 @@ def fit_poses(body: BodyModel, targets: Targets, fps: float, progress: Progress 
         def report(more: int) -> None:
             nonlocal done
             done += more
-            if progress is not None:
-                progress("fitting the body", min(done, total), total)
+            progress("fitting the body", min(done, total), total)
 
         start = _followed(problem, backwards, report)
         others = [on_branch(body, start * problem.scale, beyond) / problem.scale for beyond in (False, True)]
@@ -73,8 +72,7 @@ def fit_poses(body: BodyModel, targets: Targets, fps: float, progress: Progress 
     paths.sort(key=lambda path: float(problem.costs(path).sum()))
     path = spliced(paths, problem.groups, problem.costs, steady.acceleration)
     path = _refined(problem, path, steady, LAST_STEPS)
-    if progress is not None:
-        progress("fitting the body", total, total)
+    progress("fitting the body", total, total)
     return Fitted(path * problem.scale, problem.rms(path))
 
 

@@ -37,15 +37,18 @@ def points_at(times: Array, points: Array, new_times: Array) -> Array:
 
 def poses_at(body: BodyModel, times: Array, poses: Array, new_times: Array) -> Array:
     """(W, D) poses (F, D) at the times `new_times` on cubic splines, turns unwound, within the body's limits."""
-    angles = np.array([entry.kind == "angle" for entry in body.parameters])
-    unbounded = angles & ~np.isfinite([entry.upper - entry.lower for entry in body.parameters])
+    unbounded = body.angles & ~body.bounded_angles
     steady = np.where(unbounded, np.unwrap(poses, axis=0), poses)
     found = (
         scipy.interpolate.CubicSpline(times, steady)(new_times)
         if len(times) > 1
         else np.repeat(steady, len(new_times), axis=0)
     )
-    lower = np.array([entry.lower for entry in body.parameters])
-    upper = np.array([entry.upper for entry in body.parameters])
     # A tracked pose may lie outside the limits: only the curve's overshoot is clamped.
-    return np.clip(found, np.minimum(lower, steady.min(axis=0)), np.maximum(upper, steady.max(axis=0)))
+    return clamped(body, steady, found)
+
+
+def clamped(body: BodyModel, allowed: Array, poses: Array) -> Array:
+    """The poses (G, D) clamped to the body's limits, widened where `allowed` (F, D) goes beyond them."""
+    lower, upper = np.minimum(body.lower, allowed.min(axis=0)), np.maximum(body.upper, allowed.max(axis=0))
+    return np.clip(poses, lower, upper)

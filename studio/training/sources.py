@@ -24,7 +24,7 @@ from studio.motion_files.c3d import read_c3d
 from studio.motion_files.reading import read_recording
 from studio.motion_files.recorded_motion import RecordedMotion
 from studio.motion_files.trc import MarkerMotion, read_trc
-from studio.progress import Progress
+from studio.progress import Progress, unheard
 from studio.sessions.manifest import FILE_NAME as SESSION_FILE
 from studio.sessions.run_record import FILE_NAME as RUN_FILE
 from studio.sessions.stored_run import StoredRun
@@ -79,7 +79,7 @@ def read_source(
     *,
     fps: float = FPS,
     workspace: Workspace | None = None,
-    progress: Progress | None = None,
+    progress: Progress = unheard,
 ) -> Recording:
     """The motion of a source on `body`, at `fps`.
 
@@ -121,7 +121,7 @@ def expand(source: str | Path) -> tuple[str, ...]:
 
 
 def fitted_person(
-    motion: PersonMotion, body: BodyModel, name: str, progress: Progress | None = None
+    motion: PersonMotion, body: BodyModel, name: str, progress: Progress = unheard
 ) -> Recording:
     """The body moving as a synthetic person does, at the motion's rate."""
     return _fitted(of_person(motion), body, name, motion.fps, progress)
@@ -134,7 +134,7 @@ def recipe_recording(
     fps: float = FPS,
     options: Mapping[str, float] | None = None,
     frames: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress = unheard,
 ) -> Recording:
     """The motion of a footage's recipe (a file or a bundled name) on the body's own proportions; nothing is rendered.
 
@@ -146,14 +146,14 @@ def recipe_recording(
     return fitted_person(sampled(motion, times, fps), body, Path(recipe).stem, progress)
 
 
-def _fitted(targets: Targets, body: BodyModel, name: str, fps: float, progress: Progress | None) -> Recording:
+def _fitted(targets: Targets, body: BodyModel, name: str, fps: float, progress: Progress) -> Recording:
     found = fit_poses(body, targets, fps, progress)
     rms = float(np.sqrt(np.nanmean(found.rms_mm**2)))
     return Recording(name, fps, found.poses, rms, tuple(bad_frames(found.rms_mm).tolist()))
 
 
 def _read_file(
-    path: Path, body: BodyModel, skeleton: Path | None, fps: float, progress: Progress | None
+    path: Path, body: BodyModel, skeleton: Path | None, fps: float, progress: Progress
 ) -> Recording:
     ending = path.suffix.lower()
     if ending == RECIPE:
@@ -173,7 +173,7 @@ def _read_file(
 
 
 def _from_recorded(
-    recorded: RecordedMotion, body: BodyModel, name: str, fps: float, progress: Progress | None
+    recorded: RecordedMotion, body: BodyModel, name: str, fps: float, progress: Progress
 ) -> Recording:
     """Motion of a recorded skeleton; one with unknown joint names is fitted to the joints' positions alone."""
     if recorded.positions.shape[0] < 2:
@@ -193,7 +193,7 @@ def _from_points(
     body: BodyModel,
     path: Path,
     fps: float,
-    progress: Progress | None,
+    progress: Progress,
     *,
     unit_known: bool = True,
 ) -> Recording:
@@ -260,7 +260,7 @@ def _runs_of(folder: Path) -> StudioError:
     )
 
 
-def _read_run(run: StoredRun, body: BodyModel, fps: float, progress: Progress | None) -> Recording:
+def _read_run(run: StoredRun, body: BodyModel, fps: float, progress: Progress) -> Recording:
     """The stored poses; another body is fitted to the markers of the tracked one."""
     name, own = f"{run.session_name}/{run.name}", run.body()
     with run.results() as results:

@@ -136,7 +136,7 @@ def with_root_at(body: BodyModel, root: int, parameters: IntArray, pose: Array, 
     """
     length = MM_OF_ROTATION * scale_of(body)
     scale = np.array([[length] * 3 + [1.0]] * 3)
-    angles = np.array([body.parameters[int(index)].kind == "angle" for index in parameters])
+    angles = body.angles[parameters]
     made = np.array(pose, dtype=np.float64)
 
     def apart(values: Array) -> Array:

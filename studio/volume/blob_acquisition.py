@@ -90,18 +90,6 @@ def _sums(body: BodyModel, limbs: IntArray, local: Array, voxels: Voxels, volume
     return made.reshape(len(body.drawn), BINS, SUMS)
 
 
-def learn_blobs(
-    body: BodyModel, hulls: list[Hull], poses: Array, split: float = 12.0, most_parts: int = MOST_PARTS
-) -> BlobModel:
-    """The blobs after all of these frames' hulls and poses (F, D), in this order; empty hulls add nothing."""
-    profiles, model = Profiles.none(body), cone_blobs(body)
-    for hull, pose in zip(hulls, poses, strict=True):
-        if len(hull.centres):
-            profiles = profiles.with_frame(body, model, hull, pose)
-            model = blobs_of(body, profiles, split, most_parts)
-    return model
-
-
 def blobs_of(body: BodyModel, profiles: Profiles, split: float, most_parts: int = MOST_PARTS) -> BlobModel:
     """The blobs of the profiles; the cones' own where nothing was seen.
 

@@ -20,8 +20,7 @@ def space_of(body: BodyModel, cameras: Sequence[Camera]) -> Box:
     """The box in which the body's hull is carved. Raises CalibrationError where the cameras' views do not overlap."""
     if len(root_parameters(body)):
         return box_of(cameras, scale=scale_of(body))
-    lower = np.array([max(entry.lower, -np.pi) for entry in body.parameters])
-    upper = np.array([min(entry.upper, np.pi) for entry in body.parameters])
+    lower, upper = np.maximum(body.lower, -np.pi), np.minimum(body.upper, np.pi)
     poses = lower + np.random.default_rng(0).random((TRIED, len(lower))) * (upper - lower)
     ends = limb_ends(body, poses).reshape(-1, 3)
     thickest = max(max(limb.radius_start, limb.radius_end) for limb in body.drawn)

@@ -1,11 +1,8 @@
 # pyright: standard
 """Kernels of the visual hull: classification of voxels by pictures or masks (Caillette et al. 2007, Eq. 6).
 
-**Pixels.** A voxel needs scattered pixels, one of few in a cache line, each with nine numbers of background from
-memory. So when the first sample falls into a tile of 32 × 8 pixels the whole tile is computed, in rows, which takes
-less time than five scattered ones; its distances then serve all voxels of all depths. Distances that were not needed
-yet are NaN. Two threads may compute the same tile: each writes the same numbers, and a reader sees either NaN or the
-number.
+Voxels are looked at view by view, sixteen at a time of those that await the same view next, so that their projections
+vectorise; each still meets its views in its own order, and none after the one that carves it.
 """
 
 import math
@@ -21,32 +18,34 @@ from studio.volume.hull_projection import (
     AREA,
     BOUND_X,
     BOUND_Y,
-    PLACE,
+    COUNT,
+    LANES,
+    ROWS,
+    SEEN,
     SHARE,
     U,
     V,
-    place_voxel,
-    sample_count,
-    sample_pixel,
+    count_samples,
+    place_voxels,
+    sample_pixels,
+    set_centre,
 )
 
 BACKGROUND, EDGE, FOREGROUND, UNSEEN = 0, 1, 2, 3
 CARVED, KEPT, SPLIT = 0, 1, 2
-TILE_WIDTH, TILE_HEIGHT = 32, 8
+BLOCK = 4096
+"""Pixels whose distances are found at a time."""
 
 
 class Rules(NamedTuple):
     """The rules of carving. last : whether this is the last depth. least_views : fewest that see a voxel. edge_share :
-    of the samples at the last depth. sampling : samples / √area. shadow, deepest : shares of the luminance. single :
-    T_1. polynomial : T_k's three coefficients.
+    of the samples at the last depth. sampling : samples / √area. single : T_1. polynomial : T_k's three coefficients.
     """
 
     last: bool
     least_views: int
     edge_share: float
     sampling: float
-    shadow: float
-    deepest: float
     single: float
     polynomial: tuple[float, float, float]
 
@@ -55,8 +54,8 @@ class Sights(NamedTuple):
     """A frame's pixels or masks, all views one after another.
 
     by_pixels : not by masks. starts : (2, V + 1) offsets of a view's pixels, and of its sums. sums : summed areas of
-    the masks, (H + 1, W + 1) each. picture : (N, 3) uint8 BGR. gaussians : (9, N) `YuvBackground.packed`. distances :
-    (N,) from the background, NaN where not computed yet. heights : the radical inverse of each sample's number.
+    the masks, (H + 1, W + 1) each. picture : (N, 3) uint8 BGR. distances : (N,) from the background. heights : the
+    radical inverse of each sample's number.
     """
 
     by_pixels: bool
@@ -64,18 +63,26 @@ class Sights(NamedTuple):
     starts: NDArray[np.int64]
     sums: NDArray[np.int32]
     picture: NDArray[np.uint8]
-    gaussians: NDArray[np.float32]
     distances: NDArray[np.float32]
     heights: NDArray[np.float64]
 
 
 @njit(**EXACT, fastmath=True)
-def row_distances(first, end, picture, gaussians, shadow, deepest, distances):
-    """Squared Mahalanobis distances of pixels first to end - 1 from the background, lit or in shadow.
+def find_distances(
+    first_block: int,
+    end_block: int,
+    picture: NDArray[np.uint8],
+    gaussians: NDArray[np.float32],
+    shadow: np.float32,
+    deepest: np.float32,
+    distances: NDArray[np.float32],
+) -> None:
+    """Squared Mahalanobis distances of some blocks of pixels from the background, lit or in shadow.
 
-    picture : (N, 3) uint8 BGR. gaussians : (9, N) `YuvBackground.packed`. distances : (N,) filled. The formula is
-    `YuvBackground.squared_distances`.
+    picture : (N, 3) uint8 BGR. gaussians : (9, N) `YuvBackground.packed`. shadow, deepest : shares of the luminance.
+    distances : (N,) filled. The formula is `YuvBackground.squared_distances`.
     """
+    first, end = first_block * BLOCK, min(end_block * BLOCK, picture.shape[0])
     one = np.float32(1.0)
     for number in range(end - first):
         # Without a sign, so that no place counts from the end and the loop vectorises.
@@ -99,34 +106,21 @@ def row_distances(first, end, picture, gaussians, shadow, deepest, distances):
         distances[at] = found
 
 
-@njit(**EXACT)
-def look_at_tile(seen, view, x, y, rules):
-    """Fill in the distances of the tile around pixel (x, y) of a view."""
-    width, height = int(seen.cameras[view].size[0]), int(seen.cameras[view].size[1])
-    shadow, deepest = np.float32(rules.shadow), np.float32(rules.deepest)
-    left, top = x // TILE_WIDTH * TILE_WIDTH, y // TILE_HEIGHT * TILE_HEIGHT
-    right = min(left + TILE_WIDTH, width)
-    for row in range(top, min(top + TILE_HEIGHT, height)):
-        first = seen.starts[0, view] + row * width
-        row_distances(
-            first + left, first + right, seen.picture, seen.gaussians, shadow, deepest, seen.distances
-        )
-
-
 @njit(**EXACT_INLINED)
-def look_at_mask(seen, view, rules, place):
+def look_at_mask(seen, view, rules, place, lane):
     """Classify a voxel by a mask.
 
     Above the last depth every pixel of the rectangle around the voxel counts, so a voxel that covers a mask pixel is
     not carved. At the last depth: of the rectangle of the voxel's own area.
     """
     width, height = int(seen.cameras[view].size[0]), int(seen.cameras[view].size[1])
-    sums, across, down = seen.sums, place[BOUND_X], place[BOUND_Y]
+    sums, u, v = seen.sums, place[U * LANES + lane], place[V * LANES + lane]
+    across, down = place[BOUND_X * LANES + lane], place[BOUND_Y * LANES + lane]
     if rules.last:
-        shrunk = math.sqrt(place[AREA] / (4.0 * across * down))
+        shrunk = math.sqrt(place[AREA * LANES + lane] / (4.0 * across * down))
         across, down = across * shrunk, down * shrunk
-    left, right = math.floor(place[U] - across + 0.5), math.floor(place[U] + across + 0.5)
-    top, bottom = math.floor(place[V] - down + 0.5), math.floor(place[V] + down + 0.5)
+    left, right = math.floor(u - across + 0.5), math.floor(u + across + 0.5)
+    top, bottom = math.floor(v - down + 0.5), math.floor(v + down + 0.5)
     if right < 0 or bottom < 0 or left >= width or top >= height:
         return UNSEEN
     partly = left < 0 or top < 0 or right >= width or bottom >= height
@@ -136,33 +130,29 @@ def look_at_mask(seen, view, rules, place):
     found = sums[lower + right + 1] - sums[lower + left] - sums[upper + right + 1] + sums[upper + left]
     pixels = (right - left + 1) * (bottom - top + 1)
     if rules.last:
-        if place[U] < -0.5 or place[V] < -0.5 or place[U] >= width - 0.5 or place[V] >= height - 0.5:
+        if u < -0.5 or v < -0.5 or u >= width - 0.5 or v >= height - 0.5:
             return UNSEEN
         return FOREGROUND if found > 0 and found >= rules.edge_share * pixels else BACKGROUND
-    place[SHARE] = found / pixels
+    place[SHARE * LANES + lane] = found / pixels
     if found == 0 and not partly:
         return BACKGROUND
     return FOREGROUND if found == pixels and not partly else EDGE
 
 
 @njit(**EXACT_INLINED)
-def look_at_pixels(seen, view, rules, place):
-    """Eq. 6 for one voxel in one picture."""
+def look_at_pixels(seen, view, rules, place, lane, pixels):
+    """Eq. 6 for one voxel in one picture. pixels : of its samples."""
     # A single return: functions with several count references to their array arguments at each call.
     width, height = int(seen.cameras[view].size[0]), int(seen.cameras[view].size[1])
     start, distances = seen.starts[0, view], seen.distances
     last, single, (one, linear, square) = rules.last, np.float32(rules.single), rules.polynomial
-    count = sample_count(place, rules.sampling)
+    count = int(place[COUNT * LANES + lane])
     enough = one + count * (linear + count * square)
     total, inside, far, decided = np.float32(0.0), 0, 0, False
     for number in range(count):
-        x, y = sample_pixel(place, number, count, seen.heights)
-        if x >= 0 and y >= 0 and x < width and y < height:
-            at = start + y * width + x
-            distance = distances[at]
-            if distance != distance:
-                look_at_tile(seen, view, x, y, rules)
-                distance = distances[at]
+        pixel = np.int64(pixels[number * LANES + lane])
+        if pixel >= 0:
+            distance = distances[start + pixel]
             total += distance
             inside += 1
             far += int(distance > single)
@@ -171,8 +161,10 @@ def look_at_pixels(seen, view, rules, place):
                 break
     answer = EDGE
     if inside == 0:
-        beyond_x = place[U] + place[BOUND_X] < 0.0 or place[U] - place[BOUND_X] > width - 1.0
-        beyond_y = place[V] + place[BOUND_Y] < 0.0 or place[V] - place[BOUND_Y] > height - 1.0
+        u, v = place[U * LANES + lane], place[V * LANES + lane]
+        across, down = place[BOUND_X * LANES + lane], place[BOUND_Y * LANES + lane]
+        beyond_x = u + across < 0.0 or u - across > width - 1.0
+        beyond_y = v + down < 0.0 or v - down > height - 1.0
         answer = UNSEEN if last or beyond_x or beyond_y else EDGE
     elif not decided:
         partly = inside < count
@@ -183,7 +175,7 @@ def look_at_pixels(seen, view, rules, place):
             answer = FOREGROUND if far >= rules.edge_share * inside else BACKGROUND
         elif far == inside and not partly:
             answer = FOREGROUND
-    place[SHARE] = far / max(inside, 1)
+    place[SHARE * LANES + lane] = far / max(inside, 1)
     return answer
 
 
@@ -205,44 +197,71 @@ def judge(
     of those that do not see it, and the view to test first: that in which its parent was least foreground, the
     likeliest to carve it. They are updated; they change the amount of work, never the result.
     """
-    # One loop, not a function per voxel: with several returns references to array arguments are counted at each call.
-    cameras, place, half = seen.cameras, np.empty(PLACE), 0.5 * edge
-    views, by_pixels = cameras.shape[0], seen.by_pixels
-    for index in range(first, end):
-        x = corner[0] + nodes[index, 0] * edge + half
-        y = corner[1] + nodes[index, 1] * edge + half
-        z = corner[2] + nodes[index, 2] * edge + half
-        settled, unseen, view = states[index, 0], states[index, 1], int(states[index, 2]) - 1
-        looked, edges, least, answer = 0, 0, 2.0, EDGE
-        for _ in range(views):
-            view = view + 1 if view + 1 < views else 0
+    # One kernel, not a function per voxel: with several returns references to array arguments are counted at each call.
+    views, half, size = seen.cameras.shape[0], 0.5 * edge, seen.cameras["size"]
+    place, pixels = np.ones(ROWS * LANES), np.empty(seen.heights.shape[0] * LANES)
+    left, count = np.arange(first, end), end - first
+    begins_with, least = states[first:end, 2].copy(), np.full(count, 2.0)
+    looked, edges = np.zeros(count, np.int64), np.zeros(count, np.int64)
+    waiting, lengths = np.empty((views, count), np.int64), np.empty(views, np.int64)
+    for turn in range(views):
+        lengths[:] = 0
+        for number in range(count):
+            index = left[number]
+            view = (int(begins_with[index - first]) + turn) % views
             bit = np.uint32(1) << np.uint32(view)
-            if unseen & bit:
-                continue
-            if settled & bit:
-                looked += 1
-                continue
-            if not place_voxel(cameras, view, x, y, z, half, place):
-                answer = UNSEEN
-            elif by_pixels:
-                answer = look_at_pixels(seen, view, rules, place)
-            else:
-                answer = look_at_mask(seen, view, rules, place)
-            if answer == BACKGROUND:
-                break
-            if answer == UNSEEN:
-                unseen |= bit
-                continue
-            looked += 1
-            if place[SHARE] < least:
-                least = place[SHARE]
-                states[index, 2] = view
-            if answer == EDGE:
-                edges += 1
-            elif not by_pixels:
-                settled |= bit
-        states[index, 0], states[index, 1] = settled, unseen
-        if answer == BACKGROUND or looked < rules.least_views:
+            if states[index, 0] & bit:
+                looked[index - first] += 1
+            elif not states[index, 1] & bit:
+                waiting[view, lengths[view]] = index
+                lengths[view] += 1
+        for number in range(count):
+            verdicts[left[number]] = SPLIT
+        for view in range(views):
+            bit = np.uint32(1) << np.uint32(view)
+            for begin in range(0, lengths[view], LANES):
+                lanes = min(LANES, lengths[view] - begin)
+                for lane in range(lanes):
+                    index = waiting[view, begin + lane]
+                    x = corner[0] + nodes[index, 0] * edge + half
+                    y = corner[1] + nodes[index, 1] * edge + half
+                    z = corner[2] + nodes[index, 2] * edge + half
+                    set_centre(place, lane, x, y, z)
+                place_voxels(seen.cameras, view, half, place)
+                if seen.by_pixels:
+                    most = count_samples(place, lanes, rules.sampling)
+                    sample_pixels(place, most, size[view, 0], size[view, 1], seen.heights, pixels)
+                for lane in range(lanes):
+                    index = waiting[view, begin + lane]
+                    answer = UNSEEN
+                    if place[SEEN * LANES + lane] > 0.0:
+                        if seen.by_pixels:
+                            answer = look_at_pixels(seen, view, rules, place, lane, pixels)
+                        else:
+                            answer = look_at_mask(seen, view, rules, place, lane)
+                    if answer == BACKGROUND:
+                        verdicts[index] = CARVED
+                        continue
+                    if answer == UNSEEN:
+                        states[index, 1] |= bit
+                        continue
+                    looked[index - first] += 1
+                    if place[SHARE * LANES + lane] < least[index - first]:
+                        least[index - first] = place[SHARE * LANES + lane]
+                        states[index, 2] = view
+                    if answer == EDGE:
+                        edges[index - first] += 1
+                    elif not seen.by_pixels:
+                        states[index, 0] |= bit
+        still = 0
+        for number in range(count):
+            if verdicts[left[number]] != CARVED:
+                left[still] = left[number]
+                still += 1
+        count = still
+    for number in range(count):
+        index = left[number]
+        if looked[index - first] < rules.least_views:
             verdicts[index] = CARVED
         else:
-            verdicts[index] = SPLIT if edges else KEPT
+            verdicts[index] = SPLIT if edges[index - first] else KEPT

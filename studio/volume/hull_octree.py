@@ -7,16 +7,21 @@ from numpy.typing import NDArray
 from studio.arrays import Array, Bytes, Floats, Indices
 from studio.geometry.camera_table import CameraTable
 from studio.numba_in_threads import EXACT, KERNEL, njit
-from studio.volume.hull_kernels import KEPT, SPLIT, Rules, Sights, look_at_tile
+from studio.volume.hull_kernels import KEPT, SPLIT, Rules, Sights
 from studio.volume.hull_projection import (
     BOUND_X,
     BOUND_Y,
-    PLACE,
+    COUNT,
+    LANES,
+    ROWS,
+    SEEN,
     U,
     V,
-    place_voxel,
-    sample_count,
-    sample_pixel,
+    count_samples,
+    place_voxels,
+    sample_pixels,
+    set_centre,
+    set_centres,
 )
 
 
@@ -33,23 +38,31 @@ def first_look(
     """Initialise states without pictures: bits of the views that cannot see each voxel (N, 3) in states[:, 1], a view
     that sees all of it in states[:, 2]; its most samples in a view in samples.
     """
-    place, half = np.empty(PLACE), 0.5 * edge
-    for index in range(len(nodes)):
-        x = corner[0] + nodes[index, 0] * edge + half
-        y = corner[1] + nodes[index, 1] * edge + half
-        z = corner[2] + nodes[index, 2] * edge + half
+    place, half = np.ones(ROWS * LANES), 0.5 * edge
+    for begin in range(0, len(nodes), LANES):
+        lanes = min(LANES, len(nodes) - begin)
+        for lane in range(lanes):
+            x = corner[0] + nodes[begin + lane, 0] * edge + half
+            y = corner[1] + nodes[begin + lane, 1] * edge + half
+            z = corner[2] + nodes[begin + lane, 2] * edge + half
+            set_centre(place, lane, x, y, z)
         for view in range(cameras.shape[0]):
             width, height = cameras[view].size[0] - 1.0, cameras[view].size[1] - 1.0
-            if not place_voxel(cameras, view, x, y, z, half, place):
-                states[index, 1] |= np.uint32(1) << np.uint32(view)
-                continue
-            samples[index] = max(samples[index], sample_count(place, sampling))
-            left, right = place[U] - place[BOUND_X], place[U] + place[BOUND_X]
-            top, bottom = place[V] - place[BOUND_Y], place[V] + place[BOUND_Y]
-            if right < -0.5 or bottom < -0.5 or left > width + 0.5 or top > height + 0.5:
-                states[index, 1] |= np.uint32(1) << np.uint32(view)
-            elif left >= 0.0 and top >= 0.0 and right <= width and bottom <= height:
-                states[index, 2] = view
+            place_voxels(cameras, view, half, place)
+            count_samples(place, lanes, sampling)
+            for lane in range(lanes):
+                index = begin + lane
+                if place[SEEN * LANES + lane] == 0.0:
+                    states[index, 1] |= np.uint32(1) << np.uint32(view)
+                    continue
+                samples[index] = max(samples[index], int(place[COUNT * LANES + lane]))
+                u, v = place[U * LANES + lane], place[V * LANES + lane]
+                across, down = place[BOUND_X * LANES + lane], place[BOUND_Y * LANES + lane]
+                left, right, top, bottom = u - across, u + across, v - down, v + down
+                if right < -0.5 or bottom < -0.5 or left > width + 0.5 or top > height + 0.5:
+                    states[index, 1] |= np.uint32(1) << np.uint32(view)
+                elif left >= 0.0 and top >= 0.0 and right <= width and bottom <= height:
+                    states[index, 2] = view
 
 
 @njit(**KERNEL)
@@ -134,53 +147,60 @@ def colour(
     own colour the mean of these, or that of all samples where no view has any.
     """
     cameras, starts, sums, picture = seen.cameras, seen.starts, seen.sums, seen.picture
-    distances, place = seen.distances, np.empty(PLACE)
+    place, pixels = np.ones(ROWS * LANES), np.empty(seen.heights.shape[0] * LANES)
     one, none = np.float32(1.0), np.float32(np.nan)
-    for index in range(first, end):
-        x, y, z = centres[index, 0], centres[index, 1], centres[index, 2]
-        blue = green = red = any_blue = any_green = any_red = np.float32(0.0)
-        showing, looked = 0, 0
+    # Of each lane: sums of B, G and R over the views that show it, and over all samples; how many these are.
+    shown, everything = np.empty((LANES, 3), np.float32), np.empty((LANES, 3), np.float32)
+    showing, looked = np.empty(LANES, np.int64), np.empty(LANES, np.int64)
+    index = first
+    while index < end:
+        lanes = set_centres(place, centres, edges, index, end)
+        shown[:], everything[:], showing[:], looked[:] = 0.0, 0.0, 0, 0
         for view in range(cameras.shape[0]):
-            width, height = int(cameras[view].size[0]), int(cameras[view].size[1])
-            count, chosen = 0, 0
-            if place_voxel(cameras, view, x, y, z, 0.5 * edges[index], place):
-                count = sample_count(place, rules.sampling)
-            b = g = r = np.float32(0.0)
-            for number in range(count):
-                column, row = sample_pixel(place, number, count, seen.heights)
-                if column < 0 or row < 0 or column >= width or row >= height:
-                    continue
-                at = starts[0, view] + row * width + column
-                if seen.by_pixels:
-                    if distances[at] != distances[at]:
-                        look_at_tile(seen, view, column, row, rules)
-                    differs = distances[at] > rules.single
-                else:
-                    above = starts[1, view] + row * (width + 1) + column
-                    below = above + width + 1
-                    differs = sums[below + 1] - sums[below] - sums[above + 1] + sums[above] > 0
-                pb, pg, pr = (
-                    np.float32(picture[at, 0]),
-                    np.float32(picture[at, 1]),
-                    np.float32(picture[at, 2]),
-                )
-                any_blue, any_green, any_red, looked = any_blue + pb, any_green + pg, any_red + pr, looked + 1
-                if differs:
-                    b, g, r, chosen = b + pb, g + pg, r + pr, chosen + 1
-            amount = one / np.float32(chosen) if chosen else none
-            views[index, view, 0], views[index, view, 1], views[index, view, 2] = (
-                b * amount,
-                g * amount,
-                r * amount,
-            )
-            if chosen:
-                blue, green, red, showing = (
-                    blue + b * amount,
-                    green + g * amount,
-                    red + r * amount,
-                    showing + 1,
-                )
-        if showing == 0:
-            blue, green, red, showing = any_blue, any_green, any_red, looked
-        amount = one / np.float32(showing)
-        means[index, 0], means[index, 1], means[index, 2] = blue * amount, green * amount, red * amount
+            width, height = float(cameras[view].size[0]), float(cameras[view].size[1])
+            row_length, first_pixel, first_sum = int(width), starts[0, view], starts[1, view]
+            place_voxels(cameras, view, 0.5 * edges[index], place)
+            most = count_samples(place, lanes, rules.sampling)
+            sample_pixels(place, most, width, height, seen.heights, pixels)
+            for lane in range(lanes):
+                count, chosen = 0, 0
+                if place[SEEN * LANES + lane] > 0.0:
+                    count = int(place[COUNT * LANES + lane])
+                b = g = r = np.float32(0.0)
+                for number in range(count):
+                    pixel = np.int64(pixels[number * LANES + lane])
+                    if pixel < 0:
+                        continue
+                    at = first_pixel + pixel
+                    if seen.by_pixels:
+                        differs = seen.distances[at] > rules.single
+                    else:
+                        above = first_sum + pixel + pixel // row_length
+                        below = above + row_length + 1
+                        differs = sums[below + 1] - sums[below] - sums[above + 1] + sums[above] > 0
+                    pb, pg, pr = (
+                        np.float32(picture[at, 0]),
+                        np.float32(picture[at, 1]),
+                        np.float32(picture[at, 2]),
+                    )
+                    everything[lane, 0] += pb
+                    everything[lane, 1] += pg
+                    everything[lane, 2] += pr
+                    looked[lane] += 1
+                    if differs:
+                        b, g, r, chosen = b + pb, g + pg, r + pr, chosen + 1
+                amount = one / np.float32(chosen) if chosen else none
+                views[index + lane, view, 0] = b * amount
+                views[index + lane, view, 1] = g * amount
+                views[index + lane, view, 2] = r * amount
+                if chosen:
+                    shown[lane, 0] += b * amount
+                    shown[lane, 1] += g * amount
+                    shown[lane, 2] += r * amount
+                    showing[lane] += 1
+        for lane in range(lanes):
+            total, number = (shown, showing[lane]) if showing[lane] else (everything, looked[lane])
+            amount = one / np.float32(number)
+            for channel in range(3):
+                means[index + lane, channel] = total[lane, channel] * amount
+        index += lanes

@@ -1,5 +1,6 @@
 # pyright: standard
-"""A voxel's projection into a picture, and samples spread over it.
+"""Voxels' projections into a picture, and samples spread over each, sixteen voxels at a time (structures of arrays, so
+that all of it vectorises: see `likelihood.outline_kernels`).
 
 It is computed at the voxel's centre: with the derivative of the lens's projection there (distortion included) its three
 half axes become three vectors in the picture, its silhouette a hexagon that the projections of the three faces turned
@@ -8,15 +9,19 @@ depth / (depth + d's depth): samples use that factor, bounds its largest value, 
 error by distortion within one voxel is hundredths of a pixel.
 """
 
-import math
+import numpy as np
 
 from studio.geometry import projection
-from studio.numba_in_threads import EXACT_INLINED, njit
+from studio.numba_in_threads import EXACT, EXACT_INLINED, njit
 
-U, V, DEPTH, AXES, SINKS, BOUND_X, BOUND_Y, AREA, FACES, SHARE, PLACE = 0, 1, 2, 3, 9, 12, 13, 14, 15, 18, 19
-"""Entries of a voxel's projection: centre (pixels), depth (mm), x and y of the half axes towards the camera, their
-depths, half sides of the upright rectangle around the hexagon, area, area of the three faces (pixels²), and
-the share of foreground that was found there."""
+LANES = 16
+U, V, DEPTH, AXES, SINKS, BOUND_X, BOUND_Y, AREA, FACES, SHARE, SEEN, CENTRE, COUNT, ROWS = (
+    0, 1, 2, 3, 9, 12, 13, 14, 15, 18, 19, 20, 23, 24,
+)  # fmt: skip
+"""Rows of projections, of sixteen lanes each: centre (pixels), depth (mm), x and y of the half axes towards the camera,
+their depths, half sides of the upright rectangle around the hexagon, area, area of the three faces (pixels²), the share
+of foreground that was found there, whether the camera sees the voxel, the voxel's centre in the world (mm), and its
+number of samples."""
 NEAR = 100.0
 """mm: voxels nearer to a camera's plane than this are not seen by it."""
 
@@ -24,78 +29,148 @@ distorted = njit(**EXACT_INLINED)(projection.distorted)
 
 
 @njit(**EXACT_INLINED)
-def place_voxel(cameras, view, x, y, z, half, place):
-    """Fill `place` with a voxel's projection; False where the camera cannot see it. half : of its edge, mm."""
+def half_axis(away, half, turned, at, slopes, lens):
+    """Across and down (pixels) and depth of a voxel's half axis towards the camera, which is `away` along it. turned :
+    that axis in the camera's. at : a, b, 1 / depth. slopes : of the lens there. lens : fx, skew, fy.
+    """
+    step = half if away >= 0.0 else -half
+    sink = step * turned[2]
+    along_a = (step * turned[0] - at[0] * sink) * at[2]
+    along_b = (step * turned[1] - at[1] * sink) * at[2]
+    along_x = slopes[0] * along_a + slopes[1] * along_b
+    along_y = slopes[1] * along_a + slopes[2] * along_b
+    return lens[0] * along_x + lens[1] * along_y, lens[2] * along_y, sink
+
+
+@njit(**EXACT_INLINED)
+def face_area(ax, ay, bx, by):
+    """Of the face between two half axes."""
+    return 4.0 * abs(ax * by - ay * bx)
+
+
+@njit(**EXACT)
+def place_voxels(cameras, view, half, place):
+    """Fill the projections (24 · 16,) of sixteen voxels from their centres. half : of their edge, mm."""
     camera = cameras[view]
-    r, t, m, k = camera.rotation, camera.translation, camera.matrix, camera.lens
-    depth = r[2, 0] * x + r[2, 1] * y + r[2, 2] * z + t[2]
-    reach = half * (abs(r[2, 0]) + abs(r[2, 1]) + abs(r[2, 2]))
-    if depth - reach < NEAR:
-        return False
-    near = 1.0 / depth
-    a = (r[0, 0] * x + r[0, 1] * y + r[0, 2] * z + t[0]) * near
-    b = (r[1, 0] * x + r[1, 1] * y + r[1, 2] * z + t[1]) * near
-    square = a * a + b * b
-    if square > camera.limit:
-        return False
+    r, t, m, k, eye = camera.rotation, camera.translation, camera.matrix, camera.lens, camera.centre
+    r00, r01, r02, r10, r11, r12 = r[0, 0], r[0, 1], r[0, 2], r[1, 0], r[1, 1], r[1, 2]
+    r20, r21, r22, t0, t1, t2 = r[2, 0], r[2, 1], r[2, 2], t[0], t[1], t[2]
+    fx, skew, cx, fy, cy = m[0, 0], m[0, 1], m[0, 2], m[1, 1], m[1, 2]
     k1, k2, p1, p2, k3 = k[0], k[1], k[2], k[3], k[4]
-    xd, yd, radial = distorted(a, b, (k1, k2, p1, p2, k3))
-    slope = 2.0 * (k1 + square * (2.0 * k2 + square * 3.0 * k3))
-    xx = radial + a * a * slope + 2.0 * p1 * b + 6.0 * p2 * a
-    xy = a * b * slope + 2.0 * p1 * a + 2.0 * p2 * b
-    yy = radial + b * b * slope + 6.0 * p1 * b + 2.0 * p2 * a
-    fx, skew, fy = m[0, 0], m[0, 1], m[1, 1]
-    place[U] = fx * xd + skew * yd + m[0, 2]
-    place[V] = fy * yd + m[1, 2]
-    place[DEPTH] = depth
-    bound_x, bound_y = 0.0, 0.0
-    for axis in range(3):
-        away = camera.centre[axis] - (x if axis == 0 else y if axis == 1 else z)
-        step = half if away >= 0.0 else -half
-        sink = step * r[2, axis]
-        along_a = (step * r[0, axis] - a * sink) * near
-        along_b = (step * r[1, axis] - b * sink) * near
-        along_x, along_y = xx * along_a + xy * along_b, xy * along_a + yy * along_b
-        across, down = fx * along_x + skew * along_y, fy * along_y
-        place[AXES + 2 * axis], place[AXES + 2 * axis + 1], place[SINKS + axis] = across, down, sink
-        bound_x += abs(across)
-        bound_y += abs(down)
-    scale = depth / (depth - reach)
-    place[BOUND_X], place[BOUND_Y] = bound_x * scale, bound_y * scale
-    place[AREA] = 0.0
-    for axis in range(3):
-        one, two = AXES + 2 * ((axis + 1) % 3), AXES + 2 * ((axis + 2) % 3)
-        face = 4.0 * abs(place[one] * place[two + 1] - place[one + 1] * place[two])
-        place[FACES + axis] = face
-        place[AREA] += face
-    return True
+    ex, ey, ez, limit = eye[0], eye[1], eye[2], camera.limit
+    reach = half * (abs(r20) + abs(r21) + abs(r22))
+    for lane in range(LANES):
+        x, y, z = (
+            place[CENTRE * LANES + lane],
+            place[(CENTRE + 1) * LANES + lane],
+            place[(CENTRE + 2) * LANES + lane],
+        )
+        depth = r20 * x + r21 * y + r22 * z + t2
+        near = 1.0 / depth
+        a = (r00 * x + r01 * y + r02 * z + t0) * near
+        b = (r10 * x + r11 * y + r12 * z + t1) * near
+        square = a * a + b * b
+        xd, yd, radial = distorted(a, b, (k1, k2, p1, p2, k3))
+        slope = 2.0 * (k1 + square * (2.0 * k2 + square * 3.0 * k3))
+        slopes = (
+            radial + a * a * slope + 2.0 * p1 * b + 6.0 * p2 * a,
+            a * b * slope + 2.0 * p1 * a + 2.0 * p2 * b,
+            radial + b * b * slope + 6.0 * p1 * b + 2.0 * p2 * a,
+        )
+        place[U * LANES + lane] = fx * xd + skew * yd + cx
+        place[V * LANES + lane] = fy * yd + cy
+        place[DEPTH * LANES + lane] = depth
+        at, lens = (a, b, near), (fx, skew, fy)
+        ax, ay, a_sink = half_axis(ex - x, half, (r00, r10, r20), at, slopes, lens)
+        bx, by, b_sink = half_axis(ey - y, half, (r01, r11, r21), at, slopes, lens)
+        gx, gy, g_sink = half_axis(ez - z, half, (r02, r12, r22), at, slopes, lens)
+        place[AXES * LANES + lane], place[(AXES + 1) * LANES + lane] = ax, ay
+        place[(AXES + 2) * LANES + lane], place[(AXES + 3) * LANES + lane] = bx, by
+        place[(AXES + 4) * LANES + lane], place[(AXES + 5) * LANES + lane] = gx, gy
+        place[SINKS * LANES + lane] = a_sink
+        place[(SINKS + 1) * LANES + lane] = b_sink
+        place[(SINKS + 2) * LANES + lane] = g_sink
+        scale = depth / (depth - reach)
+        place[BOUND_X * LANES + lane] = (abs(ax) + abs(bx) + abs(gx)) * scale
+        place[BOUND_Y * LANES + lane] = (abs(ay) + abs(by) + abs(gy)) * scale
+        first, second, third = face_area(bx, by, gx, gy), face_area(gx, gy, ax, ay), face_area(ax, ay, bx, by)
+        place[FACES * LANES + lane] = first
+        place[(FACES + 1) * LANES + lane] = second
+        place[(FACES + 2) * LANES + lane] = third
+        place[AREA * LANES + lane] = first + second + third
+        place[SEEN * LANES + lane] = 1.0 if (depth - reach >= NEAR) & (square <= limit) else 0.0
 
 
 @njit(**EXACT_INLINED)
-def sample_count(place, sampling):
-    """Number of samples for a voxel's area: the square root of its pixels, at least one."""
-    return max(1, math.ceil(sampling * math.sqrt(place[AREA]) - 1e-9))
+def set_centre(place, lane, x, y, z):
+    """A voxel's centre in the world (mm)."""
+    place[CENTRE * LANES + lane] = x
+    place[(CENTRE + 1) * LANES + lane] = y
+    place[(CENTRE + 2) * LANES + lane] = z
 
 
-@njit(**EXACT_INLINED)
-def sample_pixel(place, number, count, heights):
-    """Column and row of one of `count` samples spread evenly over a voxel's area (Hammersley's points on the faces).
+@njit(**EXACT)
+def set_centres(place, centres, edges, first, end):
+    """Set the centres of as many of the voxels from `first` on as have the same edge; returns their number."""
+    lanes = 0
+    while lanes < LANES and first + lanes < end and edges[first + lanes] == edges[first]:
+        index = first + lanes
+        set_centre(place, lanes, centres[index, 0], centres[index, 1], centres[index, 2])
+        lanes += 1
+    return lanes
+
+
+@njit(**EXACT)
+def count_samples(place, lanes, sampling):
+    """Fill in the number of each voxel's samples: the square root of its pixels, at least one. Returns the most of the
+    first lanes."""
+    for lane in range(LANES):
+        area = place[AREA * LANES + lane]
+        place[COUNT * LANES + lane] = max(1.0, np.ceil(sampling * np.sqrt(area) - 1e-9))
+    most = 0
+    for lane in range(lanes):
+        if place[SEEN * LANES + lane] > 0.0:
+            most = max(most, int(place[COUNT * LANES + lane]))
+    return most
+
+
+@njit(**EXACT)
+def sample_pixels(place, most, width, height, heights, pixels):
+    """Fill pixels (most · 16,) with the places in the picture, row by row, -1 outside, of each voxel's first samples,
+    spread evenly over its area (Hammersley's points on the faces); what lies behind its last sample is none.
 
     heights : the radical inverse of each sample's number in base 2.
     """
-    if count == 1:
-        return math.floor(place[U] + 0.5), math.floor(place[V] + 0.5)
-    at = (number + 0.5) / count * place[AREA]
-    face = 0
-    while face < 2 and at >= place[FACES + face]:
-        at -= place[FACES + face]
-        face += 1
-    p = 2.0 * at / place[FACES + face] - 1.0
-    q = 2.0 * heights[number] - 1.0
-    one, two = (face + 1) % 3, (face + 2) % 3
-    sink = place[SINKS + face] + p * place[SINKS + one] + q * place[SINKS + two]
-    scale = place[DEPTH] / (place[DEPTH] + sink)
-    f, g, h = AXES + 2 * face, AXES + 2 * one, AXES + 2 * two
-    x = place[U] + scale * (place[f] + p * place[g] + q * place[h])
-    y = place[V] + scale * (place[f + 1] + p * place[g + 1] + q * place[h + 1])
-    return math.floor(x + 0.5), math.floor(y + 0.5)
+    for number in range(most):
+        q = 2.0 * heights[number] - 1.0
+        for lane in range(LANES):
+            u, v, depth = place[U * LANES + lane], place[V * LANES + lane], place[DEPTH * LANES + lane]
+            ax, ay = place[AXES * LANES + lane], place[(AXES + 1) * LANES + lane]
+            bx, by = place[(AXES + 2) * LANES + lane], place[(AXES + 3) * LANES + lane]
+            cx, cy = place[(AXES + 4) * LANES + lane], place[(AXES + 5) * LANES + lane]
+            a_sink, b_sink = place[SINKS * LANES + lane], place[(SINKS + 1) * LANES + lane]
+            c_sink, first_area = place[(SINKS + 2) * LANES + lane], place[FACES * LANES + lane]
+            second_area, third_area = place[(FACES + 1) * LANES + lane], place[(FACES + 2) * LANES + lane]
+            count = place[COUNT * LANES + lane]
+            at = (number + 0.5) / count * place[AREA * LANES + lane]
+            beyond = at >= first_area
+            at = at - first_area if beyond else at
+            last = beyond & (at >= second_area)
+            at = at - second_area if last else at
+            p = 2.0 * at / (third_area if last else second_area if beyond else first_area) - 1.0
+            # On the first face the half axes are a, b, c; on the second b, c, a; on the third c, a, b.
+            sink = (c_sink if last else b_sink if beyond else a_sink) + p * (
+                a_sink if last else c_sink if beyond else b_sink
+            )
+            sink = sink + q * (b_sink if last else a_sink if beyond else c_sink)
+            scale = depth / (depth + sink)
+            x = (cx if last else bx if beyond else ax) + p * (ax if last else cx if beyond else bx)
+            y = (cy if last else by if beyond else ay) + p * (ay if last else cy if beyond else by)
+            x = u + scale * (x + q * (bx if last else ax if beyond else cx))
+            y = v + scale * (y + q * (by if last else ay if beyond else cy))
+            column, row = (
+                np.floor((u if count == 1.0 else x) + 0.5),
+                np.floor((v if count == 1.0 else y) + 0.5),
+            )
+            inside = (column >= 0.0) & (row >= 0.0) & (column < width) & (row < height)
+            pixels[number * LANES + lane] = row * width + column if inside else -1.0

@@ -10,7 +10,18 @@ from studio.geometry.camera import Camera
 from studio.geometry.camera_table import camera_table, picture_limit
 from studio.numba_in_threads import EXACT, njit
 from studio.volume.hull import Hull
-from studio.volume.hull_projection import AXES, BOUND_X, BOUND_Y, PLACE, U, V, place_voxel
+from studio.volume.hull_projection import (
+    AXES,
+    BOUND_X,
+    BOUND_Y,
+    LANES,
+    ROWS,
+    SEEN,
+    U,
+    V,
+    place_voxels,
+    set_centres,
+)
 
 
 def silhouette(hull: Hull, camera: Camera) -> NDArray[np.uint8]:
@@ -28,22 +39,24 @@ def draw_voxels(cameras, centres, edges, picture):
     normal n of each axis |n d| is at most the sum of |n a|.
     """
     height, width = picture.shape
-    place = np.empty(PLACE)
-    for k in range(len(centres)):
-        if not place_voxel(cameras, 0, centres[k, 0], centres[k, 1], centres[k, 2], 0.5 * edges[k], place):
-            continue
-        u, v = place[U], place[V]
-        column, row = math.floor(u + 0.5), math.floor(v + 0.5)
-        if 0 <= column < width and 0 <= row < height:
-            picture[row, column] = 255
-        for y in range(
-            max(0, math.ceil(v - place[BOUND_Y])), min(height, math.floor(v + place[BOUND_Y]) + 1)
-        ):
-            for x in range(
-                max(0, math.ceil(u - place[BOUND_X])), min(width, math.floor(u + place[BOUND_X]) + 1)
-            ):
-                if picture[y, x] == 0 and in_hexagon(place, x - u, y - v):
-                    picture[y, x] = 255
+    places = np.ones(ROWS * LANES)
+    rows, index = places.reshape((ROWS, LANES)), 0
+    while index < len(centres):
+        lanes = set_centres(places, centres, edges, index, len(centres))
+        place_voxels(cameras, 0, 0.5 * edges[index], places)
+        index += lanes
+        for lane in range(lanes):
+            place = rows[:, lane]
+            if place[SEEN] == 0.0:
+                continue
+            u, v, across, down = place[U], place[V], place[BOUND_X], place[BOUND_Y]
+            column, row = math.floor(u + 0.5), math.floor(v + 0.5)
+            if 0 <= column < width and 0 <= row < height:
+                picture[row, column] = 255
+            for y in range(max(0, math.ceil(v - down)), min(height, math.floor(v + down) + 1)):
+                for x in range(max(0, math.ceil(u - across)), min(width, math.floor(u + across) + 1)):
+                    if picture[y, x] == 0 and in_hexagon(place, x - u, y - v):
+                        picture[y, x] = 255
 
 
 @njit(**EXACT)

@@ -13,9 +13,10 @@ estimate of that integral confirms (tests), is
 
 is used here, so that Eq. 8 and 9 hold. It also costs less: Σg⁻¹ belongs to the pictures and is computed once a frame.
 
-Eq. 8 takes for each f_i the nearest g_j; Eq. 9 keeps the correspondence f_i ↔ g_i that fitting from the model's own
-blobs gives, and costs one divergence a blob. With weights that sum to 1 every term of Eq. 9 together is never negative.
-Colours add the same to every pose's divergence, so poses are weighed by the divergence in space (d = 3).
+Eq. 8 takes for each f_i the nearest g_j. Eq. 9, which is used here, keeps the correspondence f_i ↔ g_i that fitting
+from the model's own blobs gives, and costs one divergence a blob. With weights that sum to 1 all terms of Eq. 9
+together are never negative. Colours add the same to every pose's divergence, so poses are weighed by the divergence in
+space (d = 3).
 """
 
 from dataclasses import dataclass
@@ -30,31 +31,6 @@ from studio.numba_in_threads import KERNEL, njit
 from studio.volume.blob_model import BlobMixture, BlobModel
 
 DIMENSIONS = 3
-
-
-def gaussian_divergence(mean_f: Array, covariance_f: Array, mean_g: Array, covariance_g: Array) -> Array:
-    """D(f||g) in nats, the textbook form (see above), of Gaussians (..., d) with covariances (..., d, d)."""
-    apart = mean_g - mean_f
-    precision = np.linalg.inv(covariance_g)
-    trace = np.einsum("...ij,...ji->...", precision, covariance_f)
-    distance = np.einsum("...i,...ij,...j->...", apart, precision, apart)
-    logs = np.linalg.slogdet(covariance_g)[1] - np.linalg.slogdet(covariance_f)[1]
-    return 0.5 * (logs - mean_f.shape[-1] + trace + distance)
-
-
-def nearest_divergence(model: BlobMixture, image: BlobMixture) -> float:
-    """D(F||G) by Eq. 8: every blob of the model against the best of the pictures' (nats, in space)."""
-    between = gaussian_divergence(
-        model.means[:, None], model.covariances[:, None], image.means[None], image.covariances[None]
-    )
-    shares = np.log(model.weights[:, None] / image.weights[None])
-    return float(model.weights @ (between + shares).min(axis=1))
-
-
-def kept_divergence(model: BlobMixture, image: BlobMixture) -> float:
-    """D(F||G) by Eq. 9, blob i of the model against blob i of the pictures (nats, in space)."""
-    between = gaussian_divergence(model.means, model.covariances, image.means, image.covariances)
-    return float(model.weights @ (between + np.log(model.weights / image.weights)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

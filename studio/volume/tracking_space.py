@@ -50,32 +50,22 @@ class Box:
         return np.array([*(middle - 0.5 * self.edge), self.lower[2]])
 
 
-def box_of(
-    cameras: Sequence[Camera],
-    *,
-    floor: float = 0.0,
-    height: float | None = None,
-    margin: float = 0.0,
-    scale: float = 1.0,
-) -> Box:
-    """The space that all cameras see, else the most cameras with a common view.
+def box_of(cameras: Sequence[Camera], *, scale: float = 1.0) -> Box:
+    """The space on the floor that all cameras see, else the most cameras with a common view.
 
-    floor : height of the floor, mm: the box begins there. height : of the space, mm; default: HEIGHT. margin : mm added
-    on the four sides. A place counts as seen when knees, hips and head of a person standing there are in the picture.
+    A place counts as seen when knees, hips and head of a person standing there are in the picture.
     scale : of the body beside a person, by which the heights and sides are multiplied (`scale_of`).
     Raises CalibrationError where no two cameras (of several) see a common place.
     """
     if not cameras:
         raise CalibrationError("A tracking space needs at least one camera.", "Give a calibration.")
-    height = HEIGHT * scale if height is None else height
-    middle, reach = _surroundings(cameras, floor + 0.5 * height, scale)
+    height = HEIGHT * scale
+    middle, reach = _surroundings(cameras, 0.5 * height, scale)
     steps = np.linspace(-reach, reach, GRID)
     x, y = np.meshgrid(float(middle[0]) + steps, float(middle[1]) + steps, indexing="ij")
     seeing = np.zeros(x.shape, dtype=np.int64)
     for camera in cameras:
-        places = np.stack(
-            [np.stack([x, y, np.full_like(x, floor + scale * level)], axis=-1) for level in LEVELS]
-        )
+        places = np.stack([np.stack([x, y, np.full_like(x, scale * level)], axis=-1) for level in LEVELS])
         seeing += sees(camera, places).all(axis=0)
     for least in range(len(cameras), min(len(cameras), 2) - 1, -1):
         watched = seeing >= least
@@ -89,9 +79,9 @@ def box_of(
         )
     lower = np.array([x[watched].min(), y[watched].min()])
     upper = np.array([x[watched].max(), y[watched].max()])
-    half = np.maximum(0.5 * (upper - lower) + margin, 0.5 * LEAST_SIDE * scale)
+    half = np.maximum(0.5 * (upper - lower), 0.5 * LEAST_SIDE * scale)
     centre = 0.5 * (lower + upper)
-    return Box(np.array([*(centre - half), floor]), np.array([*(centre + half), floor + height]))
+    return Box(np.array([*(centre - half), 0.0]), np.array([*(centre + half), height]))
 
 
 def _surroundings(cameras: Sequence[Camera], height: float, scale: float) -> tuple[Array, float]:

@@ -54,6 +54,7 @@ def test_what_is_measured_has_the_wanted_size(tmp_path: Path) -> None:
     footage.close()
 
 
+@pytest.mark.slow
 def test_every_curve_is_measured_and_shown() -> None:
     least = Sizes((10, 20), (32, 64), (1, 2), (4, 8), (0.25, 0.5), (10, 60), (2, 4))
     curves, usual = measure_growth(least, lambda *_: None)

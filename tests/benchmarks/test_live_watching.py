@@ -59,6 +59,9 @@ def test_a_live_run_with_the_scene_open() -> None:
     assert len(found.live.tracked) + len(found.live.dropped) == 120 - found.live.tracked[0]
     assert found.viewer_messages > 0.0
     assert found.viewer_bytes > 0.0
+    early, late = found.memory
+    assert 100.0 < early < 1.5 * late
+    assert found.figures()["memory_growth"] == pytest.approx(late / early - 1.0, abs=1e-4)
     assert any("latency" in words for words in steps)
     made = prepare_replay(session, run)
     assert replay_live(session, run, made, lambda *_: None).different == ()
@@ -66,8 +69,9 @@ def test_a_live_run_with_the_scene_open() -> None:
 
 
 @pytest.mark.slow
-def test_the_live_benchmark_measures_and_reports() -> None:
-    report = run_live_benchmark(lambda *_: None, seconds=3.0)
+def test_the_live_benchmark_measures_and_reports(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("studio.benchmarks.live.SECONDS", 3.0)
+    report = run_live_benchmark(lambda *_: None)
     stages = {row["stage"]: row for row in report["stages"]}  # pyright: ignore[reportGeneralTypeIssues]
     assert all(row["ms"] > 0.0 for name, row in stages.items() if name != "the rest")
     assert stages["reconstruction"]["paper_ms"] == 28.1
@@ -79,3 +83,6 @@ def test_the_live_benchmark_measures_and_reports() -> None:
         assert figures["tracked"] > 0  # pyright: ignore[reportIndexIssue]
         assert math.isfinite(figures["latency_ms"]["p95"])  # pyright: ignore[reportIndexIssue]
     assert isinstance(report["sustained"], bool)
+    long = run_live_benchmark(lambda *_: None, minutes=0.1)
+    assert long["scene_open"]["tracked"] + long["scene_open"]["dropped"] <= 180  # pyright: ignore[reportIndexIssue]
+    assert not {"scene_open_pressed", "alone", "at_60_hz"} & set(long)

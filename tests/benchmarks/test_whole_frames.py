@@ -1,13 +1,15 @@
 """Whole frames are measured with every stage of them; the table says how far each figure is from its aim."""
 
 import json
+import math
+import os
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
 from studio.benchmarks.results_table import in_lines, remember, rows_of, this_machine
-from studio.benchmarks.timing import IdleShare
+from studio.benchmarks.timing import IdleShare, resident_megabytes
 from studio.benchmarks.whole_frames import BODYTRACK, DEFAULT, IMPROVED, SWARM, measure_frames
 from studio.cli.bench_commands import bench_command
 from studio.progress import unheard
@@ -43,6 +45,36 @@ def test_the_idle_share_is_of_all_cores(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr("studio.benchmarks.timing.time.monotonic", lambda: next(now))
     monkeypatch.setattr("studio.benchmarks.timing.os.cpu_count", lambda: 2)
     assert IdleShare().so_far() == 0.75
+
+
+def test_memory_is_what_processes_have_in_use() -> None:
+    fields = dict(
+        line.split(":") for line in Path("/proc/self/status").read_text(encoding="utf-8").splitlines()
+    )
+    kibibytes = float(fields["VmRSS"].split()[0])
+    assert resident_megabytes(os.getpid()) == pytest.approx(kibibytes * 1024 / 1e6, rel=0.05)
+    assert resident_megabytes(os.getpid(), os.getpid()) == pytest.approx(
+        2.0 * resident_megabytes(os.getpid()), rel=0.05
+    )
+    assert math.isnan(resident_megabytes(os.getpid(), 0))
+
+
+def test_who_asks_for_minutes_asks_for_the_live_run_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("STUDIO_WORKSPACE", str(tmp_path / "workspace"))
+    measured: list[float | None] = []
+
+    def live(report: object, minutes: float | None) -> dict[str, object]:
+        measured.append(minutes)
+        return {"scene_open": {"frames_per_second": 29.9, "memory_growth": 0.1}}
+
+    monkeypatch.setattr("studio.cli.bench_commands.run_live_benchmark", live)
+    monkeypatch.setattr("studio.cli.bench_commands.in_words", lambda found: "")
+    answer = CliRunner().invoke(bench_command, ["--minutes", "20", "--json"], catch_exceptions=False)
+    assert measured == [20.0]
+    rows = {row["name"]: row["reached"] for row in json.loads(answer.stdout)["rows"]}
+    assert rows == {"live, scene open, 30 Hz": 0.997, "live, growth of memory": 0.5}
 
 
 def test_the_trace_and_the_history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

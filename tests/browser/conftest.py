@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from guided_setup import PATIENCE, GuidedSetup
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, Page, expect
 from studio_page import StudioPage
 from studio_server import StudioServer
 from toy_session import make_session
@@ -17,47 +17,60 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudioServer]:
     """`studio demo` on a workspace of its own."""
-    studio = StudioServer("demo", tmp_path_factory.mktemp("demo") / "workspace")
-    yield studio
-    studio.stop()
+    with StudioServer("demo", tmp_path_factory.mktemp("demo") / "workspace") as studio:
+        yield studio
+
+
+@pytest.fixture(scope="module")
+def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The workspace of a file's studio, into which a fixture of this name in the file may put something."""
+    return tmp_path_factory.mktemp("serve") / "workspace"
+
+
+@pytest.fixture(scope="module")
+def footage() -> Path | None:
+    """The folder that a file's studio may read."""
+    return None
+
+
+@pytest.fixture(scope="module")
+def studio(workspace: Path, footage: Path | None) -> Iterator[StudioServer]:
+    """`studio serve` for all tests of a file."""
+    with StudioServer("serve", workspace, footage) as studio:
+        yield studio
 
 
 @pytest.fixture
 def toy_studio(tmp_path: Path) -> Iterator[StudioServer]:
     """`studio serve` on the toy arm."""
     make_session(tmp_path / "workspace" / "toy")
-    made = StudioServer("serve", tmp_path / "workspace")
-    yield made
-    made.stop()
+    with StudioServer("serve", tmp_path / "workspace") as studio:
+        yield studio
 
 
 @pytest.fixture(scope="module")
 def window(browser: Browser, studio: StudioServer) -> Iterator[StudioPage]:
-    """One window, its scene left blank, for all tests of a file that has a `studio`; they go on from one another."""
+    """One window, its scene left blank, for all tests of a file; they go on from one another."""
     opened = StudioPage(browser, studio, with_scene=False)
     yield opened
     opened.close()
 
 
 @pytest.fixture(scope="module")
-def way(
-    browser: Browser,
-    tmp_path_factory: pytest.TempPathFactory,
-    artefacts: Path,
-    request: pytest.FixtureRequest,
-) -> Iterator[GuidedSetup]:
-    """The guided set-up of a studio with an empty workspace that may read no folder, for all tests of a file, which
-    names the folder of its `PICTURES`; the scene is left blank.
-    """
-    studio = StudioServer("serve", tmp_path_factory.mktemp("way") / "workspace")
+def page(window: StudioPage, request: pytest.FixtureRequest) -> Page:
+    """The page of that window, waited for with the file's PATIENCE."""
+    window.context.set_default_timeout(request.module.PATIENCE)
+    return window.page
+
+
+@pytest.fixture(scope="module")
+def guided(window: StudioPage, artefacts: Path, request: pytest.FixtureRequest) -> Iterator[GuidedSetup]:
+    """The guided set-up, for all tests of a file, which names the folder of its `PICTURES`."""
     expect.set_options(timeout=PATIENCE)
     try:
-        opened = StudioPage(browser, studio, with_scene=False)
-        yield GuidedSetup(opened, artefacts / request.module.PICTURES)
-        opened.close()
+        yield GuidedSetup(window, artefacts / request.module.PICTURES)
     finally:
         expect.set_options(timeout=5_000)  # Playwright's own
-        studio.stop()
 
 
 @pytest.fixture(scope="session")

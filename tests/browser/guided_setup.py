@@ -16,7 +16,7 @@ SIZES = (("light", 1280, 800), ("dark", 1920, 1080))
 
 
 class GuidedSetup:
-    """One window that goes the whole way, and how long its steps take."""
+    """One window that goes through it all, and how long its steps take."""
 
     def __init__(self, window: StudioPage, folder: Path) -> None:
         """folder : for the pictures of the steps, and their seconds."""

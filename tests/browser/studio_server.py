@@ -69,6 +69,12 @@ class StudioServer:
             limits=httpx.Limits(max_keepalive_connections=0),
         )
 
+    def __enter__(self) -> "StudioServer":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
     def _printed(self) -> re.Match[str]:
         deadline = time.monotonic() + PATIENCE
         while True:
@@ -106,6 +112,15 @@ class StudioServer:
             assert time.monotonic() < deadline, f"it stayed at {state}"
             time.sleep(0.1)
         return state
+
+    def track(self, session: str, name: str, **wanted: object) -> None:
+        """Make a run and wait until it is tracked to its end."""
+        runs = f"/api/sessions/{session}/runs"
+        self.post(runs, {"name": name, **wanted})
+        self.post(f"{runs}/{name}/start")
+        self.until(
+            lambda state: (state["session"], state["run"], state["state"]) == (session, name, "finished")
+        )
 
     def pace(self, seconds_a_layer: float) -> None:
         """Let each layer that is tracked take at least so many seconds from now on; 0: as fast as it can."""

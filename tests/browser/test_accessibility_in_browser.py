@@ -36,14 +36,11 @@ SET = "async (changes) => (await import('/assets/js/state.js')).set(changes)"
 
 
 @pytest.fixture(scope="module")
-def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudioServer]:
-    """`studio serve` with the sample, a run of it and a comparison."""
-    made = StudioServer("serve", tmp_path_factory.mktemp("axe") / "workspace")
-    made.post("/api/samples", {"name": "walk"})
-    made.post("/api/sessions/walk/runs", {"name": "seen", "last": FRAMES, "settings": SETTINGS})
-    made.post(f"{RUN}/start")
-    made.until(lambda state: state["state"] == "finished")
-    made.post(
+def studio(studio: StudioServer) -> StudioServer:
+    """With the sample, a run of it and a comparison."""
+    studio.post("/api/samples", {"name": "walk"})
+    studio.track("walk", "seen", last=FRAMES, settings=SETTINGS)
+    studio.post(
         "/api/comparisons",
         {
             "session": "walk",
@@ -55,8 +52,7 @@ def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudioServer]:
             "last": 3,
         },
     )
-    yield made
-    made.stop()
+    return studio
 
 
 @pytest.fixture(scope="module", params=["dark", "light"])

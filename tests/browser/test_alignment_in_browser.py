@@ -1,13 +1,11 @@
 """Step Background asks whether the cameras agree: a nudged one is found, turned, and turned back."""
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from nudged_camera import make_nudged_session
 from playwright.sync_api import Page, expect
-from studio_page import StudioPage
 from studio_server import StudioServer
 
 from studio.sessions.session import CAMERAS_PATH
@@ -20,20 +18,10 @@ expect.set_options(timeout=PATIENCE)
 
 
 @pytest.fixture(scope="module")
-def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudioServer]:
-    """`studio serve` on a workspace with the session."""
-    root = tmp_path_factory.mktemp("alignment") / "workspace"
-    make_nudged_session(Workspace(root).place_for("nudged"))
-    made = StudioServer("serve", root)
-    yield made
-    made.stop()
-
-
-@pytest.fixture(scope="module")
-def page(window: StudioPage) -> Page:
-    """A window on the guided way."""
-    window.context.set_default_timeout(PATIENCE)
-    return window.page
+def workspace(workspace: Path) -> Path:
+    """With the session of a camera that was nudged."""
+    make_nudged_session(Workspace(workspace).place_for("nudged"))
+    return workspace
 
 
 def test_a_nudged_camera_is_turned_and_turned_back(page: Page, studio: StudioServer, artefacts: Path) -> None:
@@ -48,7 +36,7 @@ def test_a_nudged_camera_is_turned_and_turned_back(page: Page, studio: StudioSer
     expect(calibration).to_contain_text("The silhouettes miss by up to")
     turn.scroll_into_view_if_needed()
     artefacts.mkdir(parents=True, exist_ok=True)
-    page.screenshot(path=artefacts / "way-cameras-agree.png")
+    page.screenshot(path=artefacts / "setup-cameras-agree.png")
     assert place.read_bytes() == before
     turn.click()
     back = page.get_by_role("button", name="Turn them back")

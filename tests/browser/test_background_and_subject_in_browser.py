@@ -1,6 +1,5 @@
-"""The guided way's Background and Subject steps as a person uses them, on a rendered person seen by four cameras."""
+"""The guided set-up's Background and Subject steps as a person uses them, on a rendered person seen by four cameras."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
@@ -8,7 +7,6 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 from sized_sessions import make_sized_session
-from studio_page import StudioPage
 from studio_server import StudioServer
 
 from studio.sessions.workspace import Workspace
@@ -20,20 +18,10 @@ expect.set_options(timeout=PATIENCE)
 
 
 @pytest.fixture(scope="module")
-def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudioServer]:
-    """`studio serve` on a workspace with one person in it."""
-    root = tmp_path_factory.mktemp("ways") / "workspace"
-    make_sized_session(Workspace(root).place_for("person"), 21)
-    made = StudioServer("serve", root)
-    yield made
-    made.stop()
-
-
-@pytest.fixture(scope="module")
-def page(window: StudioPage) -> Page:
-    """A window on the guided way."""
-    window.context.set_default_timeout(PATIENCE)
-    return window.page
+def workspace(workspace: Path) -> Path:
+    """With one person in it."""
+    make_sized_session(Workspace(workspace).place_for("person"), 21)
+    return workspace
 
 
 def step(page: Page, studio: StudioServer, name: str) -> None:
@@ -57,7 +45,7 @@ def all_masks_are_there(page: Page) -> None:
 def test_masks_follow_a_slider_and_are_kept(page: Page, studio: StudioServer, artefacts: Path) -> None:
     step(page, studio, "background")
     all_masks_are_there(page)
-    shoot(page, artefacts / "way-background-begin.png")
+    shoot(page, artefacts / "setup-background-begin.png")
     page.get_by_text("Fine adjustment").click()
     slider = page.get_by_role("slider", name="mask threshold")
     with page.expect_request(lambda request: "mask_threshold" in request.url):
@@ -84,9 +72,9 @@ def test_the_background_is_set_up_and_the_views_agree(
     assert response["job"]["state"] == "done"
     assert all(line["agreement"] > 0.8 for line in response["job"]["quality"]["cameras"])
     all_masks_are_there(page)
-    shoot(page, artefacts / "way-background-dark.png")
+    shoot(page, artefacts / "setup-background-dark.png")
     page.locator("#theme").click()
-    shoot(page, artefacts / "way-background-light.png")
+    shoot(page, artefacts / "setup-background-light.png")
     page.locator("#theme").click()
 
 
@@ -105,7 +93,7 @@ def test_a_region_is_painted_by_mouse_and_keyboard(page: Page, studio: StudioSer
     page.mouse.down()
     page.mouse.up()
     page.get_by_role("button", name="Undo").click()
-    shoot(page, artefacts / "way-brush.png")
+    shoot(page, artefacts / "setup-brush.png")
     canvas.focus()
     page.keyboard.press("Enter")
     page.locator(".masks .picture").first.wait_for()
@@ -150,7 +138,7 @@ def test_a_height_becomes_a_body_and_the_body_is_fitted(
     begin = page.get_by_role("button", name="Fit the subject")
     expect(begin).to_be_enabled()
     assert studio.get("/api/sessions/person/subject")["height_mm"] == 1780
-    shoot(page, artefacts / "way-subject-height.png")
+    shoot(page, artefacts / "setup-subject-height.png")
     page.get_by_label("or these frames").fill("1")
     page.get_by_label("or these frames").press("Tab")
     begin.click()
@@ -158,7 +146,7 @@ def test_a_height_becomes_a_body_and_the_body_is_fitted(
     save = page.get_by_role("button", name="Save as the subject")
     save.wait_for()
     page.wait_for_function("() => document.querySelector('.fitted img').naturalWidth > 0")
-    shoot(page, artefacts / "way-subject-fitted.png")
+    shoot(page, artefacts / "setup-subject-fitted.png")
     save.click()
     expect(page.get_by_text("The old subject is kept")).to_be_visible()
     response = studio.get("/api/sessions/person/subject")
@@ -166,4 +154,4 @@ def test_a_height_becomes_a_body_and_the_body_is_fitted(
     rows = page.locator(".sizes tr").filter(has_text="thigh")
     assert f"{response['dimensions']['left_thigh_length']:.0f}" in rows.first.inner_text()
     page.locator("#theme").click()
-    shoot(page, artefacts / "way-subject-light.png")
+    shoot(page, artefacts / "setup-subject-light.png")

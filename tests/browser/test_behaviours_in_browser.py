@@ -1,25 +1,15 @@
 """The page of behaviour models: one is learnt in the background, opens, gets another name, goes and comes back."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from scene_wire import until
 from studio_page import StudioPage
-from studio_server import StudioServer
 from swaying_person import swaying
 
 pytestmark = pytest.mark.browser
 
 FEW = {"most_clusters": "6", "reduced_dimensions": "3", "memory": "3", "smoothings": "2"}
-
-
-@pytest.fixture(scope="module")
-def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudioServer]:
-    """`studio serve` on an empty workspace."""
-    made = StudioServer("serve", tmp_path_factory.mktemp("serve") / "workspace")
-    yield made
-    made.stop()
 
 
 def names(window: StudioPage) -> list[str]:

@@ -25,13 +25,16 @@ def takes(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def studio(tmp_path_factory: pytest.TempPathFactory, takes: Path) -> Iterator[StudioServer]:
-    """`studio serve` on a workspace with a session that is not calibrated."""
-    root = tmp_path_factory.mktemp("calibrating") / "workspace"
-    session_of_takes(Workspace(root).place_for("fresh"), takes)
-    made = StudioServer("serve", root, footage=takes)
-    yield made
-    made.stop()
+def workspace(workspace: Path, takes: Path) -> Path:
+    """With a session that is not calibrated."""
+    session_of_takes(Workspace(workspace).place_for("fresh"), takes)
+    return workspace
+
+
+@pytest.fixture(scope="module")
+def footage(takes: Path) -> Path:
+    """The takes may be read."""
+    return takes
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,7 @@
 """Comparisons and reports in the page: asked for, watched, cancelled, gone on with, read, downloaded, thrown away."""
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -23,12 +23,10 @@ FIRST = "/api/comparisons/walk/small"
 
 
 @pytest.fixture(scope="module")
-def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudioServer]:
-    """`studio serve` with the sample, which has a truth."""
-    made = StudioServer("serve", tmp_path_factory.mktemp("serve") / "workspace")
-    made.post("/api/samples", {"name": "walk"})
-    yield made
-    made.stop()
+def studio(studio: StudioServer) -> StudioServer:
+    """With the sample, which has a truth."""
+    studio.post("/api/samples", {"name": "walk"})
+    return studio
 
 
 @pytest.fixture

@@ -21,9 +21,7 @@ QUICK = {"particles": 40, "layers": 4, "start_repeats": 1, "recovery": "off"}
 def studio(toy_studio: StudioServer) -> StudioServer:
     """The toy arm, with a run that is tracked to its end."""
     start = (true_poses()[0] + [1.2, -2.0, 1.8, -1.5]).tolist()
-    toy_studio.post(RUN, {"name": "one", "start_pose": start, "settings": {**QUICK, "refine_frames": False}})
-    toy_studio.post(f"{RUN}/one/start")
-    toy_studio.until(lambda state: state["run"] == "one" and state["state"] == "finished")
+    toy_studio.track("toy", "one", start_pose=start, settings={**QUICK, "refine_frames": False})
     return toy_studio
 
 

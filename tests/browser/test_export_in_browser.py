@@ -19,18 +19,15 @@ FRAMES = 6
 
 
 @pytest.fixture(scope="module")
-def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudioServer]:
-    """`studio serve` on a workspace with one tracked run."""
-    root = tmp_path_factory.mktemp("exports") / "workspace"
-    session = make_session(Workspace(root).place_for("toy"))
+def workspace(workspace: Path) -> Path:
+    """With one tracked run."""
+    session = make_session(Workspace(workspace).place_for("toy"))
     run = session.new_run(record_of(session, "first"))
     with ResultsWriter(run.folder) as writer:
         writer.write_settings(1, 0, 0, run.record.settings)
         for frame in range(FRAMES):
             writer.write_frame(result_of(frame), [layer_of(frame, layer) for layer in range(3)], 2000)
-    made = StudioServer("serve", root)
-    yield made
-    made.stop()
+    return workspace
 
 
 @pytest.fixture(scope="module")

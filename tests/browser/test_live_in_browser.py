@@ -3,7 +3,6 @@
 import json
 import os
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -25,13 +24,10 @@ FRAMES = 360
 
 
 @pytest.fixture(scope="module")
-def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudioServer]:
-    """`studio serve` with six seconds of the toy arm."""
-    place = tmp_path_factory.mktemp("live") / "workspace"
-    make_session(Workspace(place).place_for("toy"), FRAMES)
-    made = StudioServer("serve", place)
-    yield made
-    made.stop()
+def workspace(workspace: Path) -> Path:
+    """With six seconds of the toy arm."""
+    make_session(Workspace(workspace).place_for("toy"), FRAMES)
+    return workspace
 
 
 def test_a_live_run_is_ticked_and_says_how_it_keeps_up(browser: Browser, studio: StudioServer) -> None:

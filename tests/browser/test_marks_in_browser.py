@@ -24,17 +24,16 @@ NAMES = {LOST: "search lost", NO_EVIDENCE: "no evidence", RECOVERED: "found agai
 @pytest.fixture
 def studio(tmp_path: Path) -> Iterator[StudioServer]:
     """`studio serve` with the sample and a run that was thrown off twice."""
-    made = StudioServer("serve", tmp_path / "workspace")
-    made.post("/api/samples", {"name": "walk"})
-    made.post("/api/sessions/walk/runs", {"name": "thrown", "last": len(WENT)})
-    run = Workspace(tmp_path / "workspace").session("walk").run("thrown")
-    size = len(run.record.parameters)
-    with ResultsWriter(run.folder) as writer:
-        for frame, tracking in enumerate(WENT):
-            result = dataclasses.replace(result_of(frame, size=size, layers=1), tracking=tracking)
-            writer.write_frame(result, [layer_of(frame, 0, size=size)])
-    yield made
-    made.stop()
+    with StudioServer("serve", tmp_path / "workspace") as made:
+        made.post("/api/samples", {"name": "walk"})
+        made.post("/api/sessions/walk/runs", {"name": "thrown", "last": len(WENT)})
+        run = Workspace(tmp_path / "workspace").session("walk").run("thrown")
+        size = len(run.record.parameters)
+        with ResultsWriter(run.folder) as writer:
+            for frame, tracking in enumerate(WENT):
+                result = dataclasses.replace(result_of(frame, size=size, layers=1), tracking=tracking)
+                writer.write_frame(result, [layer_of(frame, 0, size=size)])
+        yield made
 
 
 def test_the_marks_are_named_reported_and_reached_by_keys(

@@ -18,9 +18,8 @@ def studio(tmp_path: Path) -> Iterator[StudioServer]:
     """`studio serve` with the planar arm, and the guide's package beside the studio."""
     install_guide_package(tmp_path / "site")
     make_session(tmp_path / "workspace" / "toy")
-    made = StudioServer("serve", tmp_path / "workspace", beside=tmp_path / "site")
-    yield made
-    made.stop()
+    with StudioServer("serve", tmp_path / "workspace", beside=tmp_path / "site") as made:
+        yield made
 
 
 def test_a_run_with_both_is_begun_from_the_form(browser: Browser, studio: StudioServer) -> None:

@@ -31,10 +31,15 @@ def streams(walk: Session) -> Iterator[Streams]:
 
 
 @pytest.fixture(scope="module")
-def studio(walk: Session) -> Iterator[StudioServer]:
-    made = StudioServer("serve", walk.path.parent, footage=walk.path.parent)
-    yield made
-    made.stop()
+def workspace(walk: Session) -> Path:
+    """Where the walk is."""
+    return walk.path.parent
+
+
+@pytest.fixture(scope="module")
+def footage(workspace: Path) -> Path:
+    """What is in the workspace may be read."""
+    return workspace
 
 
 @pytest.fixture(scope="module")

@@ -21,12 +21,11 @@ PACE = 0.1
 @pytest.fixture
 def studio(tmp_path: Path) -> Iterator[StudioServer]:
     """`studio serve` with the sample and two runs that differ in nothing but their name."""
-    made = StudioServer("serve", tmp_path / "workspace")
-    made.post("/api/samples", {"name": "walk"})
-    for name in ("unbroken", "broken"):
-        made.post(RUNS, {"name": name, "seed": SEED, "last": FRAMES, "settings": KNOBS})
-    yield made
-    made.stop()
+    with StudioServer("serve", tmp_path / "workspace") as made:
+        made.post("/api/samples", {"name": "walk"})
+        for name in ("unbroken", "broken"):
+            made.post(RUNS, {"name": name, "seed": SEED, "last": FRAMES, "settings": KNOBS})
+        yield made
 
 
 def test_a_killed_process_is_said_and_the_run_resumes_bit_for_bit(

@@ -26,14 +26,6 @@ def footage(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def studio(tmp_path_factory: pytest.TempPathFactory, footage: Path) -> Iterator[StudioServer]:
-    """`studio serve` on an empty workspace."""
-    made = StudioServer("serve", tmp_path_factory.mktemp("serve") / "workspace", footage)
-    yield made
-    made.stop()
-
-
-@pytest.fixture(scope="module")
 def window(browser: Browser, studio: StudioServer) -> Iterator[StudioPage]:
     """One window for all tests of this file."""
     opened = StudioPage(browser, studio)

@@ -1,4 +1,4 @@
-"""The guided way's start pose: made better from the page, edited by hand, shown in every view."""
+"""The guided set-up's start pose: made better from the page, edited by hand, shown in every view."""
 
 import numpy as np
 import pytest

@@ -1,6 +1,5 @@
 """Strokes painted on a camera's picture in Chromium: the mask follows, undo, another frame, kept, all masks made."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +7,6 @@ import pytest
 from patched_ball import SIZE, PatchedBall, patched_ball
 from playwright.sync_api import Page, expect
 from rendered_people import overlap
-from studio_page import StudioPage
 from studio_server import StudioServer
 
 from studio.sessions.session import Session
@@ -27,17 +25,9 @@ def ball(tmp_path_factory: pytest.TempPathFactory) -> PatchedBall:
 
 
 @pytest.fixture(scope="module")
-def studio(ball: PatchedBall) -> Iterator[StudioServer]:
-    """`studio serve` on a workspace with the ball in it."""
-    made = StudioServer("serve", ball.session.path.parent)
-    yield made
-    made.stop()
-
-
-@pytest.fixture(scope="module")
-def page(window: StudioPage) -> Page:
-    window.context.set_default_timeout(PATIENCE)
-    return window.page
+def workspace(ball: PatchedBall) -> Path:
+    """Where the ball is."""
+    return ball.session.path.parent
 
 
 def paint(page: Page, points: tuple[tuple[float, float], ...]) -> None:
@@ -92,7 +82,7 @@ def test_strokes_are_painted_and_all_masks_are_made(
         paint(page, outside)
         assert overlap(shown_mask(page), ball.masks[name, 2]) > 0.9
         if name == "cam1":
-            page.screenshot(path=artefacts / "way-strokes.png")
+            page.screenshot(path=artefacts / "setup-strokes.png")
         page.get_by_role("button", name="Keep", exact=True).first.click()
         page.locator(".masks .picture").first.wait_for()
     expect(page.get_by_text("2 strokes in 1 frame")).to_have_count(3)
@@ -105,7 +95,7 @@ def test_strokes_are_painted_and_all_masks_are_made(
     page.get_by_role("button", name="Cancel").wait_for()
     expect(page.locator(".agree li")).to_have_count(3)
     expect(page.get_by_text("masks made")).to_have_count(3)
-    page.screenshot(path=artefacts / "way-strokes-made.png")
+    page.screenshot(path=artefacts / "setup-strokes-made.png")
     footage = Session(ball.session.path).footage()
     for key, true in ball.masks.items():
         mask = footage.mask(*key)

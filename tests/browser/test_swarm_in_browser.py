@@ -22,12 +22,10 @@ PARTICLES, LATER_PARTICLES = 10, 20
 
 
 @pytest.fixture(scope="module")
-def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudioServer]:
-    """`studio serve` with the sample."""
-    made = StudioServer("serve", tmp_path_factory.mktemp("serve") / "workspace")
-    made.post("/api/samples", {"name": "walk"})
-    yield made
-    made.stop()
+def studio(studio: StudioServer) -> StudioServer:
+    """With the sample."""
+    studio.post("/api/samples", {"name": "walk"})
+    return studio
 
 
 @pytest.fixture

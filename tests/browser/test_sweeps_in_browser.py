@@ -1,14 +1,12 @@
 """A sweep in the page: what it takes is said, its runs are drawn and opened, one of them is given away as a page."""
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, expect
 from scene_wire import until
 from studio_page import StudioPage
-from studio_server import StudioServer
 from toy_session import make_session
 
 pytestmark = pytest.mark.browser
@@ -18,13 +16,10 @@ FIGURES = ("parallel", "map", "curve")
 
 
 @pytest.fixture(scope="module")
-def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudioServer]:
-    """`studio serve` on the toy arm, which has no truth."""
-    workspace = tmp_path_factory.mktemp("sweeps") / "workspace"
+def workspace(workspace: Path) -> Path:
+    """With the toy arm, which has no truth."""
     make_session(workspace / "toy")
-    made = StudioServer("serve", workspace)
-    yield made
-    made.stop()
+    return workspace
 
 
 def test_a_sweep_is_begun_and_watched(window: StudioPage) -> None:
@@ -62,7 +57,7 @@ def test_what_is_drawn_is_the_result_and_opens_the_runs(window: StudioPage, arte
     expect(form.locator("[name=seeds]")).to_have_value("2")
     expect(form.locator("[name=last]")).to_have_value("2")
     expect(form.locator("[name=shape]")).not_to_be_checked()
-    expect(form.locator("[name=despite]")).not_to_be_visible()
+    expect(form.locator("[name=inconsistent]")).not_to_be_visible()
     page.locator(".entry", has_text="sweep-1").click()
     until(page, window.charts_drawn)
     for name in FIGURES:

@@ -30,12 +30,11 @@ def studio(tmp_path: Path) -> Iterator[StudioServer]:
     workspace = tmp_path / "workspace"
     workspace.mkdir()
     make_session(workspace / "arm", FRAMES)
-    made = StudioServer("serve", workspace)
-    settings = {"layers": 6, "particles": 60, "start_repeats": 1}
-    start = true_poses(1)[0].tolist()
-    made.post("/api/sessions/arm/runs", {"name": "long", "settings": settings, "start_pose": start})
-    yield made
-    made.stop()
+    with StudioServer("serve", workspace) as made:
+        settings = {"layers": 6, "particles": 60, "start_repeats": 1}
+        start = true_poses(1)[0].tolist()
+        made.post("/api/sessions/arm/runs", {"name": "long", "settings": settings, "start_pose": start})
+        yield made
 
 
 def heap(window: StudioPage) -> float:

@@ -4,7 +4,6 @@ import csv
 import io
 import math
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -50,15 +49,11 @@ HELD = (
 
 
 @pytest.fixture(scope="module")
-def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudioServer]:
-    """`studio serve` with the sample, tracked over some frames."""
-    made = StudioServer("serve", tmp_path_factory.mktemp("views") / "workspace")
-    made.post("/api/samples", {"name": "walk"})
-    made.post("/api/sessions/walk/runs", {"name": "seen", "last": FRAMES, "settings": SETTINGS})
-    made.post(f"{RUN}/start")
-    made.until(lambda state: state["state"] == "finished")
-    yield made
-    made.stop()
+def studio(studio: StudioServer) -> StudioServer:
+    """With the sample, tracked over some frames."""
+    studio.post("/api/samples", {"name": "walk"})
+    studio.track("walk", "seen", last=FRAMES, settings=SETTINGS)
+    return studio
 
 
 def layers_of(studio: StudioServer) -> list[LayerRecord]:

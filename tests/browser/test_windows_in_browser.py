@@ -19,21 +19,20 @@ SURVIVAL = {"left": 0.42, "right": 0.66}
 
 
 @pytest.fixture(scope="module")
-def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudioServer]:
-    """Two sessions of the toy arm, a tracked run in each, with another survival rate and seed."""
-    workspace = tmp_path_factory.mktemp("windows") / "workspace"
+def workspace(workspace: Path) -> Path:
+    """With two sessions of the toy arm."""
     for name in SURVIVAL:
         make_session(workspace / name)
-    made = StudioServer("serve", workspace)
+    return workspace
+
+
+@pytest.fixture(scope="module")
+def studio(studio: StudioServer) -> StudioServer:
+    """With a tracked run in each, of another survival rate and seed."""
     for seed, (name, survival) in enumerate(SURVIVAL.items()):
-        runs = f"/api/sessions/{name}/runs"
-        settings = QUICK | {"survival": survival}
-        start = true_poses()[0].tolist()
-        made.post(runs, {"name": f"of-{name}", "settings": settings, "start_pose": start, "seed": seed})
-        made.post(f"{runs}/of-{name}/start")
-        made.until(lambda state, name=name: state["session"] == name and state["state"] == "finished")
-    yield made
-    made.stop()
+        wanted = {"settings": QUICK | {"survival": survival}, "start_pose": true_poses()[0].tolist()}
+        studio.track(name, f"of-{name}", seed=seed, **wanted)
+    return studio
 
 
 def opened(

@@ -3,6 +3,7 @@
 import cv2
 import numpy as np
 import pytest
+from looking_cameras import turned_to
 
 from studio.arrays import Array
 from studio.calibration.silhouette_alignment import aligned_cameras, turned
@@ -16,11 +17,7 @@ SIZE = (1000, 1800)
 def camera(name: str, heading: float) -> Camera:
     """One that stands 4 m away, 1.8 m above the floor, and looks at the middle of a person."""
     centre = np.array([4000.0 * np.cos(heading), 4000.0 * np.sin(heading), 1800.0])
-    ahead = np.array([0.0, 0.0, 900.0]) - centre
-    ahead /= np.linalg.norm(ahead)
-    right = np.cross(ahead, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    rotation = np.stack([right, np.cross(ahead, right), ahead])
+    rotation = turned_to(centre, (0.0, 0.0, 900.0))
     matrix = np.array([[1600.0, 0.0, 500.0], [0.0, 1600.0, 900.0], [0.0, 0.0, 1.0]])
     return Camera(name, *SIZE, matrix, np.array([-0.05, 0.1, 0.0, 0.0, 0.0]), rotation, -rotation @ centre)
 

@@ -34,7 +34,7 @@ def test_a_leap_is_reported_and_kept(session_on_disk: Session) -> None:
     assert (found["track"], found["good"]) == ("smoothed", False)
     assert [(jump["frame"], jump["limb"]) for jump in found["jumps"]] == [(5, "arm")]
     assert found["frames"] == list(range(0, FRAMES, 3))
-    said = CliRunner().invoke(main, ["way", "toy"], catch_exceptions=False)
+    said = CliRunner().invoke(main, ["workflow", "toy"], catch_exceptions=False)
     assert said.exit_code == 0
     again = studio.check("toy/one", every=4)
     assert "1 jump (frame 5, arm)" in again.in_words()

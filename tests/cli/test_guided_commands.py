@@ -97,6 +97,6 @@ def test_track_despite_what_the_footage_says(started: Session) -> None:
     assert refused.exit_code == 2
     assert doubt in refused.stderr
     assert not started.runs()
-    tracked = run(*common, "--despite-findings")
+    tracked = run(*common, "--allow-inconsistent")
     assert tracked.exit_code == 0, tracked.stderr
     assert f"Tracked despite: {doubt}" in tracked.stderr

@@ -49,13 +49,17 @@ def test_the_request_is_read_back(walk: Session, kept: KeptComparison) -> None:
     assert place_of(walk).name == "comparison-2"
 
 
-def test_a_record_of_version_1_is_read(kept: KeptComparison) -> None:
-    """Version 1 calls the candidates entrants."""
+def test_records_of_older_versions_are_read(kept: KeptComparison) -> None:
+    """Version 2 calls allow_inconsistent despite_findings, version 1 the candidates entrants."""
     path = kept.folder / RECORD_NAME
     written = json.loads(path.read_text())
-    written["plan"]["entrants"] = written["plan"].pop("candidates")
-    path.write_text(json.dumps(written | {"schema": 1}))
-    assert kept.record().plan == plan("annealed", "condensation")
+    for version, name, before in (
+        (2, "allow_inconsistent", "despite_findings"),
+        (1, "candidates", "entrants"),
+    ):
+        written["plan"][before] = written["plan"].pop(name)
+        path.write_text(json.dumps(written | {"schema": version}))
+        assert kept.record().plan == plan("annealed", "condensation")
 
 
 def test_nothing_is_overwritten(walk: Session, kept: KeptComparison) -> None:

@@ -32,7 +32,7 @@ from studio.comparison.sweep import (
     sweep_text,
     sweep_trials,
 )
-from studio.comparison.trials import Outcome
+from studio.comparison.trials import ALLOW_INCONSISTENT, Outcome
 from studio.errors import CalibrationError, RunError, SettingsError
 from studio.runs.new_run import prepare_run
 from studio.sessions.provenance import note
@@ -273,7 +273,7 @@ def test_a_doubted_calibration_is_swept_only_if_requested(tmp_path: Path) -> Non
     note(session, "background", "in doubt", good=False, stops=(doubt,))
     with pytest.raises(CalibrationError, match=doubt):
         plan_sweep(session, GRID, range(1))
-    drawn = plan_sweep(session, GRID, range(1), despite_findings=True)
-    assert drawn.despite_findings
-    assert all(trial.arguments["despite_findings"] for trial in sweep_trials(drawn))
-    assert differences(drawn, replace(drawn, despite_findings=False)) == ("despite_findings",)
+    drawn = plan_sweep(session, GRID, range(1), allow_inconsistent=True)
+    assert drawn.allow_inconsistent
+    assert all(trial.arguments[ALLOW_INCONSISTENT] for trial in sweep_trials(drawn))
+    assert differences(drawn, replace(drawn, allow_inconsistent=False)) == ("allow_inconsistent",)

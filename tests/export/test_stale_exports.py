@@ -1,4 +1,4 @@
-"""A file that is older than the track it was written from is called old, in the list and on the guided way."""
+"""A file that is older than the track it was written from is called old, in the list and on the guided set-up."""
 
 import dataclasses
 

@@ -15,7 +15,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> InspectedRun:
     poses = person_poses("walk", 30, FRAMES, 2)
     session = drawn_session(tmp_path_factory.mktemp("views") / "drawn", poses, ring_of_cameras(4))
     knobs = {"refine_frames": False, "particles": PARTICLES, "layers": LAYERS, "start_repeats": 1}
-    made = prepare_run(session, knobs=knobs, seed=4, fit_shape=False, despite_findings=True, name="small")
+    made = prepare_run(session, knobs=knobs, seed=4, fit_shape=False, allow_inconsistent=True, name="small")
     finish(session, made)
     return InspectedRun(session, made)
 

@@ -11,7 +11,7 @@ from studio.body.catalogue import load_body
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.inspection.camera_checks import fault_of, view_fits
 from studio.likelihood.catalogue import WEIGHTINGS
-from studio.likelihood.problem import PreparedProblem
+from studio.likelihood.problem import BaseFrameLikelihood
 from studio.synthesis.damage import turned_camera
 
 BODY, CAMERAS = load_body("human31"), ring_of_cameras(4)
@@ -60,7 +60,7 @@ def test_cut_masks_are_bad_masks(evidence: FrameEvidence) -> None:
 def test_shares_add_up_to_the_log_weight(evidence: FrameEvidence, name: str) -> None:
     weighting = WEIGHTINGS[name]
     problem = weighting.prepare(BODY, CAMERAS, weighting.settings_type()).problem(evidence)
-    assert isinstance(problem, PreparedProblem)
+    assert isinstance(problem, BaseFrameLikelihood)
     rng = np.random.default_rng(1)
     poses = BODY.neutral + 0.05 * rng.standard_normal((5, len(BODY.parameters)))
     shares = problem.shares(poses)

@@ -34,7 +34,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Session:
 )
 def test_every_view_answers(session: Session, tracker: str, weighting: str, knobs: dict[str, object]) -> None:
     made = prepare_run(
-        session, tracker=tracker, weighting=weighting, knobs=knobs, fit_shape=False, despite_findings=True
+        session, tracker=tracker, weighting=weighting, knobs=knobs, fit_shape=False, allow_inconsistent=True
     )
     finish(session, made)
     run = InspectedRun(session, made)

@@ -16,9 +16,8 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pytest
-import s3fs
 from distributed import LocalCluster
-from s3_server import BUCKET, s3_server
+from s3_server import BUCKET, s3_server, used_here
 from sample_walk import copy_of_walk
 from toy_experiments import toy
 from waiting import until
@@ -30,7 +29,6 @@ from studio.comparison.trials import Scale
 from studio.errors import SessionError
 from studio.jobs.comparison_run import run_comparison
 from studio.reproduction.runner import reproduce
-from studio.sessions import remote_sessions
 from studio.sessions.object_stores import Store
 from studio.sessions.remote_sessions import address_of, remote_runs, remote_session, sessions_at
 from studio.sessions.session import Session
@@ -68,13 +66,8 @@ def server() -> Iterator[Mapping[str, str]]:
 @pytest.fixture
 def store(server: Mapping[str, str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[str]:
     """A folder of the store that this machine may use, too; it has a cache of its own."""
-    for name, value in server.items():
-        monkeypatch.setenv(name, value)
-    monkeypatch.setenv("STUDIO_CACHE", str(tmp_path / "cache of this machine"))
-    s3fs.S3FileSystem.clear_instance_cache()
-    yield f"{FOLDER}/{tmp_path.name}"
-    while remote_sessions._holds:
-        remote_sessions._holds.popitem()[1].free()
+    with used_here(server, monkeypatch, tmp_path / "cache of this machine"):
+        yield f"{FOLDER}/{tmp_path.name}"
 
 
 @pytest.fixture
@@ -148,6 +141,7 @@ def test_a_sweep_of_a_session_in_a_store_with_a_machine_lost(
     assert {name: one.stamp for name, one in Store(f"{address}/runs").listed().items()} == before
 
 
+@pytest.mark.slow
 def test_a_batch_compares_and_tracks_at_addresses(
     store: str, scheduler: str, far: list[Far], tmp_path: Path
 ) -> None:

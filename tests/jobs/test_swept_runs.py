@@ -110,7 +110,7 @@ def test_a_doubted_calibration_is_tracked_despite_it(walk: Session) -> None:
     doubt = "Cameras A and B seem to be exchanged."
     note(walk, "background", "in doubt", good=False, stops=(doubt,))
     plan = plan_sweep(
-        walk, GRID, range(1), knobs={"layers": 1, "particles": 10}, last=2, fit_shape=False, despite_findings=True
+        walk, GRID, range(1), knobs={"layers": 1, "particles": 10}, last=2, fit_shape=False, allow_inconsistent=True
     )  # fmt: skip
     kept = new_comparison(place_of(walk, "doubted"), plan)
     with ThreadPoolExecutor(1) as threads:

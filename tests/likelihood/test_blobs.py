@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from divergences import kept_divergence
 
 from studio.benchmarks.kernels import made_evidence, ring_of_cameras
 from studio.body.catalogue import load_body
@@ -14,7 +15,6 @@ from studio.evidence.frame_evidence import FrameEvidence
 from studio.likelihood.blob_settings import BlobSettings
 from studio.likelihood.blobs import NOTHING_SEEN, BlobLikelihood, ExpectedBlobs, blob_mixture
 from studio.likelihood.problem import TRUNK_FIRST, FittedToPoses, QualityMeasured
-from studio.volume.relative_entropy import kept_divergence
 
 Array = np.ndarray
 SETTINGS = BlobSettings(hull_depth=6)

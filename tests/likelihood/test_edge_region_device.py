@@ -26,8 +26,23 @@ BODIES = ("human31", "planar_arm4")
 def simulated(tmp_path_factory):
     """What the device's kernels give, in a process whose device is simulated."""
     place = tmp_path_factory.mktemp("device") / "terms.npz"
-    simulator = {"NUMBA_ENABLE_CUDASIM": "1", "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(HERE)}
-    script = [sys.executable, "-W", "error", str(HERE / "simulated_device.py"), str(place), *BODIES]
+    simulator = {
+        "NUMBA_ENABLE_CUDASIM": "1",
+        "NUMBA_DISABLE_JIT": "1",
+        "PYTHONPATH": f"{HERE}{os.pathsep}{HERE.parent}",
+    }
+    # Words of 64 bits wrap around where masks are packed, on purpose.
+    wrapping = "ignore:overflow encountered in scalar:RuntimeWarning"
+    script = [
+        sys.executable,
+        "-W",
+        "error",
+        "-W",
+        wrapping,
+        str(HERE / "simulated_device.py"),
+        str(place),
+        *BODIES,
+    ]
     done = subprocess.run(script, env={**os.environ, **simulator}, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     with np.load(place) as found:

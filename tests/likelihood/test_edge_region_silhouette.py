@@ -54,6 +54,30 @@ def test_weights_of_the_terms(human, ring, smooth):
     )
 
 
+@pytest.mark.parametrize("views", [1, 4, 9, 17])
+@pytest.mark.parametrize("count", [1, 7, 16, 17, 40])
+def test_the_terms_are_summed_as_numpy_does(human, views, count):
+    """Bit for bit: a run's poses depend on the last bit of a weight."""
+    rng, middle = (
+        np.random.default_rng(views),
+        limb_ends(human, human.neutral[None]).reshape(-1, 3).mean(axis=0),
+    )
+    around = 2.0 * np.pi * np.arange(views) / views
+    places = middle + 3000.0 * np.stack([np.cos(around), np.sin(around), np.full(views, 0.2)], axis=1)
+    cameras = tuple(looking_at(f"c{k}", place, middle) for k, place in enumerate(places))
+    nothing = np.zeros((0, 0, 3), np.uint8)
+    maps = rng.integers(0, 256, (views, 2, 240, 320)).astype(np.uint8)
+    evidence = FrameEvidence(0, tuple(ViewEvidence(f"c{k}", nothing, *maps[k]) for k in range(views)))
+    poses = scattered(human, count)
+    weights = {"edge_weight": 1.1, "region_weight": 0.7, "silhouette_weight": 1.3}
+    problem = problem_of(human, cameras, evidence, **weights)
+    edge, region, silhouette = (term.mean(axis=1) for term in problem.terms(poses))
+    np.testing.assert_array_equal(problem.fitness(poses), 1.1 * edge + 0.7 * region + 1.3 * silhouette)
+    other = EdgeSilhouetteLikelihood(human, cameras, EdgeSilhouetteSettings()).problem(evidence)
+    silhouette, edge = (term.mean(axis=1) for term in other.terms(poses))
+    np.testing.assert_array_equal(other.fitness(poses), silhouette + edge)
+
+
 @pytest.mark.parametrize("aware", [False, True])
 def test_the_first_stage_uses_the_trunks_edges_only(human, ring, smooth, aware):
     """A pose that differs in the limbs alone has the trunk's edges of the other, unless a limb comes before it."""

@@ -1,6 +1,7 @@
 """A made scene for the weighting's tests, and plain NumPy twins of what the kernels do."""
 
 import numpy as np
+from looking_cameras import turned_to
 from numpy.typing import NDArray
 
 from studio.arrays import Array
@@ -18,10 +19,7 @@ def looking_at(
     name: str, centre: Array, target: Array, size: tuple[int, int] = (320, 240), focal: float = 260.0
 ) -> Camera:
     """A camera with a little of every kind of distortion and a skew."""
-    forward = (target - centre) / np.linalg.norm(target - centre)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    rotation = np.stack([right, np.cross(forward, right), forward])
+    rotation = turned_to(centre, target)
     matrix = np.array([[focal, 0.7, size[0] / 2 + 3], [0, focal * 1.02, size[1] / 2 - 2], [0, 0, 1.0]])
     distortion = np.array([-0.2, 0.06, 0.002, -0.001, 0.01])
     return Camera(name, *size, matrix, distortion, rotation, -rotation @ centre)

@@ -1,5 +1,7 @@
 """The verbs for Python on a session of a planar arm: what goes in, what comes back, what is refused."""
 
+import ast
+import importlib
 import subprocess
 import sys
 from pathlib import Path
@@ -24,6 +26,14 @@ def test_importing_studio_imports_no_room_until_a_verb_is_requested() -> None:
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[] True False"
+
+
+def test_what_editors_know_is_what_is_there() -> None:
+    stub = ast.parse(Path(studio.__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
+    named = {entry.name: node.module for node in stub.body for entry in node.names}  # pyright: ignore[reportAttributeAccessIssue]
+    assert sorted(named) == dir(studio)
+    for name, module in named.items():
+        assert getattr(importlib.import_module(module), name) is getattr(studio, name)
 
 
 def test_all_verbs_are_there_with_a_docstring() -> None:

@@ -19,7 +19,7 @@ FRAMES = (0, 30, 60, 99)
 @pytest.mark.real_data
 def test_masks_agree_in_all_four_views(real_data: Path, tmp_path: Path) -> None:
     """Agreement with the hull of 0.9 or more in each view, from plates in two of which people stand; the cameras turned
-    first, as the guided way says: one of them was touched, which the masks cannot help.
+    first, as the guided set-up says: one of them was touched, which the masks cannot help.
     """
     folder = real_data / "pose2sim-balance"
     session = import_source(folder, tmp_path / "balance", ImportOptions(copy=False)).session

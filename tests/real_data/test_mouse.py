@@ -4,29 +4,26 @@ The strokes are those of one person in the first picture of each camera. Sheets 
 (STUDIO_ARTEFACTS, default artefacts/mouse).
 """
 
-import os
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import msgspec
 import numpy as np
 import pytest
+from kept_overlays import keep_overlays
 
 import studio
 from studio.evaluation.errors import Evaluation
 from studio.motion_files.truth_files import read_truth
 from studio.runs.checking import RunCheck
 from studio.runs.mask_quality import MaskQuality
-from studio.runs.overlay_pictures import ViewComposer
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 
 pytestmark = [pytest.mark.slow, pytest.mark.real_data]
 
-ROOT = Path(__file__).resolve().parents[2]
-STROKES = Path(__file__).with_name("mouse_way_strokes.json")
+STROKES = Path(__file__).with_name("mouse_setup_strokes.json")
 BOARD = "charuco:8x11,24,18.75,DICT_4X4_1000"
 ASKED = (
     "Nose",
@@ -66,7 +63,7 @@ def mouse(real_data: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def way(mouse: Path, tmp_path_factory: pytest.TempPathFactory) -> Workflow:
+def workflow(mouse: Path, tmp_path_factory: pytest.TempPathFactory) -> Workflow:
     take = tmp_path_factory.mktemp("mouse") / "take"
     (take / "truth").mkdir(parents=True)
     shutil.copytree(mouse / "videos", take / "videos")
@@ -89,38 +86,20 @@ def way(mouse: Path, tmp_path_factory: pytest.TempPathFactory) -> Workflow:
     masks = studio.mask_quality(session)
     start = studio.initialise(session)
     run = studio.track(session, name="first").run
-    way = Workflow(session, masks, start.confidence, run, studio.check(run), studio.evaluate(run))
-    keep_overlays(way)
-    return way
+    keep_overlays("mouse", session, run, 30)
+    return Workflow(session, masks, start.confidence, run, studio.check(run), studio.evaluate(run))
 
 
-def keep_overlays(way: Workflow) -> None:
-    """Every thirtieth frame, the four views side by side, with masks and outlines."""
-    place = Path(os.environ.get("STUDIO_ARTEFACTS", ROOT / "artefacts")) / "mouse"
-    place.mkdir(parents=True, exist_ok=True)
-    composer = ViewComposer(way.session, way.run)
-    track = studio.read_track(way.run)
-    try:
-        for row in range(0, len(track.frames), 30):
-            views = [
-                composer.compose(
-                    int(track.frames[row]), name, ("mask", "outline"), pose=track.poses[row], height=960
-                )
-                for name in composer.cameras
-            ]
-            cv2.imwrite(str(place / f"frame-{int(track.frames[row]):03d}.png"), np.hstack(views))
-    finally:
-        composer.close()
-
-
-def test_the_board_gives_the_cameras_and_the_truth_arrives_in_their_world(way: Workflow, mouse: Path) -> None:
+def test_the_board_gives_the_cameras_and_the_truth_arrives_in_their_world(
+    workflow: Workflow, mouse: Path
+) -> None:
     report = msgspec.json.decode(
-        (way.session.path.parent / "take/calibration/cameras.report.json").read_bytes()
+        (workflow.session.path.parent / "take/calibration/cameras.report.json").read_bytes()
     )
     assert report
-    assert way.session.truth_path is not None
-    carried = read_truth(way.session.truth_path, way.session.manifest.fps)
-    given = read_truth(mouse / "truth_frames_0_59.csv", way.session.manifest.fps)
+    assert workflow.session.truth_path is not None
+    carried = read_truth(workflow.session.truth_path, workflow.session.manifest.fps)
+    given = read_truth(mouse / "truth_frames_0_59.csv", workflow.session.manifest.fps)
     assert carried.positions.shape == given.positions.shape == (60, 15, 3)
     # Distances in the animal do not depend on the world; the two calibrations differ by up to a percent.
     for one, other in (("Nose", "TTI"), ("TTI", "TailTip"), ("Haunch_left", "Haunch_right")):
@@ -138,29 +117,29 @@ def test_the_board_gives_the_cameras_and_the_truth_arrives_in_their_world(way: W
     assert np.nanmax(heights) < 80.0
 
 
-def test_the_masks_of_the_strokes_agree_in_all_views(way: Workflow) -> None:
-    print([(view.camera, round(view.agreement, 3)) for view in way.masks.views])
-    assert all(view.agreement >= 0.88 for view in way.masks.views)
-    assert not way.masks.doubts
+def test_the_masks_of_the_strokes_agree_in_all_views(workflow: Workflow) -> None:
+    print([(view.camera, round(view.agreement, 3)) for view in workflow.masks.views])
+    assert all(view.agreement >= 0.88 for view in workflow.masks.views)
+    assert not workflow.masks.doubts
 
 
-def test_the_start_pose_is_found_without_a_click(way: Workflow) -> None:
-    print(way.confidence)
-    assert way.confidence >= 0.7
+def test_the_start_pose_is_found_without_a_click(workflow: Workflow) -> None:
+    print(workflow.confidence)
+    assert workflow.confidence >= 0.7
 
 
-def test_all_frames_are_tracked_without_a_jump(way: Workflow) -> None:
-    print(way.check.in_words())
-    assert way.check.count == 120
-    assert not way.check.lost
-    assert not way.check.turned
-    assert not way.check.jumps
-    assert way.check.inside_mean >= 0.85
+def test_all_frames_are_tracked_without_a_jump(workflow: Workflow) -> None:
+    print(workflow.check.in_words())
+    assert workflow.check.count == 120
+    assert not workflow.check.lost
+    assert not workflow.check.turned
+    assert not workflow.check.jumps
+    assert workflow.check.inside_mean >= 0.85
 
 
-def test_the_points_are_where_people_saw_them(way: Workflow) -> None:
+def test_the_points_are_where_people_saw_them(workflow: Workflow) -> None:
     """The labels' own uncertainty is 2 to 3 mm."""
-    errors = way.errors.per_marker_mm
+    errors = workflow.errors.per_marker_mm
     print({name: round(value, 1) for name, value in errors.items()})
-    assert len(way.errors.frames) == 60
+    assert len(workflow.errors.frames) == 60
     assert float(np.mean([errors[name] for name in ASKED])) <= MOST_MM

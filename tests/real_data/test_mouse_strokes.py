@@ -18,7 +18,7 @@ STROKES = Path(__file__).parent / "mouse_strokes.json"
 @pytest.fixture
 def mouse(real_data: Path, tmp_path: Path) -> Session:
     """Its first frames, in a calibration that has no floor."""
-    options = ImportOptions(copy=False, despite_findings=True)
+    options = ImportOptions(copy=False, allow_inconsistent=True)
     session = import_source(real_data / "mouse", tmp_path / "mouse", options).session
     footage = replace(session.manifest.footage, frame_count=FRAMES)
     return described_anew(session, msgspec.structs.replace(session.manifest, footage=footage))

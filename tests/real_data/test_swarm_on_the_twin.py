@@ -37,11 +37,11 @@ def footage(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureReq
     return folder
 
 
-def runs(footage: Path, contender: Candidate, name: str = TWIN) -> list[Tracked]:
-    """A contender on the whole footage, every seed."""
+def runs(footage: Path, candidate: Candidate, name: str = TWIN) -> list[Tracked]:
+    """A candidate on the whole footage, every seed."""
     cache = FootageCache(footage)
     try:
-        return [track(contender.attempt(name, seed, EVALUATIONS), cache) for seed in SEEDS]
+        return [track(candidate.attempt(name, seed, EVALUATIONS), cache) for seed in SEEDS]
     finally:
         cache.close()
 

@@ -208,7 +208,7 @@ def test_200_particles_are_judged_with_eq_13() -> None:
 
 
 def test_the_fewest_particles_of_a_body_are_searched_on_footage(cache) -> None:
-    trial = particles_needed.body_trials(Scale((1,), quick=True), {"Eq. 13": {"survival": 0.5, "layers": 2}})[
+    trial = particles_needed.body_trials({"Eq. 13": {"survival": 0.5, "layers": 2}}, Scale((1,), quick=True))[
         0
     ]
     arguments = {**json.loads(json.dumps(trial.arguments)), "footage": "walk", "last": 8, "sizes": [1, 60]}
@@ -239,14 +239,14 @@ def test_fig_3_measures_clouds_that_draw_together(cache) -> None:
     assert len(measured["spreads"]) == 10
     assert measured["spreads"][-1] < 0.7 * measured["spreads"][0]
     assert 0.0 <= measured["covered"] <= 1.0
-    found = layers_of_a_body.FIG_3.conclude([Outcome(trial, measured)])
+    found = EXPERIMENTS["deutscher-fig-3"].conclude([Outcome(trial, measured)])
     assert len(found.charts[0].series) == len(layers_of_a_body.DRAWN_LAYERS)
     never = {**measured, "covered": 0.0}
-    assert layers_of_a_body.FIG_3.conclude([Outcome(trial, never)] * 5).verdict == "not reproduced"
+    assert EXPERIMENTS["deutscher-fig-3"].conclude([Outcome(trial, never)] * 5).verdict == "not reproduced"
     growing = {**measured, "covered": 1.0, "spreads": measured["spreads"][::-1]}
-    assert layers_of_a_body.FIG_3.conclude([Outcome(trial, growing)] * 5).verdict == "not reproduced"
+    assert EXPERIMENTS["deutscher-fig-3"].conclude([Outcome(trial, growing)] * 5).verdict == "not reproduced"
     falling = {**measured, "covered": 1.0, "spreads": sorted(measured["spreads"], reverse=True)}
-    assert layers_of_a_body.FIG_3.conclude([Outcome(trial, falling)] * 5).verdict == "reproduced"
+    assert EXPERIMENTS["deutscher-fig-3"].conclude([Outcome(trial, falling)] * 5).verdict == "reproduced"
 
 
 def test_the_pelvis_is_where_its_marker_is(cache) -> None:
@@ -276,7 +276,7 @@ def test_fig_7_measures_a_weight_that_is_largest_near_the_true_knee(cache) -> No
     # Eq. 16: the terms add up.
     assert logs["both"] == pytest.approx(logs["edges"] + logs["region"], abs=1e-3)
     assert abs(angles[np.argmax(logs["both"])] - measured["truth"]) < 20.0
-    assert weight_of_a_knee.FIG_7.conclude([Outcome(trial, measured)]).verdict in VERDICTS
+    assert EXPERIMENTS["deutscher-fig-7"].conclude([Outcome(trial, measured)]).verdict in VERDICTS
 
 
 def test_fig_7_is_judged_by_modes_and_peak() -> None:
@@ -292,7 +292,7 @@ def test_fig_7_is_judged_by_modes_and_peak() -> None:
             "truth": 40.0,
             "log_weights": dict.fromkeys(weight_of_a_knee.TERMS, logs(centre, second)),
         }
-        return weight_of_a_knee.FIG_7.conclude(
+        return EXPERIMENTS["deutscher-fig-7"].conclude(
             [Outcome(trial, measured) for trial in weight_of_a_knee.trials(SEEDS)]
         )
 
@@ -340,12 +340,12 @@ def test_figs_19_and_20_follow_the_tree(cache) -> None:
         shares = np.ones((5, 31))
         shares[1:] = np.array(order)[rank] + 0.01 * np.arange(31) / 31
         outcome = Outcome(trial, {**measured, "shares": shares.tolist()})
-        assert layers_of_a_body.FIG_19.conclude([outcome] * 5).verdict == verdict
+        assert EXPERIMENTS["deutscher-fig-19"].conclude([outcome] * 5).verdict == verdict
     # hips, shoulders, knees, elbows, ankles, wrists
     for ends, verdict in (([1, 1, 2, 2, 3, 3], "reproduced"), ([1, 1, 3, 3, 2, 2], "not reproduced")):
         scatter = [[10.0] * 6] + [[float(value) for value in ends]] * 4
         outcome = Outcome(trial, {**measured, "scatter": scatter})
-        assert layers_of_a_body.FIG_20.conclude([outcome] * 5).verdict == verdict
+        assert EXPERIMENTS["deutscher-fig-20"].conclude([outcome] * 5).verdict == verdict
 
 
 def test_processors_are_compared_in_turn(cache) -> None:
@@ -356,7 +356,7 @@ def test_processors_are_compared_in_turn(cache) -> None:
     assert min(measured["frame"]) > min(measured["weighing"]) > 0.0
 
     def made(each: float, frame: float = 0.8) -> Findings:
-        return processors.EXPERIMENT.conclude(
+        return EXPERIMENTS["deutscher-processors"].conclude(
             [
                 Outcome(
                     trial,
@@ -376,7 +376,7 @@ def test_processors_are_compared_in_turn(cache) -> None:
     # The claim is on the processing time: whole frames count, too.
     assert made(0.95, 0.55).verdict == "not reproduced"
     one = [Outcome(trial, {"threads": [1], "frame": [9.0], "weighing": [1.0]})]
-    assert processors.EXPERIMENT.conclude(one).verdict == "answered"
+    assert EXPERIMENTS["deutscher-processors"].conclude(one).verdict == "answered"
 
 
 @pytest.mark.slow

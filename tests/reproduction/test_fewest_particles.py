@@ -10,6 +10,7 @@ import pytest
 from studio.comparison.findings import Findings
 from studio.comparison.footage_cache import FootageCache
 from studio.comparison.trials import Outcome, Scale
+from studio.reproduction.catalogue import EXPERIMENTS
 from studio.reproduction.deutscher_reid import particles_needed
 from studio.reproduction.deutscher_reid.particles_needed import (
     ABOVE,
@@ -139,7 +140,7 @@ def concluded(experiment: Experiment, needed: dict[str, float]) -> Findings:
     ("slow", "verdict"), [(200.0, "reproduced"), (800.0, "better"), (100.0, "not reproduced")]
 )
 def test_adaptive_diffusion_saves_two_more_or_nothing(slow: float, verdict: str) -> None:
-    experiment = particles_needed.DIFFUSION
+    experiment = EXPERIMENTS["deutscher-adaptive-diffusion"]
     names = {group_of(trial) for trial in experiment.trials(SEEDS)}
     needed = {name: slow if name.startswith("Eq. 13") else 100.0 for name in names}
     found = concluded(experiment, needed)
@@ -161,7 +162,7 @@ def test_adaptive_diffusion_saves_two_more_or_nothing(slow: float, verdict: str)
     ],
 )
 def test_crossover_saves_on_branches_and_not_on_a_chain(branched: float, chain: float, verdict: str) -> None:
-    experiment = particles_needed.CROSSOVER
+    experiment = EXPERIMENTS["deutscher-crossover"]
     needed = {group_of(trial): 100.0 for trial in experiment.trials(SEEDS)}
     for base in particles_needed.ADDED_TO:
         needed[group(f"{base}, crossed by parameters", "branched_arms6", RATE)] = branched
@@ -176,11 +177,11 @@ def test_crossover_saves_on_branches_and_not_on_a_chain(branched: float, chain: 
 
 
 def test_every_particle_is_crossed_and_the_chain_is_shared_with_adaptive_diffusion() -> None:
-    trials = particles_needed.CROSSOVER.trials(SEEDS)
+    trials = EXPERIMENTS["deutscher-crossover"].trials(SEEDS)
     assert {trial.arguments["knobs"]["crossover"] for trial in trials} == {0.0, 1.0}
     keys = [
         {json.dumps(trial.arguments, sort_keys=True) for trial in experiment.trials(SEEDS)}
-        for experiment in (particles_needed.DIFFUSION, particles_needed.CROSSOVER)
+        for experiment in (EXPERIMENTS["deutscher-adaptive-diffusion"], EXPERIMENTS["deutscher-crossover"])
     ]
     assert len(keys[0] & keys[1]) == 4 * len(SEEDS.seeds)
 
@@ -196,7 +197,7 @@ def test_six_layers_may_anneal_as_much_as_ten() -> None:
 )
 def test_both_together_save_four_on_a_whole_body(both: float, verdict: str) -> None:
     needed = dict(zip(particles_needed.FILTERS, (400.0, 200.0, both, 100.0), strict=True))
-    found = concluded(particles_needed.BOTH_IMPROVEMENTS, needed)
+    found = concluded(EXPERIMENTS["deutscher-full-body"], needed)
     assert found.verdict == verdict
     assert found.numbers[0].ours == pytest.approx(400.0 / both)
     # Crossing half of the particles by limbs is ours: no claim of the paper rests on it.
@@ -205,7 +206,7 @@ def test_both_together_save_four_on_a_whole_body(both: float, verdict: str) -> N
 
 @pytest.mark.parametrize(("ten", "verdict"), [(100.0, "reproduced"), (300.0, "not reproduced")])
 def test_doubling_the_layers_more_than_halves_the_particles(ten: float, verdict: str) -> None:
-    layers = particles_needed.MORE_LAYERS
+    layers = EXPERIMENTS["deutscher-layers"]
     of_count = {"5": 400.0, "10": ten, "20": 60.0}
     needed = {name: of_count[name.partition(" ")[0]] for name in particles_needed.LAYER_FILTERS}
     found = concluded(layers, needed)
@@ -216,9 +217,9 @@ def test_doubling_the_layers_more_than_halves_the_particles(ten: float, verdict:
 
 
 def test_ten_layers_and_eq_13_are_the_same_trial() -> None:
-    layers = particles_needed.MORE_LAYERS
+    layers = EXPERIMENTS["deutscher-layers"]
     keys = [
         {json.dumps(trial.arguments, sort_keys=True) for trial in experiment.trials(SEEDS)}
-        for experiment in (layers, particles_needed.BOTH_IMPROVEMENTS)
+        for experiment in (layers, EXPERIMENTS["deutscher-full-body"])
     ]
     assert len(keys[0] & keys[1]) == len(SEEDS.seeds)

@@ -19,7 +19,8 @@ from studio.reproduction.deutscher_reid.localisation import (
 from studio.reproduction.experiment import Experiment
 
 SEEDS = Scale(tuple(range(6)))
-FIGURES = {entry.name: entry for entry in (*localisation.EXPERIMENTS, *localisation.EXPERIMENTS_ON_BRANCHES)}
+FIGURES = {one.name: one for one in localisation.EXPERIMENTS if one.name != "deutscher-fig-16"}
+FIGS_12_TO_14 = ("deutscher-fig-12", "deutscher-fig-13", "deutscher-fig-14")
 
 
 def falling(shares: list[list[float]], noisy: float = 1.0) -> dict:
@@ -161,11 +162,11 @@ def test_verdicts_follow_the_measurements() -> None:
 def test_trials_of_figures_12_to_14_are_shared() -> None:
     searches = [
         json.dumps(trial.arguments, sort_keys=True)
-        for experiment in localisation.EXPERIMENTS
-        for trial in experiment.trials(SEEDS)
+        for figure in FIGS_12_TO_14
+        for trial in FIGURES[figure].trials(SEEDS)
     ]
     assert len(set(searches)) == (3 + 2 * len(localisation.MILDER)) * len(SEEDS.seeds)
-    assert {experiment.measure for experiment in localisation.EXPERIMENTS} == {measure}
+    assert {FIGURES[figure].measure for figure in FIGS_12_TO_14} == {measure}
 
 
 def test_slopes_tell_even_falls_from_uneven_ones() -> None:

@@ -58,7 +58,7 @@ def test_a_factor_makes_spreads_right_in_95_of_100_cases() -> None:
 @pytest.mark.parametrize("tracker", [0, 2, 3])
 def test_a_tracker_is_measured_layer_by_layer(tracker: int) -> None:
     cache = FootageCache(SAMPLES)
-    one = posterior.CONTENDERS[tracker]
+    one = posterior.CANDIDATES[tracker]
     trial = next(
         trial
         for trial in posterior.trials(Scale((0,), quick=True))

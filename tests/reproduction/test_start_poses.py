@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pytest
+
 from studio.comparison.findings import Chart, Number, Table
 from studio.comparison.footage_cache import FootageCache
 from studio.comparison.trials import Outcome, Trial
@@ -10,6 +12,7 @@ from studio.reproduction.open_questions import start_poses
 SAMPLES = Path(__file__).parents[2] / "sample_sessions"
 
 
+@pytest.mark.slow
 def test_a_start_pose_is_measured_against_the_truth() -> None:
     found = start_poses.measure({"footage": "walk", "frame": 0, "seed": 0}, FootageCache(SAMPLES))
     assert found["mean_mm"] <= start_poses.RIGHT_MM
@@ -22,6 +25,7 @@ def test_poses_are_counted_by_confidence() -> None:
         trial = Trial(f"reporting {kind}, frame 0, seed 0", {})
         return Outcome(trial, {"confidence": confidence, "mean_mm": mean, "worst_mm": 2.0 * mean})
 
+    assert f"{100 * start_poses.SURE:.0f} % sure" in start_poses.EXPERIMENTS[0].claim
     planted = [outcome(f"clip-{at}", 0.98, 30.0) for at in range(9)]
     planted += [outcome("leap", 0.98, 250.0), outcome("hard", 0.4, 300.0), outcome("walk", 0.4, 20.0)]
     parts = list(start_poses.shown(planted))

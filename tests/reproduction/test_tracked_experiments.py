@@ -76,6 +76,12 @@ def test_findings_are_plain_and_name_their_settings(name: str) -> None:
     json.dumps(asdict(findings))
 
 
+def test_effort_says_what_a_smaller_search_costs() -> None:
+    words = concluded("effort", lambda label: 44.0 if label.startswith("10 × 20,") else 40.0).words
+    assert words.count("10 × 20 +10.0 %") == 2
+    assert words.count("10 × 50 +0.0 %") == 2
+
+
 def test_table_2_is_reproduced_bettered_or_not() -> None:
     paper = {"1000": 38.0, "2000": 37.3, "4000": 35.7}
 

@@ -13,7 +13,7 @@ from tracked_runs import finish
 from studio.capture.calibration_files import write_calibration
 from studio.errors import RunError
 from studio.geometry.camera import Camera
-from studio.likelihood.edge_region import EdgeRegionProblem
+from studio.likelihood.edge_region import EdgeRegionFrameLikelihood
 from studio.runs.new_run import prepare_run
 from studio.sessions.manifest import write_manifest
 from studio.sessions.session import Session
@@ -106,10 +106,10 @@ def test_a_frame_without_a_finite_weight_ends_the_run_with_its_number(
     """What was tracked before stays, and the run goes on once its frames can be weighed."""
     run = prepare_run(session_on_disk, name="a", start_pose=true_poses()[0], seed=2, last=4, knobs=QUICK)
     finish(session_on_disk, run, layers=2 * QUICK["layers"] + 1 * QUICK["layers"] + 1)
-    whole = EdgeRegionProblem.log_likelihood
+    whole = EdgeRegionFrameLikelihood.log_likelihood
     with monkeypatch.context() as patched:
         patched.setattr(
-            EdgeRegionProblem,
+            EdgeRegionFrameLikelihood,
             "log_likelihood",
             lambda self, poses, stage=0: whole(self, poses, stage) * np.nan,
         )

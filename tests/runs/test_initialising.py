@@ -73,6 +73,7 @@ def errors_in(session: Session, frames: range, seed: int) -> list[float]:
     return errors
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_people_in_random_moments_and_headings_are_found(people: Session) -> None:
     assert max(errors_in(people, range(3), seed=2)) <= 80.0
@@ -128,7 +129,7 @@ def test_the_source_of_a_pose_names_its_confidence(session_on_disk: Session) -> 
 
 
 def test_a_frame_without_a_body_is_refused(session_on_disk: Session, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("studio.runs.initialising.anything_seen", lambda _: False)
+    monkeypatch.setattr("studio.runs.problem_source.anything_seen", lambda _: False)
     with pytest.raises(RunError, match="shows no body"):
         initialise(session_on_disk, 0)
 

@@ -1,6 +1,7 @@
 """Frames are made once, ahead of their time where there is a thread for it, and not held longer than
 needed."""
 
+import threading
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -77,6 +78,24 @@ def test_the_next_frame_is_made_ready_and_is_the_same(session_on_disk: Session, 
             assert np.array_equal(source.problem(frame, SETTINGS).log_likelihood(poses), wanted[frame])
         source.close()
     assert sorted(made) == list(range(7))
+
+
+def test_the_next_frame_is_begun_by_a_later_layer_where_the_thread_was_busy(
+    session_on_disk: Session, made: list[int]
+) -> None:
+    """Frame 1 is still being made when frame 4 is first asked for; the next request finds the thread free."""
+    held = threading.Event()
+    with ThreadPoolExecutor(1) as executor:
+        executor.submit(held.wait, 60.0)
+        source = ProblemSource(session_on_disk, session_on_disk.body(), executor=executor)
+        source.problem(0, SETTINGS)
+        first = source.problem(4, SETTINGS)
+        held.set()
+        executor.submit(int).result()
+        assert source.problem(4, SETTINGS) is first
+        executor.submit(int).result()
+        source.close()
+    assert made == [0, 4, 1, 5]
 
 
 def test_what_goes_wrong_ahead_comes_up_where_it_is_used(session_on_disk: Session) -> None:

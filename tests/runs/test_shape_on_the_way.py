@@ -13,12 +13,14 @@ from studio.body.catalogue import load_body
 from studio.body.dimensions import with_dimensions
 from studio.body.shape_space import dimension_kinds, end_lengths
 from studio.body.subject import Subject, fit_subject
+from studio.evidence.settings import EvidenceSettings
 from studio.runs import shape_on_the_way
 from studio.runs.new_run import prepare_run
 from studio.runs.search_space import default_sigma
 from studio.runs.shape_on_the_way import FOLDER, shaped_body
 from studio.runs.workflow import run_changes
 from studio.sessions.session import Session
+from studio.settings import default_settings
 
 WALK = Path(__file__).parents[2] / "sample_sessions" / "walk"
 CAMERAS = ring_of_cameras(4, 480, 360)
@@ -100,6 +102,19 @@ def test_a_fit_is_found_again_whatever_the_last_bits_are(
     monkeypatch.setattr(shape_on_the_way, "shaped_body", lambda *_, **__: pytest.fail("fitted again"))
     nudged = np.nextafter(start, np.inf)
     assert prepare_run(walk, last=20, start_pose=nudged).record.dimensions == first.dimensions
+
+
+def test_a_fit_with_the_masks_of_another_default_is_not_taken(
+    walk: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    start = walk.start_pose()
+    assert start is not None
+    keys = list[str]()
+    for defaults in (EvidenceSettings(), EvidenceSettings(mask_shadow_darkest=0.6)):
+        monkeypatch.setattr(shape_on_the_way, "EvidenceSettings", lambda kept=defaults: kept)
+        settings = dataclasses.replace(default_settings(), evidence=defaults)
+        keys.append(shape_on_the_way._key(walk, walk.body(), settings, start, range(30)))
+    assert keys[0] != keys[1]
 
 
 def test_few_frames_or_one_camera_give_no_shape(walk: Session, session_on_disk: Session) -> None:

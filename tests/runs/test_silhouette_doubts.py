@@ -119,7 +119,7 @@ def test_a_session_whose_footage_contradicts_its_cameras_is_not_tracked(walk: Se
     assert sound[0].name in refused.value.message
     assert sound[2].name in refused.value.message
     assert len(spoilt.runs()) == 2
-    (note,) = prepare_run(spoilt, last=2, fit_shape=False, despite_findings=True).record.notes
+    (note,) = prepare_run(spoilt, last=2, fit_shape=False, allow_inconsistent=True).record.notes
     assert note.startswith("Tracked despite: ")
     step = next(step for step in workflow_of(spoilt).steps if step.step == "calibration")
     assert (step.state, "contradicts" in step.why) == ("stale", True)

@@ -28,7 +28,7 @@ def aligned(session: Session) -> SessionAlignment:
 
 
 def calibration_step(session: Session) -> StepStatus:
-    """Step Calibration of the guided way."""
+    """Step Calibration of the guided set-up."""
     return next(step for step in workflow_of(session).steps if step.step == "calibration")
 
 

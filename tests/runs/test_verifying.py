@@ -49,7 +49,14 @@ def change(run: StoredRun, sql: str) -> None:
         connection.commit()
 
 
-def test_each_of_a_hundred_flips_is_named_and_repaired(session_on_disk: Session, run: StoredRun) -> None:
+@pytest.mark.parametrize(
+    ("in_store", "in_files"),
+    [(6, 14), pytest.param(60, 40, marks=pytest.mark.slow)],
+    ids=["few", "a hundred"],
+)
+def test_each_flip_is_named_and_repaired(
+    session_on_disk: Session, run: StoredRun, in_store: int, in_files: int
+) -> None:
     whole, rng = content(run), np.random.default_rng(14)
     note_files(session_on_disk.path)
     store = (run.folder / FILE_NAME).read_bytes()
@@ -60,7 +67,7 @@ def test_each_of_a_hundred_flips_is_named_and_repaired(session_on_disk: Session,
     ]
     assert len(files) > 12
     assert verify(session_on_disk).faults == ()
-    for _ in range(60):
+    for _ in range(in_store):
         frame = flip_stored(run.folder / FILE_NAME, rng)
         found = verify(session_on_disk).faults
         assert [(fault.run, fault.frame) for fault in found] == [("a", frame)]
@@ -68,7 +75,7 @@ def test_each_of_a_hundred_flips_is_named_and_repaired(session_on_disk: Session,
         assert content(run) == whole
     assert verify(session_on_disk).faults == ()
     (run.folder / FILE_NAME).write_bytes(store)
-    for number in range(40):
+    for number in range(in_files):
         name = files[number % len(files)]
         path = session_on_disk.path / name
         before, status = path.read_bytes(), path.stat()

@@ -1,4 +1,4 @@
-"""The guided way: how far a session is, and what a change makes stale."""
+"""The guided set-up: how far a session is, and what a change makes stale."""
 
 from pathlib import Path
 
@@ -23,11 +23,11 @@ def states(session) -> dict[str, str]:
 def test_an_empty_session_waits_for_footage(tmp_path):
     workspace = Workspace(tmp_path)
     session = begin_session(workspace.place_for("mine"), "My take")
-    way = workflow_of(session)
-    assert [step.step for step in way.steps] == STEPS
-    assert way.next == "footage"
-    assert [step.state for step in way.steps] == ["ready"] + ["blocked"] * 7
-    assert all(step.why for step in way.steps[1:])
+    found = workflow_of(session)
+    assert [step.step for step in found.steps] == STEPS
+    assert found.next == "footage"
+    assert [step.state for step in found.steps] == ["ready"] + ["blocked"] * 7
+    assert all(step.why for step in found.steps[1:])
     assert [summary.name for summary in workspace.sessions()] == ["mine"]
     with pytest.raises(SessionError, match="no footage yet"):
         session.cameras()

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from looking_cameras import turned_to
 
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
@@ -22,11 +23,7 @@ WIDTH, HEIGHT, FPS = 320, 240, 60.0
 def ring_camera(name: str, bearing: float, quarter_turns: int = 0) -> Camera:
     """A camera 3.4 m from the middle and 2.2 m high, looking at the hips; rolled if it is to be turned."""
     centre = np.array([3400.0 * np.cos(bearing), 3400.0 * np.sin(bearing), 2200.0])
-    forward = np.array([0.0, 0.0, 900.0]) - centre
-    forward /= np.linalg.norm(forward)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    rotation = np.stack([right, np.cross(forward, right), forward])
+    rotation = turned_to(centre, (0.0, 0.0, 900.0))
     # Rolled so that turning the picture clockwise by the quarter turns makes it upright again.
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     rotation = np.linalg.matrix_power(turn.T, quarter_turns) @ rotation

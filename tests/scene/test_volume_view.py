@@ -11,7 +11,7 @@ from tracked_runs import finish
 
 from studio.body.model import BodyModel
 from studio.errors import StudioError
-from studio.likelihood.blobs import BlobProblem
+from studio.likelihood.blobs import BlobFrameLikelihood
 from studio.runs.colour_tokens import colour_tokens
 from studio.runs.new_run import prepare_run
 from studio.runs.problem_source import ProblemSource
@@ -141,7 +141,7 @@ def test_a_run_weighed_by_blobs_shows_its_own_hull_and_fit(session_on_disk: Sess
         before, answer = results.result(2), results.result(3)
     source = ProblemSource(session_on_disk, run.body(), run.cameras())
     problem = source.problem(3, made.opened.settings())
-    assert isinstance(problem, BlobProblem)
+    assert isinstance(problem, BlobFrameLikelihood)
     np.testing.assert_array_equal(volume.hull.centres, problem.hull.centres)
     expected = problem.expecting(answer.estimate.pose[None], before.carried.memory)
     assert expected.fitted is not None

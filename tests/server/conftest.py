@@ -83,11 +83,24 @@ def session(workspace: Workspace) -> Session:
 def record(rng: np.random.Generator, frame: int, layer: int, size: int, particles: int = 7) -> LayerRecord:
     """A layer with numbers that can be told apart."""
     poses = rng.normal(size=(particles, size))
-    variances = [np.full(size, 4.0 / (layer + 1) / (kind + 1)) for kind in range(3)]
+    flat = np.full(size, 4.0 / (layer + 1))
     return LayerRecord(
-        frame, layer, 1, 0.5 + layer, 0.5, 0.4, *variances, poses[0], -1.0, poses.mean(0), poses,
-        rng.normal(size=particles), 3.0,
-    )  # fmt: skip
+        frame=frame,
+        layer=layer,
+        settings_version=1,
+        beta=0.5 + layer,
+        alpha_wanted=0.5,
+        alpha_reached=0.4,
+        variance_weighed=flat,
+        variance_resampled=flat / 2,
+        variance_diffused=flat / 3,
+        best=poses[0],
+        best_log_weight=-1.0,
+        mean=poses.mean(0),
+        poses=poses,
+        log_weights=rng.normal(size=particles),
+        milliseconds=3.0,
+    )
 
 
 @pytest.fixture

@@ -40,7 +40,7 @@ def ended(studio: Studio) -> dict:
 
 
 def calibration_why(studio: Studio) -> str:
-    """What the guided way says of the calibration."""
+    """What the guided set-up says of the calibration."""
     steps = studio.client.get("/api/sessions/nudged/way").json()["steps"]
     return next(step["why"] for step in steps if step["step"] == "calibration")
 

@@ -26,21 +26,21 @@ def layer(number: int = 0, particles: int = 2000) -> LayerRecord:
     three = np.array([1.0, NAN, 3.0])
     weights = np.linspace(-2.0, 0.0, particles)
     return LayerRecord(
-        4,
-        number,
-        2,
-        1.5,
-        NAN,
-        0.4,
-        three,
-        three / 2,
-        three / 4,
-        poses[-1],
-        0.0,
-        poses[0],
-        poses,
-        weights,
-        7.0,
+        frame=4,
+        layer=number,
+        settings_version=2,
+        beta=1.5,
+        alpha_wanted=NAN,
+        alpha_reached=0.4,
+        variance_weighed=three,
+        variance_resampled=three / 2,
+        variance_diffused=three / 4,
+        best=poses[-1],
+        best_log_weight=0.0,
+        mean=poses[0],
+        poses=poses,
+        log_weights=weights,
+        milliseconds=7.0,
     )
 
 

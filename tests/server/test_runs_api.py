@@ -265,7 +265,7 @@ def test_a_doubted_calibration_is_reported_and_tracked_only_if_requested(studio:
     assert refused.status_code == 422
     assert doubt in refused.json()["message"]
     assert studio.client.get("/api/sessions/take1/runs/refused").status_code == 404
-    wish = {"name": "wished", "despite_findings": True}
+    wish = {"name": "wished", "allow_inconsistent": True}
     assert studio.client.post("/api/sessions/take1/runs", json=wish).status_code == 201
     notes = studio.client.get("/api/sessions/take1/runs/wished").json()["notes"]
     assert f"Tracked despite: {doubt}" in notes

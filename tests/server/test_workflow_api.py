@@ -1,4 +1,4 @@
-"""The guided way over the API: a session that begins empty, footage added to it, how far it is."""
+"""The guided set-up over the API: a session that begins empty, footage added to it, how far it is."""
 
 import shutil
 from pathlib import Path

@@ -47,9 +47,9 @@ def test_what_makes_results_wrong_blocks(
     path.write_text(path.read_text() + "\n[metadata.board]\nsquare_length_mm = 30.0\n")
     with pytest.raises(CalibrationError, match=message) as caught:
         import_source(source, tmp_path / "made")
-    assert "--despite-findings" in caught.value.hint
+    assert "--allow-inconsistent" in caught.value.hint
     assert not (tmp_path / "made").exists()
-    report = import_source(source, tmp_path / "made", ImportOptions(despite_findings=True))
+    report = import_source(source, tmp_path / "made", ImportOptions(allow_inconsistent=True))
     assert any("axis points up" in line or "floor" in line or "metres" in line for line in report.warnings)
 
 

@@ -48,7 +48,9 @@ def test_points_in_the_calibrations_world_turn_with_it(tmp_path: Path) -> None:
     plain = import_source(source, tmp_path / "plain").session
     np.testing.assert_allclose(truth_of(plain), points, atol=0.1)
     assert any("points.csv" in note for note in plain.manifest.notes)
-    turned = import_source(source, tmp_path / "turned", ImportOptions(up="y", despite_findings=True)).session
+    turned = import_source(
+        source, tmp_path / "turned", ImportOptions(up="y", allow_inconsistent=True)
+    ).session
     read = read_calibration(source / "calibration" / "Calib.toml")
     expected, _ = carried(points, read.cameras, with_up(read, "y").cameras)
     assert np.abs(expected - points).max() > 500.0

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 import s3fs
-from s3_server import BUCKET, s3_server
+from s3_server import BUCKET, s3_server, used_here
 from store_records import layer_of, record_of, result_of
 from toy_session import make_session
 
@@ -51,14 +51,8 @@ def address(
     server: Mapping[str, str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, request: pytest.FixtureRequest
 ) -> Iterator[str]:
     """Where this test's session is put; copies lie in its own cache."""
-    for name, value in server.items():
-        monkeypatch.setenv(name, value)
-    monkeypatch.setenv("STUDIO_CACHE", str(tmp_path / "cache"))
-    # Connections are kept by what they were opened with, which is not all of the environment.
-    s3fs.S3FileSystem.clear_instance_cache()
-    yield f"{FOLDER}-{abs(hash(request.node.name))}/toy"
-    while remote_sessions._holds:
-        remote_sessions._holds.popitem()[1].free()
+    with used_here(server, monkeypatch, tmp_path / "cache"):
+        yield f"{FOLDER}-{abs(hash(request.node.name))}/toy"
 
 
 @pytest.fixture

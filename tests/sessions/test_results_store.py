@@ -314,29 +314,69 @@ def test_what_is_stored_is_read_once_by_a_process_and_some_frames_at_a_time(
     assert len(blobs_read) == 6
 
 
-def test_the_numbers_are_read_once_until_something_changes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def rows_read(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """How many rows each reading of numbers got."""
     read, rows = list[int](), ResultsReader._rows
 
-    def noting(self: ResultsReader, frame: int | None = None) -> list[Row]:
-        read.append(1)
-        return rows(self, frame)
+    def noting(self: ResultsReader, frame: int | None = None, after: int = -1) -> list[Row]:
+        found = rows(self, frame, after)
+        read.append(len(found))
+        return found
 
     monkeypatch.setattr(ResultsReader, "_rows", noting)
+    return read
+
+
+def test_the_numbers_are_read_once_until_something_changes(tmp_path: Path, rows_read: list[int]) -> None:
     with ResultsWriter(tmp_path) as writer, ResultsReader(tmp_path) as reader:
         write(writer, 0)
         for _ in range(3):
             assert reader.damaged(blobs=False) == {}
             assert len(reader.timeline(blobs=False).frames) == 1
             assert not reader.is_checked()
-        assert len(read) == 1
+        assert rows_read == [1]
         write(writer, 1)
         assert reader.frames(blobs=False) == [0, 1]
-        assert len(read) == 2
+        assert rows_read == [1, 1]
         with ResultsReader(tmp_path) as other:
             other.frames()
         assert reader.is_checked()
+
+
+@pytest.mark.parametrize("blobs", [False, True])
+def test_of_a_run_that_goes_on_only_new_frames_are_read(
+    tmp_path: Path, rows_read: list[int], *, blobs: bool
+) -> None:
+    def whole() -> list[int]:
+        with ResultsReader(tmp_path) as fresh:
+            found = fresh.frames(blobs=blobs)
+        rows_read.clear()
+        assert reader.frames(blobs=blobs) == found
+        poses = reader.poses(blobs=blobs)[1]
+        assert np.array_equal(poses, [result_of(frame).estimate.pose for frame in found])
+        return found
+
+    with ResultsWriter(tmp_path) as writer, ResultsReader(tmp_path) as reader:
+        for frame in range(20):
+            write(writer, frame)
+        assert whole() == list(range(20))
+        for frame in (20, 23):
+            write(writer, frame)
+        assert whole() == [*range(21), 23]
+        assert rows_read == [2]
+        writer.mark_ended("cancelled")
+        assert whole() == [*range(21), 23]
+        writer.forget_from(10)
+        write(writer, 10)
+        assert whole() == list(range(11))
+        assert rows_read == [11], "frames were dropped"
+        writer.give_up(4)
+        write(writer, 11)
+        assert whole() == [0, 1, 2, 3, *range(5, 12)]
+        write(writer, 4)
+        assert whole() == list(range(12))
+        assert rows_read == [12], "a frame was replaced"
 
 
 def test_damage_that_was_found_is_known_without_reading_until_it_is_mended(

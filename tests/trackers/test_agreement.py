@@ -5,18 +5,12 @@ import pytest
 from drawn_people import drawn_evidence, ring_of_cameras
 from moving_bodies import standing
 
-from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
 from studio.evidence.distance_maps import silhouette_distances
 from studio.trackers.agreement import Agreement, limb_names
 from studio.trackers.tracker import LIMB_LOST_SHARE
 
 CAMERAS = ring_of_cameras(4, 480, 360)
-
-
-@pytest.fixture(scope="module")
-def body() -> BodyModel:
-    return load_body("human31")
 
 
 def place(body: BodyModel, **angles: float) -> np.ndarray:

@@ -80,22 +80,6 @@ def test_a_repeat_begins_where_the_search_before_ended() -> None:
     assert not np.allclose(noise, records[0].poses)
 
 
-def test_checkpoint_may_leave_the_frame() -> None:
-    states: list[SearchState] = []
-
-    def leave(state: SearchState) -> None:
-        states.append(state)
-        if len(states) == 2:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        searched(checkpoint=leave)
-    resumed = new_search(1, states[-1])
-    while not resumed.finished:
-        resumed.step(PROBLEM, 5, SETTINGS)
-    assert np.array_equal(resumed.result().estimate.pose, searched()[0].estimate.pose)
-
-
 def test_quick_knobs_change_at_the_next_layer_and_slow_ones_wait() -> None:
     search = new_search()
     changed = dataclasses.replace(SETTINGS, survival=0.2, particles=999, layers=9)

@@ -9,7 +9,6 @@ import pytest
 from drawn_people import drawn_evidence, ring_of_cameras
 from moving_bodies import standing
 
-from studio.body.catalogue import load_body
 from studio.body.dimensions import with_dimensions
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
@@ -26,11 +25,6 @@ from studio.trackers.tracker import Estimate, FilterState, FrameLikelihood, Fram
 CAMERAS = ring_of_cameras(4, 480, 360)
 SETTINGS = FrameRefinementSettings()
 Angles = tuple[float, ...]
-
-
-@pytest.fixture(scope="module")
-def body() -> BodyModel:
-    return load_body("human31")
 
 
 @pytest.fixture(scope="module")

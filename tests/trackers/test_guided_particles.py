@@ -8,19 +8,18 @@ from toy_problems import toy_space
 from turning_behaviour import CLUSTERS, DWELL, PERIOD, ROOT, guided_space, toy_model, turning_poses
 
 from studio.behaviour.root_motion import RootFrame, RootMotion, gaussians_of
-from studio.trackers.behaviour_settings import BehaviourSettings
 from studio.trackers.guided_particles import (
     STATES,
     VELOCITY,
     GuidedParticles,
     followed,
     foreseen,
-    known_of,
     near,
     propagated,
     spread_over_clusters,
     walkers_from,
 )
+from studio.trackers.settings import BehaviourSettings
 from studio.trackers.tracker import FilterState, ParticleSet, SearchSpace
 
 SPACE = guided_space()
@@ -162,7 +161,7 @@ def test_far_from_all_clusters_movements_stay_bounded() -> None:
 def test_recovery_spreads_over_all_clusters_as_often_as_they_were_seen() -> None:
     root = np.arange(9.0)
     spread = spread_over_clusters(np.random.default_rng(4), SPACE, COUNT, root, 0.1 * SPACE.sigma)
-    labels = MODEL.automaton.last_symbols[known_of(spread)[STATES]]
+    labels = MODEL.automaton.last_symbols[spread.extra[STATES]]
     shares = np.bincount(labels, minlength=CLUSTERS) / COUNT
     assert np.allclose(shares, 1.0 / CLUSTERS, atol=0.04)
     assert np.allclose(spread.poses[:, :ROOT].mean(axis=0), root[:ROOT], atol=0.01)

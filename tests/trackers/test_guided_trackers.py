@@ -159,6 +159,21 @@ def test_hard_priors_hold_in_guided_sets(name: str, constraints: str) -> None:
         assert np.all((states >= 0) & (states < MODEL.states))
 
 
+def test_a_run_without_a_start_pose_may_redraw() -> None:
+    start = FilterState(None)
+    settings = settings_of("behaviour", constraints="redraw")
+    found = search_frame(
+        TRACKERS["behaviour"],
+        Bowl(TRUTH[0], 0.1),
+        start,
+        SPACE,
+        seed=0,
+        frame=0,
+        settings_source=lambda: (1, settings),
+    )
+    assert np.isfinite(found.estimate.pose).all()
+
+
 def test_a_body_without_possible_poses_is_still_tracked(name: str) -> None:
     class Nothing(Bowl):
         """No pose is possible."""

@@ -9,7 +9,6 @@ from drawn_people import drawn_evidence, ring_of_cameras
 from moving_bodies import standing
 
 from studio.arrays import Array
-from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
 from studio.evidence.distance_maps import silhouettes_by_camera
 from studio.evidence.frame_evidence import FrameEvidence
@@ -27,11 +26,6 @@ from studio.trackers.tracker import (
 )
 
 CAMERAS = ring_of_cameras(4, 480, 360)
-
-
-@pytest.fixture(scope="module")
-def body() -> BodyModel:
-    return load_body("human31")
 
 
 @pytest.fixture(scope="module")

@@ -18,11 +18,6 @@ SETTINGS = RefinementSettings()
 
 
 @pytest.fixture(scope="module")
-def body() -> BodyModel:
-    return load_body("human31")
-
-
-@pytest.fixture(scope="module")
 def truth(body: BodyModel) -> np.ndarray:
     """Standing with arms and a leg away from the trunk, so that every limb has border."""
     rng = np.random.default_rng(4)

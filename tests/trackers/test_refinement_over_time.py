@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from drawn_people import drawn_evidence, ring_of_cameras
 
-from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
 from studio.evidence.distance_maps import SilhouetteDistances, silhouette_distances
@@ -26,11 +25,6 @@ from studio.trackers.smoothing import rms_second_difference
 Array = np.ndarray
 CAMERAS = ring_of_cameras(3, 320, 240)
 FPS, FRAMES = 30.0, 12
-
-
-@pytest.fixture(scope="module")
-def body() -> BodyModel:
-    return load_body("human31")
 
 
 @pytest.fixture(scope="module")

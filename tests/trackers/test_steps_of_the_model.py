@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 from turning_behaviour import guided_space, turning_angles
 
-from studio.trackers.behaviour_settings import BehaviourSettings
 from studio.trackers.guided_particles import GuidedParticles, columns_of, model_of, propagated
 from studio.trackers.guided_start import arrived
+from studio.trackers.settings import BehaviourSettings
 
 COUNT = 4000
 STILL = BehaviourSettings(attenuation=0.0, model_free_share=0.0)

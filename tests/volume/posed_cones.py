@@ -1,6 +1,7 @@
 """A body of cones in a ring of cameras: its exact masks and which points lie in it, without the studio's hull."""
 
 import numpy as np
+from looking_cameras import turned_to
 from scipy.spatial import ConvexHull
 
 from studio.body.forward_kinematics import limb_frames
@@ -20,11 +21,7 @@ def ring(count: int, width: int = 320, height: int = 240, distance: float = 3300
         bearing = 2.0 * np.pi * number / count + 0.3
         up = 2500.0 if number % 2 else 1500.0
         centre = np.array([distance * np.cos(bearing), distance * np.sin(bearing), up])
-        forward = np.array([0.0, 0.0, 950.0]) - centre
-        forward /= np.linalg.norm(forward)
-        right = np.cross(forward, [0.0, 0.0, 1.0])
-        right /= np.linalg.norm(right)
-        rotation = np.stack([right, np.cross(forward, right), forward])
+        rotation = turned_to(centre, (0.0, 0.0, 950.0))
         focal = 0.95 * width
         matrix = np.array([[focal, 0.0, width / 2 - 3.0], [0.0, focal, height / 2 + 2.0], [0.0, 0.0, 1.0]])
         cameras.append(

@@ -8,6 +8,8 @@ from scipy.spatial import cKDTree
 
 from studio.body.forward_kinematics import limb_frames
 from studio.body.model import BodyModel, kinematic_tables
+from studio.volume.blob_acquisition import Profiles, blobs_of
+from studio.volume.blob_model import BlobModel, cone_blobs
 from studio.volume.hull import Hull
 from studio.volume.tracking_space import Box
 
@@ -76,3 +78,13 @@ def near(body: BodyModel, pose: Array, seed: int, frames: float = 2.0, fps: floa
     lower = np.array([entry.lower for entry in body.parameters])
     upper = np.array([entry.upper for entry in body.parameters])
     return np.clip(pose + frames * step * rng.uniform(-1.0, 1.0, len(pose)), lower, upper)
+
+
+def learn_blobs(body: BodyModel, hulls: list[Hull], poses: Array) -> BlobModel:
+    """The blobs after all of these frames' hulls and poses (F, D), in this order; empty hulls add nothing."""
+    profiles, model = Profiles.none(body), cone_blobs(body)
+    for hull, pose in zip(hulls, poses, strict=True):
+        if len(hull.centres):
+            profiles = profiles.with_frame(body, model, hull, pose)
+            model = blobs_of(body, profiles, 12.0)
+    return model

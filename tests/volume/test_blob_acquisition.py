@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from posed_hulls import empty_hull, hull_of, limb_colours, near, plain
+from posed_hulls import empty_hull, hull_of, learn_blobs, limb_colours, near, plain
 
 from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
@@ -14,7 +14,6 @@ from studio.volume.blob_acquisition import (
     Profiles,
     blobs_of,
     colour_change,
-    learn_blobs,
     parts_of,
 )
 from studio.volume.blob_model import cone_blobs

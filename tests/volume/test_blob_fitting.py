@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from posed_hulls import empty_hull, hull_of, limb_colours, near
+from posed_hulls import empty_hull, hull_of, learn_blobs, limb_colours, near
 from scipy.stats import multivariate_normal
 
 from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
-from studio.volume.blob_acquisition import learn_blobs
 from studio.volume.blob_fitting import Fitted, Voxels, fit_blobs, nearest_blobs, self_likelihood
 from studio.volume.blob_kernels import FACTORS, SUMS, assign, count_changes, gather
 from studio.volume.blob_model import BlobModel, cone_blobs

@@ -17,10 +17,25 @@ CORNERS = np.array([[a, b, c] for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)
 HEIGHTS = radical_inverses(4096)
 
 
+def rows_of(camera: Camera, centre: np.ndarray, half: float) -> np.ndarray:
+    """Projections (rows, 16) of a voxel, sixteen times the same."""
+    rows = np.ones((projection.ROWS, projection.LANES))
+    rows[projection.CENTRE : projection.CENTRE + 3] = centre[:, None]
+    projection.place_voxels(camera_table([camera], picture_limit), 0, half, rows.reshape(-1))
+    return rows
+
+
 def placed(camera: Camera, centre: np.ndarray, half: float) -> np.ndarray | None:
-    place = np.empty(projection.PLACE)
-    seen = projection.place_voxel(camera_table([camera], picture_limit), 0, *centre, half, place)
-    return place if seen else None
+    place = rows_of(camera, centre, half)[:, 5]
+    return place if place[projection.SEEN] else None
+
+
+def pixels_of(rows: np.ndarray, count: int) -> np.ndarray:
+    """(count,) places in the picture of a voxel's samples."""
+    rows[projection.COUNT] = count
+    pixels = np.empty((count, projection.LANES))
+    projection.sample_pixels(rows.reshape(-1), count, 320.0, 240.0, HEIGHTS, pixels.reshape(-1))
+    return pixels[:, 5].astype(int)
 
 
 def places_near(camera: Camera, half: float) -> list[np.ndarray]:
@@ -47,10 +62,9 @@ def test_centre_area_and_bounds_are_those_of_the_projected_corners(half: float) 
 
 def test_samples_lie_inside_and_spread_evenly() -> None:
     camera, centre, half = ring(3)[0], np.array([150.0, -80.0, 800.0]), 140.0
-    place = placed(camera, centre, half)
-    assert place is not None
     count = 4096
-    samples = np.array([projection.sample_pixel(place, number, count, HEIGHTS) for number in range(count)])
+    found = pixels_of(rows_of(camera, centre, half), count)
+    samples = np.stack([found % 320, found // 320], axis=1)
     outline = ConvexHull(project(camera, centre + half * CORNERS)[0])
     distances = outline.equations[:, :2] @ samples.T + outline.equations[:, 2:]
     # Pixels are rounded: at most half a diagonal outside.
@@ -67,18 +81,20 @@ def test_samples_lie_inside_and_spread_evenly() -> None:
 
 
 def test_the_number_of_samples_is_the_root_of_the_area() -> None:
-    place = np.zeros(projection.PLACE)
+    rows = np.ones((projection.ROWS, projection.LANES))
     for area, factor, expected in ((100.0, 1.0, 10), (101.0, 1.0, 11), (0.2, 1.0, 1), (100.0, 1.5, 15)):
-        place[projection.AREA] = area
-        assert projection.sample_count(place, factor) == expected
+        rows[projection.AREA, :3] = area, 4.0 * area, 100.0 * area
+        rows[projection.SEEN, :3] = 1.0, 1.0, 0.0
+        most = projection.count_samples(rows.reshape(-1), 3, factor)
+        assert rows[projection.COUNT, 0] == expected
+        assert most == rows[projection.COUNT, 1]
 
 
 def test_a_single_sample_is_the_middle() -> None:
     camera = ring(3)[0]
-    place = placed(camera, np.array([0.0, 0.0, 900.0]), 5.0)
-    assert place is not None
+    (pixel,) = pixels_of(rows_of(camera, np.array([0.0, 0.0, 900.0]), 5.0), 1)
     expected = np.floor(project(camera, np.array([0.0, 0.0, 900.0]))[0] + 0.5)
-    np.testing.assert_array_equal(projection.sample_pixel(place, 0, 1, HEIGHTS), expected)
+    assert [pixel % 320, pixel // 320] == expected.tolist()
 
 
 def test_voxels_at_or_behind_the_camera_or_where_the_lens_folds_are_not_seen() -> None:

@@ -31,14 +31,6 @@ def test_the_box_stands_on_the_floor_in_the_common_view() -> None:
         assert not all(sees(camera, places).all() for camera in cameras)
 
 
-def test_floor_height_and_margin_are_the_given_ones() -> None:
-    plain, other = box_of(ring(4)), box_of(ring(4), floor=-50.0, height=2000.0, margin=100.0)
-    assert (other.lower[2], other.upper[2]) == (-50.0, 1950.0)
-    assert other.upper[0] - other.lower[0] == pytest.approx(
-        plain.upper[0] - plain.lower[0] + 200.0, abs=150.0
-    )
-
-
 def test_the_cube_stands_on_the_middle_of_the_floor() -> None:
     box = Box(np.array([-1000.0, 500.0, 10.0]), np.array([1000.0, 1500.0, 2200.0]))
     assert box.edge == 2190.0

@@ -78,9 +78,12 @@ function show(opened) {
 
 // Changes, one after the other.
 
+/** @param {() => void | Promise<void>} change */
+const inTurn = (change) => (changing = changing.then(change));
+
 /** @param {Partial<Schemas["BodyEdit"]>} change @param {HTMLInputElement | null} [input] */
 function apply(change, input = null) {
-  changing = changing.then(async () => {
+  return inTurn(async () => {
     try {
       const changed = await post(`${pathOf(body.name)}/edit`, /** @type {any} */ ({ ...change, text: body.text }));
       if (changed.text !== body.text) { past = [...past, body].slice(-REMEMBERED); undone = []; }
@@ -92,7 +95,6 @@ function apply(change, input = null) {
       drawSaid();
     }
   });
-  return changing;
 }
 
 function step(from, to) {
@@ -102,8 +104,8 @@ function step(from, to) {
   [wrong, notes] = [null, []];
   draw();
 }
-const undo = () => step(past, undone);
-const redo = () => step(undone, past);
+const undo = () => inTurn(() => step(past, undone));
+const redo = () => inTurn(() => step(undone, past));
 
 /** A number of the body; its name in the request is `key`. */
 function entry(label, value, send, more = {}) {
@@ -212,6 +214,9 @@ function saveForm() {
       [{ name: "place", label: "For", choices: places, value: own || places[0].value }], [{ name: "replace", kind: "check", label: "replace the one of that name", value: Boolean(own) }],
       ...(session ? [[{ name: "use", kind: "check", label: `track session ${session} with it`, value: true }]] : [])],
     send: async (values) => {
+      // What was typed last is saved, too; what was refused is in its field still, and not in the body.
+      await changing;
+      if (wrong) throw wrong;
       const saved = await post(`${pathOf(body.name)}/edit`, { text: body.text, title: values.title, save_as: values.name, replace: values.replace, session: values.place === "session" ? session : null });
       if (values.use) await put(`${sessionPath(session)}/subject`, { body: saved.saved });
       await refresh();

@@ -106,7 +106,7 @@ export async function newRunForm(entry, like = null) {
       [{ name: "shape", kind: "check", label: "fit the body's shape to the first frames (some seconds)", value: true }],
       [{ name: "start", kind: "check", label: "start tracking at once", value: true }],
       [{ name: "live", kind: "check", label: "live: drops frames rather than falls behind" }],
-      ...(doubt ? [[{ name: "despite", kind: "check", label: "track although the calibration is in doubt" }]] : []),
+      ...(doubt ? [[{ name: "inconsistent", kind: "check", label: "track although the calibration is in doubt" }]] : []),
     ],
     changed: async (name, form) => {
       const { tracker, weighting, preset } = /** @type {any} */ (form.elements);
@@ -128,7 +128,7 @@ export async function newRunForm(entry, like = null) {
       const { name } = await post(`${sessionPath(entry.name)}/runs`, {
         name: values.name || null, tracker: values.tracker, weighting: values.weighting, body: values.body || null, seed: Number(values.seed),
         first: Number(values.first), last: Number(values.last) + 1, settings: { ...preset?.values, ...moved(preset), ...(values.prediction === BEHAVIOUR ? { prediction: BEHAVIOUR } : {}) },
-        behaviour: values.behaviour || null, live: values.live, despite_findings: Boolean(values.despite), fit_shape: values.shape,
+        behaviour: values.behaviour || null, live: values.live, allow_inconsistent: Boolean(values.inconsistent), fit_shape: values.shape,
         ...(found ? { start_pose: found.pose, start_source: found.source } : {}),
       });
       await refreshSessions();

@@ -211,7 +211,7 @@ async function drawTrash() {
 /** Wire the rail. */
 export function startRail() {
   byId("import-open").onclick = importForm;
-  byId("way-new").onclick = () => go("/way?new");
+  byId("session-new").onclick = () => go("/way?new");
   list.addEventListener("keydown", takeArrow);
   watch(["sessions", "session", "run"], draw);
   watch(["sessions"], () => { closeWhatIsGone(); drawTrash(); });

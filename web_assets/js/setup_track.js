@@ -90,7 +90,7 @@ export function mount(place, setup) {
   async function begin() {
     const values = valuesOf(form);
     const settings = Number(values.evaluations) ? await fetchJson(`/api/evaluations?tracker=${values.tracker}&evaluations=${values.evaluations}`) : {};
-    const made = await post(`${here}/runs`, { tracker: values.tracker, weighting: values.weighting, first: Number(values.first), last: Number(values.last) + 1, settings, despite_findings: Boolean(values.despite) });
+    const made = await post(`${here}/runs`, { tracker: values.tracker, weighting: values.weighting, first: Number(values.first), last: Number(values.last) + 1, settings, allow_inconsistent: Boolean(values.inconsistent) });
     fold.open = false;
     await loadRuns();
     await start(made.name);
@@ -112,7 +112,7 @@ export function mount(place, setup) {
       element("div", { className: "step-row" }, field("First frame", number(first, { name: "first", max: count - 1, step: 1 })), field("Last frame", number(count - 1, { name: "last", max: count - 1, step: 1 }))),
       first > 0 && hint(`The start pose is of frame ${first}: tracking begins there. The frames before it can be tracked backwards afterwards.`),
       !known && hint("There is no start pose yet: the first frame is searched for one, which takes a while."),
-      doubts.length > 0 && [notice(`The footage contradicts the calibration. ${doubts[0]}`), check("track all the same", { name: "despite", className: "despite" })],
+      doubts.length > 0 && [notice(`The footage contradicts the calibration. ${doubts[0]}`), check("track all the same", { name: "inconsistent", className: "inconsistent" })],
       actions(submit), wrong);
     sends(form, submit, wrong, begin);
   }

@@ -80,7 +80,7 @@ export async function showSweepForm(content, { sessions, trackers, weightings, i
   const tracker = select(trackers.map((one) => [one.name, one.label]), "", { name: "tracker", onchange: () => takeKnobs() });
   const weighting = select(weightings.map((one) => [one.name, one.label]), "", { name: "weighting", onchange: () => takeKnobs() });
   const [first, last] = [whole("first", 0), whole("last", 0)];
-  const despite = check("track although the calibration is in doubt", { name: "despite" });
+  const inconsistent = check("track although the calibration is in doubt", { name: "inconsistent" });
   const submit = element("button", { className: "primary" }, "Start the sweep");
   const form = element("form", { className: "compare-form" },
     card("", element("div", { className: "fields" }, field("Session", session), field("Tracker", tracker), field("Likelihood", weighting),
@@ -88,7 +88,7 @@ export async function showSweepForm(content, { sessions, trackers, weightings, i
       field("Frames", element("span", { className: "two" }, first, element("span", {}, "to"), last)),
       field("Knobs of all runs", text({ name: "fixed", placeholder: "layers=10, crossover=0", value: initial.fixed ?? "" })),
       field("Name", text({ name: "name", placeholder: "numbered", pattern: "[A-Za-z0-9_\\-]{0,48}" })),
-      check("fit the body's shape in each run", { name: "shape", checked: initial.fit_shape ?? true }, "Some seconds a run: radii, hands, feet and head that the first frames show."), despite)),
+      check("fit the body's shape in each run", { name: "shape", checked: initial.fit_shape ?? true }, "Some seconds a run: radii, hands, feet and head that the first frames show."), inconsistent)),
     card("Knobs and their values", rows.list, element("div", {}, rows.more)),
     wrong, element("div", { className: "form-foot" }, submit, wait));
   const own = (name) => /** @type {any} */ (form.elements).namedItem(name);
@@ -97,7 +97,7 @@ export async function showSweepForm(content, { sessions, trackers, weightings, i
     const fixed = Object.fromEntries(words(own("fixed").value).map((one) => one.split("=").map((part) => part.trim())));
     return {
       session: session.value, tracker: tracker.value, weighting: weighting.value, vary: rows.read(), seeds: Number(own("seeds").value),
-      first: Number(first.value), last: Number(last.value) + 1, settings: fixed, fit_shape: own("shape").checked, despite_findings: !despite.hidden && own("despite").checked,
+      first: Number(first.value), last: Number(last.value) + 1, settings: fixed, fit_shape: own("shape").checked, allow_inconsistent: !inconsistent.hidden && own("inconsistent").checked,
       ...(session.value === initial.session ? { body: initial.body || null, behaviour: initial.behaviour || null } : {}),
     };
   }
@@ -125,7 +125,7 @@ export async function showSweepForm(content, { sessions, trackers, weightings, i
     const entry = able.find((one) => one.name === session.value);
     const isSame = initial.session === entry.name;
     const { start_pose_frame, doubts } = await fetchJson(sessionPath(entry.name));
-    despite.hidden = !doubts.length;
+    inconsistent.hidden = !doubts.length;
     first.value = String((isSame ? initial.first : undefined) ?? start_pose_frame);
     first.max = last.max = String(entry.frame_count - 1);
     last.value = String(Math.min((isSame && initial.last ? initial.last : entry.frame_count) - 1, entry.frame_count - 1));

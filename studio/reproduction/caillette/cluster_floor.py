@@ -19,13 +19,12 @@ from studio.comparison.footage_cache import FootageCache
 from studio.comparison.statistics import number
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.reproduction.caillette.clusters_and_states import frames_inside
-from studio.reproduction.caillette.comparing import by_contender, limb, position, ratio, summary_table
+from studio.reproduction.caillette.comparing import by_candidate, limb, position, ratio, summary_table
 from studio.reproduction.caillette.following import Followed, follow_trial
 from studio.reproduction.caillette.following import measure as measure_following
 from studio.reproduction.caillette.setting import (
     BLOBS,
     LEARNT_AS_PRINTED,
-    SOURCE,
     TEST,
     TEST_2,
     guided,
@@ -36,7 +35,7 @@ from studio.reproduction.caillette.setting import (
 )
 from studio.reproduction.caillette.training_set import Training, learnt, recorded
 from studio.reproduction.drawing import line_chart, seed_range
-from studio.reproduction.experiment import Experiment, Part, each_seed, group_of
+from studio.reproduction.experiment import Part, each_seed, group_of, listed
 
 FLOORS = (0.0, 0.003, 0.01, 0.02, 0.03, 0.05, 0.1)
 QUICK_FLOORS = (0.0, 0.02)
@@ -117,7 +116,7 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
         if "learnt" in outcome.trial.arguments:
             name = group_of(outcome.trial).removeprefix("learnt, ")
             learning.setdefault(name, []).append(outcome.measured)
-    runs = by_contender(outcome for outcome in outcomes if "learnt" not in outcome.trial.arguments)
+    runs = by_candidate(outcome for outcome in outcomes if "learnt" not in outcome.trial.arguments)
     floors = [float(name.removeprefix("floor ")) for name in learning]
 
     def of(kind: str, clip: str, name: str) -> list[Followed]:
@@ -183,14 +182,4 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield {"memory": MEMORY, "particles": PARTICLES, "weighting": BLOBS, "training": training_words(quick)}
 
 
-EXPERIMENT = Experiment(
-    name="caillette-cluster-floor",
-    title="How wide a cluster must be at least",
-    source=f"{SOURCE}, sections 4.1 and 4.2",
-    claim="Which floor of the clusters' covariances describes performances that were not learnt, and tracks them best?",
-    trials=trials,
-    measure=measure,
-    shown=shown,
-    footage=tuple(EXERCISES.values()),
-    long="Seven floors are learnt and tracked with every seed.",
-)
+EXPERIMENTS = (listed("caillette-cluster-floor", trials, measure, shown, footage=tuple(EXERCISES.values())),)

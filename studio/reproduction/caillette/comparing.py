@@ -45,8 +45,8 @@ MEASURES: Mapping[str, tuple[str, str]] = {
 """Names to a field of `Followed` and an axis."""
 
 
-def by_contender(outcomes: Iterable[Outcome]) -> dict[str, list[Followed]]:
-    """The measurements by contender in the order of the trials, seeds in order."""
+def by_candidate(outcomes: Iterable[Outcome]) -> dict[str, list[Followed]]:
+    """The measurements by candidate in the order of the trials, seeds in order."""
     return grouped(outcomes, Followed)
 
 
@@ -65,12 +65,12 @@ def loses_track(run: Followed) -> bool:
 
 
 def ratio(name: str, ours: Runs, theirs: Runs, claim: str = "", of: Error = limb) -> Number:
-    """The ratio of two contenders' errors, paired by seed. claim : of `claims.ratio`."""
+    """The ratio of two candidates' errors, paired by seed. claim : of `claims.ratio`."""
     return claims.ratio(name, [of(run) for run in ours], [of(run) for run in theirs], claim)
 
 
 def errors(what: str, groups: Groups, of: Error = limb, unit: str = "°") -> Iterable[Number]:
-    """The mean over seeds of each contender's error; the paper has curves but no figures."""
+    """The mean over seeds of each candidate's error; the paper has curves but no figures."""
     return (number(f"{what}: {name}", map(of, runs), unit) for name, runs in groups.items())
 
 
@@ -107,8 +107,8 @@ def side_by_side(rows: Iterable[tuple[str, Number, Number]]) -> Table:
 
 
 def summary_table(title: str, groups: Groups) -> Table:
-    """A line a contender: errors, losses, time."""
-    return table_over(title, "contender", COLUMNS, groups)
+    """A line a candidate: errors, losses, time."""
+    return table_over(title, "candidate", COLUMNS, groups)
 
 
 def _model_free(runs: Runs) -> Any:  # noqa: ANN401 - a cell

@@ -19,11 +19,12 @@ annealed filter, tracking as a run does, at equal evaluations.
 
 import dataclasses
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from studio.comparison.findings import Number, Table
+from studio.comparison.findings import FIRM_SEEDS, Number, Table
 from studio.comparison.statistics import number, sign_test
 from studio.comparison.trials import Outcome, Scale, Trial
 from studio.reproduction.caillette.comparing import (
@@ -34,7 +35,7 @@ from studio.reproduction.caillette.comparing import (
     Error,
     Groups,
     angle,
-    by_contender,
+    by_candidate,
     centre,
     curves,
     errors,
@@ -57,7 +58,6 @@ from studio.reproduction.caillette.setting import (
     LEARNT_AS_PRINTED,
     MEMORY,
     SIGMA,
-    SOURCE,
     TEST,
     TEST_2,
     UNSEEN,
@@ -69,7 +69,7 @@ from studio.reproduction.caillette.setting import (
 )
 from studio.reproduction.claims import EQUAL, LOWER, beside, share
 from studio.reproduction.drawing import line_chart, seed_range
-from studio.reproduction.experiment import Experiment, Part
+from studio.reproduction.experiment import Experiment, Part, listed
 from studio.reproduction.tracking import Candidate
 from studio.trackers.catalogue import knobs_for_evaluations
 
@@ -79,32 +79,44 @@ FREE_SHARE = {"model_free_share": 0.1, "model_free_grows": True}
 
 
 def _trials(
-    contenders: Sequence[Candidate],
+    candidates: Sequence[Candidate],
     clips: Mapping[str, str],
     *,
     frames: int | None = None,
     seeds: int | None = None,
     **wanted: Any,  # noqa: ANN401 - other fields of `Follow`
 ) -> Callable[[Scale], tuple[Trial, ...]]:
-    """Every contender on every footage with every seed. clips : footage by the suffix of a contender's name."""
+    """Every candidate on every footage with every seed. clips : footage by name, "" where there is one."""
 
     def trials(scale: Scale) -> tuple[Trial, ...]:
         return tuple(
             follow_trial(
                 one,
-                f"{one.name}{words}",
+                f"{one.name}, {clip}" if clip else one.name,
                 footage,
                 seed,
                 last_frame(footage, scale.quick, frames),
                 training=training_for(one, MEMORY, scale.quick),
                 **wanted,
             )
-            for words, footage in clips.items()
-            for one in contenders
+            for clip, footage in clips.items()
+            for one in candidates
             for seed in scale.seeds[:seeds]
         )
 
     return trials
+
+
+def _followed(
+    name: str,
+    candidates: Sequence[Candidate],
+    clips: Mapping[str, str],
+    shown: Callable[[Sequence[Outcome]], Iterator[Part]],
+    **wanted: Any,  # noqa: ANN401 - as `_trials` takes it
+) -> Experiment:
+    """The experiment of a name that follows every candidate on every clip."""
+    trials = _trials(candidates, clips, **wanted)
+    return listed(name, trials, measure, shown, footage=tuple(clips.values()))
 
 
 def _settings(outcomes: Sequence[Outcome]) -> dict[str, Any]:
@@ -126,12 +138,12 @@ FIG_11 = (
     *(*BLIND, PRINTED_KEEPS, RESETS, KEEPS, GUIDED_RESETS),
     guided(1000, "guided, 1000, model-free share", **FREE_SHARE),
 )
-FIG_11_FRAMES, FIG_11_SEEDS = 300, 5
+FIG_11_FRAMES = 300
 """Carving hulls and fitting blobs for every run makes this the longest of the figures."""
 
 
 def _fig_11(outcomes: Sequence[Outcome]) -> Iterator[Part]:
-    groups = by_contender(outcomes)
+    groups = by_candidate(outcomes)
 
     def loses(one: Candidate, paper: float) -> Number:
         return share(f"{one.name}: seeds that lose track", map(loses_track, groups[one.name]), paper)
@@ -173,24 +185,12 @@ def _fig_11(outcomes: Sequence[Outcome]) -> Iterator[Part]:
 def _fig_11_trials(scale: Scale) -> tuple[Trial, ...]:
     """As `_trials`; those with the paper's recovery are marked so."""
     plain_ones = tuple(one for one in FIG_11 if one not in RESETTING)
-    within: dict[str, Any] = {"frames": FIG_11_FRAMES, "seeds": FIG_11_SEEDS}
+    within: dict[str, Any] = {"frames": FIG_11_FRAMES, "seeds": FIRM_SEEDS}
     return (
         *_trials(plain_ones, {"": TEST}, **within)(scale),
         *_trials(RESETTING, {"": TEST}, **within, recovers=True)(scale),
     )
 
-
-FIG_11_EXPERIMENT = Experiment(
-    name="caillette-fig-11",
-    title="Who loses track of the first exercise",
-    source=f"{SOURCE}, Fig. 11",
-    claim="In the blobs framework Condensation and annealing lose track quickly even with 5000 evaluations a frame; "
-    "1000 particles guided by a model with a memory of 20 frames keep it, with automatic recovery.",
-    trials=_fig_11_trials,
-    measure=measure,
-    shown=_fig_11,
-    footage=(TEST,),
-)
 
 # Fig. 12.
 
@@ -259,7 +259,7 @@ REASON = (
 
 
 def _fig_12(footage: str, outcomes: Sequence[Outcome]) -> Iterator[Part]:
-    groups = by_contender(outcomes)
+    groups = by_candidate(outcomes)
     unseen = footage == UNSEEN
     ratios = [
         ratio(name, groups[ours.name], groups[theirs.name], claim, of)
@@ -297,51 +297,6 @@ def _fig_12(footage: str, outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield {"footage": footage, "weighting": BLOBS, **_settings(outcomes)}
 
 
-def _dynamics(name: str, footage: str, title: str, source: str, claim: str) -> Experiment:
-    contenders = STRANGE if footage == UNSEEN else SAME
-    return Experiment(
-        name=name,
-        title=title,
-        source=source,
-        claim=claim,
-        trials=_trials(
-            contenders, {"": footage}, frames=None if footage == UNSEEN else FIG_12_FRAMES, from_truth=True
-        ),
-        measure=measure,
-        shown=lambda outcomes: _fig_12(footage, outcomes),
-        footage=(footage,),
-    )
-
-
-FIG_12_CLAIM = (
-    "With the likelihood initialised from the truth, 200 guided particles are as accurate and robust as annealing with "
-    "5 layers of 1000; Condensation with 5000 is poor."
-)
-FIG_12_EXPERIMENTS = (
-    _dynamics(
-        "caillette-fig-12",
-        TEST,
-        "Dynamics compared on the first exercise",
-        f"{SOURCE}, Fig. 12",
-        FIG_12_CLAIM,
-    ),
-    _dynamics(
-        "caillette-fig-12-second",
-        TEST_2,
-        "Dynamics compared on the second exercise",
-        f"{SOURCE}, Fig. 12",
-        FIG_12_CLAIM,
-    ),
-    _dynamics(
-        "caillette-unseen",
-        UNSEEN,
-        "A clip that was never learnt",
-        "beyond the paper (its section 7.5)",
-        "The paper has no answer to movements that are not in the training data. Claimed here: with a share of "
-        "particles that no model moves, the tracker is no worse than annealing of as many evaluations.",
-    ),
-)
-
 # The printed tracker, with one addition at a time.
 
 AS_IT_IS = "as printed"
@@ -361,11 +316,10 @@ ADDITIONS: tuple[Candidate, ...] = (
     *(printed(200, name, learning, **changes) for name, (changes, learning) in ADDED.items()),
     ALL_ADDED,
 )
-ADDITION_FRAMES = 150
 
 
 def _additions(outcomes: Sequence[Outcome]) -> Iterator[Part]:
-    groups = by_contender(outcomes)
+    groups = by_candidate(outcomes)
     by_clip: dict[str, dict[str, list[Followed]]] = {
         clip: {name.removesuffix(f", {clip}"): runs for name, runs in groups.items() if name.endswith(clip)}
         for clip in EXERCISES
@@ -389,22 +343,6 @@ def _additions(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield {"footage": ", ".join(EXERCISES.values()), "weighting": BLOBS, **knobs, **_settings(outcomes)}
 
 
-AS_PRINTED_EXPERIMENT = Experiment(
-    name="caillette-as-printed",
-    title="The printed tracker, one addition at a time",
-    source=f"{SOURCE}, sections 5 and 6.4",
-    claim="What does each of the studio's additions to the printed tracker change, on both exercises?",
-    trials=_trials(
-        ADDITIONS,
-        {f", {clip}": footage for clip, footage in EXERCISES.items()},
-        frames=ADDITION_FRAMES,
-        from_truth=True,
-    ),
-    measure=measure,
-    shown=_additions,
-    footage=tuple(EXERCISES.values()),
-)
-
 # How wide learnt root motion is spread: chosen on two performances by other dancers that no test uses.
 
 SPREADS = (0.5, 1.0, 1.5, 2.0, 3.0)
@@ -419,7 +357,7 @@ SPREAD_CANDIDATES = tuple(guided(200, _spread_name(spread), root_spread=spread) 
 
 
 def _spreads(outcomes: Sequence[Outcome]) -> Iterator[Part]:
-    groups = by_contender(outcomes)
+    groups = by_candidate(outcomes)
     usual = _spread_name(2.0)
     tests: list[tuple[Any, ...]] = []
     for name in map(_spread_name, SPREADS):
@@ -453,22 +391,6 @@ def _spreads(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield {"footage": ", ".join(CHOOSING.values()), "weighting": BLOBS, **_settings(outcomes)}
 
 
-ROOT_SPREAD_EXPERIMENT = Experiment(
-    name="caillette-root-spread",
-    title="How wide learnt root motion is spread",
-    source="an open question",
-    claim="By how much must the root's learnt movement be spread for people who were not learnt from?",
-    trials=_trials(
-        SPREAD_CANDIDATES,
-        {f", {clip}": footage for clip, footage in CHOOSING.items()},
-        frames=ADDITION_FRAMES,
-        from_truth=True,
-    ),
-    measure=measure,
-    shown=_spreads,
-    footage=tuple(CHOOSING.values()),
-)
-
 # Which tracker a user should take.
 
 EVALUATIONS = 1000
@@ -500,7 +422,7 @@ QUESTIONS = (
 
 
 def _best_tracker(outcomes: Sequence[Outcome]) -> Iterator[Part]:
-    groups = by_contender(outcomes)
+    groups = by_candidate(outcomes)
     by_clip: dict[str, Groups] = {
         clip: {name: runs for name, runs in groups.items() if name.endswith(clip)} for clip in CLIPS
     }
@@ -518,15 +440,15 @@ def _best_tracker(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield {"evaluations": EVALUATIONS, "edges": EDGES, **_settings(outcomes)}
 
 
-BEST_TRACKER = Experiment(
-    name="caillette-best-tracker",
-    title="Which tracker for the dance",
-    source="an open question",
-    claim="Which tracker and weighting is best for a user, with a model of the motion and without, at equal "
-    "evaluations?",
-    # There are eight contenders on two clips, and a weight of edges costs twenty times that of blobs.
-    trials=_trials(CHOICES, {f", {clip}": footage for clip, footage in CLIPS.items()}, frames=100, seeds=3),
-    measure=measure,
-    shown=_best_tracker,
-    footage=tuple(CLIPS.values()),
+EXPERIMENTS = (
+    listed("caillette-fig-11", _fig_11_trials, measure, _fig_11, footage=(TEST,)),
+    *(
+        _followed(name, SAME, {"": clip}, partial(_fig_12, clip), frames=FIG_12_FRAMES, from_truth=True)
+        for name, clip in (("caillette-fig-12", TEST), ("caillette-fig-12-second", TEST_2))
+    ),
+    _followed("caillette-unseen", STRANGE, {"": UNSEEN}, partial(_fig_12, UNSEEN), from_truth=True),
+    _followed("caillette-as-printed", ADDITIONS, EXERCISES, _additions, frames=150, from_truth=True),
+    _followed("caillette-root-spread", SPREAD_CANDIDATES, CHOOSING, _spreads, frames=150, from_truth=True),
+    # There are eight candidates on two clips, and a weight of edges costs twenty times that of blobs.
+    _followed("caillette-best-tracker", CHOICES, CLIPS, _best_tracker, frames=100, seeds=3),
 )

@@ -18,7 +18,7 @@ from studio.comparison.footage_cache import FootageCache
 from studio.comparison.trials import Trial, kept_as
 from studio.errors import SettingsError
 from studio.evidence.frame_evidence import FrameEvidence
-from studio.likelihood.blobs import FLOOR, BlobProblem, ExpectedBlobs
+from studio.likelihood.blobs import FLOOR, BlobFrameLikelihood, ExpectedBlobs
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.likelihood.problem import FittedToPoses, FrameLikelihood, QualityMeasured
 from studio.progress import report
@@ -286,11 +286,11 @@ RESET_KEY = 0x5EED
 
 def _fitted_from_many(problem: FrameLikelihood) -> FrameLikelihood:
     """A frame whose blobs are fitted from FITTED_AGAIN expected poses."""
-    if not isinstance(problem, BlobProblem):
+    if not isinstance(problem, BlobFrameLikelihood):
         return problem
     likelihood = copy.copy(problem.likelihood)
     likelihood.settings = dataclasses.replace(likelihood.settings, blob_starts=FITTED_AGAIN)
-    return BlobProblem(likelihood, problem.hull)
+    return BlobFrameLikelihood(likelihood, problem.hull)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -311,16 +311,16 @@ class FollowedRun:
 
 
 def follow_trial(
-    contender: Candidate,
+    candidate: Candidate,
     group: str,
     footage: str,
     seed: int,
     last: int,
     **fields: Any,  # noqa: ANN401
 ) -> Trial:
-    """The trial of a contender. group : contender and setting as text. fields : other fields of `Follow`."""
-    changes = {**contender.changes, **fields.pop("changes", {})}
-    follow = Follow(footage, contender.tracker, contender.weighting, seed, last, changes, **fields)
+    """The trial of a candidate. group : candidate and setting as text. fields : other fields of `Follow`."""
+    changes = {**candidate.changes, **fields.pop("changes", {})}
+    follow = Follow(footage, candidate.tracker, candidate.weighting, seed, last, changes, **fields)
     return Trial(f"{group}, seed {seed}", follow.plain())
 
 

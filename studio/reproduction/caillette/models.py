@@ -30,7 +30,7 @@ from studio.reproduction.caillette.comparing import (
     TWO_TRACKERS,
     Error,
     angle,
-    by_contender,
+    by_candidate,
     curves,
     errors,
     limb,
@@ -55,7 +55,6 @@ from studio.reproduction.caillette.setting import (
     LEARNT_AS_PRINTED,
     MEMORY,
     SIGMA,
-    SOURCE,
     TEST,
     UNSEEN,
     guided,
@@ -68,7 +67,7 @@ from studio.reproduction.caillette.training_set import Training, learnt, recorde
 from studio.reproduction.caillette.true_motion import true_motion
 from studio.reproduction.claims import LOWER, beside
 from studio.reproduction.drawing import line_chart, seed_range
-from studio.reproduction.experiment import Experiment, Part, each_seed
+from studio.reproduction.experiment import Part, each_seed, listed
 from studio.reproduction.tracking import Candidate
 from studio.runs.behaviour_models import fitting
 from studio.trackers.online_learning import updated_model
@@ -140,7 +139,7 @@ def measure_memory(arguments: Mapping[str, Any], cache: FootageCache) -> dict[st
 
 def _fig_13(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     """Runs by tracker, evidence and memory, and each automaton's entropy of the test performance."""
-    groups = by_contender(outcome for outcome in outcomes if "entropy_of" not in outcome.trial.arguments)
+    groups = by_candidate(outcome for outcome in outcomes if "entropy_of" not in outcome.trial.arguments)
     automata = {
         int(outcome.trial.label.rpartition(" ")[2]): outcome.measured
         for outcome in outcomes
@@ -209,18 +208,6 @@ def _fig_13(outcomes: Sequence[Outcome]) -> Iterator[Part]:
         "training": training_words(quick),
     }
 
-
-FIG_13 = Experiment(
-    name="caillette-fig-13",
-    title="Error over the model's memory",
-    source=f"{SOURCE}, Fig. 13",
-    claim="With 200 particles a memory of one frame wastes them on the wrong clusters; longer memories, up to 30 "
-    "frames, are more accurate.",
-    trials=_memory_trials,
-    measure=measure_memory,
-    shown=_fig_13,
-    footage=(TEST,),
-)
 
 # Online learning.
 
@@ -312,14 +299,7 @@ def _online(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield {"footage": UNSEEN, "particles": PARTICLES, "memory": MEMORY, "training": _training_of(outcomes)}
 
 
-ONLINE_LEARNING = Experiment(
-    name="caillette-online-learning",
-    title="A second pass with what the first has learnt",
-    source="beyond the paper (its section 8)",
-    claim="Online learning, where unseen sequences are added to the model, would be worthwhile: a second pass over a "
-    "clip is more accurate than one whose model learnt nothing.",
-    trials=_online_trials,
-    measure=measure_online,
-    shown=_online,
-    footage=(UNSEEN,),
+EXPERIMENTS = (
+    listed("caillette-fig-13", _memory_trials, measure_memory, _fig_13, footage=(TEST,)),
+    listed("caillette-online-learning", _online_trials, measure_online, _online, footage=(UNSEEN,)),
 )

@@ -11,20 +11,19 @@ from typing import Any
 import numpy as np
 
 from studio.behaviour.prediction import propagate, start_states
-from studio.comparison.findings import Series, Table
+from studio.comparison.findings import FIRM_SEEDS, Series, Table
 from studio.comparison.footage_cache import FootageCache
 from studio.comparison.statistics import number
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
-from studio.reproduction.caillette.setting import EXERCISE, EXERCISE_2, SOURCE
+from studio.reproduction.caillette.setting import EXERCISE, EXERCISE_2
 from studio.reproduction.caillette.training_set import Training, lesson_of
 from studio.reproduction.claims import share
 from studio.reproduction.drawing import line_chart, places
-from studio.reproduction.experiment import Experiment, Part
+from studio.reproduction.experiment import Part, listed
 
 CLASSES = (EXERCISE, EXERCISE_2, "walk-with-turns", "run", "jumps", "handstand")
 """Recipes, whose motion is used without rendering."""
 FRAMES, QUICK_FRAMES, QUICK_CLASSES = 150, 60, 3
-MOST_SEEDS = 5
 PARTICLES, ROUNDS = 1000, 12
 UNAFFECTED = 2.0
 """Greatest time of prediction with all classes, relative to one class."""
@@ -39,7 +38,7 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
             f"{count} classes, seed {seed}",
             {"training": Training(names[:count], frames=frames, seed=seed).plain(), "alone": True},
         )
-        for seed in scale.seeds[:MOST_SEEDS]
+        for seed in scale.seeds[:FIRM_SEEDS]
         for count in range(1, len(names) + 1)
     )
 
@@ -121,14 +120,4 @@ LABELS = {
 }
 
 
-EXPERIMENT = Experiment(
-    name="caillette-scalability",
-    title="More classes of motion",
-    source=f"{SOURCE}, section 7.5",
-    claim="Clusters do not grow in proportion to the training data, learning takes longer, and the time to predict is "
-    "largely unaffected.",
-    trials=trials,
-    measure=measure,
-    shown=shown,
-    alone=True,
-)
+EXPERIMENTS = (listed("caillette-scalability", trials, measure, shown, alone=True),)

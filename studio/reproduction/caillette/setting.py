@@ -1,4 +1,4 @@
-"""Common parts of the experiments of Caillette, Galata & Howard (2007): footage, training, contenders.
+"""Common parts of the experiments of Caillette, Galata & Howard (2007): footage, training, candidates.
 
 Footage: two exercises of real modern dance, performed again by a rendered person of another build (`dance-test-1`,
 `dance-test-2`), seen by five cameras of 320 × 240 at 30 Hz as in the paper, and a clip that is in no training
@@ -14,7 +14,6 @@ from studio.reproduction.caillette.training_set import Training
 from studio.reproduction.tracking import Candidate
 from studio.synthesis.recipe_file import find_recipe, read_recipe
 
-SOURCE = "Caillette, Galata & Howard 2007"
 BLOBS = "blobs"
 BODY = "human25"
 FPS = 30
@@ -106,11 +105,11 @@ def training_with(memory: int, quick: bool, learning: Mapping[str, Any] = NOTHIN
     return dataclasses.replace(training(quick), memory=memory, clusters=dict(learning))
 
 
-def training_for(contender: Candidate, memory: int, quick: bool) -> Training | None:
-    """The training set of a contender's model, None where none guides it."""
-    if contender.tracker != GUIDED and "prediction" not in contender.changes:
+def training_for(candidate: Candidate, memory: int, quick: bool) -> Training | None:
+    """The training set of a candidate's model, None where none guides it."""
+    if candidate.tracker != GUIDED and "prediction" not in candidate.changes:
         return None
-    return training_with(memory, quick, contender.learning if isinstance(contender, Learner) else NOTHING)
+    return training_with(memory, quick, candidate.learning if isinstance(candidate, Learner) else NOTHING)
 
 
 def training_words(quick: bool) -> str:

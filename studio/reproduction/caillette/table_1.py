@@ -14,12 +14,12 @@ from studio.arrays import Array
 from studio.behaviour.model import BehaviourModel
 from studio.benchmarks.hulls import TABLE_1
 from studio.benchmarks.timing import quickest
-from studio.comparison.findings import Plain, Series, Table
+from studio.comparison.findings import FIRM_SEEDS, Plain, Series, Table
 from studio.comparison.footage_cache import FootageCache
 from studio.comparison.statistics import number
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.evidence.frame_evidence import FrameEvidence
-from studio.likelihood.blobs import BlobLikelihood, BlobProblem
+from studio.likelihood.blobs import BlobFrameLikelihood, BlobLikelihood
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.numba_in_threads import numba
 from studio.reproduction.caillette.following import Known
@@ -27,7 +27,6 @@ from studio.reproduction.caillette.setting import (
     BLOBS,
     GUIDED,
     MEMORY,
-    SOURCE,
     TEST,
     TEST_640,
     guided,
@@ -37,7 +36,7 @@ from studio.reproduction.caillette.training_set import Training, learnt
 from studio.reproduction.caillette.true_motion import true_motion
 from studio.reproduction.claims import beside, share
 from studio.reproduction.drawing import bar_chart, places
-from studio.reproduction.experiment import Experiment, Part
+from studio.reproduction.experiment import Part, listed
 from studio.runs.behaviour_models import fitting
 from studio.runs.search_space import search_space, session_sigma
 from studio.sessions.session import Session
@@ -70,7 +69,6 @@ LABELS = {
     **{f"particles {count}": f"{count} particles" for count in PARTICLES},
 }
 FRAMES, QUICK_FRAMES = 8, 3
-MOST_SEEDS = 5
 FRAME_MS = 1000.0 / 30.0
 NOT_MUCH, LINEAR = 1.5, (1.5, 2.7)
 """Greatest cost of five views relative to three; range of the cost of 1000 particles relative to 500."""
@@ -85,7 +83,7 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
             f"{footage}, seed {seed}", {"footage": footage, "seed": seed, "last": frames, "training": model}
         )
         for footage in ((TEST,) if scale.quick else (TEST, TEST_640))
-        for seed in scale.seeds[:MOST_SEEDS]
+        for seed in scale.seeds[:FIRM_SEEDS]
     )
 
 
@@ -133,7 +131,7 @@ def blob_fitting(session: Session, hulls: Sequence[Hull], truth: Array) -> float
     likelihood, body = _likelihood(session), session.body()
     memory: Mapping[str, Array] = {}
     for hull, pose in zip(hulls, truth, strict=True):
-        memory = BlobProblem(likelihood, hull).expecting(pose[None], memory).remembered(pose)
+        memory = BlobFrameLikelihood(likelihood, hull).expecting(pose[None], memory).remembered(pose)
     model = likelihood.model(memory)
     starts = truth[[max(0, frame - 1) for frame in range(len(hulls))]]
     return _milliseconds(
@@ -155,13 +153,13 @@ def searching(
     """Milliseconds of a frame of the guided tracker whose blobs are fitted already: prediction, evaluation, drawing."""
     body, fps = session.body(), session.manifest.fps
     space = search_space(body, session_sigma(session, body, fps), fitting(model, body, fps))
-    contender = guided(particles)
-    settings = changed_settings(default_settings(contender.tracker, BLOBS), contender.changes).tracker
+    candidate = guided(particles)
+    settings = changed_settings(default_settings(candidate.tracker, BLOBS), candidate.changes).tracker
     likelihood = _likelihood(session)
 
     def search(informed: Known, before: FilterState, frame: int) -> FrameResult:
         return search_frame(
-            TRACKERS[contender.tracker],
+            TRACKERS[candidate.tracker],
             informed,
             before,
             space,
@@ -172,7 +170,7 @@ def searching(
 
     carried, frames = start_of(tuple(float(value) for value in truth[0])), list[Callable[[], FrameResult]]()
     for frame, (hull, pose) in enumerate(zip(hulls, truth, strict=True)):
-        informed = Known(BlobProblem(likelihood, hull).expecting(pose[None], {}))
+        informed = Known(BlobFrameLikelihood(likelihood, hull).expecting(pose[None], {}))
         if frame:
             frames.append(
                 lambda informed=informed, before=carried, frame=frame: search(informed, before, frame)
@@ -259,15 +257,4 @@ def _table(title: str, runs: Sequence[Mapping[str, Any]]) -> Table:
     return Table(f"Milliseconds, ours / paper: {title}", heads, tuple(rows))
 
 
-EXPERIMENT = Experiment(
-    name="caillette-table-1",
-    title="Time of reconstruction, blob fitting and particles",
-    source=f"{SOURCE}, Table 1",
-    claim="Depth decides on the time of the reconstruction, the number of views hardly; particles count in proportion; "
-    "1000 particles run in real time.",
-    trials=trials,
-    measure=measure,
-    shown=shown,
-    footage=(TEST, TEST_640),
-    alone=True,
-)
+EXPERIMENTS = (listed("caillette-table-1", trials, measure, shown, footage=(TEST, TEST_640), alone=True),)

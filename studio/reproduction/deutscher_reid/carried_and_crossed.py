@@ -23,7 +23,6 @@ from studio.reproduction.deutscher_reid.setting import (
     IMPROVED,
     PLAIN,
     QUICK_FRAMES,
-    SOURCE,
     WEIGHTING,
     succeeded,
 )
@@ -64,10 +63,10 @@ def lasting(run: Tracked) -> float:
     return terminal_failure(run) * FPS / len(run.frames)
 
 
-def _lines(contenders: Mapping[str, Mapping[str, Any]], quick: bool) -> Iterable[Line]:
+def _lines(candidates: Mapping[str, Mapping[str, Any]], quick: bool) -> Iterable[Line]:
     """Every setting on every clip; 200 particles in ten layers unless it says otherwise."""
     for clip, footage in CLIPS.items():
-        for name, knobs in contenders.items():
+        for name, knobs in candidates.items():
             words = f"{name}, {clip}"
             sized = {"layers": LAYERS, "particles": PARTICLES, **knobs}
             last = {"last": QUICK_FRAMES if quick else None}
@@ -126,15 +125,6 @@ def _carried(groups: Groups) -> Iterator[Part]:
     }
 
 
-CARRIED_EXPERIMENT = tracked_experiment(
-    "deutscher-carried",
-    "What is carried to the next frame",
-    f"{SOURCE}, Eq. 9 and 13",
-    "Which reading of Eq. 9 (every particle, survivors by weight, the mode) and of the product of Eq. 13 tracks best?",
-    lines=lambda quick: _lines(CARRYING, quick),
-    shown=_carried,
-)
-
 CROSSING = {
     f"{words}, {LAYERS} × {size}": {**IMPROVED, **knobs, "particles": size}
     for size in SIZES
@@ -155,12 +145,9 @@ def _crossed(groups: Groups) -> Iterator[Part]:
     yield {"clips": ", ".join(CLIPS.values()), "layers": LAYERS, "weighting": WEIGHTING, **IMPROVED}
 
 
-CROSSED_EXPERIMENT = tracked_experiment(
-    "deutscher-crossover-share",
-    "How many particles are crossed, and where",
-    f"{SOURCE}, sections 6.2 and 6.3",
-    "Does crossover help a whole body, with few particles and with many, and what should the default be?",
-    lines=lambda quick: _lines(CROSSING, quick),
-    shown=_crossed,
+EXPERIMENTS = (
+    tracked_experiment("deutscher-carried", lines=lambda quick: _lines(CARRYING, quick), shown=_carried),
+    tracked_experiment(
+        "deutscher-crossover-share", lines=lambda quick: _lines(CROSSING, quick), shown=_crossed
+    ),
 )
-EXPERIMENTS = (CARRIED_EXPERIMENT, CROSSED_EXPERIMENT)

@@ -27,11 +27,10 @@ from studio.reproduction.deutscher_reid.setting import (
     EQ18_WORDS,
     IMPROVED,
     PLAIN,
-    SOURCE,
     WEIGHTING,
 )
 from studio.reproduction.drawing import layer_table, line, line_chart, places, seeds_and_mean
-from studio.reproduction.experiment import Experiment, Part, each_seed, measured
+from studio.reproduction.experiment import Part, each_seed, listed, measured
 from studio.runs.hierarchy import hierarchy_of
 from studio.sessions.session import Session
 from studio.trackers.tracker import LayerRecord
@@ -264,37 +263,8 @@ def fig_20(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield {**SETTINGS, **KNOBS}
 
 
-FIG_3 = Experiment(
-    name="deutscher-fig-3",
-    title="Particles over ten layers",
-    source=f"{SOURCE}, Fig. 3",
-    claim="The first cloud covers the expected movement; over ten layers it is annealed to a cluster "
-    "around the maximum "
-    "of the weighting function.",
-    trials=trials_fig_3,
-    measure=measure_fig_3,
-    shown=fig_3,
-    footage=(CIRCLE,),
-)
-FIG_19 = Experiment(
-    name="deutscher-fig-19",
-    title="Variance reduction of a whole body",
-    source=f"{SOURCE}, Fig. 19",
-    claim="The parameters of a whole body are localised at clearly different rates, in a more complicated pattern "
-    "than those of the arm.",
-    trials=trials,
-    measure=measure,
-    shown=fig_19,
-    footage=(CIRCLE,),
-)
-FIG_20 = Experiment(
-    name="deutscher-fig-20",
-    title="Particles of a whole body over the layers",
-    source=f"{SOURCE}, Fig. 20",
-    claim="The particles draw together hierarchically, from the torso's rotation and translation out to the limbs' "
-    "joint angles.",
-    trials=trials,
-    measure=measure,
-    shown=fig_20,
-    footage=(CIRCLE,),
+EXPERIMENTS = (
+    listed("deutscher-fig-3", trials_fig_3, measure_fig_3, fig_3, footage=(CIRCLE,)),
+    listed("deutscher-fig-19", trials, measure, fig_19, footage=(CIRCLE,)),
+    listed("deutscher-fig-20", trials, measure, fig_20, footage=(CIRCLE,)),
 )

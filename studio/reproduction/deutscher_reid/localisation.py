@@ -35,7 +35,7 @@ from studio.reproduction.deutscher_reid.arms import (
     template_arm,
     true_pose,
 )
-from studio.reproduction.deutscher_reid.setting import EQ18_WORDS, SOURCE
+from studio.reproduction.deutscher_reid.setting import EQ18_WORDS
 from studio.reproduction.drawing import (
     bar_chart,
     floats,
@@ -46,7 +46,7 @@ from studio.reproduction.drawing import (
     places,
     seeds_and_mean,
 )
-from studio.reproduction.experiment import Experiment, Part, each_seed, measured
+from studio.reproduction.experiment import Part, each_seed, listed, measured
 
 CHAIN, BRANCHED = "planar_arm4", "branched_arms6"
 CHAIN_JOINTS = ("x1", "x2", "x3", "x4")
@@ -247,6 +247,12 @@ def _slope_spread(found: Reduction) -> Array:
     """(S,) the steepest parameter's slope over the flattest's: 1 where all fall evenly."""
     fall = -slopes(found.shares)
     return fall.max(axis=1) / np.maximum(fall.min(axis=1), 1e-3)
+
+
+KINDS_OF_FIG_14 = (
+    *(WITH, WITHOUT, WITH_LOUD),
+    *(f"{kind}, α {survival:g}" for survival in MILDER for kind in (WITH, WITHOUT)),
+)
 
 
 def fig_14(outcomes: Sequence[Outcome]) -> Iterator[Part]:
@@ -478,68 +484,10 @@ def fig_18(outcomes: Sequence[Outcome]) -> Iterator[Part]:
 
 
 EXPERIMENTS = (
-    Experiment(
-        name="deutscher-fig-12",
-        title="Variances over one layer, planned and adaptive noise",
-        source=f"{SOURCE}, Fig. 12",
-        claim="Selection localises the first joint far and the others little; noise planned by Eq. 13 all but wipes "
-        "that out, noise in proportion to the variance preserves it.",
-        trials=trials_of(CHAIN, WITH, WITHOUT),
-        measure=measure,
-        shown=fig_12,
-    ),
-    Experiment(
-        name="deutscher-fig-13",
-        title="Variance reduction with adaptive diffusion",
-        source=f"{SOURCE}, Fig. 13",
-        claim="The variances of the four joints fall in order, from the most dominant to the least, over six layers.",
-        trials=trials_of(CHAIN, WITH),
-        measure=measure,
-        shown=fig_13,
-    ),
-    Experiment(
-        name="deutscher-fig-14",
-        title="Variance reduction with planned noise",
-        source=f"{SOURCE}, Fig. 14",
-        claim="With the conventional filter all variances fall evenly over six layers; there is little evidence of "
-        "hierarchical partitioning.",
-        trials=trials_of(
-            CHAIN,
-            *(WITH, WITHOUT, WITH_LOUD),
-            *(f"{kind}, α {survival:g}" for survival in MILDER for kind in (WITH, WITHOUT)),
-        ),
-        measure=measure,
-        shown=fig_14,
-    ),
-)
-FIG_16 = Experiment(
-    name="deutscher-fig-16",
-    title="Crossover on the arm and on the branched arms",
-    source=f"{SOURCE}, Fig. 16",
-    claim="The match does not get worse with the share of crossover on an arm without branches, and gets steadily "
-    "better on branched arms.",
-    trials=trials_fig_16,
-    measure=measure_fig_16,
-    shown=fig_16,
-)
-EXPERIMENTS_ON_BRANCHES = (
-    Experiment(
-        name="deutscher-fig-17",
-        title="Variance reduction of the branched arms",
-        source=f"{SOURCE}, Fig. 17",
-        claim="With crossover the parameters of both arms are localised in order of their dominance, from the fixed "
-        "point outwards, in parallel.",
-        trials=trials_of(BRANCHED, CROSSING),
-        measure=measure,
-        shown=fig_17,
-    ),
-    Experiment(
-        name="deutscher-fig-18",
-        title="Particles of the branched arms over eight layers",
-        source=f"{SOURCE}, Fig. 18",
-        claim="Each segment is localised from the hinge joint outwards.",
-        trials=trials_fig_18,
-        measure=measure_fig_18,
-        shown=fig_18,
-    ),
+    listed("deutscher-fig-12", trials_of(CHAIN, WITH, WITHOUT), measure, fig_12),
+    listed("deutscher-fig-13", trials_of(CHAIN, WITH), measure, fig_13),
+    listed("deutscher-fig-14", trials_of(CHAIN, *KINDS_OF_FIG_14), measure, fig_14),
+    listed("deutscher-fig-16", trials_fig_16, measure_fig_16, fig_16),
+    listed("deutscher-fig-17", trials_of(BRANCHED, CROSSING), measure, fig_17),
+    listed("deutscher-fig-18", trials_fig_18, measure_fig_18, fig_18),
 )

@@ -37,13 +37,12 @@ from studio.reproduction.deutscher_reid.setting import (
     IMPROVED,
     LIMIT_MM,
     PLAIN,
-    SOURCE,
     WEIGHTING,
     annealing_as_ten,
     succeeded,
 )
 from studio.reproduction.drawing import bar_chart, intervals, line, places
-from studio.reproduction.experiment import Experiment, Part, each_seed, grouped
+from studio.reproduction.experiment import Part, each_seed, grouped, listed
 from studio.runs.search_space import default_sigma, search_space
 from studio.synthesis.arm_footage import arm_motion
 from studio.trackers.catalogue import TRACKERS
@@ -309,16 +308,6 @@ def _diffusion(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield ARM_SETTINGS
 
 
-DIFFUSION = Experiment(
-    name="deutscher-adaptive-diffusion",
-    title="What adaptive diffusion saves on the arm",
-    source=f"{SOURCE}, section 6.1 and caption of Fig. 13",
-    claim="With adaptive diffusion half of the particles track the articulated arm over 40 frames.",
-    trials=_diffusion_trials,
-    measure=measure_arm,
-    shown=_diffusion,
-)
-
 # Section 6.2: crossover. 6.2.1 makes every particle from two, so the share is 100 %. The saving depends on the filter
 # that it is added to and on how fast that anneals, neither of which the paper gives for this test: measured are the
 # filter with the diffusion of section 6.1 ("noise is then added … as detailed in Section 6.1") and the one of Eq. 13,
@@ -374,17 +363,6 @@ def _crossover(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield {**ARM_SETTINGS, "crossover": SHARE, "pictures a second": RATE}
 
 
-CROSSOVER = Experiment(
-    name="deutscher-crossover",
-    title="What crossover saves on branched arms and on a chain",
-    source=f"{SOURCE}, section 6.2.2",
-    claim="Crossover halves the particles needed once more for branched arms, and makes no difference for an arm "
-    "without branches.",
-    trials=_crossover_trials,
-    measure=measure_arm,
-    shown=_crossover,
-)
-
 # Whole bodies over 40 frames: the person who walks in a circle before three cameras, with the paper's body of 29
 # parameters. The paper does not name the footage of its factor of 4 (6.3). Every seed tracks another 40
 # frames, from a pose fitted to the true markers; success is that of `setting`: every frame below 100 mm, no limb lost.
@@ -401,7 +379,7 @@ def body_frames(seed: int, quick: bool = False) -> dict[str, int]:
     return {"first": first, "last": first + BODY_FRAMES}
 
 
-def body_trials(scale: Scale, filters: Mapping[str, Knobs]) -> tuple[Trial, ...]:
+def body_trials(filters: Mapping[str, Knobs], scale: Scale) -> tuple[Trial, ...]:
     """One bisection a filter and seed."""
     return tuple(
         bisections(
@@ -473,17 +451,6 @@ def _both_improvements(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     }
 
 
-BOTH_IMPROVEMENTS = Experiment(
-    name="deutscher-full-body",
-    title="What both improvements save on a whole body",
-    source=f"{SOURCE}, section 6.3",
-    claim="Adaptive diffusion and crossover together track a whole body with one quarter of the particles.",
-    trials=lambda scale: body_trials(scale, FILTERS),
-    measure=measure_body,
-    shown=_both_improvements,
-    footage=(CIRCLE,),
-)
-
 # Section 3.1: with more layers each may anneal more slowly. The survival rate is 0.5^(10 / M), so that the frame as a
 # whole is annealed as much as by the paper's ten layers of 0.5, and the planned noise of Eq. 13 ends at the same size.
 
@@ -527,13 +494,17 @@ def _more_layers(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield {"footage": CIRCLE, "frames": BODY_FRAMES, "weighting": WEIGHTING, **survivals, **PLAIN}
 
 
-MORE_LAYERS = Experiment(
-    name="deutscher-layers",
-    title="More layers, fewer particles",
-    source=f"{SOURCE}, section 3.1",
-    claim="Doubling the number of annealing layers reduces the particles needed by more than half, up to a point.",
-    trials=lambda scale: body_trials(scale, LAYER_FILTERS),
-    measure=measure_body,
-    shown=_more_layers,
-    footage=(CIRCLE,),
+EXPERIMENTS = (
+    listed("deutscher-adaptive-diffusion", _diffusion_trials, measure_arm, _diffusion),
+    listed("deutscher-crossover", _crossover_trials, measure_arm, _crossover),
+    listed(
+        "deutscher-full-body",
+        partial(body_trials, FILTERS),
+        measure_body,
+        _both_improvements,
+        footage=(CIRCLE,),
+    ),
+    listed(
+        "deutscher-layers", partial(body_trials, LAYER_FILTERS), measure_body, _more_layers, footage=(CIRCLE,)
+    ),
 )

@@ -18,9 +18,9 @@ from studio.comparison.statistics import number
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.numba_in_threads import numba
-from studio.reproduction.deutscher_reid.setting import CIRCLE, PLAIN, SOURCE, WEIGHTING
+from studio.reproduction.deutscher_reid.setting import CIRCLE, PLAIN, WEIGHTING
 from studio.reproduction.drawing import line, line_chart
-from studio.reproduction.experiment import Experiment, Part, each_seed, measured
+from studio.reproduction.experiment import Part, each_seed, listed, measured
 from studio.runs.search_space import default_sigma, search_space
 from studio.settings import changed_settings, default_settings
 from studio.trackers.catalogue import TRACKERS
@@ -115,14 +115,4 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield Table("Times of one machine", ("processors", "a frame (ms)", "weighing a layer (ms)"), tuple(rows))
 
 
-EXPERIMENT = Experiment(
-    name="deutscher-processors",
-    title="Speed-up over processors",
-    source=f"{SOURCE}, section 6.3",
-    claim="Processing time decreases linearly in the number of processors, with a constant of about 0.8.",
-    trials=trials,
-    measure=measure,
-    shown=shown,
-    footage=(CIRCLE,),
-    alone=True,
-)
+EXPERIMENTS = (listed("deutscher-processors", trials, measure, shown, footage=(CIRCLE,), alone=True),)

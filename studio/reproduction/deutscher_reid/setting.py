@@ -11,7 +11,6 @@ from typing import Any
 
 from studio.comparison.tracked import Tracked
 
-SOURCE = "Deutscher & Reid 2005"
 WEIGHTING = "edge-region"
 BODY = "human29, the paper's 29 parameters"
 

@@ -32,7 +32,6 @@ from studio.reproduction.deutscher_reid.setting import (
     PLAIN,
     QUICK_FRAMES,
     RUN,
-    SOURCE,
     STUDIO,
     STUDIO_WEIGHTING,
     TURNS,
@@ -40,7 +39,7 @@ from studio.reproduction.deutscher_reid.setting import (
     succeeded,
 )
 from studio.reproduction.drawing import bar_chart, intervals, places
-from studio.reproduction.experiment import Experiment, Part
+from studio.reproduction.experiment import Part
 from studio.reproduction.tracking import (
     Candidate,
     Groups,
@@ -53,7 +52,7 @@ from studio.reproduction.tracking import (
     tracked_experiment,
 )
 
-FPS = 60.0
+FPS, LAYERS = 60.0, 10
 EQ13, SECTION_6, OWN = "Eq. 13", "section 6", "studio"
 THAT_TRACK = "seeds that track"
 SUCCESS_WORDS = (
@@ -62,10 +61,10 @@ SUCCESS_WORDS = (
 )
 
 
-def _annealed(name: str, knobs: Mapping[str, Any], particles: int, layers: int = 10) -> Candidate:
+def _annealed(name: str, knobs: Mapping[str, Any], particles: int) -> Candidate:
     """The annealed filter; the studio's own choice of knobs with its own weighting."""
     weighting = STUDIO_WEIGHTING if knobs is STUDIO else WEIGHTING
-    return Candidate(name, "annealed", weighting, {**knobs, "layers": layers, "particles": particles})
+    return Candidate(name, "annealed", weighting, {**knobs, "layers": LAYERS, "particles": particles})
 
 
 def _tracks(groups: Groups, paper: Mapping[str, float]) -> Iterator[Number]:
@@ -74,8 +73,8 @@ def _tracks(groups: Groups, paper: Mapping[str, float]) -> Iterator[Number]:
         yield share(f"{name}: {THAT_TRACK}", map(succeeded, runs), paper.get(name))
 
 
-def _knobs(contenders: Iterable[Candidate]) -> dict[str, Any]:
-    return {f"{one.name}: {knob}": value for one in contenders for knob, value in one.changes.items()}
+def _knobs(candidates: Iterable[Candidate]) -> dict[str, Any]:
+    return {f"{one.name}: {knob}": value for one in candidates for knob, value in one.changes.items()}
 
 
 # Fig. 8: Condensation, with the same number of evaluations and with ten times as many.
@@ -84,7 +83,7 @@ CONDENSATION, LARGE = "Condensation, 4000", "Condensation, 40 000"
 ONE_LAYER = "annealed, 1 × 4000, the mode carried"
 TEN_LAYERS, FEW = "annealed, 10 × 400", "annealed, 10 × 100"
 FIG_8_FRAMES = 240
-CONTENDERS = (
+CANDIDATES = (
     Candidate(CONDENSATION, "condensation", WEIGHTING, {"particles": 4000}),
     Candidate(LARGE, "condensation", WEIGHTING, {"particles": 40000}),
     Candidate(
@@ -108,10 +107,10 @@ FAILING = (CONDENSATION, ONE_LAYER)
 
 
 def _fig_8_lines(quick: bool) -> Iterable[Line]:
-    """The contenders; 40 000 particles take as long as all others together, and are left out of a preview."""
+    """The candidates; 40 000 particles take as long as all others together, and are left out of a preview."""
     last = {"last": QUICK_FRAMES if quick else FIG_8_FRAMES}
     return (
-        Line(one.name, one, CIRCLE, wanted=last) for one in CONTENDERS if not (quick and one.name == LARGE)
+        Line(one.name, one, CIRCLE, wanted=last) for one in CANDIDATES if not (quick and one.name == LARGE)
     )
 
 
@@ -151,18 +150,8 @@ def _fig_8(groups: Groups) -> Iterator[Part]:
     series = (Series("all limbs held", places(len(held)), held),)
     yield bar_chart("Frames in which no limb is lost", "tracker", "share of the frames", series, groups)
     frames = len(groups[FEW][0].frames)
-    yield {"footage": CIRCLE, "frames": frames, "body": BODY, "weighting": WEIGHTING, **_knobs(CONTENDERS)}
+    yield {"footage": CIRCLE, "frames": frames, "body": BODY, "weighting": WEIGHTING, **_knobs(CANDIDATES)}
 
-
-FIG_8 = tracked_experiment(
-    "deutscher-fig-8",
-    "Condensation against annealed particle filtering",
-    f"{SOURCE}, Fig. 8",
-    "Condensation with 4000 particles fails after 1.2 s and with 40 000, too, as does a search of one layer; the "
-    "annealed filter with 10 layers of 400 particles tracks very well, and of as few as 100.",
-    lines=_fig_8_lines,
-    shown=_fig_8,
-)
 
 # Figs. 9, 10, 21, 22 and 23: 10 layers of 200 particles.
 
@@ -239,22 +228,9 @@ def _figure_claims(figure: Figure, groups: Groups) -> Iterator[Part]:
     yield {"footage": figure.footage, "frames": frames, "body": figure.body, **_knobs(FILTERS), **weightings}
 
 
-THREE_CAMERAS: tuple[Experiment, ...] = tuple(
-    tracked_experiment(
-        f"deutscher-fig-{figure.number}",
-        f"Three cameras: {figure.what}",
-        f"{SOURCE}, Fig. {figure.number}",
-        "With three cameras and 10 layers of 200 particles the tracker keeps an accurate lock throughout: "
-        f"{figure.what}.",
-        lines=partial(_figure_lines, figure),
-        shown=partial(_figure_claims, figure),
-    )
-    for figure in FIGURES
-)
-
 # Section 3.1: ten layers with 200 particles and more, on the frames of the bisections.
 
-LAYERS, ENOUGH = 10, 200
+ENOUGH = 200
 PARTICLES = (50, 100, 200, 400, 800)
 QUICK_PARTICLES = (100, 200, 400)
 
@@ -273,9 +249,9 @@ SIZED: Mapping[str, Mapping[str, Any]] = {
 def _size_lines(quick: bool) -> Iterable[Line]:
     for name, knobs in SIZED.items():
         for particles in QUICK_PARTICLES if quick else PARTICLES:
-            contender = _annealed(name, knobs, particles)
+            candidate = _annealed(name, knobs, particles)
             frames = partial(body_frames, quick=quick)
-            yield Line(_size_name(name, particles), contender, CIRCLE, wanted=frames)
+            yield Line(_size_name(name, particles), candidate, CIRCLE, wanted=frames)
 
 
 def _sizes(groups: Groups) -> Iterator[Part]:
@@ -297,11 +273,15 @@ def _sizes(groups: Groups) -> Iterator[Part]:
     yield {"footage": CIRCLE, "frames": BODY_FRAMES, "layers": LAYERS, "weighting": WEIGHTING, **PLAIN}
 
 
-ENOUGH_PARTICLES = tracked_experiment(
-    "deutscher-particles",
-    "200 particles in 10 layers",
-    f"{SOURCE}, section 3.1",
-    "For a model of 30 parameters 10 layers with 200 particles or more work well.",
-    lines=_size_lines,
-    shown=_sizes,
+EXPERIMENTS = (
+    *(
+        tracked_experiment(
+            f"deutscher-fig-{figure.number}",
+            lines=partial(_figure_lines, figure),
+            shown=partial(_figure_claims, figure),
+        )
+        for figure in FIGURES
+    ),
+    tracked_experiment("deutscher-fig-8", lines=_fig_8_lines, shown=_fig_8),
+    tracked_experiment("deutscher-particles", lines=_size_lines, shown=_sizes),
 )

@@ -28,11 +28,10 @@ from studio.reproduction.deutscher_reid.setting import (
     CIRCLE,
     EQ17_WORDS,
     QUICK_FRAMES,
-    SOURCE,
     WEIGHTING,
 )
 from studio.reproduction.drawing import floats, line, line_chart
-from studio.reproduction.experiment import Experiment, Part
+from studio.reproduction.experiment import Part, listed
 from studio.sessions.session import Session
 from studio.settings import changed_settings, default_settings
 
@@ -213,13 +212,4 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield {"footage": CIRCLE, "body": BODY, "parameter": KNEE, "angles": STEPS}
 
 
-FIG_7 = Experiment(
-    name="deutscher-fig-7",
-    title="Weight against one knee's angle",
-    source=f"{SOURCE}, Fig. 7",
-    claim="Varied in the right knee only, the weighting function is highly peaked around the correct angle.",
-    trials=trials,
-    measure=measure,
-    shown=shown,
-    footage=(CIRCLE,),
-)
+EXPERIMENTS = (listed("deutscher-fig-7", trials, measure, shown, footage=(CIRCLE,)),)

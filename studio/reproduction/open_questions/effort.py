@@ -48,6 +48,7 @@ def _lines(quick: bool) -> Iterator[Line]:
 
 def _shown(found: dict[str, list[Tracked]]) -> Iterable[Part]:
     """By half: the mean error of every size over its clips, its limbs lost, and sign tests against the default."""
+    usual, added = _name(*SIZES[0]), list[str]()
     for half in HALVES:
         runs = {
             _name(*size): [found[f"{_name(*size)}, {half} {kind}"] for kind in KIND_OF_CLIPS]
@@ -59,6 +60,9 @@ def _shown(found: dict[str, list[Tracked]]) -> Iterable[Part]:
             lost = [float(np.mean([lost_percent(run) for run in one])) for one in by_seed]
             yield number(f"mean error, {name}, {half}", errors, "mm", better="lower")
             yield number(f"frames with a limb lost, {name}, {half}", lost, "%", better="lower")
+        means = {name: float(np.mean([mean_errors(one) for one in clips])) for name, clips in runs.items()}
+        shares = (f"{name} {100.0 * (mean / means[usual] - 1.0):+.1f} %" for name, mean in means.items())
+        added.append(f"{half} half: {', '.join(list(shares)[1:])}")
         rows: list[tuple[Plain, ...]] = []
         for name, clips in runs.items():
             cells = [
@@ -74,7 +78,8 @@ def _shown(found: dict[str, list[Tracked]]) -> Iterable[Part]:
             means = [error for one in clips for error in mean_errors(one)]
             return means, [float(error) for one in clips for error in error_rows(one).ravel()]
 
-        yield sign_tests(of, [(_name(*size), _name(*SIZES[0])) for size in SIZES[1:]])
+        yield sign_tests(of, [(_name(*size), usual) for size in SIZES[1:]])
+    yield f"Mean error over clips and seeds against {usual}'s: {'; '.join(added)}."
     yield {
         "tracker": DEFAULT_TRACKER,
         "weighting": DEFAULT_WEIGHTING,
@@ -83,11 +88,4 @@ def _shown(found: dict[str, list[Tracked]]) -> Iterable[Part]:
     }
 
 
-EXPERIMENT = tracked_experiment(
-    "effort",
-    "How much search a refined frame needs",
-    "an open question",
-    "How few layers and particles give the default's error, when every frame is refined?",
-    lines=_lines,
-    shown=_shown,
-)
+EXPERIMENTS = (tracked_experiment("effort", lines=_lines, shown=_shown),)

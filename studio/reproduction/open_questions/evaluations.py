@@ -16,7 +16,7 @@ from studio.comparison.statistics import number
 from studio.comparison.tracked import Tracked
 from studio.comparison.trials import Outcome, Scale, Trial
 from studio.reproduction.drawing import intervals
-from studio.reproduction.experiment import Experiment, Part, each_seed
+from studio.reproduction.experiment import Part, each_seed, listed
 from studio.reproduction.open_questions.generalisation import TRAINING, measure
 from studio.reproduction.tracking import Candidate, by_group, lost_percent, mean_errors
 from studio.trackers.catalogue import TRACKERS
@@ -31,7 +31,7 @@ SEEDS, MANY, SEEDS_OF_MANY = 5, 10_000, 2
 LAYERS = 10
 WEIGHTING = "edge-region-silhouette"
 GUIDED = "guided by behaviour"
-CONTENDERS = (
+CANDIDATES = (
     Candidate("annealed, improved", "annealed", WEIGHTING),
     Candidate("annealed, Eq. 13", "annealed", WEIGHTING, {"adaptive_diffusion": False, "crossover": 0.0}),
     Candidate("swarm", "swarm", WEIGHTING),
@@ -45,7 +45,7 @@ def _label(name: str, clip: str, count: int) -> str:
 
 
 def _with(one: Candidate, clip: str) -> bool:
-    """Whether a contender tracks a clip."""
+    """Whether a candidate tracks a clip."""
     return one.name != GUIDED or clip in WALKS
 
 
@@ -54,7 +54,7 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
     last = QUICK_FRAMES if scale.quick else FRAMES
     found: list[Trial] = []
     for clip, footage in CLIPS.items():
-        for one in (one for one in CONTENDERS if _with(one, clip)):
+        for one in (one for one in CANDIDATES if _with(one, clip)):
             for count in QUICK_COUNTS if scale.quick else COUNTS:
                 arguments = partial(_arguments, one, footage, count, last)
                 seeds = scale.seeds[: SEEDS if count <= MANY else SEEDS_OF_MANY]
@@ -79,7 +79,7 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
 
     rows: list[tuple[Plain, ...]] = []
     for clip in CLIPS:
-        here = [one.name for one in CONTENDERS if _with(one, clip)]
+        here = [one.name for one in CANDIDATES if _with(one, clip)]
         for name in here:
             for count in (counts[0], counts[-1]):
                 label = f"mean error, {name}, {clip}, {count} evaluations"
@@ -124,14 +124,4 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     }
 
 
-EXPERIMENT = Experiment(
-    name="evaluations",
-    title="Error against evaluations, for every tracker",
-    source="an open question",
-    claim="Which tracker is best with how many evaluations a frame, from 100 to 100 000?",
-    trials=trials,
-    measure=measure,
-    shown=shown,
-    footage=tuple(CLIPS.values()),
-    long="100 000 evaluations take minutes a run; --quick ends at 10 000.",
-)
+EXPERIMENTS = (listed("evaluations", trials, measure, shown, footage=tuple(CLIPS.values())),)

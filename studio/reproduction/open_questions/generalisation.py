@@ -1,7 +1,7 @@
 """Accuracy of each tracker on footage that it was not tuned to: the suite of rendered clips, by halves.
 
 Defaults are chosen on the first half; the second is used only for reporting. A tracker knows of a clip only what a
-session gives: the lengths of the bones, or, for one contender, the person's height alone.
+session gives: the lengths of the bones, or, for one candidate, the person's height alone.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -18,7 +18,7 @@ from studio.comparison.tracked import Tracked, TrackingTrial, track
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.reproduction.caillette.training_set import Training, model_file
 from studio.reproduction.drawing import heat_chart
-from studio.reproduction.experiment import Experiment, Part, each_seed
+from studio.reproduction.experiment import Part, each_seed, listed
 from studio.reproduction.tracking import Candidate, Runs, by_group, lost_percent, named_percent
 from studio.runs.shape_on_the_way import FIRST_FRAMES
 from studio.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING
@@ -48,19 +48,19 @@ AS_A_RUN = {"shape_frames": FIRST_FRAMES}
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A contender of the suite. kinds : clips that it tracks, () for all. fields : of its attempts. training : of its
+    """A candidate of the suite. kinds : clips that it tracks, () for all. fields : of its attempts. training : of its
     behaviour model.
     """
 
-    contender: Candidate
+    candidate: Candidate
     kinds: tuple[str, ...] = ()
     fields: Mapping[str, Any] = field(default_factory=dict[str, Any])
     training: Training | None = None
 
     @property
     def name(self) -> str:
-        """The contender's name."""
-        return self.contender.name
+        """The candidate's name."""
+        return self.candidate.name
 
 
 def _usual(name: str, tracker: str = DEFAULT_TRACKER, weighting: str = "") -> Candidate:
@@ -85,7 +85,7 @@ ENTRIES = (
         fields={**AS_A_RUN, "subject": SUBJECT_OF_HEIGHT},
     ),
 )
-"""The contenders; knobs to switch on or off are among a contender's changes."""
+"""The candidates; knobs to switch on or off are among a candidate's changes."""
 
 
 def _mean(of: Callable[[Tracked], float]) -> Callable[[Runs], float]:
@@ -111,7 +111,7 @@ COLUMNS: Mapping[str, Callable[[Runs], float]] = {
 
 
 def trials(scale: Scale) -> tuple[Trial, ...]:
-    """Every contender on every clip with every seed, clip by clip so that a clip's evidence is computed once."""
+    """Every candidate on every clip with every seed, clip by clip so that a clip's evidence is computed once."""
     found: list[Trial] = []
     for clip, kind in ((clip_name(half, kind), kind) for half in HALVES for kind in KINDS):
         last = QUICK_FRAMES if scale.quick else KINDS[kind].frames
@@ -123,7 +123,7 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
 
 
 def _arguments(entry: Entry, clip: str, last: int, seed: int) -> dict[str, Any]:
-    attempt = entry.contender.attempt(clip, seed, EVALUATIONS, last=last, **entry.fields)
+    attempt = entry.candidate.attempt(clip, seed, EVALUATIONS, last=last, **entry.fields)
     extra = {} if entry.training is None else {"training": entry.training.plain()}
     return {"attempt": attempt.plain(), **extra}
 
@@ -138,10 +138,10 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
 
 
 def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
-    """Both halves' tables, the number of clips in which each contender is near, and its frames with a limb lost."""
+    """Both halves' tables, the number of clips in which each candidate is near, and its frames with a limb lost."""
     groups = by_group(outcomes)
     for half in HALVES:
-        # By contender and kind, the runs of the half.
+        # By candidate and kind, the runs of the half.
         found: dict[str, dict[str, list[Tracked]]] = {}
         for entry in ENTRIES:
             clips = {kind: groups.get(f"{entry.name} on {clip_name(half, kind)}") for kind in KINDS}
@@ -156,7 +156,7 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
 
 
 def _half(half: str, found: Mapping[str, Mapping[str, Runs]]) -> Iterator[Part]:
-    """Of each contender over its clips: mean, share of near clips, frames with a limb lost, one value a seed; a short
+    """Of each candidate over its clips: mean, share of near clips, frames with a limb lost, one value a seed; a short
     table (mean / mean of worst frames / % frames with a limb lost), a long one, heat maps, and the nearest of those
     that track all clips.
     """
@@ -203,13 +203,12 @@ def _half(half: str, found: Mapping[str, Mapping[str, Runs]]) -> Iterator[Part]:
         yield heat_chart(f"{called}: {title}", "clip", "tracker", kinds, rows)
 
 
-EXPERIMENT = Experiment(
-    name="generalisation",
-    title="Footage that nothing was tuned to",
-    source="an open question",
-    claim="How far off is each tracker on people, rooms, cameras and motions that its defaults were not chosen by?",
-    trials=trials,
-    measure=measure,
-    shown=shown,
-    footage=tuple(clip_name(half, kind) for half in HALVES for kind in KINDS),
+EXPERIMENTS = (
+    listed(
+        "generalisation",
+        trials,
+        measure,
+        shown,
+        footage=tuple(clip_name(half, kind) for half in HALVES for kind in KINDS),
+    ),
 )

@@ -32,7 +32,7 @@ from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.errors import TruthError
 from studio.reproduction.claims import share
 from studio.reproduction.deutscher_reid.weight_of_a_knee import true_poses
-from studio.reproduction.experiment import Experiment, Part, each_seed, group_of
+from studio.reproduction.experiment import Part, each_seed, group_of, listed
 from studio.reproduction.tracking import Candidate
 from studio.trackers.annealing import normalised
 from studio.trackers.tracker import LayerRecord
@@ -44,7 +44,7 @@ EVERY, FIRST = 5, 5
 FRAMES, QUICK_FRAMES = 75, 30
 LEVELS = tuple(float(value) for value in np.linspace(0.0, 1.0, 41))
 CONFIDENCE = 0.05
-CONTENDERS = (
+CANDIDATES = (
     Candidate("annealed, improved", "annealed", WEIGHTING),
     Candidate("annealed, Eq. 13", "annealed", WEIGHTING, {"adaptive_diffusion": False, "crossover": 0.0}),
     Candidate("Condensation", "condensation", WEIGHTING),
@@ -64,7 +64,7 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
     return tuple(
         trial
         for clip in CLIPS[: 1 if scale.quick else None]
-        for one in CONTENDERS
+        for one in CANDIDATES
         for trial in each_seed(f"{one.name} on {clip}", scale.seeds, partial(arguments, one, clip))
     )
 
@@ -229,14 +229,4 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     }
 
 
-EXPERIMENT = Experiment(
-    name="posterior",
-    title="Is the cloud a posterior?",
-    source="an open question",
-    claim="Does the truth lie anywhere in a tracker's cloud with equal probability, and would a last layer at β = 1 "
-    "change that?",
-    trials=trials,
-    measure=measure,
-    shown=shown,
-    footage=CLIPS,
-)
+EXPERIMENTS = (listed("posterior", trials, measure, shown, footage=CLIPS),)

@@ -21,7 +21,7 @@ from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.geometry.camera import Camera
 from studio.reproduction.drawing import heat_chart
-from studio.reproduction.experiment import Experiment, Part, each_seed
+from studio.reproduction.experiment import TABLE, Part, each_seed, listed
 from studio.reproduction.fleischmann import EQ13, EVALUATIONS, IMPROVED, SWARM, TWIN
 from studio.reproduction.tracking import Candidate, by_group
 from studio.synthesis.damage import misplaced
@@ -162,12 +162,10 @@ DAMAGES: dict[str, Callable[[float, int], Changed]] = {
 EIGHT = "eight-cameras"
 FRAMES, QUICK_FRAMES = 90, 30
 ALL_TERMS = "edge-region-silhouette"
-MOST_SEEDS = 5
-"""Seeds: a cell of a heat map is a colour, which more seeds do not change, and there are 140 cells."""
 STANDS_MM, STANDS_LOST = 60.0, 5.0
 """Limits of tolerance: mean error over seeds, mm, and share of frames with a loss, %."""
 
-CONTENDERS = (
+CANDIDATES = (
     replace(IMPROVED, name="annealed, all terms", weighting=ALL_TERMS),
     IMPROVED,
     EQ13,
@@ -179,14 +177,12 @@ CONTENDERS = (
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """One heat map. degrees : from none to much. damage : of DAMAGES. fields : of an attempt for a degree,
-    where evidence is reduced instead of damaged. shown : a degree on the axis.
+    """One heat map. name : of its experiment. degrees : from none to much. damage : of DAMAGES. fields : of an attempt
+    for a degree, where evidence is reduced instead of damaged. shown : a degree on the axis.
     """
 
     name: str
-    title: str
     axis: str
-    claim: str
     degrees: tuple[float, ...]
     footage: str = TWIN
     damage: str = "none"
@@ -202,43 +198,33 @@ def fewer_cameras(count: float) -> dict[str, Any]:
 
 QUESTIONS = (
     Question(
-        "mask-damage",
-        "Damaged silhouettes",
+        "robustness-mask-damage",
         "damaged pixels, share of the person's",
-        "How much of the silhouettes may be wrong (holes and blobs, new in every frame)?",
         (0.0, 0.1, 0.2, 0.4, 0.8),
         damage="mask",
     ),
     Question(
-        "background-clutter",
-        "Background clutter",
+        "robustness-background-clutter",
         "edge pixels, share of the picture's",
-        "How many edges of a cluttered background may there be?",
         (0.0, 0.02, 0.05, 0.1, 0.2),
         damage="clutter",
     ),
     Question(
-        "calibration-error",
-        "Wrong calibration",
+        "robustness-calibration-error",
         "pixels off in the picture's middle",
-        "How far may the cameras look elsewhere than the calibration says?",
         (0.0, 2.0, 5.0, 10.0, 20.0),
         damage="calibration",
     ),
     Question(
-        "fewer-cameras",
-        "Few cameras",
+        "robustness-fewer-cameras",
         "cameras",
-        "How few cameras are enough?",
         (8.0, 6.0, 4.0, 3.0, 2.0, 1.0),
         footage=EIGHT,
         fields=fewer_cameras,
     ),
     Question(
-        "fewer-frames",
-        "Few frames a second",
+        "robustness-fewer-frames",
         "frames a second",
-        "How few frames a second are enough?",
         (1.0, 2.0, 3.0, 4.0, 6.0, 10.0),
         # Frames are skipped.
         fields=lambda step: {"every": int(step)},
@@ -248,23 +234,23 @@ QUESTIONS = (
 
 
 def _trials(question: Question, scale: Scale) -> tuple[Trial, ...]:
-    """Every contender at every degree with every seed."""
+    """Every candidate at every degree with every seed."""
     last = QUICK_FRAMES if scale.quick else FRAMES
 
-    def arguments(contender: Candidate, degree: float, seed: int) -> dict[str, Any]:
+    def arguments(candidate: Candidate, degree: float, seed: int) -> dict[str, Any]:
         wanted = {"last": last, **question.fields(degree)}
-        attempt = contender.attempt(question.footage, seed, EVALUATIONS, **wanted)
+        attempt = candidate.attempt(question.footage, seed, EVALUATIONS, **wanted)
         damaged = degree if question.damage != "none" else 0.0
         return {"attempt": attempt.plain(), "damage": question.damage, "degree": damaged}
 
     return tuple(
         trial
-        for contender in CONTENDERS
+        for candidate in CANDIDATES
         for degree in question.degrees
         for trial in each_seed(
-            f"{contender.name}, {question.shown(degree)}",
-            scale.seeds[:MOST_SEEDS],
-            partial(arguments, contender, degree),
+            f"{candidate.name}, {question.shown(degree)}",
+            scale.seeds,
+            partial(arguments, candidate, degree),
         )
     )
 
@@ -278,11 +264,11 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
 
 
 def _shown(question: Question, outcomes: Sequence[Outcome]) -> Iterator[Part]:
-    """Mean error (mm) and frames with a limb lost (%) of every contender at every degree; the tolerance of each."""
+    """Mean error (mm) and frames with a limb lost (%) of every candidate at every degree; the tolerance of each."""
     runs, columns = by_group(outcomes), tuple(map(question.shown, question.degrees))
     errors: dict[str, list[float]] = {}
     losses: dict[str, list[float]] = {}
-    for entry in CONTENDERS:
+    for entry in CANDIDATES:
         cells = [runs[f"{entry.name}, {degree}"] for degree in columns]
         errors[entry.name] = [float(np.mean([run.mean_mm for run in cell])) for cell in cells]
         losses[entry.name] = [
@@ -293,31 +279,30 @@ def _shown(question: Question, outcomes: Sequence[Outcome]) -> Iterator[Part]:
     for name, cells in pairs.items():
         stands = [error <= STANDS_MM and loss <= STANDS_LOST for error, loss in cells]
         count = [*stands, False].index(False)
-        stood.append(f"{name} stands {f'up to {columns[count - 1]}' if count else 'none of it'}.")
+        stood.append(f"{name} {columns[count - 1] if count else 'not even the first'}")
     yield (
-        f"{' '.join(stood)} In {question.axis}; to stand: a mean below {STANDS_MM:.0f} mm and a limb lost in fewer "
-        f"than {STANDS_LOST:.0f} % of the frames."
+        f"The hardest that each stands, in {question.axis} (a mean of at most {STANDS_MM:.0f} mm and a limb lost in at "
+        f"most {STANDS_LOST:.0f} % of the frames): {'; '.join(stood)}."
     )
     rows = tuple(
         (name, *(f"{error:.1f} / {loss:.0f}" for error, loss in cells)) for name, cells in pairs.items()
     )
-    heads = (f"{degree} {question.axis}" for degree in columns)
-    yield Table("Mean error over seeds (mm), frames with a limb lost (%)", ("tracker", *heads), rows)
+    title = f"Mean error over seeds (mm) / frames with a limb lost (%), over {question.axis}"
+    yield Table(title, ("tracker", *columns), rows)
     for words, values in (("mean error (mm)", errors), ("frames with a limb lost (%)", losses)):
-        yield heat_chart(f"{question.title}: {words}", question.axis, "tracker", columns, values)
+        yield heat_chart(
+            f"{TABLE[question.name]['title']}: {words}", question.axis, "tracker", columns, values
+        )
     frames = outcomes[0].trial.arguments["attempt"]["last"]
     yield {"footage": question.footage, "frames": frames, "evaluations": EVALUATIONS}
 
 
 EXPERIMENTS = tuple(
-    Experiment(
-        name=f"robustness-{question.name}",
-        title=question.title,
-        source="an open question",
-        claim=question.claim,
-        trials=partial(_trials, question),
-        measure=measure,
-        shown=partial(_shown, question),
+    listed(
+        question.name,
+        partial(_trials, question),
+        measure,
+        partial(_shown, question),
         footage=(question.footage,),
     )
     for question in QUESTIONS

@@ -121,7 +121,7 @@ class ImportOptions:
     unit: Unit = ""
     up: Up = "z"
     replace: Annotated[bool, Field(description="Forget all cameras that the source does not name.")] = False
-    despite_findings: Annotated[
+    allow_inconsistent: Annotated[
         bool,
         Field(
             description="Take a calibration that would make results wrong (z not up, a wrong unit), with a warning."
@@ -285,13 +285,13 @@ def _plan(source: Path, options: ImportOptions, *, bare: bool = False) -> Source
 def _checked_rig(measured: MeasuredSource, options: ImportOptions) -> MeasuredSource:
     """The plan with findings on its cameras as warnings: faults that a reprojection error cannot show.
 
-    Raises CalibrationError with the first finding that would make results wrong, unless `despite_findings`.
+    Raises CalibrationError with the first finding that would make results wrong, unless `allow_inconsistent`.
     """
     findings = check_calibration(tuple(entry.camera for entry in measured.cameras))
     wrong = blocking(findings)
-    if wrong and not options.despite_findings:
+    if wrong and not options.allow_inconsistent:
         raise CalibrationError(
-            wrong[0].message, f"{wrong[0].remedy} To import it unchanged: --despite-findings."
+            wrong[0].message, f"{wrong[0].remedy} To import it unchanged: --allow-inconsistent."
         )
     return replace(measured, warnings=(*measured.warnings, *map(str, findings)))
 

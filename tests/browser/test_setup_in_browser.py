@@ -1,12 +1,10 @@
-"""The guided way in a real browser, from raw files to an exported motion."""
+"""The guided set-up in a real browser, from raw files to an exported motion."""
 
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Page, expect
-from studio_page import StudioPage
 from studio_server import StudioServer
 
 from studio.runs.samples import sample_folder
@@ -30,18 +28,9 @@ def raw(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def studio(tmp_path_factory: pytest.TempPathFactory, raw: Path) -> Iterator[StudioServer]:
-    """A studio with an empty workspace that may read the raw files."""
-    served = StudioServer("serve", tmp_path_factory.mktemp("way") / "workspace", raw.parent)
-    yield served
-    served.stop()
-
-
-@pytest.fixture(scope="module")
-def page(window: StudioPage) -> Page:
-    """One window that goes the whole way; the scene is left blank."""
-    window.context.set_default_timeout(PATIENCE)
-    return window.page
+def footage(raw: Path) -> Path:
+    """The raw files may be read."""
+    return raw.parent
 
 
 def state_of(page: Page, step: str, state: str) -> None:
@@ -68,7 +57,7 @@ def test_from_raw_files_to_an_exported_motion(
     expect(page.locator("figure.picture img")).to_have_count(4)
     loaded = "() => [...document.querySelectorAll('figure.picture img')].every((one) => one.naturalWidth > 0)"
     page.wait_for_function(loaded)
-    page.screenshot(path=artefacts / "way-footage.png")
+    page.screenshot(path=artefacts / "setup-footage.png")
     state_of(page, "background", "done")
     state_of(page, "start-pose", "done")
 
@@ -82,7 +71,7 @@ def test_from_raw_files_to_an_exported_motion(
     state_of(page, "track", "done")
     assert studio.get("/api/sessions/mine")["runs"][0]["done"] == LAST + 1
     page.wait_for_function(loaded)
-    page.screenshot(path=artefacts / "way-track.png")
+    page.screenshot(path=artefacts / "setup-track.png")
 
     page.keyboard.press("ArrowDown")
     page.locator("#step button.primary", has_text="Check the motion").click()
@@ -93,7 +82,7 @@ def test_from_raw_files_to_an_exported_motion(
     assert response["turned"] == []
     page.get_by_role("button", name="Smooth in time").click()
     expect(page.locator("input[value=smoothed]")).to_be_checked(timeout=PATIENCE)
-    page.screenshot(path=artefacts / "way-check.png")
+    page.screenshot(path=artefacts / "setup-check.png")
 
     page.locator("#stepper [data-step=export]").click()
     page.locator(".export-actions button.primary").click()
@@ -101,7 +90,7 @@ def test_from_raw_files_to_an_exported_motion(
     with page.expect_download() as waiting:
         page.locator(".export-files a").first.click()
     assert waiting.value.suggested_filename == "mine-run-1-smoothed.bvh"
-    page.screenshot(path=artefacts / "way-export.png")
+    page.screenshot(path=artefacts / "setup-export.png")
 
 
 def test_a_change_of_the_footage_makes_the_rest_stale(page: Page, studio: StudioServer) -> None:

@@ -1,4 +1,4 @@
-"""`studio new`, `add-footage` and `way`."""
+"""`studio new`, `add-footage` and `workflow`."""
 
 import json
 import shutil
@@ -32,15 +32,15 @@ def studio(*words: str) -> Result:
 
 def test_the_way_from_nothing_to_footage_with_a_calibration(workspace: Path, tmp_path: Path) -> None:
     assert printed("new", "mine", "--title", "My take")["next"] == "footage"
-    assert printed("way", "mine")["next"] == "footage"
+    assert printed("workflow", "mine")["next"] == "footage"
     made = make_session(tmp_path / "toy")
     for part in ("pictures", "calibration"):
         shutil.copytree(made.path / part, tmp_path / "raw" / part)
     added = printed("add-footage", "mine", str(tmp_path / "raw"), "--fps", "60")
     assert (added["cameras"], added["frames"], added["calibrated"]) == (["front"], FRAMES, True)
-    way = {step["step"]: step["state"] for step in printed("way", "mine")["steps"]}
-    assert (way["footage"], way["calibration"], way["track"]) == ("done", "done", "ready")
-    assert "✓ calibration" in studio("way", "mine").stdout
+    states = {step["step"]: step["state"] for step in printed("workflow", "mine")["steps"]}
+    assert (states["footage"], states["calibration"], states["track"]) == ("done", "done", "ready")
+    assert "✓ calibration" in studio("workflow", "mine").stdout
 
 
 @pytest.mark.parametrize("verb", ["track", "initialise", "background", "synchronise", "fit-subject"])

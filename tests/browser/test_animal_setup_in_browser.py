@@ -1,7 +1,7 @@
 """A mouse, from its raw videos and pictures of a board to a CSV of points, in the browser only (the guide's animal).
 
 The first frames of four videos, pictures of a board, and a person's clicks and strokes; no file is written by hand and
-no command typed. Pictures of every step are kept in STUDIO_ARTEFACTS/animal-way.
+no command typed. Pictures of every step are kept in STUDIO_ARTEFACTS/animal-guided.
 """
 
 import csv
@@ -20,7 +20,7 @@ from studio.synthesis.clips import ClipWriter
 
 pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.real_data, pytest.mark.timeout(3600)]
 
-PICTURES = "animal-way"
+PICTURES = "animal-setup"
 FRAMES = 10
 SIZE = (1280, 1024)
 """Pixels, width and height."""
@@ -32,7 +32,7 @@ TURNED: tuple[Callable[[float, float], tuple[float, float]], ...] = (
 )
 """Where a pixel lies after quarter turns clockwise."""
 CAMERAS = ("back", "mid", "side", "top")
-STROKES = Path(__file__).resolve().parents[1] / "real_data" / "mouse_way_strokes.json"
+STROKES = Path(__file__).resolve().parents[1] / "real_data" / "mouse_setup_strokes.json"
 APART_MM = {("Nose", "TTI"): (60.0, 130.0), ("Shoulder_left", "Shoulder_right"): (15.0, 40.0)}
 """Distances of a grown mouse's points (by the footage's proofread points: 85 and 27 mm)."""
 
@@ -56,34 +56,34 @@ def raw(real_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_footage(way: GuidedSetup, raw: Path) -> None:
-    page = way.page
+def test_footage(guided: GuidedSetup, raw: Path) -> None:
+    page = guided.page
     page.locator("dialog input[name=name]").fill("mouse")
     page.get_by_role("combobox", name="Who or what is tracked").select_option("mouse")
     page.click("dialog button.primary")
-    way.stands("footage", "ready")
+    guided.stands("footage", "ready")
     page.set_input_files("input[name=files]", sorted((raw / "videos").glob("*.mp4")))
-    way.press("Add footage")
-    way.stands("footage", "done")
-    way.shoot("footage")
+    guided.press("Add footage")
+    guided.stands("footage", "done")
+    guided.shoot("footage")
 
 
-def test_calibration_from_pictures_of_a_board(way: GuidedSetup, raw: Path) -> None:
+def test_calibration_from_pictures_of_a_board(guided: GuidedSetup, raw: Path) -> None:
     """One folder of pictures a camera gives lenses, places and, by its first picture, the floor."""
-    page = way.page
-    way.to("calibration")
+    page = guided.page
+    guided.to("calibration")
     page.get_by_role("tab", name="From a board").click()
     for label, value in (("Columns", "8"), ("Rows", "11"), ("Square mm", "24"), ("Marker mm", "18.75")):
         page.get_by_label(label, exact=True).fill(value)
     page.get_by_role("combobox", name="Markers", exact=True).select_option("DICT_4X4_1000")
     page.get_by_label("Upload a folder").set_input_files((raw / "board").resolve())
     page.get_by_label("Board on the floor in frame").fill("0")
-    way.press("Calibrate")
+    guided.press("Calibrate")
     expect(page.locator(".proposal")).to_contain_text("ChArUco board 8x11")
-    way.shoot("calibration-proposed")
-    way.press("Use this calibration")
-    way.stands("calibration", "done")
-    way.shoot("calibration")
+    guided.shoot("calibration-proposed")
+    guided.press("Use this calibration")
+    guided.stands("calibration", "done")
+    guided.shoot("calibration")
 
 
 def paint(page: Page, stroke: dict[str, Any], turns: int) -> None:
@@ -105,11 +105,11 @@ def paint(page: Page, stroke: dict[str, Any], turns: int) -> None:
     page.mouse.up()
 
 
-def test_masks_from_strokes(way: GuidedSetup) -> None:
-    page = way.page
+def test_masks_from_strokes(guided: GuidedSetup) -> None:
+    page = guided.page
     strokes = json.loads(STROKES.read_text())["strokes"]
-    turns = {one["name"]: one["quarter_turns"] for one in way.studio.get("/api/sessions/mouse")["cameras"]}
-    way.to("background")
+    turns = {one["name"]: one["quarter_turns"] for one in guided.studio.get("/api/sessions/mouse")["cameras"]}
+    guided.to("background")
     page.set_viewport_size({"width": 1920, "height": 1080})
     page.get_by_role("radio", name="Strokes Anything").check()
     for name in CAMERAS:
@@ -120,65 +120,65 @@ def test_masks_from_strokes(way: GuidedSetup) -> None:
                 paint(page, stroke, turns[name])
         page.get_by_role("button", name="Keep", exact=True).first.click()
         page.locator(".masks .picture").first.wait_for()
-    way.press("Set up the background")
-    shares = way.agreement()
+    guided.press("Set up the background")
+    shares = guided.agreement()
     print("agreement:", shares)
     assert min(shares) >= 0.8
-    way.shoot("masks")
+    guided.shoot("masks")
 
 
-def test_the_body_is_made_of_the_shipped_mouse(way: GuidedSetup) -> None:
+def test_the_body_is_made_of_the_shipped_mouse(guided: GuidedSetup) -> None:
     """The shipped mouse is chosen, changed on the page of bodies, and saved as this session's own."""
-    page = way.page
-    way.to("subject")
+    page = guided.page
+    guided.to("subject")
     page.get_by_role("combobox", name="Body", exact=True).select_option("mouse")
-    way.press("Take this body")
-    way.stands("subject", "done")
-    way.shoot("subject")
+    guided.press("Take this body")
+    guided.stands("subject", "done")
+    guided.shoot("subject")
     page.get_by_role("link", name="Change it, or make one of your own").click()
     expect(page.get_by_role("heading", level=1)).to_have_text("mouse")
     ear = page.get_by_label("left ear, length", exact=True)
     ear.fill("9")
     ear.press("Tab")
     expect(page.get_by_label("right ear, length", exact=True)).to_have_value("9")
-    way.shoot("body")
+    guided.shoot("body")
     page.get_by_role("button", name="Save…").click()
     page.get_by_label("Name", exact=True).fill("my-mouse")
     page.get_by_role("button", name="Save", exact=True).click()
     page.get_by_role("link", name="Go on in the guided set-up").click()
-    way.stands("subject", "done")
-    assert way.studio.get("/api/sessions/mouse")["body"]["name"] == "my-mouse"
+    guided.stands("subject", "done")
+    assert guided.studio.get("/api/sessions/mouse")["body"]["name"] == "my-mouse"
 
 
-def test_start_pose(way: GuidedSetup) -> None:
-    way.to("start-pose")
-    way.press("Find it automatically")
-    way.stands("start-pose", "done")
-    expect(way.page.locator("figure.picture img[alt*='start pose']")).to_have_count(4)
-    way.shoot("start-pose")
-    way.press("Yes, track from here")
+def test_start_pose(guided: GuidedSetup) -> None:
+    guided.to("start-pose")
+    guided.press("Find it automatically")
+    guided.stands("start-pose", "done")
+    expect(guided.page.locator("figure.picture img[alt*='start pose']")).to_have_count(4)
+    guided.shoot("start-pose")
+    guided.press("Yes, track from here")
 
 
-def test_track_and_check(way: GuidedSetup) -> None:
-    page = way.page
+def test_track_and_check(guided: GuidedSetup) -> None:
+    page = guided.page
     page.locator("#step form button.primary").click()
-    way.stands("track", "done")
-    way.shoot("track")
-    way.to("check")
-    way.press("Check the motion")
+    guided.stands("track", "done")
+    guided.shoot("track")
+    guided.to("check")
+    guided.press("Check the motion")
     expect(page.locator(".share-strip button").first).to_be_visible()
     expect(page.locator("#step .step-progress")).to_have_count(0)
-    way.shoot("check")
+    guided.shoot("check")
 
 
-def test_a_csv_of_points_comes_out(way: GuidedSetup, tmp_path: Path) -> None:
-    page = way.page
-    way.to("export")
+def test_a_csv_of_points_comes_out(guided: GuidedSetup, tmp_path: Path) -> None:
+    page = guided.page
+    guided.to("export")
     page.locator(".export .format", has_text=".csv").click()
     page.locator(".export-actions button.primary").click()
-    way.stands("export", "done")
-    way.shoot("export")
-    file = way.download(tmp_path)
+    guided.stands("export", "done")
+    guided.shoot("export")
+    file = guided.download(tmp_path)
     with file.open(newline="") as opened:
         rows = list(csv.DictReader(line for line in opened if not line.startswith("#")))
     assert len(rows) == FRAMES

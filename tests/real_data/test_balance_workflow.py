@@ -1,21 +1,20 @@
-"""The balancing man, the whole way from his raw files (issue 5, Show 3): every step through the verbs a person uses.
+"""The balancing man, from his raw files to a motion (issue 5, Show 3): every step through the verbs a person uses.
 
 Overlays of every tenth frame in all views are kept to be looked at (STUDIO_ARTEFACTS, default artefacts/balance).
 """
 
 import contextlib
 import io
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
 import av
 import bvhsdk
 import c3d
-import cv2
 import numpy as np
 import pytest
 import trimesh
+from kept_overlays import keep_overlays
 from numpy.typing import NDArray
 
 import studio
@@ -25,13 +24,11 @@ from studio.motion_files.trc import read_trc
 from studio.operations.cameras import Alignment
 from studio.runs.checking import RunCheck, check_run
 from studio.runs.mask_quality import MaskQuality
-from studio.runs.overlay_pictures import ViewComposer
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 
 pytestmark = [pytest.mark.slow, pytest.mark.real_data]
 
-ROOT = Path(__file__).resolve().parents[2]
 GUESS_MM = 1800.0
 WEIGHTING = "edge-silhouette"
 """The room is cluttered: the edges of what stands in it would be taken for the man's."""
@@ -50,9 +47,9 @@ class Workflow:
 
 
 @pytest.fixture(scope="module")
-def way(real_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Workflow:
+def workflow(real_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Workflow:
     folder = real_data / "pose2sim-balance"
-    session = studio.import_footage(folder, tmp_path_factory.mktemp("way") / "balance", copy=False)
+    session = studio.import_footage(folder, tmp_path_factory.mktemp("balance") / "balance", copy=False)
     plates = {
         source.name: folder / "calibration" / "extrinsics" / f"{source.name.replace('_', '')}_ext.png"
         for source in session.manifest.footage.cameras
@@ -73,82 +70,63 @@ def way(real_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Workflow:
     studio.refine(run)
     studio.smooth(run)
     check = check_run(session, run, "smoothed")
-    way = Workflow(session, aligned, masks, run, check)
-    keep_overlays(way)
-    return way
+    keep_overlays("balance", session, run, 10, "smoothed")
+    return Workflow(session, aligned, masks, run, check)
 
 
-def keep_overlays(way: Workflow) -> None:
-    """Every tenth frame, the four views side by side, with masks and outlines."""
-    place = Path(os.environ.get("STUDIO_ARTEFACTS", ROOT / "artefacts")) / "balance"
-    place.mkdir(parents=True, exist_ok=True)
-    composer = ViewComposer(way.session, way.run)
-    track = studio.read_track(way.run, "smoothed")
-    try:
-        for row in range(0, len(track.frames), 10):
-            frame = int(track.frames[row])
-            views = [
-                composer.compose(frame, name, ("mask", "outline"), pose=track.poses[row], height=960)
-                for name in composer.cameras
-            ]
-            cv2.imwrite(str(place / f"frame-{frame:03d}.png"), np.hstack(views))
-    finally:
-        composer.close()
-
-
-def test_cameras_agree_after_alignment(way: Workflow) -> None:
+def test_cameras_agree_after_alignment(workflow: Workflow) -> None:
     """The published calibration misses by 14 px in a camera; turned by less than a degree, by no more than two."""
-    print(way.aligned.before, way.aligned.after, way.aligned.turns)
-    assert way.aligned.changed
-    assert max(way.aligned.before.values()) > 8.0
-    assert max(way.aligned.after.values()) < 2.5
-    assert max(way.aligned.turns.values()) < 1.0
+    print(workflow.aligned.before, workflow.aligned.after, workflow.aligned.turns)
+    assert workflow.aligned.changed
+    assert max(workflow.aligned.before.values()) > 8.0
+    assert max(workflow.aligned.after.values()) < 2.5
+    assert max(workflow.aligned.turns.values()) < 1.0
 
 
-def test_masks_are_usable_in_all_views(way: Workflow) -> None:
-    print([(view.camera, round(view.agreement, 3)) for view in way.masks.views])
-    assert all(view.agreement >= 0.9 for view in way.masks.views)
+def test_masks_are_usable_in_all_views(workflow: Workflow) -> None:
+    print([(view.camera, round(view.agreement, 3)) for view in workflow.masks.views])
+    assert all(view.agreement >= 0.9 for view in workflow.masks.views)
 
 
-def test_the_model_lies_in_the_masks(way: Workflow) -> None:
+def test_the_model_lies_in_the_masks(workflow: Workflow) -> None:
     """At least 85 % of the model's pixels, in every tenth frame, in each view."""
-    shares = np.array(way.check.inside, dtype=np.float64)
+    shares = np.array(workflow.check.inside, dtype=np.float64)
     print(np.round(shares, 3))
-    print(way.check.in_words())
+    print(workflow.check.in_words())
     assert float(shares.min()) >= 0.85
 
 
-def test_left_and_right_are_not_swapped(way: Workflow) -> None:
+def test_left_and_right_are_not_swapped(workflow: Workflow) -> None:
     """Cameras 1 and 2 see his face, 3 and 4 his back, all the time: his left is on the right of the first two."""
-    track, body = studio.read_track(way.run, "smoothed"), way.run.body()
+    track, body = studio.read_track(workflow.run, "smoothed"), workflow.run.body()
     names = [marker.name for marker in body.markers]
     points = marker_points(body, track.poses[::10])
-    for camera in way.run.cameras():
+    for camera in workflow.run.cameras():
         for left, right in (("LShoulder", "RShoulder"), ("LHip", "RHip")):
             at: list[NDArray[np.float64]] = [
                 project(camera, points[:, names.index(name)])[0][:, 0] for name in (left, right)
             ]
             aside = at[0] - at[1]
             assert (np.median(aside) > 0.0) == (camera.name in BEFORE_HIM), (camera.name, left, aside)
-    assert not way.check.turned
-    assert not way.check.lost
+    assert not workflow.check.turned
+    assert not workflow.check.lost
 
 
-def test_markers_move_smoothly(way: Workflow) -> None:
+def test_markers_move_smoothly(workflow: Workflow) -> None:
     """Second difference at 60 Hz: 5 mm at most, root mean square."""
-    print(way.check.jitter_mm)
-    assert way.run.record.fps == 60.0
-    assert way.check.jitter_mm <= 5.0
+    print(workflow.check.jitter_mm)
+    assert workflow.run.record.fps == 60.0
+    assert workflow.check.jitter_mm <= 5.0
 
 
 @pytest.mark.filterwarnings("ignore:No analog data found")
-def test_exports_open_in_other_readers(way: Workflow, tmp_path: Path) -> None:
+def test_exports_open_in_other_readers(workflow: Workflow, tmp_path: Path) -> None:
     made = {
-        ending: studio.export_run(way.run, tmp_path / f"man.{ending}", track="smoothed")
+        ending: studio.export_run(workflow.run, tmp_path / f"man.{ending}", track="smoothed")
         for ending in ("bvh", "trc", "c3d", "glb")
     }
-    made["mp4"] = studio.export_run(way.run, tmp_path / "man.mp4", track="smoothed", height=480)
-    count = len(studio.read_track(way.run, "smoothed").frames)
+    made["mp4"] = studio.export_run(workflow.run, tmp_path / "man.mp4", track="smoothed", height=480)
+    count = len(studio.read_track(workflow.run, "smoothed").frames)
     with contextlib.redirect_stdout(io.StringIO()):
         read = bvhsdk.ReadFile(str(tmp_path / "man.bvh"))
     assert read is not None

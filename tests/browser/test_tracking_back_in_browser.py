@@ -1,4 +1,4 @@
-"""The guided way where the start pose is in the middle: tracked on from there and back; leaps are called out; an export
+"""The guided set-up where the start pose is in the middle: tracked on and back from there; leaps are named; an export
 that is older than its track is called old.
 """
 
@@ -20,6 +20,7 @@ from studio.runs.start_pose_file import keep_start_pose
 from studio.runs.tracks import read_track, write_track
 from studio.sessions.provenance import note
 from studio.sessions.session import Session
+from studio.sessions.workspace import Workspace
 
 pytestmark = pytest.mark.browser
 
@@ -30,24 +31,20 @@ expect.set_options(timeout=PATIENCE)
 
 
 @pytest.fixture(scope="module")
-def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudioServer]:
-    """`studio serve` on the walk with a start pose of frame 4, tracked from there."""
-    root = tmp_path_factory.mktemp("back") / "workspace"
-    root.mkdir()
-    session = copy_of_walk(root / "walk")
+def workspace(workspace: Path) -> Path:
+    """With the walk, a start pose of frame 4 and a run from there."""
+    session = copy_of_walk(Workspace(workspace).place_for("walk"))
     before = prepare_run(session, name="before", last=START + 1, knobs=QUICK)
     track_to_end(session, before, lambda *_: None)
     keep_start_pose(session, session.body(), read_track(before).poses[-1], START)
     late = prepare_run(session, name="late", last=LAST, knobs=QUICK)
     track_to_end(session, late, lambda *_: None)
-    made = StudioServer("serve", root)
-    yield made
-    made.stop()
+    return workspace
 
 
 @pytest.fixture
 def page(browser: Browser, studio: StudioServer) -> Iterator[Page]:
-    """A window on the guided way."""
+    """A window on the guided set-up."""
     context = browser.new_context(viewport={"width": 1280, "height": 800}, color_scheme="dark")
     context.set_default_timeout(PATIENCE)
     opened = context.new_page()
@@ -77,7 +74,7 @@ def test_tracking_begins_at_the_start_pose_and_goes_back(
     expect(page.get_by_text(f"The start pose is of frame {START}: tracking begins there.")).to_be_visible()
     expect(page.get_by_text(f"(from frame {START} on)")).to_be_visible()
     artefacts.mkdir(parents=True, exist_ok=True)
-    page.screenshot(path=artefacts / "way-track-from-the-middle.png")
+    page.screenshot(path=artefacts / "setup-track-from-the-middle.png")
     page.get_by_role("button", name="Track back to frame 0").click()
     expect(page.get_by_role("button", name="Track back to frame 0")).to_have_count(0)
     track = page.locator("#stepper [data-step=track]")
@@ -105,7 +102,7 @@ def test_leaps_are_called_out_and_an_old_export_is(page: Page, studio: StudioSer
     expect(chip).to_have_attribute("aria-current", "")
     expect(page.locator("#aside")).to_contain_text("frame 5")
     expect(page.locator("#stepper [data-step=check]")).to_contain_text("frame 5, left arm")
-    page.screenshot(path=artefacts / "way-check-jumps.png")
+    page.screenshot(path=artefacts / "setup-check-jumps.png")
     step(page, studio, "export")
     page.get_by_role("button", name="Export", exact=True).click()
     expect(page.locator(".export-files li")).to_have_count(1)
@@ -134,7 +131,7 @@ def test_a_doubted_calibration_is_tracked_only_if_requested(
     page.get_by_text("Track again").first.click()
     expect(page.locator("form .notice")).to_contain_text(doubt)
     page.get_by_label("Last frame").fill(str(START + 1))
-    page.screenshot(path=artefacts / "way-track-doubted.png")
+    page.screenshot(path=artefacts / "setup-track-doubted.png")
     track = page.get_by_role("button", name="Track again", exact=True)
     track.click()
     expect(page.locator("form .wrong")).to_contain_text("contradicts its calibration")

@@ -1,0 +1,158 @@
+"""Kernels of what follows a frame's first layer, compiled in a process of their own while that layer's are here.
+
+Numba compiles one kernel at a time in a process, and half of a frame's kernels are those that compare and refine the
+pose that was found. They are compiled by being called, with a frame whose masks are the body itself; this process
+finds them kept (`kernel_cache`), or waits for the one that is in hand.
+"""
+
+import contextlib
+import dataclasses
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Generator
+from functools import partial
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.arrays import Array
+from studio.body.model import BodyModel
+from studio.evidence.distance_maps import silhouettes_by_camera
+from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
+from studio.geometry.camera import Camera
+from studio.kernel_cache import when_compiling
+from studio.likelihood.outline_kernels import LANES, ROWS
+from studio.likelihood.outlines import OutlineProjector
+from studio.likelihood.silhouette_areas import HALF, silhouettes_of
+from studio.numba_in_threads import numba
+from studio.runs.search_space import search_space
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+from studio.trackers.agreement import Agreement
+from studio.trackers.agreement_kernels import FIELDS, count_cells, view_counts
+from studio.trackers.catalogue import TRACKERS
+from studio.trackers.frame_loop import search_frame
+from studio.trackers.frame_refinement import FrameRefinementSettings, FrameRefiner
+from studio.trackers.hidden_areas import cell_size, counts_of
+from studio.trackers.refinement import RefinementSettings, Refiner
+from studio.trackers.settings import AnnealedSettings
+from studio.trackers.tracker import Estimate, FrameResult, start_of
+
+COMMAND = "import sys; from studio.runs.compiling_beside import compile_for; compile_for(*sys.argv[1:])"
+
+
+@contextlib.contextmanager
+def compiling_beside(run: StoredRun) -> Generator[None]:
+    """Where something has to be compiled within, another process compiles what follows a frame's search of the run."""
+    if numba.get_num_threads() < 2:
+        yield
+        return
+    with when_compiling(partial(_start, run)):
+        yield
+
+
+def compile_for(session_folder: str, run_name: str) -> None:
+    """The process: ends when it is done, or when the one that started it is gone."""
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    run = Session(Path(session_folder)).run(run_name)
+    body, cameras = run.body(), run.cameras()
+    start = run.record.start_pose
+    pose = body.neutral if start is None else np.array(start)
+    _compile_without_outlines(body, cameras, pose)
+    corners = Agreement(body, cameras).corners(pose)
+    evidence = FrameEvidence(0, tuple(_view(*seen) for seen in zip(cameras, corners, strict=True)))
+    result = FrameResult(0, Estimate(pose, pose, pose, 0.0), 0, 0, 0, 0.0, start_of(tuple(pose.tolist())))
+    settings = dataclasses.replace(FrameRefinementSettings(), redraw_limbs=False)
+    silhouettes = partial(silhouettes_by_camera, evidence)
+    FrameRefiner(body, cameras, 0).refined(result, silhouettes, _Alike(), settings)
+
+
+def _compile_without_outlines(body: BodyModel, cameras: tuple[Camera, ...], pose: Array) -> None:
+    """What takes outlines, called with none: the other process is about to compile how they are made, and to wait for
+    it costs this one three seconds.
+    """
+    shown = FrameEvidence(0, tuple(_view(camera, _middle_of(camera)[None]) for camera in cameras))
+    limbs = len(body.drawn)
+    outlines = np.zeros((1, len(cameras), limbs, ROWS * LANES), np.float32)
+    silhouettes_of(shown, HALF).areas(outlines, 1)
+    borders = tuple(silhouettes_by_camera(shown).values())
+    refiner = Refiner(body, cameras, RefinementSettings())
+    refiner.projector = _NoOutlines.of_body(body, cameras)
+    refiner.loss(pose, borders)
+    for camera, view in zip(cameras, borders, strict=True):
+        none, counts = np.full((limbs, 4, 2), np.nan), counts_of({}, camera)
+        view_counts(none, view.signed, view.corner, view.size, 1, 1.0, np.zeros((limbs, FIELDS)))
+        count_cells(none, view.signed, view.corner, cell_size(camera), 1.0, counts)
+    # Of the search what a filter does between two layers, which its first layer leaves time for.
+    settings = AnnealedSettings(layers=2, particles=2)
+    search_frame(
+        TRACKERS["annealed"],
+        _Alike(),
+        start_of(tuple(pose.tolist())),
+        search_space(body, np.ones(len(pose))),
+        seed=0,
+        frame=0,
+        settings_source=lambda: (1, settings),
+    )
+
+
+def _start(run: StoredRun) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", COMMAND, str(run.folder.parents[1]), run.name],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+    )
+    # Nobody else waits for it: what it has compiled is found.
+    threading.Thread(target=_wait_for, args=(process,), name="compiling beside", daemon=True).start()
+
+
+def _wait_for(process: subprocess.Popen[bytes]) -> None:
+    """Return when it has ended, its pipe closed; closed earlier, the pipe would end it."""
+    process.wait()
+    if process.stdin is not None:
+        process.stdin.close()
+
+
+def _end_with_parent() -> None:
+    sys.stdin.read()
+    os._exit(0)
+
+
+def _view(camera: Camera, corners: Array) -> ViewEvidence:
+    """A view of limbs with outlines (L, 4, 2)."""
+    mask = np.zeros((camera.height, camera.width), np.uint8)
+    for outline in corners[np.isfinite(corners).all(axis=(1, 2))]:
+        cv2.fillConvexPoly(mask, np.rint(outline).astype(np.int32), 255)
+    return ViewEvidence(camera.name, np.zeros((*mask.shape, 3), np.uint8), mask, np.zeros_like(mask))
+
+
+def _middle_of(camera: Camera) -> Array:
+    """(4, 2) corners of the middle of its picture."""
+    return np.array(((1, 1), (3, 1), (3, 3), (1, 3))) / 4 * (camera.width, camera.height)
+
+
+class _NoOutlines(OutlineProjector):
+    """Sees no limb."""
+
+    def slopes(self, pose: Array, steps: Array, difference: float) -> tuple[Array, Array]:
+        unseen = np.full((len(self.cameras), self.limb_count, 4, 2), np.nan)
+        return unseen, np.zeros((*unseen.shape, len(pose)))
+
+
+class _Alike:
+    """A frame in which all poses are alike."""
+
+    def log_likelihood(self, poses: Array, stage: int = 0) -> Array:
+        return np.zeros(len(poses))
+
+    def fitness(self, poses: Array, stage: int = 0) -> Array:
+        return np.zeros(len(poses))
+
+    def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
+        return np.ones(len(poses), np.bool_)
