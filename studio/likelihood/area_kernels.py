@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from studio.arrays import Array, Floats, Indices, Mask
 from studio.likelihood.outline_kernels import LANES
 from studio.likelihood.picture_maps import Maps
-from studio.numba_in_threads import CONTRACTED, CONTRACTED_INLINED, EXACT, KERNEL, intrinsic, njit, types
+from studio.numba_in_threads import CONTRACTED, CONTRACTED_INLINED, EXACT, KERNEL, SHORT, intrinsic, njit, types
 
 ROWS = 8
 PARTS = 8
@@ -394,17 +394,7 @@ def areas_fitness(both, projected, observed, outside, found):
         found[v] = 0.5 * own + 0.5 * seen
 
 
-@njit(**EXACT)
-def two_terms(edge: Array, both: Indices, projected: Indices, observed: Indices, outside: Array) -> Array:
-    """(N,) of N poses the mean over the views of the areas' fitness plus that of edge (N, V); see `three_terms`."""
-    found, covered, in_parts = np.empty(edge.shape[0]), np.empty(edge.shape[1]), is_in_parts(edge.shape[0])
-    for n in range(edge.shape[0]):
-        areas_fitness(both[n], projected[n], observed, outside[n], covered)
-        found[n] = mean_in_order(covered, in_parts) + mean_in_order(edge[n], in_parts)
-    return found
-
-
-@njit(**EXACT)
+@njit(**SHORT)
 def three_terms(
     edge: Array,
     region: Array,

@@ -16,7 +16,7 @@ import numpy as np
 from studio.arrays import Array, Floats, Indices, Mask
 from studio.likelihood.kinematic_program import KinematicProgram
 from studio.likelihood.outline_kernels import LANES, ONE, ZERO, block_frames
-from studio.numba_in_threads import EXACT, FAST, FAST_INLINED, njit
+from studio.numba_in_threads import EXACT_INLINED, FAST, FAST_INLINED, njit
 
 # Squared sine of two axes' angle below which they count as parallel; squared mm that count as nothing.
 PARALLEL, NOTHING = np.float32(1.0e-6), np.float32(1.0e-6)
@@ -102,22 +102,44 @@ def ratio_blocks(
                 out[block, pair, lane] = ratios[lane]
 
 
-@njit(**EXACT)
-def within_limits(poses: Array, lower: Array, upper: Array) -> Mask:
-    """(N,) whether every parameter of poses (N, D) is finite and within its limits (D,), both included."""
-    held = np.ones(len(poses), np.bool_)
-    for n in range(len(poses)):
-        for d in range(poses.shape[1]):
-            value = poses[n, d]
-            held[n] &= lower[d] <= value <= upper[d] and np.isfinite(value)
+@njit(**EXACT_INLINED)
+def is_within(pose, limits):
+    """Whether every parameter of a pose (D,) is finite and within its limits (2, D), both included."""
+    held = True
+    for d in range(len(pose)):
+        held &= limits[0, d] <= pose[d] <= limits[1, d] and np.isfinite(pose[d])
     return held
 
 
-@njit(**EXACT)
-def all_at_least(ratios: Floats, least: Floats, count: int) -> Mask:
-    """(N,) whether all ratios (B, P, 16) of each of the first `count` poses are at least those of the pairs (P,)."""
-    held = np.ones(count, np.bool_)
-    for n in range(count):
-        for pair in range(len(least)):
-            held[n] &= ratios[n // LANES, pair, n % LANES] >= least[pair]
-    return held
+@njit(**FAST)
+def hold_blocks(
+    first: int,
+    last: int,
+    poses: Array,
+    limits: Array,
+    program: KinematicProgram,
+    limbs: Indices,
+    least: Floats,
+    held: Mask,
+) -> None:
+    """Of the poses (N, D) in blocks first..last - 1 of sixteen each, fill held (N,): whether every parameter is finite
+    and within its limits (2, D), both included, and all pairs keep their least share (P,). Those beyond a limit are not
+    compared further.
+    """
+    begin, end = first * LANES, min(last * LANES, poses.shape[0])
+    kept, count = np.zeros((end - begin, poses.shape[1]), np.float64), 0
+    for n in range(begin, end):
+        held[n] = is_within(poses[n], limits)
+        if held[n]:
+            kept[count] = poses[n]
+            count += 1
+    if len(least) == 0 or count == 0:
+        return
+    ratios = np.zeros((-(-count // LANES), limbs.shape[0], LANES), np.float32)
+    ratio_blocks(0, ratios.shape[0], kept[:count], program, limbs, ratios)
+    count = 0
+    for n in range(begin, end):
+        if held[n]:
+            for pair in range(len(least)):
+                held[n] &= ratios[count // LANES, pair, count % LANES] >= least[pair]
+            count += 1

@@ -25,7 +25,7 @@ from studio.arrays import Array, Floats
 from studio.body.forward_kinematics import checked_poses, limb_frames
 from studio.body.model import BodyModel, kinematic_tables
 from studio.errors import BodyError
-from studio.likelihood.hard_prior_kernels import all_at_least, ratio_blocks, within_limits
+from studio.likelihood.hard_prior_kernels import hold_blocks, ratio_blocks
 from studio.likelihood.kinematic_program import KinematicProgram, compile_program
 from studio.likelihood.outline_kernels import LANES
 from studio.numba_in_threads import parallel_blocks
@@ -54,19 +54,10 @@ class LimbPairs:
 
     def shares(self, poses: Array) -> Floats:
         """(N, P) distance of each pair's axes in poses (N, D), as a share of the radii between them."""
-        ratios = self._ratios(poses)
-        return ratios.transpose(0, 2, 1).reshape(-1, len(self.limbs))[: len(poses)]
-
-    def apart(self, poses: Array) -> NDArray[np.bool_]:
-        """(N,) whether all pairs keep their least share in poses (N, D)."""
-        return all_at_least(self._ratios(poses), self.least, len(poses))
-
-    def _ratios(self, poses: Array) -> Floats:
-        """(B, P, 16) `shares` in blocks of sixteen poses."""
         count = -(-len(poses) // LANES)
-        out = np.empty((count, len(self.limbs), LANES), dtype=np.float32)
-        parallel_blocks(ratio_blocks, count, BLOCKS_A_THREAD, poses, self.program, self.limbs, out)
-        return out
+        ratios = np.empty((count, len(self.limbs), LANES), dtype=np.float32)
+        parallel_blocks(ratio_blocks, count, BLOCKS_A_THREAD, poses, self.program, self.limbs, ratios)
+        return ratios.transpose(0, 2, 1).reshape(-1, len(self.limbs))[: len(poses)]
 
 
 class HardPriors:
@@ -74,28 +65,27 @@ class HardPriors:
 
     def __init__(self, body: BodyModel) -> None:
         self.body = body
-        self.lower, self.upper = body.lower, body.upper
+        self.limits = np.stack([body.lower, body.upper])
 
     def hold(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
         """(N, D) poses to (N,) whether every parameter lies within its limits, both included, and, if
         `limbs_apart`, no limb is inside another.
 
-        Poses outside the limits are not compared further. Raises BodyError for poses that are no (N, D); False for a
-        pose with a NaN or an infinity.
+        Raises BodyError for poses that are no (N, D); False for a pose with a NaN or an infinity.
         """
-        poses = checked_poses(self.body, poses)
-        held = within_limits(poses, self.lower, self.upper)
-        if limbs_apart:
-            within = np.count_nonzero(held)
-            if within == len(held):
-                return self.apart(poses)
-            if within:
-                held[held] = self.apart(poses[held])
-        return held
+        return self._held(poses, self.limits, limbs_apart)
 
     def apart(self, poses: Array) -> NDArray[np.bool_]:
         """(N, D) finite poses to (N,) whether no limb is inside another, whatever the joints' limits."""
-        return limb_pairs(self.body).apart(poses)
+        return self._held(poses, np.array([[-np.inf], [np.inf]]).repeat(self.limits.shape[1], axis=1), True)
+
+    def _held(self, poses: Array, limits: Array, limbs_apart: bool) -> NDArray[np.bool_]:
+        poses, pairs = checked_poses(self.body, poses), limb_pairs(self.body)
+        held = np.empty(len(poses), dtype=np.bool_)
+        least = pairs.least if limbs_apart else pairs.least[:0]
+        given = poses, limits, pairs.program, pairs.limbs, least, held
+        parallel_blocks(hold_blocks, -(-len(poses) // LANES), BLOCKS_A_THREAD, *given)
+        return held
 
 
 @lru_cache(maxsize=64)

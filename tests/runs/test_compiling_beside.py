@@ -24,7 +24,7 @@ from studio.evidence import distance_maps
 def forms():
     modules = agreement_kernels, refinement_kernels, area_kernels, distance_maps
     kernels = {one for module in modules for one in vars(module).values() if isinstance(one, Dispatcher)}
-    kernels -= {area_kernels.two_terms, area_kernels.three_terms}  # of the search itself
+    kernels -= {area_kernels.three_terms}  # of the search itself
     return {(kernel.py_func.__name__, str(form)) for kernel in kernels for form in kernel.overloads}
 
 session, run = sys.argv[1:]
