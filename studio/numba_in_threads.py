@@ -32,7 +32,6 @@ __all__ = [
     "FAST",
     "FAST_INLINED",
     "KERNEL",
-    "SHORT",
     "intrinsic",
     "njit",
     "numba",
@@ -50,8 +49,6 @@ KERNEL: dict[str, Any] = {"nogil": True}
 """Options of every kernel: other threads go on meanwhile."""
 EXACT: dict[str, Any] = {**KERNEL, "error_model": "numpy"}
 """Dividing by zero gives infinity, as in NumPy."""
-SHORT: dict[str, Any] = {**EXACT, "nogil": False}
-"""A kernel of some microseconds: to let other threads go on, and to wait for the interpreter after it, takes longer."""
 CONTRACTED: dict[str, Any] = {**EXACT, "fastmath": {"contract", "nsz"}}
 """Products and sums may be rounded together."""
 FAST: dict[str, Any] = {**EXACT, "fastmath": {"contract", "reassoc", "nsz", "arcp", "afn"}}

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from studio.arrays import Array, Floats, Indices, Mask
 from studio.likelihood.outline_kernels import LANES
 from studio.likelihood.picture_maps import Maps
-from studio.numba_in_threads import CONTRACTED, CONTRACTED_INLINED, EXACT, KERNEL, SHORT, intrinsic, njit, types
+from studio.numba_in_threads import CONTRACTED, CONTRACTED_INLINED, EXACT, KERNEL, intrinsic, njit, types
 
 ROWS = 8
 PARTS = 8
@@ -394,7 +394,7 @@ def areas_fitness(both, projected, observed, outside, found):
         found[v] = 0.5 * own + 0.5 * seen
 
 
-@njit(**SHORT)
+@njit(**EXACT)
 def three_terms(
     edge: Array,
     region: Array,

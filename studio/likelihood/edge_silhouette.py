@@ -26,12 +26,11 @@ from studio.knobs import next_frame_knob
 from studio.likelihood.edge_region_kernels import CHUNK
 from studio.likelihood.edge_silhouette_kernels import fitness_blocks
 from studio.likelihood.evidence_check import check_views
-from studio.likelihood.problem import WHOLE_BODY, BaseFrameLikelihood, Preparation, Shares
 from studio.likelihood.outline_kernels import LANES
+from studio.likelihood.problem import WHOLE_BODY, BaseFrameLikelihood, Preparation, Shares
 from studio.likelihood.silhouette_areas import Silhouettes, resolution_knob, silhouettes_of
 from studio.likelihood.visible_edges import EdgeMaps, body_edges
 from studio.numba_in_threads import parallel_blocks
-
 
 BLOCKS_A_THREAD = 8
 """About half a millisecond of ten limbs in four pictures."""

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from studio.arrays import Array, Indices, Mask
-from studio.numba_in_threads import EXACT, SHORT, njit
+from studio.numba_in_threads import EXACT, njit
 
 
 class Moments(NamedTuple):
@@ -23,7 +23,7 @@ def moments(poses: Array) -> Moments:
     return Moments(*_moments(poses))
 
 
-@njit(**SHORT)
+@njit(**EXACT)
 def _moments(poses: Array) -> tuple[Array, Array]:
     count, size = poses.shape
     mean, variance = np.zeros(size), np.zeros(size)
@@ -41,7 +41,7 @@ def _moments(poses: Array) -> tuple[Array, Array]:
     return mean, variance
 
 
-@njit(**SHORT)
+@njit(**EXACT)
 def drawn(weights: Array, marks: Array) -> Indices:
     """(K,) for each of marks (K,) in [0, 1): the first whose cumulated share of weights (N,) lies beyond it, and the
     last that weighs anything where rounding leaves none.
@@ -66,7 +66,7 @@ def drawn(weights: Array, marks: Array) -> Indices:
     return found
 
 
-@njit(**SHORT)
+@njit(**EXACT)
 def children(first: Array, second: Array, place: Indices, chosen: Mask, cuts: Array) -> tuple[Array, Mask]:
     """(N, D) `first`, but of each that is chosen (N,) the parameters between its two cuts from `second`; (N,) which
     have any. place : (D,) 1 to L of each parameter. cuts : (N, 2) in [0, 1), shares of L.
@@ -86,7 +86,7 @@ def children(first: Array, second: Array, place: Indices, chosen: Mask, cuts: Ar
     return made, crossed
 
 
-@njit(**SHORT)
+@njit(**EXACT)
 def places(limb: Indices) -> Indices:
     """(D,) 1, 2, … : how many runs of equal values `limb` (D,) has up to each."""
     found = np.ones(len(limb), np.int64)
