@@ -108,12 +108,17 @@ class OpenedRun:
             for known in [one for one in kept if one >= frame]:
                 del kept[known]
 
-    def poses(self, track: str = RAW) -> tuple[NDArray[np.int64], Array]:
-        """The frames (K,) of a track and their poses (K, D); the search's own where there is no such track."""
+    def poses(self, track: str, between: tuple[int, int]) -> tuple[NDArray[np.int64], Array]:
+        """The frames (K,) of a track from the first to the last of `between` and their poses (K, D); the search's own
+        where there is no such track.
+        """
         if self.results is None:
             return np.zeros(0, dtype=np.int64), np.zeros((0, len(self.body.parameters)))
         found = self._read_track(track)
-        return self.results.poses(blobs=False) if found is None else (found.frames, found.poses)
+        if found is None:
+            return self.results.poses(between, blobs=False)
+        first, after = np.searchsorted(found.frames, (between[0], between[1] + 1))
+        return found.frames[first:after], found.poses[first:after]
 
     def tracks(self) -> tuple[str, ...]:
         """The run's tracks, raw first."""

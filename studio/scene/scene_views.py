@@ -28,6 +28,8 @@ DOUBTFUL, EDITED, STORED, GHOST = 0.35, 0.6, 0.35, 0.6
 """Opacity of a body that is held or known to be lost, of one being edited (so that handles behind a limb can be
 grasped), of the stored result beside another, and of bodies that were asked for beside the answer."""
 TRAIL_SECONDS = 1.0
+EVERY_FRAME = 2**40
+"""The reach of trails over the whole run."""
 _VIEW_ELEVATION = 0.34
 _ASKANCE = 0.7
 """Radians from straight ahead, where there are no cameras: what is longer than high is seen at its length."""
@@ -68,7 +70,7 @@ class SceneViews:
         self._volumes = FrameVolumes(opened, volume_made, failed)
         self._composer: ViewComposer | None = None
         self._trails_of: tuple[tuple[str, int], tuple[int, ...]] = ("", 0), ()
-        self._trails_read = float("-inf")
+        self._trails_read, self._trails_between = float("-inf"), (0, 0)
 
     def close(self) -> None:
         """Release footage and threads; what is drawn stays until the scene is cleared."""
@@ -81,8 +83,8 @@ class SceneViews:
         subject, knobs, options = model.subject, model.knobs, model.options
         if subject is None or knobs is None:
             return
-        if options.trails:
-            self._read_trails(model)
+        if options.trails and moment.frame is not None:
+            self._read_trails(model, moment.frame)
         wanted = options.hull or (options.blobs and has_blobs(knobs.settings))
         volume = self._volumes.of(moment, knobs.settings, blobs=options.blobs) if wanted else None
         doubtful = moment.tracking in (LOST, NO_EVIDENCE)
@@ -180,13 +182,17 @@ class SceneViews:
             with client.atomic():
                 client.camera.position, client.camera.look_at = position, middle
 
-    def _read_trails(self, model: Model) -> None:
-        """Take the poses of the shown track, once they changed and not too often."""
-        track, frames = self._opened.track_key(model.options.track), model.frames
-        now = time.monotonic()
+    def _read_trails(self, model: Model, frame: int) -> None:
+        """Take the poses of the shown track about a frame, twice as far as they are drawn: again once it is beyond
+        them, or they changed, and that not too often.
+        """
+        track, frames, now = self._opened.track_key(model.options.track), model.frames, time.monotonic()
+        reach = int(model.options.trail_frames) or EVERY_FRAME
+        near = self._trails_between[0] <= frame - reach and frame + reach <= self._trails_between[1]
         is_due = frames is not self._trails_of[1] and now - self._trails_read >= TRAIL_SECONDS
-        if track != self._trails_of[0] or is_due:
-            self.trails.set_poses(*self._opened.poses(track[0]))
+        if track != self._trails_of[0] or not near or is_due:
+            self._trails_between = frame - 2 * reach, frame + 2 * reach
+            self.trails.set_poses(*self._opened.poses(track[0], self._trails_between))
             self._trails_of, self._trails_read = (track, frames), now
 
 

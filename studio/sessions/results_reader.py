@@ -1,5 +1,6 @@
 """Reading a run's results while they are written, from any thread of any process (see `results_store`)."""
 
+import bisect
 import math
 import sqlite3
 import threading
@@ -7,6 +8,7 @@ from collections.abc import Callable, Generator, Iterable, Mapping
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -225,9 +227,16 @@ class ResultsReader:
             raise self._missing(f"layer {layer + 1} of frame {frame}")
         return self._layer(frame, layer, blobs[layer])
 
-    def poses(self, *, blobs: bool = True) -> tuple[Indices, Array]:
-        """The finished frames (K,) that are whole and their estimates (K, D), radians and mm. blobs : as `damaged`."""
+    def poses(self, between: tuple[int, int] | None = None, *, blobs: bool = True) -> tuple[Indices, Array]:
+        """The finished frames (K,) that are whole and their estimates (K, D), radians and mm. between : of these alone,
+        both included. blobs : as `damaged`.
+        """
         rows = self._state(blobs).rows
+        if between is not None:
+            first, after = (
+                bisect.bisect_left(rows, end, key=itemgetter(0)) for end in (between[0], between[1] + 1)
+            )
+            rows = rows[first:after]
         frames = np.array([row[0] for row in rows], dtype=np.int64)
         if not rows:
             return frames, np.zeros((0, 0))

@@ -59,7 +59,7 @@ def compare_with_oracle(body, cameras, masks, poses, resolution):
 
 
 @pytest.mark.real_data
-@pytest.mark.parametrize("resolution", [FULL, HALF])
+@pytest.mark.parametrize("resolution", [pytest.param(FULL, marks=pytest.mark.slow), HALF])
 def test_a_thousand_poses_in_the_real_cameras(real_data, resolution):
     lee = real_data / "lee-walk"
     body, cameras = load_body("human31"), read_calibration(lee / "CALIB").cameras

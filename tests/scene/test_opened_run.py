@@ -54,4 +54,10 @@ def test_another_track_is_drawn_with_the_search_beside_it(stored: tuple[Session,
     np.testing.assert_array_equal(opened.moment(2, NOTHING, track="smoothed").pose, raw.poses[2])
     write_track(run, dataclasses.replace(made, poses=raw.poses[:2] + 0.7), replace=True)
     np.testing.assert_array_equal(opened.moment(1, NOTHING, track="smoothed").pose, raw.poses[1] + 0.7)
+    # Of a track as of the search's own poses, those between two frames.
+    for track, poses in (("raw", raw.poses), ("smoothed", raw.poses[:2] + 0.7)):
+        frames, found = opened.poses(track, (1, 3))
+        assert frames.tolist() == list(range(1, min(len(poses), 4)))
+        np.testing.assert_array_equal(found, poses[1:4])
+        assert not len(opened.poses(track, (40, 50))[0])
     opened.close()

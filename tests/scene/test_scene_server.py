@@ -19,7 +19,7 @@ from websockets.typing import Subprotocol
 
 from studio.body.catalogue import load_body
 from studio.body.editing import edited
-from studio.body.forward_kinematics import limb_ends, limb_frames
+from studio.body.forward_kinematics import limb_ends, limb_frames, marker_points
 from studio.body.model import BodyModel, extremities
 from studio.errors import SettingsError, StudioError
 from studio.jobs import commands
@@ -200,6 +200,25 @@ def test_playback_shows_one_frame_after_another_and_notifies_the_page(
     stage.play(True, speed=4.0)
     until(lambda: {shown.frame for shown in selections} >= set(range(1, FRAMES - 1)) and len(selections) > 6)
     stage.stop()
+
+
+def _alike(found: np.ndarray, wanted: np.ndarray) -> bool:
+    return found.shape == wanted.shape and np.allclose(found, wanted, atol=1e-6)
+
+
+def test_trails_follow_the_shown_frame(stage: SceneServer, human: BodyModel) -> None:
+    open_run(stage)
+    stage.set_options(trail_markers=("LWrist",), trail_frames=1)
+    wrist = [marker.name for marker in human.markers].index("LWrist")
+    poses = np.stack([swaying_pose(human, frame) for frame in range(FRAMES - 1)])
+    path = (marker_points(human, poses)[:, wrist] / 1000.0).astype(np.float32)
+    trail = views(stage).trails.handle
+    for frame, frames in ((0, [0, 1]), (3, [2, 3, 4]), (0, [0, 1])):
+        stage.show_frame(frame)
+        wanted = np.stack([path[frames[:-1]], path[frames[1:]]], axis=1)
+        until(lambda wanted=wanted: _alike(trail.points, wanted))
+    stage.set_options(trail_frames=0)
+    until(lambda: trail.points.shape == (FRAMES - 2, 2, 3))
 
 
 def test_looking_through_a_camera_by_its_name(stage: SceneServer) -> None:
