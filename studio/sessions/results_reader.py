@@ -264,11 +264,13 @@ class ResultsReader:
         """
         with VERIFIED.reading(self._folder) if blobs else nullcontext():
             known = VERIFIED.of(self._folder)
-            before, stored = self._known, self._query("PRAGMA data_version")
+            before = self._known
             same = before.of == (blobs, known, known.damage())
-            if same and before.stored == stored:
+            if same and before.stored == self._query("PRAGMA data_version"):
                 return before
             with self._snapshot():
+                # Asked within: of what is written meanwhile the next call would think that it is no new frame.
+                stored = self._query("PRAGMA data_version")
                 rewritten = self._query("SELECT value FROM meta WHERE key = 'rewritten'")
                 if not same or before.rewritten != rewritten:
                     before = _NOTHING

@@ -379,6 +379,30 @@ def test_of_a_run_that_goes_on_only_new_frames_are_read(
         assert rows_read == [12], "a frame was replaced"
 
 
+def test_a_frame_that_is_stored_while_a_reader_looks_is_read_once(
+    tmp_path: Path, rows_read: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    query, coming = ResultsReader._query, [4, 5]
+
+    def asked(self: ResultsReader, sql: str, values: tuple[int, ...] = ()) -> list[Row]:
+        found = query(self, sql, values)
+        if sql == "PRAGMA data_version" and coming and not self._within:
+            write(writer, coming.pop(0))
+        return found
+
+    with ResultsWriter(tmp_path) as writer, ResultsReader(tmp_path) as reader:
+        for frame in range(3):
+            write(writer, frame)
+        assert reader.frames(blobs=False) == [0, 1, 2]
+        monkeypatch.setattr(ResultsReader, "_query", asked)
+        write(writer, 3)
+        rows_read.clear()
+        for _ in range(3):
+            reader.frames(blobs=False)
+        assert reader.frames(blobs=False) == [0, 1, 2, 3, 4, 5]
+    assert rows_read == [2, 1], "none of them twice"
+
+
 def test_damage_that_was_found_is_known_without_reading_until_it_is_mended(
     tmp_path: Path, blobs_read: list[str]
 ) -> None:
