@@ -95,6 +95,7 @@ def same_search(one: StoredRun, other: StoredRun) -> None:
                 np.testing.assert_array_equal(layer.log_weights, expected.log_weights)
 
 
+@pytest.mark.slow
 def test_a_sweep_of_a_session_in_a_store_with_a_machine_lost(
     store: str, scheduler: str, far: list[Far], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
