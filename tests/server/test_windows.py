@@ -83,6 +83,7 @@ def windows(
         yield Windows(base, client, scenes, control)
 
 
+@pytest.mark.slow
 def test_ten_windows_on_ten_runs_each_show_their_own(windows: Windows, runs: list[str]) -> None:
     with ExitStack() as stack:
         viewers = {}
