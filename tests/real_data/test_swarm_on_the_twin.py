@@ -5,6 +5,7 @@ it in its `footage`.
 """
 
 import os
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -37,11 +38,13 @@ def footage(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureReq
     return folder
 
 
-def runs(footage: Path, candidate: Candidate, name: str = TWIN) -> list[Tracked]:
+def runs(
+    footage: Path, candidate: Candidate, name: str = TWIN, seeds: Iterable[int] = SEEDS
+) -> list[Tracked]:
     """A candidate on the whole footage, every seed."""
     cache = FootageCache(footage)
     try:
-        return [track(candidate.attempt(name, seed, EVALUATIONS), cache) for seed in SEEDS]
+        return [track(candidate.attempt(name, seed, EVALUATIONS), cache) for seed in seeds]
     finally:
         cache.close()
 
@@ -52,7 +55,8 @@ def mean(found: list[Tracked]) -> float:
 
 @pytest.mark.usefixtures("real_data")
 def test_the_swarm_with_the_papers_fitness_reaches_the_papers_figure(footage: Path) -> None:
-    found = runs(footage, SWARM)
+    # Of one seed and the next it is 29 to 49 mm: the mean of five may be above the paper's.
+    found = runs(footage, SWARM, seeds=range(10))
     assert found[0].evaluations == 1000
     assert len(found[0].frames) == 450
     assert mean(found) <= 38.0
