@@ -33,8 +33,11 @@ def _distances(run: InspectedRun, track: str) -> dict[int, Array]:
     chosen = read_track(run.run, track or RAW)
     if not len(chosen.frames):
         return {}
+    poses = dict(zip(chosen.frames.tolist(), chosen.poses, strict=True))
+    if run.tried is not None:
+        poses[run.tried.number] = run.tried.result.estimate.pose
     found: dict[int, Array] = {}
-    for frame, points in zip(chosen.frames.tolist(), body_points(run.body, chosen.poses), strict=True):
+    for frame, points in zip(poses, body_points(run.body, np.stack(list(poses.values()))), strict=True):
         truth = true_points(run, frame)
         if truth is not None:
             found[frame] = np.linalg.norm(points - truth, axis=1)
@@ -49,7 +52,8 @@ def disagreements_of(run: InspectedRun) -> dict[int, dict[str, float]]:
     for frame, entry in summaries(run).items():
         own: dict[str, float] = {}
         for name, share in entry.disagreement.items():
-            own[limb_group(name)] = max(own.get(limb_group(name), 0.0), share)
+            group = limb_group(run.body, name)
+            own[group] = max(own.get(group, 0.0), share)
         found[frame] = own
     return found
 

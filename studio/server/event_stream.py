@@ -14,6 +14,7 @@ from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 
 from studio.jobs.control import StudioControl
 from studio.jobs.events import Event, SettingsApplied, StateChanged
+from studio.jobs.tried_frames import TriedFrames
 from studio.jobs.watchers import Subscription
 from studio.scene.scene_server import SceneServer
 from studio.server.event_encoding import as_json, key_of, message_of
@@ -29,13 +30,14 @@ Watcher = Subscription[str]
 
 class EventStream:
     """Takes the worker's events and the web's own messages to all watchers. scenes : the open ones by window; layers,
-    of which there are many, go to the windows whose scene shows their run.
+    of which there are many, go to the windows whose scene shows their run. tried : what was annealed again.
     """
 
     def __init__(
         self, control: StudioControl, scenes: Callable[[], Mapping[str, SceneServer]] = lambda: {}
     ) -> None:
         self._control, self._scenes = control, scenes
+        self.tried = TriedFrames()
         self._lock = threading.Lock()
         self._watchers: dict[Watcher, str] = {}
         self._settings: dict[str, object] | None = None
@@ -101,6 +103,8 @@ class EventStream:
             while True:
                 event = await source.next()
                 message = message_of(event)
+                if name := self.tried.hear(event):
+                    message["trial"] = name
                 if isinstance(event, SettingsApplied):
                     self._settings = message
                 elif isinstance(event, StateChanged) and event.state == "idle":

@@ -25,7 +25,7 @@ ChosenName = Annotated[str | None, Field(max_length=128)]
 class GhostBody(Request):
     """A body beside the answer. colour: the name of a colour token. pose: radians and mm."""
 
-    colour: str = Field("ghost", pattern="^(ghost|accent|before|after|truth|series-[0-7]|layer-[0-9])$")
+    colour: str = Field("ghost", pattern="^(ghost|accent|stored|tried|truth|series-[0-7]|layer-[0-9])$")
     pose: list[float] = Field(max_length=512)
 
 

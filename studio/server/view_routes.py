@@ -116,6 +116,21 @@ def selection_of(
 Selected = Annotated[Selection, Depends(selection_of)]
 
 
+def inspected_run(
+    session: OpenSession,
+    run: OpenRun,
+    app: App,
+    trial: Annotated[
+        str, Query(max_length=32, description="A trial that is looked at in the place of its frame.")
+    ] = "",
+) -> InspectedRun:
+    """The run that is looked into, with what was tried in one of its frames, as a dependency of routes."""
+    return InspectedRun(session, run, app.events.tried.tried(run, session.name, trial) if trial else None)
+
+
+Inspected = Annotated[InspectedRun, Depends(inspected_run)]
+
+
 @router.get("/views")
 def views() -> ViewList:
     """All views: what each answers, what of the selection it uses, and its tables."""
@@ -123,16 +138,14 @@ def views() -> ViewList:
 
 
 @router.get(RUN + "/frames/{frame}/views/{view}")
-def frame_view(session: OpenSession, run: OpenRun, frame: int, view: str, selection: Selected) -> ViewAnswer:
+def frame_view(inspected: Inspected, frame: int, view: str, selection: Selected) -> ViewAnswer:
     """A view's tables of a frame. Before a job has ended the tables of `seeds` are empty."""
-    inspected = InspectedRun(session, run)
     return _answer(inspected, view, look(inspected, frame, view, selection), frame)
 
 
 @router.get(RUN + "/views/{view}")
-def run_view(session: OpenSession, run: OpenRun, view: str, selection: Selected) -> ViewAnswer:
+def run_view(inspected: Inspected, view: str, selection: Selected) -> ViewAnswer:
     """A view's tables of the whole run; none for a view that shows single frames only."""
-    inspected = InspectedRun(session, run)
     return _answer(inspected, view, look_over(inspected, view, selection), None)
 
 

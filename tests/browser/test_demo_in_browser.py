@@ -136,7 +136,7 @@ def test_the_survival_rate_is_moved_and_new_layers_are_drawn(paused: StudioPage)
 
     # The stored answer stays, in the store and beside the new one.
     assert paused.wire.shown("/stored")
-    paused.page.locator("#what-if", has_text=f"Frame {frame} re-annealed, not stored").wait_for()
+    paused.page.locator("#trial", has_text=f"Frame {frame} tried again, not stored").wait_for()
     assert paused.studio.get(f"{run_path(paused)}/frames/{frame}") == stored
 
 
@@ -316,7 +316,7 @@ def test_a_new_answer_can_be_kept(paused: StudioPage) -> None:
     before = paused.studio.get(f"{run_path(paused)}/frames/{last - 2}")
     paused.key("r")
     paused.until("get('whatIf')?.length === get('layerCount') && get('work').state === 'paused'")
-    paused.page.locator("#what-if").get_by_role("button", name="Keep…", exact=True).click()
+    paused.page.locator("#trial").get_by_role("button", name="Keep…", exact=True).click()
     paused.page.locator("dialog form").get_by_role("button", name="Keep it", exact=True).click()
     paused.until(f"get('summary').frames.at(-1).frame === {last - 2} && get('whatIf') === null")
     after = paused.studio.get(f"{run_path(paused)}/frames/{last - 2}")

@@ -124,7 +124,7 @@ async function showInScene() {
   if (!isElsewhere(shown) && requested === moves) return;
   scene = shown;
   requested = moves;
-  const discard = isAnew;
+  const discard = isAnew && !get("trial");
   isAnew = false;
   await post("/api/scene/show", { ...shown, eye: eyeOf(shown.eye), request_number: requested, discard }).catch(complain);
 }

@@ -16,6 +16,8 @@ import { startPlayback } from "./playback.js";
 import { startRail } from "./rail.js";
 import { startSceneFrame } from "./scene_frame.js";
 import { refreshSessions } from "./sessions.js";
+import { startTrialCard } from "./studio/trial_card.js";
+import { startTrials } from "./studio/trials.js";
 import { startTabs } from "./tabs.js";
 import { startTheme } from "./theme.js";
 import { startTimeline } from "./timeline.js";
@@ -40,6 +42,8 @@ async function start() {
   startKeys();
   startPalette();
   startCurtain();
+  startTrials();
+  startTrialCard();
   startData();
   startTracks();
   startCorrecting();

@@ -4,7 +4,7 @@ import { figure } from "./chart_looks.js";
 import { drawSoon } from "./pacing.js";
 import { byId, dotted, element, fill } from "./elements.js";
 import { say } from "./messages.js";
-import { goTo, layersShown, range, stepLayer } from "./selection.js";
+import { goTo, layersShown, range, shownTrial, stepLayer } from "./selection.js";
 import { get, watch } from "./state.js";
 import { onTheme, token } from "./theme.js";
 
@@ -170,7 +170,7 @@ function showFrame() {
   if (!summary || frame === null) return fill(label, "–");
   const entry = summary.frames.find((one) => one.frame === frame);
   const state = standing(entry);
-  const [before, after] = [entry?.error_mm, get("outcome")?.frame === frame ? get("outcome").after?.error_mm : undefined];
+  const [before, after] = [entry?.error_mm, shownTrial()?.error_mm ?? undefined];
   const measured = before == null ? "" : after == null ? `${figure(before)} mm` : `${figure(before)} → ${figure(after)} mm`;
   const name = STATES[entry?.tracking]?.[0] ?? (entry?.lost ? TRUE_LOSS[0] : "");
   fill(label, element("span", {}, element("b", {}, `frame ${frame}`), element("small", {}, ` of ${summary.first} to ${summary.last - 1}`)), element("small", {}, dotted(measured, name)));
@@ -204,7 +204,7 @@ export function startTimeline() {
   new ResizeObserver(drawTimeline).observe(track);
   onTheme(drawTimeline);
   document.fonts.ready.then(drawTimeline);
-  watch(["summary", "frame", "outcome"], () => { drawSoon(drawTimeline); showFrame(); });
+  watch(["summary", "frame", "trial", "trials"], () => { drawSoon(drawTimeline); showFrame(); });
   watch(["detail"], () => { label.title = (get("detail")?.notes ?? []).join(" "); label.classList.toggle("noted", label.title !== ""); });
   const layerLabel = byId("layer-label");
   watch(["layer", "detail", "whatIf"], () => {

@@ -62,8 +62,8 @@ function varianceOfFrame(sheet, { layers: rows, settled }, at) {
   });
   const line = (name, key, colour, more = {}) => sheet.line(plot, name, own.map((row) => (row[key] > 0 ? row[key] : null)), token(colour), { ...more, click: ({ dataIndex }) => ({ layer: own[dataIndex].layer, parameter: chosen }) });
   line("as weighed", "weighed", "text-quiet", { dashed: true });
-  line("before noise", "before", "before");
-  line("after noise", "after", "after");
+  line("before noise", "before", "series-1");
+  line("after noise", "after", "series-0");
   sheet.chosen(plot, { column: at.layer });
   const now = own.find((row) => row.layer === (at.layer ?? count - 1));
   return `${at.label(chosen)}, layer ${now.layer + 1} of ${count}: variance ${figure(now.weighed)} ${now.unit}² as weighed, ${figure(now.before)} before noise, ${figure(now.after)} after noise.`;
@@ -115,17 +115,17 @@ function scheduleOfFrame(sheet, { layers: rows }, at) {
     sheet.chosen(plot, { column: at.layer === null ? null : layerName(at.layer) });
   };
   const of = (key) => rows.map((row) => row[key]);
-  const beside = (key, colour = "accent") => (again ? [["before", of(key), "before", {}], ["after", again.map((layer) => layer[AGAIN[key]] ?? null), "after", {}]] : [["reached", of(key), colour, {}]]);
+  const beside = (key, colour = "accent") => (again ? [["stored", of(key), "stored", {}], ["tried", again.map((layer) => layer[AGAIN[key]] ?? null), "tried", {}]] : [["reached", of(key), colour, {}]]);
   const positive = (values) => values.every((value) => value === null || value > 0);
   if (of("alpha_reached").some((value) => value !== null)) draw(0, "Survival α", "asked and reached", numbers("", { min: 0, max: 1, scale: false }), [["asked", of("alpha_wanted"), "text-quiet", { dashed: true, stepped: true }], ...beside("alpha_reached")]);
   else draw(0, "Best log weight", "nats", numbers(), beside("best_log_weight"));
   if (of("beta").some((value) => value !== null)) draw(1, "Exponent β", "log scale", positive(of("beta")) ? logarithmic() : numbers(), beside("beta"));
   else draw(1, "Particles", "in each layer", numbers(), beside("particles"));
-  draw(2, "Effective number", `of ${rows.at(-1).particles} particles, log scale`, logarithmic("", { min: 1 }), [["particles", of("particles"), "text-quiet", { dashed: true }], ...(again ? [["before", of("effective"), "before", {}], ["after", again.map((layer) => layer.effective_share * layer.particles), "after", {}]] : [["effective", of("effective"), "accent", {}]])]);
+  draw(2, "Effective number", `of ${rows.at(-1).particles} particles, log scale`, logarithmic("", { min: 1 }), [["particles", of("particles"), "text-quiet", { dashed: true }], ...(again ? [["stored", of("effective"), "stored", {}], ["tried", again.map((layer) => layer.effective_share * layer.particles), "tried", {}]] : [["effective", of("effective"), "accent", {}]])]);
   const plot = sheet.plot({ ...places[3], top: 0, height }, { title: "Time", unit: `${figure(of("milliseconds").reduce((sum, one) => sum + (one ?? 0), 0))} ms in all`, x: categories(names, "layer"), y: numbers("", { scale: false }) });
   sheet.series(plot, { type: "bar", barMaxWidth: 22, data: rows.map((row, index) => ({ value: row.milliseconds, itemStyle: { color: layerColour(index, rows.length) } })), click, tip: ({ dataIndex, value }) => tipOf(`layer ${dataIndex + 1}`, [["time", `${figure(value)} ms`]]) });
   sheet.chosen(plot, { column: at.layer === null ? null : layerName(at.layer) });
-  if (again) sheet.legend(["before", "after"], places[0].left + places[0].width - 110, 8, 110);
+  if (again) sheet.legend(["stored", "tried"], places[0].left + places[0].width - 110, 8, 110);
   const row = rows.find((one) => one.layer === at.layer) ?? rows.at(-1);
   return `Layer ${row.layer + 1} of ${rows.length}: β ${figure(row.beta)}, α asked ${figure(row.alpha_wanted)}, reached ${figure(row.alpha_reached)}, effective number ${figure(row.effective)} of ${row.particles}, largest weight ${figure(100 * row.largest)} %${row.alarm ? `. Alarm: ${row.alarm}` : ""}.`;
 }
@@ -242,8 +242,8 @@ function clouds(sheet, { summary, own: steps, ridges, marks }, at) {
     click: ({ data }) => ({ parameter: data.own.parameter }),
     tip: ({ data: { own } }) => tipOf(`${at.label(own.parameter)}, layer ${own.layer + 1}`, [["median", withUnit(own.median, own.unit)], ["5 %", withUnit(own.q05, own.unit)], ["95 %", withUnit(own.q95, own.unit)], ["deviation", withUnit(own.deviation, own.unit)]]),
   });
-  bar("first cloud", (own) => own[0], "before", 9);
-  bar("last cloud", (own) => own.at(-1), "after", 4);
+  bar("first cloud", (own) => own[0], "layer-0", 9);
+  bar("last cloud", (own) => own.at(-1), "layer-9", 4);
   const point = (name, key, colour, symbol) => sheet.series(all, {
     name, type: "scatter", symbol, symbolSize: 8, itemStyle: { color: token(colour), borderColor: token("surface"), borderWidth: 1 },
     data: names.flatMap((parameter, row) => { const place = places.get(parameter)(marked.get(parameter)?.[key]); return place === null ? [] : [{ value: [Math.max(-2, Math.min(2, place)), row], parameter }]; }),
@@ -265,7 +265,7 @@ function clouds(sheet, { summary, own: steps, ridges, marks }, at) {
   own.forEach(([set, rows], index) => {
     const base = own.length - 1 - index;
     const most = Math.max(...rows.map((row) => row.density)) || 1;
-    const colour = set < 0 ? token("before") : layerColour(set, Math.max(at.layers, own.length - 1));
+    const colour = set < 0 ? token("ghost") : layerColour(set, Math.max(at.layers, own.length - 1));
     const dim = at.layer !== null && at.layer !== set;
     sheet.series(plot, {
       name: nameOf(set), type: "custom", z: 2 + index, encode: { x: 0, y: 1 }, data: [[onScreen(rows[0].value, unit), base]], clip: false,

@@ -72,7 +72,7 @@ async function attempt(remedy) {
   try {
     set({ follow: false });
     await patch(`${runPath(get("session"), get("run"))}/settings?frame=${get("frame")}`, remedy.settings);
-    say(`Frame ${get("frame")} is annealed again: ${remedy.title}. Its outcome stands over the scene.`);
+    say(`Frame ${get("frame")} is annealed again: ${remedy.title}. What it changes stands under the knobs.`);
   } catch (error) { complain(error); }
 }
 
