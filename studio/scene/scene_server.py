@@ -19,6 +19,7 @@ from studio.scene.guarded_server import GuardedServer
 from studio.scene.model import (
     Ghost,
     LayerPlayback,
+    LiveSearch,
     Selection,
     ViewOptions,
     change_options,
@@ -31,6 +32,7 @@ from studio.scene.model import (
     show_frame,
     show_ghosts,
 )
+from studio.scene.twin import show_trial
 from studio.sessions.workspace import Workspace
 
 
@@ -124,6 +126,17 @@ class SceneServer:
     def discard_what_if(self) -> None:
         """Forget the frame that was annealed again."""
         self._controller.post(discard_what_if, announce=False)
+
+    def show_trial(self, trial: LiveSearch | None) -> None:
+        """Show what was tried of a frame in its place; None: what is stored."""
+        self._controller.post(show_trial, trial or LiveSearch(), announce=False)
+
+    def lead(self, follower: "SceneServer | None") -> None:
+        """Let another scene show trials of the moment that this one shows as stored, seen alike; None: no longer."""
+        if follower is not None:
+            follower.set_options(trials=True, stored=False)
+        self.set_options(trials=follower is None)
+        self._controller.lead(None if follower is None else follower._controller)
 
     def show_ghosts(self, ghosts: Sequence[tuple[str, Sequence[float]]]) -> None:
         """Draw bodies beside the answer until another frame is shown: a colour's token and a pose (D,) of each."""

@@ -18,6 +18,7 @@ import { startSceneFrame } from "./scene_frame.js";
 import { refreshSessions } from "./sessions.js";
 import { startTrialCard } from "./studio/trial_card.js";
 import { startTrials } from "./studio/trials.js";
+import { startTwin } from "./studio/twin.js";
 import { startTabs } from "./tabs.js";
 import { startTheme } from "./theme.js";
 import { startTimeline } from "./timeline.js";
@@ -48,6 +49,7 @@ async function start() {
   startTracks();
   startCorrecting();
   startSceneFrame(takeKey);
+  startTwin(takeKey);
   await refreshSessions();
   startAddress();
 }

@@ -1,7 +1,7 @@
 // Limbs over the frames, and how near the particles of each layer came: what the words on why a frame failed rest on.
 
 import { figure as figureWords } from "./chart_looks.js";
-import { seriesColour } from "./theme.js";
+import { limbLook } from "./limb_looks.js";
 import { categories, distinct, extent, grouped, numbers, tipOf } from "./view_sheet.js";
 
 const ROW = 17;
@@ -32,10 +32,12 @@ export function drawLimbs(sheet, /** @type {any} */ { limbs: rows, nearest }, at
     const shown = at.limb && own.some(([limb]) => limb === at.limb) ? own.filter(([limb]) => limb === at.limb) : own.filter(([, list]) => list.some((row) => row.nearest > row.reach)).slice(0, 5);
     const drawnOnes = shown.length ? shown : own.slice(0, 3);
     const plot = sheet.plot({ ...two, top: 0, height }, { title: "Nearest particle", unit: "to the reference pose, mm; dashed: the layer's noise", names: drawnOnes.map(([limb]) => limb), x: categories(layers.map((layer) => String(layer + 1)), "layer"), y: numbers("", { scale: false, min: 0 }) });
-    drawnOnes.forEach(([limb, list], index) => {
+    const limbs = own.map(([limb]) => limb);
+    drawnOnes.forEach(([limb, list]) => {
+      const { colour, symbol } = limbLook(limb, limbs);
       const click = ({ dataIndex }) => ({ layer: list[dataIndex].layer, limb });
-      sheet.line(plot, limb, list.map((row) => row.nearest), seriesColour(index), { click, tip: ({ dataIndex }) => tipOf(`${limb}, layer ${list[dataIndex].layer + 1}`, [["nearest particle", `${figureWords(list[dataIndex].nearest)} mm`], ["median particle", `${figureWords(list[dataIndex].median)} mm`], ["noise of the layer", `${figureWords(list[dataIndex].reach)} mm`], ["reference inside the cloud", list[dataIndex].inside ? "yes" : "no"]]) });
-      sheet.line(plot, `${limb}: noise`, list.map((row) => row.reach), seriesColour(index), { dashed: true, symbols: false, tooltip: { show: false } });
+      sheet.line(plot, limb, list.map((row) => row.nearest), colour, { symbol, click, tip: ({ dataIndex }) => tipOf(`${limb}, layer ${list[dataIndex].layer + 1}`, [["nearest particle", `${figureWords(list[dataIndex].nearest)} mm`], ["median particle", `${figureWords(list[dataIndex].median)} mm`], ["noise of the layer", `${figureWords(list[dataIndex].reach)} mm`], ["reference inside the cloud", list[dataIndex].inside ? "yes" : "no"]]) });
+      sheet.line(plot, `${limb}: noise`, list.map((row) => row.reach), colour, { dashed: true, symbols: false, tooltip: { show: false } });
     });
     sheet.chosen(plot, { column: at.layer === null ? null : String(at.layer + 1) });
   } else sheet.words("There is no reference pose to measure the particles against.", two.left, 40, two.width);

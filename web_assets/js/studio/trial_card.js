@@ -150,7 +150,7 @@ function valueWords(value) {
 }
 
 /** @param {{ label: string, unit?: string, stored: any, tried: any }[]} moved */
-const movedWords = (moved) =>
+export const movedWords = (moved) =>
   moved.length
     ? moved.map((knob) => `${knob.label} ${valueWords(knob.tried)}`).join(", ")
     : "the same knobs";

@@ -40,12 +40,15 @@ async function loadLayers() {
     if (place !== here() || name !== get("trial")) return;
     if (frame !== get("frame")) return leave();
     set({ whatIf: layers });
-    await post("/api/scene/show", { trial: name });
+    await post("/api/scene/show", { trial: placeOf(name) });
   } catch (/** @type {any} */ error) {
     if (get("trial") === name) leave();
     complain(error);
   }
 }
+
+/** A trial of the open run as the scene takes it; "" for none. @param {string | null} name */
+export const placeOf = (name) => (name ? `${get("session")}/${get("run")}/${name}` : "");
 
 /** No trial is shown any more; what else is stays. */
 function leave() {
@@ -59,7 +62,10 @@ export function showTrial(name) {
 }
 
 /** Compare the shown trial with another one, or (null) with what is stored. @param {string | null} name */
-export const compareWith = (name) => set({ against: name });
+export function compareWith(name) {
+  set({ against: name });
+  post("/api/scene/show", { against: placeOf(name) }).catch(complain);
+}
 
 /** Leave the stored result as it is; the knobs stay as they were moved. */
 export function discard() {
