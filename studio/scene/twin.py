@@ -1,7 +1,7 @@
 """Two scenes of one window beside each other: the stored frame in one, a trial of it in the other, seen alike.
 
 Whatever is chosen in either is chosen in both; what is drawn, and where layers are played, is said by the leading
-scene, which has the controls. A viewer's place goes from scene to scene as it moves, without waiting for either to be drawn.
+scene, which has the controls. A viewer's place goes from scene to scene as it moves, and waits for neither to be drawn.
 """
 
 import time

@@ -100,10 +100,9 @@ def show(request: SceneRequest, app: App, scene: Scene, window: Window = "") -> 
         scene.discard_what_if()
     if request.twin is not None:
         app.scenes.split(window, request.twin)
-    twin = app.scenes.twin(window)
     if request.trial is not None:
-        (twin or scene).show_trial(_search(app, request.trial))
-    if request.against is not None and twin is not None:
+        (app.scenes.twin(window) or scene).show_trial(_search(app, request.trial))
+    if request.against is not None and app.scenes.twin(window) is not None:
         scene.show_trial(_search(app, request.against))
     chosen = {name: getattr(request, name) for name in CHOSEN if name in given}
     if chosen:

@@ -8,6 +8,7 @@ from pydantic import BeforeValidator, Field
 from studio.errors import RunError
 from studio.inspection.comparing import compare_stored
 from studio.inspection.reading import InspectedRun
+from studio.inspection.seeds import search_seeds
 from studio.inspection.shared_page import shared_page
 from studio.inspection.tables import Column, Remedy, Selection, View, Viewed
 from studio.inspection.views import VIEWS, look, look_over, view_named
@@ -168,13 +169,17 @@ def begin_seeds(
     run: OpenRun,
     frame: int,
     arguments: Annotated[Arguments, body_of(seeds, "SeedsRequest", without=("frame",))],
+    inspected: Inspected,
     app: App,
 ) -> SeedsState:
-    """Begin to search a frame with other seeds. Ask for its state, or wait for `seeds` events."""
-    InspectedRun(session, run).frame(frame)
+    """Begin to search a frame, or a trial of it, with other seeds. Ask for its state, or wait for `seeds` events."""
+    inspected.frame(frame)
 
     def work(job: Job) -> dict[str, object]:
-        seeds(run, frame, **arguments, progress=job.report_or_stop)
+        if inspected.tried is None:
+            seeds(run, frame, **arguments, progress=job.report_or_stop)
+        else:
+            search_seeds(inspected, frame, int(arguments["count"]), job.report_or_stop)
         return {}
 
     return app.jobs.begin(SEEDS, SeedsState(session=session.name, run=run.name, frame=frame), work)

@@ -426,7 +426,9 @@ def test_a_what_if_says_what_it_changes_and_is_discarded(window: StudioPage, stu
         expect(row).to_have_class(f"change {'better' if after < before else 'worse'}")
     card = page.locator("#trial").bounding_box()
     stage = page.locator("#stage").bounding_box()
-    assert card and stage and card["y"] >= stage["y"] + stage["height"]
+    assert card
+    assert stage
+    assert card["y"] >= stage["y"] + stage["height"]
     assert "→" in page.locator("#frame-label").inner_text()
     # Both results are outlined in the pictures, and in the charts before stands beside after.
     page.click("[data-panel=cameras]")

@@ -3,7 +3,7 @@
 
 import { axis, figure, token } from "./chart_looks.js";
 
-const HEADING = 30, LEGEND = 17;
+const HEADING = 30, LEGEND = 17, WORD = 12;
 const HEAT = ["heat-lowest", "heat-low", "heat-middle", "heat-high"];
 const SPLIT = "stored and tried";
 const FAMILY = "Inter, system-ui, sans-serif";
@@ -151,20 +151,52 @@ export class Sheet {
     });
   }
 
-  /** Lines across a plot at values of its axes, each with a word. @param {{ x?: any, y?: any, word?: string, colour?: string, dashed?: boolean }[]} marks */
-  marks(plot, marks) {
+  /**
+   * Where the words of vertical lines stand so that none covers another: which side of its line, and how many lines of text
+   * below the plot's top.
+   * @param {{ x?: any, word?: string }[]} marks
+   * @param {[number, number]} range of the axis
+   * @param {number} width of the plot, pixels
+   * @returns {Map<any, { side: -1 | 1, level: number }>}
+   */
+  static wordPlaces(marks, [low, high], width) {
+    pen.font = `10px ${FAMILY}`;
+    const taken = [];
+    const places = new Map();
+    for (const mark of [...marks].sort((a, b) => a.x - b.x)) {
+      const at = (width * (mark.x - low)) / (high - low || 1);
+      const size = pen.measureText(mark.word).width + 6;
+      const side = at + size > width ? -1 : 1;
+      const [left, right] = side < 0 ? [at - size, at] : [at, at + size];
+      const meets = (level) =>
+        taken.some((one) => one.level === level && left < one.right && right > one.left);
+      let level = 0;
+      while (meets(level)) level += 1;
+      taken.push({ left, right, level });
+      places.set(mark, { side, level });
+    }
+    return places;
+  }
+
+  /**
+   * Lines across a plot at values of its axes, each with a word. `range`: of the x axis.
+   * @param {number} plot
+   * @param {{ x?: any, y?: any, word?: string, colour?: string, dashed?: boolean }[]} marks
+   * @param {[number, number] | null} range
+   */
+  marks(plot, marks, range = null) {
     const shown = marks.filter((one) => (one.x ?? one.y) !== null && (one.x ?? one.y) !== undefined);
     if (!shown.length) return;
-    // Words of neighbouring lines stand on either side of them.
-    const order = shown.map((one) => one.x).sort((a, b) => a - b);
-    const sides = (x) => (x === order[0] && order.length > 1 ? -1 : 1);
+    const upright = shown.filter((one) => one.x !== undefined && one.word);
+    const width = this.option.grid[plot].width;
+    const places = Sheet.wordPlaces(upright, range ?? extent(upright.map((one) => one.x)), width);
     this.series(plot, {
       type: "line", data: [], silent: true, tooltip: { show: false },
       markLine: {
         symbol: "none", silent: true, animation: false,
-        data: shown.map(({ x, y, word = "", colour = "text-quiet", dashed = false }) => ({
+        data: shown.map((mark) => ({ ...mark, .../** @type {{ side: number, level: number }} */ (places.get(mark) ?? { side: 1, level: 0 }) })).map(({ x, y, word = "", colour = "text-quiet", dashed = false, side, level }) => ({
           ...(x === undefined ? { yAxis: y } : { xAxis: x }), lineStyle: { color: token(colour), width: 1.4, type: dashed ? "dashed" : "solid", opacity: 0.9 },
-          label: { show: Boolean(word), formatter: word, position: x === undefined ? "insideEndTop" : "end", rotate: 0, align: x === undefined ? "right" : sides(x) < 0 ? "right" : "left", color: token(colour), fontSize: 10, distance: 2 },
+          label: { show: Boolean(word), formatter: word, position: x === undefined ? "insideEndTop" : "end", rotate: 0, offset: [0, WORD * level], align: x === undefined || side < 0 ? "right" : "left", color: token(colour), fontSize: 10, distance: 2 },
         })),
       },
     });

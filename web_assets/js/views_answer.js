@@ -59,7 +59,7 @@ function landscape(sheet, { slice, terms, tempered, plane, rug, marks, ends }, a
     name: "particles", type: "scatter", symbol: "rect", symbolSize: [1.5, 9], data: own.filter((row) => row.at >= bounds[0] && row.at <= bounds[1]).map((row) => ({ value: [put(row.at), low - 0.04 * (high - low || 1)], row, itemStyle: { color: layerColour(row.layer, at.layers), opacity: 0.75 } })),
     click: ({ data }) => ({ layer: data.row.layer, particle: data.row.particle }), tip: ({ data: { row } }) => tipOf(`particle ${row.particle}, layer ${row.layer + 1}`, [["place", isParameter ? withUnit(row.at, unit) : figure(row.at)], ["log weight", nats(row.log_weight)]]),
   });
-  sheet.marks(main, markSpots);
+  sheet.marks(main, markSpots, [put(range[0]), put(range[1])]);
 
   const layers = [...grouped(tempered, "layer")];
   const most = new Map(layers.map(([layer, rows]) => [layer, Math.max(...rows.map((row) => row.density)) || 1]));

@@ -501,7 +501,7 @@ function clouds(sheet, { summary, own: steps, ridges, marks }, at) {
     });
   }));
   const near = (value) => Number.isFinite(value) && value >= least && value <= greatest;
-  sheet.marks(plot, [{ x: near(lower) ? onScreen(lower, unit) : null, word: "limit", dashed: true }, { x: near(upper) ? onScreen(upper, unit) : null, word: "limit", dashed: true }, { x: near(estimate) ? onScreen(estimate, unit) : null, word: "estimate", colour: "text" }, { x: near(truth) ? onScreen(truth, unit) : null, word: "truth", colour: "truth" }]);
+  sheet.marks(plot, [{ x: near(lower) ? onScreen(lower, unit) : null, word: "limit", dashed: true }, { x: near(upper) ? onScreen(upper, unit) : null, word: "limit", dashed: true }, { x: near(estimate) ? onScreen(estimate, unit) : null, word: "estimate", colour: "text" }, { x: near(truth) ? onScreen(truth, unit) : null, word: "truth", colour: "truth" }], [onScreen(least, unit), onScreen(greatest, unit)]);
   const words = (list) => {
     const mine = list.filter((row) => row.parameter === chosen);
     const [first, last] = [mine[0], mine.at(-1)];

@@ -98,8 +98,13 @@ export function startTrials() {
   watch(["session", "run", "frame", "moved", "trial"], listLater);
   onEvent("frame", (/** @type {any} */ event, /** @type {boolean} */ isHere) => {
     if (!isHere || !event.reannealed || event.frame !== get("frame")) return;
-    held = event.trial ?? null;
-    set({ trial: held });
-    listLater();
+    // By then its layers are taken; those that came before this window's scene showed the run are missing.
+    queueMicrotask(() => {
+      const isWhole = get("whatIf")?.length === event.layers;
+      held = isWhole ? (event.trial ?? null) : null;
+      set({ trial: event.trial ?? null });
+      loadLayers();
+      listLater();
+    });
   });
 }
