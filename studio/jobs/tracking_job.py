@@ -205,7 +205,16 @@ class TrackingJob:
         record = reannealing.step_layer()
         if record.layer == 0:
             self._say.settings(run, reannealing.version, reannealing.settings, reannealing.frame, 0)
-        self._say.post(LayerFinished(*names_of(run), record, True, self._requested_at))
+        self._say.post(
+            LayerFinished(
+                *names_of(run),
+                record,
+                reannealed=True,
+                requested_at=self._requested_at,
+                search_layers=reannealing.search_layers,
+                searches=reannealing.searches,
+            )
+        )
         if not reannealing.finished:
             return
         result, kept = reannealing.result(), run.keep_result
