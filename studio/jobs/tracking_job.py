@@ -219,8 +219,12 @@ class TrackingJob:
             return
         result, kept = reannealing.result(), run.keep_result
         if kept:
-            reannealing.keep()
-            run.keep_moved()
+            run.keep_reannealed()
+            self._say.log(
+                run,
+                "info",
+                f"Frame {reannealing.frame} is replaced, those after it are dropped; the old run is in the trash.",
+            )
         run.reannealing, run.keep_result = None, False
         self._say.post(FrameFinished(*names_of(run), result, not kept))
         if run.reanneal_again:
