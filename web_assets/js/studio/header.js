@@ -139,11 +139,5 @@ const Header = () => html`
   <div class="group" role="group" aria-label="Tracking"><${Speed} /><${Tracking} /></div>
 `;
 
-/** Show the header, and let the narrow page's button open the rail. */
-export function startHeader() {
-  mount(byId("header-parts"), html`<${Header} />`);
-  const toggle = byId("rail-toggle");
-  toggle.onclick = () => {
-    toggle.ariaExpanded = String(document.body.classList.toggle("rail-open"));
-  };
-}
+/** Show the header. */
+export const startHeader = () => mount(byId("header-parts"), html`<${Header} />`);
