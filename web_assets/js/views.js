@@ -229,7 +229,8 @@ export function startViews() {
   fetchJson("/api/views").then((answer) => {
     views = [...answer.views.filter((view) => DRAWINGS[view.name]), OVER_FRAMES];
     drawList();
-    loadLater();
+    // Whoever shows one of them can do so now.
+    document.dispatchEvent(new Event("panel"));
   }).catch(complain);
   watch(["view"], () => { drawList(); figure.isTable = false; });
   watch(["session", "run", "frame", "layer", "limb", "parameter", "particle", "camera", "track", "over", "second", "towards", "view", "panel", "summary", "whatIf", "parameters", "detail", "follow", "work"], loadLater);

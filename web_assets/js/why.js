@@ -112,7 +112,7 @@ export function startWhy() {
   fill(panel, words, place);
   figure = new Figure(place);
   const later = paced(load, LOAD_MILLISECONDS);
-  watch(["session", "run", "frame", "track", "summary", "panel", "limb", "layer", "follow", "work", "detail"], later);
+  watch(["session", "run", "frame", "track", "summary", "panel", "limb", "layer", "follow", "work", "detail", "parameters"], later);
   onEvent("frame", (event, here) => { if (here && !event.reannealed) age += 1; });
   document.addEventListener("panel", () => later());
 }
