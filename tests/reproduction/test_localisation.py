@@ -165,7 +165,7 @@ def test_trials_of_figures_12_to_14_are_shared() -> None:
         for figure in FIGS_12_TO_14
         for trial in FIGURES[figure].trials(SEEDS)
     ]
-    assert len(set(searches)) == (3 + 2 * len(localisation.MILDER)) * len(SEEDS.seeds)
+    assert len(set(searches)) == (4 + 2 * len(localisation.MILDER)) * len(SEEDS.seeds)
     assert {FIGURES[figure].measure for figure in FIGS_12_TO_14} == {measure}
 
 
