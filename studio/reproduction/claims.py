@@ -64,12 +64,12 @@ def percent(name: str, held: Iterable[bool], least: float | None = None) -> Numb
     holds, count = sum(seen), len(seen)
     if not count:
         return number(name, [], "%", paper=least, better="higher")
-    outer, inner = (
-        tuple(100.0 * end for end in binomtest(holds, count).proportion_ci(level, method="exact"))
-        for level in (LEVEL, ONE_SIDED)
-    )
-    verdict = verdict_of(outer, inner, least, "higher")
-    return Number(name, 100.0 * holds / count, *outer, "%", least, "higher", count, verdict)
+    test = binomtest(holds, count)
+    outer, inner = (test.proportion_ci(level, method="exact") for level in (LEVEL, ONE_SIDED))
+    low, high = 100.0 * float(outer.low), 100.0 * float(outer.high)
+    tested = 100.0 * float(inner.low), 100.0 * float(inner.high)
+    verdict = verdict_of((low, high), tested, least, "higher")
+    return Number(name, 100.0 * holds / count, low, high, "%", least, "higher", count, verdict)
 
 
 def ratio(name: str, ours: Sequence[float], theirs: Sequence[float], claim: str = "") -> Number:
