@@ -24,6 +24,7 @@ from studio.comparison.plan import Plan, conclude
 from studio.comparison.sweep import SweepExpected, conclude_sweep, expected, plan_sweep
 from studio.comparison.trial_runs import TrialLine, run_of_trial, trial_lines
 from studio.errors import NotFoundError, RunError, StudioError, WorkCancelledError
+from studio.foreign_files import read_file
 from studio.jobs import commands
 from studio.jobs.cluster import chosen_executor
 from studio.jobs.comparison_run import done_before, run_comparison
@@ -440,4 +441,4 @@ def _file(session: Session, kept: KeptComparison, name: str, kind: str, ending: 
     path = kept.folder / name
     if not path.is_file():
         raise NotFoundError(f"Comparison '{kept.name}' is not finished.", "Wait for it, or let it go on.")
-    return files.download(path.read_bytes(), f"{session.name}-{kept.name}.{ending}", kind)
+    return files.download(read_file(path), f"{session.name}-{kept.name}.{ending}", kind)

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import msgspec
 
-from studio.errors import NotFoundError, StudioError
+from studio.errors import NotFoundError, SessionError, StudioError
+from studio.foreign_files import LARGEST_RECORD, read_file
 from studio.server.schemas import Answer, Value
 from studio.sessions.atomic_files import write_bytes
 from studio.settings import in_todays_names, knob_table
@@ -97,8 +98,8 @@ def _view(name: str, help_text: str, values: Mapping[str, Value], own: bool) -> 
 def _read(folder: Path) -> dict[str, _Kept]:
     """The kept presets; a missing or damaged file counts as none."""
     try:
-        return decode_json((folder / FILE_NAME).read_bytes(), dict[str, _Kept])
-    except (OSError, msgspec.DecodeError):
+        return decode_json(read_file(folder / FILE_NAME, LARGEST_RECORD), dict[str, _Kept])
+    except (OSError, SessionError, msgspec.DecodeError):
         return {}
 
 
