@@ -150,7 +150,7 @@ def _check_frames(run: StoredRun, frame: int, backwards_to: int | None) -> None:
 def _new_folder(run: StoredRun, record: RunRecord, last: int | None) -> StoredRun:
     """The corrected run's folder with the old run's snapshots and its frames before `last`; atomic."""
     place = run.folder.parent / checked_name(record.name, "run")
-    folder = atomic_files.new_folder_beside(place)
+    folder = atomic_files.new_folder_beside(place, parents=False)
     try:
         for part in (CAMERAS_NAME, BEHAVIOUR_NAME):
             if (run.folder / part).exists():

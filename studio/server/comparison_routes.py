@@ -33,7 +33,7 @@ from studio.jobs.process_executor import cores
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.operations.comparing import MOST_TRACKERS, compare, kept_sweep, planned, sweep
 from studio.server import files
-from studio.server.app_state import App, AppState, release
+from studio.server.app_state import App, AppState, moving
 from studio.server.error_responses import log
 from studio.server.requests import Arguments, body_of
 from studio.server.schemas import Answer, Request, RunName, Value
@@ -305,8 +305,8 @@ def delete(
         raise RunError(f"Run '{tracked[0]}' of the sweep is being tracked.", "Cancel it first.")
     place = throw_away(app.workspace, session, kept)
     for run in own:
-        release(app, session.name, run.name)
-        app.workspace.trash_run(session.name, run.name)
+        with moving(app, session.name, run.name):
+            app.workspace.trash_run(session.name, run.name)
     app.events.session_changed(session.name)
     return trash_entry(place)
 

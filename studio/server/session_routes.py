@@ -12,7 +12,7 @@ from studio.comparison.kept_comparison import KeptComparison
 from studio.errors import NotFoundError, StudioError
 from studio.foreign_files import read_file
 from studio.server import files
-from studio.server.app_state import App, AppState, release
+from studio.server.app_state import App, AppState, moving
 from studio.server.error_responses import log
 from studio.server.schemas import Answer, Request, RunName
 from studio.server.session_views import SessionDetail, SessionLine, session_detail, session_line
@@ -122,8 +122,8 @@ def change_session(session: OpenSession, change: SessionChange, app: App) -> New
     if change.title is not None:
         app.workspace.retitle(name, change.title)
     if change.name is not None and change.name != name:
-        release(app, name)
-        name = app.workspace.rename(name, change.name).name
+        with moving(app, name):
+            name = app.workspace.rename(name, change.name).name
     return _changed(app, name)
 
 
@@ -136,8 +136,8 @@ def duplicate(session: OpenSession, app: App, request: NewName | None = None) ->
 @router.delete("/sessions/{session}")
 def delete(session: OpenSession, app: App) -> TrashEntry:
     """Move a session to the trash. Refused while a run of it is being tracked."""
-    release(app, session.name)
-    place = app.workspace.trash(session.name)
+    with moving(app, session.name):
+        place = app.workspace.trash(session.name)
     _changed(app, session.name)
     return trash_entry(place)
 

@@ -91,12 +91,15 @@ def copy_database(source: Path, target: Path) -> None:
         writing.close()
 
 
-def new_folder_beside(path: Path) -> Path:
-    """An empty hidden folder next to `path`, to be filled and then given to `move_into_place`. Raises SessionError."""
+def new_folder_beside(path: Path, parents: bool = True) -> Path:
+    """An empty hidden folder next to `path`, to be filled and then given to `move_into_place`. Raises SessionError.
+
+    parents : make the folders above that are missing; False in a session, which may have been renamed meanwhile.
+    """
     check_inside(path.parent)
     with writing("The folder", path.parent):
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
+            path.parent.mkdir(parents=parents, exist_ok=True)
         except FileExistsError as error:
             # A file stands where a folder would have to be.
             raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), error.filename) from None
@@ -131,12 +134,12 @@ def discard(folder: Path) -> None:
 
 
 @contextlib.contextmanager
-def made_whole(place: Path) -> Generator[Path]:
+def made_whole(place: Path, parents: bool = True) -> Generator[Path]:
     """An empty hidden folder to be filled, which is then renamed to `place`; where anything fails, nothing is left.
 
     Raises SessionError if something is at the place.
     """
-    folder = new_folder_beside(place)
+    folder = new_folder_beside(place, parents)
     try:
         yield folder
         move_into_place(folder, place)

@@ -212,7 +212,7 @@ def made_masks(session: Session, home: str) -> Generator[MadeMasks]:
     """
     numbers = [int(path.name) for path in made_folders(session, home)]
     place = f"{home}/{max(numbers, default=0) + 1}"
-    with atomic_files.made_whole(session.path / place) as folder:
+    with atomic_files.made_whole(session.path / place, parents=False) as folder:
         made = MadeMasks(session, folder)
         yield made
     evidence = read_evidence(session)

@@ -149,7 +149,7 @@ def _keep(folder: Path) -> Path:
     """Copy everything of the calibration in use to a folder of its own."""
     now = datetime.datetime.now(datetime.UTC)
     place = folder / EARLIER / now.strftime("%Y%m%d-%H%M%S-%f")
-    with atomic_files.made_whole(place) as made:
+    with atomic_files.made_whole(place, parents=False) as made:
         for path in _own_parts(folder):
             atomic_files.copy_part(path, made / path.name)
     return place
@@ -157,7 +157,7 @@ def _keep(folder: Path) -> Path:
 
 def _write(place: Path, new: NewCalibration) -> None:
     """Replace the canonical file atomically, then the files beside it."""
-    made = atomic_files.new_folder_beside(place)
+    made = atomic_files.new_folder_beside(place, parents=False)
     try:
         if new.calibrated is not None and new.calibrated.rig is not None:
             rig = dataclasses.replace(new.calibrated.rig, cameras=new.cameras)

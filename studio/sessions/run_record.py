@@ -87,9 +87,6 @@ def _impossible(record: RunRecord) -> str:
         return f"that its footage has {record.fps:g} frames per second"
     if not is_time(record.created):
         return f"that it was made at {record.created[:40]!r}"
-    poses = (record.sigma, record.start_pose or (), record.corrected_pose or ())
-    if any(pose and len(pose) != len(record.parameters) for pose in poses):
-        return f"other numbers of values than of its {len(record.parameters)} parameters"
     return ""
 
 

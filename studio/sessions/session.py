@@ -249,7 +249,7 @@ class Session:
         place = self.path / RUNS_NAME / checked_name(record.name, "run")
         if place.exists():
             raise SessionError(f"Session '{self.name}' has a run '{record.name}'.", "Choose another name.")
-        with writing("The run", place), atomic_files.made_whole(place) as folder:
+        with writing("The run", place), atomic_files.made_whole(place, parents=False) as folder:
             atomic_files.write_bytes(folder / CAMERAS_NAME, self.calibration_of_footage())
             if body_text:
                 (folder / BODY_FOLDER).mkdir()

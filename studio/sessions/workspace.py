@@ -169,7 +169,13 @@ class Workspace:
         wanted = new_name or free_name(name, {path.name for path in self.root.iterdir()})
         place = self._free(wanted)
         with atomic_files.made_whole(place) as folder:
-            shutil.copytree(session.path, folder, symlinks=True, dirs_exist_ok=True, ignore=_transient)
+            try:
+                shutil.copytree(session.path, folder, symlinks=True, dirs_exist_ok=True, ignore=_transient)
+            except shutil.Error as error:
+                raise SessionError(
+                    f"Session '{name}' cannot be copied: {error.args[0][0][2]}.",
+                    "Say 'studio inspect' of it, and remove what is no file.",
+                ) from None
             for store in session.path.glob(f"{RUNS_NAME}/*/{RESULTS_NAME}"):
                 atomic_files.copy_database(store, folder / store.relative_to(session.path))
             title = f"{session.manifest.title} (copy)"

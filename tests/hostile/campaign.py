@@ -170,11 +170,12 @@ def _watched(work: Callable[[Say], None], tally: Tally) -> None:
 
 def _seconds_of(process: psutil.Process) -> float:
     """Of the processor, that it has had."""
-    try:
-        times = process.cpu_times()
-    except psutil.Error:
-        return 0.0
-    return times.user + times.system
+    spent = 0.0
+    with contextlib.suppress(psutil.Error):
+        for one in (process, *process.children(recursive=True)):
+            times = one.cpu_times()
+            spent += times.user + times.system + times.children_user + times.children_system
+    return spent
 
 
 def _live(work: Callable[[Say], None], writing: int) -> None:
@@ -225,7 +226,7 @@ def _ask(workspace: Path, _: Path, say: Say, part: int | None) -> None:
             if SECRET in answer.text:
                 say(f"wrong {method} {path} shows what lies outside")
             if path == "/api/sessions" and b'"other"' not in answer.content:
-                say("wrong the list lacks the other session")
+                say(f"wrong the list lacks the other session: {answer.status_code} {answer.text[:300]}")
         say("request GET (closing)")
 
 

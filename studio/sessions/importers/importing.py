@@ -226,7 +226,7 @@ def _added(session: Session, source: Path, options: ImportOptions, report: Progr
     truths, carried_notes = carried_truth(plan, read, measured.fps, options.unit)
     if takes_over:
         measured = _checked_rig(measured, options)
-    staged = new_folder_beside(session.path / "take")
+    staged = new_folder_beside(session.path / "take", parents=False)
     try:
         footage = write_footage(staged, measured, options.copy, report)
         stay = _cameras_that_stay(session, footage, plan, options.replace)
