@@ -11,9 +11,9 @@ from studio.body.forward_kinematics import limb_ends
 from studio.errors import NotFoundError
 from studio.inspection.reading import InspectedRun, TriedFrame
 from studio.inspection.reference import body_points, by_limb, limb_group, true_points
+from studio.inspection.searches import layers_of_a_search, searches_of
 from studio.server.app_state import App
-from studio.server.event_encoding import layer_summary
-from studio.server.result_routes import LayerView
+from studio.server.result_routes import LayerView, layer_view
 from studio.server.run_routes import RUN, OpenRun
 from studio.server.schemas import Answer, Number, Numbers, Value
 from studio.server.session_routes import OpenSession
@@ -69,10 +69,12 @@ class TrialList(Answer):
 
 
 class TrialLayers(Answer):
-    """A trial with its layers, which have the entries of `layer` events."""
+    """A trial with its layers, which have the entries of `layer` events. search_layers, searches: as of a frame."""
 
     trial: TrialView
     frame: int
+    search_layers: int
+    searches: int
     layers: list[LayerView]
 
 
@@ -96,10 +98,14 @@ def trials(session: OpenSession, run: OpenRun, frame: int, app: App) -> TrialLis
 def trial(session: OpenSession, run: OpenRun, trial: str, app: App) -> TrialLayers:
     """A trial by its name, with its layers."""
     found = app.events.tried.tried(run, session.name, trial)
+    inspected, camera = InspectedRun(session, run, found), run.cameras()[0]
+    frame = inspected.frame(found.number)
     return TrialLayers(
         trial=_view(InspectedRun(session, run), found),
         frame=found.number,
-        layers=[LayerView.model_validate(layer_summary(layer)) for layer in found.layers],
+        search_layers=layers_of_a_search(frame),
+        searches=searches_of(frame),
+        layers=[layer_view(inspected.body, camera, layer) for layer in found.layers],
     )
 
 

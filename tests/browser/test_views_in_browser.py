@@ -409,21 +409,23 @@ def test_a_what_if_says_what_it_changes_and_is_discarded(window: StudioPage, stu
     studio.post(f"{RUN}/settings?frame={FRAME}", {"survival": 0.55}, method="PATCH")
     bar = page.locator("#trial .outcome")
     bar.wait_for()
-    outcome = window.get("outcome")
-    assert isinstance(outcome, dict)
+    trials = window.get("trials")
+    assert isinstance(trials, dict)
+    before, after = trials["stored"], trials["trials"][-1]
+    assert after["name"] == window.get("trial")
     stored = studio.get(f"{RUN}/frames/{FRAME}")
     line = studio.get(f"{RUN}/frames")["frames"][FRAME]
-    assert outcome["before"]["error_mm"] == pytest.approx(line["error_mm"], rel=1e-6)
-    assert outcome["after"]["error_mm"] != outcome["before"]["error_mm"]
-    assert outcome["stored"]["log_weight"] == pytest.approx(stored["log_weight"])
+    assert before["error_mm"] == pytest.approx(line["error_mm"], rel=1e-6)
+    assert after["error_mm"] != before["error_mm"]
+    assert before["log_weight"] == pytest.approx(stored["log_weight"])
     limbs = bar.locator("tbody th").all_inner_texts()
-    assert limbs == ["error", "log weight", "evaluations", "time", *outcome["before"]["limbs"]]
+    assert limbs == ["error", "log weight", "evaluations", "time", *before["limbs"]]
     # Bars mean one thing: to the left and in one colour better, to the right and in the other worse.
-    for name, before, after in [("error", outcome["before"]["error_mm"], outcome["after"]["error_mm"])] + [
-        (limb, mm, outcome["after"]["limbs"][limb]) for limb, mm in outcome["before"]["limbs"].items()
+    for name, old, new in [("error", before["error_mm"], after["error_mm"])] + [
+        (limb, mm, after["limbs"][limb]) for limb, mm in before["limbs"].items()
     ]:
         row = bar.locator("tbody tr", has=page.get_by_role("rowheader", name=name, exact=True))
-        expect(row).to_have_class(f"change {'better' if after < before else 'worse'}")
+        expect(row).to_have_class(f"change {'better' if new < old else 'worse'}")
     card = page.locator("#trial").bounding_box()
     stage = page.locator("#stage").bounding_box()
     assert card
@@ -435,9 +437,9 @@ def test_a_what_if_says_what_it_changes_and_is_discarded(window: StudioPage, stu
     until(page, lambda: "beside=" in str(page.locator(".view img").first.get_attribute("src")))
     drawn = show(window, "schedule")
     window.until("get('whatIf') !== null")
-    assert {"stored", "tried"} <= {str(one["name"]) for one in drawn}
+    assert {"stored, reached", "tried, reached", "stored", "tried"} <= {str(one["name"]) for one in drawn}
     page.locator("#trial").get_by_role("button", name="Discard", exact=True).click()
-    window.until("get('whatIf') === null && get('outcome') === null")
+    window.until("get('whatIf') === null && get('trial') === null")
     page.locator("#trial", has_text="tried again").wait_for(state="hidden")
     assert studio.get(f"{RUN}/frames/{FRAME}") == stored
     page.get_by_role("button", name="Put back", exact=True).click()

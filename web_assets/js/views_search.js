@@ -133,8 +133,19 @@ const tipOfLayer = (points) =>
       .map((point) => [point.seriesName, point.data?.value ?? point.data]),
   );
 
+/** Of frames that are searched several times over the rows of the last search, whose result is the frame's; `step`: its layers counted from 0. */
+export function lastSearches(rows) {
+  return [...grouped(rows, "frame").values()].flatMap((own) => {
+    const search = Math.max(...own.map((row) => row.search));
+    const its = own.filter((row) => row.search === search);
+    const first = Math.min(...its.map((row) => row.layer));
+    return its.map((row) => ({ ...row, step: row.layer - first }));
+  });
+}
+
 /** Variance of the run: parameters over the frames, and the chosen parameter as layers over frames. */
-function varianceOfRun(sheet, { last, parameter }, at) {
+function varianceOfRun(sheet, { last, parameter: searched }, at) {
+  const parameter = lastSearches(searched);
   const frames = last.map((row) => row.frame);
   const names = Object.keys(last[0] ?? {}).filter((name) => name !== "frame");
   const medians = new Map(names.map((name) => { const own = last.map((row) => row[name]).filter((value) => value > 0).sort((a, b) => a - b); return [name, own[own.length >> 1] ?? 0]; }));
@@ -151,22 +162,21 @@ function varianceOfRun(sheet, { last, parameter }, at) {
   });
   sheet.chosen(whole, { column: frames.indexOf(at.frame), row: at.parameter ? names.indexOf(at.parameter) : null });
   if (!parameter.length) { sheet.words("Choose a parameter: a click on its row shows it layer by layer over the frames.", two.left, 40, two.width); return ""; }
-  const levels = Math.max(...parameter.map((row) => row.layer)) + 1;
+  const levels = Math.max(...parameter.map((row) => row.step)) + 1;
   const own = distinct(parameter.map((row) => row.frame));
   const logs = parameter.map((row) => decades(row.before)).filter((value) => value !== null);
   const [least, most] = extent(logs);
   const plot = sheet.plot({ ...two, top: 0, height }, { title: at.label(at.parameter ?? ""), unit: "variance before noise, layers over frames", x: categories(own.map(String), "frame"), y: categories(Array.from({ length: levels }, (_, layer) => layerName(layer)), "layer", { inverse: true, nameGap: 24 }) });
   sheet.heat(plot, {
-    cells: parameter.map((row) => [own.indexOf(row.frame), row.layer, decades(row.before) ?? "-"]), low: least, high: most, framed: false,
-    click: ({ value }) => ({ frame: own[value[0]], layer: value[1] }), tip: ({ value }) => tipOf(`frame ${own[value[0]]}, layer ${value[1] + 1}`, [["before noise", 10 ** value[2]]]),
+    cells: parameter.map((row) => [own.indexOf(row.frame), row.step, decades(row.before) ?? "-", row.layer]), low: least, high: most, framed: false,
+    click: ({ value }) => ({ frame: own[value[0]], layer: value[3] }), tip: ({ value }) => tipOf(`frame ${own[value[0]]}, layer ${value[1] + 1}`, [["before noise", 10 ** value[2]]]),
   });
-  sheet.chosen(plot, { column: own.indexOf(at.frame), row: at.layer });
+  sheet.chosen(plot, { column: own.indexOf(at.frame), row: parameter.find((row) => row.frame === at.frame && row.layer === at.layer)?.step ?? null });
   return at.parameter ? `${at.label(at.parameter)}: last variance ${figure(last[frames.indexOf(at.frame)]?.[at.parameter])} in frame ${at.frame}, median of the run ${figure(medians.get(at.parameter))}.` : "";
 }
 
 /** Schedule: α, β, the effective number and the time of each layer, stored beside tried. */
 function scheduleOfFrame(sheet, tables, at) {
-  const { layers: rows } = tables;
   const sides = sidesOf(tables, at);
   const layers = layersOfAll(sides, "layers");
   const names = layers.map(layerName);
@@ -482,8 +492,8 @@ function clouds(sheet, { summary, own: steps, ridges, marks }, at) {
     title: at.label(chosen), unit: `${screenUnit(unit)}, density of each layer's set`, x: numbers("", { scale: false, min: onScreen(least, unit), max: onScreen(greatest, unit), axisLabel: { formatter: (value) => figure(value), hideOverlap: true, showMinLabel: false, showMaxLabel: false } }),
     y: { ...numbers("", {}), scale: false, min: 0, max: own.length, interval: 1, axisLabel: { formatter: (value) => (own[own.length - 1 - value] ? nameOf(own[own.length - 1 - value][0]) : "") }, splitLine: { show: false } },
   });
-  own.forEach(([set, stored], index) => [stored, triedSets.get(set) ?? []].forEach((rows, side) => {
-    if (!rows.length) return;
+  own.forEach(([set, stored], index) => { for (const [side, rows] of [stored, triedSets.get(set) ?? []].entries()) {
+    if (!rows.length) continue;
     const base = own.length - 1 - index;
     const most = Math.max(...rows.map((row) => row.density)) || 1;
     const alone = set < 0 ? token("ghost") : layerColour(set, Math.max(at.layers, own.length - 1));
@@ -499,7 +509,7 @@ function clouds(sheet, { summary, own: steps, ridges, marks }, at) {
       click: () => ({ layer: Math.max(0, set), parameter: chosen }),
       tip: () => { const row = (side ? tried.own : steps).find((entry) => entry.layer === Math.max(0, set) && Boolean(entry.weighted) === set >= 0); return tipOf(`${at.label(chosen)}, ${set < 0 ? "first set as drawn" : `layer ${set + 1}`}`, [["mean", withUnit(row?.mean, unit)], ["deviation", withUnit(row?.deviation, unit)], ["median", withUnit(row?.median, unit)]]); },
     });
-  }));
+  } });
   const near = (value) => Number.isFinite(value) && value >= least && value <= greatest;
   sheet.marks(plot, [{ x: near(lower) ? onScreen(lower, unit) : null, word: "limit", dashed: true }, { x: near(upper) ? onScreen(upper, unit) : null, word: "limit", dashed: true }, { x: near(estimate) ? onScreen(estimate, unit) : null, word: "estimate", colour: "text" }, { x: near(truth) ? onScreen(truth, unit) : null, word: "truth", colour: "truth" }], [onScreen(least, unit), onScreen(greatest, unit)]);
   const words = (list) => {

@@ -1,13 +1,12 @@
 // The card under the knobs: which knobs were moved, what the shown trial changes beside the stored result (or another
 // trial), and the tray of all trials of the frame. Bars to the left are better, to the right worse, on scales that stay.
 
-import { post, readOnly, runPath } from "../api.js";
+import { readOnly } from "../api.js";
 import { figure } from "../chart_looks.js";
-import { openForm } from "../dialogs.js";
 import { byId } from "../elements.js";
 import { besideTrial, shownTrial } from "../selection.js";
-import { get } from "../state.js";
 import { follow, html, mount } from "./component.js";
+import { keepAsNewRun, replaceStored } from "./keeping.js";
 import { compareWith, discard, putBack, showTrial } from "./trials.js";
 
 /** @import { Schemas } from "../api_types" */
@@ -240,17 +239,32 @@ function Tray() {
   </ul>`;
 }
 
-/** @param {number} frame */
-function keepForm(frame) {
-  const path = runPath(get("session"), get("run"));
-  openForm({
-    heading: `Keep the new result of frame ${frame}?`,
-    action: "Keep it",
-    rows: [],
-    intro:
-      "It replaces the stored one. The frames after it followed from the old result and are dropped; continuing the run computes them again.",
-    send: () => post(`${path}/reanneal`, { frame, keep: true }),
-  });
+/** What becomes of the shown trial. @param {{ frame: number, tried: Schemas["TrialView"] | null }} properties */
+function Keeping({ frame, tried }) {
+  // The process has the newest trial's knobs: that one can take the stored frame's place.
+  const list = /** @type {Schemas["TrialList"] | null} */ (follow("trials"));
+  const isNewest = !tried || list?.trials.at(-1)?.name === tried.name;
+  const settings = Object.fromEntries((tried?.moved ?? []).map((knob) => [knob.name, knob.tried]));
+  return html`<div class="keeping">
+    <button
+      class="primary small"
+      onClick=${() => keepAsNewRun(frame, settings)}
+      title="The frames before this one, then this result and all after it with these knobs, as a run of its own"
+    >
+      Keep as new run
+    </button>
+    ${
+      isNewest &&
+      html`<button
+        class="small"
+        onClick=${() => replaceStored(frame)}
+        title="This result takes the place of the stored one; the frames after it go"
+      >
+        Replace…
+      </button>`
+    }
+    <button class="quiet small" onClick=${discard}>Discard</button>
+  </div>`;
 }
 
 /** The knobs that were moved and that no stored frame uses, with a way back. */
@@ -295,9 +309,8 @@ function TrialCard() {
     : "Moved, used by no stored frame";
   return html`<header>
       <h2>${heading}</h2>
-      ${isTried && html`<button class="small" onClick=${() => keepForm(frame)}>Keep…</button>`}
-      ${isTried && html`<button class="quiet small" onClick=${discard}>Discard</button>`}
     </header>
+    ${isTried && html`<${Keeping} frame=${frame} tried=${tried} />`}
     ${moved.length > 0 && html`<${Moved} moved=${moved} />`}
     ${isTried && tried && stored && html`<${Changes} tried=${tried} stored=${stored} />`}
     <${Tray} />`;

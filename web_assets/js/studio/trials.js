@@ -36,10 +36,13 @@ async function loadLayers() {
   if (!run || !name || name === held || !get("detail")) return;
   held = name;
   try {
-    const { layers, frame } = await fetchJson(`${runPath(session, run)}/trials/${name}`);
+    const { layers, frame, ...searched } = await fetchJson(
+      `${runPath(session, run)}/trials/${name}`,
+    );
     if (place !== here() || name !== get("trial")) return;
     if (frame !== get("frame")) return leave();
-    set({ whatIf: layers });
+    const { search_layers, searches } = searched;
+    set({ whatIf: layers.map((layer) => ({ ...layer, search_layers, searches })) });
     await post("/api/scene/show", { trial: placeOf(name) });
   } catch (/** @type {any} */ error) {
     if (get("trial") === name) leave();
