@@ -126,8 +126,8 @@ def test_the_survival_rate_is_moved_and_new_layers_are_drawn(paused: StudioPage)
     assert {layer["frame"] for layer in layers} == {frame}
     assert {layer["alpha_wanted"] for layer in layers} == {wanted}
 
-    # The scene is split: what is stored at the left; at the right the first cloud is the same, for only the knob differs,
-    # and the others are new, and so are the charts.
+    # The scene is split: what is stored at the left; at the right the first cloud is the same, for only the knob
+    # differs, and the others are new, and so are the charts.
     until(paused.page, lambda: differing(paused.tried_wire.layers(), clouds) == set(clouds) - {0})
     until(paused.page, lambda: differing(paused.wire.layers(), clouds) == set())
     until(paused.page, lambda: paused.chart("views") != before)
