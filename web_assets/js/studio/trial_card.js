@@ -251,7 +251,7 @@ function Keeping({ frame, tried }) {
       onClick=${() => keepAsNewRun(frame, settings)}
       title="The frames before this one, then this result and all after it with these knobs, as a run of its own"
     >
-      Keep as new run
+      Keep as a new run
     </button>
     ${
       isNewest &&
