@@ -23,6 +23,7 @@ from studio.inspection.views import look, look_over, view_named
 from studio.motion_files.trc import read_trc
 from studio.progress import Progress, unheard
 from studio.runs.new_run import software_version
+from studio.runs.notes import notes_by_frame
 from studio.runs.self_contained import self_contained_page
 from studio.runs.tracks import RAW, read_track
 from studio.sessions.manifest import now
@@ -103,7 +104,7 @@ def shared_page(run: InspectedRun, frame: int, *, track: str = "", progress: Pro
             "made": f"{now()[:16].replace('T', ' ')} UTC, Capture studio {software_version()}",
             "facts": _facts(shown),
             "settings": _settings(run),
-            "notes": [*record.notes, *_left_out(shown)],
+            "notes": [*record.notes, *_remarks(shown), *_left_out(shown)],
             "fps": record.fps,
             "frame": frame,
             "parameter": parameter,
@@ -128,6 +129,11 @@ def _some(finished: Sequence[int], frame: int) -> NDArray[np.int64]:
     """At most MOST_FRAMES of the frames, the first, the last and `frame` among them."""
     chosen = np.linspace(0, len(finished) - 1, min(len(finished), MOST_FRAMES - 1)).round().astype(int)
     return np.unique(np.append(np.array(finished)[chosen], frame))
+
+
+def _remarks(shown: _Shown) -> list[str]:
+    """The notes on frames."""
+    return [f"Frame {frame}: {words}" for frame, words in notes_by_frame(shown.run.run).items()]
 
 
 def _left_out(shown: _Shown) -> list[str]:

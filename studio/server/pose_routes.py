@@ -88,10 +88,13 @@ class MirrorRequest(PoseRequest):
 
 
 class BetterPoseRequest(PoseRequest):
-    """A short search around the pose in a frame, then local refinement."""
+    """A short search around the pose in a frame, then local refinement. keep: what is better becomes the session's
+    start pose, whoever still waits for it.
+    """
 
     frame: int = Field(0, ge=0)
     seed: int = Field(0, ge=0, le=2**63 - 1)
+    keep: bool = False
 
 
 class EditRequest(Request):
@@ -139,7 +142,14 @@ class InitialisationState(NumberedJob):
     file: str = ""
 
 
-START_POSE = JobKind("initialise", "search", InitialisationState, changes_session=True)
+START_POSE = JobKind(
+    "initialise",
+    "search for the start pose",
+    InitialisationState,
+    changes_session=True,
+    at="/api/initialisations/{identifier}",
+    page="/way?session={session}&step=start-pose",
+)
 
 
 @router.get(SESSION + "/start-pose")
@@ -196,6 +206,9 @@ async def begin_refining_pose(session: OpenSession, request: BetterPoseRequest, 
             seed=request.seed,
             progress=job.report_or_stop,
         )
+        if request.keep and run is None and found.gain > 0.0:
+            keep_start_pose(session, body, found.pose, request.frame)
+            app.events.session_changed(session.name)
         return TRACK.entries(found, pose=found.pose.tolist())
 
     return begin_job(app, "pose", session, run, work)

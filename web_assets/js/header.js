@@ -3,6 +3,7 @@
 import { fetchJson, post, runPath } from "./api.js";
 import { byId, element, fill, offer } from "./elements.js";
 import { complain } from "./messages.js";
+import { standingOf } from "./run_standing.js";
 import { get, set, watch } from "./state.js";
 
 const WORDS = {
@@ -41,10 +42,10 @@ function stateLine(work) {
 function drawState() {
   const work = get("work");
   const here = isOpen(work);
-  const state = get("connected") === false ? "disconnected" : (work?.state ?? "idle");
+  const { state, words } = standingOf({ session: get("session"), run: get("run"), work, summary: get("summary"), connected: get("connected") });
   byId("state").dataset.state = state;
   const elsewhere = work && !here && work.run && work.state === "tracking" ? `${work.session}: ` : "";
-  byId("state-text").textContent = state === "disconnected" ? "disconnected, reconnecting" : elsewhere + stateLine(work);
+  byId("state-text").textContent = words || elsewhere + stateLine(work);
   byId("state").title = work?.message ? `${work.message} ${work.hint}` : "";
   const progress = byId("run-progress");
   progress.hidden = !here || !["tracking", "paused", "compiling"].includes(work.state);

@@ -8,6 +8,7 @@ import { togglePlay, toggleLoop } from "./playback.js";
 import { enterScene } from "./scene_frame.js";
 import { goTo, stepLayer } from "./selection.js";
 import { get } from "./state.js";
+import { toggleBookmark } from "./studio/notes.js";
 import { goToMark } from "./timeline.js";
 import { stepParameter, stepView, toggleTable } from "./views.js";
 
@@ -20,7 +21,7 @@ const KEYS = [
   ["Shift →", "next layer", (event) => event.key === "ArrowRight" && event.shiftKey, () => stepLayer(1)],
   ["Home", "first frame", (event) => event.key === "Home", () => goTo(-Infinity)],
   ["End", "last frame", (event) => event.key === "End", () => goTo(Infinity)],
-  ["n", "next mark of the timeline: search lost, a limb off, limb lost (truth), no evidence, found again, corrected", (event) => event.key === "n", () => goToMark(1)],
+  ["n", "next mark of the timeline: search lost, a limb off, limb lost (truth), no evidence, found again, corrected, noted", (event) => event.key === "n", () => goToMark(1)],
   ["p", "mark before", (event) => event.key === "p", () => goToMark(-1)],
   ["1 – 9", "look through a camera", (event) => /^[1-9]$/.test(event.key), (event) => lookThrough(Number(event.key) - 1)],
   ["0", "free view", (event) => event.key === "0", () => lookThrough(null)],
@@ -28,6 +29,7 @@ const KEYS = [
   ["[ ]", "parameter before, next parameter", (event) => event.key === "[" || event.key === "]", (event) => stepParameter(event.key === "]" ? 1 : -1)],
   ["t", "the view's numbers as a table, or its drawing", (event) => event.key === "t", toggleTable],
   ["r", "anneal this frame again", (event) => event.key === "r", reanneal],
+  ["b", "a bookmark on this frame; its note, where it has one", (event) => event.key === "b", toggleBookmark],
   ["c", "correct this frame by hand", (event) => event.key === "c", () => byId("correct").click()],
   ["l", "loop", (event) => event.key === "l", toggleLoop],
   ["s", "into the scene's panel; Escape leads back", (event) => event.key === "s", () => enterScene()],
