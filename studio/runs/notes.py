@@ -47,15 +47,13 @@ def notes_by_frame(run: StoredRun) -> Mapping[int, str]:
 
 def write_note(run: StoredRun, frame: int, text: str = "") -> tuple[Note, ...]:
     """Put a note on a frame, in place of the one it has; all notes. Raises RunError for a frame that the run does not
-    span or a text that is too long.
+    span.
     """
     record = run.record
     if not record.first <= frame < record.last:
         raise RunError(
             f"Run '{run.name}' has no frame {frame}.", f"It goes from {record.first} to {record.last - 1}."
         )
-    if len(text) > LONGEST:
-        raise RunError(f"The note has {len(text)} characters.", f"Write at most {LONGEST}.")
     return _keep(run, (*_others(run, frame), Note(frame, text.strip(), now())))
 
 

@@ -109,7 +109,9 @@ class EditRequest(Request):
 
 
 class EditState(Answer):
-    """What is being edited in the scene; all null while nothing is. moved: whether it is another pose than it was."""
+    """What is being edited in the scene; all null while nothing is. moved: whether it is another pose than it was.
+    steps: changes that can be undone.
+    """
 
     editing: bool = False
     session: str | None = None
@@ -117,6 +119,7 @@ class EditState(Answer):
     frame: int | None = None
     pose: list[float] | None = None
     moved: bool = False
+    steps: int = 0
 
 
 SESSION = "/sessions/{session}"
@@ -227,6 +230,7 @@ def editing(scene: Scene) -> EditState:
         frame=found.frame,
         pose=[float(value) for value in found.pose],
         moved=found.moved,
+        steps=found.steps,
     )
 
 
@@ -244,6 +248,12 @@ def edit(request: EditRequest, app: App, scene: Scene) -> None:
     if request.frame is not None:
         checked_frames(session, request.frame, request.frame + 1)
     scene.poses.edit(session.name, run.name if run else "", request.frame, request.pose)
+
+
+@router.post("/scene/edit/undo", status_code=202)
+def undo(scene: Scene) -> None:
+    """Take the newest change of the edited pose back; without one nothing happens."""
+    scene.poses.undo()
 
 
 @router.delete("/scene/edit", status_code=202)

@@ -11,7 +11,7 @@ from tracked_runs import finish
 
 import studio
 from studio.cli.main import main
-from studio.errors import RunError, SessionError
+from studio.errors import RunError, SessionError, SettingsError
 from studio.inspection.reading import InspectedRun
 from studio.inspection.shared_page import shared_page
 from studio.runs.new_run import prepare_run
@@ -39,7 +39,7 @@ def test_a_note_replaces_the_one_of_its_frame(run: StoredRun) -> None:
     assert studio.note(run, 1, remove=True) == kept[1:]
     with pytest.raises(RunError, match="no frame 3"):
         studio.note(run, 3)
-    with pytest.raises(RunError, match="characters"):
+    with pytest.raises(SettingsError, match="characters"):
         studio.note(run, 1, "x" * (LONGEST + 1))
     (run.folder / FILE_NAME).write_text("{")
     with pytest.raises(SessionError):

@@ -122,7 +122,9 @@ function NoteOfFrame() {
     event.preventDefault();
     event.stopPropagation();
   };
-  const words = note ? `Note on frame ${frame}: ${noteWords(note)}` : `Note on frame ${frame} (b: a bookmark)`;
+  const words = note
+    ? `Note on frame ${frame}: ${noteWords(note)}`
+    : `Note on frame ${frame} (b: a bookmark)`;
   return html`
     <button
       type="button"
