@@ -19,6 +19,7 @@ import numpy as np
 
 from studio.errors import NotFoundError, RunError, SessionError
 from studio.evidence.distance_maps import silhouettes_by_camera
+from studio.likelihood.problem import BaseFrameLikelihood
 from studio.numba_in_threads import numba
 from studio.runs.frame_steps import FrameHistory, space_over
 from studio.runs.pace import Pace, Progress
@@ -236,9 +237,10 @@ class TrackingRun:
         self, search: FrameSearch, settings: RunSettings, layers: Sequence[LayerRecord]
     ) -> FrameResult:
         """The result of a finished search of a frame, with its tracking state. layers : its records."""
-        found = dataclasses.replace(search.result(settings.tracker), notes=search_notes(layers))
         held = self._held_in(search.frame, settings)
         problem = search.problem or self.problems.problem(search.frame, held)
+        notes = (*search_notes(layers), *(problem.notes if isinstance(problem, BaseFrameLikelihood) else ()))
+        found = dataclasses.replace(search.result(settings.tracker), notes=notes)
         if self._refiner is not None and self._seen is not None and settings.refinement.refine_frames:
             evidence = self._seen.evidence(search.frame, held)
             with span("refine", search.frame):

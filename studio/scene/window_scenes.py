@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from studio.capture.video import give_back_freed_memory
 from studio.errors import StudioError
 from studio.jobs.control import StudioControl
-from studio.scene.model import Selection
+from studio.scene.model import LayerPlayback, Selection
 from studio.scene.recording import record_scene
 from studio.scene.scene_server import SceneServer
 from studio.sessions.workspace import Workspace
@@ -50,12 +50,12 @@ class WindowScenes:
         self._entries: dict[str, _Entry] = {}
         self._lock = threading.Lock()
         self._stopped = False
-        self._moved: Callable[[str, Selection], None] = lambda window, shown: None
+        self._moved: Callable[[str, Selection, LayerPlayback], None] = lambda window, shown, layers: None
         self.record_scene = record_scene
 
-    def watch(self, moved: Callable[[str, Selection], None]) -> None:
-        """Call `moved` with the window and what it shows when a scene's own controls, playback or the tracking
-        move it, in that scene's thread.
+    def watch(self, moved: Callable[[str, Selection, LayerPlayback], None]) -> None:
+        """Call `moved` with the window, what it shows and how it plays layers when a scene's own controls, playback or
+        the tracking move it, in that scene's thread.
         """
         self._moved = moved
 
@@ -70,7 +70,10 @@ class WindowScenes:
             if entry is None:
                 self._make_room()
                 scene = SceneServer(
-                    self._workspace, self._process, lambda shown: self._moved(window, shown), bare=bare
+                    self._workspace,
+                    self._process,
+                    lambda shown, layers: self._moved(window, shown, layers),
+                    bare=bare,
                 )
                 entry = self._entries[window] = _Entry(scene, 0.0)
             entry.used = time.monotonic()

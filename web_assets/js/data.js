@@ -34,6 +34,7 @@ let again = [];        // layers of the frame that is annealed again
 let showsAgain = 0;    // timer that shows them
 let asking = "";       // the frame whose layers are on their way
 let isOpening = false; // whether the run's frames are on their way: the scene is built after that
+let plays = false;     // whether the scene plays layers: it goes on with them unless one is chosen here
 let isAnew = true;     // whether the page was loaded since: a frame that was annealed again before is not shown on it
 
 const sceneLater = paced(() => showInScene(), SCENE_MILLISECONDS);
@@ -134,11 +135,13 @@ async function showInScene() {
   if (!get("session") || isOpening) return;
   const shown = wantedNow();
   if (!isElsewhere(shown) && requested === moves) return;
+  const { layer, ...others } = shown;
+  const request = plays && layer === scene.layer ? others : shown;
   scene = shown;
   requested = moves;
   const discard = isAnew;
   isAnew = false;
-  await post("/api/scene/show", { ...shown, eye: eyeOf(shown.eye), request_number: requested, discard }).catch(complain);
+  await post("/api/scene/show", { ...request, eye: eyeOf(shown.eye), request_number: requested, discard }).catch(complain);
 }
 
 /** The scene's own controls moved, or it plays: follow them, without sending the change back. What it said before it knew of the page's own last move is old. */
@@ -250,6 +253,7 @@ export function startData() {
     if (event.state !== "tracking") sessionsLater();
   });
   onEvent("sessions", sessionsLater);
+  onEvent("scene", (event, here) => { if (here) plays = event.layers.playing; });
   onEvent("scene", takeScene);
   let before = false;
   watch(["connected"], () => {

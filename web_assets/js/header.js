@@ -124,7 +124,6 @@ export function startHeader() {
   for (const id of /** @type {const} */ (["step-layer", "step-frame"])) byId(id).onclick = () => { set({ follow: true }); command(id); };
   byId("cancel").onclick = () => command("cancel");
   byId("reanneal").onclick = reanneal;
-  byId("rail-toggle").onclick = () => { byId("rail-toggle").ariaExpanded = String(document.body.classList.toggle("rail-open")); };
   watch(["work", "run", "session", "connected", "summary", "frame"], drawState);
   watch(["session", "run", "summary"], () => {
     const [session, run, summary] = [get("session"), get("run"), get("summary")];
