@@ -65,12 +65,11 @@ def test_notes_are_exported(run: StoredRun, session_on_disk: Session, tmp_path: 
 
 
 def test_the_command_line_writes_them(run: StoredRun) -> None:
-    name = f"{run.session_name}/{run.name}"
-    runner = CliRunner()
-    written = runner.invoke(main, ["note", name, "--frame", "1", "--text", "look here"])
+    name, runner = (run.session_name, run.name), CliRunner()
+    written = runner.invoke(main, ["note", *name, "--frame", "1", "--text", "look here"])
     assert written.exit_code == 0, written.output
     assert "frame 1: look here" in written.output
-    listed = runner.invoke(main, ["notes", name, "--json"])
+    listed = runner.invoke(main, ["notes", *name, "--json"])
     assert json.loads(listed.output)["notes"][0]["text"] == "look here"
-    assert runner.invoke(main, ["note", name, "--frame", "1", "--remove"]).exit_code == 0
+    assert runner.invoke(main, ["note", *name, "--frame", "1", "--remove"]).exit_code == 0
     assert studio.notes(run) == ()

@@ -1,5 +1,6 @@
 """Reload, Back, a second window and a copied link lead to the same: of a job, of the set-up, of what is not there."""
 
+import re
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -194,3 +195,88 @@ def test_the_set_up_goes_back_step_by_step_and_tracks_when_it_says_so(
     [started] = [one for one in studio.control.commands if isinstance(one, Start)]
     assert started.session == "take1"
     assert [run.name for run in studio.workspace.session("take1").runs()] == [started.run]
+
+
+def test_find_knows_frames_knobs_limbs_formats_pages_and_help(
+    context: BrowserContext, studio: Studio, tracked: StoredRun
+) -> None:
+    page = opened(context, studio, "/?session=take1&run=first&frame=1")
+    expect(page.locator("#crumbs")).to_contain_text("take1 / first")
+    page.wait_for_function("async () => Boolean((await import('/assets/js/state.js')).get('parameters'))")
+    field, entries = page.locator(".palette input"), page.locator(".palette-list li")
+
+    def found(wanted: str, kind: str) -> None:
+        page.keyboard.press("Control+k")
+        field.fill(wanted)
+        expect(entries.filter(has=page.locator(".kind", has_text=kind)).first).to_be_visible()
+
+    for wanted, kind in (
+        ("survival", "Knob"), ("bvh", "Export"), ("gallery", "Page"), ("dark", "Theme"), ("lost and", "Help"),
+        ("head", "Limb"),
+    ):  # fmt: skip
+        if kind == "Help":
+            wanted = "what the charts show"
+        found(wanted, kind)
+        page.keyboard.press("Escape")
+    found("0", "Frame")
+    page.keyboard.press("Enter")
+    page.wait_for_url("**frame=0**")
+    found("light", "Theme")
+    page.keyboard.press("Enter")
+    expect(page.locator("html")).to_have_attribute("data-theme", "light")
+
+
+def test_a_note_is_written_on_a_frame_and_seen_in_every_window(
+    context: BrowserContext, studio: Studio, tracked: StoredRun
+) -> None:
+    page = opened(context, studio, "/?session=take1&run=first&frame=1")
+    other = opened(context, studio, "/?session=take1&run=first&frame=0")
+    writer = page.get_by_role("button", name="Write a note on this frame")
+    writer.click()
+    page.get_by_label("Note", exact=True).fill("the arm is hidden")
+    page.keyboard.press("Control+Enter")
+    flag = other.get_by_label("Note on frame 1: the arm is hidden")
+    flag.click()
+    expect(other.get_by_role("button", name="Note on this frame")).to_be_visible()
+    other.reload()
+    expect(flag).to_have_count(1)
+    # A bookmark by its key, and away by the same.
+    page.goto(f"{studio.base}/?session=take1&run=first&frame=0")
+    expect(page.locator(".note-flag")).to_have_count(1)
+    page.keyboard.press("b")
+    expect(page.get_by_label("Note on frame 0: bookmark")).to_have_count(1)
+    page.keyboard.press("b")
+    expect(page.locator(".note-flag")).to_have_count(1)
+
+
+DROP = """(files) => {
+  const data = new DataTransfer();
+  for (const [name, text] of files) data.items.add(new File([text], name));
+  for (const type of ["dragenter", "dragover", "drop"])
+    document.body.dispatchEvent(new DragEvent(type, { dataTransfer: data, bubbles: true, cancelable: true }));
+}"""
+
+
+def test_videos_are_dropped_on_the_page(context: BrowserContext, studio: Studio) -> None:
+    page = opened(context, studio, "/?session=take1")
+    expect(page.locator("#crumbs")).to_contain_text("take1")
+    page.evaluate(DROP, [["left.mp4", "no video"], ["right.mp4", "none either"]])
+    dialog = page.locator("dialog[open]")
+    expect(dialog).to_contain_text("2 files, 0.0 MB were dropped: left.mp4, right.mp4.")
+    dialog.get_by_label("Session name").fill("dropped")
+    dialog.get_by_role("button", name="Import").click()
+    # They arrived, and are no videos.
+    expect(dialog.locator(".wrong")).to_be_visible()
+    expect(dialog.locator(".wrong")).not_to_have_text("")
+
+
+def test_a_session_without_a_run_shows_its_footage(context: BrowserContext, studio: Studio) -> None:
+    page = opened(context, studio, "/?session=take1&run=")
+    views = page.locator("#panel-cameras .view img")
+    expect(views).to_have_count(2)
+    slider = page.get_by_label("Frame of the footage")
+    slider.fill("2")
+    expect(views.first).to_have_attribute("src", re.compile("/frames/2/views/cam1"))
+    page.goto(f"{studio.base}/comparisons?session=take1")
+    expect(page.locator("#content")).to_contain_text("take1")
+    assert "new" in page.url
