@@ -193,7 +193,7 @@ def test_the_set_up_goes_back_step_by_step_and_tracks_when_it_says_so(
     page.wait_for_selector(STEP.format("track"))
     expect(page.locator(".track-status")).to_contain_text("compiling the kernels")
     [started] = [one for one in studio.control.commands if isinstance(one, Start)]
-    assert started.session == "take1"
+    assert started.session.endswith("/take1")
     assert [run.name for run in studio.workspace.session("take1").runs()] == [started.run]
 
 
@@ -278,5 +278,4 @@ def test_a_session_without_a_run_shows_its_footage(context: BrowserContext, stud
     slider.fill("2")
     expect(views.first).to_have_attribute("src", re.compile("/frames/2/views/cam1"))
     page.goto(f"{studio.base}/comparisons?session=take1")
-    expect(page.locator("#content")).to_contain_text("take1")
-    assert "new" in page.url
+    page.wait_for_url("**/comparisons?new*")
