@@ -5,7 +5,7 @@ from pathlib import Path
 
 import msgspec
 
-from studio.errors import RunError
+from studio.errors import NotFoundError, SettingsError
 from studio.sessions.manifest import now
 from studio.sessions.record_files import RecordFile
 from studio.sessions.stored_run import StoredRun
@@ -46,14 +46,16 @@ def notes_by_frame(run: StoredRun) -> Mapping[int, str]:
 
 
 def write_note(run: StoredRun, frame: int, text: str = "") -> tuple[Note, ...]:
-    """Put a note on a frame, in place of the one it has; all notes. Raises RunError for a frame that the run does not
-    span.
+    """Put a note on a frame, in place of the one it has; all notes. Raises NotFoundError for a frame that the run does
+    not span, SettingsError for a text that is too long.
     """
     record = run.record
     if not record.first <= frame < record.last:
-        raise RunError(
+        raise NotFoundError(
             f"Run '{run.name}' has no frame {frame}.", f"It goes from {record.first} to {record.last - 1}."
         )
+    if len(text) > LONGEST:
+        raise SettingsError(f"The note has {len(text)} characters.", f"Write at most {LONGEST}.")
     return _keep(run, (*_others(run, frame), Note(frame, text.strip(), now())))
 
 

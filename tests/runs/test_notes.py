@@ -1,6 +1,7 @@
 """Notes and bookmarks on frames: kept with the run, exported, and the same from Python, the command line and HTTP."""
 
 import csv
+import io
 import json
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from tracked_runs import finish
 
 import studio
 from studio.cli.main import main
-from studio.errors import RunError, SessionError, SettingsError
+from studio.errors import NotFoundError, SessionError, SettingsError
 from studio.inspection.reading import InspectedRun
 from studio.inspection.shared_page import shared_page
 from studio.runs.new_run import prepare_run
@@ -37,13 +38,17 @@ def test_a_note_replaces_the_one_of_its_frame(run: StoredRun) -> None:
     assert studio.notes(run) == kept
     assert studio.note(run, 0, remove=True) == kept[1:]
     assert studio.note(run, 1, remove=True) == kept[1:]
-    with pytest.raises(RunError, match="no frame 3"):
+    with pytest.raises(NotFoundError, match="no frame 3"):
         studio.note(run, 3)
     with pytest.raises(SettingsError, match="characters"):
         studio.note(run, 1, "x" * (LONGEST + 1))
     (run.folder / FILE_NAME).write_text("{")
     with pytest.raises(SessionError):
         studio.notes(run)
+
+
+def rows_of(table: Path) -> list[list[str]]:
+    return list(csv.reader(io.StringIO(table.read_text(encoding="utf-8"))))
 
 
 def test_notes_are_exported(run: StoredRun, session_on_disk: Session, tmp_path: Path) -> None:
@@ -53,10 +58,10 @@ def test_notes_are_exported(run: StoredRun, session_on_disk: Session, tmp_path: 
     studio.note(run, 2)
     table = tmp_path / "noted.csv"
     studio.export_run(run, to=table)
-    rows = list(csv.reader(table.open(newline="")))
+    rows = rows_of(table)
     assert rows[0][-1] == "note"
     assert [row[-1] for row in rows[1:]] == ["", 'left, or "right"?', "bookmark"]
-    assert [row[:-1] for row in rows] == list(csv.reader(bare.open(newline="")))
+    assert [row[:-1] for row in rows] == rows_of(bare)
     studio.export_run(run, to=tmp_path / "noted.parquet")
     metadata = pq.read_schema(tmp_path / "noted.parquet").metadata
     assert json.loads(metadata[b"notes"]) == {"1": 'left, or "right"?', "2": "bookmark"}
