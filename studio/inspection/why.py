@@ -46,6 +46,7 @@ from studio.inspection.tables import Finding, Found, Remedy, Row, Selection, Vie
 from studio.inspection.verdict import STATE_WORDS, Verdict, verdict, verdict_on
 from studio.knobs import Value, knobs_of
 from studio.likelihood.catalogue import WEIGHTINGS
+from studio.runs.run_footage import filmed_cameras
 from studio.runs.tracks import RAW, best_track, track_stamp
 from studio.settings import RunSettings
 from studio.trackers.tracker import TRACKED
@@ -215,7 +216,12 @@ class Case:
     def camera_fault(self) -> CameraFault | None:
         """The camera that contradicts the others at the reference pose."""
         return fault_of(
-            view_fits(self.run.body, self.run.run.cameras(), self.evaluation.evidence, self.reference.pose)
+            view_fits(
+                self.run.body,
+                filmed_cameras(self.run.session, self.run.run.cameras()),
+                self.evaluation.evidence,
+                self.reference.pose,
+            )
         )
 
     @cached_property

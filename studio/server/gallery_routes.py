@@ -4,6 +4,7 @@ from fastapi import APIRouter, Response
 from pydantic import Field
 
 from studio.errors import NotFoundError
+from studio.foreign_files import read_file
 from studio.jobs.job_runner import Job, JobKind, SessionJob
 from studio.operations.gallery import (
     CARDS,
@@ -75,7 +76,7 @@ def card_picture(card: str, app: App) -> Response:
     found = card_of(card)
     if standing_of(found, app.workspace).there:
         place = app.workspace.session(found.name).thumbnail()
-        content = place.read_bytes() if place else None
+        content = read_file(place) if place else None
     else:
         shipped = GALLERY_PICTURES / f"{found.name}.jpg"
         content = shipped.read_bytes() if shipped.is_file() else None

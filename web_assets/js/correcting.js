@@ -38,6 +38,13 @@ function leave() {
   draw();
 }
 
+/** Leave the correction, unless it is being tracked. Whether there was one to leave. */
+export function leaveCorrecting() {
+  if (frame === null || going) return false;
+  leave();
+  return true;
+}
+
 /** Make the corrected run and track it. back : the last frame to be tracked backwards; null: onwards. */
 async function track(back) {
   const [session, run] = [get("session"), get("run")];
@@ -88,13 +95,12 @@ function draw() {
 /** Take the last change of the pose back. */
 const undo = () => post(`${POSE_PATH}/undo`).catch(complain);
 
-/** Ctrl Z takes a change back, Escape leaves, unless a field or a dialog has the key. */
+/** Ctrl Z takes a change back, unless a field or a dialog has the key. */
 function takeKey(event) {
   if (frame === null || going || event.target.closest?.("input, textarea, dialog, [role=menu]")) return;
-  if ((event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "z" && !event.shiftKey) undo();
-  else if (event.key === "Escape") leave();
-  else return;
+  if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z" || event.shiftKey) return;
   event.preventDefault();
+  undo();
 }
 
 /** Wire the button, the bar, and what the scene says. */

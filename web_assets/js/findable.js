@@ -3,11 +3,11 @@
 import { fetchJson, patch, readOnly, runPath } from "./api.js";
 import { openForm } from "./dialogs.js";
 import { chooseFormat } from "./exporting.js";
-import { commands } from "./keys.js";
 import { complain, say } from "./messages.js";
 import { goTo, limbGroup, range, select } from "./selection.js";
 import { openSession, setupPath } from "./sessions.js";
 import { get, set } from "./state.js";
+import { commands } from "./studio/keys.js";
 import { showPanel } from "./tabs.js";
 import { useTheme } from "./theme.js";
 import { allViews, saveView, showView, stepView, toggleTable } from "./views.js";
