@@ -77,6 +77,7 @@ ROUTERS = (
     health_routes.router,
     page_routes.router,
     guide_routes.router,
+    guide_routes.contents_router,
     gallery_routes.router,
     session_routes.router,
     workflow_routes.router,

@@ -30,6 +30,7 @@ from studio.trackers.tracker import Printed
 from studio.training.oversampling import OversamplingSettings
 
 router = APIRouter(tags=["page"], include_in_schema=False)
+contents_router = APIRouter(prefix="/api", tags=["page"])
 
 PLACE_OF_KNOBS, PLACE_OF_SUMMARY, PLACE_OF_FINDINGS = "{{knobs}}", "{{reproduction}}", "{{findings}}"
 PLACE_OF_PRINTED = "{{printed}}"
@@ -75,7 +76,7 @@ class GuideContents(Answer):
     headings: list[GuideHeading]
 
 
-@router.get("/api/guide-contents", include_in_schema=True)
+@contents_router.get("/guide-contents")
 def contents() -> GuideContents:
     """What the guide has, for a search."""
     return GuideContents(headings=list(_headings()))

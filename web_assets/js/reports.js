@@ -31,7 +31,8 @@ async function begin() {
   drawRunner();
 }
 
-const stop = () => remove("/api/jobs/reproduction/reproduction").catch(complain);
+const KIND = String("reproduction");
+const stop = () => remove(`/api/jobs/${KIND}/${KIND}`).catch(complain);
 
 /** The form, or how far what was begun is, whichever page or window it was begun in. */
 function drawRunner() {

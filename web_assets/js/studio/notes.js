@@ -19,7 +19,7 @@ export const noteWords = (note) => note.text || "bookmark";
 
 /** @param {number} frame */
 const pathOf = (frame) =>
-  /** @type {const} */ (`${runPath(get("session"), get("run"))}/frames/${frame}/note`);
+  /** @type {const} */ (`${runPath(get("session"), get("run"))}/frames/${String(frame)}/note`);
 
 async function load() {
   const [session, run] = [get("session"), get("run")];
