@@ -130,7 +130,9 @@ def test_the_checker_sees_a_fault(window: StudioPage) -> None:
 def test_what_does_not_fit_is_seen(window: StudioPage) -> None:
     if window.page.evaluate("document.documentElement.dataset.theme") == "light":
         return
-    window.page.evaluate("document.body.insertAdjacentHTML('beforeend', '<div id=wide style=width:3000px>wide</div>')")
+    window.page.evaluate(
+        "document.body.insertAdjacentHTML('beforeend', '<div id=wide style=width:3000px>wide</div>')"
+    )
     with pytest.raises(AssertionError, match="2560: .*wide"):
         fits(window)
     window.page.evaluate("document.getElementById('wide').remove()")
