@@ -36,8 +36,8 @@ PAGES = {
 }
 USUAL = {"width": 1280, "height": 800}
 WIDTHS = (390, 900, 1600, 2560)
-# What sticks out of the window and cannot be scrolled to by what it stands in; the page itself must not scroll sideways.
-# A closed drawer waits beside the window.
+# What sticks out of the window and cannot be scrolled to by what it stands in; the page itself must not scroll
+# sideways. A closed drawer waits beside the window.
 STICKING_OUT = """() => {
   const right = innerWidth + 1;
   const holds = (place) => {
@@ -53,7 +53,8 @@ STICKING_OUT = """() => {
     const box = one.getBoundingClientRect();
     return box.width && box.height && (box.right > right || box.left < -1) && !isHeld(one);
   });
-  const scrolled = document.documentElement.scrollWidth > innerWidth ? [`the page is ${document.documentElement.scrollWidth} wide`] : [];
+  const wide = document.documentElement.scrollWidth;
+  const scrolled = wide > innerWidth ? [`the page is ${wide} wide`] : [];
   return [...scrolled, ...out.map((one) => one.cloneNode(false).outerHTML.slice(0, 160))];
 }"""
 SET = "async (changes) => (await import('/assets/js/state.js')).set(changes)"
@@ -133,7 +134,7 @@ def test_what_does_not_fit_is_seen(window: StudioPage) -> None:
     window.page.evaluate(
         "document.body.insertAdjacentHTML('beforeend', '<div id=wide style=width:3000px>wide</div>')"
     )
-    with pytest.raises(AssertionError, match="2560: .*wide"):
+    with pytest.raises(AssertionError, match=r"2560: .*wide"):
         fits(window)
     window.page.evaluate("document.getElementById('wide').remove()")
 
