@@ -36,8 +36,7 @@ PAGES = {
 }
 USUAL = {"width": 1280, "height": 800}
 WIDTHS = (390, 900, 1600, 2560)
-# What sticks out of the window and cannot be scrolled to by what it stands in; the page itself must not scroll sideways.
-# A closed drawer waits beside the window.
+# What sticks out of the window and is not held by something inside it; the page itself must not scroll sideways.
 STICKING_OUT = """() => {
   const right = innerWidth + 1;
   const holds = (place) => {
@@ -53,8 +52,9 @@ STICKING_OUT = """() => {
     const box = one.getBoundingClientRect();
     return box.width && box.height && (box.right > right || box.left < -1) && !isHeld(one);
   });
-  const scrolled = document.documentElement.scrollWidth > innerWidth ? [`the page is ${document.documentElement.scrollWidth} wide`] : [];
-  return [...scrolled, ...out.map((one) => one.cloneNode(false).outerHTML.slice(0, 160))];
+  const wide = document.documentElement.scrollWidth;
+  const page = wide > innerWidth ? [`the page is ${wide} wide`] : [];
+  return [...page, ...out.map((one) => one.cloneNode(false).outerHTML.slice(0, 160))];
 }"""
 SET = "async (changes) => (await import('/assets/js/state.js')).set(changes)"
 
@@ -130,8 +130,10 @@ def test_the_checker_sees_a_fault(window: StudioPage) -> None:
 def test_what_does_not_fit_is_seen(window: StudioPage) -> None:
     if window.page.evaluate("document.documentElement.dataset.theme") == "light":
         return
-    window.page.evaluate("document.body.insertAdjacentHTML('beforeend', '<div id=wide style=width:3000px>wide</div>')")
-    with pytest.raises(AssertionError, match="2560: .*wide"):
+    window.page.evaluate(
+        "document.body.insertAdjacentHTML('beforeend', '<div id=wide style=width:3000px>wide</div>')"
+    )
+    with pytest.raises(AssertionError, match=r"2560: .*wide"):
         fits(window)
     window.page.evaluate("document.getElementById('wide').remove()")
 

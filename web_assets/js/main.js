@@ -21,6 +21,8 @@ import { startTheme } from "./theme.js";
 import { startTimeline } from "./timeline.js";
 import { startTracks } from "./tracks.js";
 import { startViews } from "./views.js";
+import { startCourseColumn } from "./studio/course_column.js";
+import { startFirstSteps } from "./studio/first_steps.js";
 import { startWhy } from "./why.js";
 
 async function start() {
@@ -43,6 +45,8 @@ async function start() {
   startData();
   startTracks();
   startCorrecting();
+  startCourseColumn();
+  startFirstSteps();
   startSceneFrame(takeKey);
   await refreshSessions();
   startAddress();
