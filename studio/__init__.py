@@ -49,7 +49,16 @@ _VERBS = {
     ),
     "studio.operations.sharing": ("share",),
     "studio.operations.subjects": ("subjects", "together"),
-    "studio.operations.tracking": ("correct", "go_on", "live", "new_run", "replay", "resume_live", "track"),
+    "studio.operations.tracking": (
+        "branch",
+        "correct",
+        "go_on",
+        "live",
+        "new_run",
+        "replay",
+        "resume_live",
+        "track",
+    ),
     "studio.self_check": ("doctor",),
 }
 _MODULE_OF = {name: module for module, names in _VERBS.items() for name in names}

@@ -49,6 +49,7 @@ from studio.operations.results import verify as verify
 from studio.operations.sharing import share as share
 from studio.operations.subjects import subjects as subjects
 from studio.operations.subjects import together as together
+from studio.operations.tracking import branch as branch
 from studio.operations.tracking import correct as correct
 from studio.operations.tracking import go_on as go_on
 from studio.operations.tracking import live as live

@@ -42,6 +42,7 @@ COMMANDS = {
     "refine": ("result_commands", "operations.results.refine"),
     "smooth": ("result_commands", "operations.results.smooth"),
     "correct": ("tracking_commands", "operations.tracking.correct"),
+    "branch": ("tracking_commands", "operations.tracking.branch"),
     "compare": ("comparison_commands", "operations.comparing.compare"),
     "sweep": ("comparison_commands", "operations.comparing.sweep"),
     "learn": ("behaviour_commands", "operations.behaviours.learn"),

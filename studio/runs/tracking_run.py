@@ -52,12 +52,14 @@ class Problems(Protocol):
 @dataclass(frozen=True, slots=True, eq=False)
 class Stepped:
     """The outcome of one layer. result : of the frame, if this was its last layer. applied : settings used from this
-    layer on, None if unchanged.
+    layer on, None if unchanged. search_layers, searches : layers of one search of the frame, and how many it has.
     """
 
     record: LayerRecord
     result: FrameResult | None
     applied: RunSettings | None
+    search_layers: int = 0
+    searches: int = 1
 
 
 class TrackingRun:
@@ -231,7 +233,7 @@ class TrackingRun:
             self._pace.add(self._spent)
             self._seconds, self._frames = self._seconds + sum(self._spent), self._frames + 1
             self._spent = []
-        return Stepped(record, result, settings if is_new else None)
+        return Stepped(record, result, settings if is_new else None, search.layer_count, search.repeats)
 
     def result_of(
         self, search: FrameSearch, settings: RunSettings, layers: Sequence[LayerRecord]

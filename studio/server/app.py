@@ -60,6 +60,7 @@ from studio.server.body_limit import BodyLimit
 from studio.server.content_policy import PolicyHeaders
 from studio.server.error_responses import ErrorsInWords, add_error_handlers, log
 from studio.server.event_stream import EventStream
+from studio.server.layer_outlines import LayerOutlines
 from studio.server.schemas import ErrorAnswer
 from studio.sessions.workspace import Workspace
 
@@ -147,7 +148,12 @@ def build_app(
     path. log_path : named in answers to unforeseen errors.
     """
     state = AppState(
-        workspace, control, scenes, EventStream(control, scenes.open_scenes), footage_roots, log_path
+        workspace,
+        control,
+        scenes,
+        EventStream(control, scenes.open_scenes, LayerOutlines(workspace)),
+        footage_roots,
+        log_path,
     )
     app = Application(
         title="Capture studio",

@@ -12,7 +12,7 @@ from pydantic import Field
 from studio.errors import RunError
 from studio.jobs import commands
 from studio.jobs.search_pace import MOST_SECONDS, SpeedChoice, offered
-from studio.operations.tracking import new_run
+from studio.operations.tracking import branch, branched_run, new_run
 from studio.progress import unheard
 from studio.runs.sides import notes_of
 from studio.server.app_state import App, AppState, release
@@ -135,6 +135,21 @@ def make_run(
     return run_line(made.summary(), session)
 
 
+@router.post(RUN + "/branch", status_code=201)
+def make_branch(
+    session: OpenSession,
+    run: OpenRun,
+    arguments: Annotated[Arguments, body_of(branch, "BranchRequest")],
+    app: App,
+) -> RunLine:
+    """A new run with this one's frames before a frame, ready to be started: it and all after it are tracked with other
+    knobs (those that were moved in this run, where none are given). This run stays as it is.
+    """
+    made = branched_run(run, **arguments)
+    app.events.session_changed(session.name, made.name)
+    return run_line(made.summary(), session)
+
+
 @router.get(RUN)
 def run_detail(session: OpenSession, run: OpenRun, check: Checked = True) -> RunDetail:
     """What was requested of the run, how far it got, and its body's parameters."""
@@ -249,7 +264,9 @@ def seek(run: OpenRun, where: Frame, app: App) -> Posted:
 
 @router.post(RUN + "/reanneal", status_code=202)
 def reanneal(run: OpenRun, where: ReannealRequest, app: App) -> Posted:
-    """Anneal a frame again with the knobs as they are; the stored answer stays, unless `keep` replaces it."""
+    """Anneal a frame again with the knobs as they are; the stored answer stays, unless `keep` replaces it: then the
+    frames after it are dropped, and the run as it was goes to the trash.
+    """
     return _post_for(
         app, run, commands.Reanneal(frame=where.frame, keep=where.keep, **commands.about(run.folder))
     )

@@ -30,9 +30,10 @@ class RunRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     readers of the results. behaviour : name of the behaviour model whose copy the run keeps, "" without one. live :
     frames came on a clock and those that came too fast were dropped; the results store lists the tracked ones.
     ping_pong : the footage is played forwards and backwards without end (`capture.footage`), so that `last` may lie
-    behind its end. made_from : the run that was corrected, "" if none: other frames are that run's. corrected : the
-    frame that restarts at corrected_pose. backwards_to : None where the frames after it follow from it; else these are
-    the old ones, and from it down to this frame each was tracked from the one after it. subject_dimensions : the
+    behind its end. made_from : the run that was corrected, or that this one leaves with other knobs, "" if none: other
+    frames are that run's. corrected : the frame that restarts at corrected_pose. backwards_to : None where the frames
+    after it follow from it; else these are the old ones, and from it down to this frame each was tracked from the one
+    after it. subject_dimensions : the
     subject's, where the first frames gave the body another shape; empty where they did not.
     """
 

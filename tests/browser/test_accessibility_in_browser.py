@@ -36,7 +36,8 @@ PAGES = {
 }
 USUAL = {"width": 1280, "height": 800}
 WIDTHS = (390, 900, 1600, 2560)
-# What sticks out of the window and is not held by something inside it; the page itself must not scroll sideways.
+# What sticks out of the window and cannot be scrolled to by what it stands in; the page itself must not scroll
+# sideways. A closed drawer waits beside the window.
 STICKING_OUT = """() => {
   const right = innerWidth + 1;
   const holds = (place) => {
@@ -53,8 +54,8 @@ STICKING_OUT = """() => {
     return box.width && box.height && (box.right > right || box.left < -1) && !isHeld(one);
   });
   const wide = document.documentElement.scrollWidth;
-  const page = wide > innerWidth ? [`the page is ${wide} wide`] : [];
-  return [...page, ...out.map((one) => one.cloneNode(false).outerHTML.slice(0, 160))];
+  const scrolled = wide > innerWidth ? [`the page is ${wide} wide`] : [];
+  return [...scrolled, ...out.map((one) => one.cloneNode(false).outerHTML.slice(0, 160))];
 }"""
 SET = "async (changes) => (await import('/assets/js/state.js')).set(changes)"
 

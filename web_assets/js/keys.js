@@ -3,17 +3,20 @@
 import { lookThrough } from "./cameras.js";
 import { openList } from "./dialogs.js";
 import { byId } from "./elements.js";
-import { reanneal } from "./header.js";
+import { toggleLayers } from "./studio/layer_playback.js";
+import { step as stepLayer } from "./studio/layer_strip.js";
+import { reanneal } from "./studio/tracking.js";
 import { togglePlay, toggleLoop } from "./playback.js";
 import { enterScene } from "./scene_frame.js";
-import { goTo, stepLayer } from "./selection.js";
+import { goTo } from "./selection.js";
 import { get } from "./state.js";
 import { goToMark } from "./timeline.js";
 import { stepParameter, stepView, toggleTable } from "./views.js";
 
 /** @type {[string, string, (event: KeyboardEvent) => boolean, (event: KeyboardEvent) => void][]} */
 const KEYS = [
-  ["Space", "play or pause what is stored", (event) => event.key === " ", togglePlay],
+  ["Space", "play or pause the frames", (event) => event.key === " " && !event.shiftKey, togglePlay],
+  ["Shift Space", "play or pause the frame's layers", (event) => event.key === " " && event.shiftKey, toggleLayers],
   ["←", "frame before", (event) => event.key === "ArrowLeft" && !event.shiftKey, () => goTo(get("frame") - 1)],
   ["→", "next frame", (event) => event.key === "ArrowRight" && !event.shiftKey, () => goTo(get("frame") + 1)],
   ["Shift ←", "layer before", (event) => event.key === "ArrowLeft" && event.shiftKey, () => stepLayer(-1)],
@@ -40,7 +43,7 @@ function showKeys() {
 }
 
 // What needs all keys for itself, and what needs the arrows only up and down or not at all.
-const TYPING = "input:not([type=checkbox]), textarea, dialog:not(.large-view), [role=slider]:not(#track), [role=menu], [role=tab]";
+const TYPING = "input:not([type=checkbox]), textarea, dialog:not(.large-view), [role=slider]:not(#track, #layer-tiles), [role=menu], [role=tab]";
 const CHOOSING = "select, input[type=checkbox]";
 
 /** Do what a key says; typing in a field and holding control are left alone. */
