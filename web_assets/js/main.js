@@ -25,6 +25,7 @@ import { startTracks } from "./tracks.js";
 import { startViews } from "./views.js";
 import { startCourseColumn } from "./studio/course_column.js";
 import { startFirstSteps } from "./studio/first_steps.js";
+import { startScenePictures } from "./studio/scene_pictures.js";
 import { startWhy } from "./why.js";
 
 async function start() {
@@ -51,6 +52,7 @@ async function start() {
   startCorrecting();
   startCourseColumn();
   startFirstSteps();
+  startScenePictures();
   startSceneFrame(takeKey);
   await refreshSessions();
   startAddress();
