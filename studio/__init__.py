@@ -22,6 +22,7 @@ _VERBS = {
         "synchronise",
         "synthesize",
     ),
+    "studio.operations.foreign": ("inspect",),
     "studio.operations.gallery": ("gallery",),
     "studio.operations.inspecting": ("compare_runs", "seeds", "view", "why"),
     "studio.operations.masks": ("background", "mask_quality"),

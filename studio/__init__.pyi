@@ -17,6 +17,7 @@ from studio.operations.footage import new_session as new_session
 from studio.operations.footage import record as record
 from studio.operations.footage import synchronise as synchronise
 from studio.operations.footage import synthesize as synthesize
+from studio.operations.foreign import inspect as inspect
 from studio.operations.gallery import gallery as gallery
 from studio.operations.inspecting import compare_runs as compare_runs
 from studio.operations.inspecting import seeds as seeds

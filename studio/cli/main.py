@@ -58,6 +58,7 @@ COMMANDS = {
     "runs": ("session_commands", "cli.session_commands.runs_command"),
     "upload": ("remote_commands", "operations.remote.upload"),
     "download": ("remote_commands", "operations.remote.download"),
+    "inspect": ("session_commands", "operations.foreign.inspect"),
     "verify": ("result_commands", "operations.results.verify"),
     "doctor": ("doctor_commands", "self_check.doctor"),
     "diagnostics": ("doctor_commands", "diagnostics_archive.diagnostics"),

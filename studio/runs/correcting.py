@@ -180,7 +180,7 @@ def new_folder(
 
 def copied_beside(run: StoredRun, record: RunRecord, last: int | None = None) -> Path:
     """A hidden folder beside the run's own with its snapshots, its frames before `last` (None: all) and a record."""
-    folder = atomic_files.new_folder_beside(run.folder)
+    folder = atomic_files.new_folder_beside(run.folder, parents=False)
     try:
         for part in (CAMERAS_NAME, BEHAVIOUR_NAME):
             if (run.folder / part).exists():

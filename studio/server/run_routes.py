@@ -15,7 +15,7 @@ from studio.jobs.search_pace import MOST_SECONDS, SpeedChoice, offered
 from studio.operations.tracking import branch, branched_run, new_run
 from studio.progress import unheard
 from studio.runs.sides import notes_of
-from studio.server.app_state import App, AppState, release
+from studio.server.app_state import App, AppState, moving
 from studio.server.event_encoding import message_of, plain
 from studio.server.requests import Arguments, body_of
 from studio.server.schemas import Answer, Numbers, Request, Value
@@ -167,8 +167,8 @@ def rename_run(session: OpenSession, run: OpenRun, change: SessionChange, app: A
     """Give a run another name. Refused while it is being tracked."""
     name = run.name
     if change.name is not None and change.name != name:
-        release(app, session.name, name)
-        name = app.workspace.rename_run(session.name, name, change.name).name
+        with moving(app, session.name, name):
+            name = app.workspace.rename_run(session.name, name, change.name).name
     app.events.session_changed(session.name, name)
     return NewName(name=name)
 
@@ -176,8 +176,8 @@ def rename_run(session: OpenSession, run: OpenRun, change: SessionChange, app: A
 @router.delete(RUN)
 def delete_run(session: OpenSession, run: OpenRun, app: App) -> TrashEntry:
     """Move a run to the trash. Refused while it is being tracked."""
-    release(app, session.name, run.name)
-    place = app.workspace.trash_run(session.name, run.name)
+    with moving(app, session.name, run.name):
+        place = app.workspace.trash_run(session.name, run.name)
     app.events.session_changed(session.name)
     return trash_entry(place)
 

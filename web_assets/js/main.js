@@ -10,7 +10,7 @@ import { startExporting } from "./exporting.js";
 import { startHeader } from "./studio/header.js";
 import { startLayerPlayback } from "./studio/layer_playback.js";
 import { startLayerStrip } from "./studio/layer_strip.js";
-import { startKeys, takeKey } from "./keys.js";
+import { startKeys, takeKey } from "./studio/keys.js";
 import { startLive } from "./live.js";
 import { startLog } from "./log.js";
 import { startPalette } from "./palette.js";
