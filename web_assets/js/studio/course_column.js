@@ -139,7 +139,7 @@ function Lesson({ name }) {
     let timer = 0;
     let last = "";
     const follow = () => {
-      const middle = column.getBoundingClientRect().top + column.clientHeight * 0.45;
+      const middle = column.getBoundingClientRect().top + column.clientHeight * 0.4;
       const above = statesOf(column).filter((link) => link.getBoundingClientRect().top < middle);
       const link = above.at(-1);
       if (!link || link.href === last) return;
