@@ -33,6 +33,7 @@ from studio.scene.model import (
     show_ghosts,
 )
 from studio.scene.pose_edit import UNDO, changed_whole
+from studio.scene.scene_pictures import ScenePictures
 from studio.sessions.workspace import Workspace
 
 
@@ -57,6 +58,7 @@ class SceneServer:
         self._controller.bare = bare
         self._controller.start()
         self.poses = ScenePoses(self._controller)
+        self.pictures = ScenePictures(self._server, self._controller)
         self.port: int = self._server.get_port()
 
     def stop(self) -> None:
