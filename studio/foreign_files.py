@@ -4,7 +4,9 @@ Parsers raise what they like (RecursionError for deep TOML, OverflowError for 40
 an OSError for a corrupt archive's offsets), so readers do not list what may come: they read inside `foreign_file`.
 """
 
+import codecs
 import errno
+import re
 import stat
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -14,6 +16,14 @@ from studio.errors import StudioError
 
 NO_ROOM = frozenset((errno.ENOSPC, errno.EDQUOT))
 LONGEST_REASON = 200
+BYTE_ORDER_MARKS = (
+    (codecs.BOM_UTF8, "utf-8-sig"),
+    (codecs.BOM_UTF32_LE, "utf-32"),
+    (codecs.BOM_UTF32_BE, "utf-32"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
+CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f]")
 KINDS = (
     (stat.S_ISFIFO, "a pipe"),
     (stat.S_ISSOCK, "a socket"),
@@ -42,6 +52,20 @@ def foreign_file(path: Path, wrong: type[StudioError], what: str, remedy: str) -
         raise _no_such(path, wrong, what, remedy, problem) from problem
     except Exception as problem:
         raise _no_such(path, wrong, what, remedy, problem) from problem
+
+
+def read_foreign_text(path: Path) -> str:
+    """A text file of another program: UTF-8 with or without a byte order mark, UTF-16 and UTF-32 with one, else
+    Windows' Western European, if nothing in it is a control character. Raises UnicodeDecodeError for what is no text.
+    """
+    content = path.read_bytes()
+    encoding = next((name for mark, name in BYTE_ORDER_MARKS if content.startswith(mark)), "utf-8")
+    try:
+        return content.decode(encoding)
+    except UnicodeDecodeError:
+        if encoding != "utf-8" or CONTROL.search(content):
+            raise
+        return content.decode("cp1252", errors="replace")
 
 
 def check_regular(path: Path, wrong: type[StudioError]) -> None:

@@ -6,6 +6,7 @@ determines it: rigs are metres wide, so a number above 50 means mm. Names, rotat
 """
 
 import dataclasses
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -50,6 +51,8 @@ __all__ = [
 ]
 
 MM_FROM = 50.0
+UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
+UNIT_PATTERN = r"^(|mm|cm|m|in|board=[0-9]+(\.[0-9]+)?(mm)?)$"
 WORLDS = {
     "x": ((0, 1, 0), (0, 0, 1), (1, 0, 0)),
     "y": ((0, 0, 1), (1, 0, 0), (0, 1, 0)),
@@ -108,8 +111,8 @@ def find_calibrations(folder: Path) -> tuple[Path, ...]:
 def read_calibration(path: Path, unit: str = "", up: str = "z") -> Calibration:
     """The cameras of a file of any format that is known, or of a folder of files that belong together.
 
-    unit : "mm" or "m" overrides the file and the distances. up : the axis of the file's world that points up
-    (x, y, z, -x, -y, -z); the cameras' world has z up.
+    unit : "mm", "cm", "m", "in" or "board=MM" overrides the file and the distances. up : the axis of the file's
+    world that points up (x, y, z, -x, -y, -z); the cameras' world has z up.
     Raises CalibrationError naming file, camera and entry: wrong shapes, numbers that are not finite or no camera's,
     an invalid rotation, a fisheye camera, a name given twice, a damaged file, one that is a pipe.
     """
@@ -127,8 +130,8 @@ def _calibration(path: Path, unit: str, up: str) -> Calibration:
     calibration = Calibration(
         path.name, found.cameras, "", found.sources, found.sizes_known, found.crops, (*found.notes, *notes)
     )
-    if unit not in ("", "mm", "m"):
-        raise CalibrationError(f"'{unit}' is no unit of a calibration.", "Write mm or m.")
+    if unit:
+        mm_of(unit)
     calibration = with_up(calibration, up)
     return _finished(calibration, found.unit, unit, turned=is_canonical(path) and up == "z")
 
@@ -234,10 +237,7 @@ def _finished(read: Calibration, unit: str, requested: str, turned: bool = False
         )
     scale, note = _unit(read.cameras, unit)
     if requested:
-        scale, note = (
-            (1.0 if requested == "mm" else 1000.0),
-            f"The calibration is taken to be in {requested}, as requested.",
-        )
+        scale, note = mm_of(requested), f"The calibration is taken to be in {requested}, as requested."
     cameras = sorted(read.cameras, key=lambda camera: natural_key(camera.name))
     scaled = [dataclasses.replace(camera, translation=camera.translation * scale) for camera in cameras]
     if not turned:
@@ -245,10 +245,24 @@ def _finished(read: Calibration, unit: str, requested: str, turned: bool = False
     return dataclasses.replace(read, cameras=tuple(scaled), unit_note=note)
 
 
+def mm_of(unit: str) -> float:
+    """Millimetres in a unit: one of UNITS, or board=MM. Raises CalibrationError."""
+    if unit in UNITS:
+        return UNITS[unit]
+    found = re.fullmatch(r"board=([0-9]+(?:\.[0-9]+)?)(?:mm)?", unit)
+    length = float(found[1]) if found else 0.0
+    if not 1e-3 <= length <= 1e5:
+        raise CalibrationError(
+            f"'{unit}' is no unit of a calibration.",
+            f"Write one of {', '.join(UNITS)}, or board=MM: the mm that are 1 in the file.",
+        )
+    return length
+
+
 def _unit(cameras: tuple[Camera, ...], named: str) -> tuple[float, str]:
     """The factor to mm, and its reason as a sentence."""
     if named:
-        return (1.0 if named == "mm" else 1000.0), f"The calibration is in {named}, as the file says."
+        return mm_of(named), f"The calibration is in {named}, as the file says."
     centres = np.array([camera.centre for camera in cameras])
     distance = float(np.median(np.linalg.norm(centres, axis=1)))
     if len(centres) > 1:

@@ -22,7 +22,7 @@ import gc
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import av
@@ -201,7 +201,9 @@ FORWARD = 24
 class VideoMeasure:
     """A video measured by decoding all of it. width, height : pixels as shown (the file's rotation applied).
 
-    uneven_frame : the first frame that is not where a constant frame rate puts it, or -1.
+    uneven_frame : the first frame that is not where a constant frame rate puts it, or -1. turned : degrees clockwise by
+    which the file itself says to turn its pictures. interlaced : whether most frames are of two fields. times : (F,)
+    seconds as the file has them, empty where it has none.
     """
 
     width: int
@@ -209,6 +211,9 @@ class VideoMeasure:
     frame_count: int
     fps: float
     uneven_frame: int
+    turned: int = 0
+    interlaced: bool = False
+    times: Array = field(default_factory=lambda: np.zeros(0), compare=False)
 
 
 def measure_video(path: Path, on_frame: Callable[[int, int], None] | None = None) -> VideoMeasure:
@@ -223,13 +228,14 @@ def measure_video(path: Path, on_frame: Callable[[int, int], None] | None = None
 
 def _measured(path: Path, on_frame: Callable[[int, int], None]) -> VideoMeasure:
     times: list[float] = []
-    width = height = 0
+    width = height = turned = fields = 0
     with open_video(path) as container:
         stream = container.streams.video[0]
         announced = announced_frames(container, stream)
         for frame in _decoded(path, container, stream):
-            turned = round(frame.rotation / 90.0) % 2 == 1
-            size = (frame.height, frame.width) if turned else (frame.width, frame.height)
+            turned = round(-frame.rotation / 90.0) % 4 * 90
+            fields += frame.interlaced_frame
+            size = (frame.height, frame.width) if turned in (90, 270) else (frame.width, frame.height)
             if times and size != (width, height):
                 raise FootageError(
                     f"'{path.name}' changes its size at frame {len(times)}.", "Re-encode it with one size."
@@ -242,13 +248,15 @@ def _measured(path: Path, on_frame: Callable[[int, int], None]) -> VideoMeasure:
         nominal = float(stream.average_rate or stream.guessed_rate or 0)
     if not times:
         raise FootageError(f"'{path.name}' holds no frames.", "Record or export the video again.")
-    if len(times) < announced - max(1, announced // 100):
+    if len(times) < announced - max(1, announced // 100) - _hidden_frames(path, announced - len(times)):
         raise FootageError(
             f"'{path.name}' ends at frame {len(times)} of the {announced} that it announces.",
             "The file was cut short: copy or export it again.",
         )
     fps, uneven = _rate(np.array(times), nominal)
-    return VideoMeasure(width, height, len(times), fps, uneven)
+    known = np.array(times)
+    shown_at = known if np.isfinite(known).all() and np.all(np.diff(known) > 0.0) else np.zeros(0)
+    return VideoMeasure(width, height, len(times), fps, uneven, turned, 2 * fields > len(times), shown_at)
 
 
 class VideoReader:
@@ -383,6 +391,18 @@ def _packet_times(path: Path) -> tuple[list[int] | None, list[int]]:
             return [], []
     shown.sort()
     return [time for time, _ in shown], [number for number, (_, key) in enumerate(shown) if key]
+
+
+def _hidden_frames(path: Path, lacking: int) -> int:
+    """Frames that an edit list hides, of those that are lacking: they are only there to decode the others."""
+    hidden = 0
+    with open_video(path) as container:
+        try:
+            for packet in container.demux(container.streams.video[0]):
+                hidden += packet.is_discard and packet.size > 0
+        except av.error.FFmpegError:
+            return 0
+    return min(hidden, lacking)
 
 
 def _again(first: av.VideoFrame, rest: Iterator[av.VideoFrame]) -> Iterator[av.VideoFrame]:

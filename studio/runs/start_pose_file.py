@@ -61,7 +61,7 @@ def start_pose_from_file(path: Path, body: BodyModel, frame: int, fps: float) ->
     """The pose (D,), radians and mm, that a file gives for a frame, and its origin as text.
 
     A CSV has one row, its header the body's parameters. Of a TRC the row whose `Time` × fps is the frame is
-    taken (its first row is frame 0) and the body is fitted to the markers that both have. Raises RunError,
+    taken and the body is fitted to the markers that both have. Raises RunError,
     BodyError, TruthError naming the file.
     """
     if not path.is_file():
@@ -71,7 +71,7 @@ def start_pose_from_file(path: Path, body: BodyModel, frame: int, fps: float) ->
     if path.suffix.lower() != ".trc":
         return read_pose(path, parameter_names(body), frame), f"file {path.name}"
     motion = read_trc(path)
-    rows = np.rint((motion.times - motion.times[0]) * fps).astype(int)
+    rows = np.rint(motion.times * fps).astype(int)
     found = np.flatnonzero(rows == frame)
     if not found.size:
         raise TruthError(
