@@ -193,6 +193,8 @@ VIDEO_SUFFIXES = frozenset((".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".m
 STEADY = 0.6
 """Frames may lie this share of a frame's duration off an even spacing before a frame rate is called
 variable."""
+MOST_GAPS, ROUNDED = 0.1, 5e-4
+"""At most this share of the frames' steps are gaps; measured rates are this near the usual one that they are."""
 FORWARD = 24
 """A jump forward of up to this many frames is decoded through instead of sought."""
 
@@ -366,14 +368,29 @@ def _decoded(
 
 
 def _rate(times: Array, nominal: float) -> tuple[float, int]:
-    """Frames per second, and the first frame off an even spacing (-1: none)."""
+    """Frames per second, and the first frame off an even spacing (-1: none), in which lost ones leave gaps."""
     if len(times) < 2 or not np.all(np.isfinite(times)):
         return nominal, -1
+    steps = np.diff(times)
+    usual = float(np.median(steps))
+    gaps = np.maximum(np.round(steps / usual) - 1.0, 0.0) if usual > 0.0 else np.zeros(len(steps))
+    if 0 < np.count_nonzero(gaps) <= MOST_GAPS * len(steps):
+        fps = 1.0 / float(steps[gaps == 0.0].mean())
+        slots = np.arange(len(times)) + np.concatenate([[0.0], np.cumsum(gaps)])
+        off = np.abs((times - times[0]) * fps - slots)
+        if not np.any(off > STEADY):
+            return _rounded(fps), -1
     fps = (len(times) - 1) / float(times[-1] - times[0]) if times[-1] > times[0] else nominal
     if nominal > 0.0 and abs(fps / nominal - 1.0) < 0.005:
         fps = nominal
     off = np.abs((times - times[0]) * fps - np.arange(len(times)))
     return fps, int(np.argmax(off > STEADY)) if np.any(off > STEADY) else -1
+
+
+def _rounded(fps: float) -> float:
+    """A rate that was measured, as the usual one that it is."""
+    usual = min((round(fps), round(fps * 1.001) / 1.001), key=lambda rate: abs(rate - fps))
+    return usual if usual > 0.0 and abs(usual / fps - 1.0) < ROUNDED else fps
 
 
 def _packet_times(path: Path) -> tuple[list[int] | None, list[int]]:

@@ -13,7 +13,7 @@ from studio.errors import RunError, TruthError
 from studio.geometry.reach import within_reach
 from studio.motion_files.trc import read_trc
 from studio.runs.search_space import parameter_names
-from studio.sessions.named_rows import pose_frame, read_pose, write_pose
+from studio.sessions.named_rows import check_radians, pose_frame, read_pose, write_pose
 from studio.sessions.names import free_name
 from studio.sessions.provenance import note
 from studio.sessions.session import START_POSE_NAME, Session
@@ -69,7 +69,9 @@ def start_pose_from_file(path: Path, body: BodyModel, frame: int, fps: float) ->
             f"There is no start pose file '{path}'.", "Give a CSV with one row of parameters, or a TRC."
         )
     if path.suffix.lower() != ".trc":
-        return read_pose(path, parameter_names(body), frame), f"file {path.name}"
+        pose = read_pose(path, parameter_names(body), frame)
+        check_radians(path, body, pose)
+        return pose, f"file {path.name}"
     motion = read_trc(path)
     rows = np.rint(motion.times * fps).astype(int)
     found = np.flatnonzero(rows == frame)

@@ -29,7 +29,7 @@ from studio.sessions.importers.mask_forms import write_meant_masks
 from studio.sessions.importers.measuring import MeasuredSource
 from studio.sessions.importers.plan import SourcePlan
 from studio.sessions.manifest import SessionManifest, now, write_manifest
-from studio.sessions.named_rows import read_pose, read_sigma, write_pose, write_sigma
+from studio.sessions.named_rows import check_radians, read_pose, read_sigma, write_pose, write_sigma
 from studio.sessions.names import free_name, name_from
 
 COPY_CHUNK = 8_000_000
@@ -60,7 +60,7 @@ def check_person(plan: SourcePlan) -> CheckedPerson:
         fitted = body
     names = tuple(entry.name for entry in body.parameters)
     if plan.start_pose_file is not None:
-        read_pose(plan.start_pose_file, names)
+        check_radians(plan.start_pose_file, body, read_pose(plan.start_pose_file, names))
     if plan.sigma_file is not None:
         read_sigma(plan.sigma_file, names, 1.0)
     for path in plan.truth:
