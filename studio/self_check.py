@@ -1,6 +1,7 @@
 """Whether this machine can run the studio: everything that it stands on tried once, with what to do where it fails."""
 
 import contextlib
+import importlib
 import importlib.metadata
 import os
 import platform
@@ -24,11 +25,14 @@ from studio.declaring import Terminal
 from studio.errors import StudioError
 from studio.jobs.batch import track_to_end
 from studio.launch import PORT, served_at
+from studio.likelihood.edge_region import CPU, DEVICE_MODULE, GPU
 from studio.numba_in_threads import numba
 from studio.runs.new_run import prepare_run
+from studio.runs.problem_source import ProblemSource
 from studio.runs.samples import install_sample
 from studio.runs.self_contained import assets_folder
 from studio.sessions.workspace import Workspace
+from studio.settings import changed_settings, default_settings
 
 PACKAGE = "capture-studio"
 OLDEST_PYTHON = (3, 11)
@@ -36,6 +40,8 @@ LEAST_FREE_BYTES = 2_000_000_000
 DECODERS, ENCODERS = ("h264", "hevc", "mjpeg", "mpeg4", "png"), ("libx264",)
 ENDINGS = (".png", ".jpg", ".tif")
 QUICK = {"particles": 20, "layers": 2}
+MOST_APART = 0.01
+"""Nats between a pose on the card and on the processor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +76,7 @@ def doctor(
         ("workspace", lambda: _workspace(place.root)),
         ("disk", lambda: _disk(place.root)),
         ("port", lambda: _port(place.root)),
-        ("graphics card", lambda: "none is needed: everything runs on the processor"),
+        ("graphics card", _card),
         ("one frame tracked", _tracked),
     )
     return tuple(_examined(name, check) for name, check in checks)
@@ -214,6 +220,39 @@ def _port(root: Path) -> str:
         raise _Fault(
             f"{PORT} cannot be used ({error.strerror})", "Serve on another one: studio serve --port 0."
         ) from None
+
+
+def _card() -> str:
+    """Evaluates a sample's pose on the card, where there is one, and compares it with the processor."""
+    try:
+        why = importlib.import_module(DEVICE_MODULE).missing()
+    except ImportError as error:
+        why = str(error)
+    if why:
+        return f"none is needed, everything runs on the processor ({why})"
+    remedy = (
+        "Install the extra again, which brings versions that fit (pip install 'capture-studio[gpu]'), and the card's"
+        " driver; or set device to cpu."
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        session = install_sample(Workspace(Path(folder)), "planar_arm")
+        body = session.body()
+        problems = ProblemSource(session, body)
+        pose = np.zeros((1, len(body.parameters)))
+        try:
+            there, here = (
+                problems.problem(
+                    0, changed_settings(default_settings(weighting_name="edge-region"), {"device": device})
+                ).log_likelihood(pose)
+                for device in (GPU, CPU)
+            )
+        except StudioError as error:
+            raise _Fault(error.message, remedy) from None
+        finally:
+            problems.close()
+    if np.abs(there - here).max() > MOST_APART:
+        raise _Fault("a pose on the card is weighed otherwise than on the processor", remedy)
+    return "its kernels compile, run and agree with the processor"
 
 
 def _tracked() -> str:

@@ -12,7 +12,7 @@ from studio.capture.calibration_parts import FoundCameras
 from studio.capture.naming import natural_key
 from studio.capture.sanity import check_rotation
 from studio.errors import CalibrationError
-from studio.foreign_files import foreign_file, read_foreign_text
+from studio.foreign_files import foreign_file, read_file, read_foreign_text
 from studio.geometry.camera import Camera
 from studio.geometry.rotations import rotation_from_vector
 
@@ -35,7 +35,9 @@ def read_bouguet(path: Path) -> FoundCameras:
 
 def _read_file(path: Path) -> Camera:
     where = f"'{path.name}'"
-    if b"\0" in path.read_bytes()[:4096]:
+    with foreign_file(path, CalibrationError, "a list of numbers", "Export it again."):
+        binary = b"\0" in read_file(path)[:4096]
+    if binary:
         raise CalibrationError(
             f"{where} is binary: a .cal of Motive (OptiTrack), it seems, which only Motive reads. Bouguet's is text.",
             "Export the cameras from Motive as text, or calibrate with a board; read are a Pose2Sim, aniposelib,"

@@ -69,7 +69,12 @@ def read_toml(path: Path) -> FoundCameras:
 def write_calibration(
     cameras: tuple[Camera, ...], path: Path, crops: dict[str, AssumedCrop] | None = None
 ) -> None:
-    """Write the canonical file: mm, rotation as matrix rows, names as sections' `name`."""
+    """Write the canonical file (`calibration_text`)."""
+    path.write_text(calibration_text(cameras, crops), encoding="utf-8")
+
+
+def calibration_text(cameras: tuple[Camera, ...], crops: dict[str, AssumedCrop] | None = None) -> str:
+    """The canonical file: mm, rotation as matrix rows, names as sections' `name`."""
     document: dict[str, object] = {}
     for index, camera in enumerate(cameras):
         table: dict[str, object] = {
@@ -86,7 +91,7 @@ def write_calibration(
             table["assumed_crop"] = asdict(crop) | {"calibrated": list(crop.calibrated)}
         document[f"cam_{index:02d}"] = table
     document["metadata"] = {"format": CANONICAL, "version": VERSION, "unit": "mm"}
-    path.write_text(tomli_w.dumps(document), encoding="utf-8")
+    return tomli_w.dumps(document)
 
 
 def is_canonical(path: Path) -> bool:

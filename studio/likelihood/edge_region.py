@@ -18,7 +18,8 @@ doing so is small: with all four Lee-walk pictures cut off below the hips the be
 mm.
 
 **On a device.** `device` has the sums of Eq. 14 and 15 found on a graphics card (`edge_region_device`, which also says
-how equal they are); occlusion-aware edges are the processor's alone.
+how equal they are); occlusion-aware edges are the processor's alone. With `auto` a card that is not there, or that
+fails in compiling or launching a kernel, leaves the work to the processor, and a frame's notes say why, once.
 
 **Occlusion-aware edges.** A side that passes behind a nearer limb makes no edge in the picture. With the
 option on, such samples are left out of Eq. 14 and its N (of that view and pose) counts the others; if none is
@@ -54,7 +55,7 @@ from studio.likelihood.visible_edges import hidden_samples, limb_sides
 from studio.numba_in_threads import parallel_blocks
 
 if TYPE_CHECKING:
-    from studio.likelihood.edge_region_device import DeviceLimbs, EdgeRegionDevice
+    from studio.likelihood.edge_region_device import EdgeRegionDevice
 
 IntArray = NDArray[np.int64]
 Words = NDArray[np.uint32]
@@ -62,8 +63,8 @@ Words = NDArray[np.uint32]
 CPU, AUTO, GPU = "cpu", "auto", "gpu"
 DEVICE_MODULE = "studio.likelihood.edge_region_device"
 NO_DEVICE_HINT = (
-    "It needs an NVIDIA card, its driver and the extra `gpu` (pip install 'capture-studio[gpu]'); set device to cpu, or"
-    " to auto, which takes a card only where there is one."
+    "It needs an NVIDIA card, its driver and the extra `gpu` (pip install 'capture-studio[gpu]'), which `studio doctor`"
+    " tries; set device to cpu, or to auto, which takes a card only where one works."
 )
 # About half a millisecond of a four-camera frame.
 BLOCKS_A_THREAD = 24
@@ -121,11 +122,18 @@ class EdgeRegionSettings:
 
 
 class EdgeRegionLikelihood(Preparation):
-    """Makes that of any frame. device : what finds the sums in place of the processor, and all limbs there."""
+    """Makes that of any frame. device : what finds the sums in place of the processor. unsaid : why the processor finds
+    them where a card was to be taken if there is one; the next frame's notes say it.
+    """
 
     def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: EdgeRegionSettings) -> None:
         super().__init__(body, cameras, settings)
-        self.device = device_for(settings, self)
+        self.device: EdgeRegionDevice | None = None
+        self.unsaid: tuple[str, ...] = ()
+        try:
+            self.device = device_for(settings, self)
+        except StudioError as error:
+            self.unsaid = without_device(settings, error)
 
     @property
     def samples_per_evaluation(self) -> int:
@@ -145,25 +153,39 @@ class EdgeRegionFrameLikelihood(BaseFrameLikelihood):
 
     def __init__(self, likelihood: EdgeRegionLikelihood, maps: Maps) -> None:
         self.likelihood, self.priors, self.maps = likelihood, likelihood.priors, maps
-        self._there = None if likelihood.device is None else likelihood.device.maps(maps)
+        self._notes, likelihood.unsaid = likelihood.unsaid, ()
+        device = likelihood.device
+        try:
+            self._there = None if device is None else device.maps(maps)
+        except Exception as error:
+            self._give_up(error)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Why the processor finds the sums, in the first frame after a card was not there or failed."""
+        return self._notes
 
     def log_likelihood(self, poses: Array, stage: int = 0) -> Array:
         """(N, D) poses to (N,) log-weights, Eq. 17. Raises BodyError for poses that are no finite (N, D)."""
-        if self._there is not None:
-            return self.shares(poses).values.sum(axis=(1, 2))
+        there = self.terms_there(poses)
+        if there is not None:
+            return self._shares(*there).values.sum(axis=(1, 2))
         outlines = self.likelihood.projector.blocks(poses)
         return self._evaluated(outlines, self.hidden(outlines), len(poses))[1]
 
     def terms(self, poses: Array) -> tuple[Array, Array]:
         """Σe and Σr, each (N, V), of poses (N, D)."""
-        if self.likelihood.device is not None:
-            return self.terms_there(poses, self.likelihood.device.all_limbs)
+        there = self.terms_there(poses)
+        if there is not None:
+            return there
         outlines = self.likelihood.projector.blocks(poses)
         return self.terms_of(outlines, self.hidden(outlines), len(poses))
 
     def shares(self, poses: Array) -> Shares:
         """-a Σe and -b Σr of every camera."""
-        edge, region = self.terms(poses)
+        return self._shares(*self.terms(poses))
+
+    def _shares(self, edge: Array, region: Array) -> Shares:
         settings, names = self.likelihood.settings, tuple(camera.name for camera in self.likelihood.cameras)
         values = np.stack([-settings.edge_weight * edge, -settings.region_weight * region], axis=2)
         return Shares(names, ("edge", "region"), values)
@@ -177,18 +199,34 @@ class EdgeRegionFrameLikelihood(BaseFrameLikelihood):
         terms = self._evaluated(outlines, hidden, count)[0]
         return terms[..., 0], terms[..., 1]
 
-    def terms_there(self, poses: Array, limbs: "DeviceLimbs") -> tuple[Array, Array]:
-        """Σe and Σr, each (N, V), of poses (N, D) over some limbs, found on the device.
+    def terms_there(self, poses: Array, limbs: NDArray[np.int64] | None = None) -> tuple[Array, Array] | None:
+        """Σe and Σr, each (N, V), of poses (N, D) over some limbs by number (None: all), found on the device; None
+        where the processor is to find them.
 
-        Raises BodyError for poses that are no finite (N, D).
+        Raises BodyError for poses that are no finite (N, D), StudioError where a card that was asked for fails.
         """
         device, settings = self.likelihood.device, self.likelihood.settings
-        assert device is not None
-        assert self._there is not None
-        sums = device.sums(self.likelihood.projector.checked(poses), self._there, limbs)
+        if device is None or self._there is None:
+            return None
+        finite = self.likelihood.projector.checked(poses)
+        try:
+            # Kernels are compiled by a process's first launch.
+            chosen = device.limbs(limbs)
+            sums = device.sums(finite, self._there, chosen)
+        except Exception as error:
+            self._give_up(error)
+            return None
         samples = CHUNK * np.array([EDGE_LINES * settings.edge_chunks, REGION_LINES * settings.region_chunks])
-        terms = sums / (WORST * samples * len(limbs.frame))
+        terms = sums / (WORST * samples * len(chosen.frame))
         return terms[..., 0], terms[..., 1]
+
+    def _give_up(self, error: Exception) -> None:
+        """The processor from now on, in this frame and the next. Raises StudioError where the card was asked for."""
+        refused = StudioError(f"The card failed: {in_a_line(error)}.", NO_DEVICE_HINT)
+        note = without_device(self.likelihood.settings, refused)
+        # Another frame's failure has said it already.
+        self._notes += note if self.likelihood.device is not None else ()
+        self.likelihood.device = self._there = None
 
     def _evaluated(
         self, outlines: NDArray[np.float32], hidden: NDArray[np.uint64], count: int
@@ -229,30 +267,39 @@ class EdgeRegionFrameLikelihood(BaseFrameLikelihood):
 def device_for(settings: EdgeRegionSettings, likelihood: Preparation) -> "EdgeRegionDevice | None":
     """What the setting `device` asks for; None is the processor.
 
-    Raises SettingsError for what is not computed there, StudioError where there is no device, both for GPU alone.
+    Raises SettingsError for what is not computed there, StudioError where there is no device or it cannot be used.
     """
     if settings.device == CPU:
         return None
     projector = likelihood.projector
+    if settings.occlusion_aware:
+        raise SettingsError(
+            "Occlusion-aware edges are not found on a GPU.",
+            "Set device to cpu, or occlusion_aware to false.",
+        )
+    samples = settings.edge_chunks * CHUNK, settings.region_chunks * CHUNK
     try:
-        if settings.occlusion_aware:
-            raise SettingsError(
-                "Occlusion-aware edges are not found on a GPU.",
-                "Set device to cpu, or occlusion_aware to false.",
-            )
-        try:
-            module = importlib.import_module(DEVICE_MODULE)
-        except ImportError as error:
-            raise StudioError(f"A GPU cannot be used: {error}.", NO_DEVICE_HINT) from error
+        module = importlib.import_module(DEVICE_MODULE)
         why = module.missing()
-        if why:
-            raise StudioError(f"A GPU cannot be used: {why}.", NO_DEVICE_HINT)
-        samples = settings.edge_chunks * CHUNK, settings.region_chunks * CHUNK
-        return module.EdgeRegionDevice(projector.program, projector.camera_table, samples)
+        if not why:
+            return module.EdgeRegionDevice(projector.program, projector.camera_table, samples)
     except StudioError:
-        if settings.device == GPU:
-            raise
-        return None
+        raise
+    except Exception as error:
+        raise StudioError(f"A GPU cannot be used: {in_a_line(error)}.", NO_DEVICE_HINT) from error
+    raise StudioError(f"A GPU cannot be used: {why}.", NO_DEVICE_HINT)
+
+
+def without_device(settings: EdgeRegionSettings, error: StudioError) -> tuple[str, ...]:
+    """A note that says why the processor evaluates. Raises the error where the settings ask for the card."""
+    if settings.device == GPU:
+        raise error
+    return (f"The processor evaluates edges and region. {error.message}",)
+
+
+def in_a_line(error: Exception) -> str:
+    """An error of a library in one line, its kind where it says nothing else."""
+    return " ".join(str(error).split()).rstrip(" :.") or type(error).__name__
 
 
 def weighting_maps(evidence: FrameEvidence) -> Maps:

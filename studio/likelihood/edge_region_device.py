@@ -10,6 +10,7 @@ that both round in single precision falls on either side of a pixel's border, wh
 Each such sample changes Σe or Σr by at most 1 / N.
 """
 
+import functools
 import math
 from typing import Any, NamedTuple
 
@@ -166,11 +167,17 @@ class DeviceLimbs(NamedTuple):
     shape: Any
 
 
+@functools.cache
+def kernels() -> tuple[Any, Any]:
+    """`find_frames` and `add_samples` for the device, compiled by their first launch in a process."""
+    return cuda.jit(find_frames), cuda.jit(add_samples)
+
+
 class EdgeRegionDevice:
-    """The sums of one body in some cameras; immutable. all_limbs : of the body."""
+    """The sums of one body in some cameras."""
 
     def __init__(self, program: KinematicProgram, cameras: CameraTable, samples: tuple[int, int]) -> None:
-        """samples : on each side, on each inner line."""
+        """samples : on each side, on each inner line. Raises StudioError for a body with too many limbs."""
         self._program, self._samples, self._views = program, samples, len(cameras)
         self._cameras = cuda.to_device(cameras)
         given = (
@@ -182,17 +189,21 @@ class EdgeRegionDevice:
             program.fixed,
         )
         self._tables = tuple(cuda.to_device(np.ascontiguousarray(table)) for table in given)
-        self.all_limbs = self.limbs(np.arange(len(program.limb_frame)))
-        self._find, self._add = cuda.jit(find_frames), cuda.jit(add_samples)
-
-    def limbs(self, chosen: NDArray[np.int64]) -> DeviceLimbs:
-        """The limbs of some numbers. Raises StudioError for more than fit into a block of threads."""
-        if len(chosen) > MOST_LIMBS:
+        self._limbs: dict[bytes, DeviceLimbs] = {}
+        count = len(program.limb_frame)
+        if count > MOST_LIMBS:
             raise StudioError(
-                f"A GPU takes bodies of at most {MOST_LIMBS} limbs, not {len(chosen)}.", "Set device to cpu."
+                f"A GPU takes bodies of at most {MOST_LIMBS} limbs, not {count}.", "Set device to cpu."
             )
-        frame, shape = self._program.limb_frame[chosen], self._program.limb_shape[chosen]
-        return DeviceLimbs(cuda.to_device(frame), cuda.to_device(np.ascontiguousarray(shape)))
+
+    def limbs(self, chosen: NDArray[np.int64] | None = None) -> DeviceLimbs:
+        """The limbs of some numbers, of all if None."""
+        numbers = np.arange(len(self._program.limb_frame)) if chosen is None else chosen
+        key = numbers.tobytes()
+        if key not in self._limbs:
+            frame, shape = self._program.limb_frame[numbers], self._program.limb_shape[numbers]
+            self._limbs[key] = DeviceLimbs(cuda.to_device(frame), cuda.to_device(np.ascontiguousarray(shape)))
+        return self._limbs[key]
 
     def maps(self, maps: Maps) -> Maps:
         """A frame's maps, on the device."""
@@ -200,14 +211,15 @@ class EdgeRegionDevice:
 
     def sums(self, poses: Array, maps: Maps, limbs: DeviceLimbs) -> NDArray[np.int32]:
         """(N, V, 2) sums of the edge and the region map of poses (N, D)."""
+        find, add = kernels()
         found = np.empty((len(poses), self._views, 2), dtype=np.int32)
         for first in range(0, len(poses), POSES_AT_ONCE):
             some = np.ascontiguousarray(poses[first : first + POSES_AT_ONCE].T, dtype=np.float64)
             count = some.shape[1]
             frames = cuda.device_array((len(self._program.parent), FRAME, count), np.float32)
             sums = cuda.device_array((count, self._views, 2), np.int32)
-            self._find[-(-count // THREADS), THREADS](cuda.to_device(some), *self._tables, frames)
-            self._add[(count, self._views), THREADS](
+            find[-(-count // THREADS), THREADS](cuda.to_device(some), *self._tables, frames)
+            add[(count, self._views), THREADS](
                 frames, limbs.frame, limbs.shape, self._cameras, maps.values, maps.views, *self._samples, sums
             )
             found[first : first + count] = sums.copy_to_host()

@@ -41,7 +41,7 @@ class EdgeRegionSilhouetteSettings(EdgeRegionSettings):
 
 
 class EdgeRegionSilhouetteLikelihood:
-    """Makes the likelihood of any frame; immutable."""
+    """Makes the likelihood of any frame."""
 
     def __init__(
         self, body: BodyModel, cameras: tuple[Camera, ...], settings: EdgeRegionSilhouetteSettings
@@ -49,8 +49,6 @@ class EdgeRegionSilhouetteLikelihood:
         self.settings, self.cameras = settings, cameras
         self.edge_region = EdgeRegionLikelihood(body, cameras, settings)
         self.trunk = np.unique(body_edges(body).trunk[:, 0])
-        device = self.edge_region.device
-        self.trunk_there = None if device is None else device.limbs(self.trunk)
 
     def problem(self, evidence: FrameEvidence) -> "EdgeRegionSilhouetteFrameLikelihood":
         """One frame as a function of poses. Raises FootageError where views do not fit the cameras."""
@@ -71,6 +69,11 @@ class EdgeRegionSilhouetteFrameLikelihood(BaseFrameLikelihood):
         self.likelihood, self.edge_region, self.silhouettes = likelihood, edge_region, silhouettes
         self.priors = edge_region.priors
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Those of edges and region."""
+        return self.edge_region.notes
+
     def terms(self, poses: Array, stage: int = WHOLE_BODY) -> tuple[Array, Array, Array]:
         """1 - Σe, 1 - Σr and f_s, each (N, V), of poses (N, D).
 
@@ -82,12 +85,13 @@ class EdgeRegionSilhouetteFrameLikelihood(BaseFrameLikelihood):
     def _found(self, poses: Array, stage: int) -> tuple[Array, Array, Areas]:
         """Σe and Σr, each (N, V), and the areas of poses (N, D)."""
         outlines = self.likelihood.edge_region.projector.blocks(poses)
-        trunk, there = self.likelihood.trunk, self.likelihood.trunk_there
+        trunk = self.likelihood.trunk
         trunk_alone = stage == TRUNK_FIRST and len(trunk) < outlines.shape[2]
-        if there is not None:
-            edge, region = self.edge_region.terms(poses)
-            if trunk_alone:
-                edge = self.edge_region.terms_there(poses, there)[0]
+        there = self.edge_region.terms_there(poses)
+        trunk_there = self.edge_region.terms_there(poses, trunk) if there and trunk_alone else None
+        if there is not None and (trunk_there is not None or not trunk_alone):
+            edge, region = there
+            edge = edge if trunk_there is None else trunk_there[0]
         else:
             hidden = self.edge_region.hidden(outlines)
             edge, region = self.edge_region.terms_of(outlines, hidden, len(poses))

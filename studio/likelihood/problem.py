@@ -68,6 +68,11 @@ class BaseFrameLikelihood(ABC):
 
     priors: HardPriors
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know of how the frame was evaluated, in sentences."""
+        return ()
+
     @abstractmethod
     def log_likelihood(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
         """(N, D) poses to (N,) log-weights. Raises BodyError for poses that are no finite (N, D)."""

@@ -37,11 +37,13 @@ from studio.scene.body_trial import TrialView, trial_pose
 from studio.scene.controls import Change
 from studio.scene.floor_view import FloorView, light
 from studio.scene.model import (
+    LayerPlayback,
     Model,
     Selection,
     Subject,
     Trial,
     advance,
+    advance_layers,
     camera_clicked,
     edit_pose,
     hear,
@@ -51,6 +53,7 @@ from studio.scene.model import (
     request,
     same_drawing,
     same_pictures,
+    scrub,
     select,
     set_playback,
     settle,
@@ -84,8 +87,9 @@ Values = TypeVarTuple("Values")
 
 
 class SceneController:
-    """Owns a scene's model and views. moved : called in the scene's thread with the selection whenever the scene's
-    controls, playback or the tracking changed it; it must return at once.
+    """Owns a scene's model and views. moved : called in the scene's thread with the selection and the playback of
+    layers whenever the scene's controls, playback or the tracking changed the selection, or anything whether and how
+    layers are played; it must return at once.
     """
 
     def __init__(
@@ -93,7 +97,7 @@ class SceneController:
         server: viser.ViserServer,
         workspace: Workspace,
         process: StudioControl,
-        moved: Callable[[Selection], None],
+        moved: Callable[[Selection, LayerPlayback], None],
     ) -> None:
         self._server, self._workspace, self._process, self._moved = server, workspace, process, moved
         self.model = Model(process.state)
@@ -142,11 +146,20 @@ class SceneController:
     # Changes that need more than the model.
 
     def show_run(
-        self, model: Model, session: str, run: str, frame: int | None = None, layer: int | None = None
+        self,
+        model: Model,
+        session: str,
+        run: str,
+        frame: int | None = None,
+        layer: int | None = None,
+        *,
+        is_scrubbed: bool = True,
     ) -> Model:
-        """Show a session ("" : none) and one of its runs ("" : none), a frame (None: as it is), a layer."""
-        model = replace(self._open(model, session, run), trial=None)
-        return select(show_frame(model, frame), layer=layer)
+        """Show a session ("" : none) and one of its runs ("" : none), a frame (None: as it is), a layer. is_scrubbed :
+        whether the layer was chosen by hand, else layers that are played go on.
+        """
+        model = show_frame(replace(self._open(model, session, run), trial=None), frame)
+        return scrub(model, layer) if is_scrubbed or not model.layers.playing else model
 
     def try_body(self, model: Model, session: str, body: BodyModel | None) -> Model:
         """Show a body that is being made in place of a session's own, or ("") alone on the floor; None: no longer."""
@@ -382,6 +395,8 @@ class SceneController:
             now = time.monotonic()
             if self.model.playback.playing:
                 self._happen(advance, (now - before,))
+            if self.model.layers.playing:
+                self._happen(advance_layers, (now - before, self._layers_so_far()))
             before = now
             self._pace()
             for drawing, draw in zip(self._drawings, (self._draw, self._draw_pictures), strict=True):
@@ -404,7 +419,8 @@ class SceneController:
     def _patience(self) -> float:
         """Seconds to wait for events: until the next redraw is due."""
         now = time.monotonic()
-        rest = REDRAW_SECONDS if self.model.playback.playing else IDLE_SECONDS
+        plays = self.model.playback.playing or self.model.layers.playing
+        rest = REDRAW_SECONDS if plays else IDLE_SECONDS
         return min((drawing.waits(now) for drawing in self._drawings if drawing.is_wanted), default=rest)
 
     def _listen(self, patience: float) -> None:
@@ -470,8 +486,9 @@ class SceneController:
         if self._refining is not None and (edit is None or edit.refining is None):
             self._refining.stop()
             self._refining = None
-        if announce and self.model.selection != before.selection:
-            self._moved(self.model.selection)
+        is_moved = announce and self.model.selection != before.selection
+        if is_moved or self.model.layers.state != before.layers.state:
+            self._moved(self.model.selection, self.model.layers)
 
     def _guarded(self, action: Callable[[], Any]) -> Any:  # noqa: ANN401 - what the action gives
         """Call an action and handle its errors, so that an unreadable file does not end the thread."""
@@ -493,6 +510,11 @@ class SceneController:
             layers=int(getattr(self.model.knobs.settings.tracker, "layers", 1)),
             track=self.model.options.track,
         )
+
+    def _layers_so_far(self) -> int:
+        """How many layers of the shown frame are there, of whatever search is shown."""
+        moment = self._moment()
+        return max((record.layer + 1 for record in moment.records), default=0) if moment is not None else 0
 
     def _draw(self) -> None:
         model, tokens = self.model, colour_tokens(self.model.options.dark)

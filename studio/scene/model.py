@@ -25,6 +25,8 @@ SEARCHING = ("tracking", "compiling")
 NEAR_THE_END = 3
 """A viewer who goes to one of the last frames while more are tracked keeps following."""
 REMEMBERED = 256
+MOST_LATE = 0.5
+"""Of a layer's time that one which is shown late may begin with; what is later still is not caught up."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +98,30 @@ class Playback:
     speed: float = 1.0
     loop: bool = True
     debt: float = 0.0
+
+
+LOOP, PING_PONG = "loop", "pingpong"
+LAYER_MODES = LOOP, PING_PONG
+
+
+@dataclass(frozen=True, slots=True)
+class LayerPlayback:
+    """Playing the shown frame's layers. rate : layers a second. mode : start over after the last layer, or turn back.
+
+    phase : how much of the shown layer's time has passed, 0..1: its particles travel from their parents' places to
+    their own. backwards : the way back of a ping-pong, on which the phase falls.
+    """
+
+    playing: bool = False
+    rate: float = 3.0
+    mode: str = LOOP
+    phase: float = 1.0
+    backwards: bool = False
+
+    @property
+    def state(self) -> tuple[bool, float, str]:
+        """The choices: all but where it is."""
+        return self.playing, self.rate, self.mode
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -200,6 +226,7 @@ class Model:
     selection: Selection = Selection()
     options: ViewOptions = ViewOptions()
     playback: Playback = Playback()
+    layers: LayerPlayback = LayerPlayback()
     live: LiveSearch = LiveSearch()
     subject: Subject | None = None
     frames: tuple[int, ...] = ()
@@ -272,6 +299,7 @@ def opened(
             session, run, frames[-1] if frames else None, follow=model.selection.follow, editing=False
         ),
         playback=replace(model.playback, playing=False),
+        layers=replace(model.layers, playing=False, phase=1.0, backwards=False),
         live=LiveSearch(),
         subject=subject,
         frames=tuple(frames),
@@ -372,6 +400,8 @@ def set_playback(
         now.loop if loop is None else loop,
         now.debt if playing is None else 0.0,
     )
+    if after.playing and model.layers.playing:
+        model = stop_layers(model)
     return model if after == now else replace(model, playback=after)
 
 
@@ -403,6 +433,75 @@ def played(
     if place >= len(frames) and not playback.loop:
         return replace(playback, playing=False, debt=0.0), frames[-1]
     return replace(playback, debt=due - steps), frames[place % len(frames)]
+
+
+# Playing the layers of the shown frame.
+
+
+def set_layer_playback(
+    model: Model, playing: bool | None = None, rate: float | None = None, mode: str | None = None
+) -> Model:
+    """Play the shown frame's layers or stop, and how; None leaves it. Frames and layers are not played at once."""
+    now = model.layers
+    after = replace(
+        now,
+        playing=now.playing if playing is None else playing,
+        rate=now.rate if rate is None else rate,
+        mode=now.mode if mode is None else mode,
+    )
+    if after.playing and not now.playing:
+        after = replace(after, phase=0.0, backwards=False)
+        model = set_playback(model, playing=False)
+    elif not after.playing:
+        after = replace(after, phase=1.0, backwards=False)
+    return model if after == now else replace(model, layers=after)
+
+
+def stop_layers(model: Model) -> Model:
+    """Stop playing layers: the shown one stays, its particles at their places."""
+    return set_layer_playback(model, playing=False)
+
+
+def scrub(model: Model, layer: int | None) -> Model:
+    """Show one layer's cloud (None: all together), by hand: layers are no longer played."""
+    return select(stop_layers(model), layer=layer)
+
+
+def advance_layers(model: Model, seconds: float, count: int) -> Model:
+    """Advance the playback of layers by `seconds`. count : layers of the shown frame that are there so far."""
+    if not model.layers.playing or count < 1:
+        return model
+    layers, layer = played_layers(model.layers, seconds, model.selection.layer, count)
+    return select(replace(model, layers=layers), layer=layer)
+
+
+def played_layers(
+    layers: LayerPlayback, seconds: float, layer: int | None, count: int
+) -> tuple[LayerPlayback, int]:
+    """The playback and the layer to show after so many seconds. count : layers there are, from 0; one at least.
+
+    No layer is skipped, however long nothing was drawn. A ping-pong shows the last and the first layer both ways.
+    """
+    if layer is None or layer >= count:
+        return replace(layers, phase=0.0, backwards=False), 0
+    passed = seconds * layers.rate
+    if layers.backwards and layers.mode == PING_PONG:
+        phase = layers.phase - passed
+        if phase > 0.0:
+            return replace(layers, phase=phase), layer
+        late = min(-phase, MOST_LATE)
+        if layer > 0:
+            return replace(layers, phase=1.0 - late), layer - 1
+        return replace(layers, phase=late, backwards=False), 0
+    phase = layers.phase + passed
+    if phase < 1.0:
+        return replace(layers, phase=phase, backwards=False), layer
+    late = min(phase - 1.0, MOST_LATE)
+    if layer + 1 < count:
+        return replace(layers, phase=late, backwards=False), layer + 1
+    if layers.mode == PING_PONG and count > 1:
+        return replace(layers, phase=1.0 - late, backwards=True), layer
+    return replace(layers, phase=late, backwards=False), 0
 
 
 # What the tracking process reports.

@@ -6,6 +6,7 @@ the request to the scene's own thread and return.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 
 import numpy as np
 
@@ -17,12 +18,15 @@ from studio.scene.controller import SceneController
 from studio.scene.guarded_server import GuardedServer
 from studio.scene.model import (
     Ghost,
+    LayerPlayback,
     Selection,
     ViewOptions,
     change_options,
     discard_what_if,
     look_through,
+    scrub,
     select,
+    set_layer_playback,
     set_playback,
     show_frame,
     show_ghosts,
@@ -34,14 +38,15 @@ class SceneServer:
     """The scene of one window. process : the tracking process, shared by all windows.
 
     moved : called with every move that the scene's own controls, its playback or the tracking make, in the scene's
-    thread; it returns at once. bare : without controls. Moves made through `show_run` and its like are not reported.
+    thread; it returns at once. bare : without controls. Moves made through `show_run` and its like are not reported,
+    but whether and how layers are played always is.
     """
 
     def __init__(
         self,
         workspace: Workspace,
         process: StudioControl,
-        moved: Callable[[Selection], None] = lambda _: None,
+        moved: Callable[[Selection, LayerPlayback], None] = lambda shown, layers: None,
         *,
         bare: bool = False,
     ) -> None:
@@ -71,11 +76,25 @@ class SceneServer:
         """The current selection."""
         return self._controller.model.selection
 
+    @property
+    def layers(self) -> LayerPlayback:
+        """Whether and how layers are played."""
+        return self._controller.model.layers
+
     def show_run(
-        self, session: str, run: str = "", frame: int | None = None, layer: int | None = None
+        self,
+        session: str,
+        run: str = "",
+        frame: int | None = None,
+        layer: int | None = None,
+        *,
+        is_scrubbed: bool = True,
     ) -> None:
-        """Show a session and one of its runs ("" : the session alone), a frame, one layer's cloud (None: all)."""
-        self._controller.post(self._controller.show_run, session, run, frame, layer, announce=False)
+        """Show a session and one of its runs ("" : the session alone), a frame, one layer's cloud (None: all).
+        is_scrubbed : layers that are played stop; else they go on, and `layer` counts only where none are.
+        """
+        show = partial(self._controller.show_run, is_scrubbed=is_scrubbed)
+        self._controller.post(show, session, run, frame, layer, announce=False)
 
     def show_frame(self, frame: int) -> None:
         """Show a stored frame; where it is not stored the nearest one."""
@@ -86,8 +105,8 @@ class SceneServer:
         self._controller.post(lambda model: select(model, **changes), announce=False)
 
     def show_layer(self, layer: int | None) -> None:
-        """Show one layer's cloud, or all (None)."""
-        self.select(layer=layer)
+        """Show one layer's cloud, or all (None); layers that are played stop."""
+        self._controller.post(scrub, layer, announce=False)
 
     def follow(self, following: bool) -> None:
         """Show each frame as it is tracked, or stay where the viewer is."""
@@ -128,6 +147,12 @@ class SceneServer:
     ) -> None:
         """Play stored frames, or stop. speed : 1 is real time. loop : start over at the end. None leaves each."""
         self._controller.post(set_playback, playing, speed, loop, announce=False)
+
+    def play_layers(
+        self, playing: bool | None = None, *, rate: float | None = None, mode: str | None = None
+    ) -> None:
+        """Play the shown frame's layers, or stop. rate : layers a second. mode : of LAYER_MODES. None leaves each."""
+        self._controller.post(set_layer_playback, playing, rate, mode)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,6 +1,6 @@
 """What the 3-D scene shows: the page's timeline, layer buttons and camera keys arrive here."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from fastapi import APIRouter
@@ -10,7 +10,7 @@ from studio.body.reader import parse_body
 from studio.errors import SettingsError
 from studio.geometry.reach import within_reach
 from studio.operations.own_bodies import MOST_TEXT
-from studio.scene.model import Selection
+from studio.scene.model import LayerPlayback, Selection
 from studio.server.app_state import App, AppState, Scene
 from studio.server.schemas import Request, RunName
 
@@ -32,10 +32,11 @@ class GhostBody(Request):
 class SceneRequest(Request):
     """What is to be shown; what is left out stays as it is.
 
-    With `session` the whole moment is named: `run` left out shows the session alone, `layer` left out
-    all layers. follow: whether each frame is shown as it is tracked. look_through: a camera's name, null
-    or "" for the free view. options: what is drawn, by the names of the scene's own view options (body,
-    truth, particles, trails, cameras, pictures, overlays …). playing, speed (1 is real time), loop: of stored frames.
+    With `session` the whole moment is named: `run` left out shows the session alone, `layer` left out all layers, or
+    the ones that are played go on; a layer that is given is shown by itself, and playing layers ends. follow: whether
+    each frame is shown as it is tracked. look_through: a camera's name, null or "" for the free view. options: what is
+    drawn, by the names of the scene's own view options (body, truth, particles, trails, cameras, pictures, overlays …).
+    playing, speed (1 is real time), loop: of stored frames.
     limb, parameter, particle (a row of the layer's cloud), camera: what else is chosen, null for none. eye: from where
     the scene is looked at and what is looked at, metres; null: the usual place. ghosts: bodies beside the answer, until
     another frame is shown. body: the file of a body that is being made, shown in place of the session's own, or without
@@ -77,7 +78,7 @@ def show(request: SceneRequest, app: App, scene: Scene) -> None:
     elif request.session is not None:
         session = app.workspace.session(request.session)
         run = session.run(request.run).name if request.run else ""
-        scene.show_run(session.name, run, request.frame, request.layer)
+        scene.show_run(session.name, run, request.frame, request.layer, is_scrubbed="layer" in given)
     else:
         if request.frame is not None:
             scene.show_frame(request.frame)
@@ -122,10 +123,48 @@ def view(request: SceneRequest, app: App, scene: Scene) -> None:
     show(request, app, scene)
 
 
+class LayerPlaying(Request):
+    """How the shown frame's layers are to be played; what is left out stays as it is.
+
+    rate: layers a second. mode: what follows the last layer, the first one or the way back. Frames and layers are not
+    played at once.
+    """
+
+    playing: bool | None = None
+    rate: float | None = Field(None, ge=1.0, le=10.0)
+    mode: Literal["loop", "pingpong"] | None = None
+
+
+class LayersPlayed(Request):
+    """Whether and how layers are played in the asking window's scene. rate: layers a second."""
+
+    playing: bool
+    rate: float
+    mode: Literal["loop", "pingpong"]
+
+
+@router.post("/play-layers", status_code=204)
+def play_layers(request: LayerPlaying, scene: Scene) -> None:
+    """Play the shown frame's layers in the asking window's scene, or stop: the stored ones, those of the frame in
+    progress so far, or those of a what-if. Each move is told by a `scene` event.
+    """
+    scene.play_layers(request.playing, rate=request.rate, mode=request.mode)
+
+
+@router.get("/play-layers")
+def layers_played(scene: Scene) -> LayersPlayed:
+    """Whether and how layers are played."""
+    return LayersPlayed.model_validate(_played(scene.layers))
+
+
+def _played(layers: LayerPlayback) -> dict[str, object]:
+    return {"playing": layers.playing, "rate": layers.rate, "mode": layers.mode}
+
+
 def report_moves(app: AppState) -> None:
     """From now on, report the moves that a scene's own controls make to its window (`scene` events)."""
 
-    def moved(window: str, shown: Selection) -> None:
+    def moved(window: str, shown: Selection, layers: LayerPlayback) -> None:
         app.events.publish(
             {
                 "type": "scene",
@@ -142,6 +181,7 @@ def report_moves(app: AppState) -> None:
                 "follow": shown.follow,
                 "editing": shown.editing,
                 "request_number": shown.request_number,
+                "layers": _played(layers),
             },
             window,
         )

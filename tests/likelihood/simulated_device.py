@@ -42,7 +42,7 @@ def terms_of(name, device):
         if device == "cpu":
             found["trunk"] = 1.0 - three.terms(poses, TRUNK_FIRST)[0]
         else:
-            found["trunk"] = three.edge_region.terms_there(poses, likelihood.trunk_there)[0]
+            found["trunk"] = three.edge_region.terms_there(poses, likelihood.trunk)[0]
     return found
 
 

@@ -1,6 +1,8 @@
 """Edge and region on a device: in Numba's simulator against the processor, as PTX, and where there is none."""
 
+import importlib
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -15,8 +17,17 @@ from weighting_scene import four_cameras
 from studio.body.catalogue import load_body
 from studio.errors import SettingsError, StudioError
 from studio.geometry.camera_table import camera_table, outward_limit
+from studio.jobs.batch import track_to_end
 from studio.likelihood import edge_region
 from studio.likelihood.edge_region import EdgeRegionLikelihood, EdgeRegionSettings
+from studio.likelihood.edge_region_silhouette import (
+    EdgeRegionSilhouetteLikelihood,
+    EdgeRegionSilhouetteSettings,
+)
+from studio.likelihood.problem import TRUNK_FIRST, WHOLE_BODY
+from studio.runs.new_run import prepare_run
+from studio.runs.samples import install_sample
+from studio.sessions.workspace import Workspace
 
 HERE = Path(__file__).parent
 BODIES = ("human31", "planar_arm4")
@@ -29,7 +40,7 @@ def simulated(tmp_path_factory):
     simulator = {
         "NUMBA_ENABLE_CUDASIM": "1",
         "NUMBA_DISABLE_JIT": "1",
-        "PYTHONPATH": f"{HERE}{os.pathsep}{HERE.parent}",
+        "PYTHONPATH": os.pathsep.join(map(str, (HERE, HERE.parent, HERE.parents[1]))),
     }
     # Words of 64 bits wrap around where masks are packed, on purpose.
     wrapping = "ignore:overflow encountered in scalar:RuntimeWarning"
@@ -116,11 +127,13 @@ def settings(**knobs):
     return EdgeRegionSettings(**knobs)
 
 
+def three_settings(**knobs):
+    return EdgeRegionSilhouetteSettings(**knobs)
+
+
 @pytest.fixture
 def no_device(monkeypatch):
     """A machine without a card, whatever this one has."""
-    import importlib  # noqa: PLC0415
-
     module = importlib.import_module(edge_region.DEVICE_MODULE)
     monkeypatch.setattr(module, "missing", lambda: "no card here")
 
@@ -136,6 +149,89 @@ def test_without_a_card_the_gpu_is_refused_and_auto_is_the_processor(no_device):
         for device in ("auto", "cpu")
     ]
     np.testing.assert_array_equal(*weighed)
+
+
+def broken(what):
+    """In place of the device's kernels: these fail as numba-cuda 0.30.4 does beside NumPy 2.5, or as a driver does."""
+    failures = {
+        "compilation": AttributeError("module 'numpy' has no attribute 'row_stack'"),
+        "launch": RuntimeError("[999] Call to cuLaunchKernel results in\n CUDA_ERROR_UNKNOWN"),
+    }
+
+    class Kernel:
+        def __getitem__(self, grid):
+            if what == "compilation":
+                raise failures[what]
+            return self.launched
+
+        def launched(self, *_):
+            raise failures[what]
+
+    return Kernel(), Kernel()
+
+
+class Memory:
+    """A card's memory, which works."""
+
+    @staticmethod
+    def to_device(values):
+        return values
+
+    @staticmethod
+    def device_array(shape, kind):
+        return np.zeros(shape, kind)
+
+
+@pytest.mark.parametrize(
+    ("fails", "why"),
+    [("compilation", "row_stack"), ("launch", "cuLaunchKernel results in CUDA_ERROR_UNKNOWN")],
+)
+def test_a_card_that_fails_leaves_auto_to_the_processor_which_says_why_once(monkeypatch, fails, why):
+    """There is a card; its kernels cannot be compiled, or the first launch fails."""
+    device = importlib.import_module(edge_region.DEVICE_MODULE)
+    monkeypatch.setattr(device, "missing", lambda: "")
+    monkeypatch.setattr(device, "cuda", Memory)
+    monkeypatch.setattr(device, "kernels", lambda: broken(fails))
+    body, cameras, evidence, poses = scene_of("human31")
+    expected = EdgeRegionLikelihood(body, cameras, settings()).problem(evidence).log_likelihood(poses)
+    likelihood = EdgeRegionLikelihood(body, cameras, settings(device="auto"))
+    assert likelihood.device is not None
+    first, beside = likelihood.problem(evidence), likelihood.problem(evidence)
+    assert first.notes == ()
+    np.testing.assert_array_equal(first.log_likelihood(poses), expected)
+    np.testing.assert_array_equal(beside.log_likelihood(poses), expected)
+    later = likelihood.problem(evidence)
+    np.testing.assert_array_equal(later.log_likelihood(poses), expected)
+    (note,) = first.notes + beside.notes + later.notes
+    assert note.startswith("The processor evaluates edges and region.")
+    assert why in note
+
+    three = EdgeRegionSilhouetteLikelihood(body, cameras, three_settings(device="auto")).problem(evidence)
+    here = EdgeRegionSilhouetteLikelihood(body, cameras, three_settings()).problem(evidence)
+    for stage in (WHOLE_BODY, TRUNK_FIRST):
+        np.testing.assert_array_equal(three.log_likelihood(poses, stage), here.log_likelihood(poses, stage))
+    assert len(three.notes) == 1
+
+    asked_for = EdgeRegionLikelihood(body, cameras, settings(device="gpu")).problem(evidence)
+    with pytest.raises(StudioError, match=re.escape(why)) as caught:
+        asked_for.log_likelihood(poses)
+    assert "device to cpu" in caught.value.hint
+
+
+def test_a_run_stores_why_it_does_without_a_card(no_device, tmp_path):
+    """A note of its first frame, and of no other."""
+    session = install_sample(Workspace(tmp_path), "planar_arm")
+    run = prepare_run(
+        session,
+        weighting="edge-region",
+        first=0,
+        last=2,
+        knobs={"device": "auto", "particles": 10, "layers": 2},
+    )
+    track_to_end(session, run, lambda words, done, total: None)
+    with run.results() as results:
+        noted = [[note for note in results.result(frame).notes if "no card here" in note] for frame in (0, 1)]
+    assert noted == [["The processor evaluates edges and region. A GPU cannot be used: no card here."], []]
 
 
 def test_without_numbas_target_the_gpu_is_refused(monkeypatch):

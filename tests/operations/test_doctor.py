@@ -1,10 +1,12 @@
 """`studio doctor` passes here, and names each of the faults that are planted, with a remedy."""
 
 import collections
+import importlib
 import importlib.metadata
 import json
 import socket
 import sqlite3
+import types
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,6 +18,7 @@ from click.testing import CliRunner
 from studio import self_check as examination
 from studio.cli.main import main
 from studio.errors import RunError
+from studio.likelihood.edge_region import DEVICE_MODULE, EdgeRegionFrameLikelihood
 from studio.self_check import Examined, doctor
 from studio.sessions.workspace import Workspace
 
@@ -100,6 +103,43 @@ def taken_port(patch: pytest.MonkeyPatch, folder: Path) -> None:
     OPEN.append(taken)
 
 
+def a_card(patch: pytest.MonkeyPatch, add: Callable[..., object]) -> None:
+    """A card whose memory works; `add` stands for the kernel that adds up the samples."""
+
+    class Kernel:
+        def __init__(self, launched: Callable[..., object]) -> None:
+            self.launched = launched
+
+        def __getitem__(self, grid: object) -> Callable[..., object]:
+            return self.launched
+
+    class There(np.ndarray):
+        def copy_to_host(self) -> np.ndarray:
+            return np.asarray(self)
+
+    device = importlib.import_module(DEVICE_MODULE)
+    memory = types.SimpleNamespace(
+        to_device=lambda values: values, device_array=lambda shape, kind: np.zeros(shape, kind).view(There)
+    )
+    patch.setattr(device, "missing", lambda: "")
+    patch.setattr(device, "cuda", memory)
+    patch.setattr(device, "kernels", lambda: (Kernel(lambda *_: None), Kernel(add)))
+
+
+def failing_card(patch: pytest.MonkeyPatch, folder: Path) -> None:
+    """As numba-cuda 0.30.4 fails beside NumPy 2.5, in the first kernel that it compiles."""
+
+    def fail(*_: object) -> None:
+        raise AttributeError("module 'numpy' has no attribute 'row_stack'")
+
+    a_card(patch, fail)
+
+
+def forgetful_card(patch: pytest.MonkeyPatch, folder: Path) -> None:
+    """Its sums are all zero."""
+    a_card(patch, lambda *_: None)
+
+
 def broken_search(patch: pytest.MonkeyPatch, folder: Path) -> None:
     def fail(*_: object) -> None:
         raise RunError("The kernels cannot be compiled.", "Install numba again.")
@@ -120,6 +160,8 @@ def broken_search(patch: pytest.MonkeyPatch, folder: Path) -> None:
         (network_share, "workspace", "cannot be shared", "local disk"),
         (full_disk, "disk", "5 MB are free", "Make room"),
         (taken_port, "port", "cannot be used", "--port 0"),
+        (failing_card, "graphics card", "no attribute 'row_stack'", "capture-studio[gpu]"),
+        (forgetful_card, "graphics card", "otherwise than on the processor", "set device to cpu"),
         (broken_search, "one frame tracked", "cannot be compiled", "Install numba again"),
     ],
 )
@@ -141,6 +183,26 @@ def test_each_planted_fault_is_named(
     assert fault.name == name
     assert found in fault.found
     assert remedy in fault.remedy
+
+
+def test_a_card_that_agrees_with_the_processor_is_good(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sums are whole numbers: 255 times the samples of the limbs times what the terms' means are."""
+
+    def add(frames: np.ndarray, limbs: np.ndarray, *rest: np.ndarray) -> None:
+        samples = np.array([2 * rest[-3], 3 * rest[-2]])
+        rest[-1][:] = np.round(255 * samples * len(limbs) * expected)
+
+    a_card(monkeypatch, add)
+    expected, known = np.zeros(0), EdgeRegionFrameLikelihood.terms_there
+
+    def remembered(self: EdgeRegionFrameLikelihood, poses: np.ndarray, *limbs: np.ndarray) -> object:
+        nonlocal expected
+        outlines = self.likelihood.projector.blocks(poses)
+        expected = np.stack(self.terms_of(outlines, self.hidden(outlines), len(poses)), axis=2)
+        return known(self, poses, *limbs)
+
+    monkeypatch.setattr(EdgeRegionFrameLikelihood, "terms_there", remembered)
+    assert examination._card() == "its kernels compile, run and agree with the processor"
 
 
 def test_the_command_ends_with_1_where_something_is_wrong(

@@ -157,6 +157,69 @@ def test_playing_moves_the_frame(shown: Model) -> None:
     assert stopped.playback == Playback(False, 0.5, False)
 
 
+# Playing layers.
+
+
+def layers_shown(model: Model, times: int, seconds: float = 0.25, count: int = LAYERS) -> list[int | None]:
+    shown = []
+    for _ in range(times):
+        model = scene.advance_layers(model, seconds, count)
+        shown.append(model.selection.layer)
+    return shown
+
+
+def test_layers_are_played_one_after_another_and_start_over(shown: Model) -> None:
+    assert scene.advance_layers(shown, 1.0, LAYERS) is shown
+    playing = scene.set_layer_playback(shown, True, rate=4.0)
+    assert layers_shown(playing, 6) == [0, 1, 2, 3, 0, 1]
+    assert layers_shown(playing, 4, seconds=9.0) == [0, 1, 2, 3], "none is skipped, however late"
+    assert layers_shown(playing, 6, count=2) == [0, 1, 0, 1, 0, 1], "of a frame in progress those so far"
+    assert scene.advance_layers(playing, 1.0, 0) is playing
+    # What is late with one layer is not lost for the next: ten layers take the time of ten.
+    slow, moves = scene.set_layer_playback(playing, rate=10.0), 0
+    before = slow.selection.layer
+    for _ in range(60):
+        slow = scene.advance_layers(slow, 1.0 / 30.0, LAYERS)
+        moves += slow.selection.layer != before
+        before = slow.selection.layer
+    assert moves in (19, 20)
+
+
+def test_a_ping_pong_turns_back_at_both_ends(shown: Model) -> None:
+    playing = scene.set_layer_playback(shown, True, rate=4.0, mode="pingpong")
+    assert layers_shown(playing, 12) == [0, 1, 2, 3, 3, 2, 1, 0, 0, 1, 2, 3]
+    phases = []
+    for _ in range(2 * LAYERS * 5):
+        playing = scene.advance_layers(playing, 0.05, LAYERS)
+        phases.append((playing.selection.layer or 0) + playing.layers.phase)
+    steps = np.abs(np.diff(phases))
+    assert steps.max() < 0.21, "the particles go back the way that they came"
+    assert (
+        layers_shown(scene.set_layer_playback(shown, True, rate=4.0, mode="pingpong"), 3, count=1) == [0] * 3
+    )
+
+
+def test_a_layer_chosen_by_hand_stops_the_layers_and_other_choices_do_not(shown: Model) -> None:
+    playing = scene.advance_layers(scene.set_layer_playback(shown, True), 0.1, LAYERS)
+    assert playing.layers.playing
+    assert playing.layers.phase == pytest.approx(0.0)
+    scrubbed = scene.scrub(playing, 2)
+    assert (scrubbed.selection.layer, scrubbed.layers.playing, scrubbed.layers.phase) == (2, False, 1.0)
+    assert scene.show_frame(playing, 2).layers.playing, "another frame's layers are played on"
+    assert scene.select(playing, limb="head").layers.playing
+    stopped = scene.set_layer_playback(playing, False)
+    assert (stopped.selection.layer, stopped.layers.phase) == (0, 1.0)
+    assert not scene.opened(playing, "s", "q", shown.subject, FRAMES, default_settings()).layers.playing
+    assert scene.set_layer_playback(stopped, False) is stopped
+
+
+def test_frames_and_layers_are_not_played_at_once(shown: Model) -> None:
+    layers = scene.set_layer_playback(scene.set_playback(shown, True), True)
+    assert (layers.playback.playing, layers.layers.playing) == (False, True)
+    frames = scene.set_playback(layers, True)
+    assert (frames.playback.playing, frames.layers.playing) == (True, False)
+
+
 # What is tracked.
 
 

@@ -192,13 +192,34 @@ def test_playback_shows_one_frame_after_another_and_notifies_the_page(
     workspace: Workspace, control: FakeControl
 ) -> None:
     selections: list[Selection] = []
-    stage = SceneServer(workspace, control, selections.append)
+    stage = SceneServer(workspace, control, lambda shown, _: selections.append(shown))
     open_run(stage)
     stage.show_frame(0)
     until(lambda: stage.shown.frame == 0)
     assert selections == [], "the caller is not notified"
     stage.play(True, speed=4.0)
     until(lambda: {shown.frame for shown in selections} >= set(range(1, FRAMES - 1)) and len(selections) > 6)
+    stage.stop()
+
+
+def test_layers_play_and_each_move_is_told_until_one_is_chosen_by_hand(
+    workspace: Workspace, control: FakeControl
+) -> None:
+    told: list[tuple[int | None, tuple[bool, float, str]]] = []
+    stage = SceneServer(workspace, control, lambda shown, layers: told.append((shown.layer, layers.state)))
+    open_run(stage)
+    stage.play_layers(True, rate=10.0)
+    until(lambda: [layer for layer, _ in told].count(LAYERS - 1) >= 2)
+    assert {state for _, state in told} == {(True, 10.0, "loop")}
+    told_of = [layer for layer, _ in told if layer is not None]
+    assert told_of[: LAYERS + 1] == [*range(LAYERS), 0]
+    # What the page says beside the layer leaves them playing; another frame's are played on.
+    stage.show_run("swaying", "run-1", 1, is_scrubbed=False)
+    until(lambda: stage.shown.frame == 1)
+    assert stage.layers.playing
+    stage.show_run("swaying", "run-1", 1, 2)
+    until(lambda: told[-1] == (2, (False, 10.0, "loop")))
+    assert stage.shown.layer == 2
     stage.stop()
 
 

@@ -127,8 +127,10 @@ def test_changes_of_the_workspace_and_moves_of_the_scene_are_reported(studio: St
         studio.client.post("/api/sessions/take1/duplicate", json={"name": "take2"})
         assert next_of(socket, "sessions")["session"] == "take2"
         assert studio.scenes.moved is not None
-        studio.scenes.moved("", studio.stage.shown)
-        assert next_of(socket, "scene")["frame"] is None
+        studio.scenes.moved("", studio.stage.shown, studio.stage.layers)
+        moved = next_of(socket, "scene")
+        assert moved["frame"] is None
+        assert moved["layers"] == {"playing": False, "rate": 3.0, "mode": "loop"}
 
 
 def test_a_sleeping_browser_is_reported_how_much_it_lost() -> None:

@@ -165,7 +165,7 @@ def test_preferences_are_remembered(studio: Studio) -> None:
     ("wish", "calls"),
     [
         ({"session": "take1", "run": "first", "frame": 1, "layer": 2}, [("run", "take1", "first", 1, 2)]),
-        ({"session": "take1"}, [("run", "take1", "", None, None)]),
+        ({"session": "take1"}, [("run", "take1", "", None, None, "goes on")]),
         ({"session": "take1", "run": None, "frame": None, "layer": None}, [("run", "take1", "", None, None)]),
         ({"frame": 3}, [("frame", 3)]),
         ({"layer": None}, [("layer", None)]),
@@ -184,6 +184,19 @@ def test_the_scene_is_reported_what_to_show(
 ) -> None:
     assert studio.client.post(f"/api/scene/{path}", json=wish).status_code == 204
     assert studio.stage.calls == calls
+
+
+def test_layers_are_played_as_asked_and_what_is_left_out_stays(studio: Studio) -> None:
+    path = "/api/scene/play-layers"
+    assert studio.client.get(path).json() == {"playing": False, "rate": 3.0, "mode": "loop"}
+    assert studio.client.post(path, json={"playing": True, "rate": 10}).status_code == 204
+    assert studio.client.post(path, json={"mode": "pingpong"}).status_code == 204
+    assert studio.stage.calls == [
+        ("play layers", True, 10.0, None),
+        ("play layers", None, None, "pingpong"),
+    ]
+    for wrong in ({"rate": 0.5}, {"rate": 11}, {"mode": "random"}, {"speed": 1}):
+        assert studio.client.post(path, json=wrong).status_code == 422
 
 
 def test_the_scene_is_not_reported_of_what_does_not_exist(studio: Studio, tracked: StoredRun) -> None:

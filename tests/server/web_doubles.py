@@ -19,7 +19,7 @@ from studio.export.task import ExportTask, Written
 from studio.jobs.commands import ChangeSettings, Command
 from studio.jobs.events import Event, StateChanged
 from studio.jobs.watchers import Subscription, Watchers
-from studio.scene.model import Selection
+from studio.scene.model import LayerPlayback, Selection
 from studio.sessions.workspace import Workspace
 
 NAN = float("nan")
@@ -87,10 +87,18 @@ class RecordingStage:
     def relay_headers(self) -> Mapping[str, str]:
         return self.headers
 
+    layers: LayerPlayback = field(default_factory=LayerPlayback)
+
     def show_run(
-        self, session: str, run: str = "", frame: int | None = None, layer: int | None = None
+        self,
+        session: str,
+        run: str = "",
+        frame: int | None = None,
+        layer: int | None = None,
+        *,
+        is_scrubbed: bool = True,
     ) -> None:
-        self.calls.append(("run", session, run, frame, layer))
+        self.calls.append(("run", session, run, frame, layer, *(() if is_scrubbed else ("goes on",))))
 
     @property
     def poses(self) -> "RecordingPoses":
@@ -131,6 +139,11 @@ class RecordingStage:
     ) -> None:
         self.calls.append(("play", playing))
 
+    def play_layers(
+        self, playing: bool | None = None, *, rate: float | None = None, mode: str | None = None
+    ) -> None:
+        self.calls.append(("play layers", playing, rate, mode))
+
 
 @dataclass
 class RecordingScenes:
@@ -138,7 +151,7 @@ class RecordingScenes:
 
     plain: RecordingStage = field(default_factory=RecordingStage)
     by_window: dict[str, RecordingStage] = field(default_factory=dict)
-    moved: Callable[[str, Selection], None] | None = None
+    moved: Callable[[str, Selection, LayerPlayback], None] | None = None
     unused: list[set[str]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -150,7 +163,7 @@ class RecordingScenes:
     def open_scenes(self) -> Mapping[str, RecordingStage]:
         return self.by_window
 
-    def watch(self, moved: Callable[[str, Selection], None]) -> None:
+    def watch(self, moved: Callable[[str, Selection, LayerPlayback], None]) -> None:
         self.moved = moved
 
     def close_unused(self, windows: Collection[str]) -> None:

@@ -5,7 +5,7 @@ import { onEvent } from "./live.js";
 import { complain } from "./messages.js";
 import { paced } from "./pacing.js";
 import { dressScene } from "./scene_window.js";
-import { isWatched } from "./header.js";
+import { isWatched } from "./studio/tracking.js";
 import { refreshSessions } from "./sessions.js";
 import { goTo } from "./selection.js";
 import { get, set, watch } from "./state.js";
@@ -34,6 +34,7 @@ let again = [];        // layers of the frame that is annealed again
 let showsAgain = 0;    // timer that shows them
 let asking = "";       // the frame whose layers are on their way
 let isOpening = false; // whether the run's frames are on their way: the scene is built after that
+let plays = false;     // whether the scene plays layers: it goes on with them unless one is chosen here
 let isAnew = true;     // whether the page was loaded since: a frame that was annealed again before is not shown on it
 
 const sceneLater = paced(() => showInScene(), SCENE_MILLISECONDS);
@@ -59,7 +60,8 @@ async function loadFrames(check) {
     if (!isShown(session, run) || track !== get("track")) return true;
     const last = summary.frames.at(-1)?.frame ?? -1;
     summary.frames.push(...arrived.filter((line) => line.frame > last));
-    const newest = summary.frames.at(-1)?.frame ?? null;
+    // A search that was paused inside a run's first frame has layers to be looked at already.
+    const newest = summary.frames.at(-1)?.frame ?? summary.partial ?? null;
     set({ summary, frame: get("frame") === null || (get("follow") && searching()) ? newest : get("frame") });
     // An address may name a frame that is not tracked.
     const known = summary.frames.some((line) => line.frame === get("frame")) || get("detail")?.frame === get("frame");
@@ -122,11 +124,13 @@ async function showInScene() {
   if (!get("session") || isOpening) return;
   const shown = wantedNow();
   if (!isElsewhere(shown) && requested === moves) return;
+  const { layer, ...others } = shown;
+  const request = plays && layer === scene.layer ? others : shown;
   scene = shown;
   requested = moves;
   const discard = isAnew;
   isAnew = false;
-  await post("/api/scene/show", { ...shown, eye: eyeOf(shown.eye), request_number: requested, discard }).catch(complain);
+  await post("/api/scene/show", { ...request, eye: eyeOf(shown.eye), request_number: requested, discard }).catch(complain);
 }
 
 /** The scene's own controls moved, or it plays: follow them, without sending the change back. What it said before it knew of the page's own last move is old. */
@@ -170,7 +174,8 @@ function showAgain() {
 function showLive(frame, finished) {
   if (!get("parameters") || layers[0]?.layer !== 0 || layers.some((layer, at) => layer.layer !== at)) return false;
   drawnAt = performance.now();
-  set({ frame, whatIf: null, detail: { frame, finished, parameters: get("parameters"), layers } });
+  const { search_layers, searches } = layers[0];
+  set({ frame, whatIf: null, detail: { frame, finished, search_layers, searches, parameters: get("parameters"), layers } });
   return true;
 }
 
@@ -238,6 +243,7 @@ export function startData() {
     if (event.state !== "tracking") sessionsLater();
   });
   onEvent("sessions", sessionsLater);
+  onEvent("scene", (event, here) => { if (here) plays = event.layers.playing; });
   onEvent("scene", takeScene);
   let before = false;
   watch(["connected"], () => {

@@ -34,6 +34,7 @@ const values = {
 };
 
 const watchers = new Map();
+const followers = new Set();
 
 /** The current value under a name. */
 export const get = (name) => values[name];
@@ -41,11 +42,14 @@ export const get = (name) => values[name];
 /** Change values and call whoever watches one of them, once each. */
 export function set(changes) {
   const called = new Set();
+  const changed = {};
   for (const [name, value] of Object.entries(changes)) {
     if (values[name] === value) continue;
     values[name] = value;
+    changed[name] = value;
     for (const watcher of watchers.get(name) ?? []) called.add(watcher);
   }
+  for (const follower of followers) follower(changed);
   for (const watcher of called) watcher(values);
 }
 
@@ -57,3 +61,6 @@ export function watch(names, watcher) {
   }
   watcher(values);
 }
+
+/** Call `follower(changed)` with every change of any values, before the watchers; for the signals of components. */
+export const onChange = (follower) => followers.add(follower);

@@ -16,7 +16,7 @@ from studio.capture.footage import MASK_LEVEL
 from studio.capture.pictures import list_pictures, png_of
 from studio.capture.video import VideoReader
 from studio.errors import FootageError
-from studio.foreign_files import foreign_file
+from studio.foreign_files import foreign_file, read_file
 
 SAMPLES = 9
 FULL = 0.5
@@ -128,7 +128,9 @@ class MaskPictures:
             return self._video.read(frame)
         path = self._folder[frame]
         with foreign_file(path, FootageError, "a picture that can be read", "Copy or export it again."):
-            picture = cv2.imdecode(np.frombuffer(path.read_bytes(), np.uint8), cv2.IMREAD_UNCHANGED)
+            picture = cv2.imdecode(
+                np.frombuffer(read_file(path, footage=True), np.uint8), cv2.IMREAD_UNCHANGED
+            )
             if picture.dtype not in (np.uint8, np.uint16):
                 raise ValueError(f"{picture.dtype} pixels")
         return picture
