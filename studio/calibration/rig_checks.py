@@ -254,9 +254,9 @@ def _unit(cameras: Sequence[Camera]) -> Iterator[Finding]:
 
 
 def room_findings(cameras: Sequence[Camera], size_mm: float) -> tuple[Finding, ...]:
-    """A rig in which a body of `size_mm` has no room: another unit was meant."""
+    """A rig in which a body of `size_mm` (0: unknown) has no room: another unit was meant."""
     target = common_target(tuple(cameras))
-    if target is None or looks_at_one_place(cameras):
+    if target is None or size_mm <= 0.0 or looks_at_one_place(cameras):
         return ()
     away = float(np.median([np.linalg.norm(camera.centre - target) for camera in cameras]))
     # Cameras side by side cross their axes anywhere.

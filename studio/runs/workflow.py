@@ -162,8 +162,11 @@ def _standing_mm(session: Session) -> float:
 
 
 def _size_mm(session: Session) -> float:
-    """The longest extent of the session's body."""
-    body = session.body()
+    """The longest extent of the session's body, 0 where that cannot be read."""
+    try:
+        body = session.body()
+    except StudioError:
+        return 0.0
     return float(np.ptp(limb_ends(body, body.neutral)[0].reshape(-1, 3), axis=0).max())
 
 
