@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from studio.capture.calibration_bouguet import BOUGUET_SUFFIX, bouguet_files, read_bouguet
+from studio.capture.calibration_dannce import DANNCE_SUFFIX, dannce_files, is_label3d, read_dannce
 from studio.capture.calibration_easymocap import (
     EXTRINSICS,
     INTRINSICS,
@@ -187,6 +188,9 @@ def _of_other_tools(folder: Path) -> list[Path]:
     found = [path for path in files if is_qualisys(path) or added_reader(path)]
     if is_easymocap(folder):
         return [*found, folder / INTRINSICS]
+    if dannce_files(folder):
+        return [*found, folder]
+    found += [path for path in files if is_label3d(path)]
     opened = opencv_files(folder)
     return [*found, *((folder,) if len(opened) > 1 else opened)]
 
@@ -201,6 +205,8 @@ def _read(path: Path) -> FoundCameras:
         return read_bouguet(path)
     if is_qualisys(path):
         return read_qualisys(path)
+    if suffix == DANNCE_SUFFIX:
+        return read_dannce(path)
     if path.name.lower() in (INTRINSICS, EXTRINSICS):
         return read_easymocap(path)
     added = added_reader(path)
@@ -227,6 +233,8 @@ def _read_folder(folder: Path) -> FoundCameras:
         return read_bouguet(folder)
     if is_easymocap(folder):
         return read_easymocap(folder)
+    if dannce_files(folder):
+        return read_dannce(folder)
     if opencv_files(folder):
         return read_opencv(folder)
     raise CalibrationError(
