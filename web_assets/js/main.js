@@ -15,7 +15,10 @@ import { startLive } from "./live.js";
 import { startLog } from "./log.js";
 import { startPalette } from "./palette.js";
 import { startPlayback } from "./playback.js";
+import { startMissing } from "./studio/missing.js";
+import { startNotes } from "./studio/notes.js";
 import { startRail } from "./rail.js";
+import { startWorkList } from "./studio/work_list.js";
 import { startSceneFrame } from "./scene_frame.js";
 import { refreshSessions } from "./sessions.js";
 import { startTrialCard } from "./studio/trial_card.js";
@@ -26,6 +29,9 @@ import { startTheme } from "./theme.js";
 import { startTimeline } from "./timeline.js";
 import { startTracks } from "./tracks.js";
 import { startViews } from "./views.js";
+import { startCourseColumn } from "./studio/course_column.js";
+import { startFirstSteps } from "./studio/first_steps.js";
+import { startScenePictures } from "./studio/scene_pictures.js";
 import { startWhy } from "./why.js";
 
 async function start() {
@@ -49,9 +55,15 @@ async function start() {
   startCurtain();
   startTrials();
   startTrialCard();
+  startMissing();
+  startWorkList();
+  startNotes();
   startData();
   startTracks();
   startCorrecting();
+  startCourseColumn();
+  startFirstSteps();
+  startScenePictures();
   startSceneFrame(takeKey);
   startTwin(takeKey);
   await refreshSessions();

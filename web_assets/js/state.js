@@ -2,6 +2,7 @@
 
 const values = {
   sessions: null,      // [{name, title, thumbnail, runs: [...]}], null while unknown
+  missing: null,       // what the address names that is not here: {session, run}
   session: null,       // name of the open session
   run: null,           // name of the open run
   track: "raw",        // whose poses are shown: as searched, refined, smoothed …
@@ -30,6 +31,7 @@ const values = {
   trial: null,         // name of the trial that is shown, null while it has none yet
   against: null,       // name of the trial that it is compared with, null: what is stored
   trials: null,        // all that was tried of the shown frame, and the numbers of what is stored of it
+  notes: [],           // notes and bookmarks on the run's frames: [{frame, text, made}]
   work: null,          // the worker's last state
   connected: null,     // whether the event socket is open, null before it was
   stranger: false,     // whether the studio was started anew and does not know this browser

@@ -97,13 +97,14 @@ function varianceOfFrame(sheet, tables, at) {
     const of = (key) =>
       byLayer(mine, layers, key).map((value) => (value !== null && value > 0 ? value : null));
     const noise = [
-      [named(name, "before noise"), of("before"), name ? colour : "series-1", {}],
+      [name || "before noise", of("before"), name ? colour : "series-1", {}],
       [named(name, "after noise"), of("after"), name ? colour : "series-0", { dashed: Boolean(name) }],
     ];
     return name ? noise : [["as weighed", of("weighed"), "text-quiet", { dashed: true }], ...noise];
   });
   const plot = sheet.plot({ ...three, top: 0, height: Math.max(90, at.room - 84) }, {
-    title: at.label(chosen), unit: `variance, ${unit}²`, names: lines.map(([name]) => name),
+    title: at.label(chosen), unit: `variance, ${unit}²${at.tried ? "; dashed: after noise" : ""}`,
+    names: at.tried ? sides.map(({ name }) => name) : lines.map(([name]) => name),
     x: categories(layers.map(layerName), "layer"), y: logarithmic(), over: tipOfLayer,
   });
   const click = ({ dataIndex }) => ({ layer: layers[dataIndex], parameter: chosen });

@@ -114,7 +114,7 @@ function ChangeLine({ line }) {
     <td class="value new">
       ${figure(tried)}${unit && html`<small> ${unit}</small>`}
     </td>
-    <td class="bar">
+    <td class="change-bar">
       <i style=${style}></i><span class="hidden-words">${kind === "same" ? "as before" : kind}</span>
     </td>
   </tr>`;

@@ -92,7 +92,7 @@ function TriedScene({ takeKey }) {
       const style = page.createElement("style");
       // The first scene has the panel and says what there is to say.
       style.textContent =
-        "body > *:not(#root) { display: none !important } .mantine-Notifications-root { display: none }";
+        "body > *:not(#root) { display: none !important } .mantine-Notifications-root, .mantine-Paper-root { display: none !important }";
       page.head.append(style);
       wait = window.setInterval(() => {
         if (!canvasOf(page)) return;
