@@ -26,6 +26,7 @@ _VERBS = {
     "studio.operations.gallery": ("gallery",),
     "studio.operations.inspecting": ("compare_runs", "seeds", "view", "why"),
     "studio.operations.masks": ("background", "mask_quality"),
+    "studio.operations.notes": ("note", "notes"),
     "studio.operations.opening": (
         "bodies",
         "list_runs",

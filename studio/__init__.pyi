@@ -25,6 +25,8 @@ from studio.operations.inspecting import view as view
 from studio.operations.inspecting import why as why
 from studio.operations.masks import background as background
 from studio.operations.masks import mask_quality as mask_quality
+from studio.operations.notes import note as note
+from studio.operations.notes import notes as notes
 from studio.operations.opening import bodies as bodies
 from studio.operations.opening import list_runs as list_runs
 from studio.operations.opening import list_sessions as list_sessions

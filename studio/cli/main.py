@@ -47,6 +47,8 @@ COMMANDS = {
     "sweep": ("comparison_commands", "operations.comparing.sweep"),
     "learn": ("behaviour_commands", "operations.behaviours.learn"),
     "models": ("behaviour_commands", "operations.behaviours.models"),
+    "note": ("note_commands", "operations.notes.note"),
+    "notes": ("note_commands", "operations.notes.notes"),
     "export": ("result_commands", "operations.results.export_run"),
     "share": ("result_commands", "operations.sharing.share"),
     "synthesize": ("footage_commands", "operations.footage.synthesize"),

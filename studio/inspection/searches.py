@@ -3,7 +3,6 @@
 from studio.errors import StudioError
 from studio.inspection.reading import InspectedFrame
 from studio.trackers.catalogue import TRACKERS
-from studio.trackers.tracker import LayerRecord
 
 
 def layers_of_a_search(frame: InspectedFrame) -> int:
@@ -23,9 +22,3 @@ def searches_of(frame: InspectedFrame) -> int:
     if frame.result is not None or frame.number != frame.of.run.record.first:
         return begun
     return max(begun, getattr(frame.settings.tracker, "start_repeats", 1))
-
-
-def last_search(frame: InspectedFrame) -> tuple[LayerRecord, ...]:
-    """The layers of the frame's last search, whose result is the frame's."""
-    count = layers_of_a_search(frame)
-    return frame.layers[(len(frame.layers) - 1) // count * count :]

@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 from studio_page import PATIENCE, StudioPage
 from studio_server import StudioServer
-from toy_session import make_session, true_poses
+from toy_session import FRAMES, make_session, true_poses
 
 pytestmark = pytest.mark.browser
 
@@ -77,3 +77,57 @@ def test_the_first_frame_shows_the_layers_that_there_are(
     expect(page.locator(f"{TILES}:not(.to-come)")).to_have_count(done)
     expect(page.locator(TILES)).to_have_count(2 * LAYERS)
     expect(page.locator("#panel-why .figure-chart canvas").first).to_be_visible()
+
+
+def test_layers_are_played_stepped_and_left(window: StudioPage, studio: StudioServer, page: Page) -> None:
+    studio.pace(0.0)
+    page.click("#track-toggle")
+    window.until(f"get('work').state === 'finished' && get('summary')?.frames.length === {FRAMES}")
+    window.key("Home")
+    window.until("get('frame') === 0 && get('detail')?.frame === 0 && get('detail').finished")
+    words = page.locator("#layer-label span")
+    page.get_by_label("Layers a second").select_option(label="10/s")
+    window.key("Shift+Space")
+    button = page.locator("#play-layers")
+    expect(button).to_have_attribute("aria-label", "Pause layers")
+    # All layers of both searches come, and the first one again.
+    window.until("get('layer') === 2")
+    window.until(f"get('layer') === {2 * LAYERS - 1}")
+    expect(words).to_have_text(f"layer {LAYERS} of {LAYERS}, second search")
+    window.until("get('layer') === 0")
+    # A drag scrubs, and what plays stops.
+    box = page.locator(TILES).nth(LAYERS).bounding_box()
+    assert box
+    page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    window.until(f"get('layer') === {LAYERS}")
+    expect(button).to_have_attribute("aria-label", "Play layers")
+    expect(words).to_have_text(f"layer 1 of {LAYERS}, second search")
+    window.key("Shift+ArrowLeft")
+    window.until(f"get('layer') === {LAYERS - 1}")
+    strip = page.get_by_role("slider", name="Layer")
+    expect(strip).to_have_attribute("aria-valuenow", str(LAYERS))
+    strip.focus()
+    page.keyboard.press("Home")
+    window.until("get('layer') === 0")
+    page.keyboard.press("Escape")
+    window.until("get('layer') === null")
+    expect(words).to_have_text("all layers")
+
+
+def test_a_what_if_is_kept_as_a_run_of_its_own(window: StudioPage, studio: StudioServer, page: Page) -> None:
+    before = studio.text(f"{RUNS}/one/poses.csv")
+    studio.post(f"{RUNS}/one/settings?frame=5", {"survival": 0.8}, method="PATCH")
+    window.key("End")
+    window.page.evaluate("async () => (await import('/assets/js/selection.js')).select({ frame: 5 })")
+    window.until("get('frame') === 5 && get('work').state === 'finished'")
+    window.key("r")
+    window.until(f"get('whatIf')?.length === {LAYERS} && get('work').state === 'finished'")
+    page.get_by_role("button", name="Keep as a new run", exact=True).click()
+    window.until(f"get('run') !== 'one' && get('summary')?.frames.length === {FRAMES}")
+    made = str(window.get("run"))
+    after = studio.text(f"{RUNS}/{made}/poses.csv").splitlines()
+    assert after[:6] == before.splitlines()[:6]
+    assert after[6:] != before.splitlines()[6:]
+    assert studio.get(f"{RUNS}/{made}/frames/5")["layers"][0]["alpha_wanted"] == 0.8
+    # Nothing of the run that was shown is lost.
+    assert studio.text(f"{RUNS}/one/poses.csv") == before

@@ -22,6 +22,8 @@ SESSION_COMMANDS: dict[str, Sequence[Sequence[str]]] = {
     "share": (("share", f"{NAME}/{RUN}", "--out", "{out}/page.html"),),
     "synchronise": (("synchronise", NAME),),
     "check": (("check", f"{NAME}/{RUN}"),),
+    "notes": (("notes", f"{NAME}/{RUN}"),),
+    "note": (("note", f"{NAME}/{RUN}", "--frame", "1"),),
     "import": (("import", "{session}", "--into", "again"),),
     "add-footage": (("add-footage", NAME, "{session}"),),
 }

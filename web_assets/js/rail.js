@@ -1,9 +1,10 @@
 // Sessions and their runs: list, open, import, new run, rename, duplicate, delete to the trash.
 
-import { fetchJson, patch, post, remove, runPath, sessionPath } from "./api.js";
+import { fetchJson, patch, post, readOnly, remove, runPath, sessionPath } from "./api.js";
 import { figure } from "./chart_looks.js";
 import { compareForm } from "./comparing.js";
 import { openForm, openMenu } from "./dialogs.js";
+import { acceptDrops } from "./dropping.js";
 import { button, byId, element, fill, NAME } from "./elements.js";
 import { importForm } from "./importing.js";
 import { complain, say } from "./messages.js";
@@ -85,6 +86,20 @@ function sessionMenu(opener, entry) {
   ]);
 }
 
+/** A run as one page, with the particles of chosen frames. */
+function shareForm(path, isOpen) {
+  const shown = isOpen && get("frame") !== null ? String(get("frame")) : "";
+  openForm({
+    heading: "Share as one page", intro: "One file that opens without the studio: settings, charts, the body moving, and layer by layer the particles of the frames that you name.", action: "Save the page",
+    rows: [[{ name: "frames", label: "Frames with particles (9, 13, …)", value: shown, placeholder: "the worst one" }]],
+    send: ({ frames }) => {
+      const chosen = String(frames ?? "").split(/[\s,]+/).filter(Boolean);
+      if (chosen.some((one) => !/^\d+$/.test(one)) || chosen.length > 12) throw Object.assign(new Error(`'${frames}' are not up to twelve frames.`), { hint: "Write their numbers, with commas between." });
+      go(`${path}/shared.html?${new URLSearchParams([...chosen.slice(0, 1).map((one) => ["frame", one]), ...chosen.slice(1).map((one) => ["clouds", one])])}`);
+    },
+  });
+}
+
 function runMenu(opener, entry, run) {
   const path = runPath(entry.name, run.name);
   const open = get("session") === entry.name && get("run") === run.name;
@@ -92,7 +107,7 @@ function runMenu(opener, entry, run) {
     ["Refine…", () => makeTrackForm(entry.name, run.name, "refine")],
     ["Smooth…", () => makeTrackForm(entry.name, run.name, "smooth")],
     ["Export…", () => { openSession(entry.name, run.name); showPanel("export"); }],
-    ["Share as one page", () => go(`${path}/shared.html`)],
+    ["Share as one page…", () => shareForm(path, open)],
     ["Poses as CSV", () => go(`${path}/poses.csv`)],
     ["Compare with…", () => compareForm(entry.name, run.name)],
     ["New run like this…", () => newRunForm(entry, run)],
@@ -210,7 +225,8 @@ async function drawTrash() {
 
 /** Wire the rail. */
 export function startRail() {
-  byId("import-open").onclick = importForm;
+  byId("import-open").onclick = () => importForm();
+  if (!readOnly) acceptDrops("Drop videos or a folder to import them", importForm);
   byId("session-new").onclick = () => go("/way?new");
   list.addEventListener("keydown", takeArrow);
   watch(["sessions", "session", "run"], draw);

@@ -6,18 +6,12 @@
 import { figure } from "../chart_looks.js";
 import { byId } from "../elements.js";
 import { stepLayer } from "../selection.js";
+import { get } from "../state.js";
 import { layerColour, onTheme } from "../theme.js";
 import { follow, html, mount, signal, useMemo } from "./component.js";
 import { LayerOutline, scaleOf } from "./layer_outline.js";
 import { layerPlayback, playLayers, RATES, scrubTo, toggleLayers } from "./layer_playback.js";
-import {
-  layersOf,
-  layerWords,
-  searchName,
-  shownLayers,
-  survivorsOf,
-  varianceShare,
-} from "./shown_layers.js";
+import { layersOf, layerWords, searchName, survivorsOf, varianceShare } from "./shown_layers.js";
 
 const PLAY = "M4 2.5v11l9-5.5z";
 const PAUSE = "M4 3h3v10H4zM9 3h3v10H9z";
@@ -244,16 +238,12 @@ export function step(by) {
   stepLayer(by);
 }
 
-/** Leave the layers: stop what plays, then show all of them together. Whether there was anything to leave. */
+/** Leave the layers: stop what plays and show all of them together. Whether there was anything to leave. */
 export function leaveLayers() {
-  if (!layerPlayback.value.playing && (shownLayers().layers.length === 0 || !hasChosen())) {
-    return false;
-  }
+  if (!layerPlayback.value.playing && get("layer") === null) return false;
   scrubTo(null);
   return true;
 }
-
-const hasChosen = () => byId("layer-tiles")?.querySelector(".chosen") !== null;
 
 /** Show the strip. */
 export function startLayerStrip() {
