@@ -91,8 +91,8 @@ DEUTSCHER_REID_SECTION_6 = Preset(
                 "diffusion_covariance": "full",
                 "diffusion_constant": EQ_18_CONSTANT,
             },
-            why="The constant is not printed. On the bundled walk, which no figure is tried on, 0.01 and 0.03 are as good, "
-            "and 0.1 loses the body.",
+            why="The constant is not printed. On the bundled walk, which no figure is tried on, 0.01 and 0.03 are as "
+            "good, and 0.1 loses the body.",
         ),
         Printed(
             "Each particle is made from two parents, cut at two random parameters (6.2.1, Eq. 19)",
