@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import zstandard
 from store_records import layer_of, record_of, result_of
 from toy_session import make_session
 
@@ -18,6 +19,7 @@ from studio.runs.verifying import UNTOUCHED_SECONDS, remove_left_behind, verify
 from studio.sessions import atomic_files
 from studio.sessions.foreign_sessions import inspect_place
 from studio.sessions.process_lock import ProcessLock
+from studio.sessions.results_codec import LARGEST_BLOB, unpack
 from studio.sessions.results_store import ResultsReader, ResultsWriter
 from studio.sessions.run_log import append_to_log, read_log
 from studio.sessions.session import Session
@@ -273,3 +275,10 @@ def test_a_disk_that_cannot_be_written_is_verified_all_the_same(
     monkeypatch.setattr("studio.sessions.record_files.write_bytes", refused)
     (taken.path / "new").write_text("words")
     assert verify(taken).faults == ()
+
+
+def test_a_result_unpacks_to_a_bounded_size() -> None:
+    bomb = zstandard.ZstdCompressor().compress(bytes(LARGEST_BLOB + 1))
+    assert len(bomb) < 1 << 20
+    with pytest.raises(SessionError, match="unpacks to more than"):
+        unpack(bomb)
