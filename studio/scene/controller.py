@@ -139,6 +139,16 @@ class SceneController:
         self._inbox.append((change, values, announce))
         self._events.put(_WAKE)
 
+    def draw_now(self, drawn: Callable[[int], None]) -> None:
+        """Draw, after the changes that are posted already, and call `drawn` with the number of layers there are."""
+
+        def draw(model: Model) -> Model:
+            self._guarded(self._draw)
+            drawn(self._layers_so_far())
+            return model
+
+        self.post(draw, announce=False)
+
     def refused(self, problem: StudioError) -> None:
         """Show a refusal to every viewer."""
         notify(self._server, problem.message, problem.hint, bad=True)

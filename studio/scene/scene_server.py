@@ -31,6 +31,7 @@ from studio.scene.model import (
     show_frame,
     show_ghosts,
 )
+from studio.scene.scene_pictures import ScenePictures
 from studio.sessions.workspace import Workspace
 
 
@@ -55,6 +56,7 @@ class SceneServer:
         self._controller.bare = bare
         self._controller.start()
         self.poses = ScenePoses(self._controller)
+        self.pictures = ScenePictures(self._server, self._controller)
         self.port: int = self._server.get_port()
 
     def stop(self) -> None:

@@ -43,6 +43,7 @@ from studio.server import (
     report_routes,
     result_routes,
     run_routes,
+    scene_picture_routes,
     scene_relay,
     scene_routes,
     session_routes,
@@ -103,6 +104,7 @@ ROUTERS = (
     behaviour_learning_routes.router,
     report_routes.router,
     scene_routes.router,
+    scene_picture_routes.router,
     scene_relay.router,
     event_stream.router,
 )

@@ -42,6 +42,7 @@ VERB_COLUMNS = ("Keyword", "What it means", "Default", "Option", "HTTP")
 TEXTS = {
     "": ("guide.md", "Guide"),
     "course": ("course.md", "Course"),
+    "arm": ("arm.md", "An arm of four links"),
     "particle": ("particle.md", "What a particle is"),
     "layer": ("layer.md", "Why one layer fails"),
     "annealing": ("annealing.md", "What annealing changes"),
@@ -54,7 +55,7 @@ TEXTS = {
     REPRODUCTION: ("reproduction.md", "The papers' claims"),
 }
 """The packaged texts and their titles, by the addresses below /guide."""
-COURSE = ("course", "particle", "layer", "annealing", "partitions")
+COURSE = ("course", "arm", "particle", "layer", "annealing", "partitions")
 """Those of the course, in their order."""
 VERBS = "verbs"
 COLUMNS = ("Name", "What it does", "Range", "Default", "Unit", "Takes effect")

@@ -23,6 +23,9 @@ import { startTheme } from "./theme.js";
 import { startTimeline } from "./studio/timeline.js";
 import { startTracks } from "./tracks.js";
 import { startViews } from "./views.js";
+import { startCourseColumn } from "./studio/course_column.js";
+import { startFirstSteps } from "./studio/first_steps.js";
+import { startScenePictures } from "./studio/scene_pictures.js";
 import { startWhy } from "./why.js";
 
 async function start() {
@@ -47,6 +50,9 @@ async function start() {
   startData();
   startTracks();
   startCorrecting();
+  startCourseColumn();
+  startFirstSteps();
+  startScenePictures();
   startSceneFrame(takeKey);
   await refreshSessions();
   startAddress();

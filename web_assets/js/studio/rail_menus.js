@@ -1,6 +1,6 @@
 // What can be done to a session, a run and what lies in the trash, from the rail's menus.
 
-import { fetchJson, patch, post, remove, runPath, sessionPath } from "../api.js";
+import { fault, fetchJson, patch, post, remove, runPath, sessionPath } from "../api.js";
 import { compareForm } from "../comparing.js";
 import { openForm, openMenu } from "../dialogs.js";
 import { NAME } from "../elements.js";
@@ -14,6 +14,7 @@ import { makeTrackForm } from "../tracks.js";
 import { signal } from "./component.js";
 
 const MOST_RESTORED = 12;
+const MOST_SHARED = 12;
 
 const go = (address) => {
   location.href = address;
@@ -110,6 +111,35 @@ export function sessionMenu(opener, entry) {
   ]);
 }
 
+/** A run as one page, with the particles of chosen frames. */
+function shareForm(path, isOpen) {
+  const shown = isOpen && get("frame") !== null ? String(get("frame")) : "";
+  const label = "Frames with particles (9, 13, …)";
+  openForm({
+    heading: "Share as one page",
+    intro:
+      "One file that opens without the studio: settings, charts, the body moving, and layer by layer " +
+      "the particles of the frames that you name.",
+    action: "Save the page",
+    rows: [[{ name: "frames", label, value: shown, placeholder: "the worst one" }]],
+    send: async ({ frames }) => {
+      const chosen = String(frames ?? "").split(/[\s,]+/).filter(Boolean);
+      if (chosen.some((one) => !/^\d+$/.test(one)) || chosen.length > MOST_SHARED) {
+        throw fault(
+          `'${frames}' are not up to twelve frames.`,
+          "Write their numbers, with commas between.",
+        );
+      }
+      const [first, ...others] = chosen;
+      const query = [
+        ...(first ? [["frame", first]] : []),
+        ...others.map((one) => ["clouds", one]),
+      ];
+      go(`${path}/shared.html?${new URLSearchParams(query)}`);
+    },
+  });
+}
+
 /** Open the menu of a run. @param {Element} opener */
 export function runMenu(opener, entry, run) {
   const path = runPath(entry.name, run.name);
@@ -126,7 +156,7 @@ export function runMenu(opener, entry, run) {
     ["Refine…", () => makeTrackForm(entry.name, run.name, "refine")],
     ["Smooth…", () => makeTrackForm(entry.name, run.name, "smooth")],
     ["Export…", exported],
-    ["Share as one page", () => go(`${path}/shared.html`)],
+    ["Share as one page…", () => shareForm(path, open)],
     ["Poses as CSV", () => go(`${path}/poses.csv`)],
     ["Compare with…", () => compareForm(entry.name, run.name)],
     ["New run like this…", () => newRunForm(entry, run)],
