@@ -123,7 +123,9 @@ function shareForm(path, isOpen) {
     action: "Save the page",
     rows: [[{ name: "frames", label, value: shown, placeholder: "the worst one" }]],
     send: async ({ frames }) => {
-      const chosen = String(frames ?? "").split(/[\s,]+/).filter(Boolean);
+      const chosen = String(frames ?? "")
+        .split(/[\s,]+/)
+        .filter(Boolean);
       if (chosen.some((one) => !/^\d+$/.test(one)) || chosen.length > MOST_SHARED) {
         throw fault(
           `'${frames}' are not up to twelve frames.`,
@@ -131,10 +133,7 @@ function shareForm(path, isOpen) {
         );
       }
       const [first, ...others] = chosen;
-      const query = [
-        ...(first ? [["frame", first]] : []),
-        ...others.map((one) => ["clouds", one]),
-      ];
+      const query = [...(first ? [["frame", first]] : []), ...others.map((one) => ["clouds", one])];
       go(`${path}/shared.html?${new URLSearchParams(query)}`);
     },
   });
