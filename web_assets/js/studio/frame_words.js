@@ -38,26 +38,35 @@ export function knownFrames(summary) {
 }
 
 /**
- * Where the marks that are drawn begin: frames of which something is to be said that is not said of the one before.
+ * Where the marks that are drawn begin: frames of which something is to be said that is not said of the one before, and those
+ * with a note.
+ * @param {{ frame: number }[]} notes
  * @returns {number[]}
  */
-export function marks(summary) {
+export function marks(summary, notes) {
   const frames = knownFrames(summary);
+  const noted = new Set(notes.map((note) => note.frame));
   return frames
     .filter(
       (entry, at) =>
         entry.frame === summary.corrected ||
+        noted.has(entry.frame) ||
         (STATES[entry.tracking] && frames[at - 1]?.tracking !== entry.tracking) ||
         (entry.lost && !frames[at - 1]?.lost),
     )
     .map((entry) => entry.frame);
 }
 
-const limbs = (entry) => (entry.lost_limbs?.length ? `: ${entry.lost_limbs.join(", ")}` : "");
+const limbsOf = (words, limbs) => (limbs?.length ? `${words}: ${limbs.join(", ")}` : words);
 
 /** Both measures of a frame in words; "" where there is nothing to say. */
-export const standingOf = (entry) =>
-  dotted(STATES[entry?.tracking]?.[0] ?? "", entry?.lost ? `${TRUE_LOSS[0]}${limbs(entry)}` : "");
+export function standingOf(entry) {
+  const state = STATES[entry?.tracking];
+  return dotted(
+    state ? limbsOf(state[0], entry.limbs_off) : "",
+    entry?.lost ? limbsOf(TRUE_LOSS[0], entry.lost_limbs) : "",
+  );
+}
 
 /** The one measure of a frame that its label has room for. */
 export const shortStanding = (entry) =>
@@ -73,8 +82,9 @@ export function frameWords(summary, frame) {
   const entry = knownFrames(summary).find((one) => one.frame === frame);
   const state = STATES[entry?.tracking];
   const parts = [
-    state && `${state[0]} – ${state[2]}${entry.part ? ` (${entry.part})` : ""}`,
-    entry?.lost && `${TRUE_LOSS[0]} – ${TRUE_LOSS[2]}${limbs(entry)}`,
+    state && limbsOf(`${state[0]} – ${state[2]}`, entry.limbs_off),
+    entry?.part && `(${entry.part})`,
+    entry?.lost && limbsOf(`${TRUE_LOSS[0]} – ${TRUE_LOSS[2]}`, entry.lost_limbs),
   ].filter(Boolean);
   return parts.length ? `frame ${frame}: ${parts.join("; ")}` : "";
 }

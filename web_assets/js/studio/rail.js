@@ -1,7 +1,8 @@
 // The rail: sessions and their runs, and what is in the trash.
 
-import { sessionPath } from "../api.js";
+import { readOnly, sessionPath } from "../api.js";
 import { figure } from "../chart_looks.js";
+import { acceptDrops } from "../dropping.js";
 import { byId } from "../elements.js";
 import { importForm } from "../importing.js";
 import { newRunForm } from "../new_run.js";
@@ -284,7 +285,8 @@ function takeArrow(event) {
 
 /** Show the rail. */
 export function startRail() {
-  byId("import-open").onclick = importForm;
+  byId("import-open").onclick = () => importForm();
+  if (!readOnly) acceptDrops("Drop videos or a folder to import them", importForm);
   byId("session-new").onclick = () => go("/way?new");
   byId("sessions").addEventListener("keydown", takeArrow);
   mount(byId("sessions"), html`<${Sessions} />`);

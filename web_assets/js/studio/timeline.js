@@ -15,12 +15,13 @@ import { drawTimeline, frameAt } from "./timeline_drawing.js";
 /** Show the next mark, or (by < 0) the one before. */
 export function goToMark(by) {
   const summary = get("summary");
-  const all = summary ? marks(summary) : [];
+  const all = summary ? marks(summary, get("notes")) : [];
   const at = get("frame") ?? -Infinity;
   const next = by > 0 ? all.find((frame) => frame > at) : all.findLast((frame) => frame < at);
   if (next !== undefined) return goTo(next);
   const none =
-    "The timeline has no marks: neither the search nor the truth says that anything was lost.";
+    "The timeline has no marks: neither the search nor the truth says that anything was lost, " +
+    "and no frame has a note.";
   say(all.length ? `No mark ${by > 0 ? "after" : "before"} this frame.` : none);
 }
 
