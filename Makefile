@@ -10,7 +10,7 @@ TOOLS := node_modules/.package-lock.json
 # Compiled modules are kept: every process that a test starts would compile some 500 of them anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: env browser demo test test-fast test-slow faults fuzz soak watching audit test-opencv-4 check check-types check-style check-pages bench growth lock guide pictures wheel-test clean
+.PHONY: env browser demo gallery-pictures test test-fast test-slow faults fuzz soak watching audit test-opencv-4 check check-types check-style check-pages bench growth lock guide pictures wheel-test clean
 
 env: $(READY)
 
@@ -126,6 +126,10 @@ guide: env
 # The guide's pictures, of the running program; takes some minutes.
 pictures: env browser
 	$(BIN)/python tests/guide_pictures.py
+
+# A frame of each session of the gallery that is rendered at a click; takes minutes.
+gallery-pictures: env
+	$(BIN)/python tests/gallery_pictures.py
 
 clean:
 	rm -rf .venv .venv-* node_modules build artefacts

@@ -40,14 +40,14 @@ def why_command(call: Call) -> dict[str, object]:
     frame = call.given.get("frame")
     frame = worst_frame(opened) if frame is None else frame
     shown: Viewed = call(frame=frame)
-    lines = [opened.caption(frame), *(f"- {finding.words}" for finding in shown.findings)]
+    lines = [opened.caption(frame), *shown.notes, *(f"- {finding.words}" for finding in shown.findings)]
     lines += [f"May help: {remedy.title}. {remedy.words}{_set(remedy.settings)}" for remedy in shown.remedies]
     return {
         "frame": frame,
         "findings": list(shown.findings),
         "remedies": list(shown.remedies),
         "notes": list(shown.notes),
-        "text": "\n".join([*lines, *shown.notes]),
+        "text": "\n".join(lines),
     }
 
 

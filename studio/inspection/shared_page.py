@@ -24,6 +24,7 @@ from studio.inspection.views import look, look_over, view_named
 from studio.motion_files.trc import read_trc
 from studio.progress import Progress, unheard
 from studio.runs.new_run import software_version
+from studio.runs.notes import notes_by_frame
 from studio.runs.self_contained import self_contained_page
 from studio.runs.tracks import RAW, read_track
 from studio.sessions.manifest import now
@@ -119,7 +120,7 @@ def shared_page(
             "made": f"{now()[:16].replace('T', ' ')} UTC, Capture studio {software_version()}",
             "facts": _facts(shown),
             "settings": _settings(run),
-            "notes": [*record.notes, *_left_out(shown)],
+            "notes": [*record.notes, *_remarks(shown), *_left_out(shown)],
             "fps": record.fps,
             "frame": frame,
             "parameter": parameter,
@@ -182,6 +183,11 @@ def _cloud(run: InspectedRun, frame: int) -> dict[str, Any]:
 
 def _packed(numbers: NDArray[Any]) -> str:
     return base64.b64encode(numbers.tobytes()).decode("ascii")
+
+
+def _remarks(shown: _Shown) -> list[str]:
+    """The notes on frames."""
+    return [f"Frame {frame}: {words}" for frame, words in notes_by_frame(shown.run.run).items()]
 
 
 def _left_out(shown: _Shown) -> list[str]:

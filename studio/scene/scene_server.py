@@ -23,6 +23,7 @@ from studio.scene.model import (
     ViewOptions,
     change_options,
     discard_what_if,
+    edit_pose,
     look_through,
     scrub,
     select,
@@ -31,6 +32,7 @@ from studio.scene.model import (
     show_frame,
     show_ghosts,
 )
+from studio.scene.pose_edit import UNDO, changed_whole
 from studio.scene.scene_pictures import ScenePictures
 from studio.sessions.workspace import Workspace
 
@@ -160,7 +162,7 @@ class SceneServer:
 @dataclass(frozen=True, slots=True, eq=False)
 class Editing:
     """A pose being edited. frame : of the run being corrected, None: the session's start pose. pose : (D,). moved :
-    whether it differs from the original.
+    whether it differs from the original. steps : changes that can be undone.
     """
 
     session: str
@@ -168,6 +170,7 @@ class Editing:
     frame: int | None
     pose: Array
     moved: bool
+    steps: int
 
 
 class ScenePoses:
@@ -183,7 +186,8 @@ class ScenePoses:
         edit, selection = model.edit, model.selection
         if edit is None or not edit.active:
             return None
-        return Editing(selection.session, selection.run, edit.frame, edit.pose.copy(), edit.is_moved)
+        pose = edit.pose.copy()
+        return Editing(selection.session, selection.run, edit.frame, pose, edit.is_moved, len(edit.past))
 
     def propose(self, session: str, pose: Sequence[float], text: str, frame: int | None = None) -> None:
         """Show a start pose (D,) found for a session. text : its confidence, for the viewers. frame : of the pose."""
@@ -198,6 +202,10 @@ class ScenePoses:
         """
         given = None if pose is None else np.array(pose, dtype=np.float64)
         self._controller.post(self._controller.begin_edit, session, run, frame, given)
+
+    def undo(self) -> None:
+        """Take the newest change of the edited pose back."""
+        self._controller.post(edit_pose, lambda edit: changed_whole(edit, UNDO, None))
 
     def leave(self) -> None:
         """Stop editing."""

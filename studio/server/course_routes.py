@@ -17,7 +17,12 @@ class CourseState(SessionJob):
 
 
 COURSE = JobKind(
-    "course", "course", CourseState, changes_session=True, busy="The course's runs are being made."
+    "course",
+    "making of the course's runs",
+    CourseState,
+    changes_session=True,
+    busy="The course's runs are being made.",
+    page="/guide/course",
 )
 
 

@@ -90,7 +90,13 @@ class SeedsState(NumberedJob):
     frame: int
 
 
-SEEDS = JobKind("seeds", "search with other seeds", SeedsState)
+SEEDS = JobKind(
+    "seeds",
+    "search with other seeds",
+    SeedsState,
+    at="/api/seeds/{identifier}",
+    page="/?session={session}&run={run}&frame={frame}&panel=views&view=seeds",
+)
 
 
 Name = Annotated[str, Query(max_length=64)]

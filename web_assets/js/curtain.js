@@ -56,7 +56,7 @@ function draw() {
   if (get("connected") === false) return banner("Disconnected. The last state is shown; trying to reach the studio again …");
   if (sessions?.length === 0) {
     return cover("Nothing here yet", "Import the footage of your cameras, or start with the bundled walk.",
-      group(button("Open the sample", addSample, "primary"), button("From my own cameras", () => { location.href = "/way?new"; }), button("Import footage", importForm)));
+      group(button("Open the sample", addSample, "primary"), button("From my own cameras", () => { location.href = "/way?new"; }), button("Import footage", () => importForm())));
   }
   if (work?.state === "lost" && work.session === get("session")) {
     const resume = () => post(`${runPath(work.session, work.run)}/start`).catch(complain);

@@ -1,9 +1,10 @@
 // Sessions and their runs: list, open, import, new run, rename, duplicate, delete to the trash.
 
-import { fetchJson, patch, post, remove, runPath, sessionPath } from "./api.js";
+import { fetchJson, patch, post, readOnly, remove, runPath, sessionPath } from "./api.js";
 import { figure } from "./chart_looks.js";
 import { compareForm } from "./comparing.js";
 import { openForm, openMenu } from "./dialogs.js";
+import { acceptDrops } from "./dropping.js";
 import { button, byId, element, fill, NAME } from "./elements.js";
 import { importForm } from "./importing.js";
 import { complain, say } from "./messages.js";
@@ -224,7 +225,8 @@ async function drawTrash() {
 
 /** Wire the rail. */
 export function startRail() {
-  byId("import-open").onclick = importForm;
+  byId("import-open").onclick = () => importForm();
+  if (!readOnly) acceptDrops("Drop videos or a folder to import them", importForm);
   byId("session-new").onclick = () => go("/way?new");
   list.addEventListener("keydown", takeArrow);
   watch(["sessions", "session", "run"], draw);

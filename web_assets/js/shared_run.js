@@ -206,9 +206,9 @@ function figureOf(data, entry, choose, place) {
 }
 
 function whyBox({ why }) {
-  return card(`Why is frame ${why.frame} as it is?`,
+  return card(`Why is frame ${why.frame} as it is?`, why.notes.map((note) => hint(note)),
     why.findings.length ? element("ul", { className: "words" }, why.findings.map((one) => element("li", { className: one.is_cause ? "chief" : "" }, one.words))) : hint("Nothing stands out in this frame."),
-    why.remedies.length > 0 && [element("h3", {}, "What may help"), element("ul", { className: "words" }, why.remedies.map((one) => element("li", {}, element("b", {}, one.title), ` ${one.words}`)))], why.notes.map((note) => hint(note)));
+    why.remedies.length > 0 && [element("h3", {}, "What may help"), element("ul", { className: "words" }, why.remedies.map((one) => element("li", {}, element("b", {}, one.title), ` ${one.words}`)))]);
 }
 
 function settingsBox({ settings }) {

@@ -33,7 +33,8 @@ function known(summary) {
 /** Where the marks that are drawn begin: frames of which something is to be said that is not said of the one before. */
 export function marks(frames) {
   const corrected = get("summary")?.corrected;
-  return frames.filter((entry, at) => entry.frame === corrected || (STATES[entry.tracking] && frames[at - 1]?.tracking !== entry.tracking) || (entry.lost && !frames[at - 1]?.lost)).map((entry) => entry.frame);
+  const noted = new Set(get("notes").map((note) => note.frame));
+  return frames.filter((entry, at) => entry.frame === corrected || noted.has(entry.frame) || (STATES[entry.tracking] && frames[at - 1]?.tracking !== entry.tracking) || (entry.lost && !frames[at - 1]?.lost)).map((entry) => entry.frame);
 }
 
 /** Show the next mark, or (by < 0) the one before. */
@@ -42,7 +43,7 @@ export function goToMark(by) {
   const found = marks(known(summary));
   const at = get("frame") ?? -Infinity;
   const next = by > 0 ? found.find((frame) => frame > at) : found.findLast((frame) => frame < at);
-  if (next === undefined) return say(found.length ? `No mark ${by > 0 ? "after" : "before"} this frame.` : "The timeline has no marks: neither the search nor the truth says that anything was lost.");
+  if (next === undefined) return say(found.length ? `No mark ${by > 0 ? "after" : "before"} this frame.` : "The timeline has no marks: neither the search nor the truth says that anything was lost, and no frame has a note.");
   goTo(next);
 }
 
@@ -158,10 +159,12 @@ function explain(pen, frames) {
   }
 }
 
+const limbsOf = (words, limbs) => (limbs?.length ? `${words}: ${limbs.join(", ")}` : words);
+
 /** Both measures of a frame in words; "" where there is nothing to say. */
 function standing(entry) {
-  const lost = entry?.lost ? `${TRUE_LOSS[0]}${entry.lost_limbs?.length ? `: ${entry.lost_limbs.join(", ")}` : ""}` : "";
-  return dotted(STATES[entry?.tracking]?.[0] ?? "", lost);
+  const state = STATES[entry?.tracking];
+  return dotted(state ? limbsOf(state[0], entry.limbs_off) : "", entry?.lost ? limbsOf(TRUE_LOSS[0], entry.lost_limbs) : "");
 }
 
 function showFrame() {
@@ -190,7 +193,8 @@ function wordsOf(frame) {
   const entry = known(summary).find((one) => one.frame === frame);
   const state = STATES[entry?.tracking];
   if (isCorrected(summary) && frame === summary.corrected) return `frame ${frame}: corrected by hand in ${summary.made_from}, tracked ${summary.backwards_to === null ? "on" : `backwards to ${summary.backwards_to}`} from it`;
-  const parts = [state && `${state[0]} – ${state[2]}${entry.part ? ` (${entry.part})` : ""}`, entry?.lost && `${TRUE_LOSS[0]} – ${TRUE_LOSS[2]}${entry.lost_limbs?.length ? `: ${entry.lost_limbs.join(", ")}` : ""}`].filter(Boolean);
+  const parts = [state && `${limbsOf(`${state[0]} – ${state[2]}`, entry.limbs_off)}${entry.part ? ` (${entry.part})` : ""}`,
+    entry?.lost && limbsOf(`${TRUE_LOSS[0]} – ${TRUE_LOSS[2]}`, entry.lost_limbs)].filter(Boolean);
   return parts.length ? `frame ${frame}: ${parts.join("; ")}` : "";
 }
 
