@@ -26,8 +26,6 @@ OPENS_ITSELF = {
     "studio/export/table_files.py": "an export, in a folder made for it",
     "studio/isolated.py": "the pipes of its own processes",
     "studio/kernel_cache.py": "compiled kernels, which have checks of their own",
-    "studio/runs/samples.py": "the package's own runs, packed",
-    "studio/scene/scene_pictures.py": "an export, in a folder made for it",
     "studio/runs/colour_tokens.py": "the package's own colours",
     "studio/runs/self_contained.py": "the package's own pages",
     "studio/runs/samples.py": "the package's own samples",
