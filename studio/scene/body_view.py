@@ -21,8 +21,8 @@ _CAGE_SECTIONS, _CAGE_SCALE = 10, (1.03, 1.03, 1.0)
 
 class BodyView:
     """A body at one pose. name : the nodes' path. ghost : a cage, for what stands beside the answer, in the
-    colour of the token `colour`. clicked : called with the name of a limb as errors are counted by, in a
-    thread of viser's.
+    colour of the token `colour`. clicked : called with the name of a limb as errors are counted by and where it was
+    clicked, shares of the view, in a thread of viser's.
     """
 
     def __init__(
@@ -32,7 +32,7 @@ class BodyView:
         *,
         name: str,
         ghost: bool = False,
-        clicked: Callable[[str], None] | None = None,
+        clicked: Callable[[str, tuple[float, float]], None] | None = None,
     ) -> None:
         self._body, self._ghost, self.colour = body, ghost, "ghost"
         self.limb_of = limb_of_drawn(body)
@@ -54,7 +54,7 @@ class BodyView:
         ]
         if clicked is not None:
             for limb, handle in zip(body.drawn, self.handles, strict=True):
-                handle.on_click(lambda _, name=self.limb_of[limb.name]: clicked(name))
+                handle.on_click(lambda event, name=self.limb_of[limb.name]: clicked(name, event.screen_pos))
 
     def show(
         self, pose: Array | None, tokens: ColourTokens, opacity: float = 1.0, chosen: str | None = None

@@ -104,9 +104,13 @@ def test_going_back_while_tracking_stops_following(shown: Model) -> None:
 
 
 def test_cameras_are_looked_through_and_left(shown: Model) -> None:
-    through = scene.camera_clicked(shown, "cam2")
-    assert through.selection.look_through == "cam2"
-    assert scene.camera_clicked(through, "cam2").selection.look_through is None
+    once = scene.camera_clicked(shown, "cam2")
+    assert (once.selection.camera, once.selection.look_through) == ("cam2", None), "one click only chooses it"
+    assert scene.camera_clicked(once, "cam2").selection.camera is None
+    through = scene.camera_clicked(once, "cam2", twice=True)
+    assert (through.selection.camera, through.selection.look_through) == ("cam2", "cam2")
+    assert scene.camera_clicked(through, "cam2") is through, "its picture is the whole background then"
+    assert scene.camera_clicked(through, "cam2", twice=True).selection.look_through is None
     assert scene.look_through(through, "no such camera") is through
     assert scene.look_through(through, None).selection.look_through is None
 

@@ -8,6 +8,7 @@ import { togglePlay, toggleLoop } from "./playback.js";
 import { enterScene } from "./scene_frame.js";
 import { goTo, stepLayer } from "./selection.js";
 import { get } from "./state.js";
+import { frameBody, resetView, toggleFollow } from "./studio/scene_tools.js";
 import { goToMark } from "./timeline.js";
 import { stepParameter, stepView, toggleTable } from "./views.js";
 
@@ -23,7 +24,9 @@ const KEYS = [
   ["n", "next mark of the timeline: search lost, a limb off, limb lost (truth), no evidence, found again, corrected", (event) => event.key === "n", () => goToMark(1)],
   ["p", "mark before", (event) => event.key === "p", () => goToMark(-1)],
   ["1 – 9", "look through a camera", (event) => /^[1-9]$/.test(event.key), (event) => lookThrough(Number(event.key) - 1)],
-  ["0", "free view", (event) => event.key === "0", () => lookThrough(null)],
+  ["0", "the first view of the scene; free of a camera", (event) => event.key === "0", resetView],
+  ["f", "frame the body in the scene", (event) => event.key === "f", frameBody],
+  ["g", "go along with the body from frame to frame", (event) => event.key === "g", toggleFollow],
   ["v", "next view; Shift v the one before", (event) => event.key.toLowerCase() === "v", (event) => stepView(event.shiftKey ? -1 : 1)],
   ["[ ]", "parameter before, next parameter", (event) => event.key === "[" || event.key === "]", (event) => stepParameter(event.key === "]" ? 1 : -1)],
   ["t", "the view's numbers as a table, or its drawing", (event) => event.key === "t", toggleTable],

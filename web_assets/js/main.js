@@ -16,6 +16,7 @@ import { startPlayback } from "./playback.js";
 import { startRail } from "./rail.js";
 import { startSceneFrame } from "./scene_frame.js";
 import { refreshSessions } from "./sessions.js";
+import { scenePointer, startSceneTools } from "./studio/scene_tools.js";
 import { startTabs } from "./tabs.js";
 import { startTheme } from "./theme.js";
 import { startTimeline } from "./timeline.js";
@@ -43,7 +44,8 @@ async function start() {
   startData();
   startTracks();
   startCorrecting();
-  startSceneFrame(takeKey);
+  startSceneTools();
+  startSceneFrame(takeKey, scenePointer);
   await refreshSessions();
   startAddress();
 }
