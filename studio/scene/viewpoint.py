@@ -17,6 +17,8 @@ FILLED, WIDEST = 0.76, 0.86
 """Of the view's height that a framed body fills, and at most of its width."""
 WELL_FRAMED = 0.6, 0.9
 """Shares of the height between which a body needs not be framed again."""
+CLOSEST = 0.3
+"""Between the eye and the nearest point of a framed body, beside its size: from above that is its head."""
 NEAREST, FARTHEST = 0.12, 9.0
 """Distances of the eye from what it looks at, beside the body's size."""
 ASTRAY = 0.6
@@ -53,19 +55,22 @@ def framed(points: Array, toward: Array, fov: float, aspect: float, filled: floa
     """The eye that sees points (K, 3) metres fill the view. toward : (3,) from them to the eye."""
     right, up, forward = axes((*toward, 0.0, 0.0, 0.0))
     along = points @ forward
-    # Of every point the view's edges say how far away the eye has to be: least where both edges touch.
-    across, far = _fitted(points @ right, along, np.tan(fov / 2.0) * aspect * WIDEST)
-    high, farther = _fitted(points @ up, along, np.tan(fov / 2.0) * filled)
-    place = across * right + high * up - max(far, farther) * forward
-    middle = (float(along.min()) + float(along.max())) / 2.0
-    target = place + (middle + max(far, farther)) * forward
+    ways = (
+        (points @ right, np.tan(fov / 2.0) * aspect * WIDEST),
+        (points @ up, np.tan(fov / 2.0) * filled),
+    )
+    # Of every point the view's edges say how far behind 0 the eye has to be: least where both edges touch.
+    behind = max(
+        float(((side / slope - along).max() + (-side / slope - along).max()) / 2.0) for side, slope in ways
+    )
+    behind = max(behind, CLOSEST * float(np.linalg.norm(np.ptp(points, axis=0))) - float(along.min()))
+    across, high = (
+        float(((side - slope * (along + behind)).max() + (side + slope * (along + behind)).min()) / 2.0)
+        for side, slope in ways
+    )
+    place = across * right + high * up - behind * forward
+    target = place + ((float(along.min()) + float(along.max())) / 2.0 + behind) * forward
     return (*map(float, place), *map(float, target))
-
-
-def _fitted(sideways: Array, along: Array, slope: float) -> tuple[float, float]:
-    """Where an eye stands sideways, and how far behind 0, that sees points within `slope` of its axis."""
-    one, other = float((sideways / slope - along).max()), float((-sideways / slope - along).max())
-    return slope * (one - other) / 2.0, (one + other) / 2.0
 
 
 def is_well_framed(points: Array, eye: Eye, fov: float, aspect: float) -> bool:
