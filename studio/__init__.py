@@ -22,6 +22,7 @@ _VERBS = {
         "synchronise",
         "synthesize",
     ),
+    "studio.operations.foreign": ("inspect",),
     "studio.operations.gallery": ("gallery",),
     "studio.operations.inspecting": ("compare_runs", "seeds", "view", "why"),
     "studio.operations.masks": ("background", "mask_quality"),
@@ -49,7 +50,16 @@ _VERBS = {
     ),
     "studio.operations.sharing": ("share",),
     "studio.operations.subjects": ("subjects", "together"),
-    "studio.operations.tracking": ("correct", "go_on", "live", "new_run", "replay", "resume_live", "track"),
+    "studio.operations.tracking": (
+        "branch",
+        "correct",
+        "go_on",
+        "live",
+        "new_run",
+        "replay",
+        "resume_live",
+        "track",
+    ),
     "studio.self_check": ("doctor",),
 }
 _MODULE_OF = {name: module for module, names in _VERBS.items() for name in names}

@@ -17,6 +17,7 @@ from studio.operations.footage import new_session as new_session
 from studio.operations.footage import record as record
 from studio.operations.footage import synchronise as synchronise
 from studio.operations.footage import synthesize as synthesize
+from studio.operations.foreign import inspect as inspect
 from studio.operations.gallery import gallery as gallery
 from studio.operations.inspecting import compare_runs as compare_runs
 from studio.operations.inspecting import seeds as seeds
@@ -49,6 +50,7 @@ from studio.operations.results import verify as verify
 from studio.operations.sharing import share as share
 from studio.operations.subjects import subjects as subjects
 from studio.operations.subjects import together as together
+from studio.operations.tracking import branch as branch
 from studio.operations.tracking import correct as correct
 from studio.operations.tracking import go_on as go_on
 from studio.operations.tracking import live as live

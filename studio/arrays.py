@@ -5,18 +5,26 @@ threads that parse at the same moment may both end in "AST constructor recursion
 where four views of a frame are requested at once). Hence one lock.
 """
 
+import math
 import threading
+import zipfile
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.foreign_files import open_file
+
 Array = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float32]
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+
+LARGEST_ARCHIVE, MOST_ARRAYS = 256 << 20, 1000
+"""Bytes, unpacked, and arrays of an archive."""
+CHUNK = 1 << 20
 
 _one_at_a_time = threading.Lock()
 
@@ -38,15 +46,42 @@ def evenly_spread(count: int, most: int) -> Indices:
     return np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(np.int64))
 
 
-def read_archive(source: Path | IO[bytes]) -> dict[str, NDArray[Any]]:
-    """All arrays of an npz archive by name; nothing in it can run.
+def read_archive(source: Path | IO[bytes], most: int = LARGEST_ARCHIVE) -> dict[str, NDArray[Any]]:
+    """All arrays of an npz archive by name; nothing in it can run, and it takes at most `most` bytes of memory.
 
-    Raises OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile for what is damaged or none; AttributeError or
-    TypeError for a file of a single array.
+    Raises OSError, ValueError, EOFError, zipfile.BadZipFile for what is damaged, too large, or no such archive.
     """
     if isinstance(source, Path):
-        # What NumPy opens itself stays open where the archive is damaged.
-        with source.open("rb") as stream:
-            return read_archive(stream)
-    with _one_at_a_time, np.load(source, allow_pickle=False) as archive:
-        return {name: archive[name] for name in archive.files}
+        # What zipfile opens itself stays open where the archive is damaged.
+        with open_file(source) as stream:
+            return read_archive(stream, most)
+    with zipfile.ZipFile(source) as archive:
+        members = archive.infolist()
+        # The index's sizes are upheld below: no more than that is read of a member.
+        if len(members) > MOST_ARRAYS or sum(member.file_size for member in members) > most:
+            raise ValueError(f"it holds more than {MOST_ARRAYS} arrays or {most >> 20} MB")
+        return {member.filename.removesuffix(".npy"): _array(archive, member) for member in members}
+
+
+def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
+    with archive.open(member) as stream:
+        with _one_at_a_time:
+            version = np.lib.format.read_magic(stream)
+            if version not in ((1, 0), (2, 0)):
+                raise ValueError(f"'{member.filename}' has the unknown version {version}")
+            head = (
+                np.lib.format.read_array_header_1_0
+                if version == (1, 0)
+                else np.lib.format.read_array_header_2_0
+            )
+            shape, by_column, kind = head(stream)
+        count = math.prod(shape)
+        if kind.hasobject or min(shape, default=0) < 0 or count * max(1, kind.itemsize) > member.file_size:
+            raise ValueError(f"'{member.filename}' is not an array of its size")
+        content = bytearray()
+        # Its checksum is compared at its end.
+        while chunk := stream.read(CHUNK):
+            content += chunk
+        if len(content) != count * kind.itemsize:
+            raise ValueError(f"'{member.filename}' has {len(content)} bytes, which is not an array's size")
+        return np.ndarray(shape, kind, content, order="F" if by_column else "C")

@@ -27,6 +27,7 @@ from pydantic import Field
 
 from studio.declaring import Terminal
 from studio.errors import StudioError
+from studio.foreign_files import open_file, read_text
 from studio.launch import LOG_NAME, served_at
 from studio.self_check import PACKAGE, doctor
 from studio.sessions.atomic_files import taken, write_bytes
@@ -143,7 +144,7 @@ def _all_known(text: str) -> bool:
 def vocabulary() -> frozenset[str]:
     """Every word, lower case, of the studio's source, the system's messages and Python's own names."""
     here = Path(__file__).parent
-    texts: Iterable[str] = (path.read_text(encoding="utf-8") for path in sorted(here.rglob("*.py")))
+    texts: Iterable[str] = (read_text(path) for path in sorted(here.rglob("*.py")))
     found = {word for text in texts for word in WORD.findall(text.lower())}
     for other in (*map(os.strerror, errno.errorcode), *dir(builtins), README, PACKAGE):
         found.update(WORD.findall(other.lower()))
@@ -264,8 +265,10 @@ def _run(run: StoredRun) -> dict[str, object]:
 def _tail(path: Path) -> str:
     """The end of a text file, whole lines; why it cannot be read instead."""
     try:
-        with path.open("rb") as stream:
+        with open_file(path) as stream:
             stream.seek(max(0, path.stat().st_size - LOG_TAIL))
-            return stream.read().decode("utf-8", "replace")
+            return stream.read(LOG_TAIL).decode("utf-8", "replace")
+    except StudioError as error:
+        return str(error)
     except OSError as error:
         return f"cannot be read ({error.strerror})"

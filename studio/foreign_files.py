@@ -1,16 +1,32 @@
-"""Files from outside: any error while one is read is reported with its name, and none may block.
+"""Files from outside, and every session's: a session may come from anyone.
+
+All bytes of a session are read here (`tests/house/test_session_reading.py` keeps it; databases are opened in
+`sessions.session_databases`, which asks here first): of regular files, since a pipe or a device may never end; of a
+bounded size; and never through a link that leads out of the session. What OpenCV and FFmpeg open themselves is a path
+that was checked here. Only footage may lie elsewhere, by a link or by an absolute path in the manifest: it is decoded
+as pictures and never written.
 
 Parsers raise what they like (RecursionError for deep TOML, OverflowError for 400 digits, zlib.error for a flipped bit,
-an OSError for a corrupt archive's offsets), so readers do not list what may come: they read inside `foreign_file`.
+an OSError for a corrupt archive's offsets), so readers do not list what may come: they read inside
+`foreign_file`, which reports the error with the file's name.
 """
 
 import errno
+import os
 import stat
-from collections.abc import Generator
-from contextlib import contextmanager
+from collections.abc import Generator, Iterable
+from contextlib import contextmanager, suppress
+from io import BufferedReader
 from pathlib import Path
 
-from studio.errors import StudioError
+from studio.errors import SessionError, StudioError
+
+MANIFEST_NAME = "session.json"
+"""Marks a session's folder."""
+LARGEST = 256 << 20
+"""Bytes of a file that is read whole, unless its reader says less: a picture, a table of motion."""
+LARGEST_RECORD = 16 << 20
+"""Of a JSON or TOML file: parsed, it takes up to twenty times as much memory."""
 
 NO_ROOM = frozenset((errno.ENOSPC, errno.EDQUOT))
 LONGEST_REASON = 200
@@ -23,13 +39,16 @@ KINDS = (
 
 
 @contextmanager
-def foreign_file(path: Path, wrong: type[StudioError], what: str, remedy: str) -> Generator[None]:
+def foreign_file(
+    path: Path, wrong: type[StudioError], what: str, remedy: str, *, footage: bool = False
+) -> Generator[None]:
     """Read a file (or a folder of files) inside. what : what it should be, "a video". remedy : what to do if it is not.
+    footage : as of `check_file`.
 
-    Raises `wrong` naming the file for whatever is raised inside, and for a pipe, socket or device, before anything of
+    Raises `wrong` naming the file for whatever is raised inside, and for what `check_file` refuses, before anything of
     it is read. StudioErrors pass unchanged, and so does a full disk, which is no fault of the file.
     """
-    check_regular(path, wrong)
+    check_file(path, wrong, footage=footage)
     try:
         yield
     except StudioError:
@@ -44,6 +63,101 @@ def foreign_file(path: Path, wrong: type[StudioError], what: str, remedy: str) -
         raise _no_such(path, wrong, what, remedy, problem) from problem
 
 
+def read_file(
+    path: Path, most: int = LARGEST, wrong: type[StudioError] = SessionError, *, footage: bool = False
+) -> bytes:
+    """A file's bytes. footage : as of `check_file`. Raises OSError, and `wrong` for what `check_file` refuses or for
+    more bytes than `most`.
+    """
+    with open_file(path, wrong, footage=footage) as stream:
+        content = b"" if os.fstat(stream.fileno()).st_size > most else stream.read(most + 1)
+        if (not content and os.fstat(stream.fileno()).st_size) or len(content) > most:
+            raise wrong(
+                f"'{path.name}' is larger than {_megabytes(most)} MB, more than such a file can have.",
+                "Replace it, or delete it.",
+            )
+        return content
+
+
+def read_text(
+    path: Path, most: int = LARGEST, wrong: type[StudioError] = SessionError, encoding: str = "utf-8"
+) -> str:
+    """Like `read_file`, as text with line breaks as Python's; also raises UnicodeDecodeError."""
+    text = read_file(path, most, wrong).decode(encoding)
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+@contextmanager
+def open_file(
+    path: Path, wrong: type[StudioError] = SessionError, *, footage: bool = False
+) -> Generator[BufferedReader]:
+    """A file opened to be read piece by piece. Raises OSError, and `wrong` for what `check_file` refuses."""
+    check_file(path, wrong, footage=footage)
+    # What became a pipe since must not block either.
+    handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    try:
+        mode = os.fstat(handle).st_mode
+        if stat.S_ISDIR(mode):
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+        if not stat.S_ISREG(mode):
+            raise wrong(f"'{path.name}' is no regular file.", REGULAR)
+        stream = os.fdopen(handle, "rb")
+    except BaseException:
+        os.close(handle)
+        raise
+    with stream:
+        yield stream
+
+
+def check_file(path: Path, wrong: type[StudioError], *, footage: bool = False) -> None:
+    """Raises `wrong` for a pipe, a socket or a device: reading one may wait without end; and for what a link in a
+    session leads out of it to. footage : pictures or a video, which may lie elsewhere. A missing file passes.
+    """
+    if not footage:
+        check_inside(path, wrong)
+    check_regular(path, wrong)
+
+
+def check_links(folder: Path, wrong: type[StudioError] = SessionError, beside: Iterable[str] = ()) -> None:
+    """Raises `wrong` where an entry of a session's folder is a link that leads out of the session. beside : names that
+    may.
+    """
+    with suppress(FileNotFoundError, NotADirectoryError), os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.is_symlink() and entry.name not in beside:
+                check_inside(Path(entry.path), wrong)
+
+
+def leads_out(path: Path) -> bool:
+    """Whether a link leads out of the session on the way to a file: then it is not ours to change."""
+    try:
+        check_inside(path.parent)
+    except SessionError:
+        return True
+    return False
+
+
+def check_inside(path: Path, wrong: type[StudioError] = SessionError) -> None:
+    """Raises `wrong` where a link in a session leads out of it, to a file or to a place for one."""
+    named = os.path.abspath(path)
+    if (real := os.path.realpath(named)) == named:
+        return
+    folder = os.path.dirname(named)
+    while folder != (above := os.path.dirname(folder)):
+        if os.path.exists(os.path.join(folder, MANIFEST_NAME)):
+            root = os.path.realpath(folder)
+            if real != root and not real.startswith(root + os.sep):
+                raise wrong(
+                    f"'{path.name}' leads by a link out of session '{os.path.basename(folder)}'; only footage may lie"
+                    " elsewhere.",
+                    "Replace the link by the file or the folder itself, or remove it.",
+                )
+        folder = above
+
+
+REGULAR = "Give a file that lies on the disk."
+
+
 def check_regular(path: Path, wrong: type[StudioError]) -> None:
     """Raises `wrong` for a pipe, a socket or a device: reading one may wait without end. A missing file passes."""
     try:
@@ -52,7 +166,11 @@ def check_regular(path: Path, wrong: type[StudioError]) -> None:
         return
     kind = next((words for is_kind, words in KINDS if is_kind(mode)), "")
     if kind:
-        raise wrong(f"'{path.name}' is {kind} and no regular file.", "Give a file that lies on the disk.")
+        raise wrong(f"'{path.name}' is {kind} and no regular file.", REGULAR)
+
+
+def _megabytes(size: int) -> str:
+    return f"{size / (1 << 20):.3g}"
 
 
 def _no_such(path: Path, wrong: type[StudioError], what: str, remedy: str, problem: Exception) -> StudioError:

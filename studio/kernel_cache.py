@@ -10,9 +10,11 @@ import contextlib
 import functools
 import gc
 import hashlib
+import logging
 import os
 import pickle
 import sqlite3
+import stat
 import sys
 import tempfile
 from collections.abc import Callable, Generator, Iterator
@@ -40,6 +42,7 @@ KNOWN_BY_NAME = ("numpy", "numba", "math", "builtins")
 """Packages whose functions are what their name and version say."""
 PATIENCE_S = 60.0
 """How long a process that compiles a kernel is waited for."""
+OPEN = "can be written by others"
 MOST_BYTES = 256 << 20
 """Size of the folder, some thirty times that of all kernels; beyond it those go that were not used for longest."""
 
@@ -88,14 +91,14 @@ class KernelCache:
             place = self.path(sig, target_context.codegen())
         except UnkeyedError:
             return None
-        data = _kept(place)
-        if data is None and self._take_turn(place):
-            data = _kept(place)  # by the process that had its turn before
-            if data is not None:
+        found = _rebuilt(place, target_context)
+        if found is None and self._take_turn(place):
+            found = _rebuilt(place, target_context)  # by the process that had its turn before
+            if found is not None:
                 self._give_up_turn(place)
-        if data is None:
+        if found is None:
             _compiling()
-        return CompileResult._rebuild(target_context, *pickle.loads(data)) if data else None
+        return found
 
     def save_overload(self, sig: Signature | tuple[Type, ...], data: CompileResult) -> None:
         try:
@@ -113,7 +116,8 @@ class KernelCache:
         if place in self._turns:
             return False
         try:
-            place.parent.mkdir(parents=True, exist_ok=True)
+            if not _is_ours(place.parent):
+                return False
             turn = sqlite3.connect(
                 place.with_suffix(".turn"), timeout=PATIENCE_S, isolation_level=None, check_same_thread=False
             )
@@ -174,9 +178,45 @@ event.register("numba:compile", _NotCollecting())
 
 @functools.cache
 def folder() -> Path:
-    """NUMBA_CACHE_DIR, else the user's folder for caches."""
+    """Of this user alone: NUMBA_CACHE_DIR, a folder in it where others may write to it, else in the user's caches."""
     given = os.environ.get("NUMBA_CACHE_DIR")
-    return Path(given or Path(platformdirs.user_cache_dir("capture-studio", appauthor=False)) / "kernels")
+    place = Path(given or Path(platformdirs.user_cache_dir("capture-studio", appauthor=False)) / "kernels")
+    if given and place.is_dir() and _fault_of(place.stat()):
+        return place / f"kernels-of-{_user()}"
+    return place
+
+
+def _user() -> int:
+    return os.geteuid() if hasattr(os, "geteuid") else 0
+
+
+def _fault_of(status: os.stat_result) -> str:
+    """Why what is kept there may be another's, a clause; "" if it is this user's alone. A kept kernel is a pickle,
+    which can run anything.
+    """
+    if not hasattr(os, "geteuid"):
+        return ""
+    if status.st_uid != _user():
+        return "belongs to another user"
+    return OPEN if status.st_mode & 0o022 else ""
+
+
+def _is_ours(room: Path) -> bool:
+    """Whether kernels may be kept in and taken from a folder, which is made where it is missing. Raises OSError."""
+    room.mkdir(mode=0o700, parents=True, exist_ok=True)
+    if not room.is_symlink() and _fault_of(room.lstat()) == OPEN:
+        room.chmod(0o700)
+    fault = "is a link" if room.is_symlink() else _fault_of(room.lstat())
+    if fault:
+        _say_once(
+            f"Compiled kernels are not kept: '{room}' {fault}. Set NUMBA_CACHE_DIR to a folder of your own."
+        )
+    return not fault
+
+
+@functools.cache
+def _say_once(text: str) -> None:
+    logging.getLogger("studio").warning(text)
 
 
 def fields_of(kind: Type) -> object:
@@ -238,10 +278,30 @@ def _known(module: str | None) -> bool:
     return (module or "").partition(".")[0] in KNOWN_BY_NAME
 
 
-def _kept(place: Path) -> bytes | None:
-    """What is kept there; None where there is nothing, or it is damaged."""
+def _rebuilt(place: Path, context: CPUContext) -> CompileResult | None:
+    """The kernel that is kept there; None where there is none that can be used."""
+    data = _kept(place)
+    if data is None:
+        return None
     try:
-        data = place.read_bytes()
+        return CompileResult._rebuild(context, *pickle.loads(data))
+    except Exception as problem:  # whatever a wrong pickle raises, the kernel is compiled again
+        _say_once(f"'{place.name}' is no compiled kernel ({type(problem).__name__}) and is made again.")
+        return None
+
+
+def _kept(place: Path) -> bytes | None:
+    """What is kept there; None where there is nothing, it is damaged, or it is not this user's alone."""
+    try:
+        if not _is_ours(place.parent):
+            return None
+        with place.open("rb") as file:
+            status = os.fstat(file.fileno())
+            fault = _fault_of(status) if stat.S_ISREG(status.st_mode) else "is no file"
+            if fault:
+                _say_once(f"The compiled kernel '{place}' {fault} and is not used.")
+                return None
+            data = file.read()
     except OSError:
         return None
     with contextlib.suppress(OSError):

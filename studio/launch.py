@@ -2,16 +2,20 @@
 
 import logging
 import logging.handlers
+import os
 import re
 import socket
+import threading
 from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import FrameType
 
 import click
 import uvicorn
 
 from studio.errors import StudioError
+from studio.foreign_files import read_text
 from studio.jobs.commands import Start, about
 from studio.jobs.control import StudioControl
 from studio.runs.new_run import prepare_run
@@ -28,7 +32,7 @@ Announce = Callable[[str], None]
 PORT = 8642
 LOG_NAME = "server.log"
 LOG_BYTES, LOG_FILES = 2_000_000, 3
-SECONDS_TO_CLOSE = 2
+SECONDS_TO_CLOSE, SECONDS_TO_END = 2, 5.0
 SERVER_LOCK, SERVER_ADDRESS = "server.lock", "server.address"
 UNKNOWN_ADDRESS = "an address that is not known yet"
 TOKEN_IN_ADDRESS = re.compile(r"(token=)[A-Za-z0-9_%-]+")
@@ -134,7 +138,7 @@ def served_at(root: Path) -> str:
     if not ProcessLock.is_held(folder / SERVER_LOCK):
         return ""
     try:
-        return (folder / SERVER_ADDRESS).read_text(encoding="utf-8") or UNKNOWN_ADDRESS
+        return read_text(folder / SERVER_ADDRESS) or UNKNOWN_ADDRESS
     except OSError:
         return UNKNOWN_ADDRESS
 
@@ -207,9 +211,29 @@ def _serve_until_stopped(app: object, listener: socket.socket) -> None:
         timeout_graceful_shutdown=SECONDS_TO_CLOSE,
     )
     try:
-        uvicorn.Server(config).run(sockets=[listener])
+        _EndingServer(config).run(sockets=[listener])
     except KeyboardInterrupt:
         return
+
+
+class _EndingServer(uvicorn.Server):
+    """Ends the process so many seconds after the signal to end, whatever a thread is waiting for: of what is stored
+    nothing is lost by it, and the tracking process ends with this one.
+    """
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """Begin to end."""
+        if not self.should_exit:
+            timer = threading.Timer(SECONDS_TO_END, _end_now, (sig,))
+            timer.daemon = True
+            timer.start()
+        super().handle_exit(sig, frame)
+
+
+def _end_now(number: int) -> None:
+    logging.getLogger("studio.launch").warning("a thread did not end; the server ended without it")
+    logging.shutdown()
+    os._exit(128 + number)
 
 
 def _log_to_file(folder: Path) -> Path:

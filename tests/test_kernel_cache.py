@@ -4,6 +4,8 @@ import gc
 import hashlib
 import importlib
 import os
+import pickle
+import stat
 import subprocess
 import sys
 import threading
@@ -153,6 +155,60 @@ def test_a_damaged_file_and_a_folder_that_cannot_be_written_cost_a_compilation(
     monkeypatch.setattr(kernel_cache, "folder", lambda: kept)
     assert answer(checkout("four")) == 227.0
     assert sorted(compiled) == ["later", "scaled", "squared", "total", "total"]
+
+
+@pytest.mark.parametrize("planted", ["of another", "writable", "a link", "a wrong pickle"])
+def test_what_another_may_have_put_there_is_not_run(
+    planted: str,
+    compiled: list[str],
+    checkout: Callable[..., ModuleType],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    answer(checkout("one"))
+    (kept,) = (tmp_path / "kept").glob("kernels.total-*")
+    assert (kept.stat().st_mode | kept.parent.stat().st_mode) & 0o077 == 0
+
+    class Harmful:
+        def __reduce__(self) -> tuple[object, ...]:
+            return Path.touch, (tmp_path / "it-ran",)
+
+    content = pickle.dumps(Harmful() if planted != "a wrong pickle" else "words")
+    kept.write_bytes(hashlib.sha256(content).digest() + content)
+    user = os.geteuid()
+    if planted == "of another":
+        monkeypatch.setattr(os, "fstat", lambda handle: another(os.stat(handle), user))
+    elif planted == "writable":
+        kept.chmod(0o666)
+    elif planted == "a link":
+        (tmp_path / "kept").rename(tmp_path / "elsewhere")
+        (tmp_path / "kept").symlink_to(tmp_path / "elsewhere")
+    compiled.clear()
+    assert answer(checkout("two")) == 227.0
+    assert "total" in compiled
+    assert not (tmp_path / "it-ran").exists()
+
+
+def another(status: os.stat_result, user: int) -> os.stat_result:
+    """The status of a file as if it belonged to another user."""
+    values = list(status)
+    values[stat.ST_UID] = user + 1
+    return os.stat_result(values)
+
+
+def test_in_a_shared_folder_each_user_has_one_of_his_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    tmp_path.chmod(0o777)
+    kernel_cache.folder.cache_clear()
+    try:
+        assert kernel_cache.folder().parent == tmp_path
+        tmp_path.chmod(0o700)
+        kernel_cache.folder.cache_clear()
+        assert kernel_cache.folder() == tmp_path
+    finally:
+        kernel_cache.folder.cache_clear()
 
 
 def test_who_compiles_it_just_now_is_waited_for(

@@ -80,6 +80,32 @@ def test_the_printed_address_opens_the_studio_and_ctrl_c_closes_everything(
     assert alive == []
 
 
+def test_it_ends_whatever_a_thread_waits_for(tmp_path: Path) -> None:
+    script = tmp_path / "serving.py"
+    waiting = "import threading\nfrom studio.sessions.workspace import Workspace\n"
+    waiting += "Workspace.sessions = lambda self: threading.Event().wait()\n"
+    script.write_text(waiting + SERVE)
+    process = subprocess.Popen(
+        [sys.executable, str(script), str(tmp_path / "workspace")],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env=os.environ | {"PYTHONPATH": str(Path(launch.__file__).parents[1])},
+    )
+    try:
+        assert process.stdout is not None
+        printed = process.stdout.readline().removeprefix("Open ").strip()
+        with httpx.Client(timeout=30.0, follow_redirects=True) as browser:
+            browser.get(printed)
+            with pytest.raises(httpx.ReadTimeout):
+                browser.get(f"{printed.partition('/?')[0]}/api/sessions", timeout=0.5)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(60) == 128 + signal.SIGINT
+    finally:
+        process.kill()
+        process.communicate()
+
+
 def test_the_token_is_printed_once_and_logged_nowhere(
     served: tuple[subprocess.Popen[str], str], tmp_path: Path
 ) -> None:

@@ -80,8 +80,7 @@ def read_model(path: Path) -> BehaviourModel:
             f"There is no behaviour model '{path.name}'.", "List the models with `studio models`."
         )
     with foreign_file(path, BehaviourError, "a behaviour model", "Learn it again with `studio learn`."):
-        with path.open("rb") as file:
-            arrays = read_archive(file)
+        arrays = read_archive(path)
         head = _checked_head(path, arrays.pop("head").tobytes())
         return _model(head, arrays)
 

@@ -44,7 +44,7 @@ from studio.body.definition import (
 from studio.body.model import BodyModel
 from studio.body.reader import assemble, check_definition
 from studio.errors import BodyError
-from studio.foreign_files import foreign_file
+from studio.foreign_files import foreign_file, read_file
 from studio.isolated import isolated
 
 ROBOT_SUFFIXES = (".urdf", ".xml", ".mjcf")
@@ -85,7 +85,7 @@ def read_robot(path: Path) -> BodyModel:
                 f"Robot file {path.name} has more than {LARGEST_BYTES >> 20} MB.",
                 "Give the description, not the meshes.",
             )
-        digest = hashlib.sha256(path.read_bytes()).digest()
+        digest = hashlib.sha256(read_file(path)).digest()
         if importlib.util.find_spec("mujoco") is None:
             raise BodyError(ABSENT, INSTALL)
         definition = _definition(path.resolve(), digest)
@@ -105,7 +105,7 @@ def robot_definition(path: Path) -> BodyDefinition:
     mujoco.set_mju_user_warning(_ignored)
     notes: list[str] = []
     try:
-        root = ElementTree.fromstring(path.read_bytes())
+        root = ElementTree.fromstring(read_file(path))
         if root.tag not in ("robot", "mujoco"):
             raise BodyError(
                 f"Robot file {path.name} holds <{root.tag}>.",

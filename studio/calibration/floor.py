@@ -23,7 +23,7 @@ from studio.calibration.boards import Board, Sighting
 from studio.calibration.extrinsics import Rig
 from studio.calibration.intrinsics import Lens
 from studio.errors import CalibrationError
-from studio.foreign_files import foreign_file
+from studio.foreign_files import foreign_file, read_file
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project
 from studio.geometry.rigid import best_fit, compose, inverse, rigid, transform
@@ -189,7 +189,7 @@ def read_clicks(path: Path) -> Clicks:
     """The points of a file. Raises CalibrationError."""
     remedy = 'Write {"points": [{"pixels": {"cam1": [x, y], "cam2": [x, y]}, "world": [x, y, z]}]}; world is optional.'
     with foreign_file(path, CalibrationError, "a list of clicked points", remedy):
-        return msgspec.json.decode(path.read_bytes(), type=Clicks)
+        return msgspec.json.decode(read_file(path), type=Clicks)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

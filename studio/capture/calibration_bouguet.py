@@ -12,7 +12,7 @@ from studio.capture.calibration_parts import FoundCameras
 from studio.capture.naming import natural_key
 from studio.capture.sanity import check_rotation
 from studio.errors import CalibrationError
-from studio.foreign_files import foreign_file
+from studio.foreign_files import foreign_file, read_text
 from studio.geometry.camera import Camera
 from studio.geometry.rotations import rotation_from_vector
 
@@ -36,7 +36,7 @@ def read_bouguet(path: Path) -> FoundCameras:
 def _read_file(path: Path) -> Camera:
     where = f"'{path.name}'"
     with foreign_file(path, CalibrationError, "a list of numbers", "Export it again."):
-        values = np.array([float(word) for word in path.read_text(encoding="utf-8").split()])
+        values = np.array([float(word) for word in read_text(path).split()])
     if len(values) != BOUGUET_NUMBERS or not np.all(np.isfinite(values)):
         raise CalibrationError(
             f"{where} holds {np.count_nonzero(np.isfinite(values))} finite numbers, not {BOUGUET_NUMBERS}.",

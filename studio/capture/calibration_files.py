@@ -22,7 +22,13 @@ from studio.capture.calibration_opencv import opencv_files, read_opencv
 from studio.capture.calibration_parts import AssumedCrop, FoundCameras, Intrinsics
 from studio.capture.calibration_qualisys import is_qualisys, read_qualisys
 from studio.capture.calibration_storage import STORAGE_SUFFIXES
-from studio.capture.calibration_toml import is_canonical, looks_like_calibration, read_toml, write_calibration
+from studio.capture.calibration_toml import (
+    calibration_text,
+    is_canonical,
+    looks_like_calibration,
+    read_toml,
+    write_calibration,
+)
 from studio.capture.calibration_writers import (
     CALIBRATION_FORMATS,
     CalibrationFormat,
@@ -42,6 +48,7 @@ __all__ = [
     "CalibrationFormat",
     "Intrinsics",
     "WrittenCalibration",
+    "calibration_text",
     "export_calibration",
     "find_calibrations",
     "read_calibration",

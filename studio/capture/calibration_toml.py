@@ -18,7 +18,7 @@ from studio.arrays import Array
 from studio.capture.calibration_parts import AssumedCrop, FoundCameras, Intrinsics, checked_intrinsics
 from studio.capture.sanity import check_rotation
 from studio.errors import CalibrationError
-from studio.foreign_files import foreign_file
+from studio.foreign_files import foreign_file, read_text
 from studio.geometry.camera import Camera
 from studio.typed_decoding import is_table
 
@@ -69,7 +69,12 @@ def read_toml(path: Path) -> FoundCameras:
 def write_calibration(
     cameras: tuple[Camera, ...], path: Path, crops: dict[str, AssumedCrop] | None = None
 ) -> None:
-    """Write the canonical file: mm, rotation as matrix rows, names as sections' `name`."""
+    """Write the canonical file (`calibration_text`)."""
+    path.write_text(calibration_text(cameras, crops), encoding="utf-8")
+
+
+def calibration_text(cameras: tuple[Camera, ...], crops: dict[str, AssumedCrop] | None = None) -> str:
+    """The canonical file: mm, rotation as matrix rows, names as sections' `name`."""
     document: dict[str, object] = {}
     for index, camera in enumerate(cameras):
         table: dict[str, object] = {
@@ -86,7 +91,7 @@ def write_calibration(
             table["assumed_crop"] = asdict(crop) | {"calibrated": list(crop.calibrated)}
         document[f"cam_{index:02d}"] = table
     document["metadata"] = {"format": CANONICAL, "version": VERSION, "unit": "mm"}
-    path.write_text(tomli_w.dumps(document), encoding="utf-8")
+    return tomli_w.dumps(document)
 
 
 def is_canonical(path: Path) -> bool:
@@ -101,7 +106,7 @@ def is_canonical(path: Path) -> bool:
 def _document(path: Path) -> dict[str, object]:
     """The file's entries. Raises CalibrationError."""
     with foreign_file(path, CalibrationError, "TOML", "Export it again."):
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(read_text(path))
 
 
 def _camera_tables(document: dict[str, object]) -> dict[str, dict[str, object]]:

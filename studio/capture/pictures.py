@@ -20,7 +20,7 @@ from studio.arrays import Array, Bytes
 from studio.capture.naming import natural_key
 from studio.capture.video import MAX_PIXELS
 from studio.errors import FootageError
-from studio.foreign_files import check_regular, foreign_file
+from studio.foreign_files import check_regular, foreign_file, read_file
 from studio.isolated import isolated, silent
 
 PICTURE_SUFFIXES = frozenset((".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm"))
@@ -55,8 +55,8 @@ def is_picture(path: Path) -> bool:
 
 def read_picture(path: Path) -> Bytes:
     """(H, W, 3) uint8 BGR; grey pictures become three equal channels. Raises FootageError naming the file."""
-    with foreign_file(path, FootageError, "a picture that can be read", "Put the file back."):
-        content = np.frombuffer(path.read_bytes(), np.uint8)
+    with foreign_file(path, FootageError, "a picture that can be read", "Put the file back.", footage=True):
+        content = np.frombuffer(read_file(path, wrong=FootageError, footage=True), np.uint8)
     picture = None
     if content.size:
         try:

@@ -26,7 +26,7 @@ import numpy as np
 
 from studio.capture.camera_streams import Bytes, Shot
 from studio.errors import FootageError
-from studio.foreign_files import check_regular
+from studio.foreign_files import check_file, open_file
 
 QUALITY, PREVIEW_QUALITY = 95, 80
 FRAGMENT_MICROSECONDS = 500_000
@@ -208,7 +208,7 @@ def whole_boxes(path: Path) -> int:
     `mdat` does not count.
     """
     size, place, whole = path.stat().st_size, 0, 0
-    with path.open("rb") as file:
+    with open_file(path, FootageError) as file:
         while place + HEADER <= size:
             file.seek(place)
             head = file.read(LONG_HEADER)
@@ -225,7 +225,7 @@ def whole_boxes(path: Path) -> int:
 
 def mend_recording(path: Path) -> int:
     """Cut a recording back to what is whole of it; returns the bytes that went. Raises FootageError if nothing is."""
-    check_regular(path, FootageError)
+    check_file(path, FootageError)
     size, whole = path.stat().st_size, whole_boxes(path)
     if not whole:
         raise FootageError(f"'{path.name}' holds no whole piece of a recording.", "Leave that camera out.")

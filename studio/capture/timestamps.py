@@ -6,6 +6,7 @@ follow each camera's offset and the time spread of a frame's pictures.
 """
 
 import csv
+import io
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ import numpy as np
 from studio.arrays import Array
 from studio.capture.naming import listed, natural_key
 from studio.errors import FootageError
-from studio.foreign_files import foreign_file
+from studio.foreign_files import foreign_file, read_file
 
 OLDER_NAME = "frame_time_history.csv"
 TIMESTAMP_NAMES = ("timestamps.csv", "frame_timestamps.csv", OLDER_NAME)
@@ -51,24 +52,18 @@ def read_timestamps(path: Path) -> dict[str, Array]:
     Raises FootageError naming file and line.
     """
     with foreign_file(path, FootageError, "a table of times", "Copy it again."):
-        if path.stat().st_size > LARGEST_FILE:
-            raise FootageError(
-                f"'{path.name}' is larger than {LARGEST_FILE // 1_000_000} MB.", "Check the file."
-            )
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = csv.DictReader(file)
-            columns = [
-                _column(path, rows.fieldnames or (), names) for names in (CAMERA_COLUMNS, TIME_COLUMNS)
-            ]
-            # The older file counts frames from the stream's begin, not the video's.
-            numbered = () if path.name == OLDER_NAME else rows.fieldnames or ()
-            index_column = next((name for name in INDEX_COLUMNS if name in numbered), "")
-            found: dict[str, list[tuple[int, float]]] = {}
-            for number, row in enumerate(rows, 2):
-                camera = (row[columns[0]] or "").strip()
-                moment = _number(path, number, row[columns[1]])
-                index = round(_number(path, number, row[index_column])) if index_column else -1
-                found.setdefault(camera, []).append((index, moment))
+        text = read_file(path, LARGEST_FILE, FootageError).decode("utf-8-sig")
+        rows = csv.DictReader(io.StringIO(text, newline=""))
+        columns = [_column(path, rows.fieldnames or (), names) for names in (CAMERA_COLUMNS, TIME_COLUMNS)]
+        # The older file counts frames from the stream's begin, not the video's.
+        numbered = () if path.name == OLDER_NAME else rows.fieldnames or ()
+        index_column = next((name for name in INDEX_COLUMNS if name in numbered), "")
+        found: dict[str, list[tuple[int, float]]] = {}
+        for number, row in enumerate(rows, 2):
+            camera = (row[columns[0]] or "").strip()
+            moment = _number(path, number, row[columns[1]])
+            index = round(_number(path, number, row[index_column])) if index_column else -1
+            found.setdefault(camera, []).append((index, moment))
     if not found:
         raise FootageError(f"'{path.name}' holds no times.", "Copy it again, or give the offsets by hand.")
     return {name: _times(path, name, found[name]) for name in sorted(found, key=natural_key)}

@@ -76,7 +76,7 @@ def probe_video(path: Path) -> VideoProbe:
 
 def _probed(path: Path) -> VideoProbe:
     with (
-        foreign_file(path, FootageError, "a video", "Copy or export it again."),
+        foreign_file(path, FootageError, "a video", "Copy or export it again.", footage=True),
         open_video(path) as container,
     ):
         stream = container.streams.video[0]

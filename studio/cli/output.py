@@ -17,6 +17,7 @@ import msgspec
 from rich.console import Console
 
 from studio.errors import StudioError
+from studio.foreign_files import read_file
 from studio.operations.progress import Display, bar
 from studio.progress import Progress, TimeLeft, left_in_words
 from studio.registry import Registry
@@ -172,8 +173,8 @@ def notes(lines: Iterable[str], once_in: Path | None = None) -> None:
     """
     said = set[str]()
     if once_in is not None:
-        with suppress(OSError, msgspec.DecodeError):
-            said = set(decode_json((once_in / SAID).read_bytes(), list[str]))
+        with suppress(OSError, StudioError, msgspec.DecodeError):
+            said = set(decode_json(read_file(once_in / SAID), list[str]))
     new = [line for line in lines if line not in said]
     for line in new:
         note(line)

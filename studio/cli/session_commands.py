@@ -1,19 +1,22 @@
-"""What there is and how it stands: `gallery`, `bodies`, `edit-body`, `runs`, `workflow`."""
+"""What there is and how it stands: `gallery`, `bodies`, `edit-body`, `inspect`, `runs`, `workflow`."""
 
 from dataclasses import asdict
 
 import click
 
 from studio.cli.deriving import Call, command_of
-from studio.cli.output import command
+from studio.cli.output import EXIT_CODE, FOUND_FAULTS, command
+from studio.operations.foreign import inspect
 from studio.operations.gallery import Gallery, gallery
 from studio.operations.opening import bodies, workflow
 from studio.operations.own_bodies import EditedBody, edit_body
 from studio.runs.workflow import Workflow
+from studio.sessions.foreign_sessions import Inspection
 from studio.sessions.object_stores import is_address
 from studio.sessions.remote_sessions import sessions_at
 from studio.sessions.stored_run import damage_in_words
 from studio.sessions.workspace import Workspace
+from studio.words import counted
 
 MARKS = {"done": "✓", "ready": "·", "blocked": " ", "stale": "!", "running": "…"}
 
@@ -35,6 +38,22 @@ def bodies_command(call: Call) -> dict[str, object]:
         for entry in entries
     ]
     return {"bodies": entries, "text": "\n".join(lines)}
+
+
+@command_of(inspect)
+def inspect_command(call: Call) -> dict[str, object]:
+    found: Inspection = call()
+    lines = [f"{one.place}: {one.what}." for one in found.oddities]
+    said = "nothing is odd" if not lines else counted(len(lines), "oddity", "oddities")
+    lines.append(f"{found.kind}: {counted(found.files, 'file')}, {found.bytes / 1e6:.1f} MB; {said}.")
+    return {
+        EXIT_CODE: 0 if found.harmless else FOUND_FAULTS,
+        "kind": found.kind,
+        "files": found.files,
+        "bytes": found.bytes,
+        "oddities": [asdict(one) for one in found.oddities],
+        "text": "\n".join(lines),
+    }
 
 
 @command_of(gallery)

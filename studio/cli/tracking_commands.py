@@ -1,4 +1,4 @@
-"""Tracking: `track`, `live`, `correct`."""
+"""Tracking: `track`, `live`, `correct`, `branch`."""
 
 import os
 from pathlib import Path
@@ -13,6 +13,7 @@ from studio.operations.opening import Tracked
 from studio.operations.tracking import (
     Replayed,
     TrackedLive,
+    branch,
     correct,
     go_on,
     live,
@@ -160,6 +161,20 @@ def correct_command(call: Call) -> dict[str, object]:
         "back_to": back_to,
         "frames": tracked,
         "text": f"{where}, {tracked} frames tracked {way}.",
+    }
+
+
+@command_of(branch)
+def branch_command(call: Call) -> dict[str, object]:
+    old, frame = call.given["run"], call.given["frame"]
+    run: StoredRun = call().run
+    tracked = run.record.last - frame
+    return {
+        **_which(run),
+        "made_from": old.name,
+        "from_frame": frame,
+        "frames": tracked,
+        "text": f"{run.session_name} / {run.name}: run '{old.name}' from frame {frame} on, {tracked} frames tracked.",
     }
 
 

@@ -21,6 +21,7 @@ from studio.comparison.kept_trials import KeptTrials, measured_by, plain
 from studio.comparison.plan import Comparison, Plan
 from studio.comparison.sweep import Sweep, sweep_csv, sweep_document
 from studio.comparison.trials import Scale, Trial
+from studio.foreign_files import LARGEST_RECORD, read_file
 from studio.sessions import atomic_files
 from studio.sessions.manifest import now
 from studio.sessions.object_stores import below, is_address
@@ -145,7 +146,7 @@ class KeptComparison:
     def result(self) -> dict[str, Any] | None:
         """Numbers (`document`), `findings` and `per_frame`, of a sweep `sweep_document`; None while unfinished."""
         path = self.folder / RESULT_NAME
-        return decode_json(path.read_bytes(), dict[str, Any]) if path.is_file() else None
+        return decode_json(read_file(path, LARGEST_RECORD), dict[str, Any]) if path.is_file() else None
 
 
 def trial_key(trial: Trial) -> str:

@@ -15,6 +15,8 @@ from typing import Any
 
 import studio
 from studio.comparison.trials import Plain, is_mapping
+from studio.errors import SessionError
+from studio.foreign_files import LARGEST_RECORD, read_file, read_text
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.runs.new_run import software_version
 from studio.sessions.atomic_files import write_text
@@ -55,8 +57,8 @@ class KeptTrials:
     def read(self, key: str) -> KeptOutcome | None:
         """The outcome of a key; None without a readable file."""
         try:
-            return KeptOutcome(**json.loads((self.folder / f"{key}.json").read_text(encoding="utf-8")))
-        except (OSError, ValueError, TypeError, RecursionError):
+            return KeptOutcome(**json.loads(read_text(self.folder / f"{key}.json", LARGEST_RECORD)))
+        except (OSError, SessionError, ValueError, TypeError, RecursionError):
             return None
 
     def write(self, key: str, outcome: KeptOutcome) -> None:
@@ -81,7 +83,7 @@ def code_digest(rooms: tuple[str, ...]) -> str:
     for room in rooms:
         for path in sorted((package / room).rglob("*")):
             if path.suffix in (".py", ".toml"):
-                digest.update(path.read_bytes())
+                digest.update(read_file(path))
     return digest.hexdigest()[:8]
 
 

@@ -18,6 +18,7 @@ from studio.comparison.statistics import SignTest, sign_test
 from studio.comparison.tracked import Tracked, TrackingTrial, tracking_trial
 from studio.comparison.trials import Outcome, Trial
 from studio.errors import RunError, TruthError
+from studio.foreign_files import read_file
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.runs.behaviour_models import ChosenModel, chosen_model, needs_model
 from studio.runs.new_run import checked_frames, start_of
@@ -178,7 +179,7 @@ def plan_of(
         fps=session.manifest.fps,
         body=body,
         behaviour=chosen.name if chosen else "",
-        behaviour_digest=hashlib.sha256(chosen.path.read_bytes()).hexdigest()[:16] if chosen else "",
+        behaviour_digest=hashlib.sha256(read_file(chosen.path)).hexdigest()[:16] if chosen else "",
         behaviour_path=str(chosen.path) if chosen else "",
     )
 

@@ -99,7 +99,7 @@ def export_run(
     if "track" in form.takes:
         options, notes = with_track(run, options)
     motion = no_motion(run) if form.what == "cameras" else motion_of(run, options)
-    folder = _working_folder(place)
+    folder = _working_folder(place, run)
 
     try:
         written = writer(ExportTask(session, run, motion, options, folder / place.name, progress))
@@ -130,11 +130,11 @@ def _damage(run: StoredRun) -> tuple[str, ...]:
     return (damage,) if damage else ()
 
 
-def _working_folder(place: Path) -> Path:
+def _working_folder(place: Path, run: StoredRun) -> Path:
     """A hidden folder beside the place. Raises ExportError, SessionError where nothing can be written."""
     if place.is_dir():
         raise ExportError(f"'{place.name}' is a folder.", "Name a file.")
-    return new_folder_beside(place)
+    return new_folder_beside(place, parents=not place.is_relative_to(run.folder))
 
 
 def _packed(written: Written, place: Path) -> tuple[Path, ...]:

@@ -13,6 +13,7 @@ import numpy as np
 from studio.arrays import Array
 from studio.errors import ExportError
 from studio.export.task import ExportTask, Written, agreed
+from studio.foreign_files import read_text
 
 MM_PER_M = 1000.0
 END = "endheader"
@@ -66,7 +67,7 @@ def write_mot(task: ExportTask) -> Written:
 
 def read_mot(path: Path) -> MotFile:
     """An OpenSim storage in degrees. Raises ExportError where it is none."""
-    lines = path.read_text(encoding="utf-8").splitlines()
+    lines = read_text(path).splitlines()
     try:
         end = next(at for at, line in enumerate(lines) if line.strip().lower() == END)
         header = {"name": lines[0]} | dict(line.split("=", 1) for line in lines[1:end] if "=" in line)

@@ -15,6 +15,7 @@ from studio.body.forward_kinematics import joint_frames
 from studio.body.model import BodyModel
 from studio.errors import ExportError
 from studio.export.options import OWN
+from studio.foreign_files import read_file
 from studio.typed_decoding import decode_toml
 from studio.words import enumerated
 
@@ -61,7 +62,7 @@ def name_map(name: str) -> NameMap:
         raise ExportError(
             f"There is no map of names '{name[:40]}'.", "Choose own, halpe26, mixamo or opensim."
         )
-    return decode_toml(found.read_bytes(), NameMap)
+    return decode_toml(read_file(found), NameMap)
 
 
 def points_of(body: BodyModel, names: str) -> Points:

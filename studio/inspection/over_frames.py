@@ -16,6 +16,7 @@ from studio.errors import NotFoundError
 from studio.inspection.reading import InspectedFrame, InspectedRun, no_value
 from studio.inspection.reference import body_points, by_limb, true_points
 from studio.inspection.schedule import alarm_of, effective_number
+from studio.inspection.searches import layers_of_a_search
 from studio.inspection.tables import Row, Selection
 from studio.sessions.results_reader import Timeline
 
@@ -27,7 +28,7 @@ class FrameSummary:
     """variances : (L, 3, D) of each layer as weighed, before and after noise. betas, alphas, effective : (L,). alarms :
     layers with one. spread : (M,) root mean squared distance of the last set's points from their mean, mm. ranks : (M,
     3) share of the last set's weight below the truth's coordinates, NaN where there is none. disagreement : as in the
-    frame's result.
+    frame's result. search_layers : layers of one search of the frame.
     """
 
     variances: Floats
@@ -38,6 +39,7 @@ class FrameSummary:
     spread: Array
     ranks: Array
     disagreement: Mapping[str, float]
+    search_layers: int
 
     @property
     def size(self) -> int:
@@ -68,6 +70,7 @@ def summary_of(frame: InspectedFrame) -> FrameSummary:
         spread,
         ranks,
         {} if frame.result is None else frame.result.disagreement,
+        layers_of_a_search(frame),
     )
 
 
@@ -138,7 +141,7 @@ def variance_rows(run: InspectedRun, selection: Selection) -> dict[str, list[Row
     if selection.parameter:
         at = run.parameter(selection.parameter)
         tables["parameter"] = [
-            (frame, layer, *map(float, moments[:, at]))
+            (frame, 1 + layer // entry.search_layers, layer, *map(float, moments[:, at]))
             for frame, entry in found.items()
             for layer, moments in enumerate(entry.variances)
         ]

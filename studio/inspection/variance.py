@@ -5,6 +5,7 @@ noise).
 import numpy as np
 
 from studio.inspection.reading import InspectedFrame
+from studio.inspection.searches import layers_of_a_search
 from studio.inspection.tables import Row, Selection, View, table
 
 VIEW = View(
@@ -19,6 +20,7 @@ VIEW = View(
             "parameter",
             "limb",
             "unit",
+            ("search", "Search of the frame"),
             "layer",
             ("weighed", "As weighed"),
             ("before", "Before noise"),
@@ -41,6 +43,7 @@ VIEW = View(
             "parameter",
             "One parameter by layer and frame",
             "frame",
+            ("search", "Search of the frame"),
             "layer",
             ("weighed", "As weighed"),
             ("before", "Before noise"),
@@ -64,12 +67,13 @@ def settling(frame: InspectedFrame) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 
 def rows(frame: InspectedFrame, selection: Selection) -> dict[str, list[Row]]:
     """The tables of view `variance`."""
-    run, layers = frame.of, frame.layers
+    run, layers, search_layers = frame.of, frame.layers, layers_of_a_search(frame)
     settled, first, last = settling(frame)
     return {
         "layers": [
             (
                 *label,
+                1 + layer // search_layers,
                 layer,
                 float(record.variance_weighed[at]),
                 float(record.variance_resampled[at]),

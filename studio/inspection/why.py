@@ -41,6 +41,7 @@ from studio.inspection.schedule import effective_number
 from studio.inspection.tables import Finding, Found, Remedy, Row, Selection, View, table
 from studio.knobs import Value, knobs_of
 from studio.likelihood.catalogue import WEIGHTINGS
+from studio.runs.run_footage import filmed_cameras
 from studio.runs.tracks import RAW
 from studio.settings import RunSettings
 from studio.trackers.tracker import LIMB_LOST_SHARE
@@ -190,7 +191,12 @@ class Case:
     def camera_fault(self) -> CameraFault | None:
         """The camera that contradicts the others at the reference pose."""
         return fault_of(
-            view_fits(self.run.body, self.run.run.cameras(), self.evaluation.evidence, self.reference.pose)
+            view_fits(
+                self.run.body,
+                filmed_cameras(self.run.session, self.run.run.cameras()),
+                self.evaluation.evidence,
+                self.reference.pose,
+            )
         )
 
     @cached_property

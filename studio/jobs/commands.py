@@ -85,7 +85,7 @@ class Reanneal(Command):
     """Anneal a frame again with the current settings, same start and random keys; the stored result stays.
 
     frame : -1 for the selected one. keep : store the answer as the run's own and drop the frames after it,
-    which followed from the old one. A run that is being tracked is paused.
+    which followed from the old one; the run as it was goes to the trash. A run that is being tracked is paused.
     """
 
     frame: int = -1

@@ -75,13 +75,15 @@ class LayerFinished(Event):
 
     requested_at : `time.monotonic()` when the person's command (a slider's event) came that this layer answers,
     NaN where it answers none. left_at : when it left the process. The difference is the time that a person
-    waits.
+    waits. search_layers, searches : layers of one search of the frame, and how many searches the frame has.
     """
 
     record: LayerRecord
     reannealed: bool = False
     requested_at: float = math.nan
     left_at: float = math.nan
+    search_layers: int = 0
+    searches: int = 1
 
     @property
     def key(self) -> Hashable:

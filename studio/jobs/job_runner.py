@@ -8,8 +8,9 @@ import logging
 import secrets
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -200,6 +201,7 @@ class JobRunner:
         self._publish, self._log_path = publish, log_path
         self._lock = threading.RLock()
         self._jobs: dict[str, dict[str, Job]] = {}
+        self._moving: list[str] = []
         self._threads = ThreadPoolExecutor(MOST_AT_ONCE, thread_name_prefix="job")
 
     def begin(self, kind: JobKind[State], state: State, work: Work) -> State:
@@ -207,6 +209,10 @@ class JobRunner:
         there is one at a time.
         """
         with self._lock:
+            if state.session in self._moving:
+                raise RunError(
+                    f"Session '{state.session}' is being renamed or deleted.", "Begin it again in a moment."
+                )
             self.check_free(kind)
             jobs = self._jobs.setdefault(kind.event, {})
             jobs.pop(state.key, None)
@@ -223,12 +229,36 @@ class JobRunner:
         if kind.busy and going:
             raise _busy(kind, going[0])
 
+    @contextmanager
+    def moving(self, session: str, run: str = "") -> Generator[None]:
+        """Inside, a session (or a run of it) may be renamed or deleted: no job of it begins. Raises RunError while one
+        is under way.
+        """
+        with self._lock:
+            for kind, state in self._going_on(session):
+                if not run or getattr(state, "run", run) in ("", run):
+                    raise RunError(
+                        f"Session '{session}' stays as it is while its {kind.noun} is under way.",
+                        "Wait for it, or cancel it.",
+                    )
+            self._moving.append(session)
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._moving.remove(session)
+
+    def _going_on(self, session: str) -> Iterator[tuple[JobKind[SessionJob], SessionJob]]:
+        """What is under way of a session."""
+        for job in [job for jobs in list(self._jobs.values()) for job in list(jobs.values())]:
+            if job.state.session == session and job.state.state.is_going:
+                yield job.kind, job.state
+
     def check_movable(self, session: str) -> None:
         """Raise RunError while a job is under way that keeps a session where it is."""
-        for job in [job for jobs in list(self._jobs.values()) for job in list(jobs.values())]:
-            state = job.state
-            if job.kind.keeps_session and state.session == session and state.state.is_going:
-                raise _busy(job.kind, state)
+        for kind, state in self._going_on(session):
+            if kind.keeps_session:
+                raise _busy(kind, state)
 
     def known(self, kind: JobKind[State], key: str) -> State | None:
         """How a job stands, None where there is none."""

@@ -13,6 +13,7 @@ import numpy as np
 from studio.errors import SessionError, SettingsError, StudioError
 from studio.runs.behaviour_models import check_prediction
 from studio.runs.compiling_beside import compiling_beside
+from studio.runs.correcting import copied_beside
 from studio.runs.moved_knobs import keep_moved, moved_between, with_moved
 from studio.runs.problem_source import ProblemSource
 from studio.runs.reannealing import Reannealing
@@ -21,6 +22,7 @@ from studio.runs.sides import in_words, put_sides_right
 from studio.runs.tracking_run import Stepped, TrackingRun
 from studio.sessions.run_log import append_to_log
 from studio.sessions.session import Session
+from studio.sessions.workspace import Workspace
 from studio.settings import RunSettings, all_knobs, changed_settings, values
 
 
@@ -183,6 +185,16 @@ class OpenRun:
         version, settings = self.mailbox.latest()
         self.reannealing = Reannealing(self.tracking, target, version, settings)
         return target
+
+    def keep_reannealed(self) -> None:
+        """Make the finished re-annealing the run's own frame. The run as it was goes to the workspace's trash, because
+        the old frame and all after it are dropped.
+        """
+        assert self.reannealing is not None
+        copy = copied_beside(self.stored, self.stored.record)
+        Workspace(self.session.path.parent).to_trash(copy, f"{self.session_name}--{self.run_name}")
+        self.reannealing.keep()
+        self.keep_moved()
 
     def drop_reannealing(self) -> None:
         """Leave the re-annealing unfinished."""

@@ -90,7 +90,15 @@ class Reporter:
         record, result, tracking = stepped.record, stepped.result, run.tracking
         if stepped.applied is not None:
             self.settings(run, record.settings_version, stepped.applied, record.frame, record.layer)
-        self.post(LayerFinished(*names_of(run), record, False, requested_at))
+        self.post(
+            LayerFinished(
+                *names_of(run),
+                record,
+                requested_at=requested_at,
+                search_layers=stepped.search_layers,
+                searches=stepped.searches,
+            )
+        )
         if result is None:
             return
         event = FrameFinished(*names_of(run), result)

@@ -205,13 +205,26 @@ class TrackingJob:
         record = reannealing.step_layer()
         if record.layer == 0:
             self._say.settings(run, reannealing.version, reannealing.settings, reannealing.frame, 0)
-        self._say.post(LayerFinished(*names_of(run), record, True, self._requested_at))
+        self._say.post(
+            LayerFinished(
+                *names_of(run),
+                record,
+                reannealed=True,
+                requested_at=self._requested_at,
+                search_layers=reannealing.search_layers,
+                searches=reannealing.searches,
+            )
+        )
         if not reannealing.finished:
             return
         result, kept = reannealing.result(), run.keep_result
         if kept:
-            reannealing.keep()
-            run.keep_moved()
+            run.keep_reannealed()
+            self._say.log(
+                run,
+                "info",
+                f"Frame {reannealing.frame} is replaced, those after it are dropped; the old run is in the trash.",
+            )
         run.reannealing, run.keep_result = None, False
         self._say.post(FrameFinished(*names_of(run), result, not kept))
         if run.reanneal_again:

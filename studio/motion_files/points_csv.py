@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from studio.errors import TruthError
-from studio.foreign_files import foreign_file
+from studio.foreign_files import foreign_file, read_text
 from studio.motion_files.trc import MM_PER_UNIT, MarkerMotion, check_reach, number_or_nan
 
 FRAME = ("frame", "frames", "frame_number", "fnum", "frame_index")
@@ -53,7 +53,7 @@ def read_points(path: Path, fps: float) -> MarkerMotion:
     file names none. Raises TruthError naming file, line and column.
     """
     with foreign_file(path, TruthError, "a CSV file of points", SHAPE):
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_text(path, encoding="utf-8-sig")
         lines = text.splitlines()
         first = next((line for line in lines if line.strip()), "")
         separator = max(SEPARATORS, key=first.count)

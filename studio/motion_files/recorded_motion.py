@@ -9,7 +9,7 @@ import numpy as np
 
 from studio.arrays import Array
 from studio.errors import StudioError
-from studio.foreign_files import foreign_file
+from studio.foreign_files import foreign_file, read_text
 
 UP_FROM_Y_UP = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """Files with y up and people facing z become z up, facing x: (x, y, z) -> (z, x, y), a proper rotation."""
@@ -109,7 +109,7 @@ def at_line(path: Path, line: int, what: str, remedy: str) -> StudioError:
 def text_lines(path: Path) -> list[str]:
     """The lines of a motion file. Raises StudioError where it cannot be read or is no text."""
     with foreign_file(path, StudioError, "a text file", "Give a motion file as text."):
-        return path.read_text(encoding="utf-8").splitlines()
+        return read_text(path).splitlines()
 
 
 def numbers(path: Path, line: int, words: list[str]) -> list[float]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from studio.arrays import Array
 from studio.errors import StudioError, TruthError
-from studio.foreign_files import foreign_file
+from studio.foreign_files import foreign_file, read_text
 from studio.geometry.reach import FARTHEST_MM, REACH_HINT
 
 MM_PER_UNIT = {"mm": 1.0, "cm": 10.0, "m": 1000.0}
@@ -58,7 +58,7 @@ def read_trc(path: Path) -> MarkerMotion:
     Raises TruthError naming file, line and column for anything that is not a complete, finite table.
     """
     with foreign_file(path, TruthError, "a TRC file", "Export it again."):
-        return _motion(path, path.read_text(encoding="utf-8-sig").splitlines())
+        return _motion(path, read_text(path, encoding="utf-8-sig").splitlines())
 
 
 def _motion(path: Path, lines: list[str]) -> MarkerMotion:

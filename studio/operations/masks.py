@@ -10,6 +10,7 @@ from pydantic import Field
 
 from studio.capture.pictures import painted_picture, png_of
 from studio.declaring import Knobs, Terminal, Values, Web, operation
+from studio.foreign_files import read_file
 from studio.operations.opening import SessionName, open_session
 from studio.operations.progress import Reporting, reporting, say
 from studio.runs.background_setup import BackgroundSetup, BackgroundSource, set_up_background
@@ -131,6 +132,6 @@ def exclude_region(session: Session, camera: str, region: ArrayLike | str | Path
     if region is None:
         set_exclusion(session, camera, b"")
     elif isinstance(region, str | Path):
-        set_exclusion(session, camera, png_of(painted_picture(Path(region).read_bytes())))
+        set_exclusion(session, camera, png_of(painted_picture(read_file(Path(region)))))
     else:
         polygon_exclusion(session, camera, np.asarray(region, dtype=np.float64))

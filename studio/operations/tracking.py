@@ -1,6 +1,6 @@
 """Tracking: from footage or live cameras, gone on with, again without the clock, corrected."""
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,6 +39,7 @@ from studio.operations.opening import (
 )
 from studio.operations.progress import Reporting, reporting, say
 from studio.progress import Progress
+from studio.runs.branching import prepare_branch
 from studio.runs.correcting import prepare_correction, track_backwards
 from studio.runs.live_replay import Comparison, prepare_replay
 from studio.runs.live_request import last_of
@@ -298,6 +299,39 @@ def correct(
     with _reporting(new, progress, how_far) as report:
         track_backwards(session_of(stored), new, counted)
     return _tracked(new, None)
+
+
+@operation
+def branch(
+    run: RunName,
+    frame: Annotated[
+        int, Field(ge=0, description="The first frame that is tracked again."), Terminal("--at", "K")
+    ],
+    *,
+    knobs: Annotated[
+        Values,
+        Field(description="Any other knob."),
+        Knobs(own_knobs, others=True, with_defaults=False),
+    ] = None,
+    name: Annotated[str, Field(description="Of the new run; default: numbered.")] = "",
+    progress: Reporting = None,
+) -> Tracked:
+    """Track a frame and all after it again with other knobs, into a new run; the old one stays.
+
+    The frames before it are the old run's. Without knobs those count that were moved in the run. Ctrl-C stops; what was
+    tracked stays and can be gone on with.
+
+    Raises SettingsError where no knob differs.
+    """
+    return go_on(branched_run(run, frame, knobs, name), progress=progress)
+
+
+def branched_run(
+    run: RunName, frame: int, knobs: Mapping[str, object] | None = None, name: str = ""
+) -> StoredRun:
+    """The run that `branch` makes, before anything of it is tracked."""
+    stored = open_run(run)
+    return prepare_branch(session_of(stored), stored, frame, knobs, name)
 
 
 def corrected_run(

@@ -1,9 +1,9 @@
 """Numbers over seeds compared with a paper's claims.
 
 Three kinds of claim. A value that the paper prints: `comparison.statistics.number`. That something holds, of which the
-paper shows one run: `share`. That one thing is smaller than another, or than a bound: `ratio`, `beyond`. An
-experiment's verdict is that of its hardest claim; a number that no claim of the paper rests on (a setting of ours, a
-time on another machine) is shown without a verdict.
+paper shows one run: `share`. That one thing is smaller than another, no worse, or equal to it, or beyond a bound:
+`ratio`, `beyond`. An experiment's verdict is that of its hardest claim; a number that no claim of the paper rests on (a
+setting of ours, a time on another machine) is shown without a verdict.
 """
 
 import math
@@ -15,9 +15,19 @@ import numpy as np
 from scipy.stats import binomtest
 
 from studio.comparison.findings import Number, Plain, Table
-from studio.comparison.statistics import equal_to, number, ratio_number, sign_test
+from studio.comparison.statistics import (
+    LEVEL,
+    ONE_SIDED,
+    equal_to,
+    number,
+    ratio_number,
+    sign_test,
+    verdict_of,
+)
 
-EQUAL, LOWER, HIGHER = "equal", "lower", "higher"
+EQUAL, NO_WORSE, LOWER, HIGHER = "equal", "no worse", "lower", "higher"
+FEWEST_SEEDS = 5
+"""With fewer, nothing is found equal or no worse, however little they scatter."""
 HALF = 0.5
 ONE_SIDED_P = 0.05
 
@@ -46,13 +56,34 @@ def share(name: str, held: Iterable[bool], paper: float | None = 1.0) -> Number:
     return Number(name, holds / count, low, high, "of 1", paper, "", count, verdict)
 
 
+def percent(name: str, held: Iterable[bool], least: float | None = None) -> Number:
+    """Per cent of some cases in which something holds, with its exact (Clopper & Pearson) 95 % interval, which is not
+    empty where all or none do. least : claimed, per cent; better where the whole interval lies above.
+    """
+    seen = [bool(value) for value in held]
+    holds, count = sum(seen), len(seen)
+    if not count:
+        return number(name, [], "%", paper=least, better="higher")
+    test = binomtest(holds, count)
+    outer, inner = (test.proportion_ci(level, method="exact") for level in (LEVEL, ONE_SIDED))
+    low, high = 100.0 * float(outer.low), 100.0 * float(outer.high)
+    tested = 100.0 * float(inner.low), 100.0 * float(inner.high)
+    verdict = verdict_of((low, high), tested, least, "higher")
+    return Number(name, 100.0 * holds / count, low, high, "%", least, "higher", count, verdict)
+
+
 def ratio(name: str, ours: Sequence[float], theirs: Sequence[float], claim: str = "") -> Number:
     """The ratio of two settings' errors, paired by seed.
 
-    claim : "equal" (no larger than 1 by the margin of equality), "lower" (`beyond` 1), or none.
+    claim : EQUAL (within the margin of equality on both sides, so that *better* refutes it as *worse* does), NO_WORSE
+    (no larger than 1 by that margin), LOWER (`beyond` 1), or none.
     """
-    found = ratio_number(name, ours, theirs, "×", paper=1.0 if claim == EQUAL else None, better="lower")
-    return beyond(found, 1.0, LOWER) if claim == LOWER else found
+    paper = 1.0 if claim in (EQUAL, NO_WORSE) else None
+    found = ratio_number(name, ours, theirs, "×", paper=paper, better="" if claim == EQUAL else "lower")
+    if claim == LOWER:
+        return beyond(found, 1.0, LOWER)
+    enough = paper is None or found.seeds >= FEWEST_SEEDS or found.verdict != "reproduced"
+    return found if enough else replace(found, verdict="undecided")
 
 
 def beyond(found: Number, bound: float, side: str) -> Number:

@@ -25,7 +25,7 @@ from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.likelihood.outlines import OutlineProjector
 from studio.likelihood.problem import WHOLE_BODY
-from studio.reproduction.claims import EQUAL, HALF, HIGHER, LOWER, beside, beyond, ratio
+from studio.reproduction.claims import EQUAL, HALF, HIGHER, LOWER, NO_WORSE, beside, beyond, ratio
 from studio.reproduction.drawing import bar_chart, floats, places, seed_range
 from studio.reproduction.experiment import Part, each_seed, listed
 from studio.reproduction.tracking import (
@@ -50,6 +50,7 @@ from studio.runs.search_space import search_space, session_sigma
 from studio.settings import changed_settings, default_settings
 from studio.trackers.catalogue import TRACKERS, knobs_for_evaluations
 from studio.trackers.frame_loop import search_frame
+from studio.trackers.paper_presets import DEUTSCHER_REID_EQ_13, FLEISCHMANN, of_the_search
 from studio.trackers.tracker import FrameLikelihood, start_of
 
 # Common parts of the experiments of Fleischmann et al. (2012), section 3.
@@ -72,16 +73,19 @@ RATES = {60: TWIN, 20: TWIN_20}
 
 # The hard priors of section 2.3, for every compared tracker.
 PRIORS = {"constraints": "redraw", "limbs_apart": True}
+# Silhouettes are compared pixel by pixel (2.2).
+EXACT = {"silhouette_resolution": "full"}
 
-SWARM = Candidate("swarm", "swarm", FITNESS, PRIORS)
-# The filter of the paper's Fig. 6 is HumanEva's: noise planned by the survival rate, no crossover (Eq. 13).
+SWARM = Candidate("swarm", "swarm", FITNESS, {**of_the_search(FLEISCHMANN), **EXACT})
+# The filter of the paper's Fig. 6 is HumanEva's: noise planned by the survival rate, no crossover (Eq. 13); of its 1000
+# evaluations the benchmark makes five layers.
 EQ13 = Candidate(
-    "annealed, Eq. 13",
-    "annealed",
-    FITNESS,
-    {**PRIORS, "adaptive_diffusion": False, "crossover": 0.0, "survival": 0.5},
+    "annealed, Eq. 13", "annealed", FITNESS, {**of_the_search(DEUTSCHER_REID_EQ_13), **PRIORS, **EXACT}
 )
-IMPROVED = Candidate("annealed, improved", "annealed", FITNESS, PRIORS)
+FIVE_LAYERS = replace(
+    EQ13, name="annealed, Eq. 13, 5 × 200", changes={**EQ13.changes, "layers": 5, "particles": 200}
+)
+IMPROVED = Candidate("annealed, improved", "annealed", FITNESS, {**PRIORS, **EXACT})
 
 
 def last_frame(fps: int, quick: bool) -> int:
@@ -89,7 +93,7 @@ def last_frame(fps: int, quick: bool) -> int:
     return (QUICK_FRAMES if quick else FRAMES) * fps // 60
 
 
-COMPARED = (SWARM, EQ13, IMPROVED)
+COMPARED = (SWARM, EQ13, FIVE_LAYERS, IMPROVED)
 SETTINGS: Mapping[str, Any] = {"weighting": SWARM.weighting, "evaluations": EVALUATIONS, **PRIORS}
 NOTHING: Mapping[str, Any] = {}
 SEED_BARS = "bars: lowest and highest seed"
@@ -223,6 +227,8 @@ def _fig_6(groups: Groups) -> Iterator[Part]:
     for fps, claim in ((20, LOWER), (60, EQUAL)):
         ours, theirs = (groups[f"{one.name}, {fps} Hz"] for one in (SWARM, EQ13))
         yield error_ratio(f"swarm over the filter with Eq. 13, {fps} Hz", ours, theirs, claim)
+        five = groups[f"{FIVE_LAYERS.name}, {fps} Hz"]
+        yield error_ratio(f"swarm over the filter with Eq. 13, 5 × 200, {fps} Hz", ours, five, claim)
     for fps in RATES:
         own = {one.name: groups[f"{one.name}, {fps} Hz"] for one in COMPARED}
         for name, runs in own.items():
@@ -295,7 +301,7 @@ CLAIMS = {
     "hard, twelve subspaces": LOWER,
     "global, then local": LOWER,
     "global": LOWER,
-    "soft, three stages": EQUAL,
+    "soft, three stages": NO_WORSE,
 }
 """The paper's claim on soft partitioning against each: better, or as good ("not significantly increased")."""
 
@@ -534,11 +540,11 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     """Shares of the frame's time beside the paper's; the time of a frame is another machine's and no claim."""
     times = np.array([[outcome.measured[name] for name in PARTS] for outcome in outcomes])
     shares = 100.0 * times / times.sum(axis=1, keepdims=True)
-    yield number(WEIGHING, shares[:, 1] + shares[:, 2], "%", PAPER_RENDERING + PAPER_FITNESS)
+    yield beside(number(WEIGHING, shares[:, 1] + shares[:, 2], "%", PAPER_RENDERING + PAPER_FITNESS))
     yield beside(number("time of a frame", times.sum(axis=1), "ms", 1000.0 * PAPER_SECONDS, "lower"))
     for label, share in zip(LABELS, shares.T, strict=True):
         yield number(f"{label}, share", share, "%")
-    yield f"The claim is on the {WEIGHING}. Times of one machine; the paper's is of Matlab, 2012."
+    yield "Answered, not judged: times of one machine and of compiled kernels; the paper's are of Matlab, 2012."
     rows = tuple(
         (label, round(float(spent.mean()), 2), round(float(share.mean()), 1))
         for label, spent, share in zip(LABELS, times.T, shares.T, strict=True)

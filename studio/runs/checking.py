@@ -26,7 +26,7 @@ from studio.progress import Progress, unheard
 from studio.runs.jumps import Jump, jumps_of
 from studio.runs.overlay_drawing import projected_silhouette
 from studio.runs.refining import jitter
-from studio.runs.run_footage import footage_of
+from studio.runs.run_footage import filmed_cameras, footage_of
 from studio.runs.tracks import BEST, Track, read_track, track_stamp
 from studio.sessions.record_files import RecordFile
 from studio.sessions.session import Session
@@ -169,7 +169,7 @@ def check_run(
     chosen = read_track(run, track or BEST)
     if not len(chosen.frames):
         raise RunError(f"Run '{run.name}' has no finished frame.", "Track it first.")
-    body, cameras = run.body(), run.cameras()
+    body, cameras = run.body(), filmed_cameras(session, run.cameras())
     rows = range(0, len(chosen.frames), max(1, every))
     settings = _settings(run)
 

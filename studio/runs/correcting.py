@@ -74,7 +74,7 @@ def prepare_correction(
             f"Run '{run.name}', frame {frame} corrected ({source}) and tracked {way} from it.",
         ),
     )
-    return _new_folder(run, changed, frame if backwards_to is None else None)
+    return new_folder(run, changed, frame if backwards_to is None else None)
 
 
 def track_backwards(
@@ -116,7 +116,11 @@ def _track_again(tracking: TrackingRun, frame: int, cancelled: Callable[[], bool
     return True
 
 
-def _check_frames(run: StoredRun, frame: int, backwards_to: int | None) -> None:
+def check_branching_frame(run: StoredRun, frame: int, *, beyond: bool = True) -> list[int]:
+    """The run's finished frames, if another run can leave it at `frame`. beyond : also at the one after its last.
+
+    Raises RunError.
+    """
     record = run.record
     if record.ping_pong:
         raise RunError(
@@ -126,12 +130,18 @@ def _check_frames(run: StoredRun, frame: int, backwards_to: int | None) -> None:
         frames = results.frames()
     if not frames:
         raise RunError(f"Run '{run.name}' has no finished frame.", "Track it first, or start a new run.")
-    latest = frames[-1] if backwards_to is not None else min(frames[-1] + 1, record.last - 1)
+    latest = min(frames[-1] + 1, record.last - 1) if beyond else frames[-1]
     if not frames[0] <= frame <= latest:
         raise RunError(
-            f"Frame {frame} of run '{run.name}' cannot be corrected.",
+            f"Frame {frame} of run '{run.name}' cannot be tracked again.",
             f"Choose a frame from {frames[0]} to {latest}.",
         )
+    return frames
+
+
+def _check_frames(run: StoredRun, frame: int, backwards_to: int | None) -> None:
+    record = run.record
+    frames = check_branching_frame(run, frame, beyond=backwards_to is None)
     if backwards_to is None:
         return
     if not 0 <= backwards_to < frame:
@@ -147,10 +157,30 @@ def _check_frames(run: StoredRun, frame: int, backwards_to: int | None) -> None:
         )
 
 
-def _new_folder(run: StoredRun, record: RunRecord, last: int | None) -> StoredRun:
-    """The corrected run's folder with the old run's snapshots and its frames before `last`; atomic."""
+def new_folder(
+    run: StoredRun,
+    record: RunRecord,
+    last: int | None,
+    complete: Callable[[StoredRun], None] = lambda made: None,
+) -> StoredRun:
+    """A run's folder with the old run's snapshots and its frames before `last`; atomic. complete : called with it
+    before it is there.
+    """
     place = run.folder.parent / checked_name(record.name, "run")
-    folder = atomic_files.new_folder_beside(place)
+    folder = copied_beside(run, record, last)
+    try:
+        complete(StoredRun(folder))
+        atomic_files.move_into_place(folder, Path(place))
+    except FileExistsError:
+        raise SessionError(f"Session has a run '{record.name}' already.", "Choose another name.") from None
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+    return StoredRun(place)
+
+
+def copied_beside(run: StoredRun, record: RunRecord, last: int | None = None) -> Path:
+    """A hidden folder beside the run's own with its snapshots, its frames before `last` (None: all) and a record."""
+    folder = atomic_files.new_folder_beside(run.folder, parents=False)
     try:
         for part in (CAMERAS_NAME, BEHAVIOUR_NAME):
             if (run.folder / part).exists():
@@ -161,9 +191,7 @@ def _new_folder(run: StoredRun, record: RunRecord, last: int | None) -> StoredRu
         copy_frames(run.folder, folder, last)
         write_run_record(folder, record)
         note_files(folder)
-        atomic_files.move_into_place(folder, Path(place))
-    except FileExistsError:
-        raise SessionError(f"Session has a run '{record.name}' already.", "Choose another name.") from None
-    finally:
+    except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
-    return StoredRun(place)
+        raise
+    return folder

@@ -11,6 +11,7 @@ import msgspec
 import numpy as np
 
 from studio.errors import RunError
+from studio.foreign_files import read_text
 from studio.runs.live_problems import LiveProblems
 from studio.runs.live_run import LiveRun
 from studio.runs.problem_source import ProblemSource
@@ -45,10 +46,10 @@ def prepare_replay(session: Session, run: StoredRun, name: str = "") -> StoredRu
         created=now(),
         notes=(*record.notes, f"The frames that '{run.name}' tracked live, without the clock."),
     )
-    text = bodies[0].read_text(encoding="utf-8") if bodies else ""
+    text = read_text(bodies[0]) if bodies else ""
     made = session.new_run(following, text, run.folder / BEHAVIOUR_NAME if record.behaviour else None)
     # The session's calibration may have changed since.
-    atomic_files.write_text(made.folder / CAMERAS_NAME, (run.folder / CAMERAS_NAME).read_text("utf-8"))
+    atomic_files.write_text(made.folder / CAMERAS_NAME, read_text(run.folder / CAMERAS_NAME))
     return made
 
 

@@ -9,7 +9,8 @@ from typing import Any
 
 import msgspec
 
-from studio.errors import SettingsError
+from studio.errors import SessionError, SettingsError
+from studio.foreign_files import LARGEST_RECORD, read_file
 from studio.knobs import Value
 from studio.sessions.atomic_files import write_bytes
 from studio.sessions.stored_run import StoredRun
@@ -50,8 +51,8 @@ def with_moved(run: StoredRun, version: int, stored: RunSettings) -> RunSettings
     settings or holds what a knob does not allow moves nothing: no result depends on it.
     """
     try:
-        moved = decode_json(_path(run).read_bytes(), _MovedKnobs)
-    except (OSError, msgspec.DecodeError):
+        moved = decode_json(read_file(_path(run), LARGEST_RECORD), _MovedKnobs)
+    except (OSError, SessionError, msgspec.DecodeError):
         return stored
     if moved.after != version:
         return stored

@@ -22,6 +22,7 @@ from studio.evidence.pipeline import EvidenceMaker
 from studio.geometry.camera import Camera
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.likelihood.silhouette_areas import HALF, silhouettes_of
+from studio.runs.run_footage import filmed_cameras
 from studio.sessions.session import Session
 from studio.settings import RunSettings
 from studio.tracing import span
@@ -40,7 +41,8 @@ T = TypeVar("T")
 class ProblemSource:
     """The frames of a session for one body. Thread-safe. Close it when done.
 
-    cameras : the run's snapshot, by default the session's. executor : prepares the next frame; None:
+    cameras : the run's snapshot, by default the session's; those whose footage was taken away since are left out.
+    executor : prepares the next frame; None:
     no preparation. views : another executor, for a frame's cameras in parallel. last : the frame after the last one to
     prepare. footage : closed with this, by default the session's.
     """
@@ -57,7 +59,7 @@ class ProblemSource:
         footage: Footage | None = None,
     ) -> None:
         self.body = body
-        self.cameras = cameras or session.cameras()
+        self.cameras = filmed_cameras(session, cameras) if cameras else session.cameras()
         self.footage = footage or session.footage()
         self._last = self.footage.frame_count if last is None else last
         self._backgrounds = Backgrounds(self.footage)

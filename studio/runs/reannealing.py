@@ -23,6 +23,16 @@ class Reannealing:
     def finished(self) -> bool:
         return self._search.finished
 
+    @property
+    def search_layers(self) -> int:
+        """Layers of one search of the frame; 0 before the first layer."""
+        return self._search.layer_count
+
+    @property
+    def searches(self) -> int:
+        """How many searches the frame has."""
+        return self._search.repeats
+
     def step_layer(self) -> LayerRecord:
         """Do the next layer and return its record."""
         problem = self._tracking.problems.problem(self.frame, self.settings)

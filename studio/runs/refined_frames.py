@@ -18,6 +18,7 @@ from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.runs.problem_source import ProblemSource
+from studio.runs.run_footage import filmed_cameras
 from studio.runs.tracks import Track, stretches
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -112,7 +113,7 @@ class _Work:
         knobs: RefinementSettings,
         read: Callable[[int], None],
     ) -> None:
-        body, self._cameras = run.body(), run.cameras()
+        body, self._cameras = run.body(), filmed_cameras(session, run.cameras())
         self._results, self._settings = run.results(), MaskSettings(run)
         self._record, self._track, self._knobs, self._report = run.record, track, knobs, read
         self._refiner = Refiner(body, self._cameras, knobs)

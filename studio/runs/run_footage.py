@@ -1,6 +1,8 @@
 """The footage of a run, whose frame numbers may differ from the files'."""
 
 from studio.capture.footage import Footage, PingPong
+from studio.errors import RunError
+from studio.geometry.camera import Camera
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 
@@ -15,3 +17,15 @@ def footage_of(session: Session, run: StoredRun | None) -> Footage:
         return footage
     footage.close()
     return PingPong(footage.source, footage.folder)
+
+
+def filmed_cameras(session: Session, cameras: tuple[Camera, ...]) -> tuple[Camera, ...]:
+    """Those of a run's cameras that the session has footage of. Raises RunError if there is none left."""
+    filmed = {source.name for source in session.manifest.footage.cameras}
+    kept = tuple(camera for camera in cameras if camera.name in filmed)
+    if not kept:
+        raise RunError(
+            f"Session '{session.name}' has no footage any more of the cameras that the run was tracked with.",
+            "Add that footage again, or track a new run.",
+        )
+    return kept

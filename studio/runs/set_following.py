@@ -9,10 +9,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 from studio.capture.frame_clock import PATIENCE_SECONDS, Arrival
+from studio.foreign_files import open_file
 from studio.sessions.live_recordings import END, LIVE, SETS_NAME, is_being_recorded, recorded_set, start_sets
 
 LOOK_SECONDS = 0.004
 """Polling interval for new lines, seconds."""
+MOST_AT_ONCE = 64 << 20
+"""Bytes of new lines; the rest is read at the next look."""
 LOCK_SECONDS = 1.0
 """Interval between checks that the recorder is alive, seconds."""
 
@@ -61,9 +64,9 @@ class SetFollower:
     def _look(self) -> None:
         """Read the lines that are new."""
         try:
-            with self._path.open("rb") as file:
+            with open_file(self._path) as file:
                 file.seek(self._offset)
-                content = file.read()
+                content = file.read(MOST_AT_ONCE)
         except FileNotFoundError:
             return
         self._offset += len(content)
@@ -105,9 +108,9 @@ class SetNumbers:
         """Read the lines that are new."""
         if not self._path.exists():
             return
-        with self._path.open("rb") as file:
+        with open_file(self._path) as file:
             file.seek(self._offset)
-            content = file.read()
+            content = file.read(MOST_AT_ONCE)
         self._offset += len(content)
         *lines, self._rest = (self._rest + content).split(b"\n")
         words = (line.partition(b",")[0] for line in lines)

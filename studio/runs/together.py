@@ -39,7 +39,7 @@ from studio.runs.shape_on_the_way import (
 )
 from studio.runs.subject_frames import varied_frames
 from studio.runs.subject_masks import WholeMasks, subject_masks_of
-from studio.sessions.session import CAMERAS_PATH, Session
+from studio.sessions.session import Session
 from studio.settings import default_settings
 from studio.trackers.frame_refinement import FrameRefiner
 from studio.trackers.tracker import start_of
@@ -242,7 +242,7 @@ def _checked(sessions: Sequence[Session]) -> int:
     for other in sessions[1:]:
         if other.path == one.path:
             raise RunError(f"Session '{one.name}' is named twice.", "Name the session of each subject once.")
-        same = (one.path / CAMERAS_PATH).read_bytes() == (other.path / CAMERAS_PATH).read_bytes()
+        same = one.calibration_of_footage() == other.calibration_of_footage()
         if not same or _pictures(one) != _pictures(other):
             raise RunError(
                 f"Sessions '{one.name}' and '{other.name}' are not of the same footage.",

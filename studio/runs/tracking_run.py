@@ -17,6 +17,7 @@ from typing import Protocol
 
 import numpy as np
 
+from studio.capture.naming import listed
 from studio.errors import NotFoundError, RunError, SessionError
 from studio.evidence.distance_maps import silhouettes_by_camera
 from studio.likelihood.problem import BaseFrameLikelihood
@@ -52,12 +53,14 @@ class Problems(Protocol):
 @dataclass(frozen=True, slots=True, eq=False)
 class Stepped:
     """The outcome of one layer. result : of the frame, if this was its last layer. applied : settings used from this
-    layer on, None if unchanged.
+    layer on, None if unchanged. search_layers, searches : layers of one search of the frame, and how many it has.
     """
 
     record: LayerRecord
     result: FrameResult | None
     applied: RunSettings | None
+    search_layers: int = 0
+    searches: int = 1
 
 
 class TrackingRun:
@@ -82,6 +85,7 @@ class TrackingRun:
             anew=self.record.is_anew,
         )
         self._seen = problems if isinstance(problems, Sightings) else None
+        self._check_cameras()
         self._refiner = (
             None
             if self._seen is None
@@ -96,6 +100,18 @@ class TrackingRun:
         except BaseException:
             self._free()
             raise
+
+    def _check_cameras(self) -> None:
+        """Raise RunError where a camera of the stored frames has no footage any more: others would follow of less."""
+        if self._seen is None or not self._reader.done():
+            return
+        filmed = {camera.name for camera in self._seen.cameras}
+        gone = sorted(camera.name for camera in self.run.cameras() if camera.name not in filmed)
+        if gone:
+            raise RunError(
+                f"Run '{self.run.name}' was tracked with {listed(gone)}, of which the session has no footage any more.",
+                "Track a new run; this one can still be shown, exported and shared.",
+            )
 
     def close(self) -> None:
         """Save an unfinished frame, and release the run even if saving fails."""
@@ -231,7 +247,7 @@ class TrackingRun:
             self._pace.add(self._spent)
             self._seconds, self._frames = self._seconds + sum(self._spent), self._frames + 1
             self._spent = []
-        return Stepped(record, result, settings if is_new else None)
+        return Stepped(record, result, settings if is_new else None, search.layer_count, search.repeats)
 
     def result_of(
         self, search: FrameSearch, settings: RunSettings, layers: Sequence[LayerRecord]

@@ -145,7 +145,7 @@ def read_track(run: StoredRun, name: str = RAW, *, blobs: bool = True) -> Track:
         )
     what = f"the track '{name}' of run '{run.name}'"
     with foreign_file(path, SessionError, what, "Make it again with 'studio refine' or 'studio smooth'."):
-        arrays = read_archive(io.BytesIO(path.read_bytes()))
+        arrays = read_archive(path)
         entries = {entry: arrays[entry] for entry in ENTRIES}
         track = _from_entries(name, entries)
         _check(track, len(run.record.parameters))

@@ -10,7 +10,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.errors import CalibrationError, NotFoundError
+from studio.errors import CalibrationError, NotFoundError, SessionError
+from studio.foreign_files import LARGEST_RECORD, read_file
 from studio.runs.aligning import SessionAlignment, keep_alignment
 from studio.sessions.atomic_files import write_bytes
 from studio.sessions.calibration_changes import CalibrationChange, earlier_calibration, restore_calibration
@@ -119,12 +120,12 @@ def is_of(session: Session, aligned: SessionAlignment) -> bool:
 
 def _turned(session: Session) -> Turned | None:
     try:
-        found = decode_json((session.path / RECORD_PATH).read_bytes(), Turned)
+        found = decode_json(read_file(session.path / RECORD_PATH, LARGEST_RECORD), Turned)
         earlier_calibration(session, found.before)
-    except (OSError, msgspec.DecodeError, NotFoundError):
+    except (OSError, msgspec.DecodeError, SessionError):
         return None
     return found if found.content == _content(session) else None
 
 
 def _content(session: Session) -> str:
-    return hashlib.sha256((session.path / CAMERAS_PATH).read_bytes()).hexdigest()[:24]
+    return hashlib.sha256(read_file(session.path / CAMERAS_PATH)).hexdigest()[:24]

@@ -11,6 +11,7 @@ from typing import Literal, get_args
 
 from studio.body.forward_kinematics import limb_ends
 from studio.errors import StudioError
+from studio.foreign_files import read_file
 from studio.runs.background_setup import MODEL_OF
 from studio.runs.checking import kept_check
 from studio.runs.silhouette_doubts import standing_doubts
@@ -27,7 +28,7 @@ from studio.sessions.background_files import (
 from studio.sessions.footage_changes import stale_runs
 from studio.sessions.provenance import changed_inputs, origin_of
 from studio.sessions.run_record import CAMERAS_NAME
-from studio.sessions.session import CAMERAS_PATH, START_POSE_NAME, SUBJECT_NAME, Session
+from studio.sessions.session import START_POSE_NAME, SUBJECT_NAME, Session
 from studio.sessions.stored_run import StoredRun, damage_in_words
 from studio.words import counted, enumerated
 
@@ -214,8 +215,7 @@ def run_changes(session: Session, run: StoredRun) -> list[str]:
     changed: list[str] = []
     if run.name in stale_runs(session):
         changed.append("the footage's offsets or turns")
-    calibration = session.path / CAMERAS_PATH
-    if calibration.is_file() and calibration.read_bytes() != (run.folder / CAMERAS_NAME).read_bytes():
+    if session.is_calibrated and session.calibration_of_footage() != read_file(run.folder / CAMERAS_NAME):
         changed.append("the calibration")
     measured = run.record.subject_dimensions or run.record.dimensions
     if session.body(run.record.body).dimensions != measured:

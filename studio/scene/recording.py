@@ -16,6 +16,7 @@ from studio.arrays import Array
 from studio.body.forward_kinematics import limb_ends
 from studio.errors import ExportError
 from studio.export.task import ExportTask, Written, agreed
+from studio.foreign_files import read_file
 from studio.runs.colour_tokens import colour_tokens
 from studio.scene import METRES_PER_MM
 from studio.scene.body_view import BodyView, limb_frames
@@ -36,6 +37,9 @@ class Recording(NamedTuple):
 
     seconds: float
     messages: list[tuple[float, dict[str, Any]]]
+
+
+LARGEST_RECORDING = 2 << 30
 
 
 def record_scene(task: ExportTask) -> Written:
@@ -68,7 +72,7 @@ def record_scene(task: ExportTask) -> Written:
 def read_recording(path: Path) -> Recording:
     """A recording's messages. Raises ExportError for what is none."""
     try:
-        content = path.read_bytes()
+        content = read_file(path, LARGEST_RECORDING)
         if path.suffix == PAGE:
             content = base64.b64decode(content.decode("utf-8").split(EMBEDDED, 1)[1].split('"', 1)[0])
         size = int.from_bytes(content[:LENGTH], "little")

@@ -13,7 +13,7 @@ import viser
 from studio.knobs import Knob, Value, allowed, knobs_of
 from studio.scene.controls import Control, Post, on_press, take_out
 from studio.scene.model import Knobs, Model
-from studio.settings import RunSettings, values
+from studio.settings import RunSettings, all_knobs, values
 from studio.trackers.catalogue import presets
 
 FOREMOST = 6
@@ -48,7 +48,7 @@ class SettingsPanel:
 
     def show(self, knobs: Knobs) -> None:
         """Show the values in use and requested; the controls are rebuilt only for other knobs."""
-        made_for = (knobs.settings.tracker_name, *values(knobs.settings))
+        made_for = (knobs.settings.tracker_name, knobs.settings.weighting_name, *values(knobs.settings))
         if made_for != self._made_for:
             self._build(knobs.settings)
             self._made_for = made_for
@@ -70,7 +70,7 @@ class SettingsPanel:
         now = values(settings)
         with self._search, self._folder():
             self.since = self._gui.add_markdown("")
-            self._add_presets(now)
+            self._add_presets(settings)
             tracker = knobs_of(settings.tracker)
             self._add(tracker[:FOREMOST], now)
             others = [
@@ -98,13 +98,23 @@ class SettingsPanel:
         for knob in declared:
             self.inputs[knob.name] = KnobInput(self._gui, knob, now[knob.name], self._post, self._request)
 
-    def _add_presets(self, now: Mapping[str, Value]) -> None:
-        offered = {one.name: one for one in presets() if one.values.keys() <= now.keys()}
+    def _add_presets(self, settings: RunSettings) -> None:
+        """Those made for the run's tracker and likelihood, whose other knobs a run keeps."""
+        movable = {knob.name for knob in all_knobs(settings) if knob.takes_effect != "new run"}
+        offered = {
+            one.name: one
+            for one in presets()
+            if one.fits(settings.tracker_name, settings.weighting_name)
+            and one.values.keys() <= values(settings).keys()
+        }
         self.preset = None
         if offered:
             hint = " ".join(f"{one.name}: {one.help}" for one in offered.values())
             handle = self._gui.add_dropdown("preset", (NO_PRESET, *offered), hint=hint)
-            wanted = {name: one.values for name, one in offered.items()}
+            wanted = {
+                name: {knob: value for knob, value in one.values.items() if knob in movable}
+                for name, one in offered.items()
+            }
             self.preset = Control(
                 handle, self._post, lambda model, name: self._request(model, wanted.get(name, {}))
             )

@@ -29,6 +29,7 @@ class TooManyScenesError(StudioError, status=503, code="windows"):
 class _Entry:
     scene: SceneServer
     used: float
+    bare: bool
 
 
 class WindowScenes:
@@ -68,14 +69,14 @@ class WindowScenes:
         with self._lock:
             entry = self._entries.get(window)
             if entry is None:
-                self._make_room()
+                self._make_room(bare)
                 scene = SceneServer(
                     self._workspace,
                     self._process,
                     lambda shown, layers: self._moved(window, shown, layers),
                     bare=bare,
                 )
-                entry = self._entries[window] = _Entry(scene, 0.0)
+                entry = self._entries[window] = _Entry(scene, 0.0, bare)
             entry.used = time.monotonic()
             return entry.scene
 
@@ -105,15 +106,19 @@ class WindowScenes:
         for entry in closing:
             _close(entry)
 
-    def _make_room(self) -> None:
+    def _make_room(self, bare: bool) -> None:
         if self._stopped:
             raise StudioError("The studio is closing.", "Start it again.")
-        if len(self._entries) < self._most:
+        mine = {name: entry for name, entry in self._entries.items() if entry.bare or not bare}
+        # Half of the places are kept for who may change something.
+        most = self._most // 2 if bare else self._most
+        if len(mine) < most:
             return
-        idle = [name for name, entry in self._entries.items() if not entry.scene.is_viewed]
+        idle = [name for name, entry in mine.items() if not entry.scene.is_viewed]
         if not idle:
             raise TooManyScenesError(
-                f"{self._most} windows show a scene already, which is as many as the studio serves.",
+                f"{most} windows show a scene already, which is as many as the studio serves"
+                f"{' to viewers' if bare else ''}.",
                 "Close a window that is no longer needed, then load this one again.",
             )
         _close(self._entries.pop(min(idle, key=lambda name: self._entries[name].used)))

@@ -9,7 +9,8 @@ out.
 
 A second token makes a viewer: who came with it may send GETs, hear the events, and choose what the scene of a window of
 its own shows. Everything else is refused here, before any route; of what its 3-D client sends, only where it looks from
-passes the relay. `VIEWING` says inside a request whether it is a viewer's.
+passes the relay. `VIEWING` says inside a request whether it is a viewer's. A browser that has both cookies is the
+owner's; how much viewers may take of the machine is in `viewers_budget`.
 
 What remains: since cookies know no ports, a browser also sends this one to other servers on the same host name that a
 person opens in it, and whoever runs such a server could use it until this studio ends. Plain HTTP on loopback has no
@@ -49,6 +50,8 @@ VIEWERS_POSTS = frozenset(f"/api/scene/{what}" for what in ("show", "view", "pla
 """They change what the caller's own scene shows, and nothing else."""
 MAKING_PAGES = frozenset(("/way", "/recording"))
 """Pages on which there is nothing to look at."""
+OWNERS_READING = ("/api/folders", "/api/uploads", "/api/trash")
+"""Addresses that are about the owner's machine, beside the sessions."""
 VIEWERS_WINDOW = "view-"
 """Begins the names of viewers' windows, whatever they call themselves: nobody else's scene is theirs to move."""
 WINDOW_HEADER = b"x-studio-window"
@@ -144,7 +147,6 @@ class AccessGuard:
     def __init__(self, app: ASGIApp, *, token: str, hosts: HostRule, viewers_token: str = "") -> None:
         self.app = app
         self.hosts = hosts
-        self.cookie_name = f"studio_{hashlib.sha256(b'name' + token.encode()).hexdigest()[:12]}"
         self._keys = [_Key.of(token, viewing=False)]
         if viewers_token:
             self._keys.append(_Key.of(viewers_token, viewing=True))
@@ -185,7 +187,7 @@ class AccessGuard:
         answer = RedirectResponse(f"/?{rest}" if rest else "/", status_code=303)
         secure = host_name(Headers(scope=scope).get("host", "")) in self.hosts.encrypted
         answer.set_cookie(
-            self.cookie_name, key.cookie, path="/", httponly=True, samesite="strict", secure=secure
+            key.cookie_name, key.cookie, path="/", httponly=True, samesite="strict", secure=secure
         )
         answer.headers["cache-control"] = "no-store"
         return answer
@@ -231,22 +233,29 @@ class AccessGuard:
             jar.load(headers.get("cookie", ""))
         except CookieError:
             return None
-        found = jar.get(self.cookie_name)
-        return next((key for key in self._keys if found is not None and key.is_cookie(found.value)), None)
+        for key in self._keys:
+            found = jar.get(key.cookie_name)
+            if found is not None and key.is_cookie(found.value):
+                return key
+        return None
 
 
 @dataclass(frozen=True, slots=True)
 class _Key:
-    """A token and the cookie that it is exchanged for. viewing : whether it only lets look."""
+    """A token and the cookie that it is exchanged for, under a name of its own. viewing : whether it only lets look."""
 
     token: bytes
+    cookie_name: str
     cookie: str
     viewing: bool
 
     @classmethod
     def of(cls, token: str, *, viewing: bool) -> "_Key":
         return cls(
-            token.encode(), hmac.new(token.encode(), b"studio cookie", hashlib.sha256).hexdigest(), viewing
+            token.encode(),
+            f"studio_{hashlib.sha256(b'name' + token.encode()).hexdigest()[:12]}",
+            hmac.new(token.encode(), b"studio cookie", hashlib.sha256).hexdigest(),
+            viewing,
         )
 
     def is_token(self, text: str) -> bool:
@@ -262,7 +271,7 @@ def _only_looks(scope: Scope) -> bool:
     if scope["type"] == "websocket":
         return path in ("/api/events", "/scene") or path.startswith("/scene/")
     if scope["method"] in SAFE_METHODS:
-        return path.rstrip("/") not in MAKING_PAGES
+        return path.rstrip("/") not in MAKING_PAGES and not path.startswith(OWNERS_READING)
     return scope["method"] == "POST" and path in VIEWERS_POSTS
 
 

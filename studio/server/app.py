@@ -60,7 +60,9 @@ from studio.server.body_limit import BodyLimit
 from studio.server.content_policy import PolicyHeaders
 from studio.server.error_responses import ErrorsInWords, add_error_handlers, log
 from studio.server.event_stream import EventStream
+from studio.server.layer_outlines import LayerOutlines
 from studio.server.schemas import ErrorAnswer
+from studio.server.viewers_budget import ViewersBudget
 from studio.sessions.workspace import Workspace
 
 DESCRIPTION = (
@@ -147,7 +149,12 @@ def build_app(
     path. log_path : named in answers to unforeseen errors.
     """
     state = AppState(
-        workspace, control, scenes, EventStream(control, scenes.open_scenes), footage_roots, log_path
+        workspace,
+        control,
+        scenes,
+        EventStream(control, scenes.open_scenes, LayerOutlines(workspace)),
+        footage_roots,
+        log_path,
     )
     app = Application(
         title="Capture studio",
@@ -163,6 +170,7 @@ def build_app(
     app.mount("/assets", StaticFiles(directory=assets_folder()), name="assets")
     # The last one added is the first to see a request.
     app.add_middleware(BodyLimit)
+    app.add_middleware(ViewersBudget, tracking=lambda: control.state.state == "tracking")
     app.add_middleware(
         AccessGuard,
         token=token,

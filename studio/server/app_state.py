@@ -1,5 +1,7 @@
 """What the routes need of the storeys below: the tracking process, the scenes, and where things lie."""
 
+from collections.abc import Generator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -67,6 +69,17 @@ def scene_of(app: App, window: Window = "") -> SceneServer:
 
 
 Scene = Annotated[SceneServer, Depends(scene_of)]
+
+
+@contextmanager
+def moving(app: AppState, session: str, run: str = "") -> Generator[None]:
+    """Inside, a session (or a run of it) may be renamed or deleted: nothing has it open, and no job of it begins.
+
+    Raises RunError while a job of it is under way, or as `release`.
+    """
+    with app.jobs.moving(session, run):
+        release(app, session, run)
+        yield
 
 
 def release(app: AppState, session: str, run: str = "") -> None:

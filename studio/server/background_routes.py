@@ -14,6 +14,7 @@ from studio.calibration.findings import Finding
 from studio.capture.naming import match_names
 from studio.capture.pictures import is_picture
 from studio.errors import FootageError, NotFoundError, RunError, StudioError
+from studio.foreign_files import read_file
 from studio.geometry.projection import project
 from studio.jobs.job_runner import Job, JobKind, SessionJob
 from studio.knobs import knobs_of
@@ -204,7 +205,7 @@ def exclusion(session: OpenSession, camera: str) -> Response:
     path = exclusion_path(session, camera)
     if path is None:
         raise NotFoundError(f"Nothing of camera '{camera[:64]}' is excluded.", "Paint something.")
-    return files.picture(path.read_bytes(), "png")
+    return files.picture(read_file(path), "png")
 
 
 @router.put("/exclusions/{camera}")

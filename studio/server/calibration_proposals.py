@@ -18,6 +18,7 @@ from studio.capture.calibration_files import AssumedCrop, Calibration, read_cali
 from studio.capture.naming import CameraMatch
 from studio.capture.sanity import quarter_turns
 from studio.errors import CalibrationError, NotFoundError, StudioError
+from studio.foreign_files import read_file
 from studio.geometry.camera import Camera
 from studio.sessions.calibration_changes import NewCalibration, fit_to_session
 from studio.sessions.session import CAMERAS_PATH, Session
@@ -107,7 +108,7 @@ def proposal_of_file(session: Session, read: Calibration) -> Proposal:
         (*read.notes, *fitted.warnings),
         fitted.matching,
         fitted.crops,
-        {path.name: path.read_bytes() for path in read.sources if path.is_file()},
+        {path.name: read_file(path) for path in read.sources if path.is_file()},
     )
 
 

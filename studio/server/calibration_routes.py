@@ -28,6 +28,7 @@ from studio.capture.calibration_files import (
     read_calibration,
 )
 from studio.errors import CalibrationError, NotFoundError
+from studio.foreign_files import read_file as content_of
 from studio.geometry.camera import Camera
 from studio.runs.overlay_drawing import encode_jpeg
 from studio.server import files
@@ -128,7 +129,7 @@ def coverage(session: OpenSession, identifier: str, camera: str, app: App) -> Re
     name = camera if camera in lenses else _camera(found, camera).name
     kept = session.path / CAMERAS_PATH.with_name(f"cameras.coverage-{name}.png")
     if found.calibrated is None and identifier == CURRENT and kept.is_file():
-        content = kept.read_bytes()
+        content = content_of(kept)
     elif found.calibrated is not None and name in lenses:
         lens = lenses[name]
         dropped = {residual.frame for residual in lens.residuals if residual.dropped}
@@ -171,7 +172,7 @@ def board_pdf(
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder) / "board.pdf"
         write_board_pdf(made, place, page)
-        content = place.read_bytes()
+        content = content_of(place)
     plain = made.text.replace(":", "-").replace(",", "-")
     return files.download(content, f"{plain}.pdf", "application/pdf", x_studio_board=made.text)
 
@@ -202,7 +203,7 @@ def _camera(found: Proposal, name: str) -> Camera:
 def _packed(files: tuple[Path, ...], name: str) -> tuple[str, bytes]:
     """The only file itself, or all in a zip of that name."""
     if len(files) == 1:
-        return files[0].name, files[0].read_bytes()
+        return files[0].name, content_of(files[0])
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         for path in files:

@@ -12,7 +12,8 @@ from studio.calibration.findings import Finding, blocking
 from studio.calibration.report import report_of
 from studio.capture.calibration_files import CALIBRATION_FORMATS
 from studio.capture.naming import CameraMatch
-from studio.errors import CalibrationError
+from studio.errors import CalibrationError, SessionError
+from studio.foreign_files import LARGEST_RECORD, read_file
 from studio.server.calibration_proposals import Proposal, proposal_in_use
 from studio.server.safe_paths import FootagePlace, PlaceName
 from studio.server.schemas import Answer, Number, Numbers, Request
@@ -207,8 +208,8 @@ def _kept_report(session: Session) -> Report:
     """The report beside the calibration in use, {} where there is none or it cannot be read."""
     path = session.path / CAMERAS_PATH.with_name("cameras.report.json")
     try:
-        return decode_json(path.read_bytes(), dict[str, object])
-    except (OSError, msgspec.DecodeError):
+        return decode_json(read_file(path, LARGEST_RECORD), dict[str, object])
+    except (OSError, SessionError, msgspec.DecodeError):
         return {}
 
 

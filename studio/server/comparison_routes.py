@@ -24,6 +24,7 @@ from studio.comparison.plan import Plan, conclude
 from studio.comparison.sweep import SweepExpected, conclude_sweep, expected, plan_sweep
 from studio.comparison.trial_runs import TrialLine, run_of_trial, trial_lines
 from studio.errors import NotFoundError, RunError, StudioError, WorkCancelledError
+from studio.foreign_files import read_file
 from studio.jobs import commands
 from studio.jobs.cluster import chosen_executor
 from studio.jobs.comparison_run import done_before, run_comparison
@@ -32,7 +33,7 @@ from studio.jobs.process_executor import cores
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.operations.comparing import MOST_TRACKERS, compare, kept_sweep, planned, sweep
 from studio.server import files
-from studio.server.app_state import App, AppState, release
+from studio.server.app_state import App, AppState, moving
 from studio.server.error_responses import log
 from studio.server.requests import Arguments, body_of
 from studio.server.schemas import Answer, Request, RunName, Value
@@ -304,8 +305,8 @@ def delete(
         raise RunError(f"Run '{tracked[0]}' of the sweep is being tracked.", "Cancel it first.")
     place = throw_away(app.workspace, session, kept)
     for run in own:
-        release(app, session.name, run.name)
-        app.workspace.trash_run(session.name, run.name)
+        with moving(app, session.name, run.name):
+            app.workspace.trash_run(session.name, run.name)
     app.events.session_changed(session.name)
     return trash_entry(place)
 
@@ -440,4 +441,4 @@ def _file(session: Session, kept: KeptComparison, name: str, kind: str, ending: 
     path = kept.folder / name
     if not path.is_file():
         raise NotFoundError(f"Comparison '{kept.name}' is not finished.", "Wait for it, or let it go on.")
-    return files.download(path.read_bytes(), f"{session.name}-{kept.name}.{ending}", kind)
+    return files.download(read_file(path), f"{session.name}-{kept.name}.{ending}", kind)

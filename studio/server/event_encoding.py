@@ -49,8 +49,12 @@ def message_of(event: Event) -> dict[str, object]:
     """An event as a flat dictionary."""
     head: dict[str, object] = {"type": TYPES[type(event)], "session": event.session, "run": event.run}
     if isinstance(event, LayerFinished):
-        waited = 1000.0 * (event.left_at - event.requested_at)
-        more = {"reannealed": event.reannealed, "waited_milliseconds": waited}
+        more = {
+            "reannealed": event.reannealed,
+            "waited_milliseconds": 1000.0 * (event.left_at - event.requested_at),
+            "search_layers": event.search_layers,
+            "searches": event.searches,
+        }
         return head | more | layer_summary(event.record)
     if isinstance(event, FrameFinished):
         return head | {"reannealed": event.reannealed} | frame_summary(event.result)

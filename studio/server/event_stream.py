@@ -13,10 +13,11 @@ from collections.abc import Callable, Mapping
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 
 from studio.jobs.control import StudioControl
-from studio.jobs.events import Event, SettingsApplied, StateChanged
+from studio.jobs.events import Event, LayerFinished, SettingsApplied, StateChanged
 from studio.jobs.watchers import Subscription
 from studio.scene.scene_server import SceneServer
 from studio.server.event_encoding import as_json, key_of, message_of
+from studio.server.layer_outlines import LayerOutlines
 from studio.server.windows import WindowInQuery
 
 router = APIRouter(tags=["events"])
@@ -29,13 +30,16 @@ Watcher = Subscription[str]
 
 class EventStream:
     """Takes the worker's events and the web's own messages to all watchers. scenes : the open ones by window; layers,
-    of which there are many, go to the windows whose scene shows their run.
+    of which there are many, go to the windows whose scene shows their run. outlines : of the layers' clouds.
     """
 
     def __init__(
-        self, control: StudioControl, scenes: Callable[[], Mapping[str, SceneServer]] = lambda: {}
+        self,
+        control: StudioControl,
+        scenes: Callable[[], Mapping[str, SceneServer]] = lambda: {},
+        outlines: LayerOutlines | None = None,
     ) -> None:
-        self._control, self._scenes = control, scenes
+        self._control, self._scenes, self._outlines = control, scenes, outlines
         self._lock = threading.Lock()
         self._watchers: dict[Watcher, str] = {}
         self._settings: dict[str, object] | None = None
@@ -101,6 +105,8 @@ class EventStream:
             while True:
                 event = await source.next()
                 message = message_of(event)
+                if isinstance(event, LayerFinished) and self._outlines is not None and self._watchers:
+                    message["outline"] = self._outlines.of_event(event)
                 if isinstance(event, SettingsApplied):
                     self._settings = message
                 elif isinstance(event, StateChanged) and event.state == "idle":

@@ -4,6 +4,7 @@ from fastapi import APIRouter, Response
 from pydantic import Field
 
 from studio.errors import NotFoundError
+from studio.foreign_files import read_file
 from studio.jobs.job_runner import Job, JobKind, SessionJob
 from studio.operations.gallery import CARDS, Card, CardKind, CardStanding, card_of, make_card, standing_of
 from studio.runs.samples import sample_folder
@@ -59,7 +60,7 @@ def card_picture(card: str, app: App) -> Response:
     found = card_of(card)
     if standing_of(found, app.workspace).there:
         place = app.workspace.session(found.name).thumbnail()
-        content = place.read_bytes() if place else None
+        content = read_file(place) if place else None
     else:
         content = thumbnail_of(Session(sample_folder(found.name))) if found.kind == "sample" else None
     if content is None:

@@ -3,7 +3,7 @@
 import html
 import itertools
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import Any
 
@@ -16,19 +16,22 @@ from studio.behaviour.settings import LearningSettings
 from studio.declaring import REQUIRED, Knobs, Operation, Parameter, declared
 from studio.errors import NotFoundError
 from studio.evidence.settings import EvidenceSettings
-from studio.knobs import Knob, allowed, knobs_of
+from studio.knobs import Knob, Value, allowed, knobs_of
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.runs.self_contained import assets_folder
 from studio.server.pages import NAME, html_page
-from studio.settings import RecordingSettings
+from studio.settings import RecordingSettings, all_knobs, default_settings
 from studio.trackers.catalogue import TRACKERS
 from studio.trackers.frame_refinement import FrameRefinementSettings
+from studio.trackers.paper_presets import PAPERS
 from studio.trackers.recovery_settings import RecoverySettings
+from studio.trackers.tracker import Printed
 from studio.training.oversampling import OversamplingSettings
 
 router = APIRouter(tags=["page"], include_in_schema=False)
 
 PLACE_OF_KNOBS, PLACE_OF_SUMMARY, PLACE_OF_FINDINGS = "{{knobs}}", "{{reproduction}}", "{{findings}}"
+PLACE_OF_PRINTED = "{{printed}}"
 # Of `studio reproduce --into-guide`, and what it is compared with.
 REPRODUCTION, BEFORE = "reproduction", "before.json"
 VERBS_WORDS = (
@@ -90,6 +93,7 @@ def rendered(name: str, title: str, in_course: bool = False) -> dict[str, str]:
     content = markdown.renderer.render(tokens, markdown.options, {}).replace("&lt;br&gt;", "<br>")
     places = {
         PLACE_OF_KNOBS: all_knob_tables,
+        PLACE_OF_PRINTED: printed_and_run,
         PLACE_OF_SUMMARY: before_and_after,
         PLACE_OF_FINDINGS: place_of_findings,
     }
@@ -146,6 +150,39 @@ def findings_of_the_guide() -> dict[str, dict[str, Any]]:
     folder = assets_folder() / "guide" / REPRODUCTION
     files = sorted(path for path in folder.glob("*.json") if path.name != BEFORE)
     return {path.stem: json.loads(path.read_text(encoding="utf-8")) for path in files}
+
+
+def printed_and_run() -> str:
+    """A table a paper's preset: what is printed, what is run for it by the knobs of the preset, and why they differ."""
+    learning = {knob.name: knob for knob in knobs_of(LearningSettings)}
+    parts: list[str] = []
+    for preset in PAPERS:
+        knobs = {knob.name: knob for knob in all_knobs(default_settings(preset.tracker, preset.weighting))}
+        rows = [
+            f"<tr><td>{html.escape(entry.printed)}</td><td>{html.escape(_what_is_run(entry, known))}</td>"
+            f"<td>{html.escape(entry.why)}</td></tr>"
+            for known, entries in ((knobs, preset.printed), (learning, preset.learning))
+            for entry in entries
+        ]
+        parts.append(
+            f'<h3 id="{anchor_of(preset.name)}">{html.escape(preset.name)}</h3>\n'
+            f"<p>{html.escape(preset.help)}</p>\n"
+            f'<div class="wide"><table><thead><tr><th>Printed</th><th>What we run</th><th>Why</th></tr></thead>\n'
+            f"<tbody>{''.join(rows)}</tbody></table></div>"
+        )
+    return "\n".join(parts)
+
+
+def _what_is_run(entry: Printed, knobs: Mapping[str, Knob]) -> str:
+    """The knobs that are set, by the words on screen, and what no knob says."""
+    found = [f"{knobs[name].label} {_value_in_words(value)}" for name, value in entry.sets.items()]
+    return "; ".join([*([entry.runs] if entry.runs else []), *found])
+
+
+def _value_in_words(value: Value) -> str:
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    return f"{value:g}" if isinstance(value, float) else str(value) or "empty"
 
 
 def before_and_after() -> str:

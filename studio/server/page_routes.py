@@ -8,7 +8,8 @@ import msgspec
 from fastapi import APIRouter, Depends
 from starlette.responses import Response
 
-from studio.errors import StudioError
+from studio.errors import SessionError, StudioError
+from studio.foreign_files import LARGEST_RECORD, read_file
 from studio.server.app_state import AppState, app_state
 from studio.server.pages import NAME, PLACES, html_page
 from studio.sessions.atomic_files import write_bytes
@@ -90,6 +91,6 @@ def change_preferences(
 def read_preferences(path: Path) -> dict[str, object]:
     """The stored object; a missing or damaged file counts as empty, for nothing depends on it."""
     try:
-        return decode_json(path.read_bytes(), dict[str, object])
-    except (OSError, msgspec.DecodeError):
+        return decode_json(read_file(path, LARGEST_RECORD), dict[str, object])
+    except (OSError, SessionError, msgspec.DecodeError):
         return {}

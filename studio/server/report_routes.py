@@ -10,6 +10,7 @@ from starlette.responses import FileResponse, Response
 
 from studio.comparison.findings_document import REPORT, REPRODUCTIONS, RESULTS, SUMMARY
 from studio.errors import NotFoundError, SessionError
+from studio.foreign_files import read_file
 from studio.server.app_state import App, AppState
 from studio.server.schemas import Answer
 from studio.typed_decoding import decode_json
@@ -34,7 +35,7 @@ def reports(app: App) -> Reports:
     if not path.is_file():
         return Reports()
     try:
-        return decode_json(path.read_bytes(), _Results).as_reports()
+        return decode_json(read_file(path), _Results).as_reports()
     except (msgspec.DecodeError, OSError) as error:
         raise SessionError(
             f"'{path}' cannot be read: {error}.", "Run 'studio reproduce' again; what is measured is kept."

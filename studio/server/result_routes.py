@@ -9,11 +9,15 @@ import numpy as np
 from fastapi import APIRouter, Query, Response
 from pydantic import Field
 
+from studio.body.model import BodyModel
 from studio.errors import NotFoundError, SettingsError, StudioError
 from studio.evaluation.errors import Evaluation
+from studio.geometry.camera import Camera
 from studio.geometry.reach import within_reach
-from studio.inspection.reading import InspectedRun
+from studio.inspection.cloud_outlines import CloudOutline, outline_of
+from studio.inspection.reading import InspectedFrame, InspectedRun
 from studio.inspection.reference import body_points, by_limb, true_points
+from studio.inspection.searches import layers_of_a_search, searches_of
 from studio.runs.live_summary import summary_of
 from studio.runs.tracks import RAW
 from studio.server import files
@@ -119,15 +123,19 @@ class LayerView(Answer):
     effective_share: Number
     particles: int
     milliseconds: Number
+    outline: CloudOutline | None = Field(None, description="The cloud as the first camera sees it.")
 
 
 class FrameDetail(Answer):
     """A frame with all its layers. pose, mean, mode and log_weight are null in a frame that is not
-    finished.
+    finished. search_layers, searches: layers of one search of the frame, and how many searches it has (a run's first
+    frame is searched several times over).
     """
 
     frame: int
     finished: bool
+    search_layers: int
+    searches: int
     parameters: list[ParameterView]
     layers: list[LayerView]
     pose: Numbers | None
@@ -281,19 +289,24 @@ def live_figures(run: OpenRun) -> LiveView:
 
 
 @router.get(RUN + "/frames/{frame}")
-def frame_detail(run: OpenRun, frame: int) -> FrameDetail:
+def frame_detail(session: OpenSession, run: OpenRun, frame: int) -> FrameDetail:
     """A frame with all its layers; of the frame in progress those that are done."""
+    inspected = InspectedRun(session, run)
     with run.results() as results:
         layers = results.layers(frame)
         finished = results.is_whole(frame)
         result = results.result(frame) if finished else None
-    entry = history_of(run).in_use(frame, layers[-1].layer)
+    read = InspectedFrame(inspected, frame, tuple(layers), result)
+    camera = run.cameras()[0]
+    entry = inspected.history.in_use(frame, layers[-1].layer)
     estimate = result.estimate if result else None
     return FrameDetail(
         frame=frame,
         finished=finished,
-        parameters=parameter_views(run.body()),
-        layers=[LayerView.model_validate(layer_summary(layer)) for layer in layers],
+        search_layers=layers_of_a_search(read),
+        searches=searches_of(read),
+        parameters=parameter_views(inspected.body),
+        layers=[layer_view(inspected.body, camera, layer) for layer in layers],
         pose=estimate.pose.tolist() if estimate else None,
         mean=estimate.mean.tolist() if estimate else None,
         mode=estimate.mode.tolist() if estimate else None,
@@ -344,7 +357,13 @@ def outcome(session: OpenSession, run: OpenRun, frame: int, given: PoseGiven) ->
 def layer_detail(run: OpenRun, frame: int, layer: int) -> LayerView:
     """One layer without its particles."""
     with run.results() as results:
-        return LayerView.model_validate(layer_summary(results.layer(frame, layer)))
+        return layer_view(run.body(), run.cameras()[0], results.layer(frame, layer))
+
+
+def layer_view(body: BodyModel, camera: Camera, record: LayerRecord) -> LayerView:
+    """A layer without its particles, but with their outline. camera : the run's first."""
+    outline = outline_of(body, camera, record.poses, record.mean)
+    return LayerView.model_validate(layer_summary(record) | {"outline": outline})
 
 
 @router.get(

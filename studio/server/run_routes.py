@@ -12,10 +12,10 @@ from pydantic import Field
 from studio.errors import RunError
 from studio.jobs import commands
 from studio.jobs.search_pace import MOST_SECONDS, SpeedChoice, offered
-from studio.operations.tracking import new_run
+from studio.operations.tracking import branch, branched_run, new_run
 from studio.progress import unheard
 from studio.runs.sides import notes_of
-from studio.server.app_state import App, AppState, release
+from studio.server.app_state import App, AppState, moving
 from studio.server.event_encoding import message_of, plain
 from studio.server.requests import Arguments, body_of
 from studio.server.schemas import Answer, Numbers, Request, Value
@@ -135,6 +135,21 @@ def make_run(
     return run_line(made.summary(), session)
 
 
+@router.post(RUN + "/branch", status_code=201)
+def make_branch(
+    session: OpenSession,
+    run: OpenRun,
+    arguments: Annotated[Arguments, body_of(branch, "BranchRequest")],
+    app: App,
+) -> RunLine:
+    """A new run with this one's frames before a frame, ready to be started: it and all after it are tracked with other
+    knobs (those that were moved in this run, where none are given). This run stays as it is.
+    """
+    made = branched_run(run, **arguments)
+    app.events.session_changed(session.name, made.name)
+    return run_line(made.summary(), session)
+
+
 @router.get(RUN)
 def run_detail(session: OpenSession, run: OpenRun, check: Checked = True) -> RunDetail:
     """What was requested of the run, how far it got, and its body's parameters."""
@@ -152,8 +167,8 @@ def rename_run(session: OpenSession, run: OpenRun, change: SessionChange, app: A
     """Give a run another name. Refused while it is being tracked."""
     name = run.name
     if change.name is not None and change.name != name:
-        release(app, session.name, name)
-        name = app.workspace.rename_run(session.name, name, change.name).name
+        with moving(app, session.name, name):
+            name = app.workspace.rename_run(session.name, name, change.name).name
     app.events.session_changed(session.name, name)
     return NewName(name=name)
 
@@ -161,8 +176,8 @@ def rename_run(session: OpenSession, run: OpenRun, change: SessionChange, app: A
 @router.delete(RUN)
 def delete_run(session: OpenSession, run: OpenRun, app: App) -> TrashEntry:
     """Move a run to the trash. Refused while it is being tracked."""
-    release(app, session.name, run.name)
-    place = app.workspace.trash_run(session.name, run.name)
+    with moving(app, session.name, run.name):
+        place = app.workspace.trash_run(session.name, run.name)
     app.events.session_changed(session.name)
     return trash_entry(place)
 
@@ -249,7 +264,9 @@ def seek(run: OpenRun, where: Frame, app: App) -> Posted:
 
 @router.post(RUN + "/reanneal", status_code=202)
 def reanneal(run: OpenRun, where: ReannealRequest, app: App) -> Posted:
-    """Anneal a frame again with the knobs as they are; the stored answer stays, unless `keep` replaces it."""
+    """Anneal a frame again with the knobs as they are; the stored answer stays, unless `keep` replaces it: then the
+    frames after it are dropped, and the run as it was goes to the trash.
+    """
     return _post_for(
         app, run, commands.Reanneal(frame=where.frame, keep=where.keep, **commands.about(run.folder))
     )

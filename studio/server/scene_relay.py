@@ -20,6 +20,7 @@ from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.typing import Subprotocol
 
 from studio.errors import StudioError
+from studio.foreign_files import read_file
 from studio.server.access import VIEWING
 from studio.server.app_state import AppState
 from studio.server.windows import WindowInPath
@@ -42,7 +43,7 @@ def client_page() -> tuple[bytes, bytes]:
     path = Path(viser.__file__).parent / "client" / "build" / "index.html"
     if not path.is_file():
         raise SceneMissingError("viser's page is missing from its package.", "Install viser again.")
-    content = path.read_bytes()
+    content = read_file(path)
     return content, gzip.compress(content, 6)
 
 

@@ -10,8 +10,10 @@ from studio.comparison.folders import bring_back
 from studio.comparison.kept_comparison import RECORD_NAME as COMPARISON_FILE_NAME
 from studio.comparison.kept_comparison import KeptComparison
 from studio.errors import NotFoundError, StudioError
+from studio.foreign_files import read_file
 from studio.server import files
-from studio.server.app_state import App, AppState, release
+from studio.server.app_state import App, AppState, moving
+from studio.server.error_responses import log
 from studio.server.schemas import Answer, Request, RunName
 from studio.server.session_views import SessionDetail, SessionLine, session_detail, session_line
 from studio.sessions.manifest import FILE_NAME, read_manifest
@@ -19,7 +21,7 @@ from studio.sessions.names import inside
 from studio.sessions.run_record import FILE_NAME as RUN_FILE_NAME
 from studio.sessions.run_record import read_run_record
 from studio.sessions.session import Session
-from studio.sessions.workspace import TRASH_NAME, SessionSummary
+from studio.sessions.workspace import TRASH_NAME, SessionSummary, unusable
 from studio.training.model_repository import bring_back_model, thrown_model
 
 router = APIRouter(prefix="/api", tags=["sessions"])
@@ -86,7 +88,16 @@ OpenSession = Annotated[Session, Depends(session_of)]
 def sessions(app: App) -> SessionList:
     """All sessions by name with their runs, newest first; those that cannot be opened say why."""
     summaries = app.workspace.sessions()
-    return SessionList(sessions=[session_line(entry, _opened(app, entry)) for entry in summaries])
+    return SessionList(sessions=[_line(app, entry) for entry in summaries])
+
+
+def _line(app: AppState, entry: SessionSummary) -> SessionLine:
+    try:
+        return session_line(entry, _opened(app, entry))
+    except Exception as error:  # whatever a foreign session holds, the others are listed
+        log.exception("session '%s' cannot be summed up", entry.name)
+        reason = str(error) if isinstance(error, StudioError) else f"{type(error).__name__}: {error}"
+        return session_line(unusable(entry.name, f"The session cannot be summed up ({reason})."), None)
 
 
 @router.get("/sessions/{session}")
@@ -101,7 +112,7 @@ def thumbnail(session: OpenSession) -> Response:
     path = session.thumbnail()
     if path is None:
         raise NotFoundError(f"Session '{session.name}' has no picture to show.", "Check its footage.")
-    return files.picture(path.read_bytes(), checked_anew=True)
+    return files.picture(read_file(path), checked_anew=True)
 
 
 @router.patch("/sessions/{session}")
@@ -111,8 +122,8 @@ def change_session(session: OpenSession, change: SessionChange, app: App) -> New
     if change.title is not None:
         app.workspace.retitle(name, change.title)
     if change.name is not None and change.name != name:
-        release(app, name)
-        name = app.workspace.rename(name, change.name).name
+        with moving(app, name):
+            name = app.workspace.rename(name, change.name).name
     return _changed(app, name)
 
 
@@ -125,8 +136,8 @@ def duplicate(session: OpenSession, app: App, request: NewName | None = None) ->
 @router.delete("/sessions/{session}")
 def delete(session: OpenSession, app: App) -> TrashEntry:
     """Move a session to the trash. Refused while a run of it is being tracked."""
-    release(app, session.name)
-    place = app.workspace.trash(session.name)
+    with moving(app, session.name):
+        place = app.workspace.trash(session.name)
     _changed(app, session.name)
     return trash_entry(place)
 

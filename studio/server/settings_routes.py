@@ -82,10 +82,13 @@ class PresetList(Answer):
 
 
 class PresetRequest(Request):
-    """A preset to keep."""
+    """A preset to keep. tracker, weighting, body: that it is made for; empty fits any that has its knobs."""
 
     values: dict[str, Value] = Field(min_length=1, max_length=200)
     help: str = Field("", max_length=300)
+    tracker: str = Field("", max_length=64)
+    weighting: str = Field("", max_length=64)
+    body: str = Field("", max_length=64)
 
 
 class Choice(Answer):
@@ -240,9 +243,20 @@ def reset_settings(run: OpenRun, request: ResetRequest, app: App) -> SettingsInU
 
 @router.post(RUN + "/settings/preset")
 def use_preset(run: OpenRun, request: PresetChoice, app: App) -> SettingsInUse:
-    """Change the knobs that a preset sets."""
+    """Change the knobs that a preset sets, but for those that a run keeps; refused where it is made for another tracker
+    or likelihood.
+    """
     chosen = preset(request.name, app.state_folder)
-    return _change(app, run, chosen.values)
+    tracker, weighting = run.record.tracker, run.record.weighting
+    if not chosen.fits(tracker, weighting):
+        made_for = " with ".join(name for name in (chosen.tracker, chosen.weighting) if name)
+        raise SettingsError(
+            f"The preset '{chosen.name}' is made for {made_for}, this run is tracked by {tracker} with {weighting}.",
+            "Begin a new run with the preset.",
+        )
+    known = {entry.name: entry for entry in all_knobs(default_settings(tracker, weighting))}
+    kept = {name for name, entry in known.items() if entry.takes_effect == "new run"}
+    return _change(app, run, {name: value for name, value in chosen.values.items() if name not in kept})
 
 
 @router.get("/presets")
@@ -254,7 +268,8 @@ def presets(app: App) -> PresetList:
 @router.put("/presets/{name}")
 def put_preset(name: str, request: PresetRequest, app: App) -> PresetList:
     """Keep settings under a name."""
-    keep_preset(name, request.help, request.values, app.state_folder)
+    made_for = {"tracker": request.tracker, "weighting": request.weighting, "body": request.body}
+    keep_preset(name, request.help, request.values, app.state_folder, **made_for)
     return presets(app)
 
 

@@ -107,6 +107,19 @@ def unpack(archive: Path, folder: Path, limits: ArchiveLimits | None = None) -> 
         return written
 
 
+def check_archive(archive: Path, limits: ArchiveLimits) -> tuple[int, int]:
+    """The number of an archive's files and their bytes, as its index says; nothing is unpacked. Raises ArchiveError,
+    PathRefused.
+    """
+    words = ("an archive that can be unpacked", "Pack the folder again.")
+    with foreign_file(archive, ArchiveError, *words), _entries(archive) as found:
+        entries = [entry for entry in _checked(found, limits) if not entry.is_folder]
+        size = sum(entry.claimed for entry in entries)
+        if size > max(limits.free, int(archive.stat().st_size * limits.ratio)):
+            raise _too_much(max(entries, key=lambda entry: entry.claimed))
+        return len(entries), size
+
+
 def unpacked(folder: Path) -> Path:
     """A folder, or the content of its only archive, which is removed then. Raises ArchiveError, PathRefused."""
     archive = only_archive(folder)

@@ -11,18 +11,22 @@ import os
 import shutil
 import sqlite3
 import tempfile
+import threading
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
 from studio.errors import SessionError
-from studio.foreign_files import NO_ROOM
+from studio.foreign_files import NO_ROOM, check_file, check_inside, read_file
+from studio.sessions.session_databases import check_tables, open_database
 
+_one_at_a_time = threading.Lock()
 PARTIAL_PREFIX = ".partial-"
 
 
 def write_bytes(path: Path, content: bytes) -> None:
     """Write `content` to `path`, atomically. Raises SessionError; then the old file is unchanged."""
+    check_inside(path.parent)
     with writing("The file", path):
         handle, temporary = tempfile.mkstemp(prefix=PARTIAL_PREFIX, dir=path.parent)
         try:
@@ -30,7 +34,7 @@ def write_bytes(path: Path, content: bytes) -> None:
                 stream.write(content)
                 stream.flush()
                 os.fsync(stream.fileno())
-            os.chmod(temporary, 0o644)
+            os.chmod(temporary, 0o666 & ~_umask())
             os.replace(temporary, path)
         except BaseException:
             with contextlib.suppress(OSError):
@@ -47,7 +51,7 @@ def write_text(path: Path, content: str) -> None:
 def copy_file(source: Path, path: Path) -> None:
     """A byte-for-byte copy of `source` at `path`, in one step. Raises SessionError."""
     try:
-        content = source.read_bytes()
+        content = read_file(source)
     except OSError as error:
         raise SessionError(
             f"'{source}' cannot be read ({_reason(error)}).", "Check the disk and the folder's permissions."
@@ -55,12 +59,27 @@ def copy_file(source: Path, path: Path) -> None:
     write_bytes(path, content)
 
 
+def copy_part(source: Path, target: Path) -> None:
+    """Copy a file or a folder of a session. Raises OSError, and SessionError for what a link leads out of it to."""
+
+    def copied(path: str, place: str) -> None:
+        check_file(Path(path), SessionError)
+        shutil.copyfile(path, place)
+
+    if source.is_dir():
+        shutil.copytree(source, target, copy_function=copied, dirs_exist_ok=True)
+    else:
+        copied(str(source), str(target))
+
+
 def copy_database(source: Path, target: Path) -> None:
     """A copy of an SQLite database, also of one that is being written, with all that was committed. Raises
     SessionError.
     """
-    reading, writing = sqlite3.connect(source), sqlite3.connect(target)
+    reading = open_database(source, "rw", patience=30.0)
+    writing = open_database(target)
     try:
+        check_tables(reading, source)
         reading.backup(writing)
         writing.execute("PRAGMA journal_mode = WAL")
     except sqlite3.DatabaseError as error:
@@ -72,16 +91,20 @@ def copy_database(source: Path, target: Path) -> None:
         writing.close()
 
 
-def new_folder_beside(path: Path) -> Path:
-    """An empty hidden folder next to `path`, to be filled and then given to `move_into_place`. Raises SessionError."""
+def new_folder_beside(path: Path, parents: bool = True) -> Path:
+    """An empty hidden folder next to `path`, to be filled and then given to `move_into_place`. Raises SessionError.
+
+    parents : make the folders above that are missing; False in a session, which may have been renamed meanwhile.
+    """
+    check_inside(path.parent)
     with writing("The folder", path.parent):
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
+            path.parent.mkdir(parents=parents, exist_ok=True)
         except FileExistsError as error:
             # A file stands where a folder would have to be.
             raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), error.filename) from None
         made = Path(tempfile.mkdtemp(prefix=PARTIAL_PREFIX, dir=path.parent))
-        made.chmod(0o755)
+        made.chmod(0o777 & ~_umask())
     return made
 
 
@@ -89,11 +112,20 @@ def move_into_place(folder: Path, path: Path) -> None:
     """Rename a finished folder to its place. Raises FileExistsError if something is there (nothing is overwritten),
     SessionError.
     """
+    check_inside(path.parent)
     if path.exists() or path.is_symlink():
         raise FileExistsError(path)
     with writing("The folder", path):
         os.rename(folder, path)
     sync_folder(path.parent)
+
+
+def _umask() -> int:
+    """The permissions that the process's user withholds from what it makes; looking at it sets it for a moment."""
+    with _one_at_a_time:
+        mask = os.umask(0o077)
+        os.umask(mask)
+    return mask
 
 
 def discard(folder: Path) -> None:
@@ -102,12 +134,12 @@ def discard(folder: Path) -> None:
 
 
 @contextlib.contextmanager
-def made_whole(place: Path) -> Generator[Path]:
+def made_whole(place: Path, parents: bool = True) -> Generator[Path]:
     """An empty hidden folder to be filled, which is then renamed to `place`; where anything fails, nothing is left.
 
     Raises SessionError if something is at the place.
     """
-    folder = new_folder_beside(place)
+    folder = new_folder_beside(place, parents)
     try:
         yield folder
         move_into_place(folder, place)

@@ -28,6 +28,7 @@ from studio.capture.pictures import check_picture, is_picture, painted_picture, 
 from studio.capture.video import measure_video
 from studio.errors import FootageError, NotFoundError
 from studio.evidence.backgrounds import check_plate_size
+from studio.foreign_files import read_file
 from studio.sessions import atomic_files
 from studio.sessions.names import free_name, name_from
 from studio.sessions.record_files import RecordFile
@@ -176,7 +177,7 @@ class MadeMasks:
     def take_over(self, camera: str, frame: int, stored: Path) -> None:
         """Put a mask that lies in the session as this would write it."""
         with atomic_files.writing("The masks in", self.folder):
-            self._path(camera, frame).write_bytes(stored.read_bytes())
+            self._path(camera, frame).write_bytes(read_file(stored))
 
     @property
     def folders(self) -> dict[str, str]:
@@ -211,7 +212,7 @@ def made_masks(session: Session, home: str) -> Generator[MadeMasks]:
     """
     numbers = [int(path.name) for path in made_folders(session, home)]
     place = f"{home}/{max(numbers, default=0) + 1}"
-    with atomic_files.made_whole(session.path / place) as folder:
+    with atomic_files.made_whole(session.path / place, parents=False) as folder:
         made = MadeMasks(session, folder)
         yield made
     evidence = read_evidence(session)
@@ -316,7 +317,7 @@ def polygon_exclusion(session: Session, camera: str, corners: Array) -> int:
     path = session.path / EXCLUSIONS / f"{camera}.png"
     painted = np.zeros((source.height, source.width), np.uint8)
     if path.exists():
-        painted = painted_picture(path.read_bytes())
+        painted = painted_picture(read_file(path))
     return set_exclusion(session, camera, png_of(with_polygon(painted, corners)))
 
 

@@ -24,7 +24,8 @@ from studio.capture.calibration_files import AssumedCrop, Calibration, read_cali
 from studio.capture.footage_fit import NO_BARS, Margins, black_margins, fit_camera
 from studio.capture.footage_source import CameraSource
 from studio.capture.naming import CameraMatch, listed, match_names
-from studio.errors import CalibrationError, FootageError, NotFoundError
+from studio.errors import CalibrationError, FootageError, NotFoundError, SessionError
+from studio.foreign_files import LARGEST_RECORD, read_file
 from studio.geometry.camera import Camera
 from studio.sessions import atomic_files, provenance
 from studio.sessions.manifest import SessionManifest
@@ -107,9 +108,9 @@ def restore_calibration(session: Session, name: str, source: str) -> Calibration
     change = replace_calibration(session, NewCalibration(read.cameras, source, crops=read.crops))
     for path in _own_parts(folder):
         if path.is_dir():
-            shutil.copytree(path, place.parent / path.name, dirs_exist_ok=True)
+            atomic_files.copy_part(path, place.parent / path.name)
         else:
-            atomic_files.write_bytes(place.parent / path.name, path.read_bytes())
+            atomic_files.write_bytes(place.parent / path.name, read_file(path))
     stale = stale_runs(change.session)
     notes = tuple(_consequences(change.session, before, read.cameras, stale))
     return dataclasses.replace(change, stale_runs=stale, notes=notes)
@@ -120,7 +121,7 @@ def stale_runs(session: Session) -> tuple[str, ...]:
     place = session.path / CAMERAS_PATH
     if not place.is_file():
         return ()
-    now = place.read_bytes()
+    now = session.calibration_of_footage()
     return tuple(run.name for run in session.runs() if _content(run.folder / CAMERAS_NAME) not in (b"", now))
 
 
@@ -148,18 +149,15 @@ def _keep(folder: Path) -> Path:
     """Copy everything of the calibration in use to a folder of its own."""
     now = datetime.datetime.now(datetime.UTC)
     place = folder / EARLIER / now.strftime("%Y%m%d-%H%M%S-%f")
-    with atomic_files.made_whole(place) as made:
+    with atomic_files.made_whole(place, parents=False) as made:
         for path in _own_parts(folder):
-            if path.is_dir():
-                shutil.copytree(path, made / path.name)
-            else:
-                shutil.copyfile(path, made / path.name)
+            atomic_files.copy_part(path, made / path.name)
     return place
 
 
 def _write(place: Path, new: NewCalibration) -> None:
     """Replace the canonical file atomically, then the files beside it."""
-    made = atomic_files.new_folder_beside(place)
+    made = atomic_files.new_folder_beside(place, parents=False)
     try:
         if new.calibrated is not None and new.calibrated.rig is not None:
             rig = dataclasses.replace(new.calibrated.rig, cameras=new.cameras)
@@ -173,7 +171,7 @@ def _write(place: Path, new: NewCalibration) -> None:
             target = made / f"original{ending}" if single else made / "original" / Path(name).name
             target.parent.mkdir(exist_ok=True)
             target.write_bytes(content)
-        atomic_files.write_bytes(place, (made / CAMERAS_PATH.name).read_bytes())
+        atomic_files.write_bytes(place, read_file(made / CAMERAS_PATH.name))
         if new.floor:
             _correct_report(place.with_name(REPORT_NAME), new)
             return
@@ -192,8 +190,8 @@ def _write(place: Path, new: NewCalibration) -> None:
 def _correct_report(path: Path, new: NewCalibration) -> None:
     """The board calibration of the same cameras, with their places in the new world."""
     try:
-        report = decode_json(path.read_bytes(), dict[str, object])
-    except (OSError, msgspec.DecodeError):
+        report = decode_json(read_file(path, LARGEST_RECORD), dict[str, object])
+    except (OSError, SessionError, msgspec.DecodeError):
         return
     places = {camera.name: np.round(camera.centre, 3).tolist() for camera in new.cameras}
     entries = report.get("cameras")
@@ -250,7 +248,7 @@ def _readable(place: Path) -> bool:
 
 
 def _content(path: Path) -> bytes:
-    return path.read_bytes() if path.is_file() else b""
+    return read_file(path) if path.is_file() else b""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,6 +13,7 @@ from pathlib import Path
 import msgspec
 
 from studio.errors import SessionError
+from studio.foreign_files import open_file
 from studio.sessions.record_files import RecordFile
 
 NAME = ".checksums.json"
@@ -115,7 +116,7 @@ def _files(folder: Path) -> Iterator[tuple[str, Path]]:
 
 def _noted(path: Path) -> Noted:
     status = path.stat()
-    with path.open("rb") as stream:
+    with open_file(path) as stream:
         digest = hashlib.file_digest(stream, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
     return Noted(status.st_size, status.st_mtime_ns, digest)
 

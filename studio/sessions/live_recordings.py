@@ -13,7 +13,6 @@ import contextlib
 import csv
 import dataclasses
 import io
-import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,7 +25,7 @@ from studio.capture.live_cameras import PictureSet, SpreadFigures, spread_figure
 from studio.capture.pictures import picture_path
 from studio.capture.stream_files import jpeg_of
 from studio.errors import FootageError, SessionError
-from studio.foreign_files import foreign_file
+from studio.foreign_files import foreign_file, leads_out, read_text
 from studio.sessions import atomic_files
 from studio.sessions.background_files import BACKGROUND_NAME, EVIDENCE_NAME, read_evidence
 from studio.sessions.manifest import now, write_manifest
@@ -179,7 +178,7 @@ def read_sets(folder: Path) -> RecordedSets:
     with foreign_file(
         path, SessionError, "a recording's list of sets", "Put back a copy of it, or record again."
     ):
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
         for row in csv.reader(text[: text.rfind("\n") + 1].splitlines()[1:]):
             if row[0] == END:
                 return RecordedSets(tuple(sets), row[5])
@@ -221,7 +220,7 @@ def finish_recording(session: Session, notes: tuple[str, ...] = ()) -> Session:
     for source in cameras:
         # A picture without a line may be truncated.
         for path in (session.path / source.path).glob("*.jpg"):
-            if path.stem.isdigit() and int(path.stem) >= count:
+            if path.stem.isdigit() and int(path.stem) >= count and not leads_out(path):
                 path.unlink()
     ending = [f"{recorded.spreads.in_words[0].upper()}{recorded.spreads.in_words[1:]}."]
     ending += (
@@ -265,10 +264,8 @@ def _check_backgrounds(base: Session, sources: list[CameraSource]) -> None:
 def _copy_known(base: Session, folder: Path, keep_start: bool) -> None:
     for entry in (*COPIED, *((START_POSE_NAME,) if keep_start else ())):
         path = base.path / entry
-        if path.is_dir():
-            shutil.copytree(path, folder / entry)
-        elif path.exists():
-            shutil.copyfile(path, folder / entry)
+        if path.exists():
+            atomic_files.copy_part(path, folder / entry)
 
 
 def _source(base: Session, folder: Path, source: CameraSource, frame_count: int) -> CameraSource:
@@ -277,7 +274,7 @@ def _source(base: Session, folder: Path, source: CameraSource, frame_count: int)
     background = base.path / source.background
     kept = f"{BACKGROUND_NAME}/{source.name}{background.suffix.lower()}"
     (folder / BACKGROUND_NAME).mkdir(exist_ok=True)
-    shutil.copyfile(background, folder / kept)
+    atomic_files.copy_part(background, folder / kept)
     return dataclasses.replace(
         source, kind="numbered", path=place, masks="", background=kept, frame_count=frame_count, offset=0
     )

@@ -6,16 +6,19 @@ such.
 """
 
 import datetime
-from pathlib import Path
+from pathlib import Path, PurePath
 
 import msgspec
 
 from studio.capture.footage_source import FootageSource
 from studio.capture.naming import CameraMatch
+from studio.foreign_files import MANIFEST_NAME
 from studio.sessions.record_files import RecordFile
 
 SCHEMA_VERSION = 1
-FILE_NAME = "session.json"
+FILE_NAME = MANIFEST_NAME
+FASTEST, MOST_FRAMES, WIDEST = 10_000.0, 100_000_000, 1 << 16
+"""Frames per second, frames, pixels of a side."""
 
 
 class SessionManifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -60,9 +63,41 @@ class SessionManifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
         return self.footage.frame_count
 
 
+def is_time(text: str) -> bool:
+    """Whether a text is a time in ISO 8601 that names its zone, as `now` gives it."""
+    try:
+        return datetime.datetime.fromisoformat(text).tzinfo is not None
+    except ValueError:
+        return False
+
+
 def now() -> str:
     """The time to be written into records: UTC, ISO 8601, to the second."""
     return datetime.datetime.now(datetime.UTC).replace(microsecond=0).isoformat()
+
+
+def _impossible(manifest: SessionManifest) -> str:
+    """What no footage can have, a clause; "" for nothing."""
+    footage = manifest.footage
+    for changed in (manifest.footage_changed, manifest.calibration_changed):
+        if changed and not is_time(changed):
+            return f"that something was changed at {changed[:40]!r}"
+    if not 0.0 <= footage.fps <= FASTEST or (footage.cameras and not footage.fps):
+        return f"that the footage has {footage.fps:g} frames per second"
+    if not 0 <= footage.frame_count <= MOST_FRAMES:
+        return f"that the footage has {footage.frame_count} frames"
+    if len({camera.name for camera in footage.cameras}) < len(footage.cameras):
+        return "a camera's name twice"
+    for camera in footage.cameras:
+        if not (0 < camera.width <= WIDEST and 0 < camera.height <= WIDEST):
+            return f"that the pictures of camera {camera.name[:40]!r} are {camera.width}x{camera.height}"
+        if max(abs(camera.frame_count), abs(camera.offset)) > MOST_FRAMES:
+            return f"that camera {camera.name[:40]!r} has {camera.frame_count} frames from {camera.offset} on"
+        for place in camera.places:
+            path = PurePath(place)
+            if place and not path.is_absolute() and (not path.parts or ".." in path.parts or "\0" in place):
+                return f"that files of camera {camera.name[:40]!r} lie at {place[:80]!r}, which is not in the session"
+    return ""
 
 
 _RECORD = RecordFile(
@@ -71,6 +106,7 @@ _RECORD = RecordFile(
     "Import the session again, or correct the entry.",
     ("There is no session in '{folder}'.", "Make one with 'studio import SOURCE --into SESSION'."),
     SCHEMA_VERSION,
+    impossible=_impossible,
 )
 
 

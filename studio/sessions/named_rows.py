@@ -15,7 +15,7 @@ import numpy as np
 
 from studio.arrays import Array, Indices
 from studio.errors import BodyError
-from studio.foreign_files import foreign_file
+from studio.foreign_files import foreign_file, read_text
 from studio.geometry.reach import REACH_HINT, within_reach
 from studio.sessions.atomic_files import write_text
 
@@ -98,7 +98,7 @@ def as_csv(rows: Iterable[Iterable[object]]) -> str:
 def _read(path: Path) -> tuple[list[str], list[list[float]]]:
     """Header and rows of numbers; at least one row."""
     with foreign_file(path, BodyError, "a CSV file", "Save it as comma-separated text in UTF-8."):
-        lines = [line for line in csv.reader(path.read_text(encoding="utf-8-sig").splitlines()) if any(line)]
+        lines = [line for line in csv.reader(read_text(path, encoding="utf-8-sig").splitlines()) if any(line)]
     header = [entry.strip() for entry in lines[0]] if lines else []
     if len(lines) < 2:
         raise BodyError(f"'{path.name}' has no row under its header.", "Give one row of numbers.")

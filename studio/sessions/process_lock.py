@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from studio.sessions.atomic_files import unwritable
+from studio.sessions.session_databases import open_database
 
 HELD = frozenset((sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED))
 
@@ -38,8 +39,7 @@ class ProcessLock:
         if not path.exists():
             return False
         try:
-            address = f"{path.resolve().as_uri()}?mode=ro"
-            connection = sqlite3.connect(address, uri=True, timeout=0.0, isolation_level=None)
+            connection = open_database(path, "ro", patience=0.0)
         except sqlite3.DatabaseError:
             return False
         try:
@@ -59,7 +59,7 @@ def _begun(path: Path, patience: float, *statements: str) -> ProcessLock | None:
     """The lock once statements were executed; None while another holds it."""
     connection = None
     try:
-        connection = sqlite3.connect(path, timeout=patience, isolation_level=None, check_same_thread=False)
+        connection = open_database(path, patience=patience, shared=True)
         for statement in statements:
             connection.execute(statement).fetchall()
     except sqlite3.DatabaseError as error:

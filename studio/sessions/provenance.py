@@ -12,6 +12,7 @@ from pathlib import Path
 import msgspec
 
 from studio.capture.footage import EXCLUSIONS
+from studio.foreign_files import read_file
 from studio.sessions.background_files import EVIDENCE_NAME
 from studio.sessions.record_files import RecordFile
 from studio.sessions.session import CAMERAS_PATH, START_POSE_NAME, SUBJECT_NAME, Session
@@ -136,7 +137,7 @@ def _digest(*parts: bytes) -> str:
 
 
 def _content(path: Path) -> bytes:
-    return path.read_bytes() if path.is_file() else b""
+    return read_file(path) if path.is_file() else b""
 
 
 def _file_digest(path: Path) -> str:
@@ -146,7 +147,7 @@ def _file_digest(path: Path) -> str:
     status = path.stat()
     if status.st_size > SMALL_FILE:
         return _digest(f"{status.st_size} {status.st_mtime_ns}".encode())
-    return _digest(path.read_bytes())
+    return _digest(read_file(path))
 
 
 _RECORD = RecordFile(

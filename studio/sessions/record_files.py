@@ -10,7 +10,7 @@ from typing import Any, Generic, TypeVar
 import msgspec
 
 from studio.errors import NotFoundError, SessionError
-from studio.foreign_files import check_regular
+from studio.foreign_files import LARGEST_RECORD, read_file
 from studio.sessions.atomic_files import write_bytes
 from studio.typed_decoding import decode_json
 
@@ -22,13 +22,18 @@ class _Head(msgspec.Struct):
     schema: int = 1
 
 
+def _nothing(_: msgspec.Struct) -> str:
+    return ""
+
+
 @dataclass(frozen=True, slots=True)
 class RecordFile(Generic[Record]):
     """One kind of record.
 
     type : with the entry `schema`, the version. what, remedy : the name of the content, and the remedy for an invalid
     file. missing : cause and remedy without a file; {folder} and {name} stand for its folder. version : the newest,
-    which is written; files without one are of version 1. migrations : version to what makes a file's entries those of
+    which is written; files without one are of version 1. impossible : what no such record can say, a clause; "" for
+    nothing. migrations : version to what makes a file's entries those of
     the next version.
     """
 
@@ -40,12 +45,12 @@ class RecordFile(Generic[Record]):
     migrations: Mapping[int, Callable[[Entries], Entries]] = field(
         default_factory=dict[int, Callable[[Entries], Entries]]
     )
+    impossible: Callable[[Record], str] = _nothing
 
     def read(self, path: Path, default: Record | None = None) -> Record:
         """The record in a file, `default` where there is none. Raises NotFoundError without one, SessionError."""
-        check_regular(path, SessionError)
         try:
-            content = path.read_bytes()
+            content = read_file(path, LARGEST_RECORD)
         except (FileNotFoundError, NotADirectoryError):
             if default is not None:
                 return default
@@ -66,10 +71,14 @@ class RecordFile(Generic[Record]):
             )
         try:
             if written == self.version:
-                return decode_json(content, self.type)
-            return msgspec.convert(self._migrated(decode_json(content, Entries), written), self.type)
+                record = decode_json(content, self.type)
+            else:
+                record = msgspec.convert(self._migrated(decode_json(content, Entries), written), self.type)
         except (msgspec.DecodeError, LookupError, TypeError, ValueError) as error:
             raise SessionError(f"'{path}' is not {self.what}: {error}.", self.remedy) from None
+        if wrong := self.impossible(record):
+            raise SessionError(f"'{path}' is not {self.what}: it says {wrong}.", self.remedy)
+        return record
 
     def write(self, path: Path, record: Record) -> None:
         """Write a record as indented JSON that ends with a line break, in one step."""

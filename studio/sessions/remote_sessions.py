@@ -26,6 +26,7 @@ from tempfile import TemporaryDirectory
 import platformdirs
 
 from studio.errors import NotFoundError, SessionError
+from studio.foreign_files import LARGEST_RECORD, check_inside, read_file, read_text
 from studio.progress import Progress, unheard
 from studio.sessions.atomic_files import (
     PARTIAL_PREFIX,
@@ -108,7 +109,7 @@ def remote_session(address: str, progress: Progress = unheard) -> Session:
 def address_of(session: Session) -> str:
     """The address that a session is a copy from, "" for any other session."""
     try:
-        return str(json.loads((session.path.parent / ORIGIN_NAME).read_text(encoding="utf-8"))["address"])
+        return str(json.loads(read_text(session.path.parent / ORIGIN_NAME))["address"])
     except (OSError, ValueError, KeyError, TypeError):
         return ""
 
@@ -477,7 +478,7 @@ def _put_whole(store: Store, folder: Path, record: str, progress: Progress) -> N
             copy_database(files[name], first[name])
         store.put(first, on_bytes)
     for name in last:
-        store.write(name, files[name].read_bytes())
+        store.write(name, read_file(files[name], LARGEST_RECORD))
 
 
 def _is_record(name: str, record: str) -> bool:
@@ -491,6 +492,8 @@ def _own_files(folder: Path) -> Generator[tuple[str, Path]]:
     for path in sorted(folder.rglob("*")):
         name = path.relative_to(folder).as_posix()
         left_out = path.name.endswith((".lock", "-wal", "-shm", "-journal"))
+        if path.is_symlink():
+            check_inside(path)
         if path.is_file() and not left_out and f"/{PARTIAL_PREFIX}" not in f"/{name}":
             yield name, path
 

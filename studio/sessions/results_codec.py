@@ -39,7 +39,7 @@ from studio.trackers.tracker import (
 from studio.typed_decoding import is_table
 
 LEVEL = -1
-LARGEST_BLOB = 1 << 30
+LARGEST_BLOB = 256 << 20
 _NPZ = b"PK"
 """Begins the archives of a store's first version."""
 

@@ -4,7 +4,8 @@ import bisect
 import math
 import sqlite3
 import threading
-from collections.abc import Callable, Generator, Iterable, Mapping
+from collections import Counter
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from itertools import groupby
@@ -17,6 +18,7 @@ from msgspec import DecodeError
 
 from studio.arrays import Array, Indices
 from studio.errors import DamagedError, NotFoundError, SessionError
+from studio.sessions.manifest import MOST_FRAMES
 from studio.sessions.results_codec import (
     FRAME,
     GIVEN_UP,
@@ -29,8 +31,9 @@ from studio.sessions.results_codec import (
     unpack_layer,
     unpack_result,
 )
+from studio.sessions.session_databases import check_tables, open_database
 from studio.settings import SettingsEntry
-from studio.trackers.tracker import TRACKED, FrameResult, LayerRecord
+from studio.trackers.tracker import TRACKED, TRACKING_STATES, FrameResult, LayerRecord
 from studio.typed_decoding import decode_json
 
 FILE_NAME = "results.sqlite"
@@ -49,6 +52,7 @@ UNWATCHED = (TRACKED, None, 0)
 ROWS = "SELECT frames.frame, log_weight, milliseconds, evaluations, layers, settings_version, pose"
 NUMBERS, RESULT, LOST = "its numbers", "its result", "all of it"
 """The damaged parts of a frame as text; of layers: "layer 3"."""
+LARGEST_COUNT = 2**53
 READ_TOGETHER = 8
 """Frames whose blobs are read at once to be checked: so many queries less."""
 
@@ -193,7 +197,7 @@ class ResultsReader:
         return {
             row[0]: np.frombuffer(row[6], dtype="<f8")
             for row in self._rows()
-            if row[0] not in sums or Sums(sums[row[0]]).row_fits(row)
+            if not _impossible([row], ()) and (row[0] not in sums or Sums(sums[row[0]]).row_fits(row))
         }
 
     def partial_is_damaged(self) -> bool:
@@ -278,10 +282,12 @@ class ResultsReader:
                 if not (sums or rows) and before is not _NOTHING:
                     # Something else was written, which is rare.
                     before, sums, rows = _NOTHING, self._sums(FRAME), self._rows()
-                by_frame = {row[0]: row for row in rows}
+                by_frame = {row[0]: row for row in rows if _is_frame(row[0])}
+                sums = {frame: text for frame, text in sums.items() if _is_frame(frame)}
+                impossible = _impossible(rows, before.rows)
                 parts = {
                     frame: _damage(known, frame, text, by_frame.get(frame)) for frame, text in sums.items()
-                }
+                } | impossible
                 # What was found damaged is checked again: it may have been mended.
                 due = {
                     frame: text
@@ -295,7 +301,7 @@ class ResultsReader:
                 rewritten,
                 (blobs, known, known.damage()),
                 last=max((before.last, *sums, *by_frame)),
-                rows=[*before.rows, *(row for row in rows if row[0] not in damaged)],
+                rows=[*before.rows, *(row for frame, row in by_frame.items() if frame not in damaged)],
                 damaged=before.damaged | damaged,
                 due=before.due | {frame: text for frame, text in due.items() if frame not in found},
             )
@@ -520,6 +526,37 @@ class ResultsReader:
                 ) from None
 
 
+def _is_frame(value: object) -> bool:
+    return isinstance(value, int) and 0 <= value < MOST_FRAMES
+
+
+def _impossible(rows: Sequence[Row], known: Sequence[Row]) -> dict[int, str]:
+    """`NUMBERS` for the frames whose values are not of their columns' types, or whose poses are not finite or not of
+    the others' length: SQLite keeps whatever a column is given. known : rows that were found possible before.
+    """
+    if not rows:
+        return {}
+    sizes = Counter(len(row[6]) for row in (*known[:1], *rows) if isinstance(row[6], bytes))
+    size = len(known[0][6]) if known else max(sizes, key=lambda one: sizes[one], default=0)
+    wrong = {
+        row[0]: NUMBERS
+        for row in rows
+        if _is_frame(row[0]) and not (_are_numbers(row) and len(row[6]) == size)
+    }
+    whole = [row for row in rows if _is_frame(row[0]) and row[0] not in wrong]
+    if size % 8 or not whole:
+        return wrong | {row[0]: NUMBERS for row in whole}
+    poses = np.frombuffer(b"".join(row[6] for row in whole), "<f8").reshape(len(whole), -1)
+    unlike = np.flatnonzero(~np.isfinite(poses).all(axis=1))
+    return wrong | {whole[int(index)][0]: NUMBERS for index in unlike}
+
+
+def _are_numbers(row: Row) -> bool:
+    counts = all(isinstance(value, int) and abs(value) < LARGEST_COUNT for value in (*row[3:6], row[9] or 0))
+    reals = all(isinstance(value, int | float) for value in (*row[1:3], row[8] or 0.0))
+    return counts and reals and isinstance(row[6], bytes) and (row[7] is None or row[7] in TRACKING_STATES)
+
+
 def time_from(text: str) -> TimeTaken | None:
     """What `add_time` wrote; None for what it did not."""
     try:
@@ -563,19 +600,16 @@ def _named(layers: Iterable[int]) -> str:
 def _open_to_read(path: Path) -> sqlite3.Connection:
     """A read-only connection; also to a store in a read-only folder."""
     try:
-        return _opened(path, "mode=rw")
+        return _opened(path, "rw")
     except sqlite3.OperationalError:
-        return _opened(path, "immutable=1")
+        return _opened(path, "immutable")
 
 
 def _opened(path: Path, way: str) -> sqlite3.Connection:
-    address = f"{path.resolve().as_uri()}?{way}"
-    connection = sqlite3.connect(
-        address, uri=True, timeout=10.0, isolation_level=None, check_same_thread=False
-    )
+    connection = open_database(path, way, patience=10.0, shared=True)
     try:
         connection.execute("PRAGMA query_only = ON")
-        connection.execute("SELECT 1 FROM sqlite_master LIMIT 1").fetchall()
+        check_tables(connection, path)
         check_version(connection, path)
     except BaseException:
         connection.close()

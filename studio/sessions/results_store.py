@@ -18,6 +18,7 @@ import numpy as np
 
 from studio.arrays import Array
 from studio.errors import RunError, SessionError
+from studio.foreign_files import check_file
 from studio.sessions.atomic_files import unwritable
 from studio.sessions.process_lock import ProcessLock
 from studio.sessions.results_codec import (
@@ -38,6 +39,7 @@ from studio.sessions.results_reader import (
     check_version,
     time_from,
 )
+from studio.sessions.session_databases import check_tables, open_database
 from studio.trackers.tracker import FrameResult, LayerRecord
 
 Value = bool | int | float | str
@@ -87,7 +89,7 @@ def create_store(run_folder: Path) -> None:
     """Make the empty store of a new run. Raises SessionError."""
     path = run_folder / FILE_NAME
     try:
-        with contextlib.closing(sqlite3.connect(path, isolation_level=None)) as connection:
+        with contextlib.closing(open_database(path)) as connection:
             connection.execute("PRAGMA journal_mode = WAL")
             connection.executescript(SCHEMA)
             connection.execute(_NOTE_VERSION)
@@ -100,9 +102,11 @@ def copy_frames(source: Path, into: Path, last: int | None = None) -> None:
     settings that they were tracked with. source, into : the runs' folders.
     """
     end = last if last is not None else 2**62
-    connection = sqlite3.connect(into / FILE_NAME, isolation_level=None, timeout=30.0)
+    connection = open_database(into / FILE_NAME, patience=30.0)
     try:
+        check_file(source / FILE_NAME, SessionError)
         connection.execute("ATTACH DATABASE ? AS old", (str((source / FILE_NAME).resolve()),))
+        check_tables(connection, source / FILE_NAME, "old")
         known = {
             row[0] for row in connection.execute("SELECT name FROM old.sqlite_master WHERE type = 'table'")
         }
@@ -153,10 +157,9 @@ class ResultsWriter:
     def _opened(self) -> sqlite3.Connection:
         """A connection to the store, its tables made where they are missing. Raises SessionError."""
         try:
-            connection = sqlite3.connect(
-                self._path, timeout=30.0, isolation_level=None, check_same_thread=False
-            )
+            connection = open_database(self._path, patience=30.0, shared=True)
             try:
+                check_tables(connection, self._path)
                 check_version(connection, self._path)
                 connection.execute("PRAGMA journal_mode = WAL")
                 connection.execute("PRAGMA synchronous = NORMAL")

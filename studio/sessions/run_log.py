@@ -1,10 +1,13 @@
 """A run's log: one JSON object a line in `log.jsonl`, appended as it happens and readable at any time."""
 
+import os
 import time
 from pathlib import Path
 
 import msgspec
 
+from studio.errors import SessionError
+from studio.foreign_files import check_file, open_file
 from studio.typed_decoding import decode_json
 
 FILE_NAME = "log.jsonl"
@@ -22,19 +25,23 @@ class LogEntry(msgspec.Struct, frozen=True):
 def append_to_log(run_folder: Path, level: str, text: str) -> LogEntry:
     """Write one entry at the end of the run's log. Raises OSError."""
     entry = LogEntry(time.time(), level, text)
+    check_file(run_folder / FILE_NAME, SessionError)
     with (run_folder / FILE_NAME).open("ab") as stream:
         stream.write(msgspec.json.encode(entry) + b"\n")
     return entry
 
 
 def read_log(run_folder: Path, last: int = 200) -> tuple[LogEntry, ...]:
-    """The last entries of a run's log, oldest first; a line cut short by a crash is left out."""
+    """The last entries of a run's log, oldest first; a line cut short by a crash is left out. Raises SessionError for
+    what is no regular file of the session.
+    """
     path = run_folder / FILE_NAME
-    if not path.exists():
+    try:
+        with open_file(path) as stream:
+            stream.seek(max(0, os.fstat(stream.fileno()).st_size - LONGEST_TAIL))
+            lines = stream.read(LONGEST_TAIL).splitlines()
+    except FileNotFoundError:
         return ()
-    with path.open("rb") as stream:
-        stream.seek(max(0, path.stat().st_size - LONGEST_TAIL))
-        lines = stream.read().splitlines()
     entries: list[LogEntry] = []
     for line in lines[-last:]:
         try:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import msgspec
 
+from studio.sessions.manifest import FASTEST, MOST_FRAMES, is_time
 from studio.sessions.record_files import RecordFile, renamed
 
 Value = bool | int | float | str
@@ -30,9 +31,10 @@ class RunRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     readers of the results. behaviour : name of the behaviour model whose copy the run keeps, "" without one. live :
     frames came on a clock and those that came too fast were dropped; the results store lists the tracked ones.
     ping_pong : the footage is played forwards and backwards without end (`capture.footage`), so that `last` may lie
-    behind its end. made_from : the run that was corrected, "" if none: other frames are that run's. corrected : the
-    frame that restarts at corrected_pose. backwards_to : None where the frames after it follow from it; else these are
-    the old ones, and from it down to this frame each was tracked from the one after it. subject_dimensions : the
+    behind its end. made_from : the run that was corrected, or that this one leaves with other knobs, "" if none: other
+    frames are that run's. corrected : the frame that restarts at corrected_pose. backwards_to : None where the frames
+    after it follow from it; else these are the old ones, and from it down to this frame each was tracked from the one
+    after it. subject_dimensions : the
     subject's, where the first frames gave the body another shape; empty where they did not.
     """
 
@@ -77,6 +79,18 @@ class RunRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
         return self.last - self.first
 
 
+def _impossible(record: RunRecord) -> str:
+    """What no run can be of, a clause; "" for nothing."""
+    frames = (record.first, record.last, record.corrected or 0, record.backwards_to or 0)
+    if not all(0 <= frame <= MOST_FRAMES for frame in frames) or record.last < record.first:
+        return f"that it is of frames {record.first} to {record.last}"
+    if not 0.0 < record.fps <= FASTEST:
+        return f"that its footage has {record.fps:g} frames per second"
+    if not is_time(record.created):
+        return f"that it was made at {record.created[:40]!r}"
+    return ""
+
+
 _RECORD = RecordFile(
     RunRecord,
     "a run's record",
@@ -84,6 +98,7 @@ _RECORD = RecordFile(
     ("There is no run '{name}'.", "List the runs with 'studio runs'."),
     SCHEMA_VERSION,
     {1: renamed(to_and_fro="ping_pong")},
+    impossible=_impossible,
 )
 
 

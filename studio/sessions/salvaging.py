@@ -12,6 +12,7 @@ from studio.sessions.process_lock import ProcessLock
 from studio.sessions.results_codec import FRAME, GIVEN_UP
 from studio.sessions.results_reader import FILE_NAME, UNREADABLE
 from studio.sessions.results_store import LOCK_NAME, SCHEMA
+from studio.sessions.session_databases import check_tables, open_database
 
 WHOLE = ("meta", "settings")
 OF_A_FRAME = ("frames", "layers", "tracking", "arrivals")
@@ -24,9 +25,8 @@ def faults_of_database(run_folder: Path) -> list[str]:
     if not path.exists():
         return []
     try:
-        with contextlib.closing(
-            sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)
-        ) as connection:
+        with contextlib.closing(open_database(path, "ro")) as connection:
+            check_tables(connection, path)
             found = [str(row[0]) for row in connection.execute("PRAGMA integrity_check(20)")]
     except UNREADABLE as error:
         return [str(error)]
@@ -48,9 +48,10 @@ def salvage(run_folder: Path, first: int, last: int) -> list[int]:
     made.unlink(missing_ok=True)
     try:
         with (
-            contextlib.closing(sqlite3.connect(path, isolation_level=None)) as broken,
-            contextlib.closing(sqlite3.connect(made, isolation_level=None)) as whole,
+            contextlib.closing(open_database(path)) as broken,
+            contextlib.closing(open_database(made)) as whole,
         ):
+            check_tables(broken, path)
             whole.executescript(SCHEMA)
             whole.execute("BEGIN")
             lost = _copy(broken, whole, first, last)

@@ -16,9 +16,10 @@ from studio.body.branches import within_limits
 from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
 from studio.body.subject import Subject, fit_subject, read_subject
-from studio.capture.calibration_files import read_calibration
+from studio.capture.calibration_files import calibration_text, read_calibration
 from studio.capture.footage import Footage, open_footage
 from studio.errors import NotFoundError, SessionError, StudioError
+from studio.foreign_files import check_links, read_file
 from studio.geometry.camera import Camera
 from studio.sessions import atomic_files
 from studio.sessions.atomic_files import writing
@@ -74,11 +75,18 @@ BESIDE = "beside"
 
 
 class Session:
-    """A session's folder. Raises NotFoundError if there is no manifest in it."""
+    """A session's folder. Raises NotFoundError if there is no manifest in it, SessionError where that is invalid, or a
+    link leads out of the folder to anything but footage.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path.resolve()
         self.manifest: SessionManifest = read_manifest(self.path)
+        footage = self.manifest.footage.cameras
+        check_links(
+            self.path, beside={Path(place).parts[0] for camera in footage for place in camera.places if place}
+        )
+        check_links(self.path / CAMERAS_PATH.parent)
 
     @property
     def name(self) -> str:
@@ -227,6 +235,7 @@ class Session:
                 f"Session '{self.name}' has no run '{name}'.",
                 "List the runs with 'studio runs', or start one.",
             )
+        check_links(path)
         return StoredRun(path)
 
     def new_run(self, record: RunRecord, body_text: str = "", behaviour: Path | None = None) -> StoredRun:
@@ -240,8 +249,8 @@ class Session:
         place = self.path / RUNS_NAME / checked_name(record.name, "run")
         if place.exists():
             raise SessionError(f"Session '{self.name}' has a run '{record.name}'.", "Choose another name.")
-        with writing("The run", place), atomic_files.made_whole(place) as folder:
-            atomic_files.copy_file(self.path / CAMERAS_PATH, folder / CAMERAS_NAME)
+        with writing("The run", place), atomic_files.made_whole(place, parents=False) as folder:
+            atomic_files.write_bytes(folder / CAMERAS_NAME, self.calibration_of_footage())
             if body_text:
                 (folder / BODY_FOLDER).mkdir()
                 name = Path(record.body).stem
@@ -252,6 +261,18 @@ class Session:
             write_run_record(folder, record)
             note_files(folder)
         return StoredRun(place)
+
+    def calibration_of_footage(self) -> bytes:
+        """The calibration's file; where it names cameras without footage, the same without them. Raises
+        CalibrationError.
+        """
+        path = self.path / CAMERAS_PATH
+        known = read_calibration(path)
+        filmed = {source.name for source in self.manifest.footage.cameras}
+        kept = tuple(camera for camera in known.cameras if camera.name in filmed)
+        if len(kept) == len(known.cameras):
+            return read_file(path)
+        return calibration_text(kept, known.crops).encode()
 
 
 def free_run_name(session: Session) -> str:

@@ -1,6 +1,5 @@
 """The folder in which a person's sessions live: listing, naming, copying, throwing away."""
 
-import contextlib
 import dataclasses
 import os
 import shutil
@@ -20,7 +19,7 @@ from studio.errors import NotFoundError, SessionError, StudioError
 from studio.progress import Progress, unheard
 from studio.sessions import atomic_files
 from studio.sessions.atomic_files import made_whole, write_text
-from studio.sessions.manifest import FILE_NAME, SessionManifest, now, read_manifest, write_manifest
+from studio.sessions.manifest import FILE_NAME, SessionManifest, now, write_manifest
 from studio.sessions.names import checked_name, free_name, inside, is_name
 from studio.sessions.object_stores import folder_of, is_address
 from studio.sessions.remote_sessions import remote_session
@@ -170,7 +169,13 @@ class Workspace:
         wanted = new_name or free_name(name, {path.name for path in self.root.iterdir()})
         place = self._free(wanted)
         with atomic_files.made_whole(place) as folder:
-            shutil.copytree(session.path, folder, symlinks=True, dirs_exist_ok=True, ignore=_transient)
+            try:
+                shutil.copytree(session.path, folder, symlinks=True, dirs_exist_ok=True, ignore=_transient)
+            except shutil.Error as error:
+                raise SessionError(
+                    f"Session '{name}' cannot be copied: {error.args[0][0][2]}.",
+                    "Say 'studio inspect' of it, and remove what is no file.",
+                ) from None
             for store in session.path.glob(f"{RUNS_NAME}/*/{RESULTS_NAME}"):
                 atomic_files.copy_database(store, folder / store.relative_to(session.path))
             title = f"{session.manifest.title} (copy)"
@@ -261,11 +266,21 @@ class Workspace:
 
 def _summary(folder: Path) -> SessionSummary:
     try:
-        manifest = read_manifest(folder)
+        return _summed_up(folder)
     except StudioError as error:
-        return SessionSummary(
-            folder.name, folder.name, "", "", (), 0, 0.0, False, False, (), (), (), str(error)
-        )
+        return unusable(folder.name, str(error))
+    except Exception as error:  # whatever a foreign session holds, the others are listed
+        return unusable(folder.name, f"The session cannot be summed up ({type(error).__name__}: {error}).")
+
+
+def unusable(name: str, problem: str) -> SessionSummary:
+    """The line of a session that cannot be opened."""
+    return SessionSummary(name, name, "", "", (), 0, 0.0, False, False, (), (), (), problem)
+
+
+def _summed_up(folder: Path) -> SessionSummary:
+    manifest = Session(folder).manifest
+    runs, unread = _run_summaries(folder / RUNS_NAME)
     return SessionSummary(
         name=folder.name,
         title=manifest.title,
@@ -277,22 +292,26 @@ def _summary(folder: Path) -> SessionSummary:
         has_truth=any((folder / "truth").glob("*.trc")),
         thumbnail=(folder / THUMBNAIL_NAME).exists(),
         notes=manifest.notes,
-        warnings=manifest.warnings,
-        runs=_run_summaries(folder / RUNS_NAME),
+        warnings=(*manifest.warnings, *unread),
+        runs=runs,
     )
 
 
-def _run_summaries(folder: Path) -> tuple[RunSummary, ...]:
-    """Runs by creation time; damaged results show in the status, runs without a record are left out."""
+def _run_summaries(folder: Path) -> tuple[tuple[RunSummary, ...], tuple[str, ...]]:
+    """Runs by creation time, damaged results in the status; and what is said of those whose record cannot be read."""
     found: list[RunSummary] = []
+    unread: list[str] = []
     for path in _named_folders(folder, RECORD_NAME):
-        with contextlib.suppress(StudioError):
+        try:
             run = StoredRun(path, read_run_record(path))
-            try:
-                found.append(run.summary(blobs=False))
-            except StudioError:
-                found.append(dataclasses.replace(run.empty_summary(), status="damaged"))
-    return tuple(sorted(found, key=lambda run: (run.created, run.name)))
+        except StudioError as error:
+            unread.append(f"Run '{path.name}' is left out: {error}")
+            continue
+        try:
+            found.append(run.summary(blobs=False))
+        except Exception:  # whatever a foreign store holds, the others are listed
+            found.append(dataclasses.replace(run.empty_summary(), status="damaged"))
+    return tuple(sorted(found, key=lambda run: (run.created, run.name))), tuple(unread)
 
 
 def _named_folders(parent: Path, marker: str) -> Iterator[Path]:

@@ -25,6 +25,7 @@ from studio.trackers.guided_particles import foreseen, spread_over_clusters
 from studio.trackers.guided_start import guided_set, without_past
 from studio.trackers.model_free import judged
 from studio.trackers.one_layer_filter import OneLayerFilter
+from studio.trackers.paper_presets import CAILLETTE
 from studio.trackers.particles import first_set, uniform_poses, unweighted
 from studio.trackers.resampling import draw
 from studio.trackers.settings import BehaviourSettings
@@ -38,6 +39,7 @@ class BehaviourGuided(OneLayerFilter):
     label = "Guided by behaviour"
     settings_type = BehaviourSettings
     needs_behaviour = True
+    presets = (CAILLETTE,)
 
     def begin_frame(
         self, rng: np.random.Generator, previous: FilterState, space: SearchSpace, settings: BehaviourSettings

@@ -89,6 +89,11 @@ class FrameSearch:
         return None if self._prepared is None else self._prepared[2]
 
     @property
+    def layer_count(self) -> int:
+        """Layers of one of its searches; 0 before the first layer."""
+        return self.state.layer_count
+
+    @property
     def finished(self) -> bool:
         """Whether all layers of all repeats are done."""
         state = self.state

@@ -4,6 +4,12 @@ from dataclasses import dataclass
 
 from studio.errors import SettingsError
 from studio.knobs import knob, next_frame_knob, with_default
+from studio.trackers.paper_presets import (
+    DEUTSCHER_REID_EQ_13,
+    DEUTSCHER_REID_SECTION_6,
+    EQ_18_CONSTANT,
+    of_the_search,
+)
 from studio.trackers.shared_knobs import (
     BEHAVIOUR,
     GuidedSettings,
@@ -42,19 +48,20 @@ class AnnealedSettings(GuidedSettings):
     )
     diffusion_form: str = knob(
         "shrink", choices=("shrink", "paper"), label="adaptive form",
-        help="Survivors shrink towards their mean so that the cloud never grows, or only get noise (Eq. 18).",
+        help="shrink, the studio's own: survivors are drawn towards their mean, so that the cloud never grows; paper: "
+        "they only get noise (Eq. 18).",
     )  # fmt: skip
     diffusion_fraction: float = knob(
         0.4, 0.02, 1.0, 0.02, label="adaptive noise",
         help="h: noise as a share of the sample's standard deviation, for the form 'shrink'.",
     )  # fmt: skip
     diffusion_constant: float = knob(
-        0.1, 0.001, 2.0, 0.01, label="constant of Eq. 18",
-        help="P as a multiple of the sample's covariance, for the form 'paper'; much makes the cloud grow.",
+        EQ_18_CONSTANT, 0.001, 2.0, 0.01, label="constant of Eq. 18",
+        help="c: P as a multiple of the sample's covariance, for the form 'paper'; 0.1 makes the cloud grow.",
     )  # fmt: skip
     diffusion_covariance: str = knob(
         "diagonal", choices=("diagonal", "full"), label="covariance",
-        help="Whether adaptive noise follows each parameter on its own or all of them together.",
+        help="Whether adaptive noise follows each parameter on its own or all of them together, as Eq. 18 prints it.",
     )  # fmt: skip
     diffusion_decay: str = knob(
         "variance", choices=("variance", "deviation", "printed"), label="decay of Eq. 13",
@@ -160,42 +167,32 @@ _IMPROVED: dict[str, Value] = {
         *("diffusion_fraction", "crossover", "crossover_by"),
     )
 }
-_AS_THE_PAPER: dict[str, Value] = {
-    "adaptive_diffusion": True,
-    "diffusion_form": "paper",
-    "crossover": 0.5,
-    "crossover_by": "parameters",
-    "survival": 0.5,
-}
-_TEN_BY_200: dict[str, Value] = {"layers": 10, "particles": 200, "refine_frames": False}
-
 PRESETS = (
     Preset(
         "the studio's own",
         "The improved filter, 10 × 100, and each frame refined on its silhouettes.",
         _IMPROVED | {"layers": 10, "particles": 100, "refine_frames": True},
+        "annealed",
     ),
     Preset(
         "improved filter",
         "Adaptive diffusion with shrinkage and crossover by limbs, 10 × 200, nothing refined.",
-        _IMPROVED | _TEN_BY_200,
+        _IMPROVED | {"layers": 10, "particles": 200, "refine_frames": False},
+        "annealed",
     ),
+    DEUTSCHER_REID_EQ_13,
+    DEUTSCHER_REID_SECTION_6,
     Preset(
-        "paper, Eq. 13",
-        "The annealed filter without its improvements: a fixed plan of noise, no crossover, 10 × 200.",
-        {"adaptive_diffusion": False, "diffusion_decay": "variance", "crossover": 0.0, "survival": 0.5}
-        | _TEN_BY_200,
+        "fast preview",
+        "A quarter of the work: 5 × 50.",
+        _IMPROVED | {"layers": 5, "particles": 50},
+        "annealed",
     ),
-    Preset(
-        "paper, Eq. 18 and 19",
-        "Adaptive diffusion without shrinkage and crossover by parameters, as the paper writes them.",
-        _AS_THE_PAPER | _TEN_BY_200,
-    ),
-    Preset("fast preview", "A quarter of the work: 5 × 50.", _IMPROVED | {"layers": 5, "particles": 50}),
     Preset(
         "careful",
         "Six times the work, in more layers: 15 × 400.",
         _IMPROVED | {"layers": 15, "particles": 400},
+        "annealed",
     ),
 )
 
@@ -209,10 +206,12 @@ VARIANTS = {
         {"adaptive_diffusion": True, "diffusion_form": "shrink", "crossover": 0.5, "crossover_by": "limbs"},
     ),
     "eq13": Variant(
-        "the planned noise of Eq. 13 alone, no crossover", {"adaptive_diffusion": False, "crossover": 0.0}
+        "Eq. 13 as Deutscher & Reid print it: planned noise, no crossover, half of the particles surviving",
+        of_the_search(DEUTSCHER_REID_EQ_13),
     ),
     "paper": Variant(
-        "Eq. 18 and 19 as Deutscher & Reid write them, half of the particles surviving", _AS_THE_PAPER
+        "Eq. 18 and 19 as Deutscher & Reid print them: full covariance, all crossed, half of the particles surviving",
+        of_the_search(DEUTSCHER_REID_SECTION_6),
     ),
     "guided": GUIDED,
 }

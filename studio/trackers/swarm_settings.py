@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 from studio.errors import SettingsError
 from studio.knobs import knob, next_frame_knob, with_default
+from studio.trackers.paper_presets import FLEISCHMANN
 from studio.trackers.settings import GUIDED
 from studio.trackers.shared_knobs import GuidedSettings, dynamics, prediction
-from studio.trackers.tracker import Preset, Variant
+from studio.trackers.tracker import Variant
 
 PARTITIONS = ("soft", "soft-three", "hard-two", "hard-twelve", "global-local", "global")
 # Eq. 2 divides by N - 2.
@@ -105,18 +106,7 @@ def _check_iterations(name: str, iterations: int, stages: int) -> None:
         )
 
 
-# The swarm paper's figures are the tracker's own defaults.
-_PAPERS = (
-    *("stage1_particles", "stage1_iterations", "stage2_particles", "stage2_iterations", "c_first", "c_last"),
-    *("partition", "start_velocity", "position_divisor", "constraints", "limbs_apart"),
-)
-PRESETS = (
-    Preset(
-        "paper, swarm",
-        "The swarm as its paper has it: Table 1, two soft stages, impossible poses drawn again.",
-        {name: getattr(SwarmSettings(), name) for name in _PAPERS} | {"refine_frames": False},
-    ),
-)
+PRESETS = (FLEISCHMANN,)
 
 _PARTITION_WORDS = {
     "soft-three": "three soft stages: root, trunk and head, all",

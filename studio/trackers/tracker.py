@@ -206,12 +206,45 @@ class FrameResult:
 
 
 @dataclass(frozen=True, slots=True)
+class Printed:
+    """Something that a paper prints of its tracker, and what is run for it.
+
+    printed : with its place in the paper. sets : knobs by flat name. runs : in words, where no knob says it. why : the
+    reason, where what is run is not what is printed or the paper leaves it open; "" where it is the same.
+    """
+
+    printed: str
+    sets: Mapping[str, Value] = field(default_factory=dict[str, Value])
+    runs: str = ""
+    why: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Preset:
-    """Ready-made settings. name : shown on screen. help : its purpose, one sentence. values : knobs by flat name."""
+    """Ready-made settings. name : shown on screen. help : its purpose, one sentence. own : knobs by flat name.
+
+    tracker, weighting, body : by name, that it is made for; "" fits any that has its knobs, and the session's body.
+    printed : of a paper's whole tracker, every knob of it among them. learning : the same of its behaviour model, by
+    knobs of learning.
+    """
 
     name: str
     help: str
-    values: Mapping[str, Value]
+    own: Mapping[str, Value] = field(default_factory=dict[str, Value])
+    tracker: str = ""
+    weighting: str = ""
+    body: str = ""
+    printed: tuple[Printed, ...] = ()
+    learning: tuple[Printed, ...] = ()
+
+    @property
+    def values(self) -> dict[str, Value]:
+        """All its knobs by flat name."""
+        return {**self.own, **{name: value for entry in self.printed for name, value in entry.sets.items()}}
+
+    def fits(self, tracker: str, weighting: str) -> bool:
+        """Whether it is made for runs with that tracker and weighting."""
+        return self.tracker in ("", tracker) and self.weighting in ("", weighting)
 
 
 @dataclass(frozen=True, slots=True)

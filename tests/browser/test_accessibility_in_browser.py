@@ -1,4 +1,6 @@
-"""No page, in no state, has a fault that the accessibility checker (axe) calls serious or critical, light or dark."""
+"""No page, in no state, has a fault that the accessibility checker (axe) calls serious or critical, light or dark; and
+all of each fits into its window, from a telephone's width to a large screen's.
+"""
 
 from collections.abc import Iterator
 
@@ -32,6 +34,29 @@ PAGES = {
     "/guide": "main",
     "/guide/verbs": "main",
 }
+USUAL = {"width": 1280, "height": 800}
+WIDTHS = (390, 900, 1600, 2560)
+# What sticks out of the window and cannot be scrolled to by what it stands in; the page itself must not scroll
+# sideways. A closed drawer waits beside the window.
+STICKING_OUT = """() => {
+  const right = innerWidth + 1;
+  const holds = (place) => {
+    const { overflowX } = getComputedStyle(place);
+    return overflowX !== "visible" && place.getBoundingClientRect().right <= right;
+  };
+  const isHeld = (one) => {
+    for (let up = one.parentElement; up && up !== document.body; up = up.parentElement) if (holds(up)) return true;
+    return false;
+  };
+  const out = [...document.body.querySelectorAll("*")].filter((one) => {
+    if (!one.checkVisibility({ visibilityProperty: true }) || one.closest(".skip")) return false;
+    const box = one.getBoundingClientRect();
+    return box.width && box.height && (box.right > right || box.left < -1) && !isHeld(one);
+  });
+  const wide = document.documentElement.scrollWidth;
+  const scrolled = wide > innerWidth ? [`the page is ${wide} wide`] : [];
+  return [...scrolled, ...out.map((one) => one.cloneNode(false).outerHTML.slice(0, 160))];
+}"""
 SET = "async (changes) => (await import('/assets/js/state.js')).set(changes)"
 
 
@@ -78,6 +103,22 @@ def check(window: StudioPage, *where: str) -> None:
         for node in rule["nodes"]
     ]
     assert not grave, "\n".join([" ".join(where), *grave])
+    fits(window, *where)
+
+
+def fits(window: StudioPage, *where: str) -> None:
+    """At every width all of the page is inside the window, or in something inside it that scrolls."""
+    page = window.page
+    if page.evaluate("document.documentElement.dataset.theme") == "light":
+        return  # the themes differ in colours alone
+    out = [*page.evaluate(STICKING_OUT)]
+    for width in WIDTHS:
+        page.set_viewport_size({"width": width, "height": USUAL["height"]})
+        # Charts take their new size with the next picture.
+        page.wait_for_timeout(60)
+        out += [f"{width}: {one}" for one in page.evaluate(STICKING_OUT)]
+    page.set_viewport_size(USUAL)
+    assert not out, "\n".join([" ".join(where), *out])
 
 
 def test_the_checker_sees_a_fault(window: StudioPage) -> None:
@@ -85,6 +126,17 @@ def test_the_checker_sees_a_fault(window: StudioPage) -> None:
     with pytest.raises(AssertionError, match="button-name"):
         check(window)
     window.page.evaluate("document.getElementById('bare').remove()")
+
+
+def test_what_does_not_fit_is_seen(window: StudioPage) -> None:
+    if window.page.evaluate("document.documentElement.dataset.theme") == "light":
+        return
+    window.page.evaluate(
+        "document.body.insertAdjacentHTML('beforeend', '<div id=wide style=width:3000px>wide</div>')"
+    )
+    with pytest.raises(AssertionError, match=r"2560: .*wide"):
+        fits(window)
+    window.page.evaluate("document.getElementById('wide').remove()")
 
 
 def test_every_panel_view_and_dialog_of_the_studio(window: StudioPage, studio: StudioServer) -> None:

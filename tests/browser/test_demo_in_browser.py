@@ -316,8 +316,8 @@ def test_a_new_answer_can_be_kept(paused: StudioPage) -> None:
     before = paused.studio.get(f"{run_path(paused)}/frames/{last - 2}")
     paused.key("r")
     paused.until("get('whatIf')?.length === get('layerCount') && get('work').state === 'paused'")
-    paused.page.locator("#what-if").get_by_role("button", name="Keep…", exact=True).click()
-    paused.page.locator("dialog form").get_by_role("button", name="Keep it", exact=True).click()
+    paused.page.locator("#what-if").get_by_role("button", name="Replace…", exact=True).click()
+    paused.page.locator("dialog form").get_by_role("button", name="Replace it", exact=True).click()
     paused.until(f"get('summary').frames.at(-1).frame === {last - 2} && get('whatIf') === null")
     after = paused.studio.get(f"{run_path(paused)}/frames/{last - 2}")
     assert after["pose"] != before["pose"]

@@ -159,14 +159,19 @@ def test_a_new_swarm_brings_its_weighting_and_presets(
     )
     assert tracker.input_value() == "annealed"
     assert {"edge-silhouette", "edge-region-silhouette"} <= set(values_of(weighting.locator("option")))
-    tracker.select_option("swarm")
-    until(page, lambda: "paper, swarm" in values_of(preset.locator("option")))
-    assert weighting.input_value() == "edge-region-silhouette"
-    assert "paper, Eq. 13" not in values_of(preset.locator("option"))
+    # A paper's preset is its whole tracker: it brings tracker, likelihood and body.
+    assert {"paper, swarm", "paper, Eq. 13"} <= set(values_of(preset.locator("option")))
+    preset.select_option("paper, swarm")
+    until(page, lambda: form.locator("[name=knob-stage1_particles]").count() == 1)
+    body = form.locator("[name=body]")
+    assert (tracker.input_value(), weighting.input_value()) == ("swarm", "edge-silhouette")
+    assert (body.input_value(), preset.input_value()) == ("human31", "paper, swarm")
+    assert not form.locator("[name=shape]").is_checked()
     window.shoot(artefacts / "page-new-swarm-dark-1280x800.png")
+    # Another tracker is no longer the paper's.
     tracker.select_option("annealed")
-    until(page, lambda: "paper, Eq. 13" in values_of(preset.locator("option")))
-    assert weighting.input_value() == "edge-region-silhouette"
+    until(page, lambda: preset.input_value() == "")
+    assert weighting.input_value() == "edge-silhouette"
     form.get_by_role("button", name="Cancel", exact=True).click()
     window.close()
 

@@ -3,6 +3,7 @@
 import logging
 import math
 import threading
+import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import SimpleNamespace
@@ -105,6 +106,31 @@ def test_what_work_returns_goes_into_its_state(office: Office) -> None:
         ("sessions", "", None, None),
     ]  # fmt: skip
     assert [message["session"] for message in office.said] == ["take1"] * 4
+
+
+@pytest.mark.parametrize("kind", [WEIGHING, SHOPPING, BAKING])
+def test_nothing_is_renamed_under_a_job_and_no_job_begins_meanwhile(
+    office: Office, kind: JobKind[SessionJob]
+) -> None:
+    begun, go = threading.Event(), threading.Event()
+
+    def work(_job: Job) -> Mapping[str, object]:
+        begun.set()
+        go.wait(PATIENCE)
+        return {}
+
+    office.jobs.begin(kind, kind.states(session="take1"), work)
+    assert begun.wait(PATIENCE)
+    with pytest.raises(RunError, match=f"while its {kind.noun} is under way"), office.jobs.moving("take1"):
+        pass
+    with office.jobs.moving("take2"):
+        pass
+    go.set()
+    while office.jobs.going(kind):
+        time.sleep(0.01)
+    with office.jobs.moving("take1"), pytest.raises(RunError, match="is being renamed or deleted"):
+        office.jobs.begin(kind, kind.states(session="take1"), work)
+    office.jobs.begin(kind, kind.states(session="take1"), work)
 
 
 def test_numbers_that_are_none_become_null(office: Office) -> None:

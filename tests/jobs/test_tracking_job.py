@@ -379,7 +379,9 @@ def test_the_selected_frame_is_the_one_that_is_annealed(harness: Harness, run: S
     assert harness.state.state == "finished"
 
 
-def test_an_answer_that_is_kept_is_the_runs_own(harness: Harness, run: StoredRun) -> None:
+def test_an_answer_that_is_kept_is_the_runs_own(
+    harness: Harness, run: StoredRun, unbroken: np.ndarray
+) -> None:
     harness.open(run)
     harness.ask(commands.Start())
     harness.work()
@@ -391,6 +393,12 @@ def test_an_answer_that_is_kept_is_the_runs_own(harness: Harness, run: StoredRun
     last = [event for event in harness.events if isinstance(event, FrameFinished)][-1]
     assert not last.reannealed
     assert np.array_equal(poses_of(run)[1], last.result.estimate.pose)
+    # What it replaced and what followed from that is in the trash, and can be brought back.
+    workspace = Workspace(run.folder.parent.parent.parent)
+    (trashed,) = workspace.trashed()
+    restored = workspace.restore_run(trashed)
+    assert np.array_equal(poses_of(restored), unbroken)
+    assert restored.damage() == ""
     assert (harness.state.state, harness.state.done, harness.state.frame) == ("paused", 2, 2)
     harness.ask(commands.Start())
     harness.work()

@@ -208,7 +208,9 @@ def test_each_addition_changes_one_thing_of_the_printed_tracker() -> None:
     base, *added = dynamics.ADDITIONS[:-1]
     for one in added:
         changed = {name for name in one.changes if one.changes[name] != base.changes.get(name)}
-        changed |= {"back_off"} if one.learning != base.learning else set()
+        learnt = {name for name, value in one.learning.items() if value != base.learning[name]}
+        # Six components can have full covariances.
+        changed |= learnt - ({"covariance"} if "reduced_dimensions" in learnt else set())
         # The root's noise goes with how it is predicted, the rate of survival with the selection.
         assert len(changed - {"diffusion_scale", "survival"}) == 1, one.name
     footage = {trial.arguments["footage"] for trial in EXPERIMENTS["caillette-as-printed"].trials(SCALE)}

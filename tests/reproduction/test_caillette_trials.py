@@ -13,6 +13,7 @@ from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
 from studio.comparison.footage_cache import FootageCache
 from studio.errors import SettingsError, TruthError
+from studio.likelihood.blobs import BlobFrameLikelihood
 from studio.likelihood.problem import FittedToPoses
 from studio.motion_files.trc import read_trc, write_trc
 from studio.reproduction.caillette import training_set
@@ -241,7 +242,18 @@ def test_a_lost_run_resets_the_automaton_and_searches_the_frame_again(cache, mon
         return spread_over_clusters(*arguments)
 
     monkeypatch.setattr("studio.reproduction.caillette.following.spread_over_clusters", noted)
+    expected, known = [], BlobFrameLikelihood.expecting
+
+    def expecting(self, poses, memory):
+        expected.append((len(poses), self.likelihood.settings.blob_starts))
+        return known(self, poses, memory)
+
+    monkeypatch.setattr(BlobFrameLikelihood, "expecting", expecting)
     found = Followed(**measure(wanted.plain(), cache))
+    # All clusters that hold a particle are fitted from, however many the knobs allow, and none is left out.
+    clusters = learnt(cache, WALK).model.clusters
+    assert max(starts for _, starts in expected) == clusters + 2
+    assert all(poses <= starts for poses, starts in expected if starts == clusters + 2)
     assert found.resets == [False, True, False]
     assert spread == [40]
     assert asked == [1, 2], "the first frame has none before it"

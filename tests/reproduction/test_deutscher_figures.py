@@ -242,12 +242,9 @@ def test_fig_3_measures_clouds_that_draw_together(cache) -> None:
     assert 0.0 <= measured["covered"] <= 1.0
     found = EXPERIMENTS["deutscher-fig-3"].conclude([Outcome(trial, measured)])
     assert len(found.charts[0].series) == len(layers_of_a_body.DRAWN_LAYERS)
-    never = {**measured, "covered": 0.0}
-    assert EXPERIMENTS["deutscher-fig-3"].conclude([Outcome(trial, never)] * 5).verdict == "not reproduced"
-    growing = {**measured, "covered": 1.0, "spreads": measured["spreads"][::-1]}
-    assert EXPERIMENTS["deutscher-fig-3"].conclude([Outcome(trial, growing)] * 5).verdict == "not reproduced"
-    falling = {**measured, "covered": 1.0, "spreads": sorted(measured["spreads"], reverse=True)}
-    assert EXPERIMENTS["deutscher-fig-3"].conclude([Outcome(trial, falling)] * 5).verdict == "reproduced"
+    # What holds by construction is shown and not judged.
+    assert found.verdict == "answered"
+    assert "by construction" in found.words
 
 
 def test_the_pelvis_is_where_its_marker_is(cache) -> None:
@@ -371,11 +368,9 @@ def test_processors_are_compared_in_turn(cache) -> None:
             ]
         )
 
-    assert made(0.8).verdict == "reproduced"
-    assert made(0.95, 0.95).verdict == "better"
-    assert made(0.6).verdict == "not reproduced"
-    # The claim is on the processing time: whole frames count, too.
-    assert made(0.95, 0.55).verdict == "not reproduced"
+    # Another machine's processors are no test of the paper's.
+    assert made(0.8).verdict == made(0.6).verdict == "answered"
+    assert [entry.ours for entry in made(0.8).numbers] == pytest.approx([0.8, 0.8], rel=0.02)
     one = [Outcome(trial, {"threads": [1], "frame": [9.0], "weighing": [1.0]})]
     assert EXPERIMENTS["deutscher-processors"].conclude(one).verdict == "answered"
 

@@ -16,6 +16,7 @@ from studio.reproduction.deutscher_reid.localisation import (
     reduction,
     reductions,
 )
+from studio.reproduction.deutscher_reid.setting import ARM_CONSTANT
 from studio.reproduction.experiment import Experiment
 
 SEEDS = Scale(tuple(range(6)))
@@ -86,9 +87,12 @@ def concluded(experiment: Experiment, measured: dict[str, Outcome]) -> Findings:
 
 def test_joints_are_localised_from_the_root_outwards(measured: dict[str, Outcome]) -> None:
     found = concluded(FIGURES["deutscher-fig-13"], measured)
-    assert found.numbers[0].ours >= 5 / 6
+    shares = {entry.name: entry.ours for entry in found.numbers}
+    # With our kernel strictly in nearly every seed, as Eq. 18 is printed in most.
+    assert shares["joints fall strictly one after the other, shrunk (ours)"] >= 5 / 6
+    assert shares["joints fall strictly one after the other"] >= 1 / 2
     layers = [entry.ours for entry in found.numbers if entry.name.startswith("layer in which")]
-    assert np.all(np.diff(layers) > 0.5)
+    assert np.all(np.diff(layers) > 0.3)
     assert layers[-1] <= SETTINGS["layers"] + 0.5
     assert len(found.charts[0].series) == 4 * (1 + len(SEEDS.seeds))
 
@@ -100,7 +104,8 @@ def test_noise_undoes_the_gain_only_without_adaptive_diffusion(
     numbers = {entry.name: entry.ours for entry in found.numbers}
     assert numbers["variance of x1 after drawing"] < 0.5 * numbers["variance of x2 after drawing"]
     assert numbers["variance of x1 after planned noise"] > 1.5 * numbers["variance of x1 after drawing"]
-    assert numbers["variance of x1 after adaptive noise"] < 1.1 * numbers["variance of x1 after drawing"]
+    grown = numbers["x1's variance after adaptive noise over that before"]
+    assert grown == pytest.approx(1.0 + ARM_CONSTANT, abs=0.03)
 
 
 def test_the_plain_filter_is_even_or_the_text_gives_the_reason(measured: dict[str, Outcome]) -> None:
@@ -165,7 +170,7 @@ def test_trials_of_figures_12_to_14_are_shared() -> None:
         for figure in FIGS_12_TO_14
         for trial in FIGURES[figure].trials(SEEDS)
     ]
-    assert len(set(searches)) == (3 + 2 * len(localisation.MILDER)) * len(SEEDS.seeds)
+    assert len(set(searches)) == (4 + 2 * len(localisation.MILDER)) * len(SEEDS.seeds)
     assert {FIGURES[figure].measure for figure in FIGS_12_TO_14} == {measure}
 
 

@@ -5,7 +5,10 @@ import pytest
 from toy_session import true_poses
 from tracked_runs import abandon, finish, opened
 
-from studio.errors import NotFoundError, RunError
+from studio.errors import NotFoundError, RunError, SettingsError
+from studio.jobs.batch import track_to_end
+from studio.progress import unheard
+from studio.runs.branching import prepare_branch
 from studio.runs.new_run import prepare_run
 from studio.runs.reannealing import Reannealing
 from studio.runs.tracking_run import TrackingRun
@@ -164,6 +167,44 @@ def test_an_answer_can_be_kept_and_what_followed_from_the_old_one_goes(session_o
     assert not np.array_equal(new[2], old[2])
     with run.results() as results:
         assert [e.version for e in results.settings_history()] == [1, 9]
+
+
+@pytest.mark.parametrize("frame", [0, 2])
+def test_an_answer_can_be_kept_in_a_run_of_its_own(session_on_disk: Session, frame: int) -> None:
+    run = new_run(session_on_disk, "a")
+    old = finish(session_on_disk, run)
+    with opened(session_on_disk, run) as tracking:
+        again = annealed_again(
+            tracking, frame, changed_settings(tracking.latest_settings()[1], {"survival": 0.2})
+        )
+    made = prepare_branch(session_on_disk, run, frame, {"survival": 0.2})
+    assert made.summary().done == frame
+    track_to_end(session_on_disk, made, unheard)
+    with made.results() as results, run.results() as before:
+        _, poses = results.poses()
+        assert np.array_equal(poses[:frame], old[:frame])
+        assert np.array_equal(poses[frame], again.result().estimate.pose)
+        assert results.layer(4, 0).alpha_wanted == 0.2
+        assert np.array_equal(before.poses()[1], old)
+    assert (made.record.made_from, made.record.notes[-1]) == (
+        "a",
+        f"From frame {frame} on run 'a' with survival 0.2.",
+    )
+
+
+def test_a_run_that_would_be_the_same_again_is_refused(session_on_disk: Session) -> None:
+    run = new_run(session_on_disk, "a")
+    finish(session_on_disk, run)
+    for knobs, cause in (
+        (None, "No knob differs"),
+        ({"survival": 7}, "survival"),
+        ({"start_repeats": 3}, "cannot change inside a run"),
+    ):
+        with pytest.raises(SettingsError, match=cause):
+            prepare_branch(session_on_disk, run, 2, knobs)
+    with pytest.raises(RunError, match="Frame 9"):
+        prepare_branch(session_on_disk, run, 9, {"survival": 0.2})
+    assert [one.name for one in session_on_disk.runs()] == ["a"]
 
 
 def test_fewer_particles_recorded_change_no_pose(session_on_disk: Session) -> None:

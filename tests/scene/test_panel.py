@@ -28,7 +28,7 @@ from studio.scene.pose_edit import begun, edit_of, moved
 from studio.scene.pose_panel import PosePanel
 from studio.scene.settings_panel import NO_PRESET, SettingsPanel, knob_value, since_in_words, slider_range
 from studio.scene.show_panel import ShowPanel, legend_html
-from studio.settings import all_knobs, changed_settings, default_settings, values
+from studio.settings import DEFAULT_WEIGHTING, all_knobs, changed_settings, default_settings, values
 from studio.trackers.catalogue import TRACKERS, presets
 from studio.trackers.settings import AnnealedSettings
 
@@ -207,15 +207,20 @@ def test_presets_and_resets_are_one_request(settings: Settings) -> None:
 def test_another_tracker_gets_other_controls_and_presets(settings: Settings) -> None:
     for tracker in TRACKERS.values():
         for preset in tracker.presets:
-            assert changed_settings(default_settings(tracker.name), preset.values) is not None
+            weighting = preset.weighting or DEFAULT_WEIGHTING
+            assert changed_settings(default_settings(tracker.name, weighting), preset.values) is not None
 
-    def offered(tracker: str) -> tuple[str, ...]:
-        settings.show(Knobs(default_settings(tracker)))
+    def offered(tracker: str, weighting: str = DEFAULT_WEIGHTING) -> tuple[str, ...]:
+        settings.show(Knobs(default_settings(tracker, weighting)))
         preset = settings.panel.preset
         return () if preset is None else tuple(preset.handle.options[1:])
 
-    assert offered("swarm") == ("paper, swarm",)
-    assert offered("annealed") == tuple(preset.name for preset in TRACKERS["annealed"].presets)
+    assert offered("swarm") == ()
+    assert offered("swarm", "edge-silhouette") == ("paper, swarm",)
+    whole = tuple(preset.name for preset in TRACKERS["annealed"].presets)
+    assert offered("annealed", "edge-region") == whole
+    # A paper's tracker is offered beside its own likelihood alone.
+    assert offered("annealed") == tuple(name for name in whole if not name.startswith("paper"))
     assert offered("condensation") == ()
     assert "survival" not in settings.panel.inputs
     assert "scale_survival" in settings.panel.inputs

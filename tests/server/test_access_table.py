@@ -28,7 +28,7 @@ def row(promise: str, request: str, answer: str) -> Callable[[Request], Request]
 
 
 def said(answer: httpx.Response) -> str:
-    code = answer.json()["code"] if "json" in answer.headers.get("content-type", "") else ""
+    code = answer.json().get("code", "") if "json" in answer.headers.get("content-type", "") else ""
     return f"{answer.status_code} {code}".strip()
 
 
@@ -118,6 +118,40 @@ def _(studio: Studio) -> str:
         answer = viewer.post("/api/scene/show", json={"frame": 1}, headers={"x-studio-window": "another"})
     own = "another" not in studio.scenes.by_window and not studio.scenes.plain.calls
     return f"{answer.status_code}, in {'a window of its own' if own else 'the other'}"
+
+
+@row(
+    "A viewer does not see the owner's folders", "`GET /api/folders` with a viewer's cookie", "403 read-only"
+)
+def _(studio: Studio) -> str:
+    with let_in(studio.base, VIEWERS_TOKEN) as viewer:
+        return said(viewer.get("/api/folders"))
+
+
+@row(
+    "Who opens the viewers' address stays the owner",
+    "`POST …/duplicate` with both cookies",
+    "201",
+)
+def _(studio: Studio) -> str:
+    with let_in(studio.base, TOKEN) as both:
+        both.get("/", params={"token": VIEWERS_TOKEN})
+        return said(both.post("/api/sessions/take1/duplicate", json={}))
+
+
+@row(
+    "A link in a session does not lead out of it",
+    "`GET …/thumbnail.jpg` linked to `/etc/passwd`",
+    "409 session",
+)
+def _(studio: Studio) -> str:
+    place = studio.workspace.root / "take1" / "thumbnail.jpg"
+    place.unlink(missing_ok=True)
+    place.symlink_to("/etc/passwd")
+    try:
+        return said(studio.client.get("/api/sessions/take1/thumbnail.jpg"))
+    finally:
+        place.unlink()
 
 
 @row("No file outside is read", "`GET /assets/..%2f..%2fpyproject.toml`", "404")

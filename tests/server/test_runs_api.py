@@ -245,11 +245,30 @@ def test_reset_and_presets(studio: Studio, tracked: StoredRun) -> None:
         "label": "mine",
         "help": "for walks",
         "values": {"survival": 0.33},
+        **{"tracker": "", "weighting": "", "body": ""},
         "own": True,
     } in kept["presets"]
     assert client.post(f"{RUN}/settings/preset", json={"name": "mine"}).status_code == 200
     assert studio.control.changes[2] == {"survival": 0.33}
     assert client.post(f"{RUN}/settings/preset", json={"name": "none"}).status_code == 404
+    # A paper's tracker is whole: no run of another likelihood takes a part of it.
+    refused = client.post(f"{RUN}/settings/preset", json={"name": "paper, swarm"})
+    assert refused.status_code == 422
+    assert "made for swarm with edge-silhouette" in refused.json()["message"]
+    assert len(studio.control.changes) == 3
+    swarm = {
+        "values": {"c_first": 2.1},
+        "tracker": "swarm",
+        "weighting": "edge-silhouette",
+        "body": "human31",
+    }
+    kept = client.put("/api/presets/whole", json=swarm).json()["presets"]
+    (whole,) = [entry for entry in kept if entry["name"] == "whole"]
+    assert {name: whole[name] for name in swarm} == swarm
+    wrong = client.put("/api/presets/whole", json={**swarm, "values": {"survival": 0.5}})
+    assert wrong.status_code == 422
+    assert client.put("/api/presets/whole", json={**swarm, "tracker": "nobody"}).status_code == 422
+    assert client.delete("/api/presets/whole").status_code == 200
     assert client.put("/api/presets/odd", json={"values": {"none": 1}}).status_code == 422
     assert client.put("/api/presets/odd", json={"values": {}}).status_code == 422
     assert client.delete("/api/presets/mine").status_code == 200

@@ -3,15 +3,19 @@
 import asyncio
 import json
 from collections.abc import Iterator
+from itertools import pairwise
+from typing import NoReturn
 
 import httpx
 import pytest
+from starlette.types import Receive, Scope, Send
 from web_doubles import TOKEN, VIEWERS_TOKEN, Studio, cookie_header, let_in
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from studio.errors import AccessError
-from studio.server.access import VIEWERS_POSTS, AccessGuard, binding_rule
+from studio.server.access import VIEWERS_POSTS, VIEWING, AccessGuard, binding_rule
+from studio.server.viewers_budget import REST, ViewersBudget
 from studio.sessions.stored_run import StoredRun
 
 
@@ -21,13 +25,61 @@ def viewer(studio: Studio) -> Iterator[httpx.Client]:
         yield client
 
 
-def test_the_two_cookies_differ_and_the_last_address_counts(studio: Studio, viewer: httpx.Client) -> None:
-    assert cookie_header(viewer).partition("=")[0] == cookie_header(studio.client).partition("=")[0]
-    assert cookie_header(viewer) != cookie_header(studio.client)
+def test_the_two_cookies_have_names_of_their_own_and_the_owner_s_counts(
+    studio: Studio, viewer: httpx.Client
+) -> None:
+    assert cookie_header(viewer).partition("=")[0] != cookie_header(studio.client).partition("=")[0]
+    assert cookie_header(viewer).partition("=")[2] != cookie_header(studio.client).partition("=")[2]
     assert VIEWERS_TOKEN not in cookie_header(viewer)
     assert viewer.post("/api/sessions/take1/duplicate", json={}).status_code == 403
     viewer.get("/", params={"token": TOKEN})
     assert viewer.post("/api/sessions/take1/duplicate", json={}).status_code == 201
+    # The owner looks at what was printed for viewers: no window of this browser becomes read-only by it.
+    viewer.get("/", params={"token": VIEWERS_TOKEN})
+    assert viewer.post("/api/sessions/take1/duplicate", json={}).status_code == 201
+
+
+def test_the_owner_s_folders_uploads_and_trash_are_not_shown(studio: Studio, viewer: httpx.Client) -> None:
+    for path in (
+        "/api/folders",
+        f"/api/folders?path={studio.workspace.root}",
+        "/api/uploads/x",
+        "/api/trash",
+    ):
+        answer = viewer.get(path)
+        assert (answer.status_code, answer.json()["code"]) == (403, "read-only"), path
+    assert studio.client.get("/api/folders").status_code == 200
+
+
+def test_viewers_compute_one_after_another_and_rest_while_a_run_is_tracked() -> None:
+    async def asked(tracking: bool) -> tuple[int, list[float]]:
+        at_once, most, ends = 0, 0, list[float]()
+
+        async def app(scope: Scope, receive: Receive, send: Send) -> None:
+            nonlocal at_once, most
+            at_once += 1
+            most = max(most, at_once)
+            await asyncio.sleep(0.05)
+            at_once -= 1
+            ends.append(asyncio.get_running_loop().time())
+
+        budget = ViewersBudget(app, tracking=lambda: tracking)
+        scope = {"type": "http", "path": "/api/sessions/take1/masks/quality"}
+        VIEWING.set(True)
+        await asyncio.gather(*(budget(scope, never, never) for _ in range(3)))
+        return most, ends
+
+    most, ends = asyncio.run(asked(tracking=False))
+    assert (most, len(ends)) == (1, 3)
+    most, ends = asyncio.run(asked(tracking=True))
+    assert most == 1
+    # A rest of four times as long: no time is expected here but the order of sizes.
+    assert all(after - before > 0.05 * REST for before, after in pairwise(ends))
+
+
+async def never(*_: object) -> NoReturn:
+    """Neither receives nor sends."""
+    raise AssertionError
 
 
 def test_every_route_that_changes_is_refused_before_it_is_reached(

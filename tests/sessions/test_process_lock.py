@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from studio.errors import SessionError
-from studio.sessions import process_lock
+from studio.sessions import session_databases
 from studio.sessions.process_lock import ProcessLock
 
 HOLD = """
@@ -74,10 +74,7 @@ def test_what_the_disk_refuses_is_not_held(
             error.sqlite_errorcode = code
             raise error
 
-    connect = sqlite3.connect
-    monkeypatch.setattr(
-        process_lock.sqlite3, "connect", lambda *given, **named: connect(*given, **named, factory=Refusing)
-    )
+    monkeypatch.setattr(session_databases, "SessionDatabase", Refusing)
     assert not ProcessLock.is_held(path)
     with pytest.raises(SessionError, match=message):
         ProcessLock.take(path)

@@ -1,6 +1,6 @@
 // Which cluster follows which, as dots and lines.
 
-import { look, tooltip } from "./chart_looks.js";
+import { look, tooltip, typeSize } from "./chart_looks.js";
 import { onTheme, token } from "./theme.js";
 
 const LARGEST = 34;
@@ -21,7 +21,7 @@ export function drawAutomaton(box, { clusters, transitions }, echarts, choose) {
     }),
     series: [{
       type: "graph", layout: "circular", circular: { rotateLabel: false }, roam: false, top: 24, bottom: 24,
-      label: { show: clusters.length <= 48, color: token("text"), fontSize: 10, position: "inside" },
+      label: { show: clusters.length <= 48, color: token("text"), fontSize: typeSize(10), position: "inside" },
       itemStyle: { color: token("accent-soft"), borderColor: token("accent"), borderWidth: 1 },
       emphasis: { focus: "adjacency", label: { show: true } },
       edgeSymbol: ["none", "arrow"], edgeSymbolSize: 5,

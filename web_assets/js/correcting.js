@@ -38,6 +38,13 @@ function leave() {
   draw();
 }
 
+/** Leave the correction, unless it is being tracked. Whether there was one to leave. */
+export function leaveCorrecting() {
+  if (frame === null || going) return false;
+  leave();
+  return true;
+}
+
 /** Make the corrected run and track it. back : the last frame to be tracked backwards; null: onwards. */
 async function track(back) {
   const [session, run] = [get("session"), get("run")];

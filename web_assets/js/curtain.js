@@ -3,7 +3,6 @@
 
 import { post, readOnly, remove, runPath } from "./api.js";
 import { figure } from "./chart_looks.js";
-import { openForm } from "./dialogs.js";
 import { bar, button, byId, element, fill } from "./elements.js";
 import { importForm } from "./importing.js";
 import { onEvent } from "./live.js";
@@ -11,6 +10,7 @@ import { complain } from "./messages.js";
 import { newRunForm } from "./new_run.js";
 import { lacks, openSession, refreshSessions, setupPath } from "./sessions.js";
 import { get, set, watch } from "./state.js";
+import { keepAsNewRun, replaceStored } from "./studio/keeping.js";
 
 const MOST_MOVED = 4;
 const curtain = byId("curtain");
@@ -67,15 +67,6 @@ function draw() {
   if (entry && !entry.runs.length) invite(entry);
 }
 
-function keepForm(frame) {
-  const path = runPath(get("session"), get("run"));
-  openForm({
-    heading: `Keep the new result of frame ${frame}?`, action: "Keep it", rows: [],
-    intro: "It replaces the stored one. The frames after it followed from the old result and are dropped; continuing the run computes them again.",
-    send: () => post(`${path}/reanneal`, { frame, keep: true }),
-  });
-}
-
 /** Leave the stored result as it is; the knobs stay as they were moved. */
 function discard() {
   set({ whatIf: null, outcome: null });
@@ -127,7 +118,7 @@ function drawWhatIf() {
   drawnWhatIf = shows;
   line.hidden = frame === undefined && !moved.length;
   if (line.hidden) return;
-  const result = frame !== undefined && [element("span", {}, `Frame ${frame} re-annealed, not stored; the stored result stays beside it in grey.`), outcome?.frame === frame && outcomeWords(outcome), button("Keep…", () => keepForm(frame), "small"), button("Discard", discard, "quiet small")];
+  const result = frame !== undefined && [element("span", {}, `Frame ${frame} re-annealed, not stored; the stored result stays beside it in grey.`), outcome?.frame === frame && outcomeWords(outcome), button("Keep as a new run", () => keepAsNewRun(frame), "small primary", { title: "The frames before this one, then this result and what follows from it, as another run; this run stays" }), button("Replace…", () => replaceStored(frame), "quiet small"), button("Discard", discard, "quiet small")];
   fill(line, result, moved.length > 0 && movedWords(moved));
 }
 

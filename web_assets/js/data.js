@@ -5,7 +5,7 @@ import { onEvent } from "./live.js";
 import { complain } from "./messages.js";
 import { paced } from "./pacing.js";
 import { dressScene } from "./scene_window.js";
-import { isWatched } from "./header.js";
+import { isWatched } from "./studio/tracking.js";
 import { refreshSessions } from "./sessions.js";
 import { goTo } from "./selection.js";
 import { get, set, watch } from "./state.js";
@@ -60,7 +60,8 @@ async function loadFrames(check) {
     if (!isShown(session, run) || track !== get("track")) return true;
     const last = summary.frames.at(-1)?.frame ?? -1;
     summary.frames.push(...arrived.filter((line) => line.frame > last));
-    const newest = summary.frames.at(-1)?.frame ?? null;
+    // A search that was paused inside a run's first frame has layers to be looked at already.
+    const newest = summary.frames.at(-1)?.frame ?? summary.partial ?? null;
     set({ summary, frame: get("frame") === null || (get("follow") && searching()) ? newest : get("frame") });
     // An address may name a frame that is not tracked.
     const known = summary.frames.some((line) => line.frame === get("frame")) || get("detail")?.frame === get("frame");
@@ -173,7 +174,8 @@ function showAgain() {
 function showLive(frame, finished) {
   if (!get("parameters") || layers[0]?.layer !== 0 || layers.some((layer, at) => layer.layer !== at)) return false;
   drawnAt = performance.now();
-  set({ frame, whatIf: null, detail: { frame, finished, parameters: get("parameters"), layers } });
+  const { search_layers, searches } = layers[0];
+  set({ frame, whatIf: null, detail: { frame, finished, search_layers, searches, parameters: get("parameters"), layers } });
   return true;
 }
 

@@ -1,6 +1,6 @@
 // A chart's plain values as ECharts' option, in the colours of tokens.css.
 
-import { figure, axis as plainAxis, look, seriesToken, token, tooltip } from "./chart_looks.js";
+import { figure, axis as plainAxis, look, seriesToken, token, tooltip, typeSize } from "./chart_looks.js";
 
 const MOST_DECIMALS = 6;
 const MOST_WHISKERS = 40;
@@ -79,7 +79,7 @@ export function seriesOption(chart, width, selected) {
     : axis(chart.x, { ...below, splitLine: { show: false }, ...(chart.log_x ? logarithmic(valuesAlong(chart, "x")) : { type: "value", scale: true, ...flush(chart) }) });
   const far = farFromZero(chart);
   const yAxis = axis(chart.y, { ...above, ...(chart.log_y ? logarithmic(valuesAlong(chart, "y")) : { type: "value", scale: far, boundaryGap: far ? ["6%", "6%"] : [0, 0], axisLabel: { formatter: figure } }) });
-  yAxis.nameTextStyle = { ...above.nameTextStyle, color: token("text-quiet"), fontSize: 11 };
+  yAxis.nameTextStyle = { ...above.nameTextStyle, color: token("text-quiet"), fontSize: typeSize(11) };
   return {
     ...look(),
     legend: { show: false, selected },
@@ -157,11 +157,11 @@ function ground(chart) {
     id: "ground", type: "line", data, silent: true, symbol: "none", lineStyle: { opacity: 0 }, z: 1, tooltip: { show: false },
     markLine: chart.paper === null ? undefined : {
       silent: true, symbol: "none", data: [{ yAxis: chart.paper }], lineStyle: { type: [6, 4], color: token("text"), width: 1.2 },
-      label: { formatter: `paper ${figure(chart.paper)}`, position: "insideEndTop", color: token("text"), fontSize: 11 },
+      label: { formatter: `paper ${figure(chart.paper)}`, position: "insideEndTop", color: token("text"), fontSize: typeSize(11) },
     },
     markArea: chart.bands.length ? {
       silent: true, itemStyle: { color: token("accent-soft"), opacity: 0.55 },
-      label: { color: quiet, fontSize: 11, position: "insideTop" },
+      label: { color: quiet, fontSize: typeSize(11), position: "insideTop" },
       data: chart.bands.map(([from, to, word]) => [{ xAxis: from, name: word }, { xAxis: to }]),
     } : undefined,
   }];
@@ -298,17 +298,17 @@ export function heatOption(chart) {
     ...look(),
     grid: { left: Math.min(220, Math.max(60, widest)), right: 74, top: 30, bottom: 48 },
     xAxis: axis(chart.x, { type: "category", data: columns, ...below, splitLine: { show: false }, axisLine: { show: false }, axisLabel: { interval: 0, hideOverlap: false } }),
-    yAxis: { ...axis(chart.y, { type: "category", data: rows, inverse: true, nameLocation: "start", splitLine: { show: false }, axisLine: { show: false }, axisLabel: { interval: 0, width: 200, overflow: "truncate" } }), nameTextStyle: { color: token("text-quiet"), align: "right", fontSize: 11 } },
+    yAxis: { ...axis(chart.y, { type: "category", data: rows, inverse: true, nameLocation: "start", splitLine: { show: false }, axisLine: { show: false }, axisLabel: { interval: 0, width: 200, overflow: "truncate" } }), nameTextStyle: { color: token("text-quiet"), align: "right", fontSize: typeSize(11) } },
     visualMap: {
       min: least, max: most > least ? most : least + 1, dimension: 2, right: 8, top: 30, itemWidth: 10, itemHeight: Math.max(60, Math.min(160, 26 * rows.length)), calculable: false,
-      text: [figure(most), figure(least)], textStyle: { color: token("text-quiet"), fontSize: 11 }, textGap: 6,
+      text: [figure(most), figure(least)], textStyle: { color: token("text-quiet"), fontSize: typeSize(11) }, textGap: 6,
       inRange: { color: ["heat-lowest", "heat-low", "heat-middle", "heat-high"].map(token) },
     },
     tooltip: tooltip({ formatter: (item) => escaped`${rows[item.value[1]]}, ${columns[item.value[0]]}: ` + `<b>${figure(item.value[2])}</b>` }),
     series: [{
       type: "heatmap", emphasis: { disabled: true }, itemStyle: { borderColor: token("surface"), borderWidth: 2, borderRadius: 3 },
       data: cells.map((cell) => ({ value: cell, label: { color: ink(cell[2]) } })),
-      label: { show: cells.length <= MOST_LABELLED_CELLS, formatter: (item) => figure(item.value[2]), fontSize: 11 },
+      label: { show: cells.length <= MOST_LABELLED_CELLS, formatter: (item) => figure(item.value[2]), fontSize: typeSize(11) },
     }],
   };
 }

@@ -6,14 +6,14 @@ const table = (name, title, columns, rows) => ({ name, title, columns: columns.m
 
 /** Variance: every parameter in every layer, and which layer settled it. */
 function variance(layers, parameters) {
-  const rows = parameters.flatMap(({ name, limb, unit }, at) => layers.map((layer) => [name, limb, unit, layer.layer, layer.variance_weighed[at], layer.variance_resampled[at], layer.variance_diffused[at]]));
+  const rows = parameters.flatMap(({ name, limb, unit }, at) => layers.map((layer) => [name, limb, unit, 1 + Math.floor(layer.layer / (layer.search_layers || Infinity)), layer.layer, layer.variance_weighed[at], layer.variance_resampled[at], layer.variance_diffused[at]]));
   const settled = parameters.map(({ name, limb, unit }, at) => {
     const factor = (layer) => (layer.variance_resampled[at] > 0 ? layer.variance_weighed[at] / layer.variance_resampled[at] : 1);
     const most = layers.reduce((best, layer) => (factor(layer) > factor(best) ? layer : best));
     const [first, last] = [layers[0].variance_weighed[at], layers.at(-1).variance_resampled[at]];
     return [name, limb, unit, most.layer, first, last, last > 0 ? first / last : null];
   });
-  return [table("layers", "Variance of every parameter in every layer", ["parameter", "limb", "unit", "layer", "weighed", "before", "after"], rows),
+  return [table("layers", "Variance of every parameter in every layer", ["parameter", "limb", "unit", "search", "layer", "weighed", "before", "after"], rows),
     table("settled", "Layer that settled each parameter", ["parameter", "limb", "unit", "layer", "first", "last", "reduction"], settled)];
 }
 

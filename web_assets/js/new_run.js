@@ -35,8 +35,26 @@ function knobInput(knob, value) {
   return number(value, { name, min: knob.low, max: knob.high, step: knob.kind === "int" ? 1 : "any", required: true });
 }
 
-/** The presets all of whose knobs are among these, as choices. */
-const presetChoices = (presets, knobs) => [{ value: "", label: "defaults" }, ...named(presets.filter((one) => Object.keys(one.values).every((name) => name in knobs)))];
+/**
+ * The presets as choices: those made for a tracker, which they bring, and of the others those
+ * all of whose knobs are among these.
+ */
+const presetChoices = (presets, knobs) => [{ value: "", label: "defaults" },
+  ...named(presets.filter((one) => one.tracker
+    || Object.keys(one.values).every((name) => name in knobs)))];
+
+/** Set the tracker, likelihood and body that a preset is made for. */
+function bringWhole(form, preset) {
+  for (const name of ["tracker", "weighting", "body"]) {
+    if (preset?.[name]) form.elements[name].value = preset[name];
+  }
+  // A paper's tracker has no shape that is fitted on the way.
+  if (preset?.weighting) form.elements.shape.checked = false;
+}
+
+/** Whether a preset is made for the tracker and likelihood that are chosen. */
+const fits = (form, preset) => ["tracker", "weighting"].every((name) => !preset[name]
+  || preset[name] === form.elements[name].value);
 
 /** A behaviour model as a choice. */
 const modelChoice = (model) => ({ value: model.name, label: dotted(model.name, model.problem || `${model.body}, ${model.clusters} clusters, ${model.states} states`) });
@@ -67,8 +85,11 @@ export async function newRunForm(entry, like = null) {
 
   /** The chief knobs with the preset's values, and what they cost. */
   function drawChief(form) {
-    const own = presets.find((one) => one.name === form.elements.preset.value)?.values ?? {};
-    fill(chief, offered.knobs.filter((knob) => CHIEF.includes(knob.name) || knob.name in own).map((knob) => field(knob.label, knobInput(knob, own[knob.name] ?? knobs[knob.name]), { title: knob.help })));
+    const chosen = presets.find((one) => one.name === form.elements.preset.value);
+    const own = chosen?.values ?? {};
+    // Of a whole tracker's two dozen knobs the chief ones are enough here.
+    const isShown = (knob) => CHIEF.includes(knob.name) || (knob.name in own && !chosen.weighting);
+    fill(chief, offered.knobs.filter(isShown).map((knob) => field(knob.label, knobInput(knob, own[knob.name] ?? knobs[knob.name]), { title: knob.help })));
     drawCost(form);
   }
 
@@ -110,10 +131,12 @@ export async function newRunForm(entry, like = null) {
     ],
     changed: async (name, form) => {
       const { tracker, weighting, preset } = /** @type {any} */ (form.elements);
-      if (["tracker", "weighting"].includes(name)) {
+      const chosen = presets.find((one) => one.name === preset.value);
+      if (name === "preset") bringWhole(form, chosen);
+      if (["tracker", "weighting", "preset"].includes(name)) {
         offered = await knobsOf(tracker.value, weighting.value);
         knobs = offered.values;
-        const before = preset.value;
+        const before = chosen && fits(form, chosen) ? preset.value : "";
         offer(preset, presetChoices(presets, knobs).map((one) => [one.value, one.label]), before);
       }
       showBehaviour(form, knobs, trackers);

@@ -2,7 +2,7 @@
 
 import { allViews, saveView, showView, stepView, toggleTable } from "./views.js";
 import { byId, element, fill } from "./elements.js";
-import { commands } from "./keys.js";
+import { commands } from "./studio/keys.js";
 import { openSession } from "./sessions.js";
 import { get } from "./state.js";
 import { showPanel } from "./tabs.js";

@@ -47,6 +47,13 @@ export function togglePlay() {
   timer = setTimeout(tick, 0);
 }
 
+/** Stop what plays. Whether it did. */
+export function leavePlayback() {
+  if (!timer) return false;
+  stop();
+  return true;
+}
+
 /** Loop on or off. */
 export const toggleLoop = () => { loop.ariaPressed = String(loop.ariaPressed !== "true"); };
 

@@ -1,7 +1,7 @@
 // The result of a sweep: parallel coordinates of all runs, a heat map of two knobs, a curve over one knob with its interval over
 // the seeds. A click opens a run at its worst frame.
 
-import { figure as words, token } from "./chart_looks.js";
+import { figure as words, token, typeSize } from "./chart_looks.js";
 import { card, dotted, element, field, fill, hint, select } from "./elements.js";
 import { Figure } from "./figure.js";
 import { layerColour, seriesColour } from "./theme.js";
@@ -101,7 +101,7 @@ function drawParallel(sheet, own, room) {
   const { runs, measure, names, result, labelOf } = own;
   const good = badness(runs.map((row) => row[measure.key]), measure);
   const measured = result.measures.filter((one) => runs.some((row) => row[one.key] !== runs[0][one.key]) || one === measure);
-  const quiet = { color: token("text-quiet"), fontSize: 11 };
+  const quiet = { color: token("text-quiet"), fontSize: typeSize(11) };
   const valued = (name) => ({ type: "category", data: inOrder(result.vary[name]).map(String) });
   sheet.option.parallel = { left: 60, right: 90, top: 46, height: Math.max(120, room - 84), parallelAxisDefault: { nameTextStyle: quiet, nameLocation: "end", nameGap: 16, axisLine: { lineStyle: { color: token("line-strong") } }, axisTick: { show: false }, splitLine: { show: false }, axisLabel: { ...quiet, formatter: (value) => (typeof value === "number" ? words(value) : value) } } };
   sheet.option.parallelAxis = [...names.map((name, dim) => ({ dim, name: labelOf(name), ...valued(name) })), ...measured.map((one, at) => ({ dim: names.length + at, type: "value", scale: true, splitNumber: 4, axisLabel: { ...quiet, formatter: digitsFor(runs.map((row) => row[one.key])) }, name: one.label.replace(/ \(truth\)|, among others at once| that the search/g, ""), nameTextStyle: { ...quiet, color: one === measure ? token("text") : quiet.color, fontWeight: one === measure ? 600 : 400, width: 130, overflow: "truncate" } }))];
@@ -140,7 +140,7 @@ function drawMap(sheet, own, room) {
     cells, low, high, colours: shades, ends: [words(high), words(low)], key: { left: box.left + width + 18, top: 60, height: 110 }, click: ({ data }) => ({ run: runsAt(own, pointOf(data.row))[0] }),
     tip: ({ data: { row } }) => tipOf(`${labelOf(chosen.across)} ${row[chosen.across]}, ${labelOf(chosen.other)} ${row[chosen.other]}`, [["mean", row.mean], ["95 % interval", `${words(row.low)} to ${words(row.high)}`], ["opens", runsAt(own, pointOf(row))[0].run]]),
   });
-  sheet.option.series.at(-1).label = { show: cells.length <= 80, formatter: ({ data: { row } }) => words(row.mean), fontSize: 11 };
+  sheet.option.series.at(-1).label = { show: cells.length <= 80, formatter: ({ data: { row } }) => words(row.mean), fontSize: typeSize(11) };
   const end = [...found].sort((a, b) => (measure.more_is_better ? b.mean - a.mean : a.mean - b.mean))[0];
   return end ? `${measure.more_is_better ? "Most" : "Least"} at ${labelOf(chosen.across)} ${end[chosen.across]}, ${labelOf(chosen.other)} ${end[chosen.other]}: ${words(end.mean)}${measure.unit ? ` ${measure.unit}` : ""} [${words(end.low)}, ${words(end.high)}].` : "";
 }

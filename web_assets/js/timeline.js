@@ -4,7 +4,7 @@ import { figure } from "./chart_looks.js";
 import { drawSoon } from "./pacing.js";
 import { byId, dotted, element, fill } from "./elements.js";
 import { say } from "./messages.js";
-import { goTo, layersShown, range, stepLayer } from "./selection.js";
+import { goTo, range } from "./selection.js";
 import { get, watch } from "./state.js";
 import { onTheme, token } from "./theme.js";
 
@@ -206,10 +206,4 @@ export function startTimeline() {
   document.fonts.ready.then(drawTimeline);
   watch(["summary", "frame", "outcome"], () => { drawSoon(drawTimeline); showFrame(); });
   watch(["detail"], () => { label.title = (get("detail")?.notes ?? []).join(" "); label.classList.toggle("noted", label.title !== ""); });
-  const layerLabel = byId("layer-label");
-  watch(["layer", "detail", "whatIf"], () => {
-    layerLabel.textContent = get("layer") === null ? "all layers" : `layer ${get("layer") + 1} of ${layersShown()}`;
-  });
-  byId("layer-back").onclick = () => stepLayer(-1);
-  byId("layer-on").onclick = () => stepLayer(1);
 }

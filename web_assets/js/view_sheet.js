@@ -1,7 +1,7 @@
 // A sheet of drawings: several plots beside and below one another in one chart, so that they are seen, exported and printed
 // together. A drawing function fills one; what of it can be clicked says what it chooses.
 
-import { axis, figure, token } from "./chart_looks.js";
+import { axis, figure, token, typeSize } from "./chart_looks.js";
 
 const HEADING = 30, LEGEND = 17;
 const FAMILY = "Inter, system-ui, sans-serif";
@@ -78,7 +78,7 @@ export class Sheet {
     const unit = shortened(whole, width - 1.16 * pen.measureText(text).width - 12);
     this.option.title.push({
       left: left - 2, top: top + 6, text: unit ? `{a|${text}}  {b|${unit}}` : `{a|${text}}`, padding: 0,
-      textStyle: { fontWeight: "normal", rich: { a: { color: token("text"), fontWeight: 600, fontSize: 12, fontFamily: FAMILY }, b: { color: token("text-quiet"), fontSize: 11, fontFamily: FAMILY } } },
+      textStyle: { fontWeight: "normal", rich: { a: { color: token("text"), fontWeight: 600, fontSize: typeSize(12), fontFamily: FAMILY }, b: { color: token("text-quiet"), fontSize: typeSize(11), fontFamily: FAMILY } } },
     });
   }
 
@@ -111,7 +111,7 @@ export class Sheet {
     this.option.visualMap.push({
       type: "continuous", min: low, max: high === low ? low + 1 : high, seriesIndex: this.option.series.length - 1, dimension: 2, calculable: false, show: Boolean(key), orient: "vertical", itemWidth: 9,
       itemHeight: key?.height ?? 80, left: key?.left, top: key?.top, text: ends, textGap: 4, precision: 2, hoverLink: false,
-      inRange: { color: colours.map(token) }, textStyle: { color: token("text-quiet"), fontSize: 10 },
+      inRange: { color: colours.map(token) }, textStyle: { color: token("text-quiet"), fontSize: typeSize(10) },
     });
   }
 
@@ -128,7 +128,7 @@ export class Sheet {
         symbol: "none", silent: true, animation: false,
         data: shown.map(({ x, y, word = "", colour = "text-quiet", dashed = false }) => ({
           ...(x === undefined ? { yAxis: y } : { xAxis: x }), lineStyle: { color: token(colour), width: 1.4, type: dashed ? "dashed" : "solid", opacity: 0.9 },
-          label: { show: Boolean(word), formatter: word, position: x === undefined ? "insideEndTop" : "end", rotate: 0, align: x === undefined ? "right" : sides(x) < 0 ? "right" : "left", color: token(colour), fontSize: 10, distance: 2 },
+          label: { show: Boolean(word), formatter: word, position: x === undefined ? "insideEndTop" : "end", rotate: 0, align: x === undefined ? "right" : sides(x) < 0 ? "right" : "left", color: token(colour), fontSize: typeSize(10), distance: 2 },
         })),
       },
     });
@@ -159,12 +159,12 @@ export class Sheet {
 
   /** A legend of names of series at a place. */
   legend(names, left, top, width) {
-    this.option.legend.push({ type: "scroll", width, left, top, data: names, itemWidth: 14, itemHeight: 8, itemGap: 10, padding: 0, textStyle: { color: token("text-quiet"), fontSize: 11 }, pageIconColor: token("text"), pageTextStyle: { color: token("text-quiet") }, pageIconSize: 9 });
+    this.option.legend.push({ type: "scroll", width, left, top, data: names, itemWidth: 14, itemHeight: 8, itemGap: 10, padding: 0, textStyle: { color: token("text-quiet"), fontSize: typeSize(11) }, pageIconColor: token("text"), pageTextStyle: { color: token("text-quiet") }, pageIconSize: 9 });
   }
 
   /** Words in place of a plot that has nothing to draw. */
   words(text, left, top, width) {
-    this.option.title.push({ left, top, padding: 0, text, textStyle: { color: token("text-quiet"), fontSize: 12, fontWeight: 450, fontFamily: FAMILY, width, overflow: "break", lineHeight: 17 } });
+    this.option.title.push({ left, top, padding: 0, text, textStyle: { color: token("text-quiet"), fontSize: typeSize(12), fontWeight: 450, fontFamily: FAMILY, width, overflow: "break", lineHeight: 17 } });
     this.height = Math.max(this.height, top + 40);
   }
 }

@@ -98,9 +98,9 @@ async function load() {
   if (!get("run") || get("frame") === null || (!get("summary")?.frames.length && !get("detail"))) { held = null; return figure.show(null, "No frames yet: track a run to look into its search."); }
   if (!isOfRun(view) && (followsSearch() || !isStored())) {
     held = null;
-    const live = liveView(view.name);
-    if (live) return show(view, live);
-    if (followsSearch() || !get("detail")) return figure.show(null, "The search goes on: this view is drawn of the frame that is chosen, or once the search is paused.");
+    const live = liveFigure(view.name);
+    if (live) return figure.show(live);
+    if (followsSearch() || !get("detail")) return figure.show(null, "The first layer is being searched.");
   }
   const key = [get("session"), get("run"), view.name, queryOf(view), view.name === "clouds" ? get("parameter") : "", age, isOfRun(view) ? get("summary")?.frames.length : get("frame")].join(" ");
   if (held?.key === key) return figure.refresh();
@@ -132,6 +132,21 @@ function show(view, answer) {
   const drawing = DRAWINGS[view.name];
   const draw = isOfRun(view) ? drawing.run : drawing.frame;
   figure.show({ ...shownOf(view, answer), draw: (sheet, room) => draw(sheet, tables, at(room)) });
+}
+
+/**
+ * The layers that there are of the frame that is searched, as a figure: in that view, or as their variance where the view needs
+ * the frame's stored result; null without a layer.
+ */
+export function liveFigure(name = "variance") {
+  const own = liveView(name);
+  const answer = own ?? liveView("variance");
+  const view = views.find((one) => one.name === (own ? name : "variance"));
+  if (!answer || !view) return null;
+  const wanted = views.find((one) => one.name === name);
+  const notes = own ? [] : [`${wanted?.title ?? "This view"} is drawn of a frame that is finished: choose one, or pause the search.`];
+  const tables = Object.fromEntries(answer.tables.map((table) => [table.name, records(table)]));
+  return { ...shownOf(view, { ...answer, notes }), draw: (sheet, room) => DRAWINGS[view.name].frame(sheet, tables, at(room)) };
 }
 
 const shownOf = (view, answer) => ({
@@ -214,7 +229,8 @@ export function startViews() {
   fetchJson("/api/views").then((answer) => {
     views = [...answer.views.filter((view) => DRAWINGS[view.name]), OVER_FRAMES];
     drawList();
-    loadLater();
+    // Whoever shows one of them can do so now.
+    document.dispatchEvent(new Event("panel"));
   }).catch(complain);
   watch(["view"], () => { drawList(); figure.isTable = false; });
   watch(["session", "run", "frame", "layer", "limb", "parameter", "particle", "camera", "track", "over", "second", "towards", "view", "panel", "summary", "whatIf", "parameters", "detail", "follow", "work"], loadLater);

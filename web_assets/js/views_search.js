@@ -69,8 +69,19 @@ function varianceOfFrame(sheet, { layers: rows, settled }, at) {
   return `${at.label(chosen)}, layer ${now.layer + 1} of ${count}: variance ${figure(now.weighed)} ${now.unit}² as weighed, ${figure(now.before)} before noise, ${figure(now.after)} after noise.`;
 }
 
+/** Of frames that are searched several times over the rows of the last search, whose result is the frame's; `step`: its layers counted from 0. */
+export function lastSearches(rows) {
+  return [...grouped(rows, "frame").values()].flatMap((own) => {
+    const search = Math.max(...own.map((row) => row.search));
+    const its = own.filter((row) => row.search === search);
+    const first = Math.min(...its.map((row) => row.layer));
+    return its.map((row) => ({ ...row, step: row.layer - first }));
+  });
+}
+
 /** Variance of the run: parameters over the frames, and the chosen parameter as layers over frames. */
-function varianceOfRun(sheet, { last, parameter }, at) {
+function varianceOfRun(sheet, { last, parameter: searched }, at) {
+  const parameter = lastSearches(searched);
   const frames = last.map((row) => row.frame);
   const names = Object.keys(last[0] ?? {}).filter((name) => name !== "frame");
   const medians = new Map(names.map((name) => { const own = last.map((row) => row[name]).filter((value) => value > 0).sort((a, b) => a - b); return [name, own[own.length >> 1] ?? 0]; }));
@@ -87,16 +98,16 @@ function varianceOfRun(sheet, { last, parameter }, at) {
   });
   sheet.chosen(whole, { column: frames.indexOf(at.frame), row: at.parameter ? names.indexOf(at.parameter) : null });
   if (!parameter.length) { sheet.words("Choose a parameter: a click on its row shows it layer by layer over the frames.", two.left, 40, two.width); return ""; }
-  const levels = Math.max(...parameter.map((row) => row.layer)) + 1;
+  const levels = Math.max(...parameter.map((row) => row.step)) + 1;
   const own = distinct(parameter.map((row) => row.frame));
   const logs = parameter.map((row) => decades(row.before)).filter((value) => value !== null);
   const [least, most] = extent(logs);
   const plot = sheet.plot({ ...two, top: 0, height }, { title: at.label(at.parameter ?? ""), unit: "variance before noise, layers over frames", x: categories(own.map(String), "frame"), y: categories(Array.from({ length: levels }, (_, layer) => layerName(layer)), "layer", { inverse: true, nameGap: 24 }) });
   sheet.heat(plot, {
-    cells: parameter.map((row) => [own.indexOf(row.frame), row.layer, decades(row.before) ?? "-"]), low: least, high: most, framed: false,
-    click: ({ value }) => ({ frame: own[value[0]], layer: value[1] }), tip: ({ value }) => tipOf(`frame ${own[value[0]]}, layer ${value[1] + 1}`, [["before noise", 10 ** value[2]]]),
+    cells: parameter.map((row) => [own.indexOf(row.frame), row.step, decades(row.before) ?? "-", row.layer]), low: least, high: most, framed: false,
+    click: ({ value }) => ({ frame: own[value[0]], layer: value[3] }), tip: ({ value }) => tipOf(`frame ${own[value[0]]}, layer ${value[1] + 1}`, [["before noise", 10 ** value[2]]]),
   });
-  sheet.chosen(plot, { column: own.indexOf(at.frame), row: at.layer });
+  sheet.chosen(plot, { column: own.indexOf(at.frame), row: parameter.find((row) => row.frame === at.frame && row.layer === at.layer)?.step ?? null });
   return at.parameter ? `${at.label(at.parameter)}: last variance ${figure(last[frames.indexOf(at.frame)]?.[at.parameter])} in frame ${at.frame}, median of the run ${figure(medians.get(at.parameter))}.` : "";
 }
 

@@ -8,10 +8,11 @@ import { Figure } from "./figure.js";
 import { onEvent } from "./live.js";
 import { complain, say } from "./messages.js";
 import { paced } from "./pacing.js";
-import { followsSearch, isStored, select } from "./selection.js";
+import { followsSearch, isStored, layersShown, select } from "./selection.js";
 import { setupPath } from "./sessions.js";
 import { get, set, watch } from "./state.js";
 import { records } from "./view_sheet.js";
+import { liveFigure } from "./views.js";
 import { drawLimbs } from "./why_drawing.js";
 
 /** @import { Schemas } from "./api_types" */
@@ -35,9 +36,8 @@ const chosenNow = () => JSON.stringify([get("frame"), get("limb"), get("layer")]
 async function load() {
   if (panel.hidden) return;
   if (get("run") && !get("summary")) { held = null; return drawNothing("The run is being read ..."); }
-  if (!get("run") || get("frame") === null || !get("summary")?.frames.length) { held = null; return drawNothing("No frames yet: track a run, then this says why a frame failed."); }
-  if (followsSearch()) { held = null; return drawNothing("The search goes on. Choose a frame, or pause it, to see why a frame is as it is."); }
-  if (!isStored()) { held = null; return drawNothing(`Frame ${get("frame")} is not finished yet.`); }
+  if (!get("run") || get("frame") === null || (!get("summary")?.frames.length && !get("detail"))) { held = null; return drawNothing("No frames yet: track a run, then this says why a frame failed."); }
+  if (followsSearch() || !isStored()) { held = null; return drawSearch(); }
   const [session, run, frame] = [get("session"), get("run"), get("frame")];
   const key = `${session}/${run} ${frame} ${query()} ${age} ${get("summary").frames.length}`;
   if (held?.key === key) return held.chosen === chosenNow() ? undefined : draw();
@@ -56,6 +56,14 @@ async function load() {
 function drawNothing(text) {
   fill(words, element("p", { className: "empty" }, text));
   figure.show(null, "");
+}
+
+/** The frame that is searched: its layers so far, beside what is said of it once it is finished. */
+function drawSearch() {
+  const layers = layersShown();
+  fill(words, element("h2", {}, `Frame ${get("frame")} is searched`), element("p", {}, layers ? `${layers} ${layers === 1 ? "layer is" : "layers are"} done; beside this, what they left of each parameter's variance.` : "Its first layer is being searched."),
+    hint("Why a frame is as it is, is said of frames that are finished: choose one, or pause the search."));
+  figure.show(liveFigure(), "");
 }
 
 /** Go to what a finding speaks of. @param {Schemas["ViewAnswer"]["findings"][number]} finding */
@@ -104,7 +112,7 @@ export function startWhy() {
   fill(panel, words, place);
   figure = new Figure(place);
   const later = paced(load, LOAD_MILLISECONDS);
-  watch(["session", "run", "frame", "track", "summary", "panel", "limb", "layer", "follow", "work"], later);
+  watch(["session", "run", "frame", "track", "summary", "panel", "limb", "layer", "follow", "work", "detail", "parameters"], later);
   onEvent("frame", (event, here) => { if (here && !event.reannealed) age += 1; });
   document.addEventListener("panel", () => later());
 }

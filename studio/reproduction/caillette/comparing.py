@@ -2,8 +2,9 @@
 
 The paper's measure is the RMS joint angle error. Joints of two angles each are singular where a limb points along the
 first axis (an arm held out to the side, which dancers do): the first angle then turns nothing, and is off by 50 degrees
-for every tracker alike. So trackers are judged by the angle between a limb and its true direction, which does not
-depend on the angles' branch; joint angles are reported too.
+for every tracker alike. So the angle between a limb and its true direction stands beside it, which does not depend on
+the angles' branch, but on the root's orientation. What the paper says of its curves is judged by joint angles; where it
+prints no measure, by limbs' directions.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence

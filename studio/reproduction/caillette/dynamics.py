@@ -67,7 +67,7 @@ from studio.reproduction.caillette.setting import (
     training_for,
     training_words,
 )
-from studio.reproduction.claims import EQUAL, LOWER, beside, share
+from studio.reproduction.claims import LOWER, NO_WORSE, beside, share
 from studio.reproduction.drawing import line_chart, seed_range
 from studio.reproduction.experiment import Experiment, Part, listed
 from studio.reproduction.tracking import Candidate
@@ -213,18 +213,15 @@ PREDICTED = Candidate(
 STRANGE = (ANNEALED, IMPROVED, MANY, MANY_SHARED, PREDICTED)
 
 Comparison = tuple[str, Candidate, Candidate, str, Error]
-SAME_CLAIMS: tuple[tuple[Candidate, str, Error], ...] = (
-    (ANNEALED, EQUAL, limb),
-    (CONDENSATION, LOWER, limb),
-)
-"""What 200 guided particles are compared with, the claim, and its measure; joint angles, which are the figure's own
-measure, and positions stand beside them.
+SAME_CLAIMS: tuple[tuple[Candidate, str], ...] = ((ANNEALED, NO_WORSE), (CONDENSATION, LOWER))
+"""What 200 guided particles are compared with, and the claim, judged by joint angles, the figure's own measure: with 25
+times fewer evaluations "accuracy and robustness were maintained". Limbs' directions and positions stand beside them.
 """
 SAME_COMPARISONS: tuple[Comparison, ...] = (
     *(
         (f"{ours.name} over {other.name}, {words}", ours, other, "", of)
         for words, of in (
-            ("joint angle", angle),
+            ("limb direction", limb),
             ("joint position", position),
             ("the body's middle", centre),
             ("about its middle", shape),
@@ -233,7 +230,7 @@ SAME_COMPARISONS: tuple[Comparison, ...] = (
         for other in (ANNEALED, CONDENSATION, IMPROVED)
     ),
     *(
-        (f"{ours.name} over {IMPROVED.name}, limb direction", ours, IMPROVED, "", limb)
+        (f"{ours.name} over {IMPROVED.name}, joint angle", ours, IMPROVED, "", angle)
         for ours in (PRINTED_FEW, FEW)
     ),
     ("with a model-free share over without", FEW_SHARED, FEW, "", limb),
@@ -243,12 +240,12 @@ SAME_COMPARISONS: tuple[Comparison, ...] = (
     ),
 )
 STRANGE_CLAIMS: tuple[Comparison, ...] = (
-    ("model-free share over annealed, equal evaluations", MANY_SHARED, ANNEALED, EQUAL, limb),
-    ("annealed, behaviour first, over annealed, improved", PREDICTED, IMPROVED, EQUAL, limb),
+    ("model-free share over annealed, equal evaluations", MANY_SHARED, ANNEALED, NO_WORSE, limb),
+    ("model-free share over annealed, joint position", MANY_SHARED, ANNEALED, NO_WORSE, position),
+    ("annealed, behaviour first, over annealed, improved", PREDICTED, IMPROVED, NO_WORSE, limb),
     ("with over without model-free share", MANY_SHARED, MANY, LOWER, limb),
     ("model-free share over annealed, improved", MANY_SHARED, IMPROVED, "", limb),
     ("model-free share over annealed, joint angle", MANY_SHARED, ANNEALED, "", angle),
-    ("model-free share over annealed, joint position", MANY_SHARED, ANNEALED, "", position),
 )
 """Name, ours, theirs, claim and measure of each ratio."""
 REASON = (
@@ -267,28 +264,36 @@ def _fig_12(footage: str, outcomes: Sequence[Outcome]) -> Iterator[Part]:
     ]
     if not unseen:
         rows: list[tuple[str, Number, Number]] = []
-        for other, claim, of in SAME_CLAIMS:
+        for other, claim in SAME_CLAIMS:
             printed, ours = (
-                ratio(f"{one.name} over {other.name}", groups[one.name], groups[other.name], claim, of)
+                ratio(
+                    f"{one.name} over {other.name}, joint angle",
+                    groups[one.name],
+                    groups[other.name],
+                    claim,
+                    angle,
+                )
                 for one in (PRINTED_FEW, FEW)
             )
-            rows.append((f"{'equal to' if claim == EQUAL else 'nearer than'} {other.name}", printed, ours))
+            words = "no worse than" if claim == NO_WORSE else "nearer than"
+            rows.append((f"{words} {other.name}, joint angle", printed, ours))
         yield from (number for _, number, _ in rows)
         yield from (beside(number) for _, _, number in rows)
         yield side_by_side(rows)
     yield from ratios
-    yield from errors("limb direction, RMS", groups, limb)
     yield from errors("joint angle, RMS", groups, angle)
+    yield from errors("limb direction, RMS", groups, limb)
     yield from errors("joint position, RMS", groups, position, "mm")
     if unseen:
         yield "All weigh as many poses. Of the particles that go their own way there are 10 % at least."
-        if ratios[0].verdict == "not reproduced":
+        if "not reproduced" in (ratios[0].verdict, ratios[1].verdict):
             yield REASON
     else:
         yield (
             f"The first {len(groups[FEW.name][0].limb_deg)} frames are tracked. "
-            "Few guided particles weigh 200 poses a frame, the others 5000. Joint angles, the figure's own measure, "
-            "are singular where an arm points sideways. The annealed filter is the one of the paper's time (planned "
+            "Few guided particles weigh 200 poses a frame, the others 5000. Judged is the figure's own measure, joint "
+            "angles, which are singular where an arm points sideways; limbs' directions have the root's error in them. "
+            "The annealed filter is the one of the paper's time (planned "
             f"noise). {TWO_TRACKERS}"
         )
     yield summary_table("Likelihood fitted from the true pose in every frame", groups)
@@ -302,8 +307,13 @@ def _fig_12(footage: str, outcomes: Sequence[Outcome]) -> Iterator[Part]:
 AS_IT_IS = "as printed"
 ADDED: Mapping[str, tuple[Mapping[str, Any], Mapping[str, Any]]] = {
     AS_IT_IS: ({}, LEARNT_AS_PRINTED),
-    "a floor of the clusters added": ({}, {"back_off": 0.0}),
-    "back-off of 0.05 added": ({}, {"cluster_floor": 0.0}),
+    "a floor of the clusters added": ({}, {**LEARNT_AS_PRINTED, "cluster_floor": 0.003}),
+    "back-off of 0.05 added": ({}, {**LEARNT_AS_PRINTED, "back_off": 0.05}),
+    "six principal components, full covariances": (
+        {},
+        {**LEARNT_AS_PRINTED, "reduced_dimensions": 6, "covariance": "full"},
+    ),
+    "every darker shade a shadow": ({"hull_deepest_shadow": 0.4}, LEARNT_AS_PRINTED),
     "automaton's share of 0.8 added": ({"automaton_share": 0.8}, LEARNT_AS_PRINTED),
     "learnt root motion added": ({"root_prediction": "learnt", "diffusion_scale": 1.0}, LEARNT_AS_PRINTED),
     "survival of 0.4 added": ({"selection": "survival", "survival": 0.4}, LEARNT_AS_PRINTED),

@@ -234,17 +234,13 @@ class Followed:
         return float(np.mean(self.lost))
 
 
-CLUSTERS, FITTED_AGAIN = 20, 32
-"""Most clusters expected, and most poses that blobs are fitted from, where the tracker is lost: the knobs' largest."""
-
-
 @dataclass(eq=False)
 class Recovering(Following):
     """Following with the recovery of section 6.3. resets : of each frame.
 
     Where the best mixture of blobs gives the voxels a poor likelihood the states of all particles are reset, which
-    spreads them over the clusters, and the frame's blobs are fitted from the clusters before it is searched again: from
-    the CLUSTERS that hold most of the spread particles (the paper: from all). Roots stay, with noise of σ0.
+    spreads them over the clusters, and the frame's blobs are fitted from all clusters that hold one before it is
+    searched again. Roots stay, with noise of σ0.
     """
 
     resets: list[bool] = field(default_factory=list[bool])
@@ -265,11 +261,12 @@ class Recovering(Following):
         sigma = self.space.sigma * tracker.diffusion_scale
         spread = spread_over_clusters(rng, self.space, tracker.particles, root, sigma)
         self.carried = dataclasses.replace(before, particles=spread)
-        usual = self.settings
-        every = {"expected_support": 0.0, "expected_most": CLUSTERS, "blob_starts": FITTED_AGAIN}
-        self.settings = changed_settings(usual, every)
+        usual, clusters = self.settings, self.space.behaviour.clusters
+        # Beyond the knobs' range: as many as there are.
+        every = dataclasses.replace(tracker, expected_support=0.0, expected_most=clusters)
+        self.settings = dataclasses.replace(usual, tracker=every)
         try:
-            return super().step(frame, _fitted_from_many(problem), seen)
+            return super().step(frame, _fitted_from(problem, clusters + LAST_POSES), seen)
         finally:
             self.settings = usual
 
@@ -284,12 +281,16 @@ class Recovering(Following):
 RESET_KEY = 0x5EED
 
 
-def _fitted_from_many(problem: FrameLikelihood) -> FrameLikelihood:
-    """A frame whose blobs are fitted from FITTED_AGAIN expected poses."""
+LAST_POSES = 2
+"""That a search expects beside its tracker's: where the body was last, and where it was going."""
+
+
+def _fitted_from(problem: FrameLikelihood, starts: int) -> FrameLikelihood:
+    """A frame whose blobs are fitted from as many expected poses."""
     if not isinstance(problem, BlobFrameLikelihood):
         return problem
     likelihood = copy.copy(problem.likelihood)
-    likelihood.settings = dataclasses.replace(likelihood.settings, blob_starts=FITTED_AGAIN)
+    likelihood.settings = dataclasses.replace(likelihood.settings, blob_starts=starts)
     return BlobFrameLikelihood(likelihood, problem.hull)
 
 

@@ -13,6 +13,7 @@ from typing import Any
 from studio.reproduction.caillette.training_set import Training
 from studio.reproduction.tracking import Candidate
 from studio.synthesis.recipe_file import find_recipe, read_recipe
+from studio.trackers.paper_presets import CAILLETTE, NOTHING_ELSE, SIZE
 
 BLOBS = "blobs"
 BODY = "human25"
@@ -33,17 +34,16 @@ QUICK_TRAINING = Training((EXERCISE,))
 SIGMA: Mapping[str, Any] = {"diffusion_scale": 2.0}
 # As in the paper: no particle is moved without the model, and the best particle is the pose.
 AS_PAPER: Mapping[str, Any] = {"model_free_share": 0.0, "model_free_grows": False, "estimate": "mode"}
-# The rest of the paper as printed: transitions by Eq. 3 alone, the root moved by noise (whose width is not printed: as
-# wide as that of the trackers without a model), and weights as the likelihood gives them, normalised.
+# The paper's tracker as printed, as the preset has it; its recovery is `following.Recovering`.
 AS_PRINTED: Mapping[str, Any] = {
-    **AS_PAPER,
-    "automaton_share": 0.0,
-    "root_prediction": "noise",
-    "selection": "weights",
-    **SIGMA,
+    name: value
+    for name, value in CAILLETTE.values.items()
+    if name not in (*NOTHING_ELSE, *SIZE, "lost_after", "recovery_interval")
 }
-LEARNT_AS_PRINTED: Mapping[str, Any] = {"back_off": 0.0, "cluster_floor": 0.0}
-"""Only labels that were seen after a history are possible, and clusters have no floor."""
+LEARNT_AS_PRINTED: Mapping[str, Any] = {
+    name: value for entry in CAILLETTE.learning for name, value in entry.sets.items() if name != "memory"
+}
+"""What the preset says of learning; the memory is each experiment's own."""
 GUIDED = "behaviour"
 # The annealing of the paper's time: planned noise (Eq. 13 of Deutscher & Reid), half surviving, no crossover.
 PLANNED: Mapping[str, Any] = {"adaptive_diffusion": False, "crossover": 0.0, "survival": 0.5}
@@ -102,7 +102,11 @@ NOTHING: Mapping[str, Any] = {}
 
 def training_with(memory: int, quick: bool, learning: Mapping[str, Any] = NOTHING) -> Training:
     """The training set, for an automaton with a memory. learning : further knobs of learning."""
-    return dataclasses.replace(training(quick), memory=memory, clusters=dict(learning))
+    found = training(quick)
+    clusters = {name: value for name, value in learning.items() if name != "epsilon"}
+    return dataclasses.replace(
+        found, memory=memory, epsilon=learning.get("epsilon", found.epsilon), clusters=clusters
+    )
 
 
 def training_for(candidate: Candidate, memory: int, quick: bool) -> Training | None:

@@ -41,10 +41,9 @@ from studio.reproduction.tracking import (
 )
 
 CLIPS = {"walk": "walk", "turns": "choosing-turns", "kick": "choosing-kick"}
-PRINTED_PRODUCT: Mapping[str, Any] = {**PLAIN, "diffusion_decay": "printed"}
 BASES: Mapping[str, Mapping[str, Any]] = {
     "Eq. 13": PLAIN,
-    "Eq. 13, product as printed": PRINTED_PRODUCT,
+    "Eq. 13, the layers so far alone": {**PLAIN, "diffusion_decay": "variance"},
     "section 6": IMPROVED,
 }
 CARRIED = {"every particle": "weighted", "survivors": "resampled", "the mode": "mode"}
@@ -113,9 +112,16 @@ def _carried(groups: Groups) -> Iterator[Part]:
     """What is carried, for both products of Eq. 13 and for section 6."""
     usual, *others = CARRIED
     pairs = [(f"{base}, {other}", f"{base}, {usual}") for base in BASES for other in others]
-    eq13, as_printed, _ = BASES
-    pairs += [(f"{as_printed}, {words}", f"{eq13}, {words}") for words in CARRIED]
+    eq13, so_far, _ = BASES
+    pairs += [(f"{so_far}, {words}", f"{eq13}, {words}") for words in CARRIED]
     yield from _results(groups, tuple(CARRYING), pairs)
+    for base in BASES:
+        errors = {
+            words: sum(sum(mean_errors(groups[f"{base}, {words}, {clip}"])) for clip in CLIPS)
+            for words in CARRIED
+        }
+        best = min(errors, key=lambda words: errors[words])
+        yield f"With {base} the mean error is smallest where {best} starts the next frame."
     yield f"{EQ17_WORDS} {EQ18_WORDS}"
     yield {
         "clips": ", ".join(CLIPS.values()),

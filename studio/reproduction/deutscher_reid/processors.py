@@ -18,6 +18,7 @@ from studio.comparison.statistics import number
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.numba_in_threads import numba
+from studio.reproduction.claims import beside
 from studio.reproduction.deutscher_reid.setting import CIRCLE, PLAIN, WEIGHTING
 from studio.reproduction.drawing import line, line_chart
 from studio.reproduction.experiment import Part, each_seed, listed, measured
@@ -96,10 +97,11 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     for what, label in (("weighing", "weighing"), ("frame", "a whole frame")):
         for place, count in list(enumerate(counts))[1:]:
             name, paper = f"{PER_PROCESSOR}, {label}, {count} processors", PAPER if count == 2 else None
-            yield number(name, speed[what][:, place] / count, "", paper, "higher")
+            yield beside(number(name, speed[what][:, place] / count, "", paper, "higher"))
     yield (
-        "The paper farms out the weighing, which its frames spend their time on; here that takes milliseconds, so that "
-        "drawing and noise, done by one, are a larger part of a whole frame. With 200 particles a "
+        "Answered, not judged: two cores of one machine are not the paper's processors. The paper farms out the "
+        "weighing, which its frames spend their time on; here that takes milliseconds, so that drawing and noise, done "
+        "by one, are a larger part of a whole frame. With 200 particles a "
         "layer there is too little to share and one thread does it all. Threads of one machine in turn, the quickest "
         "of the rounds; other programs on the machine lower the figures."
     )

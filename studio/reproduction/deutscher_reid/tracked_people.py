@@ -32,6 +32,7 @@ from studio.reproduction.deutscher_reid.setting import (
     PLAIN,
     QUICK_FRAMES,
     RUN,
+    SHRUNK,
     STUDIO,
     STUDIO_WEIGHTING,
     TURNS,
@@ -164,6 +165,7 @@ FILTERS = tuple(
         (SECTION_6, IMPROVED),
         (f"{SECTION_6}, the mode carried", {**IMPROVED, **MODE}),
         (f"{SECTION_6}, none crossed", ADAPTIVE),
+        (f"{SECTION_6}, shrunk (ours)", {**IMPROVED, **SHRUNK}),
         (f"{SECTION_6}, constant velocity", {**IMPROVED, "dynamics": "constant_velocity"}),
         (OWN, STUDIO),
     )
@@ -243,6 +245,7 @@ SIZED: Mapping[str, Mapping[str, Any]] = {
     EQ13: PLAIN,
     f"{EQ13}, the mode carried": {**PLAIN, **MODE},
     SECTION_6: IMPROVED,
+    f"{SECTION_6}, shrunk (ours)": {**IMPROVED, **SHRUNK},
 }
 
 

@@ -13,11 +13,11 @@ import numpy as np
 
 from studio.comparison.findings import Chart, Plain, Series, Table
 from studio.comparison.footage_cache import FootageCache
-from studio.comparison.statistics import number
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.errors import TruthError
 from studio.evaluation.errors import evaluate
 from studio.motion_files.trc import read_trc
+from studio.reproduction.claims import percent
 from studio.reproduction.experiment import Part, each_seed, listed
 from studio.runs.initialising import initialise
 from studio.synthesis.drawn_recipes import HALVES, KINDS, REPORTING, clip_name
@@ -68,14 +68,12 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
         own = [one for one in outcomes if one.trial.label.startswith(f"{half} ")]
         sure = np.array([one.measured["confidence"] for one in own])
         right = np.array([one.measured["mean_mm"] <= RIGHT_MM for one in own])
-        yield number(f"right, of all, {half}", 100.0 * right, "%", better="higher")
+        yield percent(f"right, of all, {half}", right)
         if (sure >= SURE).any():
-            yield number(
+            yield percent(
                 f"right, of those called {100 * SURE:.0f} % sure or more, {half}",
-                100.0 * right[sure >= SURE],
-                "%",
-                paper=100.0 * SURE if half == REPORTING else None,
-                better="higher",
+                right[sure >= SURE],
+                100.0 * SURE if half == REPORTING else None,
             )
         rows, middles, shares = list[tuple[Plain, ...]](), list[float](), list[float]()
         for low, high in itertools.pairwise(CLASSES):

@@ -20,6 +20,7 @@ from studio.capture.pictures import check_picture, list_pictures
 from studio.capture.video import probe_video
 from studio.declaring import Terminal, Web
 from studio.errors import CalibrationError, FootageError, SessionError
+from studio.foreign_files import leads_out
 from studio.geometry.camera import Camera
 from studio.progress import Progress, unheard
 from studio.sessions.archives import FOOTAGE_PARTS, folder_of, is_archive
@@ -51,13 +52,12 @@ from studio.sessions.importers.writing import (
     write_person,
     write_session,
 )
-from studio.sessions.manifest import SessionManifest
+from studio.sessions.manifest import FASTEST, SessionManifest
 from studio.sessions.names import free_name
 from studio.sessions.provenance import adopt
 from studio.sessions.session import CAMERAS_PATH, THUMBNAIL_NAME, Session, described_anew
 from studio.sessions.stroke_files import OUTDATED, STROKES_NAME
 
-FASTEST = 10_000.0
 OWN_PARTS = ("videos", "pictures", "masks", "background")
 PERSON_PARTS = ("calibration", "subject.toml", "start_pose.csv", "sigma.csv", "truth", "bodies")
 
@@ -226,7 +226,7 @@ def _added(session: Session, source: Path, options: ImportOptions, report: Progr
     truths, carried_notes = carried_truth(plan, read, measured.fps, options.unit)
     if takes_over:
         measured = _checked_rig(measured, options)
-    staged = new_folder_beside(session.path / "take")
+    staged = new_folder_beside(session.path / "take", parents=False)
     try:
         footage = write_footage(staged, measured, options.copy, report)
         stay = _cameras_that_stay(session, footage, plan, options.replace)
@@ -380,7 +380,9 @@ def _forget_old(session: Session, before: FootageSource) -> None:
     for path in (path for camera in before.cameras for path in camera.places):
         if path and path not in used and not Path(path).is_absolute():
             place = session.path / path
-            if place.is_dir():
+            if leads_out(place):
+                continue
+            if place.is_dir() and not place.is_symlink():
                 shutil.rmtree(place, ignore_errors=True)
             else:
                 place.unlink(missing_ok=True)

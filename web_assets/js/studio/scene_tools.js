@@ -99,9 +99,11 @@ function Tool({ label, title, act, pressed, children }) {
 
 /** @param {string} path */
 const drawing = (path) => html`<svg viewBox="0 0 16 16"><path d=${path} /></svg>`;
-const FRAME = "M2 2h4v1.5H3.5V6H2zM10 2h4v4h-1.5V3.5H10zM2 10h1.5v2.5H6V14H2zM12.5 10H14v4h-4v-1.5h2.5zM8 5a3 3 0 1 1 0 6 3 3 0 0 1 0-6z";
+const FRAME =
+  "M2 2h4v1.5H3.5V6H2zM10 2h4v4h-1.5V3.5H10zM2 10h1.5v2.5H6V14H2zM12.5 10H14v4h-4v-1.5h2.5zM8 5a3 3 0 1 1 0 6 3 3 0 0 1 0-6z";
 const FOLLOW = "M8 1.5 11 5H9v2h2V5l3.5 3-3.5 3V9H9v2h2l-3 3.5L5 11h2V9H5v2L1.5 8 5 5v2h2V5H5z";
-const RESET = "M8 2.5a5.5 5.5 0 1 1-5.4 6.6l1.5-.3A4 4 0 1 0 5.2 5.2L7 7H2.5V2.5l1.6 1.6A5.5 5.5 0 0 1 8 2.5z";
+const RESET =
+  "M8 2.5a5.5 5.5 0 1 1-5.4 6.6l1.5-.3A4 4 0 1 0 5.2 5.2L7 7H2.5V2.5l1.6 1.6A5.5 5.5 0 0 1 8 2.5z";
 const FULL = "M2 2h5v1.5H4.6L8 6.9 6.9 8 3.5 4.6V7H2zM9 14v-1.5h2.4L8 9.1 9.1 8l3.4 3.4V9H14v5z";
 
 function toggleFullScreen() {

@@ -1,0 +1,85 @@
+"""A run that leaves another one at a frame: the frames before it are that run's, it and all after it are tracked with
+other knobs. The other run stays as it is.
+
+The frame is searched from the same start with the same random numbers, so its result is the one that annealing it again
+with these knobs has shown.
+"""
+
+from collections.abc import Mapping
+
+import msgspec
+
+from studio.errors import SettingsError
+from studio.runs.correcting import check_branching_frame, new_folder
+from studio.runs.moved_knobs import FIRST_VERSION, keep_moved, moved_between, settings_with_moved
+from studio.runs.new_run import software_version
+from studio.sessions.manifest import now
+from studio.sessions.session import Session, free_run_name
+from studio.sessions.stored_run import StoredRun
+from studio.settings import (
+    RunSettings,
+    SettingsHistory,
+    all_knobs,
+    changed_settings,
+    settings_from_values,
+    values,
+)
+
+
+def prepare_branch(
+    session: Session, run: StoredRun, frame: int, knobs: Mapping[str, object] | None = None, name: str = ""
+) -> StoredRun:
+    """Make the run's folder with the frames before `frame`; then track it as any other.
+
+    frame : of the run, or the one after its last. knobs : what is changed, by name; what is left out is as the run
+    would go on with, the knobs that were moved in it included. Raises RunError, SessionError, SettingsError; then
+    nothing was made.
+    """
+    record = run.record
+    check_branching_frame(run, frame)
+    wanted = changed_settings(settings_with_moved(run), knobs or {})
+    version, before = _settings_before(run, frame)
+    moved = moved_between(before, wanted)
+    if not moved:
+        raise SettingsError(
+            f"No knob differs from those that frame {frame} of run '{run.name}' was tracked with.",
+            "Change at least one.",
+        )
+    is_whole = frame == record.first
+    fixed = [
+        entry.name for entry in all_knobs(wanted) if entry.takes_effect == "new run" and entry.name in moved
+    ]
+    if fixed and not is_whole:
+        raise SettingsError(
+            f"Setting '{fixed[0]}' cannot change inside a run.",
+            f"Leave it, or branch off at the first frame ({record.first}).",
+        )
+    changed = ", ".join(f"{knob} {value}" for knob, value in moved.items())
+    made = msgspec.structs.replace(
+        record,
+        name=name or free_run_name(session),
+        session=session.name,
+        created=now(),
+        software=software_version(),
+        live=False,
+        made_from=run.name,
+        settings=dict(values(wanted)) if is_whole else record.settings,
+        notes=(*record.notes, f"From frame {frame} on run '{run.name}' with {changed}."),
+    )
+
+    def leave_moved(made_run: StoredRun) -> None:
+        if not is_whole:
+            keep_moved(made_run, version, moved)
+
+    return new_folder(run, made, frame, leave_moved)
+
+
+def _settings_before(run: StoredRun, frame: int) -> tuple[int, RunSettings]:
+    """The settings that the frames before `frame` ended with, and their version."""
+    record = run.record
+    with run.results() as results:
+        history = SettingsHistory(tuple(results.settings_history()))
+    entry = history.in_use(frame - 1, 2**31)
+    if entry is None:
+        return FIRST_VERSION, settings_from_values(record.tracker, record.weighting, record.settings)
+    return entry.version, settings_from_values(record.tracker, record.weighting, entry.values)

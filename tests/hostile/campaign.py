@@ -1,0 +1,270 @@
+"""All commands and addresses over the hostile sessions, each session in a child process that is watched.
+
+Wrong is a traceback, an answer of 500 or more, ten seconds without an answer, 300 MB more than at the start, a word of
+what lies outside the session, and anything changed there.
+"""
+
+import contextlib
+import hashlib
+import importlib
+import os
+import re
+import resource
+import select
+import shutil
+import signal
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import psutil
+from click.testing import CliRunner
+from fastapi.testclient import TestClient
+from fuzz.api import LONG, left_to_ask
+
+# Not under its own name here: the doubles are the server's tests'.
+from web_doubles import TOKEN, RecordingControl, RecordingScenes
+
+from hostile.makers import MAKERS, NAME, RUN, SECRET, make_outside, make_plain
+from studio.cli.main import load, main
+from studio.server.api_document import api_document
+from studio.server.app import build_app
+from studio.sessions.workspace import Workspace
+
+LONGEST_SECONDS, MOST_BYTES = 10.0, 300 << 20
+FILLED = {
+    "session": NAME,
+    "run": RUN,
+    "camera": "front",
+    "frame": "1",
+    "layer": "0",
+    "track": "raw",
+    "view": "variance",
+}
+DOCUMENT = api_document()
+SESSION_COMMANDS: dict[str, Sequence[Sequence[str]]] = {
+    "runs": (("runs",), ("runs", NAME)),
+    "workflow": (("workflow", NAME),),
+    "verify": (("verify", NAME), ("verify", NAME, "--repair")),
+    "inspect": (("inspect", NAME),),
+    "subject": (("subject", NAME),),
+    "background": (("background", NAME),),
+    "bodies": (("bodies", NAME),),
+    "evaluate": (("evaluate", f"{NAME}/{RUN}"),),
+    "why": (("why", f"{NAME}/{RUN}", "--frame", "1"),),
+    "view": (("view", f"{NAME}/{RUN}", "variance"),),
+    "smooth": (("smooth", f"{NAME}/{RUN}"),),
+    "export": (("export", f"{NAME}/{RUN}", "--as", "csv", "--out", "{out}/motion.csv"),),
+    "upload": (("upload", NAME, "--to", "{out}/put"),),
+    "diagnostics": (("diagnostics", NAME, "--out", "{out}/diagnostics.zip"),),
+    "share": (("share", f"{NAME}/{RUN}", "--out", "{out}/page.html"),),
+    "synchronise": (("synchronise", NAME),),
+    "check": (("check", f"{NAME}/{RUN}"),),
+    "import": (("import", "{session}", "--into", "again"),),
+    "add-footage": (("add-footage", NAME, "{session}"),),
+}
+
+
+@dataclass
+class Tally:
+    """Of one session. wrong : what went wrong, sentences."""
+
+    requests: int = 0
+    commands: int = 0
+    seconds: float = 0.0
+    most_bytes: int = 0
+    wrong: list[str] = field(default_factory=list)
+
+
+def campaign(names: Sequence[str], seconds: float | None = None, *, few: bool = False) -> dict[str, Tally]:
+    """Try the sessions of these names, each once. seconds : begin none after so long. few : of requests and commands a
+    part, another one for each session.
+    """
+    found: dict[str, Tally] = {}
+    began = time.monotonic()
+    # Loaded here, and not by each child again.
+    importlib.import_module("anyio._backends._asyncio")
+    for command in SESSION_COMMANDS:
+        load(command)
+    with tempfile.TemporaryDirectory(prefix="hostile-") as folder:
+        plain = make_plain(Path(folder) / "plain")
+        for number, name in enumerate(names):
+            if seconds is not None and time.monotonic() - began > seconds:
+                break
+            found[name] = tried(name, plain, Path(folder), number if few else None)
+    return found
+
+
+def tried(name: str, plain: Path, folder: Path, part: int | None = None) -> Tally:
+    """One session, in a child process."""
+    stage = folder / "stage"
+    shutil.rmtree(stage, ignore_errors=True)
+    workspace, outside, out = stage / "workspace", stage / "outside", stage / "out"
+    shutil.copytree(plain, workspace / NAME)
+    shutil.copytree(plain, workspace / "other")
+    out.mkdir()
+    make_outside(outside)
+    MAKERS[name](workspace / NAME, outside)
+    before = _digest(outside), _digest(workspace / "other")
+    tally, began = Tally(), time.monotonic()
+    for work in (_ask, _command):
+        _watched(lambda say, work=work: work(workspace, out, say, part), tally)
+    tally.seconds = time.monotonic() - began
+    if before[0] != _digest(outside):
+        tally.wrong.append("something outside was changed")
+    if before[1] != _digest(workspace / "other"):
+        tally.wrong.append("another session was changed")
+    for path in out.rglob("*"):
+        if path.is_file() and SECRET.encode() in path.read_bytes():
+            tally.wrong.append(f"'{path.name}' holds what lies outside")
+    return tally
+
+
+Say = Callable[[str], None]
+
+
+def _watched(work: Callable[[Say], None], tally: Tally) -> None:
+    """Do work in a child; what it says and how it ends goes to the tally. A line before each piece names it."""
+    reading, writing = os.pipe()
+    child = os.fork()
+    if not child:
+        os.close(reading)
+        _live(work, writing)
+    os.close(writing)
+    process, doing, rest = psutil.Process(child), "the start", b""
+    since, spent = time.monotonic(), 0.0
+    while True:
+        ready, _, _ = select.select([reading], [], [], 0.1)
+        if ready:
+            content = os.read(reading, 65536)
+            if not content:
+                break
+            since, spent = time.monotonic(), _seconds_of(process)
+            *lines, rest = (rest + content).split(b"\n")
+            for line in map(bytes.decode, lines):
+                kind, _, words = line.partition(" ")
+                if kind == "wrong":
+                    tally.wrong.append(words)
+                else:
+                    doing = words
+                    tally.requests += kind == "request"
+                    tally.commands += kind == "command"
+        with contextlib.suppress(psutil.Error):
+            tally.most_bytes = max(tally.most_bytes, process.memory_full_info().uss)
+        waited, worked = time.monotonic() - since, _seconds_of(process) - spent
+        # Its own time counts, for the machine may be busy; without any it waits for something.
+        idle = waited > LONGEST_SECONDS and worked < waited / 100
+        if tally.most_bytes > 2 * MOST_BYTES or idle or worked > LONGEST_SECONDS:
+            tally.wrong.append(f"{doing}: {tally.most_bytes >> 20} MB, {time.monotonic() - since:.0f} s")
+            os.kill(child, signal.SIGKILL)
+            break
+    os.close(reading)
+    _, status = os.waitpid(child, 0)
+    if status and os.WIFSIGNALED(status) and os.WTERMSIG(status) != signal.SIGKILL:
+        tally.wrong.append(f"{doing}: the process died of signal {os.WTERMSIG(status)}")
+    if tally.most_bytes > MOST_BYTES:
+        tally.wrong.append(f"{tally.most_bytes >> 20} MB more than at the start")
+
+
+def _seconds_of(process: psutil.Process) -> float:
+    """Of the processor, that it has had."""
+    spent = 0.0
+    with contextlib.suppress(psutil.Error):
+        for one in (process, *process.children(recursive=True)):
+            times = one.cpu_times()
+            spent += times.user + times.system + times.children_user + times.children_system
+    return spent
+
+
+def _live(work: Callable[[Say], None], writing: int) -> None:
+    """In the child."""
+
+    def say(line: str) -> None:
+        os.write(writing, line.replace("\n", " ").encode()[:2000] + b"\n")
+
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 30, 1 << 30))
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+        work(say)
+    except BaseException as problem:  # said to the parent
+        say(f"wrong the child failed: {type(problem).__name__}: {problem}")
+    os._exit(0)
+
+
+def requests_of(document: dict, part: int | None = None) -> Iterator[tuple[str, str]]:
+    """Method and path of the requests, what changes a session last. part : of the reading ones every fourth, from this
+    one on; of the others every sixteenth.
+    """
+    known = [
+        (method.upper(), re.sub(r"{(\w+)}", lambda found: FILLED.get(found[1], "x"), path))
+        for path, operations in left_to_ask(document)["paths"].items()
+        for method in operations
+        if not path.endswith(LONG) and "/learning" not in path
+    ]
+    reading = [entry for entry in known if entry[0] == "GET"]
+    changing = sorted((entry for entry in known if entry[0] != "GET"), key=lambda entry: entry[0] == "DELETE")
+    if part is not None:
+        reading, changing = reading[part % 4 :: 4], changing[part % 16 :: 16]
+    yield ("GET", "/api/sessions")
+    yield from reading
+    yield from changing
+
+
+def _ask(workspace: Path, _: Path, say: Say, part: int | None) -> None:
+    scenes = RecordingScenes()
+    app = build_app(Workspace(workspace), RecordingControl(), scenes, TOKEN)
+    with TestClient(app, base_url="http://127.0.0.1", raise_server_exceptions=False) as client:
+        headers = {"authorization": f"Bearer {TOKEN}"}
+        for method, path in requests_of(DOCUMENT, part):
+            say(f"request {method} {path}")
+            body = None if method in ("GET", "DELETE") else {}
+            answer = client.request(method, path, json=body, headers=headers, follow_redirects=False)
+            if answer.status_code >= 500:
+                say(f"wrong {method} {path}: {answer.status_code} {answer.text[:300]}")
+            if SECRET in answer.text:
+                say(f"wrong {method} {path} shows what lies outside")
+            if path == "/api/sessions" and b'"other"' not in answer.content:
+                say(f"wrong the list lacks the other session: {answer.status_code} {answer.text[:300]}")
+        say("request GET (closing)")
+
+
+def _command(workspace: Path, out: Path, say: Say, part: int | None) -> None:
+    os.environ["STUDIO_WORKSPACE"] = str(workspace)
+    commands = [command for lines in SESSION_COMMANDS.values() for command in lines]
+    if part is not None:
+        commands = commands[part % 5 :: 5]
+    for command in commands:
+        line = [word.format(out=out, session=workspace / NAME) for word in command]
+        say(f"command studio {' '.join(line)}")
+        ended = CliRunner().invoke(main, line)
+        text = ended.output
+        if ended.exit_code not in (0, 1, 2) or not isinstance(ended.exception, SystemExit | None):
+            say(f"wrong studio {' '.join(line)}: {ended.exit_code} {ended.exception!r} {text[-300:]}")
+        if "Traceback" in text or "fault of the studio" in text:
+            say(f"wrong studio {' '.join(line)}: {text[-300:]}")
+        if SECRET in text:
+            say(f"wrong studio {' '.join(line)} shows what lies outside")
+        if re.search(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]", text):
+            say(f"wrong studio {' '.join(line)} writes control characters")
+
+
+def _digest(folder: Path) -> str:
+    made = hashlib.sha256()
+    for path in sorted(folder.rglob("*")):
+        made.update(str(path.relative_to(folder)).encode())
+        # Locks are taken where there was none, and small pictures made.
+        if path.is_file() and not path.name.startswith("results.") and not path.is_symlink():
+            made.update(path.read_bytes())
+    return made.hexdigest()
+
+
+def table(found: dict[str, Tally]) -> str:
+    """The table, and what went wrong below it."""
+    lines = ["| session | requests | commands | s | MB | wrong |", "|---|---|---|---|---|---|"]
+    for name, tally in found.items():
+        numbers = (tally.requests, tally.commands, f"{tally.seconds:.1f}", tally.most_bytes >> 20)
+        lines.append(f"| {name} | {' | '.join(map(str, numbers))} | {len(tally.wrong)} |")
+    lines += [f"{name}: {words}" for name, tally in found.items() for words in tally.wrong]
+    return "\n".join(lines)
