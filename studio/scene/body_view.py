@@ -35,6 +35,7 @@ class BodyView:
         clicked: Callable[[str, tuple[float, float]], None] | None = None,
     ) -> None:
         self._body, self._ghost, self.colour = body, ghost, "ghost"
+        self._shown: tuple[object, ...] = ()
         self.limb_of = limb_of_drawn(body)
         meshes = [limb_mesh(limb, _CAGE_SECTIONS if ghost else SECTIONS) for limb in body.drawn]
         self.handles = [
@@ -62,6 +63,10 @@ class BodyView:
         """Move every limb to a pose (radians, mm); None hides the body. chosen : a limb as errors are counted by; the
         others are dimmed.
         """
+        shown = (pose if pose is None else pose.tobytes(), tokens.name, opacity, chosen, self.colour)
+        if shown == self._shown:
+            return
+        self._shown = shown
         if pose is not None:
             limbs = tuple(self.limb_of.values())
             wxyz, positions = limb_frames(self._body, pose)

@@ -57,6 +57,7 @@ from studio.scene.model import (
     refuse,
     request,
     same_drawing,
+    same_panel,
     same_pictures,
     scrub,
     select,
@@ -86,7 +87,7 @@ from studio.sessions.workspace import Workspace
 from studio.settings import all_knobs
 
 REDRAW_SECONDS = 1.0 / 30.0
-TRAVEL_SECONDS = 1.0 / 25.0
+TRAVEL_SECONDS = 1.0 / 30.0
 """Between two places of particles that travel from one layer to the next."""
 PICTURE_SECONDS, LIVE_PICTURE_SECONDS = 1.0 / 10.0, 1.0 / 2.0
 """Composing pictures ten times a second costs a third of a core, which a live run needs."""
@@ -137,6 +138,7 @@ class SceneController:
         self.viewers = Viewers(server)
         self._centre: Array | None = None
         self._trial: TrialView | None = None
+        self._panel_of: Model | None = None
         self._floor: FloorView | None = None
         self.panel = Panel(server, self.post, self.request_knobs, self.refine_pose, self.save_pose)
         server.on_client_connect(self._greet)
@@ -651,7 +653,9 @@ class SceneController:
         if model.options.shadows != self._has_shadows:
             self._has_shadows = model.options.shadows
             light(self._server, self._has_shadows)
-        self.panel.show(model, moment, tokens)
+        if self._panel_of is None or not same_panel(self._panel_of, model):
+            self.panel.show(model, moment, tokens)
+            self._panel_of = model
         if self.views is not None and moment is not None:
             self.views.show(model, moment, tokens)
             self._follow_body()

@@ -16,7 +16,7 @@ from studio.scene import METRES_PER_MM
 from studio.trackers.tracker import NO_PARENT, LayerRecord
 
 FAR_END = 1
-TRAVEL_SHARE = 0.6
+TRAVEL_SHARE = 0.75
 """Of a layer's time in which its particles travel; then they rest."""
 
 

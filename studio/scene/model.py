@@ -299,6 +299,16 @@ def _pictured(model: Model) -> Selection:
     return replace(model.selection, eye=None, layer=layer)
 
 
+def same_panel(one: Model, other: Model) -> bool:
+    """Whether the panel shows the same: layers that are played pass it by."""
+    passing = {"layer": None, "particle": None, "limb": None, "eye": None, "request_number": 0}
+    return replace(one.selection, **passing) == replace(other.selection, **passing) and all(
+        getattr(one, entry.name) is getattr(other, entry.name)
+        for entry in fields(Model)
+        if entry.name not in ("selection", "layers", "pointed")
+    )
+
+
 def only_phase_differs(one: Model, other: Model) -> bool:
     """Whether nothing but how far a layer's particles have travelled differs."""
     return one.layers.state == other.layers.state and all(

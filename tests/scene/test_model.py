@@ -217,6 +217,23 @@ def test_a_layer_chosen_by_hand_stops_the_layers_and_other_choices_do_not(shown:
     assert scene.set_layer_playback(stopped, False) is stopped
 
 
+def test_layers_that_are_played_pass_panel_and_pictures_by(shown: Model) -> None:
+    playing = scene.advance_layers(scene.set_layer_playback(shown, True), 0.1, LAYERS)
+    further = scene.advance_layers(playing, 0.1, LAYERS)
+    assert scene.only_phase_differs(playing, further)
+    assert not scene.same_drawing(playing, further)
+    moved = scene.advance_layers(further, 1.0, LAYERS)
+    assert moved.selection.layer == 1
+    assert not scene.only_phase_differs(further, moved)
+    assert scene.same_panel(playing, moved)
+    assert scene.same_pictures(playing, moved)
+    for other in (scene.show_frame(moved, 2), scene.change_options(moved, {"shells": False})):
+        assert not scene.same_panel(moved, other)
+    assert not scene.same_pictures(moved, scene.stop_layers(moved)), "one layer's clouds are on them then"
+    assert playing.is_looking_at_layers
+    assert not scene.scrub(playing, None).is_looking_at_layers
+
+
 def test_frames_and_layers_are_not_played_at_once(shown: Model) -> None:
     layers = scene.set_layer_playback(scene.set_playback(shown, True), True)
     assert (layers.playback.playing, layers.layers.playing) == (False, True)

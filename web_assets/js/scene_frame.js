@@ -81,12 +81,16 @@ function placeOf(event) {
 
 /** The wheel goes to what is under the pointer and never loses the body: the studio moves the camera, not viser. */
 function zoomWithWheel(page) {
-  let [turned, at, timer] = [0, [0.5, 0.5], 0];
+  let [turned, at, isSending] = [0, [0.5, 0.5], false];
   const send = async () => {
-    const zoom = Math.exp(Math.max(-1, Math.min(1, turned * WHEEL_STEP)));
-    turned = 0;
-    await post("/api/scene/camera", { zoom, at }).catch(() => {});
-    timer = turned ? setTimeout(send, WHEEL_MILLISECONDS) : 0;
+    isSending = true;
+    while (turned) {
+      const zoom = Math.exp(Math.max(-1, Math.min(1, turned * WHEEL_STEP)));
+      turned = 0;
+      await post("/api/scene/camera", { zoom, at }).catch(() => {});
+      await new Promise((resolve) => setTimeout(resolve, WHEEL_MILLISECONDS));
+    }
+    isSending = false;
   };
   page.addEventListener("wheel", (event) => {
     const place = placeOf(event);
@@ -95,7 +99,7 @@ function zoomWithWheel(page) {
     event.stopImmediatePropagation();
     turned += event.deltaY * (event.deltaMode === 1 ? 30 : 1);
     at = place;
-    timer ||= setTimeout(send, 0);
+    if (!isSending) send();
   }, { capture: true, passive: false });
 }
 
