@@ -24,7 +24,7 @@ HEAVIEST = 20
 """Particles that are drawn as stick figures."""
 MOST_SHELL, MOST_LINES = 60, 150
 """Particles drawn of each earlier layer, and those whose ways are."""
-SHELL_SIZE, DEAD_SIZE = 0.55, 0.9
+SHELL_SIZE, DEAD_SIZE = 0.5, 0.5
 """Widths of points beside the shown layer's."""
 FADES = 4
 _SKELETON, _WAYS, _LINEAGE = 1.4, 1.0, 3.0
@@ -125,8 +125,9 @@ class SearchView:
         self._cloud.move(record, places[:, list(look.limbs), FAR_END].reshape(-1, 3))
         self._draw_dead(record.layer, journey, look, tokens, phase)
         if look.skeletons:
-            colour = tokens.layer(record.layer, look.count)
-            self.skeletons.draw(places[heaviest].reshape(-1, 2, 3), np.array(colour, dtype=np.uint8))
+            lines = places[heaviest].reshape(-1, 2, 3)
+            colour = np.array(tokens.layer(record.layer, look.count), dtype=np.uint8)
+            self.skeletons.draw(lines, np.broadcast_to(colour, lines.shape).copy())
         else:
             self.skeletons.handle.visible = False
 
@@ -170,7 +171,7 @@ class SearchView:
             self.dead.point_size = look.size * DEAD_SIZE
         share, own = step / FADES, tokens.layer(layer - 1, look.count)
         grey, back = tokens["ghost"], tokens["scene-background"]
-        colour = mixed(grey, own, 2.0 * share) if share < 0.5 else mixed(back, grey, 1.6 * (share - 0.5))
+        colour = mixed(grey, own, 2.0 * share) if share < 0.5 else mixed(back, grey, 0.3 + share - 0.5)
         self.dead.colors = np.array(colour, dtype=np.uint8)
         self._fade = journey, step
 
