@@ -451,7 +451,6 @@ class SceneController:
         if model.selection.look_through is None or self.views is None:
             return model
         self.views.cameras.leave_here()
-        self.viewers.entered()
         return look_through(model, None)
 
     def _shown_body(self) -> Array | None:
@@ -478,12 +477,8 @@ class SceneController:
         if centre is None or before is None or self.model.selection.look_through is not None:
             return
         shift = centre - before
-        if float(np.abs(shift).max()) < 1e-4 or self.viewers.is_moving:
-            return
-        eye = np.array(self.viewers.eye()) + np.tile(shift, 2)
-        self.viewers.put(tuple(map(float, eye)))
-        if self.viewers.framed is not None and self.model.selection.eye is None:
-            self.viewers.framed = tuple(map(float, np.array(self.viewers.framed) + np.tile(shift, 2)))
+        if float(np.abs(shift).max()) > 1e-4:
+            self.viewers.shift(shift, self.model.selection.eye is None)
 
     def _note_eye(self, model: Model) -> Model:
         """Note from where a viewer looks; one who is dragged out of a camera's place looks through it no longer."""
@@ -601,7 +596,8 @@ class SceneController:
             return
         if self.model.is_looking_at_layers and not before.is_looking_at_layers:
             self.model = self._frame_for_layers(self.model)
-        if self.model.selection.look_through != before.selection.look_through:
+        through = self.model.selection.look_through
+        if through is not None and through != before.selection.look_through:
             self.viewers.entered()
         now = time.monotonic()
         if only_phase_differs(before, self.model):

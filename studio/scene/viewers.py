@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import viser
 
+from studio.arrays import Array
 from studio.scene.viewpoint import Eye, between
 
 EASE_SECONDS = 0.7
@@ -88,6 +89,16 @@ class Viewers:
         """Let all viewers go there."""
         self._ease = _Ease(self.eye(), eye, now)
 
+    def shift(self, by: Array, is_usual: bool) -> None:
+        """Take all viewers along by (3,) metres, those on their way too. is_usual : the usual place goes along."""
+        if self._ease is None:
+            self.put(_shifted(self.eye(), by))
+        else:
+            ease = self._ease
+            self._ease = _Ease(_shifted(ease.start, by), _shifted(ease.end, by), ease.began)
+        if is_usual and self.framed is not None:
+            self.framed = _shifted(self.framed, by)
+
     def tick(self, now: float) -> None:
         """Move those who are on their way."""
         if self._ease is None:
@@ -111,7 +122,7 @@ class Viewers:
             return None
         return (tuple(round(number, 2) for number in seen),)
 
-    def was_dragged_from(self, name: str, place: np.ndarray, forward: np.ndarray) -> bool:
+    def was_dragged_from(self, name: str, place: Array, forward: Array) -> bool:
         """Whether a viewer who was in a camera's place (3,) metres, looking along (3,), is there no longer."""
         camera, self.looking = self.looking, None
         if camera is None:
@@ -124,8 +135,12 @@ class Viewers:
         return away > DRAGGED and self._arrived == name
 
     def entered(self) -> None:
-        """Note that another camera is looked through, or none."""
-        self._arrived = None
+        """Note that another camera is looked through, or none: who is on the way elsewhere stops."""
+        self._arrived = self._ease = None
+
+
+def _shifted(eye: Eye, by: Array) -> Eye:
+    return tuple(map(float, np.array(eye) + np.tile(by, 2)))
 
 
 def _put(client: viser.ClientHandle, eye: Eye) -> None:
