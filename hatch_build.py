@@ -5,7 +5,7 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 SAMPLES = ("walk", "planar_arm", "branched_arms")
 TRAVELS = {
     "web_assets": "studio/server/assets",
-    **{f"sample_sessions/{name}": f"studio/sessions/samples/{name}" for name in SAMPLES},
+    **{f"sample_sessions/{name}": f"studio/sessions/samples/{name}" for name in (*SAMPLES, "prepared")},
 }
 
 

@@ -7,6 +7,7 @@ from studio.operations.behaviours import models as models
 from studio.operations.cameras import align as align
 from studio.operations.cameras import board as board
 from studio.operations.cameras import calibrate as calibrate
+from studio.operations.cameras import level as level
 from studio.operations.cameras import unalign as unalign
 from studio.operations.comparing import compare as compare
 from studio.operations.comparing import sweep as sweep
@@ -25,6 +26,8 @@ from studio.operations.inspecting import view as view
 from studio.operations.inspecting import why as why
 from studio.operations.masks import background as background
 from studio.operations.masks import mask_quality as mask_quality
+from studio.operations.notes import note as note
+from studio.operations.notes import notes as notes
 from studio.operations.opening import bodies as bodies
 from studio.operations.opening import list_runs as list_runs
 from studio.operations.opening import list_sessions as list_sessions

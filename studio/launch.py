@@ -6,20 +6,21 @@ import os
 import re
 import socket
 import threading
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from types import FrameType
+from types import FrameType, MappingProxyType
+from typing import NamedTuple
+from urllib.parse import urlencode
 
 import click
 import uvicorn
 
 from studio.errors import StudioError
 from studio.foreign_files import read_text
-from studio.jobs.commands import Start, about
+from studio.jobs.commands import Open, about
 from studio.jobs.control import StudioControl
-from studio.runs.new_run import prepare_run
-from studio.runs.samples import install_sample
+from studio.runs.samples import install_prepared_runs, install_sample
 from studio.server.access import HostRule, binding_rule, new_token
 from studio.sessions.atomic_files import write_text
 from studio.sessions.process_lock import ProcessLock
@@ -36,6 +37,26 @@ SECONDS_TO_CLOSE, SECONDS_TO_END = 2, 5.0
 SERVER_LOCK, SERVER_ADDRESS = "server.lock", "server.address"
 UNKNOWN_ADDRESS = "an address that is not known yet"
 TOKEN_IN_ADDRESS = re.compile(r"(token=)[A-Za-z0-9_%-]+")
+
+
+DEMO_RUN = "ten-layers"
+DEMO_SHOWS = MappingProxyType(
+    {
+        "session": "walk",
+        "run": DEMO_RUN,
+        "frame": "9",
+        "panel": "views",
+        "view": "variance",
+        "plays": "layers",
+    }
+)
+
+
+class Opening(NamedTuple):
+    """What a studio opens with. run : opened in the tracking process. query : the page's state in the address."""
+
+    run: StoredRun
+    query: Mapping[str, str]
 
 
 class PortTakenError(StudioError):
@@ -56,13 +77,13 @@ def serve(
     port: int = PORT,
     allow_remote: bool = False,
     *,
-    first: Callable[[], StoredRun] | None = None,
+    first: Callable[[], Opening] | None = None,
     name: str = "",
     announce: Announce = click.echo,
 ) -> None:
     """Serve the studio on a workspace until Ctrl-C.
 
-    port : 0 takes a free one. first : makes a run that is tracked at once, and that the printed address shows.
+    port : 0 takes a free one. first : what the printed address shows; its run is opened and made ready at once.
     announce : called once with the addresses (`printed`). name : the host name of a proxy with TLS before the studio,
     which is served at https://NAME/ then. Raises StudioError for a host that needs `allow_remote`, a port that is
     taken, or a workspace that cannot be written.
@@ -75,15 +96,15 @@ def serve(
         show_address(f"http://{_named(host)}:{listener.getsockname()[1]}")
         control = StudioControl(workspace)
         try:
-            # The other process loads what it needs, and begins to track, while this one loads the server.
+            # The other process loads what it needs, and compiles the run's kernels, while this one loads the server.
             control.start()
-            run = None if first is None else first()
-            if run is not None:
-                control.send(Start(**about(run.folder)))
+            opening = None if first is None else first()
+            if opening is not None:
+                control.send(Open(**about(opening.run.folder), warm=True))
             app = _app(workspace, control, (token, viewers_token), hosts, log_path)
             at = f"https://{name}" if name else f"http://{_named(host)}:{listener.getsockname()[1]}"
-            place = (None, None) if run is None else (run.record.session, run.name)
-            shown = (address(at, key, *place) for key in (token, viewers_token))
+            place = {} if opening is None else opening.query
+            shown = (address(at, key, place) for key in (token, viewers_token))
             announce(printed(*shown, plainly=allow_remote and not name))
             _serve_until_stopped(app, listener)
         finally:
@@ -91,21 +112,22 @@ def serve(
 
 
 def demo(workspace_root: Path, port: int = 0, *, announce: Announce = click.echo) -> None:
-    """The bundled walk in the browser, being tracked as the page opens; until Ctrl-C."""
-    serve(workspace_root, port=port, first=lambda: _demo_run(workspace_root), announce=announce)
+    """The bundled walk in the browser: a frame that is searched already, its layers playing; until Ctrl-C."""
 
+    def first() -> Opening:
+        return Opening(prepare_demo(workspace_root).run(DEMO_RUN), DEMO_SHOWS)
 
-def _demo_run(workspace_root: Path) -> StoredRun:
-    """The newest run of the walk that is not finished, else a new one."""
-    session = prepare_demo(workspace_root)
-    runs = session.runs()
-    unfinished = [run for run in runs if run.summary().status in ("new", "interrupted")]
-    return unfinished[-1] if unfinished else prepare_run(session, seed=len(runs))
+    serve(workspace_root, port=port, first=first, announce=announce)
 
 
 def prepare_demo(workspace_root: Path) -> Session:
-    """The bundled walk as a session of the workspace, copied there if it is absent."""
-    return install_sample(Workspace(workspace_root), "walk")
+    """The bundled walk as a session of the workspace with the runs that travel with it, copied there if absent; the
+    planar arm, with which the course begins, beside it.
+    """
+    workspace = Workspace(workspace_root)
+    for sample in ("planar_arm", "walk"):
+        install_prepared_runs(session := install_sample(workspace, sample), sample)
+    return session
 
 
 def printed(full: str, viewers: str, plainly: bool) -> str:
@@ -119,11 +141,9 @@ def printed(full: str, viewers: str, plainly: bool) -> str:
     return "\n".join(lines)
 
 
-def address(at: str, token: str, session: str | None = None, run: str | None = None) -> str:
-    """The address to open; it holds the token. at : scheme, host and port."""
-    query = f"&session={session}" if session else ""
-    query += f"&run={run}" if session and run else ""
-    return f"{at}/?token={token}{query}"
+def address(at: str, token: str, shown: Mapping[str, str] = MappingProxyType({})) -> str:
+    """The address to open; it holds the token. at : scheme, host and port. shown : the page's state, by its names."""
+    return f"{at}/?{urlencode({'token': token, **shown})}"
 
 
 def _named(host: str) -> str:

@@ -17,10 +17,12 @@ import pytest
 
 from studio import launch
 from studio.errors import AccessError, StudioError
-from studio.jobs.commands import Start
+from studio.evaluation.errors import evaluate
+from studio.jobs.commands import Open
 from studio.launch import RedactedFormatter, address, prepare_demo, serve
+from studio.motion_files.trc import read_trc
 from studio.runs.samples import sample_folder
-from studio.sessions.stored_run import StoredRun
+from studio.runs.tracks import RAW, read_track
 from studio.sessions.workspace import Workspace
 
 SERVE = """
@@ -176,7 +178,8 @@ def test_a_workspace_that_is_a_file_is_named(tmp_path: Path) -> None:
 def test_addresses(host: str, shown: str) -> None:
     assert launch._named(host) == shown
     assert address(f"http://{shown}:80", "t") == f"http://{shown}:80/?token=t"
-    assert address("https://a.example", "t", "walk", "run-1").endswith("/?token=t&session=walk&run=run-1")
+    shown = {"session": "walk", "run": "run-1"}
+    assert address("https://a.example", "t", shown).endswith("/?token=t&session=walk&run=run-1")
 
 
 def test_two_addresses_are_printed_and_a_word_about_tls_where_others_come_in() -> None:
@@ -208,18 +211,37 @@ def test_something_in_the_sample_s_place_is_not_touched(tmp_path: Path) -> None:
     assert (tmp_path / "walk" / "precious.txt").read_text() == "mine"
 
 
-def test_the_demo_tracks_the_walk_as_it_opens(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A second demo goes on with the run that the first one left."""
-    runs: list[StoredRun] = []
-    monkeypatch.setattr(launch, "serve", lambda root, first, **_: runs.append(first()))
+def test_the_demo_opens_on_a_frame_that_is_searched_already(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of the runs that travel with the walk one has lost the walker where the other holds him, with as many
+    evaluations; a run that is there already is left alone.
+    """
+    openings: list[launch.Opening] = []
+    monkeypatch.setattr(launch, "serve", lambda root, first, **_: openings.append(first()))
     launch.demo(tmp_path)
+    session = Workspace(tmp_path).session("walk")
+    (mark := session.run("ten-layers").folder / "mine.txt").write_text("mine")
     launch.demo(tmp_path)
-    one, two = runs
-    assert one.folder == two.folder
-    assert [run.name for run in Workspace(tmp_path).session("walk").runs()] == [one.name]
+    assert mark.read_text() == "mine"
+    one, two = openings
+    assert one.run.folder == two.run.folder == session.run("ten-layers").folder
+    assert one.query["run"] == "ten-layers"
+    assert [run.name for run in Workspace(tmp_path).session("planar_arm").runs()] == ["arm"]
+    assert session.truth_path is not None
+    truth, worst, effort = read_trc(session.truth_path), dict[str, float](), dict[str, int]()
+    for run in session.runs():
+        track = read_track(run, RAW)
+        assert int(one.query["frame"]) in track.frames
+        worst[run.name] = evaluate(track.poses, track.frames, run.body(), truth, 60.0).worst_mm
+        with run.results() as results:
+            assert not results.damaged()
+            effort[run.name] = int(results.timeline().evaluations[9])
+    assert worst["ten-layers"] < 30.0 < 100.0 < worst["one-layer"]
+    assert effort["ten-layers"] == effort["one-layer"] == 500
 
 
-def test_the_run_is_tracked_before_the_server_is_loaded(
+def test_the_run_is_opened_before_the_server_is_loaded(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     done: list[object] = []
@@ -228,7 +250,8 @@ def test_the_run_is_tracked_before_the_server_is_loaded(
         def __init__(self, workspace: Workspace) -> None:
             self.start, self.close = (lambda: done.append("start")), (lambda: done.append("close"))
 
-        def send(self, command: Start) -> None:
+        def send(self, command: Open) -> None:
+            assert command.warm
             done.append(Path(command.run).name)
 
     def loaded(*_: object) -> object:
@@ -239,7 +262,7 @@ def test_the_run_is_tracked_before_the_server_is_loaded(
     monkeypatch.setattr(launch, "_app", loaded)
     with pytest.raises(StudioError, match="Enough"):
         launch.demo(tmp_path)
-    assert done == ["start", "run-1", "server", "close"]
+    assert done == ["start", "ten-layers", "server", "close"]
 
 
 def test_a_second_server_on_a_workspace_is_refused_with_the_first_ones_address(

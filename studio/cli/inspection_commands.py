@@ -40,14 +40,14 @@ def why_command(call: Call) -> dict[str, object]:
     frame = call.given.get("frame")
     frame = worst_frame(opened) if frame is None else frame
     shown: Viewed = call(frame=frame)
-    lines = [opened.caption(frame), *(f"- {finding.words}" for finding in shown.findings)]
+    lines = [opened.caption(frame), *shown.notes, *(f"- {finding.words}" for finding in shown.findings)]
     lines += [f"May help: {remedy.title}. {remedy.words}{_set(remedy.settings)}" for remedy in shown.remedies]
     return {
         "frame": frame,
         "findings": list(shown.findings),
         "remedies": list(shown.remedies),
         "notes": list(shown.notes),
-        "text": "\n".join([*lines, *shown.notes]),
+        "text": "\n".join(lines),
     }
 
 
@@ -87,7 +87,8 @@ def _answer(
 
 def tables_csv(tables: Sequence[Table], caption: str) -> str:
     """The tables one after the other: caption and titles as comments, units in the head."""
-    parts = [f"# {caption}\n"]
+    # A line break within, of a run's record, would begin a cell.
+    parts = [f"# {' '.join(caption.split())}\n"]
     for table in tables:
         heads = [f"{one.key} [{one.unit}]" if one.unit else one.key for one in table.columns]
         rows = [["" if cell is None else cell for cell in row] for row in table.for_readers()]

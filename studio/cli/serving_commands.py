@@ -31,7 +31,7 @@ def _announcer(as_json: bool) -> Announce:
 @click.option("--port", type=click.IntRange(0, 65535), default=0, show_default=True, help=PORT_HELP)
 @click.option("--json", "as_json", is_flag=True, help=JSON_HELP)
 def demo_command(workspace: Path | None, port: int, as_json: bool) -> None:
-    """Track the bundled walk in the browser: prints the address to open."""
+    """Watch the search on the bundled walk in the browser: prints the address to open."""
     click.echo(PREPARING, err=True)
     with errors_in_words():
         demo(workspace or workspace_root(), port=port, announce=_announcer(as_json))

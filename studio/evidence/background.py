@@ -7,6 +7,7 @@ fixed set of frames and then only applied (learning rate 0), so that a frame's m
 frames processed before.
 """
 
+import dataclasses
 import threading
 from collections.abc import Sequence
 from typing import Literal, Protocol
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from studio.arrays import Bytes, Floats
 from studio.evidence.settings import EvidenceSettings
+from studio.evidence.shadow_colours import DARKNESS_BINS, TINT_BINS, TINT_REACH, Changed, ShadowTable
 from studio.numba_in_threads import EXACT, KERNEL, njit
 
 GAIN_STRIDE = 8
@@ -38,8 +40,12 @@ frames twice more, so that updates already due and the order of a mixture's Gaus
 class BackgroundModel(Protocol):
     """One camera's background, fitted."""
 
-    def foreground(self, picture: Bytes, settings: EvidenceSettings) -> Bytes:
-        """(H, W) uint8, 255 where the picture differs from the background, before any clean-up."""
+    def foreground(
+        self, picture: Bytes, settings: EvidenceSettings, shadows: ShadowTable | None = None
+    ) -> Bytes:
+        """(H, W) uint8, 255 where the picture differs from the background, before any clean-up. shadows : of
+        `learn_shadow_colours`.
+        """
         ...
 
 
@@ -66,10 +72,12 @@ class GaussianBackground:
         self._samples = self.mean[::GAIN_STRIDE, ::GAIN_STRIDE].astype(np.float32)
         self.is_grey = float(np.ptp(self._samples, axis=2).mean()) < GREY_SPREAD
 
-    def foreground(self, picture: Bytes, settings: EvidenceSettings) -> Bytes:
+    def foreground(
+        self, picture: Bytes, settings: EvidenceSettings, shadows: ShadowTable | None = None
+    ) -> Bytes:
         """(H, W) uint8, 255 where the picture differs and is no shadow."""
         gain = self.gain(picture) if settings.mask_gain_fit else np.ones(3, np.float32)
-        darkest = settings.mask_shadow_darkest if settings.mask_shadow_test and not self.is_grey else 2.0
+        darkest = settings.mask_shadow_darkest if self.tests_shadows(settings) else NO_SHADOW
         return differing_pixels(
             np.ascontiguousarray(picture),
             self.mean,
@@ -80,6 +88,19 @@ class GaussianBackground:
             np.float32(settings.mask_noise**2),
             np.float32(darkest),
             np.float32(settings.mask_shadow_colour),
+            ALL_SHADOW if shadows is None else shadows,
+        )
+
+    def tests_shadows(self, settings: EvidenceSettings) -> bool:
+        """Whether darker pixels may count as background: a grey picture has no colour to compare."""
+        return settings.mask_shadow_test and not self.is_grey
+
+    def changed(self, picture: Bytes, settings: EvidenceSettings) -> Changed:
+        """What differs, with and without the shadow test, for learning the colours of shadows."""
+        differs = self.foreground(picture, dataclasses.replace(settings, mask_shadow_test=False)) > 0
+        gain = self.gain(picture) if settings.mask_gain_fit else np.ones(3, np.float32)
+        return Changed(
+            differs, differs & (self.foreground(picture, settings) == 0), picture, self.mean * gain
         )
 
     def gain(self, picture: Bytes) -> Floats:
@@ -122,8 +143,10 @@ class SubtractorBackground:
             self._model.apply(picture, learningRate=self._rate)
         self._lock = threading.Lock()
 
-    def foreground(self, picture: Bytes, settings: EvidenceSettings) -> Bytes:
-        """(H, W) uint8, 255 for foreground; OpenCV's shadow pixels are background."""
+    def foreground(
+        self, picture: Bytes, settings: EvidenceSettings, shadows: ShadowTable | None = None
+    ) -> Bytes:
+        """(H, W) uint8, 255 for foreground; OpenCV's shadow pixels are background, by its own test alone."""
         with self._lock:
             if isinstance(self._model, cv2.BackgroundSubtractorMOG2):
                 self._model.setVarThreshold(settings.mask_threshold**2)
@@ -198,6 +221,12 @@ def gain_ratios(
     return ratios, counts
 
 
+NO_SHADOW = 2.0
+"""Darkest shadow at which nothing is shadow."""
+ALL_SHADOW: ShadowTable = np.ones((DARKNESS_BINS, TINT_BINS, TINT_BINS), np.uint8)
+"""The table that leaves the decision to the two tolerances."""
+ALL_SHADOW.setflags(write=False)
+REACH, PER_TINT = np.float32(TINT_REACH), np.float32(0.5 * TINT_BINS / TINT_REACH)
 PART, WORDS = 16, 6
 """Pixels of a row that are decided together, and 64-bit words of their flags, a byte a colour."""
 ROUGH = np.float32(0.501)
@@ -215,13 +244,14 @@ def differing_pixels(
     noise: np.float32,
     darkest: np.float32,
     colour: np.float32,
+    shadows: NDArray[np.uint8],
 ) -> Bytes:
     """255 where a colour differs by more than sqrt(threshold) deviations and the pixel is no shadow.
 
     picture : (H, W, 3) uint8. mean : (H, W, 3) uint8 or float32. rough : (H, W, 3) uint8, the mean rounded. variance :
     (H or 1, W, 3) float32. noise : least variance. A shadow has
     darkest <= brightness / background < 1 and a colour within `colour` of the background's, as a share of its
-    brightness.
+    brightness; of these it is one where the table `shadows` (`shadow_colours.cells_of`) has 1.
     The first loop of a row vectorises over all its colours: nearer to the rounded mean than the least noise allows
     nothing differs. Most of a picture is decided so, at a quarter of the bytes; only the rest is compared exactly.
     """
@@ -266,5 +296,17 @@ def differing_pixels(
                     off_colour = square - share * dot
                     same_colour = off_colour < colour * colour * norm + noise
                     shadow = darkest <= share and share < np.float32(1.0) and same_colour
+                    if shadow:
+                        root = np.sqrt(max(norm, np.float32(1.0)))
+                        blue = (np.float32(seen[k]) - share * gain[0] * np.float32(expected[k])) / root
+                        red = (np.float32(seen[k + 2]) - share * gain[2] * np.float32(expected[k + 2])) / root
+                        shadow = (
+                            shadows[
+                                min(int(share * (DARKNESS_BINS - 1)), DARKNESS_BINS - 1),
+                                min(max(int(np.floor((blue + REACH) * PER_TINT)), 0), TINT_BINS - 1),
+                                min(max(int(np.floor((red + REACH) * PER_TINT)), 0), TINT_BINS - 1),
+                            ]
+                            > 0
+                        )
                     row[x] = np.uint8(0) if shadow else np.uint8(255)
     return out

@@ -1,7 +1,8 @@
 """The exports in a run's folder: `exports/<file>`, each with its report."""
 
 import datetime
-from collections.abc import Mapping
+import os
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import msgspec
@@ -14,6 +15,7 @@ from studio.export.task import Writer
 from studio.progress import Progress, unheard
 from studio.runs.tracks import BEST, RAW, best_track, read_track, track_digest, track_names
 from studio.runs.workflow import ExportedFile
+from studio.sessions.atomic_files import discard, new_folder_beside, writing
 from studio.sessions.record_files import RecordFile
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -74,6 +76,28 @@ def export_into_run(
     )
     content = _content(run, report.track) if report.track else ""
     kept = msgspec.structs.replace(_kept_export(report, requested), track=report.track, content=content)
+    _RECORD.write(folder / f"{kept.file}{SAID}", kept)
+    return kept
+
+
+def keep_film(
+    run: StoredRun, stem: str, kind: str, fps: float, write: Callable[[Path], int], words: str
+) -> KeptExport:
+    """Keep a film of the scene among the run's exports. write : makes the file, and says how many pictures it has. The
+    same film replaces its file.
+    """
+    folder = run.folder / FOLDER
+    folder.mkdir(exist_ok=True)
+    place = folder / f"{stem}.{kind}"
+    part = new_folder_beside(place)
+    try:
+        count = write(part / place.name)
+        with writing("The film", place):
+            os.replace(part / place.name, place)
+    finally:
+        discard(part)
+    made = datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds")
+    kept = KeptExport(place.name, kind, made, place.stat().st_size, count, fps, words, (), {})
     _RECORD.write(folder / f"{kept.file}{SAID}", kept)
     return kept
 

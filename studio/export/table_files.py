@@ -17,6 +17,7 @@ from studio.body.forward_kinematics import joint_frames
 from studio.errors import ExportError
 from studio.export.marker_files import marked_points, point_notes
 from studio.export.task import ExportTask, Written, agreed, apart
+from studio.runs.notes import notes_by_frame
 
 DEGREE_SIGNS = {"degrees": "deg", "radians": "rad"}
 FIRST_COLUMNS = ("frame", "time [s]", "state", "confidence")
@@ -24,7 +25,9 @@ ROWS_A_STEP = 500
 
 
 def write_csv(task: ExportTask) -> Written:
-    """One row a frame: number, time, state, confidence, the pose's entries, the points. The heads name the units."""
+    """One row a frame: number, time, state, confidence, the pose's entries, the points, and the note on the frame where
+    the run has notes. The heads name the units.
+    """
     points, places = marked_points(task)
     motion, options = task.motion, task.options
     poses = np.where(motion.known[:, None], motion.poses, np.nan)
@@ -38,6 +41,8 @@ def write_csv(task: ExportTask) -> Written:
         *(f"{entry.name} [{sign}]" for entry, sign in zip(motion.body.parameters, signs, strict=True)),
         *(f"{name} {axis} [{options.unit}]" for name in points.names for axis in "xyz"),
     ]
+    remarks = notes_by_frame(task.run)
+    heads += ["note"] if remarks else []
     table = np.concatenate([shown, task.axes.points(places).reshape(len(places), -1)], axis=1)
     with task.place.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
@@ -46,7 +51,8 @@ def write_csv(task: ExportTask) -> Written:
             if row % ROWS_A_STEP == 0:
                 task.step("writing", row, len(table))
             first = (f"{motion.frames[row]:.12g}", f"{motion.times[row]:.9f}", motion.states[row])
-            writer.writerow([*first, _cell(motion.confidence[row]), *map(_cell, values)])
+            note = [remarks.get(float(motion.frames[row]), "")] if remarks else []
+            writer.writerow([*first, _cell(motion.confidence[row]), *map(_cell, values), *note])
     task.step("reading back", len(table), len(table))
     checked = _read_csv_back(task, heads, places, poses, angle)
     notes = [f"Angles in {options.angles}, lengths in {options.unit}, {options.up.upper()} up."]
@@ -73,6 +79,7 @@ def write_parquet(task: ExportTask) -> Written:
         "up": task.options.up,
         "fps": f"{motion.fps:.12g}",
         "names": task.options.names,
+        **_remarks(task),
     }
     table = pa.table(columns).replace_schema_metadata(metadata)
     task.step("writing", 0, 2)
@@ -82,6 +89,12 @@ def write_parquet(task: ExportTask) -> Written:
     values = np.stack([read.column(axis).to_numpy() for axis in "xyz"], axis=-1).reshape(places.shape)
     checked = agreed(task.place, apart(task.axes.points_back(values), places))
     return Written((task.place,), checked, point_notes(task, points, "null"))
+
+
+def _remarks(task: ExportTask) -> dict[str, str]:
+    """The notes on frames, as the JSON text of an object; {} without any."""
+    remarks = notes_by_frame(task.run)
+    return {"notes": json.dumps(remarks)} if remarks else {}
 
 
 def write_npz(task: ExportTask) -> Written:
@@ -112,6 +125,7 @@ def write_npz(task: ExportTask) -> Written:
         "fps": motion.fps,
         "poses": "radians and mm of the body's parameters, world z up, whatever unit and up say",
         "joint_rotations": "columns are the joint's axes in the file's world",
+        **_remarks(task),
     }
     task.step("writing", 0, 2)
     np.savez_compressed(task.place, about=np.array(json.dumps(about)), **arrays)
@@ -138,8 +152,8 @@ def _read_csv_back(
         rows = list(csv.reader(stream))
     if rows[0] != heads or len(rows) != len(places) + 1:
         raise ExportError(f"'{task.place.name}' reads back with other columns or rows.", "Export it again.")
-    start = len(FIRST_COLUMNS)
-    table = np.array([[float(cell) if cell else math.nan for cell in row[start:]] for row in rows[1:]])
+    numbers = slice(len(FIRST_COLUMNS), len(heads) - (heads[-1] == "note"))
+    table = np.array([[float(cell) if cell else math.nan for cell in row[numbers]] for row in rows[1:]])
     read = task.axes.points_back(table[:, poses.shape[1] :].reshape(places.shape))
     angles = table[:, : poses.shape[1]][:, angle]
     angles = angles if task.options.angles == "degrees" else np.degrees(angles)

@@ -2,16 +2,20 @@
 pose and silhouettes disagree.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from studio.arrays import Array
+from studio.body.model import BodyModel
 from studio.evaluation.errors import lost_mm
 from studio.inspection.over_frames import summaries
 from studio.inspection.reading import InspectedRun, no_value
 from studio.inspection.reference import body_points, by_limb, limb_group, limbs_of_points, true_points
 from studio.inspection.tables import Row, Selection
+from studio.inspection.verdict import Verdict, verdicts
 from studio.runs.tracks import RAW, read_track
-from studio.trackers.tracker import LIMB_LOST_SHARE
+from studio.trackers.tracker import TRACKED
 
 
 def errors_of(run: InspectedRun, track: str = "") -> dict[int, dict[str, float]]:
@@ -41,30 +45,48 @@ def _distances(run: InspectedRun, track: str) -> dict[int, Array]:
     return found
 
 
+def limbs_too_far(body: BodyModel, distances: Array) -> tuple[str, ...]:
+    """The limbs lost by the truth. distances : (M,) of a frame's markers from the true ones, mm, NaN unknown."""
+    owners = np.array(limbs_of_points(body))
+    return tuple(sorted(set(owners[distances > lost_mm(body)].tolist())))
+
+
+def limb_shares(disagreement: Mapping[str, float]) -> dict[str, float]:
+    """By limb the disagreeing share, the largest of what is counted as head and trunk."""
+    own: dict[str, float] = {}
+    for name, share in disagreement.items():
+        own[limb_group(name)] = max(own.get(limb_group(name), 0.0), share)
+    return own
+
+
 def disagreements_of(run: InspectedRun) -> dict[int, dict[str, float]]:
-    """By frame and limb the disagreeing share, the largest of what is counted as head and trunk; {} for a frame in
-    which nothing was compared.
-    """
-    found: dict[int, dict[str, float]] = {}
-    for frame, entry in summaries(run).items():
-        own: dict[str, float] = {}
-        for name, share in entry.disagreement.items():
-            own[limb_group(name)] = max(own.get(limb_group(name), 0.0), share)
-        found[frame] = own
-    return found
+    """By frame and limb the disagreeing share; {} for a frame in which nothing was compared."""
+    return {frame: limb_shares(entry.disagreement) for frame, entry in summaries(run).items()}
+
+
+def verdicts_on(run: InspectedRun, track: str = "") -> dict[int, Verdict]:
+    """By frame the verdict on a run, in a track by the truth."""
+    return _verdicts(run, _distances(run, track))
+
+
+def _verdicts(run: InspectedRun, distances: dict[int, Array]) -> dict[int, Verdict]:
+    by_truth = {frame: limbs_too_far(run.body, away) for frame, away in distances.items()}
+    with run.run.results() as results:
+        return verdicts(results, run.run.folder, results.timeline(), by_truth)
 
 
 def limb_rows(run: InspectedRun, selection: Selection) -> dict[str, list[Row]]:
-    """The run's table of view `why`. A limb is lost as in an evaluation: one of its markers is too far off."""
+    """The run's table of view `why`."""
     distances = _distances(run, selection.track)
-    errors, shares = _means(run, distances), disagreements_of(run)
+    errors, shares, said = _means(run, distances), disagreements_of(run), _verdicts(run, distances)
     table: list[Row] = []
-    limit, owners = lost_mm(run.body), np.array(limbs_of_points(run.body))
     for frame in sorted(shares.keys() | errors.keys()):
-        off, share = errors.get(frame, {}), shares.get(frame, {})
-        too_far = set(owners[distances[frame] > limit]) if frame in distances else set[str]()
+        off, share, own = errors.get(frame, {}), shares.get(frame, {}), said.get(frame, UNKNOWN)
         for limb in dict.fromkeys((*off, *share)):
             mm, area = off.get(limb, float("nan")), share.get(limb, float("nan"))
-            lost = limb in too_far if np.isfinite(mm) else area > LIMB_LOST_SHARE
-            table.append((frame, limb, no_value(mm), no_value(area), bool(lost)))
+            table.append((frame, limb, no_value(mm), no_value(area), limb in own.lost, own.lost_by(limb)))
     return {"limbs": table}
+
+
+UNKNOWN = Verdict(TRACKED)
+"""Of a frame that only a derived track has."""

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from studio.arrays import Array
 from studio.body.forward_kinematics import limb_ends
+from studio.body.model import extremities
 from studio.errors import NotFoundError, RunError, StudioError
 from studio.evaluation.errors import Evaluation, evaluate
 from studio.geometry.camera import Camera
@@ -23,6 +24,7 @@ from studio.inspection.views import look, look_over, view_named
 from studio.motion_files.trc import read_trc
 from studio.progress import Progress, unheard
 from studio.runs.new_run import software_version
+from studio.runs.notes import notes_by_frame
 from studio.runs.self_contained import self_contained_page
 from studio.runs.tracks import RAW, read_track
 from studio.sessions.manifest import now
@@ -30,6 +32,8 @@ from studio.settings import all_knobs, settings_from_values, values
 from studio.trackers.catalogue import TRACKERS
 from studio.trackers.tracker import Tracker
 
+MOST_CLOUDS, MOST_PARTICLES = 12, 200
+"""Frames whose particles are in the page, and particles of a layer: evenly chosen of more."""
 MOST_FRAMES = 800
 """Frames whose numbers and bodies are in the page."""
 DIGITS = 6
@@ -62,9 +66,16 @@ class _Shown:
     whole: int
 
 
-def shared_page(run: InspectedRun, frame: int, *, track: str = "", progress: Progress = unheard) -> str:
+def shared_page(
+    run: InspectedRun,
+    frame: int,
+    *,
+    track: str = "",
+    clouds: Sequence[int] = (),
+    progress: Progress = unheard,
+) -> str:
     """The page's text. frame : that is looked into. track : whose poses are drawn and measured, the search's own by
-    default.
+    default. clouds : frames whose particles are in the page, beside those of `frame`; at most MOST_CLOUDS.
 
     Raises RunError for a run without frames, NotFoundError for a frame or track that it does not have.
     """
@@ -75,7 +86,13 @@ def shared_page(run: InspectedRun, frame: int, *, track: str = "", progress: Pro
         raise NotFoundError(
             f"Run '{run.run.name}' has no finished frame {frame}.", f"It has {finished[0]} to {finished[-1]}."
         )
-    shown = _Shown(run, track or RAW, frame, _some(finished, frame), len(finished))
+    searched = sorted({frame, *clouds})
+    if len(searched) > MOST_CLOUDS or not set(searched) <= set(finished):
+        raise RunError(
+            f"The particles of frames {', '.join(map(str, clouds))} cannot be in the page.",
+            f"Name at most {MOST_CLOUDS - 1} finished frames; they are {finished[0]} to {finished[-1]}.",
+        )
+    shown = _Shown(run, track or RAW, frame, _some(finished, *searched), len(finished))
     figures: list[dict[str, Any]] = []
     total = 2 + len(OVER_RUN) + len(OF_FRAME)
     parameter = _most_settled(look(run, frame, "variance", Selection()))
@@ -103,13 +120,14 @@ def shared_page(run: InspectedRun, frame: int, *, track: str = "", progress: Pro
             "made": f"{now()[:16].replace('T', ' ')} UTC, Capture studio {software_version()}",
             "facts": _facts(shown),
             "settings": _settings(run),
-            "notes": [*record.notes, *_left_out(shown)],
+            "notes": [*record.notes, *_remarks(shown), *_left_out(shown)],
             "fps": record.fps,
             "frame": frame,
             "parameter": parameter,
             "parameters": [{"name": one.name, "label": one.label} for one in run.body.parameters],
             "score": list(TRACKERS.get(record.tracker, Tracker).score),
             "scene": _scene(shown),
+            "clouds": [_cloud(run, one) for one in searched],
             "figures": [_over_frames(shown), *figures],
             "why": why,
         },
@@ -124,10 +142,52 @@ def _most_settled(viewed: Viewed) -> str:
     return str(max(reduced, key=lambda entry: float(entry[1] or 0.0))[0])
 
 
-def _some(finished: Sequence[int], frame: int) -> NDArray[np.int64]:
-    """At most MOST_FRAMES of the frames, the first, the last and `frame` among them."""
-    chosen = np.linspace(0, len(finished) - 1, min(len(finished), MOST_FRAMES - 1)).round().astype(int)
-    return np.unique(np.append(np.array(finished)[chosen], frame))
+def _some(finished: Sequence[int], *frames: int) -> NDArray[np.int64]:
+    """At most MOST_FRAMES of the frames, the first, the last and `frames` among them."""
+    most = MOST_FRAMES - len(frames)
+    chosen = np.linspace(0, len(finished) - 1, min(len(finished), most)).round().astype(int)
+    return np.unique(np.append(np.array(finished)[chosen], frames))
+
+
+def _cloud(run: InspectedRun, frame: int) -> dict[str, Any]:
+    """The particles of a frame's layers: where their extremities (hands, feet, head) are, as 16-bit numbers, `step` mm
+    each, from `offset`, particle by particle; of each the particle of the layer before that it was drawn from, -1 for
+    none that is in the page; its weight beside the layer's heaviest, 0 to 255.
+    """
+    records = run.frame(frame).layers
+    tips = list(extremities(run.body))
+    kept = [
+        np.linspace(0, len(record.poses) - 1, min(len(record.poses), MOST_PARTICLES)).round().astype(int)
+        for record in records
+    ]
+    ends = [limb_ends(run.body, one.poses[rows])[:, tips, 1] for one, rows in zip(records, kept, strict=True)]
+    offset: Array = np.round(np.concatenate([one.reshape(-1, 3) for one in ends]).mean(axis=0))
+    step = max(0.5, max(float(np.abs(one - offset).max()) for one in ends) / 32000.0)
+    layers: list[dict[str, Any]] = []
+    for at, (record, rows, places) in enumerate(zip(records, kept, ends, strict=True)):
+        before = records[at - 1].parents[0] if at else np.zeros(0, dtype=np.int64)
+        place_of = {int(row): place for place, row in enumerate(kept[at - 1])} if at else {}
+        heavy = np.exp(record.log_weights[rows] - record.log_weights[rows].max())
+        layers.append(
+            {
+                "layer": record.layer,
+                "beta": _number(record.beta),
+                "points": _packed(np.round((places - offset) / step).astype("<i2")),
+                "parents": [place_of.get(int(before[row]), -1) if row < len(before) else -1 for row in rows],
+                "weights": _packed(np.round(255 * heavy).astype(np.uint8)),
+                "of": len(record.poses),
+            }
+        )
+    return {"frame": frame, "offset": offset.tolist(), "step": step, "tips": len(tips), "layers": layers}
+
+
+def _packed(numbers: NDArray[Any]) -> str:
+    return base64.b64encode(numbers.tobytes()).decode("ascii")
+
+
+def _remarks(shown: _Shown) -> list[str]:
+    """The notes on frames."""
+    return [f"Frame {frame}: {words}" for frame, words in notes_by_frame(shown.run.run).items()]
 
 
 def _left_out(shown: _Shown) -> list[str]:
@@ -289,7 +349,7 @@ def _scene(shown: _Shown) -> dict[str, Any]:
     packed: NDArray[np.int16] = np.round((ends - offset) / step).astype("<i2")
     return {
         "frames": track.frames[known].tolist(),
-        "ends": base64.b64encode(packed.tobytes()).decode("ascii"),
+        "ends": _packed(packed),
         "offset": offset.tolist(),
         "step": step,
         "limbs": [

@@ -1,9 +1,10 @@
 """Why a frame failed, in words made of measurements.
 
-What is asked, in this order; the first that holds is the cause:
+Said first is whether the frame fits, as the timeline and the badge have it (`verdict`), and what is compared with what.
+Then it is asked, in this order; the first that holds is the cause:
 
 1. Is any limb in the wrong place? In mm from the reference pose: the truth, else what a refinement or later track made
-   of the frame, else a refinement made now.
+   of the frame, else a refinement made now; that, too, where a limb is lost that the later track left where it is.
 2. Does one camera contradict the others at the reference pose (`camera_checks`)? Where a shift of the outlines mends
    it, its calibration is wrong, else its masks are.
 3. Is the pose the reference with sides exchanged?
@@ -14,10 +15,10 @@ What is asked, in this order; the first that holds is the cause:
 5. Does the likelihood prefer the wrong pose, both settled nearby? Then which camera and term (`blame`)?
 6. Else the stretch is tracked again with more particles and with more noise, and what helps names the cause.
 
-Stretches are always tracked again with the remedy, and what became of the limb is told. What these rules cannot tell
+Stretches are always tracked again with the remedy, and what became of the limb is said. What these rules cannot tell
 apart: a survival rate that is too low and too few particles where both are so; a camera that is moved and one whose
 masks are shifted; limbs exchanged by the likelihood and by a search that got lost where both limbs meet; with fewer
-than three cameras, any fault of one.
+than three cameras, any fault of one. Distances in mm are at a person's size (`scale_of`).
 """
 
 import threading
@@ -29,22 +30,26 @@ from functools import cached_property
 import numpy as np
 
 from studio.arrays import Array
+from studio.body.scale import scale_of
 from studio.errors import StudioError
+from studio.evaluation.errors import lost_mm
 from studio.inspection.blame import ReferencePose, judged_pose, reference_pose
 from studio.inspection.camera_checks import CameraFault, fault_of, view_fits
 from studio.inspection.likelihoods import FrameEvaluation, evaluation_of
+from studio.inspection.limbs import limb_shares, limbs_too_far
 from studio.inspection.modes import exchanged_in
 from studio.inspection.reading import InspectedFrame, no_value
 from studio.inspection.reference import body_points, by_limb, refined_pose, true_points
 from studio.inspection.retracking import Change, Retracking, more_evaluations
 from studio.inspection.schedule import effective_number
 from studio.inspection.tables import Finding, Found, Remedy, Row, Selection, View, table
+from studio.inspection.verdict import STATE_WORDS, Verdict, verdict, verdict_on
 from studio.knobs import Value, knobs_of
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.runs.run_footage import filmed_cameras
-from studio.runs.tracks import RAW
+from studio.runs.tracks import RAW, best_track, track_stamp
 from studio.settings import RunSettings
-from studio.trackers.tracker import LIMB_LOST_SHARE
+from studio.trackers.tracker import TRACKED
 from studio.words import enumerated
 
 VIEW = View(
@@ -81,6 +86,7 @@ VIEW = View(
             ("error", "Error", "mm"),
             ("disagreement", "Disagreement with the silhouettes"),
             ("lost", "Lost"),
+            ("lost_by", "Lost by"),
             of_run=True,
         ),
     ),
@@ -149,10 +155,29 @@ class Case:
         self.frame, self.run, self.track = frame, frame.of, track
         self.evaluation: FrameEvaluation = evaluation_of(frame)
         self._made: dict[int, Array] = {}
+        self.size = scale_of(frame.of.body)
         self.pose = judged_pose(frame, track)
+        self.verdict = self._verdict()
         self.reference = self._reference()
-        self.errors = self.all_errors(self.pose)
-        self.wrong = [limb for limb, mm in self.errors.items() if mm > WRONG_MM]
+        self.errors, self.wrong = self._compared()
+        if not self.wrong and not self.verdict.fits and self.reference.kind not in ("truth", REFINED_NOW):
+            # The later track has the same fault; a search of its own may know a better place.
+            self.reference = ReferencePose(REFINED_NOW, self._refined_now(frame.number))
+            self.errors, self.wrong = self._compared()
+
+    def _compared(self) -> tuple[dict[str, float], list[str]]:
+        """mm by limb from the reference, and the limbs that are off."""
+        errors = self.all_errors(self.pose)
+        return errors, [limb for limb, mm in errors.items() if mm > WRONG_MM * self.size]
+
+    def _verdict(self) -> Verdict:
+        """What the page says of the frame, in the track that it shows."""
+        truth, lost = true_points(self.run, self.frame.number), tuple[str, ...]()
+        if truth is not None:
+            shown = body_points(self.run.body, self.frame.estimate(self.track)[None])[0]
+            lost = limbs_too_far(self.run.body, np.linalg.norm(shown - truth, axis=1))
+        result = self.frame.result
+        return verdict(TRACKED, (), lost) if result is None else verdict_on(result, lost)
 
     def _reference(self) -> ReferencePose:
         found = reference_pose(self.frame, self.track)
@@ -232,7 +257,7 @@ class Case:
                 break
             away = np.linalg.norm(body_points(self.run.body, self._judged(number)[None])[0] - place, axis=1)
             errors = by_limb(self.run.body, away)
-            if max(float(errors[limb]) for limb in self.wrong) <= RIGHT_MM:
+            if max(float(errors[limb]) for limb in self.wrong) <= RIGHT_MM * self.size:
                 break
             began = number
         return began, max(began, self.frame.number - LONGEST + 1)
@@ -314,7 +339,10 @@ class Case:
         for scale in SETTLING:
             drawn = best + scale * sigma * rng.standard_normal((DRAWN, len(pose)))
             away = np.linalg.norm(body_points(self.run.body, drawn) - goal, axis=2)
-            near = np.stack(list(by_limb(self.run.body, away).values())).max(axis=0) <= KEPT_WITHIN_MM
+            near = (
+                np.stack(list(by_limb(self.run.body, away).values())).max(axis=0)
+                <= KEPT_WITHIN_MM * self.size
+            )
             drawn = drawn[near & self.run.priors.hold(drawn)]
             if not len(drawn):
                 continue
@@ -341,7 +369,7 @@ class Case:
                     no_value(float(mm.min())),
                     no_value(float(np.median(mm))),
                     no_value(float(spread[limb])),
-                    bool(mm.min() <= NEAR_MM),
+                    bool(mm.min() <= NEAR_MM * self.size),
                 )
                 for limb, mm in away.items()
             ]
@@ -397,8 +425,7 @@ def usual_survival(settings: RunSettings) -> dict[str, Value]:
 def rows(frame: InspectedFrame, selection: Selection) -> Found:
     """The tables, findings and remedies of view `why`; kept for the frames that were asked for last."""
     track = selection.track if selection.track != RAW else ""
-    stamp = None if frame.result is None else (frame.result.milliseconds, frame.result.estimate.log_weight)
-    key = (frame.of.run.folder, frame.number, track, stamp)
+    key = (frame.of.run.folder, frame.number, track, *_stamps(frame))
     with _lock:
         if key in _known:
             _known.move_to_end(key)
@@ -411,47 +438,104 @@ def rows(frame: InspectedFrame, selection: Selection) -> Found:
     return found
 
 
+def _stamps(frame: InspectedFrame) -> tuple[object, ...]:
+    """What the answer depends on: the frame, the track and the truth that it is compared with."""
+    result, run = frame.result, frame.of.run
+    own = None if result is None else (result.milliseconds, result.estimate.log_weight)
+    best, truth = best_track(run).name, frame.of.session.truth_path
+    return own, best, track_stamp(run, best), None if truth is None else truth.stat().st_mtime_ns
+
+
 _lock = threading.Lock()
 _known: OrderedDict[tuple[object, ...], Found] = OrderedDict()
 
 
 def _explained(case: Case) -> Found:
-    findings, remedies = [_verdict(case)], list[Remedy]()
+    findings, remedies = [_first_finding(case)], list[Remedy]()
     fault = case.camera_fault
     if fault is not None:
         _add_camera(case, fault, findings, remedies)
     if case.wrong:
         limb = max(case.wrong, key=lambda name: case.errors[name])
         _add_search(case, limb, findings, remedies, cause_known=fault is not None)
+    if not case.verdict.fits and not remedies:
+        remedies.append(BY_HAND)
     table: list[Row] = [(one.kind, one.words, one.limb, one.layer, one.camera, one.term) for one in findings]
     return Found(
         {"findings": table, "nearest": case.clouds},
-        (f"The pose is compared with: {case.reference.kind}.",),
+        (_compared_with(case),),
         tuple(findings),
         tuple(remedies),
     )
 
 
-def _verdict(case: Case) -> Finding:
-    """What is wrong with the frame."""
-    numbers = dict(case.errors)
+BY_HAND = Remedy(
+    "Correct the frame by hand",
+    "Put the limb where it belongs: the run is tracked again from there, as a new one.",
+    {},
+    "correct",
+)
+
+
+def _compared_with(case: Case) -> str:
+    """What is compared with what."""
+    ours = {"": "the pose that the search found"}.get(case.track, f"track '{case.track}'")
     result = case.frame.result
-    if not case.wrong:
-        limb = max(case.errors, key=lambda name: case.errors[name])
-        words = f"The frame fits: no limb is farther than {case.errors[limb]:.0f} mm from {_of(case.reference.kind)}."
-        return Finding("fits", words, limb, numbers=numbers)
-    named = sorted(case.wrong, key=lambda name: -case.errors[name])
-    parts = [f"the {limb} by {case.errors[limb]:.0f} mm" for limb in named]
-    words = f"Off from {_of(case.reference.kind)}: {enumerated(parts)}."
-    lost = (
-        []
-        if result is None
-        else [limb for limb, share in result.disagreement.items() if share > LIMB_LOST_SHARE]
+    if not case.track and result is not None and result.estimate.searched is not None:
+        ours += ", before it was refined"
+    theirs = {
+        "truth": "the truth",
+        "refined": "what the refinement made of it",
+        REFINED_NOW: f"{REFINED_NOW} made just now",
+    }.get(case.reference.kind, f"track '{case.reference.kind}'")
+    return f"Compared here: {ours}, with {theirs}."
+
+
+def _first_finding(case: Case) -> Finding:
+    """Whether the frame fits, in the words of timeline and badge, and how far the limbs are off."""
+    numbers, reference = dict(case.errors), _of(case.reference.kind)
+    said, mended = _verdict_sentences(case), _mended(case)
+    worst = max(case.errors, key=lambda name: case.errors[name])
+    if case.wrong:
+        named = sorted(case.wrong, key=lambda name: -case.errors[name])
+        parts = [f"the {limb} by {_mm(case.errors[limb])}" for limb in named]
+        words = f"Off from {reference}: {enumerated(parts)}.{mended}"
+        if case.verdict.fits and not mended:
+            words += f" No limb counts as lost: that begins at a marker {_mm(lost_mm(case.run.body))} off."
+        kind = "mended" if mended and case.verdict.fits else "wrong limb"
+        return Finding(kind, " ".join([*said, words]), named[0], numbers=numbers)
+    farthest = _mm(case.errors[worst])
+    if case.verdict.fits:
+        words = f"The frame fits: no limb is farther than {farthest} from {reference}."
+        return Finding("fits", words, worst, numbers=numbers)
+    if case.reference.kind == "truth":
+        said.append(f"On average no limb's points are farther than {farthest} from the truth.")
+    elif case.verdict.lost:
+        said.append(f"No better place is known: {reference} is nowhere farther than {farthest} away.")
+    limb = case.verdict.lost[0] if case.verdict.lost else worst
+    return Finding("lost", " ".join(said), limb, numbers=numbers)
+
+
+def _verdict_sentences(case: Case) -> list[str]:
+    """Why the page marks the frame as lost; [] where it does not."""
+    verdict, result = case.verdict, case.frame.result
+    found = [STATE_WORDS[verdict.tracking]] if verdict.tracking in STATE_WORDS else []
+    if verdict.by_truth:
+        found.append(
+            f"Lost by the truth: the {enumerated(verdict.by_truth)}, with a marker more than"
+            f" {_mm(lost_mm(case.run.body))} off."
+        )
+    if verdict.by_silhouettes:
+        shares = {} if result is None else limb_shares(result.disagreement)
+        limbs = [f"the {limb}{_share(shares.get(limb))}" for limb in verdict.by_silhouettes]
+        found.append(f"Lost by the silhouettes: {enumerated(limbs)}.")
+    return found
+
+
+def _share(share: float | None) -> str:
+    return (
+        "" if share is None else f" (body and silhouettes disagree about {100.0 * share:.3g} % of its area)"
     )
-    if lost:
-        words += f" The silhouettes contradict the {enumerated(lost)} too."
-    words += _mended(case)
-    return Finding("wrong limb", words, named[0], numbers=numbers)
 
 
 def _mended(case: Case) -> str:
@@ -460,24 +544,22 @@ def _mended(case: Case) -> str:
     if case.track or case.reference.kind == "refined" or result is None or result.estimate.searched is None:
         return ""
     worst = max(case.all_errors(result.estimate.pose).values())
-    return (
-        f" The refinement after the search put it right (at most {worst:.0f} mm)."
-        if worst <= WRONG_MM
-        else ""
-    )
+    if worst > WRONG_MM * case.size:
+        return ""
+    return f" The refinement after the search put it right: no limb is farther off than {_mm(worst)} now."
 
 
 def _add_camera(case: Case, fault: CameraFault, findings: list[Finding], remedies: list[Remedy]) -> None:
     fit, name = fault.fit, fault.fit.camera
     numbers = {"overlap": fit.overlap, "usual": fault.usual, "shifted": fit.best, "shift_px": fit.distance}
     seen = (
-        f"At {_of(case.reference.kind)} body and silhouette overlap by {fit.overlap:.0%} in camera {name}, by"
-        f" {fault.usual:.0%} in the others"
+        f"With the body as in {_of(case.reference.kind)}, body and silhouette overlap by {_percent(fit.overlap)} in"
+        f" camera {name} and by {_percent(fault.usual)} in the others"
     )
     if fault.kind == "calibration":
         words = (
-            f"The calibration of camera {name} is wrong. {seen}; a shift of {fit.distance:.0f} px brings it to"
-            f" {fit.best:.0%}: the camera shows the body's shape in another place."
+            f"The calibration of camera {name} is wrong. {seen}; shifted by {fit.distance:.0f} px they overlap by"
+            f" {_percent(fit.best)}: the camera shows the right shape in the wrong place."
         )
         remedies.append(
             Remedy(f"Calibrate camera {name}", "Calibrate it again, or align the cameras by their silhouettes.", {},
@@ -485,11 +567,11 @@ def _add_camera(case: Case, fault: CameraFault, findings: list[Finding], remedie
         )  # fmt: skip
     else:
         words = (
-            f"The masks of camera {name} are bad. {seen}, and no shift mends that ({fit.best:.0%} at best):"
-            f" {fit.covered:.0%} of the mask is body, {fit.inside:.0%} of the body is in the mask."
+            f"The masks of camera {name} are bad. {seen}, and no shift helps ({_percent(fit.best)} at best):"
+            f" {_percent(fit.covered)} of the mask is body, {_percent(fit.inside)} of the body is in the mask."
         )
         remedies.append(
-            Remedy(f"Look at the masks of camera {name}", "Choose another background or other masks for it.", {},
+            Remedy(f"Look at the masks of camera {name}", "Give it another background, or other masks.", {},
                    "masks")
         )  # fmt: skip
     findings.append(Finding(fault.kind, words, camera=name, numbers=numbers, is_cause=True))
@@ -499,16 +581,18 @@ def _add_search(
     case: Case, limb: str, findings: list[Finding], remedies: list[Remedy], *, cause_known: bool
 ) -> None:
     """Where and why the search lost the limb."""
-    # Refining frames on bad evidence takes long, and threshold nothing.
+    # Refining earlier frames on bad evidence takes long and shows nothing.
     known = case.reference.kind != REFINED_NOW or not cause_known
     began = case.stretch[0] if known else case.frame.number
     if began < case.frame.number:
-        words = f"It began in frame {began}: look there first."
+        words = f"It began in frame {began}: look at that frame first."
         findings.append(Finding("began", words, limb, numbers={"frame": began}, frame=began))
     cause = None if cause_known else _cause(case, limb, remedies)
     if cause is not None:
         findings.append(cause)
-    findings += [_layer_finding(case, limb), _preference_finding(case)]
+    findings.append(_layer_finding(case, limb))
+    if cause is None or cause.kind != "likelihood":
+        findings.append(_preference_finding(case))
     if cause is None or cause.kind not in TRIED:
         return
     remedy = remedies[-1]
@@ -516,8 +600,8 @@ def _add_search(
     trials = case.trials([("the same settings and other seeds", {}), (remedy.title, remedy.settings)])
     for trial in trials:
         words = (
-            f"Tracked again from frame {case.stretch[1]} with {_lowered(trial.what)}: {before:.0f} mm become"
-            f" {trial.left:.0f} mm."
+            f"Tracked again from frame {case.stretch[1]} with {_lowered(trial.what)}: the error of what is off goes"
+            f" from {_mm(before)} to {_mm(trial.left)}."
         )
         findings.append(Finding("trial", words, limb, numbers={"before": before, "after": trial.left}))
 
@@ -531,14 +615,22 @@ def _cause(case: Case, limb: str, remedies: list[Remedy]) -> Finding | None:
     if case.exchanged:
         remedies.append(
             Remedy(
-                "Correct the sides", "Put left and right as they were over all frames.", {}, "correct sides"
+                "Correct the sides",
+                "A run that is tracked to its end has them put right over all frames, in track 'sides'.",
+                {},
+                "correct sides",
             )
         )
-        words = f"{case.exchanged.capitalize()}: the pose is the right one with its sides changed."
+        words = f"{case.exchanged.capitalize()}: with the sides put back the pose is right."
         if case.stretch[0] <= case.run.run.record.first:
             words += " It was so from the run's first frame on: look at the start pose."
             remedies.append(
-                Remedy("Set the start pose", "Begin with the sides as they are.", {}, "start pose")
+                Remedy(
+                    "Set the start pose",
+                    "Begin with left and right as the pictures show them.",
+                    {},
+                    "start pose",
+                )
             )
         return Finding("exchange", words, limb, is_cause=True)
     began, settings = case.stretch[0], case.settings
@@ -548,12 +640,12 @@ def _cause(case: Case, limb: str, remedies: list[Remedy]) -> Finding | None:
     beyond = MOTION if case.effective >= FEW else 2.0 * MOTION
     if deviations > beyond and more_noise(settings):
         remedies.append(
-            Remedy(f"{TIMES_NOISE:g} times the noise", "The first set reaches as far as the motion then.",
+            Remedy(f"{TIMES_NOISE:g} times the noise", "Then the first layer's particles reach as far as the motion.",
                    more_noise(settings))
         )  # fmt: skip
         words = (
-            f"The motion is beyond the noise: the {limb} moved {moved:.0f} mm into frame {number}, {deviations:.1f}"
-            f" times the first set's deviation of {reach:.0f} mm."
+            f"The motion is beyond the noise: into frame {number} the {limb} moved {_mm(moved)}, {deviations:.1f} times"
+            f" the {_mm(reach)} over which the first layer's particles spread."
         )
         return Finding("noise", words, limb, numbers={"moved": moved, "reach": reach}, is_cause=True)
     if began <= record.first and case.frame.number - began < LONGEST:
@@ -566,7 +658,7 @@ def _cause(case: Case, limb: str, remedies: list[Remedy]) -> Finding | None:
     if preference.is_for_the_pose:
         remedies.append(_against(case, preference))
         words = (
-            f"The likelihood prefers the wrong pose by {preference.nats:.3f} nats, most of all in camera"
+            f"The likelihood prefers the wrong pose, by {preference.nats:.3f} nats: most of all camera"
             f" {preference.camera} by its {preference.term} term ({preference.share:+.3f})."
         )
         return Finding(
@@ -587,20 +679,20 @@ def _few(case: Case, limb: str, remedies: list[Remedy]) -> Finding:
                    usual_survival(settings))
         )  # fmt: skip
         words = (
-            f"The survival rate is too low: {wanted:g} of {count} particles lets {case.effective:.1f} of them carry a"
-            " layer's weight, and the cloud collapses on the first good place."
+            f"The survival rate is too low: {wanted:g} of {count} particles survive a layer, whose weight rests on"
+            f" {case.effective:.1f} of them, and the cloud collapses onto the first good pose."
         )
         return Finding("survival", words, limb, numbers=numbers, is_cause=True)
     remedies.append(_more_particles(settings))
     words = (
-        f"There are too few particles: of {count} a layer {case.effective:.1f} carry the weight, too few to look"
-        " everywhere."
+        f"There are too few particles: of {count} a layer {case.effective:.1f} carry the weight, which is too few to"
+        " look everywhere."
     )
     return Finding("particles", words, limb, numbers=numbers, is_cause=True)
 
 
-def _by_trial(case: Case, limb: str, remedies: list[Remedy]) -> Finding | None:
-    """The cause as what helps: more particles, or more noise; None where neither does."""
+def _by_trial(case: Case, limb: str, remedies: list[Remedy]) -> Finding:
+    """The cause as what helps: more particles, or more noise."""
     more, noise, before = (
         _more_particles(case.settings),
         more_noise(case.settings),
@@ -610,20 +702,18 @@ def _by_trial(case: Case, limb: str, remedies: list[Remedy]) -> Finding | None:
     if noise:
         wanted.append((f"{TIMES_NOISE:g} times the noise", noise))
     best = min(case.trials(wanted), key=lambda trial: trial.left)
+    errors = f"the error of what is off goes from {_mm(before)} to {_mm(best.left)}"
     if best.left > HELPS * before:
-        words = (
-            f"The cause is not found: neither {_lowered(more.title)} nor more noise brings the {limb} back"
-            f" ({before:.0f} mm stay {best.left:.0f} mm)."
-        )
+        tried = " or ".join(_lowered(title) for title, _ in wanted)
+        words = f"The cause is unknown: tracked again with {tried}, {errors} at best."
         return Finding("unknown", words, limb, numbers={"before": before, "after": best.left}, is_cause=True)
     if best.what == more.title:
         remedies.append(more)
-        words = "There are too few particles for this frame: the likelihood does not prefer the pose that was found."
+        words = f"There are too few particles for this frame: with {_lowered(more.title)} {errors}."
         return Finding("particles", words, limb, is_cause=True)
-    remedies.append(Remedy(best.what, "The first set reaches farther then.", best.settings))
-    return Finding(
-        "noise", f"The search looked too near: the {limb} is found with more noise.", limb, is_cause=True
-    )
+    remedies.append(Remedy(best.what, "The first layer's particles reach farther then.", best.settings))
+    words = f"The search did not look far enough: with {_lowered(best.what)} {errors}."
+    return Finding("noise", words, limb, is_cause=True)
 
 
 def _more_particles(settings: RunSettings) -> Remedy:
@@ -638,55 +728,59 @@ def _against(case: Case, preference: Preference) -> Remedy:
     if isinstance(now, float) and now > 0.0:
         return Remedy(
             f"Half the weight of the {preference.term} term",
-            "It speaks for the wrong pose.",
+            "This term prefers the wrong pose.",
             {knob: 0.5 * now},
         )
-    return Remedy(
-        f"Look at camera {preference.camera}", "Its evidence speaks for the wrong pose.", {}, "look"
-    )
+    return Remedy(f"Look at camera {preference.camera}", "Its pictures prefer the wrong pose.", {}, "look")
 
 
 def _layer_finding(case: Case, limb: str) -> Finding:
     """Where the reference left the cloud."""
     layer, nearest = case.layer_left(limb)
     numbers = {"nearest": nearest}
+    place = f"where {_of(case.reference.kind)} has the {limb}"
+    near = _mm(NEAR_MM * case.size)
     if layer is None:
-        words = f"Particles were near the {limb}'s right place to the last layer (the nearest {nearest:.0f} mm away)."
+        words = f"Down to the last layer particles were near {place}: the nearest {_mm(nearest)} away."
         return Finding("near to the end", words, limb, numbers=numbers)
     if layer == 0:
         words = (
-            f"The search never looked there: no particle of any layer came within {NEAR_MM:.0f} mm of the {limb}'s"
-            f" right place (the nearest {nearest:.0f} mm)."
+            f"The search never looked there: no particle of any layer came within {near} of {place}, the nearest to"
+            f" {_mm(nearest)}."
         )
         return Finding("never near", words, limb, 0, numbers=numbers)
-    words = (
-        f"The {limb}'s right place left the cloud at layer {layer + 1}: until then a particle was within"
-        f" {NEAR_MM:.0f} mm of it."
-    )
+    words = f"From layer {layer + 1} on no particle was within {near} of {place}; before, there was one."
     return Finding("left the cloud", words, limb, layer, numbers=numbers)
 
 
 def _preference_finding(case: Case) -> Finding:
-    found = case.preference
+    found, reference = case.preference, _of(case.reference.kind)
     numbers = {"nats": found.nats, "share": found.share}
     if found.is_for_the_pose:
         words = (
-            f"The likelihood prefers the wrong pose, by {found.nats:.3f} nats; camera {found.camera}'s"
-            f" {found.term} term most."
+            f"The likelihood prefers the wrong pose, by {found.nats:.3f} nats; most of all camera {found.camera} by its"
+            f" {found.term} term."
         )
     elif found.is_for_the_reference:
-        words = f"The likelihood prefers the right pose, by {-found.nats:.3f} nats: the search missed it."
+        words = f"The likelihood prefers {reference}, by {-found.nats:.3f} nats: the search missed it."
     else:
-        words = f"The likelihood hardly threshold the two poses apart ({found.nats:+.3f} nats)."
+        words = f"The likelihood hardly tells the pose from {reference} ({found.nats:+.3f} nats)."
     return Finding("preference", words, camera=found.camera, term=found.term, numbers=numbers)
 
 
 def _of(kind: str) -> str:
     """A reference in a sentence."""
-    usual = kind if kind.startswith(("a ", "best ")) else f"track '{kind}'"
-    return {"truth": "the truth", "refined": "its refinement", "best particle": "the best particle"}.get(
-        kind, usual
-    )
+    known = {"truth": "the truth", "refined": "its refinement", REFINED_NOW: REFINED_NOW}
+    return known.get(kind, f"track '{kind}'")
+
+
+def _mm(value: float) -> str:
+    """A distance to the millimetre; of small bodies finer."""
+    return f"{value:.0f} mm" if value >= 10.0 else f"{value:.2g} mm"
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.0f} %"
 
 
 def _lowered(text: str) -> str:

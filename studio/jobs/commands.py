@@ -41,8 +41,10 @@ class Open(Command):
     """Make a run the current one, where it stands.
 
     Another run that is being tracked is paused first, saved whole inside its frame; opening the open one changes
-    nothing.
+    nothing. warm : compile its kernels now, so that the first knob that is moved is answered at once.
     """
+
+    warm: bool = field(default=False, kw_only=True)
 
 
 @dataclass(frozen=True, slots=True)

@@ -95,7 +95,8 @@ class JobKind(Generic[SomeState]):
 
     states : the class of its states. changes_session : once it is done, all pages hear that the session has changed.
     busy : why no other of the kind can begin, with fields of the state in braces; "" where several may be under way.
-    keeps_session : meanwhile its session stays where it is, under its name.
+    keeps_session : meanwhile its session stays where it is, under its name. at : the address of its state, page : the
+    page that shows what came of it, both with fields of the state in braces.
     """
 
     event: str
@@ -104,6 +105,8 @@ class JobKind(Generic[SomeState]):
     changes_session: bool = False
     busy: str = ""
     keeps_session: bool = False
+    at: str = ""
+    page: str = ""
 
     def entries(self, found: object, **own: object) -> dict[str, object]:
         """What goes into the state of what was found, by the names of the entries. own : those that differ, or that it
@@ -115,13 +118,14 @@ class JobKind(Generic[SomeState]):
 
 class Job:
     """One job, as its work sees it. state : how it stands. found : what it found, for others to use. closing : it is
-    cancelled because the server ends.
+    cancelled because the server ends. began : seconds since 1970.
     """
 
     def __init__(self, kind: JobKind[State], state: State, publish: Publish) -> None:
         self.state: SessionJob = state
         self.found: object = None
         self.closing = False
+        self.began = time.time()
         self.kind, self._publish = kind, publish
         self._lock = threading.RLock()
         self._stop = threading.Event()
@@ -268,6 +272,37 @@ class JobRunner:
     def state(self, kind: JobKind[State], key: str) -> State:
         """How a job stands. Raises NotFoundError."""
         return cast("State", self._job(kind, key).state)
+
+    def jobs(self, session: str | None = None, event: str = "") -> list[Job]:
+        """All that are known, those that are over too, of a session and kind or of all; the oldest first."""
+        known = [
+            job
+            for name, jobs in list(self._jobs.items())
+            if event in ("", name)
+            for job in list(jobs.values())
+            if session in (None, job.state.session)
+        ]
+        return sorted(known, key=lambda job: job.began)
+
+    def stop(self, event: str, key: str) -> Job:
+        """Let a job of a kind end where it stands. Raises NotFoundError."""
+        job = self._jobs.get(event, {}).get(key)
+        if job is None:
+            raise NotFoundError(f"There is no job '{key[:80]}'.", "It is over and forgotten.")
+        job.cancel()
+        return job
+
+    def forget(self, kind: JobKind[State], session: str) -> None:
+        """Forget what is over of a session, because its answer no longer holds."""
+        with self._lock:
+            jobs = self._jobs.get(kind.event, {})
+            over = [
+                key
+                for key, job in jobs.items()
+                if job.state.session == session and not job.state.state.is_going
+            ]
+            for key in over:
+                del jobs[key]
 
     def last(self, kind: JobKind[State]) -> State | None:
         """How the newest of a kind stands, None before the first."""

@@ -91,7 +91,7 @@ class TrackingJob:
         self._requested_at = math.nan
         self._compiled: set[str] = set()
         self._actions: dict[type[commands.Command], Callable[[Any], None]] = {
-            commands.Open: lambda command: self._open(command.session, command.run),
+            commands.Open: self._open_run,
             commands.Start: self._start,
             commands.Dequeue: self._dequeue,
             commands.StepFrame: lambda command: self._begin(TO_FRAME_END, command.requested_at),
@@ -249,6 +249,11 @@ class TrackingJob:
                 "Pause it first, or wait.",
             )
         self._open(command.session, command.run)
+
+    def _open_run(self, command: commands.Open) -> None:
+        self._open(command.session, command.run)
+        if command.warm and self._run is not None:
+            self._warm_up(self._run)
 
     def _open(self, session: str, run_folder: str) -> None:
         if self._is_open(run_folder):

@@ -7,20 +7,22 @@ from pathlib import Path
 from studio.comparison.tracked import TrackingTrial
 from studio.comparison.trials import TrialJob
 from studio.declaring import operation
-from studio.errors import RunError
+from studio.errors import RunError, StudioError
 from studio.jobs.swept_runs import measure_run
 from studio.jobs.trials import TrialResult, run_jobs
 from studio.operations.behaviours import learn
 from studio.operations.progress import Reporting, reporting
 from studio.progress import Progress
 from studio.runs.behaviour_models import SUFFIX, models_folder
-from studio.runs.samples import install_sample
+from studio.runs.samples import install_prepared_runs, install_sample
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
 from studio.settings import DEFAULT_WEIGHTING
 from studio.trackers.recovery_settings import OFF
 
+BEGINNING, BEGINNING_RUN = "planar_arm", "arm"
+"""The session and run that the course begins with; they travel with the studio."""
 SAMPLE, MODEL, FRAMES = "walk", "course-walk", 40
 """The session, the behaviour model and the number of frames of its runs."""
 Checkpoint = Callable[[], None]
@@ -76,7 +78,8 @@ def make_course(
     checkpoint: Checkpoint = lambda: None,
 ) -> Course:
     """The course's runs in a workspace. processes, checkpoint : see `trials.run_jobs`. Raises StudioError."""
-    session = install_sample(workspace, SAMPLE)
+    for sample in (BEGINNING, SAMPLE):
+        install_prepared_runs(session := install_sample(workspace, sample), sample)
     missing = [one for one in RUNS if not finished(session, one)]
     model = models_folder(workspace.root) / f"{MODEL}{SUFFIX}"
     if any(one.behaviour for one in missing) and not model.exists():
@@ -102,6 +105,14 @@ def finished(session: Session, run: CourseRun) -> bool:
     """Whether a run of the course is there, whole."""
     known = {one.name: one for one in session.runs()}
     return run.name in known and known[run.name].summary(blobs=False).status == "finished"
+
+
+def begins(workspace: Workspace) -> bool:
+    """Whether the run that the course begins with is there."""
+    try:
+        return bool(workspace.session(BEGINNING).run(BEGINNING_RUN).folder)
+    except StudioError:
+        return False
 
 
 def _job(session: Session, run: CourseRun, model: Path) -> TrialJob:

@@ -12,6 +12,7 @@ from studio.footage_recipes import missing_data, real_footage, synthesize
 from studio.operations.progress import Reporting, reporting
 from studio.progress import Progress
 from studio.runs.samples import install_sample
+from studio.runs.self_contained import assets_folder
 from studio.sessions.atomic_files import discard
 from studio.sessions.importers.importing import add_footage
 from studio.sessions.manifest import FILE_NAME
@@ -124,6 +125,8 @@ CARDS = (
     ),
 )
 """A card more is an entry more here; a recipe needs its name only."""
+GALLERY_PICTURES = assets_folder() / "gallery"
+"""A picture of each recipe (`make gallery-pictures`), shown until its session is rendered."""
 
 
 @dataclass(frozen=True, slots=True)

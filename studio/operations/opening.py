@@ -14,7 +14,7 @@ from studio.declaring import Target, operation
 from studio.errors import RunError
 from studio.export.kept_exports import exported_files
 from studio.runs.tracks import Track
-from studio.runs.workflow import Workflow, newest_run, workflow_of
+from studio.runs.workflow import Workflow, run_to_use, workflow_of
 from studio.sessions.session import BODIES_NAME, RUNS_NAME, Session
 from studio.sessions.stored_run import RunSummary, StoredRun
 from studio.sessions.workspace import Workspace
@@ -112,5 +112,5 @@ def bodies() -> tuple[BodyModel, ...]:
 def workflow(session: SessionName) -> Workflow:
     """Say how far a session is, step by step from footage to an exported motion, and what is next."""
     opened = open_session(session)
-    run = newest_run(opened)
+    run = run_to_use(opened)
     return workflow_of(opened, exports=exported_files(run) if run else ())

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from studio.body.model import BodyModel
 from studio.body.subject import Subject
-from studio.declaring import Body, Model, OneOf, Seed, Terminal, operation, taking
+from studio.declaring import Body, Model, OneOf, Seed, Terminal, Web, operation, taking
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.operations.opening import SessionName, open_session
 from studio.operations.progress import Reporting, reporting, say
@@ -21,6 +21,7 @@ from studio.runs.subject_fitting import (
     FitRequest,
     FittedSubject,
     Height,
+    Shown,
     fit_session_subject,
     keep_subject,
 )
@@ -77,6 +78,12 @@ def fit_subject(
         Terminal(kind=Path),
     ] = None,
     progress: Reporting = None,
+    shown: Annotated[
+        Shown | None,
+        Field(description="Called with the body, the frames and the poses found so far."),
+        Terminal(left_out=True),
+        Web(left_out=True),
+    ] = None,
     **options: Any,  # noqa: ANN401 - of the types that are declared
 ) -> FittedSubject:
     """Find limb lengths and radii of the person in a session, together with the poses of a few frames.
@@ -88,7 +95,8 @@ def fit_subject(
     """
     opened = open_session(session)
     with reporting(progress, f"{opened.name}: subject") as report:
-        found = fit_session_subject(opened, FitRequest(**options), progress=report)
+        watched = {} if shown is None else {"shown": shown}
+        found = fit_session_subject(opened, FitRequest(**options), progress=report, **watched)
     if into is not None:
         return dataclasses.replace(found, file=keep_subject(opened, found, Path(into)))
     return dataclasses.replace(found, file=keep_fitted(opened, found)) if keep else found

@@ -1,5 +1,6 @@
 """A run given to others: one page that opens without the studio."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -36,9 +37,14 @@ def share(
     track: Annotated[
         str, Field(description="Whose poses are drawn and measured; default: what the search found.")
     ] = "",
+    clouds: Annotated[
+        Sequence[int],
+        Field(max_length=11, description="Frames whose particles are in the page; default: that one alone."),
+    ] = (),
     progress: Reporting = None,
 ) -> Shared:
-    """Write a run as one self-contained page: settings, the views of its search, the body moving in 3-D.
+    """Write a run as one self-contained page: settings, the views of its search, the body moving in 3-D, the particles
+    of chosen frames playing layer by layer.
 
     It opens from any folder without the studio and asks no other machine for anything; a few MB at most.
 
@@ -47,7 +53,7 @@ def share(
     opened, place = inspected(run), Path(to)
     chosen = worst_frame(opened) if frame is None else frame
     with reporting(progress, f"{opened.session.name} / {opened.run.name}: page") as report:
-        text = shared_page(opened, chosen, track=track, progress=report)
+        text = shared_page(opened, chosen, track=track, clouds=clouds, progress=report)
     with writing("The page", place):
         write_text(place, text)
     return Shared(place, chosen, len(text.encode("utf-8")))

@@ -26,6 +26,11 @@ def check_live(settings: RunSettings, *, live: bool, ping_pong: bool) -> None:
             "Only a live run can play its footage forwards and backwards.",
             "Make it a live run, or leave this option out.",
         )
+    if live and settings.evidence.mask_shadow_learnt:
+        raise RunError(
+            "A live run cannot learn the colours of shadows: its footage is not there yet.",
+            "Set mask_shadow_learnt to false, or track the footage without the clock.",
+        )
     if live and getattr(settings.tracker, "online_learning", False):
         raise RunError(
             "A live run cannot train its behaviour model: an update takes seconds.",

@@ -70,7 +70,7 @@ class ViewComposer:
         self.body: BodyModel = run.body() if run else session.body()
         self.cameras: dict[str, Camera] = {camera.name: camera for camera in session.cameras()}
         self._footage: Footage = footage_of(session, run)
-        self._backgrounds = Backgrounds(self._footage)
+        self._backgrounds = Backgrounds(self._footage, tuple(self.cameras.values()))
         self._settings = settings or _settings_of(session, run)
         self._truth = _truth_of(session)
         self._lock = threading.RLock()
@@ -202,9 +202,7 @@ class ViewComposer:
     def _truth_lines(self, camera: Camera, frame: int) -> Array:
         if self._truth is None:
             return NO_MARKS.truth
-        rows: Indices = np.round(
-            (self._truth.times - float(self._truth.times[0])) * self._footage.fps
-        ).astype(np.int64)
+        rows: Indices = np.round(self._truth.times * self._footage.fps).astype(np.int64)
         place = int(np.searchsorted(rows, frame))
         links = marker_links(self.body, self._truth.names)
         if place >= len(rows) or rows[place] != frame or not links:

@@ -41,4 +41,5 @@ def masks_of(session: Session, settings: EvidenceSettings | None = None) -> Gene
     """
     knobs = settings or session_settings(session).evidence
     with closing(session.footage()) as footage:
-        yield EvidenceMaker(session.cameras(), footage, Backgrounds(footage), knobs, "none")
+        cameras = session.cameras()
+        yield EvidenceMaker(cameras, footage, Backgrounds(footage, cameras), knobs, "none")

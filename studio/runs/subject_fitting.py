@@ -6,7 +6,7 @@ the session, else each frame is searched for one (`runs.initialising`). A popula
 dimensions, so that every later run of the session has this body.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -94,6 +94,14 @@ class FittedSize:
     deviation: float
 
 
+Shown = Callable[[BodyModel, tuple[int, ...], Array], None]
+"""shown(body, frames, poses) is called with what a fit has so far: poses (F, D) of the body in F frames."""
+
+
+def _unshown(_body: BodyModel, _frames: tuple[int, ...], _poses: Array) -> None:
+    """Nothing is shown of a fit before its end."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class FittedSubject:
     """A subject that was found. frames, poses (F, D) : with it. overlap_before, overlap : (F,) f_s. file : that it was
@@ -117,6 +125,7 @@ def fit_session_subject(
     request: FitRequest | None = None,
     *,
     progress: Progress = unheard,
+    shown: Shown = _unshown,
 ) -> FittedSubject:
     """The subject of a session, fitted to its silhouettes. Nothing is written: see `keep_subject`.
 
@@ -128,7 +137,8 @@ def fit_session_subject(
         raise RunError("Neither lengths nor radii are to be fitted.", "Choose at least one of them.")
     body, subject = _first_body(session, request)
     progress("choosing frames", 0, 1)
-    frames, start, poses_from = _first_poses(session, body, request, progress)
+    frames, start, poses_from = _first_poses(session, body, request, progress, shown)
+    shown(body, frames, start)
     evidence = _evidence(session, frames, progress)
     space = shape_space(body, symmetric=request.symmetric, lengths=request.lengths, radii=request.radii)
     space = levelled(space) if request.symmetric else space
@@ -143,10 +153,11 @@ def fit_session_subject(
         prior,
         settings=ShapeSearchSettings(particles=request.particles, layers=request.layers),
         seed=request.seed,
-        progress=lambda done, total: progress("fitting lengths and radii", done, total),
+        progress=lambda done, total: progress("2 of 3, fitting lengths and radii", done, total),
     )
     found = search.run(start)
-    progress("refining lengths and radii", 0, 1)
+    shown(space.body_of(found.shape), frames, found.poses)
+    progress("3 of 3, refining lengths and radii", 0, 1)
     borders = [silhouette_distances(one) for one in evidence]
     refiner = ShapeRefiner(
         silhouettes.programs, session.cameras(), borders, prior, lengths_known=not request.lengths
@@ -202,7 +213,7 @@ def _first_body(session: Session, request: FitRequest) -> tuple[BodyModel, Subje
 
 
 def _first_poses(
-    session: Session, body: BodyModel, request: FitRequest, report: Progress
+    session: Session, body: BodyModel, request: FitRequest, report: Progress, shown: Shown
 ) -> tuple[tuple[int, ...], Array, str]:
     """The frames, a pose in each (F, D), and the origin of the poses."""
     count = session.manifest.frame_count
@@ -222,18 +233,21 @@ def _first_poses(
             return frames, poses[[rows[frame] for frame in frames]], f"run {name}"
     frames = tuple(request.frames) or varied_frames(body, np.arange(count), None, request.count)
     found: list[Array] = []
+    reached = 0
     for done, frame in enumerate(frames):
 
         def report_frame(step: str, part: int, whole: int, done: int = done) -> None:
-            report(
-                f"{step} in frame {frames[done]}", done * 100 + 100 * part // max(whole, 1), 100 * len(frames)
-            )
+            # Never back, as a search ends with a step of its own: the time left is measured from rising parts.
+            nonlocal reached
+            reached = max(reached, done * 100 + 100 * part // max(whole, 1))
+            report(f"1 of 3, {step} in frame {frames[done]}", reached, 100 * len(frames))
 
         found.append(
             within_limits(
                 body, initialise(session, frame, body=body, seed=request.seed, progress=report_frame).pose
             )
         )
+        shown(body, frames[: done + 1], np.array(found))
     return frames, np.array(found), "a search in each frame"
 
 

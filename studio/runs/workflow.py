@@ -9,11 +9,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
+import numpy as np
+
 from studio.body.forward_kinematics import limb_ends
+from studio.calibration.checks import check_calibration
+from studio.calibration.rig_checks import NO_FLOOR, TILTED, UNIT, room_findings
 from studio.errors import StudioError
 from studio.foreign_files import read_file
 from studio.runs.background_setup import MODEL_OF
 from studio.runs.checking import kept_check
+from studio.runs.levelling import floor_was_set
 from studio.runs.silhouette_doubts import standing_doubts
 from studio.runs.tracks import best_track
 from studio.runs.turned_cameras import misses_in_words
@@ -42,7 +47,7 @@ STEPS: tuple[StepName, ...] = get_args(StepName)
 @dataclass(frozen=True, slots=True)
 class StepStatus:
     """A step. words : its result; why : why it is stale, blocked or unreadable, sentences. optional : tracking works
-    without it.
+    without it. run : that it is about, "" for none.
     """
 
     step: StepName
@@ -50,6 +55,7 @@ class StepStatus:
     words: str
     why: str = ""
     optional: bool = False
+    run: str = ""
 
 
 CHANGED = {
@@ -100,6 +106,11 @@ def calibration_step(session: Session) -> StepStatus:
             words,
             f"The footage of camera {enumerated(other)} is of another size now.",
         )
+    asked = (UNIT,) if floor_was_set(session) else (UNIT, TILTED, NO_FLOOR)
+    findings = (*check_calibration(cameras), *room_findings(cameras, _size_mm(session)))
+    if tilted := [finding for finding in findings if finding.code in asked]:
+        why = " ".join([*(finding.message for finding in tilted), tilted[0].remedy])
+        return StepStatus("calibration", "stale", words, why)
     if doubts := standing_doubts(session):
         return StepStatus("calibration", "stale", words, f"The footage contradicts it: {doubts[0]}")
     return StepStatus(
@@ -151,6 +162,15 @@ def _standing_mm(session: Session) -> float:
     return float(limb_ends(body, body.neutral)[0, ..., 2].max())
 
 
+def _size_mm(session: Session) -> float:
+    """The longest extent of the session's body, 0 where that cannot be read."""
+    try:
+        body = session.body()
+    except StudioError:
+        return 0.0
+    return float(np.ptp(limb_ends(body, body.neutral)[0].reshape(-1, 3), axis=0).max())
+
+
 def subject_step(session: Session) -> StepStatus:
     """The subject: by height, or fitted."""
     if not (session.path / SUBJECT_NAME).exists():
@@ -195,7 +215,7 @@ def _is_bounded(lower: float, upper: float) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class ExportedFile:
-    """A file exported from the newest run. stale : why it is out of date, a clause; "" if it is not."""
+    """A file exported from the run that is used. stale : why it is out of date, a clause; "" if it is not."""
 
     name: str
     stale: str = ""
@@ -205,9 +225,30 @@ NOT_EVERYWHERE = "It does not fit everywhere: check the marked frames."
 
 
 def newest_run(session: Session) -> StoredRun | None:
-    """The run of the guided set-up: the newest one that plays its footage once; None without one."""
-    runs = [run for run in session.runs() if not run.record.ping_pong]
+    """The newest run that plays its footage once; None without one."""
+    runs = _runs_once(session)
     return runs[-1] if runs else None
+
+
+def run_to_use(session: Session) -> StoredRun | None:
+    """The run that is checked and exported: the newest with frames, unless it was cancelled and an older one is whole;
+    None without one.
+    """
+    cancelled = None
+    for run in reversed(_runs_once(session)):
+        summary = run.summary()
+        if not summary.done:
+            continue
+        if summary.status != "cancelled":
+            if cancelled is None or summary.status == "finished":
+                return run
+        elif cancelled is None:
+            cancelled = run
+    return cancelled
+
+
+def _runs_once(session: Session) -> list[StoredRun]:
+    return [run for run in session.runs() if not run.record.ping_pong]
 
 
 def run_changes(session: Session, run: StoredRun) -> list[str]:
@@ -224,56 +265,67 @@ def run_changes(session: Session, run: StoredRun) -> list[str]:
 
 
 def track_step(session: Session) -> StepStatus:
-    """The newest run, and whether its inputs are unchanged."""
-    run = newest_run(session)
-    if run is None:
+    """The newest run, and whether its inputs are unchanged; where it was cancelled, the one that is used instead."""
+    newest = newest_run(session)
+    if newest is None:
         return StepStatus("track", "ready", "nothing tracked yet")
-    summary = run.summary()
-    words = f"{run.name}: {summary.done} of {counted(run.record.frame_count, 'frame')}"
+    summary = newest.summary()
     if summary.status == "tracking":
-        return StepStatus("track", "running", words)
-    if not summary.done:
-        return StepStatus("track", "ready", f"{run.name} has not begun")
+        words = f"{newest.name}: {summary.done} of {counted(newest.record.frame_count, 'frame')}"
+        return StepStatus("track", "running", words, run=newest.name)
+    run = run_to_use(session)
+    if run is None:
+        ended = "was cancelled before its first frame" if summary.status == "cancelled" else "has not begun"
+        return StepStatus("track", "ready", f"{newest.name} {ended}", run=newest.name)
+    before = ""
+    if run.name != newest.name:
+        ended = "was cancelled" if summary.status == "cancelled" else "has not begun"
+        before, summary = f"{newest.name} {ended}: {run.name} is used.", run.summary()
+    words = f"{run.name}: {summary.done} of {counted(run.record.frame_count, 'frame')}"
     if summary.damaged:
-        return StepStatus("track", "stale", words, damage_in_words(summary.damaged))
+        return StepStatus("track", "stale", words, damage_in_words(summary.damaged), run=run.name)
     changed = run_changes(session, run)
     if changed:
         why = f"{run.name} was tracked before {enumerated(changed)} changed: track again."
-        return StepStatus("track", "stale", words, why)
+        return StepStatus("track", "stale", words, why, run=run.name)
     missing = run.record.frame_count - summary.done
     why = (
         f"{counted(missing, 'frame')} of it {'is' if missing == 1 else 'are'} not tracked." if missing else ""
     )
-    return StepStatus("track", "done", words, why)
+    return StepStatus("track", "done", words, " ".join(filter(None, (before, why))), run=run.name)
 
 
 def check_step(session: Session) -> StepStatus:
-    """The check of the newest run."""
-    run = newest_run(session)
+    """The check of the run that is used."""
+    run = run_to_use(session)
     if run is None:
-        return StepStatus("check", "blocked", "", "It needs a run.")
+        return StepStatus("check", "blocked", "", "It needs a run that has frames.")
     name = best_track(run).name
     check = kept_check(run, name)
     if check is None:
-        return StepStatus("check", "ready", f"{run.name}, track {name}: not checked yet")
+        return StepStatus("check", "ready", f"{run.name}, track {name}: not checked yet", run=run.name)
     words = f"{name}: {check.in_words()}"
     changed = run_changes(session, run)
     if changed:
-        return StepStatus("check", "stale", words, f"Measured before {enumerated(changed)} changed.")
-    return StepStatus("check", "done", words, "" if check.good else NOT_EVERYWHERE)
+        why = f"Measured before {enumerated(changed)} changed."
+        return StepStatus("check", "stale", words, why, run=run.name)
+    return StepStatus("check", "done", words, "" if check.good else NOT_EVERYWHERE, run=run.name)
 
 
 def export_step(session: Session, exports: Sequence[ExportedFile]) -> StepStatus:
-    """The files exported from the newest run, and whether they are up to date."""
-    run = newest_run(session)
-    if run is None or not exports:
-        return StepStatus("export", "ready", "no file yet")
+    """The files exported from the run that is used, and whether they are up to date."""
+    run = run_to_use(session)
+    if run is None:
+        return StepStatus("export", "blocked", "", "It needs a run that has frames.")
+    if not exports:
+        return StepStatus("export", "ready", "no file yet", run=run.name)
     words = f"{counted(len(exports), 'file')} of {run.name}"
     old = [file for file in exports if file.stale]
     if old:
         why = f"{'; '.join(f'{file.name}: {file.stale}' for file in old[:3])}{' …' if len(old) > 3 else ''}."
-        return StepStatus("export", "stale", words, f"{why} Export again, or delete what is old.")
-    return StepStatus("export", "done", words)
+        why = f"{why} Export again, or delete what is old."
+        return StepStatus("export", "stale", words, why, run=run.name)
+    return StepStatus("export", "done", words, run=run.name)
 
 
 NEEDS: Mapping[str, tuple[str, ...]] = {
@@ -283,8 +335,8 @@ NEEDS: Mapping[str, tuple[str, ...]] = {
     "subject": ("footage", "calibration"),
     "start-pose": ("footage", "calibration"),
     "track": ("footage", "calibration"),
-    "check": ("track",),
-    "export": ("track",),
+    "check": ("footage", "calibration"),
+    "export": ("footage", "calibration"),
 }
 """Steps that have to be done (stale counts) before a step."""
 
@@ -300,8 +352,8 @@ class Workflow:
 def workflow_of(
     session: Session, running: Mapping[str, str] | None = None, exports: Sequence[ExportedFile] | None = None
 ) -> Workflow:
-    """The status of a session. running : step to the progress of its job. exports : files exported from the newest run,
-    None if unknown.
+    """The status of a session. running : step to the progress of its job. exports : files exported from the run
+    that is used, None if unknown.
 
     Never raises for a part that cannot be read: its step reports it.
     """
@@ -337,7 +389,7 @@ def _status(
     return replace(status, state="running", words=running[step]) if step in running else status
 
 
-LACKING = {"footage": "footage", "calibration": "a calibration", "track": "a run that has frames"}
+LACKING = {"footage": "footage", "calibration": "a calibration"}
 
 
 def _next(steps: Sequence[StepStatus]) -> str:

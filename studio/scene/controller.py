@@ -163,6 +163,16 @@ class SceneController:
         self._inbox.append((change, values, announce))
         self._events.put(_WAKE)
 
+    def draw_now(self, drawn: Callable[[int], None]) -> None:
+        """Draw, after the changes that are posted already, and call `drawn` with the number of layers there are."""
+
+        def draw(model: Model) -> Model:
+            self._guarded(self._draw)
+            drawn(self._layers_so_far())
+            return model
+
+        self.post(draw, announce=False)
+
     def refused(self, problem: StudioError) -> None:
         """Show a refusal to every viewer."""
         notify(self._server, problem.message, problem.hint, bad=True)
@@ -649,7 +659,9 @@ class SceneController:
         if model.options.shadows != self._has_shadows:
             self._has_shadows = model.options.shadows
             light(self._server, self._has_shadows)
-        if self._panel_of is None or not same_panel(self._panel_of, model):
+        if self.bare:
+            self.panel.hide()
+        elif self._panel_of is None or not same_panel(self._panel_of, model):
             self.panel.show(model, moment, tokens)
             self._panel_of = model
         if self.views is not None and moment is not None:

@@ -12,6 +12,7 @@ from studio.arrays import Array, Indices
 from studio.body.model import BodyModel
 from studio.errors import NotFoundError, SessionError, StudioError
 from studio.geometry.camera import Camera
+from studio.inspection.verdict import verdict_on
 from studio.motion_files.trc import MarkerMotion, read_trc
 from studio.runs.moved_knobs import settings_with_moved
 from studio.runs.tracks import RAW, Track, read_track, track_names, track_stamp
@@ -156,7 +157,7 @@ class OpenedRun:
         """
         if self.truth is None:
             return None
-        rows: Indices = np.round((self.truth.times - float(self.truth.times[0])) * self.fps).astype(np.int64)
+        rows: Indices = np.round(self.truth.times * self.fps).astype(np.int64)
         place = int(np.searchsorted(rows, frame))
         return self.truth.positions[place] if place < len(rows) and rows[place] == frame else None
 
@@ -206,8 +207,8 @@ class OpenedRun:
         pose, made = stored.estimate.pose, self.pose_in(track, frame)
         count = _at_least(stored.layers, records)
         if made is None:
-            return Moment(frame, pose, None, records, count, truth, stored.tracking)
-        return Moment(frame, made, pose, records, count, truth, stored.tracking)
+            return Moment(frame, pose, None, records, count, truth, verdict_on(stored).tracking)
+        return Moment(frame, made, pose, records, count, truth, verdict_on(stored).tracking)
 
     def close(self) -> None:
         """Release the files."""

@@ -25,6 +25,7 @@ from studio.scene.model import (
     ViewOptions,
     change_options,
     discard_what_if,
+    edit_pose,
     look_through,
     scrub,
     select,
@@ -33,6 +34,8 @@ from studio.scene.model import (
     show_frame,
     show_ghosts,
 )
+from studio.scene.pose_edit import UNDO, changed_whole
+from studio.scene.scene_pictures import ScenePictures
 from studio.scene.search_view import Pointed
 from studio.sessions.workspace import Workspace
 
@@ -60,6 +63,7 @@ class SceneServer:
         self._controller.bare = bare
         self._controller.start()
         self.poses = ScenePoses(self._controller)
+        self.pictures = ScenePictures(self._server, self._controller)
         self.port: int = self._server.get_port()
 
     def stop(self) -> None:
@@ -181,7 +185,7 @@ class SceneServer:
 @dataclass(frozen=True, slots=True, eq=False)
 class Editing:
     """A pose being edited. frame : of the run being corrected, None: the session's start pose. pose : (D,). moved :
-    whether it differs from the original.
+    whether it differs from the original. steps : changes that can be undone.
     """
 
     session: str
@@ -189,6 +193,7 @@ class Editing:
     frame: int | None
     pose: Array
     moved: bool
+    steps: int
 
 
 class ScenePoses:
@@ -204,7 +209,8 @@ class ScenePoses:
         edit, selection = model.edit, model.selection
         if edit is None or not edit.active:
             return None
-        return Editing(selection.session, selection.run, edit.frame, edit.pose.copy(), edit.is_moved)
+        pose = edit.pose.copy()
+        return Editing(selection.session, selection.run, edit.frame, pose, edit.is_moved, len(edit.past))
 
     def propose(self, session: str, pose: Sequence[float], text: str, frame: int | None = None) -> None:
         """Show a start pose (D,) found for a session. text : its confidence, for the viewers. frame : of the pose."""
@@ -219,6 +225,10 @@ class ScenePoses:
         """
         given = None if pose is None else np.array(pose, dtype=np.float64)
         self._controller.post(self._controller.begin_edit, session, run, frame, given)
+
+    def undo(self) -> None:
+        """Take the newest change of the edited pose back."""
+        self._controller.post(edit_pose, lambda edit: changed_whole(edit, UNDO, None))
 
     def leave(self) -> None:
         """Stop editing."""

@@ -47,7 +47,12 @@ class AlignmentJob(SessionJob):
     kept: bool = False
 
 
-ALIGNMENT = JobKind("alignment", "comparison of the cameras", AlignmentJob)
+ALIGNMENT = JobKind(
+    "alignment",
+    "comparison of the cameras",
+    AlignmentJob,
+    page="/way?session={session}&step=background",
+)
 
 
 class AlignmentAnswer(Answer):

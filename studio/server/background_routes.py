@@ -124,7 +124,13 @@ class BackgroundJob(SessionJob):
     choice: SourceChoiceAnswer | None = None
 
 
-BACKGROUND = JobKind("background", "set-up", BackgroundJob, changes_session=True)
+BACKGROUND = JobKind(
+    "background",
+    "set-up of the background",
+    BackgroundJob,
+    changes_session=True,
+    page="/way?session={session}&step=background",
+)
 
 
 class BackgroundAnswer(Answer):

@@ -49,6 +49,7 @@ LEARNING = JobKind(
     "learning",
     LearningProgress,
     busy="Model '{name}' is being learnt; one is learnt at a time.",
+    page="/behaviours?name={name}",
 )
 
 

@@ -44,7 +44,13 @@ class SolveState(NumberedJob):
     proposal: str = ""
 
 
-CALIBRATION = JobKind("calibration", "calibration", SolveState)
+CALIBRATION = JobKind(
+    "calibration",
+    "calibration",
+    SolveState,
+    at="/api/calibrations/{identifier}",
+    page="/way?session={session}&step=calibration",
+)
 
 
 LOOKING = "Looking for the board"

@@ -69,6 +69,7 @@ COMPARISON = JobKind(
     ComparisonState,
     busy="Comparison '{name}' of '{session}' is running; one runs at a time.",
     keeps_session=True,
+    page="/comparisons?session={session}&name={name}",
 )
 
 

@@ -5,7 +5,7 @@ from fastapi import APIRouter
 from studio.errors import StudioError
 from studio.jobs.job_runner import Job, JobKind, SessionJob
 from studio.jobs.process_executor import cores
-from studio.operations.course import RUNS, SAMPLE, finished, make_course
+from studio.operations.course import BEGINNING_RUN, RUNS, SAMPLE, begins, finished, make_course
 from studio.server.app_state import App
 from studio.server.schemas import Answer
 
@@ -17,7 +17,12 @@ class CourseState(SessionJob):
 
 
 COURSE = JobKind(
-    "course", "course", CourseState, changes_session=True, busy="The course's runs are being made."
+    "course",
+    "making of the course's runs",
+    CourseState,
+    changes_session=True,
+    busy="The course's runs are being made.",
+    page="/guide/course",
 )
 
 
@@ -47,10 +52,13 @@ def course_runs(app: App) -> CourseView:
     return CourseView(
         session=SAMPLE,
         runs=[
-            CourseRunLine(
-                name=one.name, words=one.words, there=session is not None and finished(session, one)
-            )
-            for one in RUNS
+            CourseRunLine(name=BEGINNING_RUN, words="an arm of four links", there=begins(app.workspace)),
+            *(
+                CourseRunLine(
+                    name=one.name, words=one.words, there=session is not None and finished(session, one)
+                )
+                for one in RUNS
+            ),
         ],
         job=app.jobs.known(COURSE, SAMPLE),
     )

@@ -13,6 +13,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.inspection.verdict import limbs_off, verdict_on
 from studio.jobs.events import (
     Acknowledged,
     Event,
@@ -98,7 +99,8 @@ def frame_summary(result: FrameResult) -> dict[str, object]:
         "evaluations": result.evaluations,
         "settings_version": result.settings_version,
         "milliseconds": result.milliseconds,
-        "tracking": result.tracking,
+        "tracking": verdict_on(result).tracking,
+        "limbs_off": limbs_off(result),
     }
 
 

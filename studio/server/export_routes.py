@@ -75,7 +75,13 @@ class ExportState(NumberedJob):
     result: ExportLine | None = None
 
 
-EXPORT = JobKind("export", "export", ExportState)
+EXPORT = JobKind(
+    "export",
+    "export",
+    ExportState,
+    at="/api/exports/{identifier}",
+    page="/?session={session}&run={run}&panel=export",
+)
 
 
 class ExportList(Answer):

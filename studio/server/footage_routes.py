@@ -91,7 +91,13 @@ class SynchronyState(SessionJob):
     pairs: list[PairView] = Field(default_factory=list[PairView])
 
 
-SYNCHRONY = JobKind("synchrony", "estimate", SynchronyState)
+SYNCHRONY = JobKind(
+    "synchrony",
+    "estimate of the offsets",
+    SynchronyState,
+    at="/api/sessions/{session}/synchrony",
+    page="/way?session={session}&step=footage",
+)
 
 
 @router.get("/sessions/{session}/footage")

@@ -6,7 +6,16 @@ from pydantic import Field
 from studio.errors import NotFoundError
 from studio.foreign_files import read_file
 from studio.jobs.job_runner import Job, JobKind, SessionJob
-from studio.operations.gallery import CARDS, Card, CardKind, CardStanding, card_of, make_card, standing_of
+from studio.operations.gallery import (
+    CARDS,
+    GALLERY_PICTURES,
+    Card,
+    CardKind,
+    CardStanding,
+    card_of,
+    make_card,
+    standing_of,
+)
 from studio.runs.samples import sample_folder
 from studio.server import files
 from studio.server.app_state import App, AppState
@@ -20,7 +29,14 @@ class GalleryState(SessionJob):
     """How the making of a card's session stands."""
 
 
-GALLERY = JobKind("gallery", "session", GalleryState, changes_session=True)
+GALLERY = JobKind(
+    "gallery",
+    "making of a session",
+    GalleryState,
+    changes_session=True,
+    at="/api/gallery/{session}",
+    page="/?session={session}",
+)
 
 
 class CardView(Answer):
@@ -56,13 +72,16 @@ def gallery_cards(app: App) -> GalleryView:
 
 @router.get("/{card}/picture.jpg", response_class=Response)
 def card_picture(card: str, app: App) -> Response:
-    """A small picture of a card's session (JPEG): of one that is there, or travels with the studio."""
+    """A small picture of a card's session (JPEG): of one that is there, or of what travels with the studio."""
     found = card_of(card)
     if standing_of(found, app.workspace).there:
         place = app.workspace.session(found.name).thumbnail()
         content = read_file(place) if place else None
     else:
-        content = thumbnail_of(Session(sample_folder(found.name))) if found.kind == "sample" else None
+        shipped = GALLERY_PICTURES / f"{found.name}.jpg"
+        content = read_file(shipped) if shipped.is_file() else None
+        if found.kind == "sample":
+            content = thumbnail_of(Session(sample_folder(found.name)))
     if content is None:
         raise NotFoundError(f"Card '{card}' has no picture.", "Make its session first.")
     return files.picture(content, checked_anew=True)
@@ -104,6 +123,6 @@ def _view(app: AppState, standing: CardStanding) -> CardView:
         commands=list(card.commands),
         there=standing.there,
         missing=standing.missing,
-        picture=standing.there or card.kind == "sample",
+        picture=standing.there or card.kind == "sample" or (GALLERY_PICTURES / f"{card.name}.jpg").is_file(),
         job=app.jobs.known(GALLERY, card.name),
     )

@@ -20,6 +20,7 @@ from studio.knobs import Knob, Value, allowed, knobs_of
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.runs.self_contained import assets_folder
 from studio.server.pages import NAME, html_page
+from studio.server.schemas import Answer
 from studio.settings import RecordingSettings, all_knobs, default_settings
 from studio.trackers.catalogue import TRACKERS
 from studio.trackers.frame_refinement import FrameRefinementSettings
@@ -29,6 +30,7 @@ from studio.trackers.tracker import Printed
 from studio.training.oversampling import OversamplingSettings
 
 router = APIRouter(tags=["page"], include_in_schema=False)
+contents_router = APIRouter(prefix="/api", tags=["page"])
 
 PLACE_OF_KNOBS, PLACE_OF_SUMMARY, PLACE_OF_FINDINGS = "{{knobs}}", "{{reproduction}}", "{{findings}}"
 PLACE_OF_PRINTED = "{{printed}}"
@@ -42,6 +44,7 @@ VERB_COLUMNS = ("Keyword", "What it means", "Default", "Option", "HTTP")
 TEXTS = {
     "": ("guide.md", "Guide"),
     "course": ("course.md", "Course"),
+    "arm": ("arm.md", "An arm of four links"),
     "particle": ("particle.md", "What a particle is"),
     "layer": ("layer.md", "Why one layer fails"),
     "annealing": ("annealing.md", "What annealing changes"),
@@ -54,10 +57,47 @@ TEXTS = {
     REPRODUCTION: ("reproduction.md", "The papers' claims"),
 }
 """The packaged texts and their titles, by the addresses below /guide."""
-COURSE = ("course", "particle", "layer", "annealing", "partitions")
+COURSE = ("course", "arm", "particle", "layer", "annealing", "partitions")
 """Those of the course, in their order."""
 VERBS = "verbs"
 COLUMNS = ("Name", "What it does", "Range", "Default", "Unit", "Takes effect")
+
+
+class GuideHeading(Answer):
+    """A heading of the guide. page: the title of the page that it is on. address: of its place there."""
+
+    title: str
+    page: str
+    address: str
+
+
+class GuideContents(Answer):
+    """All pages of the guide with their headings."""
+
+    headings: list[GuideHeading]
+
+
+@contents_router.get("/guide-contents")
+def contents() -> GuideContents:
+    """What the guide has, for a search."""
+    return GuideContents(headings=list(_headings()))
+
+
+@cache
+def _headings() -> tuple[GuideHeading, ...]:
+    found: list[GuideHeading] = []
+    for name, (file, page) in TEXTS.items():
+        address = f"/guide/{name}" if name else "/guide"
+        found.append(GuideHeading(title=page, page=NAME, address=address))
+        tokens = MarkdownIt("commonmark").parse(
+            (assets_folder() / "guide" / file).read_text(encoding="utf-8")
+        )
+        found += [
+            GuideHeading(title=inline.content, page=page, address=f"{address}#{anchor_of(inline.content)}")
+            for opening, inline in itertools.pairwise(tokens)
+            if opening.type == "heading_open" and opening.tag == "h2"
+        ]
+    return (*found, GuideHeading(title="All verbs", page=NAME, address=f"/guide/{VERBS}"))
 
 
 @router.get("/guide")

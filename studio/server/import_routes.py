@@ -45,7 +45,14 @@ class ImportState(NumberedJob):
     layout: str = ""
 
 
-IMPORT = JobKind("import", "import", ImportState, changes_session=True)
+IMPORT = JobKind(
+    "import",
+    "import",
+    ImportState,
+    changes_session=True,
+    at="/api/imports/{identifier}",
+    page="/?session={session}",
+)
 
 
 class FolderView(Answer):

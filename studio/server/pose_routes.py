@@ -88,10 +88,13 @@ class MirrorRequest(PoseRequest):
 
 
 class BetterPoseRequest(PoseRequest):
-    """A short search around the pose in a frame, then local refinement."""
+    """A short search around the pose in a frame, then local refinement. keep: what is better becomes the session's
+    start pose, whoever still waits for it.
+    """
 
     frame: int = Field(0, ge=0)
     seed: int = Field(0, ge=0, le=2**63 - 1)
+    keep: bool = False
 
 
 class EditRequest(Request):
@@ -106,7 +109,9 @@ class EditRequest(Request):
 
 
 class EditState(Answer):
-    """What is being edited in the scene; all null while nothing is. moved: whether it is another pose than it was."""
+    """What is being edited in the scene; all null while nothing is. moved: whether it is another pose than it was.
+    steps: changes that can be undone.
+    """
 
     editing: bool = False
     session: str | None = None
@@ -114,6 +119,7 @@ class EditState(Answer):
     frame: int | None = None
     pose: list[float] | None = None
     moved: bool = False
+    steps: int = 0
 
 
 SESSION = "/sessions/{session}"
@@ -139,7 +145,14 @@ class InitialisationState(NumberedJob):
     file: str = ""
 
 
-START_POSE = JobKind("initialise", "search", InitialisationState, changes_session=True)
+START_POSE = JobKind(
+    "initialise",
+    "search for the start pose",
+    InitialisationState,
+    changes_session=True,
+    at="/api/initialisations/{identifier}",
+    page="/way?session={session}&step=start-pose",
+)
 
 
 @router.get(SESSION + "/start-pose")
@@ -196,6 +209,9 @@ async def begin_refining_pose(session: OpenSession, request: BetterPoseRequest, 
             seed=request.seed,
             progress=job.report_or_stop,
         )
+        if request.keep and run is None and found.gain > 0.0:
+            keep_start_pose(session, body, found.pose, request.frame)
+            app.events.session_changed(session.name)
         return TRACK.entries(found, pose=found.pose.tolist())
 
     return begin_job(app, "pose", session, run, work)
@@ -214,6 +230,7 @@ def editing(scene: Scene) -> EditState:
         frame=found.frame,
         pose=[float(value) for value in found.pose],
         moved=found.moved,
+        steps=found.steps,
     )
 
 
@@ -231,6 +248,12 @@ def edit(request: EditRequest, app: App, scene: Scene) -> None:
     if request.frame is not None:
         checked_frames(session, request.frame, request.frame + 1)
     scene.poses.edit(session.name, run.name if run else "", request.frame, request.pose)
+
+
+@router.post("/scene/edit/undo", status_code=202)
+def undo(scene: Scene) -> None:
+    """Take the newest change of the edited pose back; without one nothing happens."""
+    scene.poses.undo()
 
 
 @router.delete("/scene/edit", status_code=202)

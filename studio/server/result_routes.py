@@ -18,6 +18,7 @@ from studio.inspection.cloud_outlines import CloudOutline, outline_of
 from studio.inspection.reading import InspectedFrame, InspectedRun
 from studio.inspection.reference import body_points, by_limb, true_points
 from studio.inspection.searches import layers_of_a_search, searches_of
+from studio.inspection.verdict import limbs_off, verdict_on, verdicts
 from studio.runs.live_summary import summary_of
 from studio.runs.tracks import RAW
 from studio.server import files
@@ -40,7 +41,7 @@ router = APIRouter(prefix="/api", tags=["results"])
 
 class FrameLine(Answer):
     """A finished frame in the timeline. lost: whether a limb is off by more than 150 mm (with truth only). tracking:
-    whether the tracker thinks that it is on the body.
+    what the search says of it. fits: whether neither says that the body or a limb is lost.
     """
 
     frame: int
@@ -55,6 +56,10 @@ class FrameLine(Answer):
         default_factory=list[str], description="Limbs that are off by more than 150 mm (truth)."
     )
     tracking: str = Field("tracked", description="tracked, limb lost, lost, no evidence or recovered.")
+    limbs_off: list[str] = Field(
+        default_factory=list[str], description="Limbs that the silhouettes contradict."
+    )
+    fits: bool = True
 
 
 class LiveView(Answer):
@@ -240,6 +245,8 @@ def frames(
     measured, problem = _measured(session, run, track, check)
     errors = dict(zip(measured.frames, measured.per_frame_mm, strict=True)) if measured else {}
     lost = dict(zip(measured.frames, measured.lost_by_frame, strict=True)) if measured else {}
+    with run.results() as results:
+        said = verdicts(results, run.folder, timeline, lost)
     lines = [
         FrameLine(
             frame=frame,
@@ -249,9 +256,11 @@ def frames(
             layers=int(timeline.layers[at]),
             settings_version=int(timeline.settings_versions[at]),
             error_mm=errors.get(frame),
-            lost=bool(lost.get(frame)),
-            lost_limbs=list(lost.get(frame, ())),
-            tracking=timeline.tracking[at],
+            lost=bool(said[frame].by_truth),
+            lost_limbs=list(said[frame].by_truth),
+            tracking=said[frame].tracking,
+            limbs_off=list(said[frame].by_silhouettes),
+            fits=said[frame].fits,
         )
         for at, frame in enumerate(timeline.frames.tolist())
     ]
@@ -314,10 +323,10 @@ def frame_detail(session: OpenSession, run: OpenRun, frame: int) -> FrameDetail:
         evaluations=result.evaluations if result else sum(len(layer.poses) for layer in layers),
         milliseconds=result.milliseconds if result else sum(layer.milliseconds for layer in layers),
         settings_version=layers[-1].settings_version,
-        tracking=result.tracking if result else None,
+        tracking=verdict_on(result).tracking if result else None,
         searched=estimate.searched.tolist() if estimate and estimate.searched is not None else None,
         disagreement=dict(result.disagreement) if result else {},
-        limbs_lost=list(result.limbs_lost) if result else [],
+        limbs_lost=list(limbs_off(result)) if result else [],
         notes=list(result.notes) if result else [],
         settings=dict(entry.values if entry else run.record.settings),
     )

@@ -1,11 +1,13 @@
 """The person in front of the cameras: by height, and fitted to the footage in the background (`subject` events)."""
 
 import asyncio
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Response
 from pydantic import Field
 
+from studio.arrays import Array
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
 from studio.body.subject import SHORTEST_MM, TALLEST_MM, Subject
@@ -59,6 +61,15 @@ class SubjectAnswer(Answer):
     fitted: bool = False
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class FitSoFar:
+    """What a fit under way has: poses (F, D) of a body in F frames."""
+
+    body: BodyModel
+    frames: tuple[int, ...]
+    poses: Array
+
+
 class SizeLine(Answer):
     """A group of dimensions, mm. deviation: one standard deviation of `after`."""
 
@@ -70,12 +81,14 @@ class SizeLine(Answer):
 
 
 class FitSubjectState(NumberedJob):
-    """How a fit stands. overlap: f_s of each frame's silhouettes.
+    """How a fit stands. frames: those with a pose so far, which have pictures; looks: rises whenever these are other
+    ones. overlap: f_s of each frame's silhouettes.
     limbs: of the body that was found. file: what it was kept as, "" where it is not.
     """
 
     body: str = ""
     frames: list[int] = Field(default_factory=list[int])
+    looks: int = 0
     poses_from: str = ""
     sizes: list[SizeLine] = Field(default_factory=list[SizeLine])
     overlap_before: Numbers | None = None
@@ -84,7 +97,14 @@ class FitSubjectState(NumberedJob):
     file: str = ""
 
 
-SUBJECT = JobKind("subject", "fit", FitSubjectState, changes_session=True)
+SUBJECT = JobKind(
+    "subject",
+    "fit of the subject",
+    FitSubjectState,
+    changes_session=True,
+    at="/api/subject-fits/{identifier}",
+    page="/way?session={session}&step=subject",
+)
 
 
 @router.get("/sessions/{session}/subject")
@@ -142,6 +162,7 @@ def set_subject(
     if arguments.more["height_mm"] is None and not (arguments.get("body") or arguments.get("lengths_mm")):
         raise BodyError("Neither a height nor a body is given.", "Give one of them.")
     write_subject(session, **arguments, **arguments.more, progress=unheard)
+    app.jobs.forget(SUBJECT, session.name)
     forget_composers()
     app.events.session_changed(session.name)
     return subject(Session(session.path))
@@ -155,7 +176,13 @@ async def begin_fit(
     await asyncio.to_thread(session.body, arguments.get("body"))
 
     def work(job: Job) -> dict[str, object]:
-        found = fit_subject(session, **arguments, progress=job.report_or_stop)
+        def show(body: BodyModel, frames: tuple[int, ...], poses: Array) -> None:
+            job.found = FitSoFar(body, frames, poses)
+            job.change(
+                frames=frames, looks=job.state.looks + 1 if isinstance(job.state, FitSubjectState) else 0
+            )
+
+        found = fit_subject(session, **arguments, progress=job.report_or_stop, shown=show)
         forget_composers()
         job.found = found
         file = found.file.name if found.file else ""
@@ -182,8 +209,10 @@ def keep_fit(identifier: str, app: App) -> FitSubjectState:
 
 @router.get("/subject-fits/{identifier}/frames/{frame}/views/{camera}.jpg", response_class=Response)
 def fitted_picture(identifier: str, frame: int, camera: str, app: App, height: Height = None) -> Response:
-    """The found body over what a camera saw, in a frame that was looked at."""
-    found = _found(identifier, app)
+    """The body that was found, or that is so far, over what a camera saw in a frame that was looked at."""
+    found = app.jobs.found(SUBJECT, identifier)
+    if not isinstance(found, FitSoFar):
+        found = _found(identifier, app)
     if frame not in found.frames:
         listed = ", ".join(map(str, found.frames))
         raise NotFoundError(f"Frame {frame} was not looked at in this fit.", f"These were: {listed}.")

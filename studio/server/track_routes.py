@@ -82,7 +82,13 @@ class TrackJobState(NumberedJob):
     overlap: Number = None
 
 
-TRACK = JobKind("track", "job", TrackJobState)
+TRACK = JobKind(
+    "track",
+    "job",
+    TrackJobState,
+    at="/api/track-jobs/{identifier}",
+    page="/?session={session}&run={run}",
+)
 
 
 class JumpLine(Answer):

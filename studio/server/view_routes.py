@@ -90,7 +90,13 @@ class SeedsState(NumberedJob):
     frame: int
 
 
-SEEDS = JobKind("seeds", "search with other seeds", SeedsState)
+SEEDS = JobKind(
+    "seeds",
+    "search with other seeds",
+    SeedsState,
+    at="/api/seeds/{identifier}",
+    page="/?session={session}&run={run}&frame={frame}&panel=views&view=seeds",
+)
 
 
 Name = Annotated[str, Query(max_length=64)]
@@ -142,10 +148,14 @@ def shared(
     run: OpenRun,
     frame: Annotated[int | None, Query(ge=0, description="Default: the run's worst one.")] = None,
     track: Name = "",
+    clouds: Annotated[
+        tuple[int, ...], Query(max_length=11, description="Frames whose particles are in the page, too.")
+    ] = (),
 ) -> Response:
     """The run as one page that opens without the studio."""
     opened = InspectedRun(session, run)
-    text = shared_page(opened, worst_frame(opened) if frame is None else frame, track=track)
+    chosen = worst_frame(opened) if frame is None else frame
+    text = shared_page(opened, chosen, track=track, clouds=clouds)
     return files.download(text, f"{session.name}-{run.name}.html", "text/html; charset=utf-8")
 
 

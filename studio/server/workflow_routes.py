@@ -8,7 +8,7 @@ from starlette.responses import Response
 
 from studio.export.kept_exports import exported_files
 from studio.operations.footage import new_session
-from studio.runs.workflow import Workflow, newest_run, workflow_of
+from studio.runs.workflow import Workflow, run_to_use, workflow_of
 from studio.server.app_state import App, AppState
 from studio.server.background_routes import BACKGROUND
 from studio.server.export_routes import EXPORT
@@ -70,5 +70,5 @@ def running_steps(app: AppState, session: Session) -> dict[str, str]:
 
 
 def _workflow(session: Session, running: dict[str, str]) -> Workflow:
-    run = newest_run(session)
+    run = run_to_use(session)
     return workflow_of(session, running, exported_files(run) if run else ())

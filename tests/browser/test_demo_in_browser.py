@@ -1,4 +1,6 @@
-"""`studio demo` and a browser at the printed address: the scene, the slider, the keys, the cameras, the guide."""
+"""`studio demo` and a browser at the printed address: the first two minutes; then a run that is tracked in it, with the
+scene, the slider, the keys, the cameras, the guide.
+"""
 
 import csv
 import io
@@ -29,18 +31,80 @@ SIZES = ((1280, 800), (1920, 1080))
 
 @pytest.fixture(scope="module")
 def window(browser: Browser, demo: StudioServer) -> Iterator[StudioPage]:
-    """One window for all tests of this file.
-
-    The demo is tracking when its address is printed; it is slowed and held up here, and tracked on in the window.
+    """One window for all tests of this file but the first, on a run that is begun in the demo, slowed and held up here,
+    and tracked on in the window.
     """
+    demo.post("/api/sessions/walk/runs", {"name": "run-1"})
+    demo.post(f"{RUN}/start")
     demo.pace(PACE)
     demo.until(lambda state: state["done"] >= FRAMES_BEFORE)
     demo.post(f"{RUN}/pause")
     demo.until(lambda state: state["state"] == "paused")
-    opened = StudioPage(browser, demo)
+    place = f"{demo.origin}/?token={demo.token}&session=walk&run=run-1"
+    opened = StudioPage(browser, demo, open_at=place)
     opened.see_scene()
     yield opened
     opened.close()
+
+
+def test_the_first_two_minutes(browser: Browser, demo: StudioServer, artefacts: Path) -> None:
+    """From the printed address without a click: layers play; then step by step, until the steps are closed for good."""
+    window = StudioPage(browser, demo)
+    page = window.page
+    until(page, lambda: demo.get("/api/scene/play-layers", window.name)["playing"])
+    seen: set[object] = set()
+    until(page, lambda: seen.add(window.get("layer")) or {0, 4, 9} <= seen)
+    assert (window.get("run"), window.get("frame"), window.get("view")) == ("ten-layers", 9, "variance")
+    until(page, window.charts_drawn)
+    window.shoot(artefacts / "first-steps-1.png")
+
+    # The survival rate, in the strip: the frame is searched again, and the schedule has other numbers.
+    page.get_by_role("button", name="Next", exact=True).click()
+    window.until("get('view') === 'schedule'")
+    until(page, window.charts_drawn)
+    before = window.chart("views")
+    slider = page.locator(".first-knob input:enabled")
+    slider.wait_for()
+    slider.fill("0.8")
+    window.until("get('whatIf')?.length === 10")
+    until(page, lambda: window.charts_drawn() and window.chart("views") != before)
+    assert page.locator(".first-knob output").inner_text() == "0.80"
+    window.shoot(artefacts / "first-steps-2.png")
+
+    # One layer has lost the walker where ten hold him, with as many evaluations.
+    page.get_by_role("button", name="Next", exact=True).click()
+    window.until("get('run') === 'one-layer' && get('compared') === 'walk/ten-layers' && get('frame') === 13")
+    page.get_by_role("button", name="ten layers", exact=True).click()
+    window.until("get('run') === 'ten-layers' && get('compared') === 'walk/one-layer'")
+    window.shoot(artefacts / "first-steps-3.png")
+
+    # The course beside the scene: scrolling drives it, and a number in a sentence is a knob.
+    page.get_by_role("button", name="Next", exact=True).click()
+    page.get_by_role("button", name="The course, beside the scene", exact=True).click()
+    window.until("get('session') === 'planar_arm' && get('run') === 'arm'")
+    lesson = page.get_by_role("region", name="Lesson")
+    views = set[object]()
+    for _ in range(40):
+        lesson.evaluate("place => place.scrollBy(0, 120)")
+        page.wait_for_timeout(300)
+        views.add(window.get("view"))
+    assert {"clouds", "schedule", "variance"} <= views
+    knob = page.get_by_role("slider", name="survival", exact=True).first
+    knob.scroll_into_view_if_needed()
+    knob.focus()
+    knob.press("PageUp")
+    window.until("get('whatIf')?.length > 0")
+    window.shoot(artefacts / "first-steps-course.png")
+    page.get_by_role("button", name="Close the course", exact=True).click()
+
+    page.goto(demo.origin + "/?session=walk&run=ten-layers&frame=9")
+    page.get_by_role("button", name="Close the first steps for good", exact=True).click()
+    page.locator(".first-steps").wait_for(state="detached")
+    page.reload()
+    window.until("get('summary')?.frames.length === 14")
+    assert demo.get("/api/preferences")["first-steps"] == "closed"
+    assert not page.locator(".first-steps").count()
+    window.close()
 
 
 @pytest.fixture

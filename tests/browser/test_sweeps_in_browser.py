@@ -97,7 +97,8 @@ def test_a_run_is_given_away_as_a_page(
     line = window.page.locator(".run[aria-selected=true]")
     line.hover()
     with window.page.expect_download() as kept:
-        window.choose(line.locator(".more"), "Share as one page")
+        window.choose(line.locator(".more"), "Share as one page…")
+        window.page.get_by_role("button", name="Save the page", exact=True).click()
     path = tmp_path / kept.value.suggested_filename
     kept.value.save_as(path)
     assert path.name == f"toy-{window.get('run')}.html"
@@ -112,6 +113,11 @@ def test_a_run_is_given_away_as_a_page(
     )
     page.goto(path.as_uri())
     expect(page.locator("h1")).to_have_text(f"toy / {window.get('run')}")
+    # The layers of the frame that is looked into play by themselves.
+    layer = page.locator(".shared-layers output")
+    expect(layer).to_have_text(re.compile(r"layer 1 of \d+ · \d+ particles"))
+    expect(layer).to_have_text(re.compile(r"layer 2 of \d+"))
+    page.get_by_role("button", name="Pause layers").click()
     figures = page.locator(".shared-figure")
     expect(figures).to_have_count(6)
     until(page, lambda: page.locator(".figure-body[data-drawn]").count() == 6)

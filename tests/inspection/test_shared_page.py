@@ -11,7 +11,8 @@ from html_page import HtmlPage
 
 import studio
 from studio.body.forward_kinematics import limb_ends
-from studio.errors import NotFoundError, SessionError
+from studio.body.model import extremities
+from studio.errors import NotFoundError, RunError, SessionError
 from studio.inspection import shared_page as room
 from studio.inspection.limbs import errors_of
 from studio.inspection.reading import InspectedRun
@@ -133,3 +134,24 @@ def test_the_verb_writes_the_page_and_names_what_is_wrong(run: InspectedRun, tmp
 def test_installed_pages_are_looked_for_where_the_wheel_has_them() -> None:
     build = (Path(__file__).resolve().parents[2] / "hatch_build.py").read_text()
     assert f'"web_assets": "studio/{INSTALLED}"' in build
+
+
+def test_the_particles_of_chosen_frames_are_those_of_the_store(run: InspectedRun) -> None:
+    """Where the extremities of each are, in which layer, of which parent; and only of the frames that were named."""
+    clouds = data_of(shared_page(run, 3, clouds=(1,)))["clouds"]
+    assert [cloud["frame"] for cloud in clouds] == [1, 3]
+    tips = list(extremities(run.body))
+    for cloud in clouds:
+        records = run.frame(cloud["frame"]).layers
+        assert [layer["layer"] for layer in cloud["layers"]] == [record.layer for record in records]
+        for before, record, layer in zip((None, *records), records, cloud["layers"], strict=False):
+            numbers = np.frombuffer(base64.b64decode(layer["points"]), dtype="<i2")
+            places = numbers.reshape(-1, len(tips), 3) * cloud["step"] + cloud["offset"]
+            ends = limb_ends(run.body, record.poses)[:, tips, 1]
+            assert np.abs(places - ends).max() <= 0.51 * cloud["step"]
+            parents = [-1] * len(record.poses) if before is None else before.parents[0].tolist()
+            assert layer["parents"] == parents
+            weights = np.frombuffer(base64.b64decode(layer["weights"]), dtype=np.uint8)
+            assert weights[int(record.log_weights.argmax())] == 255
+    with pytest.raises(RunError, match="cannot be in the page"):
+        shared_page(run, 3, clouds=(99,))

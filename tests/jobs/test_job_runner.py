@@ -330,7 +330,7 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     made = Clock()
-    monkeypatch.setattr(job_runner, "time", SimpleNamespace(monotonic=made.monotonic))
+    monkeypatch.setattr(job_runner, "time", SimpleNamespace(monotonic=made.monotonic, time=made.monotonic))
     return made
 
 

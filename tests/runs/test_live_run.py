@@ -156,6 +156,8 @@ def test_a_live_run_recovers_quickly_by_default(session_on_disk: Session) -> Non
 def test_what_cannot_be_done_live_is_refused(session_on_disk: Session) -> None:
     with pytest.raises(RunError, match="cannot train"):
         prepare_run(session_on_disk, **live_request(knobs={"online_learning": True}))
+    with pytest.raises(RunError, match="colours of shadows"):
+        prepare_run(session_on_disk, **live_request(knobs={"mask_shadow_learnt": True}))
     with pytest.raises(RunError, match="Only a live run"):
         prepare_run(session_on_disk, ping_pong=True)
     with pytest.raises(RunError, match="do not lie"):

@@ -1,15 +1,19 @@
 """The guided set-up: how far a session is, and what a change makes stale."""
 
+import shutil
 from pathlib import Path
 
 import msgspec
 import pytest
+from tracked_runs import finish
 
 from studio.body.subject import Subject, write_subject
 from studio.errors import SessionError
-from studio.runs.workflow import subject_step, workflow_of
+from studio.runs.new_run import prepare_run
+from studio.runs.workflow import run_to_use, subject_step, workflow_of
 from studio.sessions.provenance import note
-from studio.sessions.session import SUBJECT_NAME
+from studio.sessions.results_store import ResultsWriter
+from studio.sessions.session import SUBJECT_NAME, Session
 from studio.sessions.workspace import Workspace, begin_session
 
 STEPS = ["footage", "calibration", "background", "subject", "start-pose", "track", "check", "export"]
@@ -52,3 +56,32 @@ def test_a_fitted_subject_is_as_tall_as_its_body_stands_not_as_was_guessed(tmp_p
     write_subject(msgspec.structs.replace(guess, dimensions_mm=shorter), session.path / SUBJECT_NAME)
     note(session, "subject")
     assert subject_step(session).words == "human31, 1.78 m, fitted to the footage"
+
+
+def test_a_cancelled_run_does_not_hide_the_whole_one(session_on_disk: Session) -> None:
+    whole = prepare_run(session_on_disk, name="whole", last=2, knobs={"layers": 1, "particles": 4})
+    finish(session_on_disk, whole)
+    later = prepare_run(session_on_disk, name="later", knobs={"layers": 1, "particles": 4})
+
+    def step(name: str) -> tuple[str, str]:
+        found = next(one for one in workflow_of(session_on_disk).steps if one.step == name)
+        return found.state, found.run
+
+    assert step("track") == ("done", "whole")
+    with ResultsWriter(later.folder) as writer:
+        writer.mark_ended("cancelled")
+    used = run_to_use(session_on_disk)
+    assert used is not None
+    assert used.name == "whole"
+    assert (step("track"), step("check"), step("export")) == (
+        ("done", "whole"),
+        ("ready", "whole"),
+        ("ready", "whole"),
+    )
+    words = next(one.why for one in workflow_of(session_on_disk).steps if one.step == "track")
+    assert words == "later was cancelled: whole is used."
+
+    # What was cancelled after some frames is used where there is nothing else.
+    shutil.rmtree(whole.folder)
+    finish(session_on_disk, later, layers=2)
+    assert step("check") == ("ready", "later")

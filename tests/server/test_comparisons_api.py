@@ -3,16 +3,22 @@
 import csv
 import io
 import json
+import threading
 import time
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
+import waiting
 from sample_walk import copy_of_walk
 from web_doubles import Studio
 
 from studio.comparison.candidates import Lineup
 from studio.comparison.folders import new_comparison, place_of
 from studio.comparison.plan import plan_comparison
+from studio.reproductions import TrialCounts
+from studio.server import report_routes
 
 WISH = {
     "session": "walk", "trackers": [{"name": "annealed"}, {"name": "annealed:eq13", "settings": {"survival": 0.5}}],
@@ -240,3 +246,35 @@ def test_a_sweep_says_what_it_takes_runs_behind_and_leaves_runs(compared: Studio
     listed = next(one for one in client.get("/api/sessions").json()["sessions"] if one["name"] == "walk")
     assert listed["runs"] == []
     assert len(client.get("/api/trash").json()["entries"]) == 5
+
+
+def test_an_experiment_is_run_from_the_page(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+    go, asked = threading.Event(), list[tuple[object, ...]]()
+
+    def runs(
+        name: str, out: Path, *, quick: bool, seeds: int | None, progress: Callable[[str, int, int], None]
+    ) -> TrialCounts:
+        asked.append((name, out, quick, seeds))
+        while not go.wait(0.02):
+            progress("trials", 2, 7)
+        return TrialCounts(5, 2, 0)
+
+    monkeypatch.setattr(report_routes, "reproduce", runs)
+    place = "/api/reports/experiments"
+    listed = studio.client.get(place).json()
+    assert listed["job"] is None
+    names = [one["name"] for one in listed["experiments"]]
+    assert "deutscher-fig-8" in names
+    assert studio.client.post(place, json={"name": "no-such"}).status_code == 404
+    try:
+        begun = studio.client.post(place, json={"name": "deutscher-fig-8"})
+        assert begun.status_code == 202
+        assert studio.client.post(place, json={"name": "all"}).status_code == 409
+        [line] = studio.client.get("/api/jobs", params={"kind": "reproduction"}).json()["jobs"]
+        assert (line["name"], line["page"]) == ("deutscher-fig-8", "/reports")
+    finally:
+        go.set()
+    waiting.until(lambda: studio.client.get(place).json()["job"]["state"] == "done")
+    job = studio.client.get(place).json()["job"]
+    assert (job["measured"], job["kept"], job["failed"]) == (5, 2, 0)
+    assert asked == [("deutscher-fig-8", studio.workspace.root / "reproduction", True, None)]

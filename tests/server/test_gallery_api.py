@@ -59,6 +59,16 @@ def test_a_bundled_session_is_opened_and_stays(studio: Studio) -> None:
     assert done(studio, "planar_arm")["state"] == "done"
 
 
+def test_what_can_be_rendered_has_a_picture_before_it_is(studio: Studio) -> None:
+    for one in CARDS:
+        if one.kind == "recipe":
+            assert card(studio, one.name)["picture"], f"make gallery-pictures, for {one.name}"
+            shown = studio.client.get(f"/api/gallery/{one.name}/picture.jpg")
+            assert shown.headers["content-type"] == "image/jpeg"
+            assert len(shown.content) < 40_000
+            assert not card(studio, one.name)["there"]
+
+
 @pytest.fixture
 def standing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """The one card is a recipe, whose pictures are small."""

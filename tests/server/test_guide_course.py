@@ -10,9 +10,18 @@ from web_doubles import Studio
 import studio
 from studio.inspection.views import VIEWS
 from studio.operations import course as room
-from studio.operations.course import FRAMES, RUNS, SAMPLE, CourseRun, make_course
+from studio.operations.course import (
+    BEGINNING,
+    BEGINNING_RUN,
+    FRAMES,
+    RUNS,
+    SAMPLE,
+    CourseRun,
+    make_course,
+)
 from studio.server.guide_routes import COURSE, TEXTS
 from studio.sessions.workspace import Workspace
+from studio.settings import knob_table
 
 ROOT = Path(__file__).resolve().parents[2]
 GUIDE = ROOT / "web_assets" / "guide"
@@ -45,10 +54,15 @@ def test_every_link_of_a_page_names_a_state_that_there_is(page: str) -> None:
                 "/behaviours",
             )
             continue
-        assert set(state) <= STATES, link
-        assert state["session"] == SAMPLE
-        assert state["run"] in names
-        assert int(state["frame"]) < FRAMES
+        if set(state) == {"course"}:
+            assert state["course"] in COURSE
+            continue
+        assert set(state) - {"plays", "knob"} <= STATES, link
+        assert state.get("plays", "layers") == "layers"
+        assert state.get("knob", "survival") in {knob.name for knob in knob_table()}
+        begins = (state["session"], state["run"]) == (BEGINNING, BEGINNING_RUN)
+        assert begins or (state["session"] == SAMPLE and state["run"] in names)
+        assert int(state["frame"]) < (12 if begins else FRAMES)
         assert state["panel"] in PANELS
         assert state.get("view", "variance") in VIEWS
         for other in state.get("compared", "").split(","):
@@ -92,7 +106,7 @@ def test_runs_are_made_once(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> 
 
 def test_the_page_asks_whether_they_are_there(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
     found = studio.client.get("/api/course").json()
-    assert [run["name"] for run in found["runs"]] == [run.name for run in RUNS]
+    assert [run["name"] for run in found["runs"]] == [BEGINNING_RUN, *(run.name for run in RUNS)]
     assert not any(run["there"] for run in found["runs"])
     assert found["job"] is None
     assert studio.client.delete("/api/course").status_code == 404

@@ -247,3 +247,18 @@ def test_every_flip_in_a_store_is_a_named_gap_and_no_fault_of_the_server(
         for ending in ("", "-wal", "-shm"):
             store.with_name(store.name + ending).unlink(missing_ok=True)
         store.write_bytes(before)
+
+
+def test_notes_on_frames(studio: Studio, session: Session, tracked: StoredRun) -> None:
+    place = f"/api/sessions/{session.name}/runs/{tracked.name}"
+    assert studio.client.get(f"{place}/notes").json() == {"notes": []}
+    put = studio.client.put(f"{place}/frames/1/note", json={"text": "the arm, hidden"})
+    assert put.status_code == 200, put.text
+    assert [(one["frame"], one["text"]) for one in put.json()["notes"]] == [(1, "the arm, hidden")]
+    assert studio.client.put(f"{place}/frames/0/note", json={}).json()["notes"][0]["text"] == ""
+    table = studio.client.get(f"{place}/notes.csv").text.splitlines()
+    assert table[0] == "frame,text,made"
+    assert table[2].startswith('1,"the arm, hidden",')
+    assert len(studio.client.delete(f"{place}/frames/1/note").json()["notes"]) == 1
+    assert studio.client.put(f"{place}/frames/99/note", json={}).status_code == 404
+    assert studio.client.put(f"{place}/frames/1/note", json={"text": 5 * 1000 * "x"}).status_code == 422

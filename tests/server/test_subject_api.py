@@ -1,5 +1,6 @@
 """The person and the masks over the API. The searches themselves are tested in tests/runs and tests/trackers."""
 
+import threading
 import time
 from collections.abc import Callable
 
@@ -10,7 +11,7 @@ from web_doubles import Studio
 
 from studio.errors import RunError
 from studio.operations import person
-from studio.runs.subject_fitting import FitRequest, FittedSize, FittedSubject
+from studio.runs.subject_fitting import FitRequest, FittedSize, FittedSubject, Shown
 from studio.sessions.session import Session
 
 SESSION = "take1"
@@ -118,3 +119,48 @@ def test_a_preview_takes_knobs_and_changes_nothing(studio: Studio) -> None:
     assert studio.client.get(view).content == usual.content
     refused = studio.client.get(view, params={"show": "mask", "settings": "no json"})
     assert refused.status_code == 422
+
+
+def test_a_fit_shows_the_poses_that_it_has(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+    go, looked = threading.Event(), threading.Event()
+
+    def fits(session: Session, request: FitRequest, shown: Shown, **_: object) -> FittedSubject:
+        shown(session.body(), (2,), session.body().neutral[None])
+        looked.set()
+        go.wait(30.0)
+        return answer(session, request)
+
+    assert studio.client.put(f"/api/sessions/{SESSION}/subject", json={"height_mm": 1800}).is_success
+    monkeypatch.setattr(person, "fit_session_subject", fits)
+    begun = studio.client.post(f"/api/sessions/{SESSION}/fit-subject", json={"keep": False}).json()
+    try:
+        assert looked.wait(30.0)
+        place = f"/api/subject-fits/{begun['identifier']}"
+        state = studio.client.get(place).json()
+        assert (state["frames"], state["looks"]) == ([2], 1)
+        assert studio.client.get(f"{place}/frames/2/views/cam1.jpg").headers["content-type"] == "image/jpeg"
+        assert studio.client.get(f"{place}/frames/3/views/cam1.jpg").status_code == 404
+    finally:
+        go.set()
+    assert ended(studio, begun["identifier"])["frames"] == [3, 7]
+
+
+def test_all_work_is_listed_and_stopped_by_its_name(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+    def waits(*_: object, progress: Callable[[str, int, int], None], **__: object) -> FittedSubject:
+        while True:
+            progress("fitting", 1, 4)
+            time.sleep(0.01)
+
+    monkeypatch.setattr(person, "fit_session_subject", waits)
+    begun = studio.client.post(f"/api/sessions/{SESSION}/fit-subject", json={}).json()
+    listed = studio.client.get("/api/jobs", params={"session": SESSION, "kind": "subject"}).json()["jobs"]
+    [line] = listed
+    assert line["at"] == f"/api/subject-fits/{begun['identifier']}"
+    assert line["page"] == f"/way?session={SESSION}&step=subject"
+    assert studio.client.get("/api/jobs", params={"session": "other"}).json()["jobs"] == []
+    assert studio.client.delete(f"/api/jobs/subject/{line['key']}").status_code == 202
+    assert ended(studio, begun["identifier"])["state"] == "cancelled"
+    assert studio.client.delete("/api/jobs/subject/none").status_code == 404
+    # Another height makes a fit's answer void.
+    assert studio.client.put(f"/api/sessions/{SESSION}/subject", json={"height_mm": 1700}).is_success
+    assert studio.client.get("/api/jobs").json()["jobs"] == []

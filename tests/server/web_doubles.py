@@ -196,8 +196,16 @@ class RecordingPoses:
     ) -> None:
         given = np.zeros(4) if pose is None else np.array(pose)
         self.stage.editing = SimpleNamespace(
-            session=session, run=run, frame=frame, pose=given, moved=pose is not None
+            session=session,
+            run=run,
+            frame=frame,
+            pose=given,
+            moved=pose is not None,
+            steps=int(pose is not None),
         )
+
+    def undo(self) -> None:
+        self.stage.calls.append(("undo",))
 
     def leave(self) -> None:
         self.stage.editing = None

@@ -71,13 +71,15 @@ def paused_demo(browser: Browser, folder: Path) -> Iterator[tuple[StudioPage, Wi
     """A window on the demo, its run paused after some frames and the last of them shown."""
     demo = StudioServer("demo", folder / "workspace")
     try:
+        demo.post("/api/sessions/walk/runs", {"name": "run-1"})
+        demo.post(f"{RUN}/start")
         demo.pace(0.1)
         demo.until(lambda state: state["done"] >= FRAMES_BEFORE)
         demo.post(f"{RUN}/pause")
         demo.until(lambda state: state["state"] == "paused")
         window = StudioPage(watched(browser), demo, open_at="about:blank")
         wire = Wire(window)
-        window.page.goto(demo.address)
+        window.page.goto(f"{demo.origin}/?token={demo.token}&session=walk&run=run-1")
         window.see_scene()
         window.key("End")
         window.until(

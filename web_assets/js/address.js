@@ -1,6 +1,7 @@
 // The address is the state: what is open, shown and chosen stands in it, so that reload, back, forward, a copied link and a
 // second window show the same.
 
+import { say } from "./messages.js";
 import { openSession } from "./sessions.js";
 import { get, set, watch } from "./state.js";
 
@@ -65,7 +66,8 @@ let restoring = true;    // whether what changes now follows from an address tha
 function write() {
   isDue = false;
   const wanted = addressOf();
-  if (!get("session") || wanted === location.pathname + location.search) { restoring = false; return; }
+  // What is not here stays in the address: it may come back, and the link can be looked at.
+  if (!get("session") || get("missing") || wanted === location.pathname + location.search) { restoring = false; return; }
   const before = held();
   if (!restoring && HELD.some(({ name, step }) => step && get(name) !== before[name])) history.pushState(null, "", wanted);
   else history.replaceState(null, "", wanted);
@@ -82,21 +84,38 @@ function writeIn(milliseconds) {
 const writeSoon = () => { if (!isDue) writeIn(SETTLE_MILLISECONDS); isDue = true; };
 const writeNow = () => { isDue = true; writeIn(0); };
 
-/** Show what the address says: the newest run of a session where it names none, the first session where it names none. */
+/**
+ * Show what the address says: the newest run of a session where it names none, the first session where it names none.
+ * A session or run that is not here is said, and no other one opened.
+ */
 function read() {
   restoring = true;
   const sessions = get("sessions") ?? [];
   const { session, run: named, ...shown } = held();
-  const first = sessions.find((one) => one.name === session) ?? sessions.find((one) => one.runs.length) ?? sessions[0];
-  if (!first) return;
-  const isThere = first.name === session && (named === null || first.runs.some((one) => one.name === named));
-  const chosen = isThere ? named : undefined;
-  const more = isThere || (first.name === session && named === undefined) ? shown : {};
+  if (!sessions.length) return;
+  const first = session === null ? sessions.find((one) => one.runs.length) ?? sessions[0] : sessions.find((one) => one.name === session);
+  const isThere = first && (!named || first.runs.some((one) => one.name === named));
+  if (!isThere) {
+    openSession(first?.name ?? null, null);
+    set({ missing: { session, run: first ? named : null } });
+    return;
+  }
+  set({ missing: null });
+  const chosen = session === null ? undefined : named;
+  const more = session === null ? {} : frameOfFootage(first, chosen, shown);
   if (first.name === get("session") && chosen === get("run")) {
     const { frame, ...rest } = more;
     set({ ...rest, ...(frame === null || frame === undefined ? {} : { frame, follow: false, whatIf: null }) });
   } else openSession(first.name, chosen, more);
   writeNow();
+}
+
+/** What an address shows of a session without a run, where it names a frame that its footage does not have. */
+function frameOfFootage(entry, chosen, shown) {
+  const hasRun = chosen === undefined ? entry.runs.length > 0 : chosen !== null;
+  if (hasRun || shown.frame === null || shown.frame < entry.frame_count) return shown;
+  say(`There is no frame ${shown.frame}: ${entry.name} has ${entry.frame_count} frames.`, { kind: "warning" });
+  return { ...shown, frame: null };
 }
 
 /** Open what the address says, and keep it true from then on; called once the sessions are known. */

@@ -24,6 +24,8 @@ export class BodyDrawing {
     this.reach = reachOf(points);
     this.limbs = null;
     this.arrows = [];
+    this.points = [];
+    this.clarity = 1;
     this.seen = new IntersectionObserver((entries) => { this.isSeen = entries.at(-1).isIntersecting; this.draw(); }, { rootMargin: "200px" });
     this.seen.observe(canvas);
     this.sized = new ResizeObserver(() => this.draw());
@@ -44,6 +46,12 @@ export class BodyDrawing {
     this.limbs = limbs;
     this.arrows = arrows;
     this.draw();
+  }
+
+  /** Points over the body: {at: [x, y, z] mm, colour, radius: pixels, alpha}. clarity: how solid the body is, 0 to 1. Drawn with the next body. */
+  over(points, clarity = 1) {
+    this.points = points;
+    this.clarity = clarity;
   }
 
   close() {
@@ -79,7 +87,17 @@ export class BodyDrawing {
     for (const [from, to, colour] of this.lines) drawLine(pen, place(from), place(to), token(colour));
     const limbs = this.limbs.map((ends, index) => ({ ...this.shapes[index], ends: ends.map(place) }));
     limbs.sort((one, two) => one.ends[0][2] + one.ends[1][2] - two.ends[0][2] - two.ends[1][2]);
+    pen.globalAlpha = this.clarity;
     for (const limb of limbs) drawLimb(pen, limb, scale, this.reach.radius);
+    for (const { at, colour, radius, alpha } of this.points) {
+      const [x, y] = place(at);
+      pen.globalAlpha = alpha;
+      pen.fillStyle = colour;
+      pen.beginPath();
+      pen.arc(x, y, radius, 0, 2 * Math.PI);
+      pen.fill();
+    }
+    pen.globalAlpha = 1;
     for (const arrow of this.arrows) drawArrow(pen, arrow.map(place));
   }
 }

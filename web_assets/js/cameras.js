@@ -19,12 +19,16 @@ const LAYERS = [
 ];
 const shown = new Set(JSON.parse(localStorage.getItem("overlays") ?? '["outline"]'));
 let cameras = [];
+let frameCount = 1;  // of the footage
 let large = null;  // the camera whose picture is enlarged
 let age = 0;  // rises when a frame got another answer, so that its pictures are requested again
 
-/** A view's address: of the run's frame, or, before there is a run, the session's first picture. */
+/** The frame of the footage that is looked at before there is a run. */
+const footageFrame = () => Math.max(0, Math.min(frameCount - 1, get("frame") ?? 0));
+
+/** A view's address: of the run's frame, or, before there is a run, a frame of the session's footage. */
 function source(camera, height) {
-  const place = get("run") ? `${runPath(get("session"), get("run"))}/frames/${get("frame")}` : `${sessionPath(get("session"))}/frames/0`;
+  const place = get("run") ? `${runPath(get("session"), get("run"))}/frames/${get("frame")}` : `${sessionPath(get("session"))}/frames/${footageFrame()}`;
   const query = new URLSearchParams({ show: [...shown].join(","), height: String(height) });
   if (get("run")) {
     const outcome = get("outcome")?.frame === get("frame") ? get("outcome") : null;
@@ -124,9 +128,34 @@ export function lookThrough(at) {
   set({ through: at === null ? null : cameras[at].name });
 }
 
+/** Before there is a run: the footage's frames, from one end to the other. */
+function footageSlider() {
+  if (get("run") || !cameras.length || frameCount < 2) return null;
+  const words = element("output", {}, `frame ${footageFrame()} of ${frameCount}`);
+  const slider = element("input", { type: "range", min: 0, max: frameCount - 1, value: footageFrame(), ariaLabel: "Frame of the footage" });
+  slider.oninput = () => { set({ frame: Number(slider.value) }); words.textContent = `frame ${footageFrame()} of ${frameCount}`; };
+  return element("span", { className: "footage-slider" }, slider, words);
+}
+
+// Panels that have nothing to show of a session without a run: its footage is shown instead, until a run is opened.
+const OF_RUNS = ["why", "views", "compare", "export"];
+let instead = "";      // the panel that is shown again with a run
+
+function showFootage() {
+  const entry = get("sessions")?.find((one) => one.name === get("session"));
+  if (!entry || !get("panel")) return;
+  if (!get("run") && cameras.length && OF_RUNS.includes(get("panel"))) {
+    instead = get("panel");
+    set({ panel: "cameras" });
+  } else if (get("run") && instead) {
+    if (get("panel") === "cameras") set({ panel: instead });
+    instead = "";
+  }
+}
+
 /** The check boxes that stand in the tab line while this panel is open. */
 export function cameraTools() {
-  return [runColours(), button("Whole pictures", () => { zoom = { scale: 1, x: 0.5, y: 0.5 }; ask(false); showZoom(); }, "quiet small", { title: "No longer zoomed" }), ...LAYERS.map(([name, label, title]) => check(label, {
+  return [footageSlider(), runColours(), button("Whole pictures", () => { zoom = { scale: 1, x: 0.5, y: 0.5 }; ask(false); showZoom(); }, "quiet small", { title: "No longer zoomed" }), ...LAYERS.map(([name, label, title]) => check(label, {
     checked: shown.has(name), onchange: ({ target }) => {
       if (target.checked) shown.add(name); else shown.delete(name);
       localStorage.setItem("overlays", JSON.stringify([...shown]));
@@ -140,10 +169,18 @@ export function startCameras() {
   watch(["session"], async () => {
     cameras = [];
     if (get("session")) {
-      try { ({ cameras } = await fetchJson(sessionPath(get("session")))); } catch (error) { complain(error); }
+      const session = get("session");
+      try {
+        const detail = await fetchJson(sessionPath(session));
+        if (session !== get("session")) return;
+        ({ cameras, frame_count: frameCount } = detail);
+      } catch (error) { complain(error); }
     }
     build();
+    showFootage();
   });
+  let run = get("run");
+  watch(["run"], () => { if (run === get("run")) return; run = get("run"); showFootage(); });
   watch(["frame", "run", "summary", "track", "outcome", "compared"], refresh);
   onEvent("frame", (event, here) => {
     const seen = get("summary")?.frames.at(-1)?.frame ?? -1;

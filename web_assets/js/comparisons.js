@@ -5,7 +5,7 @@ import { showForm } from "./comparison_form.js";
 import { badge, clearComparison, isGoing, isSweep, shareOf, showComparison, sizeWords, updateProgress } from "./comparison_result.js";
 import { openForm } from "./dialogs.js";
 import { bar, button, byId, element, fill } from "./elements.js";
-import { complain } from "./messages.js";
+import { complain, say } from "./messages.js";
 import { studioPath } from "./sessions.js";
 import { showSweepForm } from "./sweep_form.js";
 import { onTheme, startTheme } from "./theme.js";
@@ -174,7 +174,11 @@ async function start() {
     await refresh();
     const query = new URLSearchParams(location.search);
     const wanted = lines.find((line) => line.session === query.get("session") && line.name === query.get("name"));
-    const newest = lines.find((line) => line.session === query.get("session")) ?? lines[0];
+    const session = query.get("session");
+    // Another session's comparison is no answer to a link to this one.
+    const newest = session ? lines.find((line) => line.session === session) : lines[0];
+    if (session && !sessions.some((one) => one.name === session)) say(`Session “${session}” is not here.`, { kind: "warning" });
+    else if (query.get("name") && !wanted) say(`${session} has no comparison “${query.get("name")}”.`, { kind: "warning" });
     if (query.get("new") === "sweep") openNewSweep({ session: query.get("session") ?? undefined });
     else if (query.has("new") || !newest) openNew({ session: query.get("session") ?? undefined });
     else await openComparison(wanted ?? newest);

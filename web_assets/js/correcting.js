@@ -88,12 +88,25 @@ function draw() {
       button("Cancel", () => remove(`/api/track-jobs/${going.identifier}`).catch(complain), "quiet small"));
   }
   const words = element("span", {}, "Correcting frame ", element("b", {}, frame), ": drag the balls on the limbs");
-  fill(line, words, button("Track on from here", () => track(null), "primary small"), backwards(), button("Leave", leave, "quiet small"));
+  fill(line, words, button("Undo", undo, "small", { title: "Take the last change back (Ctrl Z)" }), button("Track on from here", () => track(null), "primary small"), backwards(),
+    button("Leave", leave, "quiet small", { title: "Leave it as it was (Escape)" }));
+}
+
+/** Take the last change of the pose back. */
+const undo = () => post(`${POSE_PATH}/undo`).catch(complain);
+
+/** Ctrl Z takes a change back, unless a field or a dialog has the key. */
+function takeKey(event) {
+  if (frame === null || going || event.target.closest?.("input, textarea, dialog, [role=menu]")) return;
+  if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z" || event.shiftKey) return;
+  event.preventDefault();
+  undo();
 }
 
 /** Wire the button, the bar, and what the scene says. */
 export function startCorrecting() {
   opener.onclick = correctFrame;
+  document.addEventListener("keydown", takeKey);
   watch(["run", "frame", "summary", "work"], () => { if (frame === null) draw(); });
   watch(["session", "run"], () => { if (frame !== null && !going) leave(); });
   onEvent("scene", (event) => {

@@ -2,7 +2,7 @@
 
 import { fetchJson, post, runPath } from "./api.js";
 import { onEvent } from "./live.js";
-import { complain } from "./messages.js";
+import { complain, say } from "./messages.js";
 import { paced } from "./pacing.js";
 import { dressScene } from "./scene_window.js";
 import { isWatched } from "./studio/tracking.js";
@@ -65,10 +65,22 @@ async function loadFrames(check) {
     set({ summary, frame: get("frame") === null || (get("follow") && searching()) ? newest : get("frame") });
     // An address may name a frame that is not tracked.
     const known = summary.frames.some((line) => line.frame === get("frame")) || get("detail")?.frame === get("frame");
-    if (summary.frames.length && !known && !searching()) goTo(get("frame"));
+    if (get("frame") !== null && !known && !searching()) {
+      const asked = get("frame");
+      if (summary.frames.length) goTo(asked);
+      else set({ frame: null });
+      if (isOpening) sayMissingFrame(asked, summary, run, get("frame"));
+    }
     return summary.checked;
   } catch (error) { complain(error); }
   return true;
+}
+
+/** Say which frame an address names that is not there, and what is shown instead. */
+function sayMissingFrame(asked, { first, last, frames }, run, shown) {
+  const isOutside = asked < first || asked >= last;
+  const cause = isOutside ? `There is no frame ${asked}: ${run} goes from frame ${first} to ${last - 1}.` : `Frame ${asked} of ${run} is not tracked.`;
+  say(frames.length ? `${cause} Frame ${shown} is shown.` : isOutside ? cause : `${run} has no frames yet, so none is shown.`, { kind: "warning" });
 }
 
 /** The run: its parameters and its layers. */
@@ -183,7 +195,7 @@ function showLive(frame, finished) {
 function takeFrame(event) {
   const summary = get("summary");
   if (!summary) return;
-  const line = { frame: event.frame, log_weight: event.log_weight, milliseconds: event.milliseconds, error_mm: null, lost: false, tracking: event.tracking };
+  const line = { frame: event.frame, log_weight: event.log_weight, milliseconds: event.milliseconds, error_mm: null, lost: false, tracking: event.tracking, limbs_off: event.limbs_off };
   arrived.push(line);
   set({ summary: { ...summary, frames: [...summary.frames.filter((one) => one.frame < event.frame), line] } });
   const whole = layers.length === event.layers && layers[0].frame === event.frame;

@@ -13,13 +13,19 @@ export function listen(type, handler) {
   return () => { listeners.get(type).delete(handler); };
 }
 
+/** @type {Set<(event: any) => void>} */
+const forAll = new Set();
+
+/** Call `handler(event)` on every event, whatever its type. @param {(event: any) => void} handler */
+export const listenToAll = (handler) => forAll.add(handler);
+
 /** Open the socket and keep it open. opened, closed: called then; `closed` resolves with the pause before the next try. */
 export function startEvents(opened = () => {}, closed = async () => RETRY_MILLISECONDS) {
   const socket = eventSocket();
   socket.onopen = opened;
   socket.onmessage = ({ data }) => {
     const event = JSON.parse(data);
-    for (const handler of [...(listeners.get(event.type) ?? [])]) handler(event);
+    for (const handler of [...(listeners.get(event.type) ?? []), ...forAll]) handler(event);
   };
   socket.onclose = async () => setTimeout(startEvents, await closed(), opened, closed);
 }

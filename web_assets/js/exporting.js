@@ -51,15 +51,17 @@ function optionField(option, form) {
   return field(option.unit ? `${label} (${option.unit})` : label, made, { title: option.help });
 }
 
+/** Choose a format, from here or elsewhere on the page. */
+export function chooseFormat(name) {
+  format = name;
+  localStorage.setItem("export-format", format);
+  failed = null;
+  if (choices && listing) draw();
+}
+
 function formatList() {
-  const choose = (name) => {
-    format = name;
-    localStorage.setItem("export-format", format);
-    failed = null;
-    draw();
-  };
   return element("div", { className: "formats", role: "radiogroup", ariaLabel: "Format" }, choices.formats.map((form) => element("button", {
-    type: "button", className: "format", title: form.opens, role: "radio", ariaChecked: String(form.name === format), dataset: { key: form.name }, onclick: () => choose(form.name),
+    type: "button", className: "format", title: form.opens, role: "radio", ariaChecked: String(form.name === format), dataset: { key: form.name }, onclick: () => chooseFormat(form.name),
   }, element("b", {}, `.${form.name}`), form.title)));
 }
 

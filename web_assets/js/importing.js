@@ -8,19 +8,28 @@ import { say } from "./messages.js";
 import { openSession, refreshSessions } from "./sessions.js";
 import { uploadFiles } from "./uploading.js";
 
-/** Open the form. */
-export function importForm() {
+/** What dropped files are called as a session: their folder's name, else that of the only file. */
+function nameOf(files) {
+  const [first] = files;
+  const name = first.webkitRelativePath ? first.webkitRelativePath.split("/")[0] : files.length === 1 ? first.name.replace(/\.[^.]*$/, "") : "take";
+  return name.replace(/[^A-Za-z0-9_-]+/g, "-").slice(0, 64);
+}
+
+const countOf = (files) => `${files.length} ${files.length === 1 ? "file" : "files"}, ${(files.reduce((sum, file) => sum + file.size, 0) / 1e6).toFixed(1)} MB`;
+
+/** Open the form. `dropped`: files to be imported, from the computer's own windows. @param {File[] | null} [dropped] */
+export function importForm(dropped = null) {
   openForm({
     heading: "Import footage", action: "Import",
-    intro: "A folder with videos/ and calibration/ (optional: masks, background, truth, subject.toml, start_pose.csv), or a bodytrack folder.",
+    intro: dropped ? `${countOf(dropped)} were dropped: ${dropped.slice(0, 4).map((file) => file.name).join(", ")}${dropped.length > 4 ? " …" : ""}.` : "A folder with videos/ and calibration/ (optional: masks, background, truth, subject.toml, start_pose.csv), or a bodytrack folder.",
     rows: [
-      [{ name: "source", label: "Folder on this computer", placeholder: "full path of the folder" }],
-      [{ name: "files", label: "or upload a folder", kind: "file", webkitdirectory: true, multiple: true }],
-      [{ name: "name", label: "Session name", ...NAME }, { name: "fps", label: "Frames per second", kind: "number", min: 1, step: "any", hint: "needed for folders of pictures" }],
-      [{ name: "refer", kind: "check", label: "use the footage in place instead of copying it" }],
+      ...(dropped ? [] : [[{ name: "source", label: "Folder on this computer", placeholder: "full path of the folder" }],
+        [{ name: "files", label: "or upload a folder", kind: "file", webkitdirectory: true, multiple: true }]]),
+      [{ name: "name", label: "Session name", value: dropped ? nameOf(dropped) : "", ...NAME }, { name: "fps", label: "Frames per second", kind: "number", min: 1, step: "any", hint: "needed for folders of pictures" }],
+      ...(dropped ? [] : [[{ name: "refer", kind: "check", label: "use the footage in place instead of copying it" }]]),
     ],
     send: async (values, report) => {
-      const source = values.files.length ? { upload: await uploadFiles(values.files, report) } : { source: values.source };
+      const source = dropped ? { upload: await uploadFiles(dropped, report) } : values.files.length ? { upload: await uploadFiles(values.files, report) } : { source: values.source };
       const { identifier } = await post("/api/imports", { name: values.name, fps: values.fps ? Number(values.fps) : null, copy: !values.refer, ...source });
       const { warnings } = await jobDone(`/api/imports/${identifier}`, (job) => report(standing(job, "Importing…")));
       await refreshSessions();

@@ -32,6 +32,18 @@ export async function followJob(path, report = (_job) => {}, gone = () => false)
   }
 }
 
+/**
+ * The newest job of a kind that the server knows of, as it stands there; null for none. By it a page that was loaded
+ * again, or another window, finds work and its answer. `fits`: whether a line of the list is the one.
+ * @param {{ session?: string, kind: string }} which
+ */
+export async function findJob({ session, kind }, fits = (_line) => true) {
+  const query = new URLSearchParams({ kind, ...(session ? { session } : {}) });
+  const { jobs } = await fetchJson(`/api/jobs?${query}`);
+  const line = jobs.findLast((one) => fits(one));
+  return line ? fetchJson(/** @type {any} */ (line.at)) : null;
+}
+
 /** Like `followJob` for work that nothing follows from when it was cancelled: that too is thrown. */
 export async function jobDone(path, report = undefined, gone = undefined) {
   const job = await followJob(path, report, gone);

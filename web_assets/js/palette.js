@@ -1,11 +1,9 @@
-// The command palette: every view, panel and command by a few letters of its name.
+// The command palette: all that can be found, by a few letters of its name.
 
-import { allViews, saveView, showView, stepView, toggleTable } from "./views.js";
 import { byId, element, fill } from "./elements.js";
-import { commands } from "./studio/keys.js";
-import { openSession } from "./sessions.js";
-import { get } from "./state.js";
-import { showPanel } from "./tabs.js";
+import { askForFindable, findable } from "./findable.js";
+
+/** @import { Entry } from "./findable.js" */
 
 /** @type {HTMLDialogElement} */
 const dialog = element("dialog", { className: "palette", ariaLabel: "Find" });
@@ -14,28 +12,16 @@ let chosen = 0;
 /** @type {Entry[]} */
 let found = [];
 
-/** @typedef {{ kind: string, words: string, more: string, act: () => void }} Entry */
-
-/** All that can be done. @returns {Entry[]} */
-function entries() {
-  const panels = [...document.querySelectorAll("#tabs [role=tab]")].map((tab) => { const { panel } = /** @type {HTMLElement} */ (tab).dataset; return { kind: "Panel", words: tab.textContent, more: "", act: () => showPanel(panel) }; });
-  const views = allViews().map((view) => ({ kind: "View", words: view.title, more: view.question, act: () => { showPanel("views"); showView(view.name); } }));
-  const files = /** @type {const} */ ([["svg", "SVG"], ["pdf", "PDF"], ["csv", "CSV"], ["link", "link"]]).map(([kind, word]) => ({ kind: "Export", words: `This view as ${word}`, more: "", act: () => { showPanel("views"); saveView(kind); } }));
-  const doings = [{ kind: "Command", words: "Next view", more: "v", act: () => stepView(1) }, { kind: "Command", words: "View as a table", more: "t", act: toggleTable },
-    ...commands().map(([key, words, act]) => ({ kind: "Command", words: words[0].toUpperCase() + words.slice(1), more: key, act }))];
-  const runs = (get("sessions") ?? []).flatMap((session) => session.runs.map((run) => ({ kind: "Run", words: `${session.name} / ${run.name}`, more: run.describe ?? "", act: () => openSession(session.name, run.name) })));
-  return [...views, ...panels, ...files, ...doings, ...runs];
-}
-
 /** How well words fit what is looked for; -1: not at all. */
 function fit({ words, more, kind }, wanted) {
   const text = `${words} ${more} ${kind}`.toLowerCase();
+  if (kind === "Frame") return 3;
   if (!wanted.split(" ").every((part) => text.includes(part))) return -1;
   return words.toLowerCase().startsWith(wanted) ? 2 : words.toLowerCase().includes(wanted) ? 1 : 0;
 }
 
 function draw(list, wanted) {
-  found = entries().map((entry) => ({ entry, score: fit(entry, wanted) })).filter(({ score }) => score >= 0).sort((a, b) => b.score - a.score).slice(0, MOST).map(({ entry }) => entry);
+  found = findable(wanted).map((entry) => ({ entry, score: fit(entry, wanted) })).filter(({ score }) => score >= 0).sort((a, b) => b.score - a.score).slice(0, MOST).map(({ entry }) => entry);
   chosen = Math.min(chosen, Math.max(0, found.length - 1));
   fill(list, found.map((entry, at) => element("li", { role: "option", id: `palette-${at}`, ariaSelected: String(at === chosen), onclick: () => take(at) }, element("span", { className: "kind" }, entry.kind), entry.words, element("small", {}, entry.more))),
     !found.length && element("li", { className: "empty" }, "Nothing is called that."));
@@ -52,7 +38,7 @@ function take(at) {
 function openPalette() {
   chosen = 0;
   const list = element("ul", { className: "palette-list", role: "listbox", ariaLabel: "What there is", id: "palette-list" });
-  const field = element("input", { type: "text", placeholder: "A view, a panel, a command, a run …", ariaLabel: "Find", role: "combobox", ariaExpanded: "true", autocomplete: "off" });
+  const field = element("input", { type: "text", placeholder: "A view, a knob, a frame, a limb, a page, a run, help …", ariaLabel: "Find", role: "combobox", ariaExpanded: "true", autocomplete: "off" });
   field.setAttribute("aria-controls", "palette-list");
   const redraw = () => { draw(list, field.value.trim().toLowerCase()); field.setAttribute("aria-activedescendant", `palette-${chosen}`); };
   field.oninput = () => { chosen = 0; redraw(); };
@@ -66,6 +52,7 @@ function openPalette() {
   dialog.showModal();
   redraw();
   field.focus();
+  askForFindable(() => { if (dialog.open) redraw(); });
 }
 
 /** Wire its key and its button. */

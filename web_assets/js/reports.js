@@ -1,26 +1,80 @@
-// What `studio reproduce` found, drawn as in its own report.
+// What was found when the papers' experiments were run again, drawn as in the command's own report; and the form that
+// runs one.
 
 import * as echarts from "../vendor/echarts.esm.min.js";
-import { fetchJson } from "./api.js";
-import { byId, element, fill, nothing } from "./elements.js";
+import { fetchJson, post, readOnly, remove } from "./api.js";
+import { actions, button, byId, card, check, drawProgress, element, failure, field, fill, hint, lead, optional, select } from "./elements.js";
+import { listen, startEvents } from "./events.js";
 import { drawFindings } from "./findings.js";
+import { isGoing, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
+import { startWorkList } from "./studio/work_list.js";
 import { startTheme } from "./theme.js";
 
-const FILES = { Report: "report.html", JSON: "results.json", Markdown: "summary.md" };
+/** @import { Schemas } from "./api_types" */
 
-const empty = () => nothing("Nothing reproduced yet",
-  element("p", {}, "The papers' figures and tables are run again by one command. A quick pass over all of them takes about a quarter of an hour; without --quick the full runs take hours, and resume where they stopped."),
-  element("code", {}, "studio reproduce all --quick"), element("p", {}, "Results appear here, with the paper's claim beside every number."));
+const FILES = { Report: "report.html", JSON: "results.json", Markdown: "summary.md" };
+const ALL = "all";
+
+const column = element("div", { id: "findings" });
+const runner = element("section", {});
+const progress = optional();
+/** @type {Schemas["ExperimentList"] | null} */
+let known = null;
+let chosen = ALL;
+let quick = true;
+let failed = null;
+
+async function begin() {
+  failed = null;
+  try { known.job = await post("/api/reports/experiments", { name: chosen, quick }); } catch (error) { failed = error; }
+  drawRunner();
+}
+
+const KIND = String("reproduction");
+const stop = () => remove(`/api/jobs/${KIND}/${KIND}`).catch(complain);
+
+/** The form, or how far what was begun is, whichever page or window it was begun in. */
+function drawRunner() {
+  const { experiments, job } = known;
+  const going = isGoing(job);
+  const one = experiments.find((entry) => entry.name === chosen);
+  const name = select([[ALL, `all ${experiments.length}`], ...experiments.map((entry) => /** @type {[string, string]} */ ([entry.name, `${entry.source}: ${entry.title}`]))], chosen, {
+    ariaLabel: "Experiment", disabled: going, onchange: ({ target }) => { chosen = target.value; drawRunner(); },
+  });
+  fill(runner, card("Run an experiment again",
+    field("Experiment", name), one && hint(one.claim),
+    check("a quick look, with fewer seeds, frames and settings", { checked: quick, disabled: going, onchange: ({ target }) => { quick = target.checked; drawRunner(); } }),
+    hint(quick ? "All of them take about a quarter of an hour." : one && !one.is_long ? "Ten seeds of every setting." : "Ten seeds of every setting take hours. What is measured is kept: it goes on where it was stopped."),
+    !going && !readOnly && actions(button("Run it", begin, "primary")), progress,
+    failure(failed ?? (job?.state === "failed" ? job : null)),
+    job && !going && job.state !== "failed" && hint(`${job.name}: ${job.state}${job.state === "done" ? `, ${job.measured} trials run, ${job.kept} kept from before${job.failed ? `, ${job.failed} failed` : ""}` : "; what was measured is kept"}.`)));
+  drawProgress(progress, going ? progressOf(job, "beginning", stop) : null);
+}
+
+async function drawReports() {
+  const { experiments } = await fetchJson("/api/reports");
+  const files = experiments.length > 0 && Object.entries(FILES).map(([words, file]) => element("a", { className: "download", href: `/api/reports/${file}`, download: file }, words));
+  fill(byId("downloads"), files);
+  if (experiments.length) return drawFindings(column, experiments, echarts);
+  fill(column, lead("Nothing is reproduced yet. Results appear here, with the paper's claim beside every number."));
+}
 
 async function start() {
   startTheme();
-  const { experiments } = await fetchJson("/api/reports");
-  if (!experiments.length) return fill(byId("content"), empty());
-  fill(byId("downloads"), Object.entries(FILES).map(([words, file]) => element("a", { className: "download", href: `/api/reports/${file}`, download: file }, words)));
-  const column = element("div", { id: "findings" });
-  fill(byId("content"), element("div", { className: "report-column" }, column));
-  drawFindings(column, experiments, echarts);
+  startEvents();
+  startWorkList();
+  fill(byId("content"), element("div", { className: "report-column" }, runner, column));
+  known = await fetchJson("/api/reports/experiments");
+  drawRunner();
+  await drawReports();
+  listen("reproduction", (job) => {
+    const was = known.job;
+    known.job = job;
+    if (isGoing(was) && isGoing(job)) drawProgress(progress, progressOf(job, "beginning", stop));
+    else drawRunner();
+    if (!isGoing(job)) drawReports().catch(complain);
+  });
 }
 
 start().catch(complain);

@@ -22,10 +22,10 @@ export async function refreshSessions() {
 export function openSession(session, run = undefined, shown = {}) {
   const newest = get("sessions")?.find((one) => one.name === session)?.runs[0]?.name ?? null;
   const chosen = run === undefined ? newest : run;
-  if (session === get("session") && chosen === get("run")) return;
+  if (session === get("session") && chosen === get("run")) return set({ missing: null });
   const frame = shown.frame ?? null;
   set({
-    session, run: chosen, track: "raw", summary: null, detail: null, parameters: null, layerCount: null, settings: null, moved: null, whatIf: null, compared: null, through: null, eye: null,
+    missing: null, session, run: chosen, track: "raw", summary: null, detail: null, parameters: null, layerCount: null, settings: null, moved: null, whatIf: null, compared: null, through: null, eye: null,
     ...nothingChosen(), ...shown, frame, follow: frame === null,
   });
   document.body.classList.remove("rail-open");

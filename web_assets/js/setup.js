@@ -9,20 +9,24 @@ import { closeDialog, openForm } from "./dialogs.js";
 import { actions, button, byId, element, failure, fill, lead, NAME, nothing, notice, offer, spring } from "./elements.js";
 import { listen, startEvents } from "./events.js";
 import { isGoing } from "./jobs.js";
+import { acceptDrops } from "./dropping.js";
 import { complain } from "./messages.js";
 import { loadScene } from "./scene_window.js";
 import { sessionWords } from "./sessions.js";
+import { startWorkList } from "./studio/work_list.js";
 import { startTheme } from "./theme.js";
 
 /**
  * @import { Schemas } from "./api_types"
+ * @typedef {{ begin?: boolean, dropped?: File[] }} Asked what a step does at once: track; take files that were dropped
  * @typedef Setup what a step is given
  * @property {string} session
  * @property {Schemas["SessionDetail"]} detail the session as it was when the step was mounted (no cameras before the calibration)
  * @property {HTMLElement} aside the empty element at the right, for pictures (class "pictures" with `picture`s in it, if it fits)
  * @property {Schemas["Workflow"]["steps"][number]} step this step as the server sees it now
  * @property {() => Promise<any>} refresh load the steps again, after something was made
- * @property {(step: string) => Promise<void>} go show another step
+ * @property {(step: string, asked?: Asked) => Promise<void>} go show another step; `asked`: to do at once
+ * @property {Asked} asked what the step is asked to do at once
  * @property {(shown?: object) => Promise<void>} scene show the 3-D scene in `aside` instead, moved to what is to be shown
  * @property {(type: string, handler: (event: any) => void) => void} on hear events of this session while the step is shown
  */
@@ -49,6 +53,7 @@ let steps = [];
 let shown = "";        // the step whose panel is mounted
 let mounting = 0;      // rises with every mount, so that a slow one knows that it is too late
 let releases = [];     // what the mounted step has to release
+let isRestoring = true; // whether the step that is shown next follows from the address
 
 const statusOf = (name) => steps.find((one) => one.step === name);
 const beside = (by) => steps[steps.findIndex((one) => one.step === shown) + by]?.step;
@@ -95,14 +100,19 @@ function drawHead() {
   fill(head, element("h1", {}, STEPS[shown].name), lead(STEPS[shown].lead), status.why && notice(status.why));
 }
 
-/** Show a step. */
-async function go(name) {
+/** Show a step; "back" leads to the one before. @param {Asked} [asked] */
+async function go(name, asked = {}) {
   if (!statusOf(name)) return;
   const turn = ++mounting;
   release();
   shown = name;
   drawStepper();
-  history.replaceState(null, "", `?session=${encodeURIComponent(session)}&step=${name}`);
+  const address = `?session=${encodeURIComponent(session)}&step=${name}`;
+  if (location.search !== address) {
+    if (isRestoring) history.replaceState(null, "", address);
+    else history.pushState(null, "", address);
+  }
+  isRestoring = false;
   document.title = `${STEPS[name].name} · ${session} · Capture studio`;
   const place = element("div", { className: "step-place" });
   const [before, next] = [beside(-1), beside(1)];
@@ -114,15 +124,15 @@ async function go(name) {
   try {
     const [module, detail] = await Promise.all([moduleOf(name), fetchJson(sessionPath(session))]);
     if (turn !== mounting) return;
-    releases.push(module.mount(place, setupOf(detail)));
+    releases.push(module.mount(place, setupOf(detail, asked)));
   } catch (error) {
     fill(place, element("p", {}, "This step cannot be shown."), failure(error));
   }
 }
 
 /** What a step's module is given. @returns {Setup} */
-const setupOf = (detail) => ({
-  session, detail, aside, refresh, go, scene,
+const setupOf = (detail, asked) => ({
+  session, detail, aside, refresh, go, scene, asked,
   get step() { return statusOf(shown); },
   on: (type, handler) => { releases.push(listen(type, (event) => { if (event.session === session) handler(event); })); },
 });
@@ -152,7 +162,7 @@ async function drawSessions() {
 }
 
 /** The form of a session that begins empty. The body is asked for first of all: its size is that of the space in which it is sought. */
-async function beginForm() {
+async function beginForm(dropped = null) {
   const { bodies, default_body: usual } = await fetchJson("/api/choices").catch(() => ({ bodies: [], default_body: "" }));
   const choices = bodies.map((one) => ({ value: one.name, label: one.label }));
   openForm({
@@ -165,6 +175,7 @@ async function beginForm() {
       session = made.name;
       await drawSessions();
       await open(made.name);
+      if (dropped) await go("footage", { dropped });
     },
   });
 }
@@ -187,21 +198,43 @@ function takeKey(event) {
   }
 }
 
+/** Back and forward go from step to step, and to the session before. */
+async function restore() {
+  const query = new URLSearchParams(location.search);
+  const [wanted, step] = [query.get("session") ?? "", query.get("step") ?? ""];
+  isRestoring = true;
+  if (wanted === session && statusOf(step)) return go(step);
+  return open(wanted || which.options[0]?.value, step);
+}
+
+/** What a link names that is not in this workspace. */
+function sayMissing(name, names) {
+  fill(panel, nothing(`Session “${name}” is not here`, lead("It was renamed or deleted, or the link comes from another studio."),
+    names.length > 0 && actions(button(`Open ${names[0]}`, () => open(names[0]), "primary")), actions(button("New session", () => beginForm(), names.length ? "" : "primary"))));
+}
+
 async function start() {
   startTheme();
   startEvents();
+  startWorkList();
+  addEventListener("popstate", () => { restore().catch(complain); });
   document.addEventListener("keydown", takeKey);
-  byId("begin").onclick = beginForm;
+  byId("begin").onclick = () => beginForm();
+  acceptDrops("Drop your cameras' videos, or a folder", (files) => {
+    if (shown === "footage") return document.dispatchEvent(new CustomEvent("footage", { detail: files }));
+    return session && statusOf("footage") ? go("footage", { dropped: files }) : beginForm(files);
+  });
   which.onchange = () => open(which.value);
   for (const type of ["sessions", "track", "subject", "initialise", "export", "state", "import"]) {
     listen(type, (event) => { if (session && event.session === session && !isGoing(event)) refresh().catch(() => {}); });
   }
   const query = new URLSearchParams(location.search);
   try {
-    const [first] = await drawSessions();
-    const wanted = query.get("session") ?? first;
+    const names = await drawSessions();
+    const wanted = query.get("session") ?? names[0];
+    if (wanted && !names.includes(wanted)) return sayMissing(wanted, names);
     if (wanted && !query.has("new")) return await open(wanted, query.get("step") ?? "");
-    fill(panel, nothing("From your own cameras", lead("From the raw footage of your cameras to a motion file, step by step. Start with an empty session."), actions(button("New session", beginForm, "primary"))));
+    fill(panel, nothing("From your own cameras", lead("From the raw footage of your cameras to a motion file, step by step. Start with an empty session."), actions(button("New session", () => beginForm(), "primary"))));
     if (query.has("new")) beginForm();
   } catch (error) { complain(error); }
 }

@@ -40,8 +40,11 @@ export function adder(place, setup, done) {
     fill(folders, found.path && found.parent !== null && open("‹ up", found.parent), found.folders.slice(0, MOST_FOLDERS).map((name) => open(name, found.path ? `${found.path}/${name}` : name)));
   }
 
+  /** @type {File[]} */
+  let dropped = [];      // from the computer's own windows
+
   async function chosenSource() {
-    const chosen = videos.files.length ? videos.files : folder.files;
+    const chosen = dropped.length ? dropped : videos.files.length ? videos.files : folder.files;
     if (chosen.length) return { upload: await uploadFiles(chosen, (words, share) => drawProgress(going, { words, share, cancel: () => abort.abort() }), abort.signal) };
     if (source.value.trim()) return { source: source.value.trim() };
     throw fault("Nothing is chosen.", "Choose the cameras' videos, or a folder.");
@@ -58,10 +61,13 @@ export function adder(place, setup, done) {
       const job = await jobDone(`/api/imports/${identifier}`, (state) => drawProgress(going, { words: standing(state, "beginning"), share: shareOf(state), cancel }), () => stopped);
       if (job) { videos.value = folder.value = ""; place.open = false; await done(job); }
     } catch (error) { if (error.name !== "AbortError" && error.code !== CANCELLED) fill(wrong, failure(error)); }
+    dropped = [];
     drawProgress(going, null);
   }
 
   return {
+    /** Take files that were dropped on the page. @param {File[]} files */
+    take(files) { dropped = files; place.open = true; return begin(); },
     /** there: whether the session has footage; then the form is folded away. */
     draw(there) {
       summary.textContent = there ? "Add or replace footage" : "Your cameras' footage";

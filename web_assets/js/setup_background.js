@@ -39,7 +39,7 @@ const MISSING = {
 /** Sources that have no knobs to tune. */
 const AS_THEY_ARE = ["person", "strokes", "masks", "subject"];
 const THRESHOLDS = ["mask_darkest", "mask_brightest", "mask_hue", "mask_hue_reach", "mask_saturation"];
-const FIRST = ["mask_threshold", "mask_gain_fit", "mask_shadow_test", "mask_shadow_darkest", "mask_shadow_colour", "mask_opening", "mask_closing", "mask_keep_components"];
+const FIRST = ["mask_threshold", "mask_gain_fit", "mask_shadow_test", "mask_shadow_darkest", "mask_shadow_colour", "mask_shadow_learnt", "mask_opening", "mask_closing", "mask_keep_components"];
 
 /** @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
 export function mount(place, setup) {
@@ -70,11 +70,12 @@ export function mount(place, setup) {
   const cameras = element("section", { className: "background-quality", hidden: true });
   const knobs = element("details", { className: "background-knobs" });
   place.append(make, agreement, cameras, knobs);
-  const alignment = alignmentBox(setup, cameras, () => {
+  // Turned cameras see the same masks otherwise: whether they agree now is measured at once, else the step waits for it.
+  const alignment = alignmentBox(setup, cameras, async () => {
     quality = null;
     drawQuality();
     pictures.show();
-    setup.refresh().catch(complain);
+    await measureQuality();
   });
   const pictures = maskPictures(setup, paint, paintLines);
 
@@ -205,6 +206,7 @@ export function mount(place, setup) {
       source === "combined" && check("exclude regions that the subject never comes near", { checked: unused, onchange: ({ target }) => { unused = target.checked; } }, "A bystander, a monitor, a window: motion there is not the subject."),
       !running && actions(button("Set up the background", setUp, "primary", { disabled: !source || !background.possible.includes(source) || (source === "subject" && !subjectAt) })), going, failure(failed),
       background.job?.choice && sourceTable(background.job.choice), (background.job?.notes ?? []).map((note) => hint(note)));
+    pictures.cut(running);
     if (running) drawGoing();
     else fill(going);
   }
@@ -247,12 +249,18 @@ export function mount(place, setup) {
 
   // How far the views agree.
 
+  async function measureQuality() {
+    if (background.cameras.length < 2) return;
+    const words = agreement.querySelector(".hint");
+    if (words) words.textContent = "Comparing the masks of five frames…";
+    try { quality = await post(`${here}/masks/quality`); } catch (error) { complain(error); }
+    if (gone) return;
+    drawQuality();
+    setup.refresh().catch(complain);
+  }
+
   function drawQuality() {
-    const measure = button("Measure", async () => {
-      agreement.querySelector(".hint").textContent = "Comparing the masks of five frames…";
-      try { quality = await post(`${here}/masks/quality`); setup.refresh().catch(complain); } catch (error) { complain(error); }
-      drawQuality();
-    }, "small", { hidden: background.cameras.length < 2 });
+    const measure = button("Measure", measureQuality, "small", { hidden: background.cameras.length < 2 });
     fill(agreement, element("div", { className: "head-line" }, element("h2", {}, "Agreement of the views"), measure), qualityList(quality, paint, background.measured, background.source));
     pictures.rate(quality);
   }

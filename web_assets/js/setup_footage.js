@@ -84,6 +84,13 @@ export function mount(place, setup) {
     draw();
   }
 
-  load(setup.detail.warnings ?? []).catch(complain);
-  return () => { clearTimeout(wait); sync.stop(); adding.stop(); };
+  const takeDropped = ({ detail }) => adding.take(detail);
+  document.addEventListener("footage", /** @type {any} */ (takeDropped));
+  load(setup.detail.warnings ?? []).then(() => (setup.asked.dropped ? adding.take(setup.asked.dropped) : null)).catch(complain);
+  return () => {
+    document.removeEventListener("footage", /** @type {any} */ (takeDropped));
+    clearTimeout(wait);
+    sync.stop();
+    adding.stop();
+  };
 }

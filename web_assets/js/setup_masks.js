@@ -10,7 +10,7 @@ const SPREAD = 5;
 /** Pictures in `setup.aside`; `paint(camera)` opens the brush, `strokes(camera)` that for strokes. @param {import("./setup.js").Setup} setup */
 export function maskPictures(setup, paint, strokes) {
   const here = sessionPath(setup.session);
-  const state = { frame: 0, settings: {}, quality: null, views: [], age: 0, bare: false };
+  const state = { frame: 0, settings: {}, quality: null, views: [], age: 0, bare: false, cutting: false };
   const bar = element("div", { className: "mask-bar" });
   const grid = element("div", { className: "pictures masks" });
 
@@ -22,7 +22,7 @@ export function maskPictures(setup, paint, strokes) {
 
   function address(camera) {
     const settings = Object.keys(state.settings).length ? `&settings=${encodeURIComponent(JSON.stringify(state.settings))}` : "";
-    const show = state.bare ? "" : "mask";
+    const show = state.bare || state.cutting ? "" : "mask";
     return `${here}/frames/${state.frame}/views/${encodeURIComponent(camera)}.jpg?show=${show}&height=${HEIGHT}&age=${state.age}${settings}`;
   }
 
@@ -89,6 +89,14 @@ export function maskPictures(setup, paint, strokes) {
     begin, show,
     get frame() { return state.frame; },
     go(frame) { state.frame = frame; const slider = bar.querySelector("input"); if (slider) { slider.value = String(frame); bar.querySelector("output").textContent = `frame ${frame}`; } },
+    /** While new masks are cut the old ones are not shown: they would pass for the result. */
+    cut(isGoing) {
+      if (state.cutting === isGoing) return;
+      state.cutting = isGoing;
+      state.age += 1;
+      grid.classList.toggle("cutting", isGoing);
+      draw();
+    },
     preview(settings) { state.settings = { ...settings }; state.age += 1; draw(); },
     rate(quality) {
       state.quality = quality;

@@ -3,7 +3,7 @@
 
 import { fault, fetchJson, post, put, remove, sessionPath } from "./api.js";
 import { actions, button, drawProgress, element, failure, field, fill, hint, notice, number, percent, picture } from "./elements.js";
-import { followJob, progressOf } from "./jobs.js";
+import { findJob, followJob, isGoing, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
 import { foundWords, isUnsure } from "./start_pose.js";
 
@@ -35,8 +35,8 @@ export function mount(place, setup) {
   async function waited(jobs, { identifier }, words) {
     const cancel = () => remove(`${jobs}/${identifier}`).catch(complain);
     try {
+      // The job goes on when the step is left, and is found again when it is shown.
       const ended = await followJob(`${jobs}/${identifier}`, (job) => drawProgress(progress, progressOf(job, words, cancel)), () => gone);
-      if (!ended) cancel();
       return ended?.state === "done" ? ended : null;
     } finally { drawProgress(progress, null); }
   }
@@ -53,17 +53,33 @@ export function mount(place, setup) {
     setup.refresh().catch(complain);
   }
 
+  const SEARCHES = "/api/initialisations", REFINEMENTS = "/api/track-jobs";
+
   const find = () => during(async () => {
     better = null;
-    found = (await waited("/api/initialisations", await post(`${here}/initialise`, { frame, replace: true }), "looking at the frame")) ?? found;
+    await waitForFind(await post(`${here}/initialise`, { frame, replace: true }));
   });
+  const waitForFind = async (job) => { found = (await waited(SEARCHES, job, "looking at the frame")) ?? found; };
 
   const refine = () => during(async () => {
-    const ended = await waited("/api/track-jobs", await post(`${here}/pose/refine`, { frame, pose: pose.pose }), "searching around the pose");
-    if (!ended) return;
-    better = ended;
-    if (better.gain > 0) await keep(better.pose);
+    await waitForRefine(await post(`${here}/pose/refine`, { frame, pose: pose.pose, keep: true }));
   });
+  const waitForRefine = async (job) => { better = (await waited(REFINEMENTS, job, "searching around the pose")) ?? better; };
+
+  /** What was begun before this step was shown: a search that is under way is followed, what the last one found is said. */
+  async function findAgain() {
+    const [search, refinement] = await Promise.all([findJob({ session: setup.session, kind: "initialise" }),
+      findJob({ session: setup.session, kind: "track" }, (line) => line.verb === "pose" && !line.run)]);
+    if (gone || going) return;
+    if (isGoing(search)) return during(() => waitForFind(search));
+    if (isGoing(refinement)) return during(() => waitForRefine(refinement));
+    const isStored = (job) => job?.state === "done" && pose?.stored && isSame(job.pose, pose.pose);
+    if (isStored(search)) found = search;
+    if (isStored(refinement)) better = refinement;
+    if (search?.state === "failed") failed = search;
+    draw();
+  }
+  const isSame = (one, other) => one?.length === other.length && one.every((value, at) => Math.abs(value - other[at]) < 1e-6);
 
   const keep = (values) => put(`${here}/start-pose`, { pose: values, frame });
   /** @param {"turned round" | "in place"} how */
@@ -140,7 +156,7 @@ export function mount(place, setup) {
     const act = (label, work, className = "") => button(label, work, className, { disabled: going });
     return [
       ...(pose.has_sides ? [element("h2", {}, "Left and right"), element("p", { className: "side-check" }, swatch("left"), "the subject's left, ", swatch("right"), "the subject's right. Is it so in every picture?")] : []),
-      actions(act("Yes, track from here", () => setup.go("track"), "primary"),
+      actions(act("Yes, track from here", () => setup.go("track", { begin: true }), "primary"),
         pose.has_sides && [act("No: facing the other way", () => exchange("turned round")), act("Mirror", () => exchange("in place"))], act("Refine from here", refine)),
     ];
   }
@@ -175,7 +191,7 @@ export function mount(place, setup) {
     if (event.editing) begun = true;
     else if (begun) { editing = begun = false; load(); }
   });
-  load();
+  load().then(() => findAgain().catch(complain));
   return () => {
     gone = true;
     clearTimeout(timer);

@@ -2,7 +2,7 @@
 
 import { fault, fetchJson, post, put, remove, sessionPath } from "./api.js";
 import { actions, button, check, drawProgress, element, failure, field, fill, hint, number, optional, percent, select, table, text } from "./elements.js";
-import { followJob, isGoing, progressOf } from "./jobs.js";
+import { findJob, followJob, isGoing, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
 import { drawStature } from "./setup_stature.js";
 
@@ -84,7 +84,7 @@ export function mount(place, setup) {
       const query = new URLSearchParams({ body, ...(height ? { height_mm: String(height) } : {}) });
       try {
         const shown = changed() ? await fetchJson(`${here}/subject?${query}`) : subject;
-        if (!gone && !fit?.limbs?.length) drawStature(setup.aside, shown.limbs, [], note(shown));
+        if (!gone && !fit?.limbs?.length && !(isGoing(fit) && fit.frames.length)) drawStature(setup.aside, shown.limbs, [], note(shown));
       } catch (error) { complain(error); }
     }, PREVIEW_MILLISECONDS);
   }
@@ -120,14 +120,37 @@ export function mount(place, setup) {
     try {
       if (frames.some((frame) => !Number.isInteger(frame))) throw fault("Frames are whole numbers.", "Write them like 10, 40, 80.");
       fit = await post(`${here}/fit-subject`, { ...options, frames, run: options.run || null, keep: false });
-      draw();
+    } catch (error) { fit = null; unfitted = error; }
+    draw();
+    await followFit();
+  }
+
+  /** Follow the fit that is under way to its end. */
+  async function followFit() {
+    if (!isGoing(fit)) return;
+    try {
       fit = await followJob(`/api/subject-fits/${fit.identifier}`, (job) => { fit = job; drawGoing(); }, () => gone);
     } catch (error) { fit = null; unfitted = error; }
     if (!gone) draw();
   }
 
+  /** The fit that was begun before this page was loaded, or in another window: how far it is, or what it found. */
+  async function findFit() {
+    const known = await findJob({ session: setup.session, kind: "subject" });
+    if (!known || gone || fit) return;
+    if (known.state === "failed") unfitted = known;
+    // What was saved shows as the session's subject, until that is another one.
+    else if (isGoing(known) || (known.state === "done" && (!known.file || subject.fitted))) fit = known;
+  }
+
+  let looks = -1;        // which pictures of the fit under way are drawn
+
   function drawGoing() {
     const { identifier } = fit;
+    if (fit.looks !== looks && fit.frames.length) {
+      looks = fit.looks;
+      fill(setup.aside, hint("So far: the body as it is fitted, over the frames that are looked at."), fitPictures());
+    }
     drawProgress(progress, progressOf(fit, "beginning", () => remove(`/api/subject-fits/${identifier}`).catch(complain)));
   }
 
@@ -162,14 +185,15 @@ export function mount(place, setup) {
     const names = setup.detail.cameras.map((camera) => camera.name);
     return element("div", { className: "pictures fitted" }, fit.frames.map((frame, at) => {
       const camera = names[at % names.length];
-      return element("figure", { className: "picture" }, element("img", { alt: `Frame ${frame}, ${camera}`, src: `/api/subject-fits/${fit.identifier}/frames/${frame}/views/${encodeURIComponent(camera)}.jpg?height=${PICTURE_HEIGHT}` }),
-        element("figcaption", {}, element("span", {}, element("b", {}, `frame ${frame}`), ` ${camera}, overlap ${percent(fit.overlap[at])}`)));
+      return element("figure", { className: "picture" }, element("img", { alt: `Frame ${frame}, ${camera}`, src: `/api/subject-fits/${fit.identifier}/frames/${frame}/views/${encodeURIComponent(camera)}.jpg?height=${PICTURE_HEIGHT}&look=${fit.looks}` }),
+        element("figcaption", {}, element("span", {}, element("b", {}, `frame ${frame}`), ` ${camera}${fit.overlap ? `, overlap ${percent(fit.overlap[at])}` : ""}`)));
     }));
   }
 
   function draw() {
     drawWho();
     drawFit();
+    if (isGoing(fit) && fit.frames.length) return undefined;
     if (fit?.state !== "done") return look();
     drawStature(setup.aside, fit.limbs, subject.limbs, fit.file ? "Fitted and saved. Dashed: by height alone." : "As fitted. Dashed: before the fit.");
     setup.aside.append(fitPictures());
@@ -180,11 +204,14 @@ export function mount(place, setup) {
     [body, height] = [subject.body, subject.height_mm];
   }
 
-  Promise.all([fetchJson(`/api/choices?session=${encodeURIComponent(setup.session)}`), load()]).then(([choices]) => {
+  Promise.all([fetchJson(`/api/choices?session=${encodeURIComponent(setup.session)}`), load()]).then(async ([choices]) => {
     if (gone) return;
     bodies = choices.bodies;
     if (!bodies.some((one) => one.name === body)) bodies.push({ name: body, label: body });
+    await findFit().catch(complain);
+    if (gone) return;
     draw();
+    await followFit();
   }).catch((error) => place.append(failure(error)));
 
   return () => { gone = true; clearTimeout(preview); };

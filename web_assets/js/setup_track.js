@@ -3,7 +3,7 @@
 import { fetchJson, post, remove, runPath, sessionPath } from "./api.js";
 import { valuesOf } from "./dialogs.js";
 import { actions, button, check, dotted, drawProgress, duration, element, failure, field, fill, hint, notice, number, optional, select, sends } from "./elements.js";
-import { followJob, timeLeft } from "./jobs.js";
+import { findJob, followJob, isGoing, timeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
 import { studioPath } from "./sessions.js";
 import { viewWall } from "./setup_views.js";
@@ -75,7 +75,13 @@ export function mount(place, setup) {
     failed = null;
     try {
       job = await post(`${path()}/correct`, { frame: newest().first, track: "raw", back_to: 0 });
-      drawStatus();
+    } catch (error) { failed = error; return drawStatus(); }
+    await followBack();
+  }
+
+  async function followBack() {
+    drawStatus();
+    try {
       await followJob(`/api/track-jobs/${job.identifier}`, (state) => { job = state; drawStatus(); }, () => stopped);
     } catch (error) { failed = error; }
     job = null;
@@ -146,7 +152,22 @@ export function mount(place, setup) {
     timer = setTimeout(poll, POLL_MILLISECONDS);
   }
 
-  drawForm().then(poll).catch(complain);
+  /** What was begun before this step was shown goes on to be followed. */
+  async function findAgain() {
+    const known = await findJob({ session: setup.session, kind: "track" }, (line) => line.verb === "correct");
+    if (stopped || job || !isGoing(known)) return;
+    job = known;
+    await followBack();
+  }
+
+  /** "Yes, track from here": the run that waits, else a new one as the form has it. */
+  async function trackNow() {
+    const run = newest();
+    if (run && !run.done && run.first === setup.detail.start_pose_frame && setup.step?.state !== "stale") return start(run.name);
+    return form.requestSubmit();
+  }
+
+  drawForm().then(() => { if (setup.asked.begin && !isBusy()) return trackNow(); return findAgain(); }).then(poll).catch(complain);
   drawStatus();
   showNewest();
   return () => { stopped = true; clearTimeout(timer); wall.stop(); };

@@ -3,7 +3,7 @@
 import { BodyDrawing } from "./body_drawing.js";
 import { button, byId, card, element, fill, hint } from "./elements.js";
 import { Figure } from "./figure.js";
-import { startTheme } from "./theme.js";
+import { layerColour, startTheme } from "./theme.js";
 import { records } from "./view_sheet.js";
 import { ANSWER_VIEWS } from "./views_answer.js";
 import { SEARCH_VIEWS } from "./views_search.js";
@@ -20,12 +20,40 @@ const at = { frame: 0, layer: null, limb: null, parameter: null, particle: null,
 
 /** The ends of all limbs by frame: [frame][limb][end] = [x, y, z] mm. */
 function unpacked({ ends, limbs, frames, offset, step }) {
-  const bytes = Uint8Array.from(atob(ends), (letter) => letter.charCodeAt(0));
-  const values = new DataView(bytes.buffer);
+  const values = new DataView(bytesOf(ends).buffer);
   let place = 0;
   const next = (axis) => { const value = values.getInt16(place, true); place += 2; return value * step + offset[axis]; };
   const point = () => [next(0), next(1), next(2)];
   return frames.map(() => limbs.map(() => [point(), point()]));
+}
+
+const LAYER_RATES = [1, 3, 10];
+const POINT = { least: 1.2, more: 2.2, faint: 0.25, glass: 0.22 };
+
+const bytesOf = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+
+/** The particles of a frame by layer: [{beta, of, particles: [{tips: [[x, y, z]], parent, weight}]}]. */
+function unpackedCloud({ offset, step, tips, layers }) {
+  return layers.map(({ points, parents, weights, beta, of }) => {
+    const values = new DataView(bytesOf(points).buffer);
+    const heavy = bytesOf(weights);
+    let place = 0;
+    const next = (axis) => { const value = values.getInt16(place, true); place += 2; return value * step + offset[axis]; };
+    const particles = parents.map((parent, at) => ({ parent, weight: heavy[at] / 255, tips: Array.from({ length: tips }, () => [next(0), next(1), next(2)]) }));
+    return { beta, of, particles };
+  });
+}
+
+/** Points of a layer, its particles so far on their way (phase 0 to 1) from their parents' places. */
+function pointsOf(layers, index, phase) {
+  const colour = layerColour(index, layers.length);
+  const before = layers[index - 1]?.particles;
+  return layers[index].particles.flatMap(({ tips, parent, weight }) => {
+    const from = before?.[parent]?.tips ?? tips;
+    return tips.map((tip, end) => ({
+      at: tip.map((value, axis) => from[end][axis] + phase * (value - from[end][axis])), colour, radius: POINT.least + POINT.more * weight, alpha: POINT.faint + (1 - POINT.faint) * weight,
+    }));
+  });
 }
 
 /** Middle of all ends of a frame, mm. */
@@ -67,7 +95,40 @@ function sceneBox(data, choose) {
   const speed = element("select", { ariaLabel: "Speed" }, SPEEDS.map((one) => new Option(`${one}×`, String(one), one === 1, one === 1)));
   const play = button("Play", () => { if (timer) stop(); else start(); }, "small");
 
+  // The layers of the frames whose particles are in the page.
+  const clouds = new Map(data.clouds.map((one) => [one.frame, unpackedCloud(one)]));
+  const layersNow = () => clouds.get(scene.frames[Number(slider.value)]) ?? null;
+  let [layer, phase, layerTimer] = [0, 1, 0];
+  const layerPlay = button("Pause layers", () => { if (layerTimer) stopLayers(); else startLayers(); }, "small");
+  const layerSlider = element("input", { type: "range", min: 0, step: 1, value: 0, ariaLabel: "Layer", oninput: () => { stopLayers(); layer = Number(layerSlider.value); draw(); } });
+  const layerRate = element("select", { ariaLabel: "Layers a second" }, LAYER_RATES.map((one) => new Option(`${one} layer${one === 1 ? "" : "s"}/s`, String(one), one === 3, one === 3)));
+  const layerWords = element("output", {});
+  const jumps = element("span", { className: "group" }, [...clouds.keys()].map((frame) => button(`frame ${frame}`, () => { choose({ frame }); startLayers(); }, "small")));
+  const layerLine = element("div", { className: "shared-transport shared-layers" }, layerPlay, layerRate, layerSlider, layerWords, jumps);
+
+  function startLayers() {
+    if (!layersNow()) return;
+    stop();
+    cancelAnimationFrame(layerTimer);
+    layerPlay.textContent = "Pause layers";
+    let last = performance.now();
+    const step = (now) => {
+      phase += ((now - last) / 1000) * Number(layerRate.value);
+      last = now;
+      if (phase >= 1) { phase %= 1; layer = (layer + 1) % (layersNow()?.length ?? 1); }
+      draw();
+      layerTimer = requestAnimationFrame(step);
+    };
+    layerTimer = requestAnimationFrame(step);
+  }
+  function stopLayers() {
+    cancelAnimationFrame(layerTimer);
+    [layerTimer, phase] = [0, 1];
+    layerPlay.textContent = "Play layers";
+  }
+
   function start() {
+    stopLayers();
     play.textContent = "Pause";
     if (Number(slider.value) >= scene.frames.length - 1) slider.value = "0";
     let [last, place] = [performance.now(), Number(slider.value)];
@@ -92,6 +153,20 @@ function sceneBox(data, choose) {
     const limbs = bodies[Number(slider.value)];
     drawing.reach = follow.checked ? { middle: middleOf(limbs), radius: NEAR / zoom } : { middle: whole.middle, radius: whole.radius / zoom };
     output.textContent = `frame ${scene.frames[Number(slider.value)]}`;
+    const layers = layersNow();
+    if (!layers) stopLayers();
+    for (const one of [layerPlay, layerRate, layerSlider]) one.disabled = !layers;
+    if (layers) {
+      layer = Math.min(layer, layers.length - 1);
+      [layerSlider.max, layerSlider.value] = [String(layers.length - 1), String(layer)];
+      const { of, beta, particles } = layers[layer];
+      const some = particles.length < of ? `${particles.length} of ${of}` : String(of);
+      layerWords.textContent = `layer ${layer + 1} of ${layers.length} · ${some} particles${beta === null ? "" : ` · β ${beta.toPrecision(3)}`}`;
+      drawing.over(pointsOf(layers, layer, phase), POINT.glass);
+    } else {
+      layerWords.textContent = "this frame's particles are not in the page";
+      drawing.over([]);
+    }
     drawing.show(limbs);
   }
 
@@ -101,7 +176,8 @@ function sceneBox(data, choose) {
     draw();
   }, { passive: false });
   return {
-    box: element("section", { className: "card-box shared-box" }, canvas, element("div", { className: "shared-transport" }, play, speed, slider, output, element("label", { className: "check" }, follow, "follow the body"))),
+    box: element("section", { className: "card-box shared-box" }, canvas, element("div", { className: "shared-transport" }, play, speed, slider, output, element("label", { className: "check" }, follow, "follow the body")), layerLine),
+    startLayers,
     /** Show a frame, or the nearest that the page has. */
     go(frame) {
       const nearest = scene.frames.reduce((best, one, index) => (Math.abs(one - frame) < Math.abs(scene.frames[best] - frame) ? index : best), 0);
@@ -130,9 +206,9 @@ function figureOf(data, entry, choose, place) {
 }
 
 function whyBox({ why }) {
-  return card(`Why is frame ${why.frame} as it is?`,
+  return card(`Why is frame ${why.frame} as it is?`, why.notes.map((note) => hint(note)),
     why.findings.length ? element("ul", { className: "words" }, why.findings.map((one) => element("li", { className: one.is_cause ? "chief" : "" }, one.words))) : hint("Nothing stands out in this frame."),
-    why.remedies.length > 0 && [element("h3", {}, "What may help"), element("ul", { className: "words" }, why.remedies.map((one) => element("li", {}, element("b", {}, one.title), ` ${one.words}`)))], why.notes.map((note) => hint(note)));
+    why.remedies.length > 0 && [element("h3", {}, "What may help"), element("ul", { className: "words" }, why.remedies.map((one) => element("li", {}, element("b", {}, one.title), ` ${one.words}`)))]);
 }
 
 function settingsBox({ settings }) {
@@ -163,4 +239,5 @@ export function showSharedRun(data) {
     data.notes.map((note) => hint(note)), ...places, settingsBox(data));
   figures = data.figures.map((entry, index) => figureOf(data, entry, choose, places[index]));
   scene.go(data.frame);
+  if (!matchMedia("(prefers-reduced-motion: reduce)").matches) scene.startLayers();
 }

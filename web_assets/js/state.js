@@ -2,6 +2,7 @@
 
 const values = {
   sessions: null,      // [{name, title, thumbnail, runs: [...]}], null while unknown
+  missing: null,       // what the address names that is not here: {session, run}
   session: null,       // name of the open session
   run: null,           // name of the open run
   track: "raw",        // whose poses are shown: as searched, refined, smoothed …
@@ -28,6 +29,7 @@ const values = {
   whatIf: null,        // layers of a re-annealed frame that is not stored
   moved: null,         // knobs that were moved and that no stored frame uses: [{label, before, after}]
   outcome: null,       // what the re-annealed frame's result changes
+  notes: [],           // notes and bookmarks on the run's frames: [{frame, text, made}]
   work: null,          // the worker's last state
   connected: null,     // whether the event socket is open, null before it was
   stranger: false,     // whether the studio was started anew and does not know this browser

@@ -45,9 +45,16 @@ function apply(name) {
   for (const listener of listeners) listener(name);
 }
 
+const systemTheme = () => (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark");
+
+/** Use a theme from now on. @param {"light" | "dark" | "system"} name */
+export function useTheme(name) {
+  apply(name === "system" ? systemTheme() : name);
+  if (name === "system") localStorage.removeItem("theme");
+}
+
 /** Take the remembered theme (else the system's), and wire the header's button. */
 export function startTheme() {
-  const wanted = localStorage.getItem("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark");
-  apply(wanted);
+  apply(localStorage.getItem("theme") ?? systemTheme());
   byId("theme").onclick = () => apply(theme() === "dark" ? "light" : "dark");
 }

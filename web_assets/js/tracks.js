@@ -27,7 +27,9 @@ async function loadTracks() {
     if (session !== get("session") || run !== get("run")) return;
     offer(choice, tracks.map((track) => [track.name, named(track)]), get("track"));
     choice.hidden = tracks.length < 2;
-    if (!tracks.some((track) => track.name === get("track"))) set({ track: RAW });
+    if (tracks.some((track) => track.name === get("track"))) return;
+    say(`${run} has no track “${get("track")}”: the poses as searched are shown.`, { kind: "warning" });
+    set({ track: RAW });
   } catch (error) { if (error.status !== 404) complain(error); }
 }
 

@@ -1,7 +1,7 @@
 // Why a frame is as it is, in words made from the stored search, and a button that tries what may help.
 
 import { addressOf } from "./address.js";
-import { fetchJson, frameView, patch, runPath, runView } from "./api.js";
+import { fetchJson, frameView, patch, readOnly, runPath, runView } from "./api.js";
 import { figure as figureWords } from "./chart_looks.js";
 import { button, byId, element, fill, hint } from "./elements.js";
 import { Figure } from "./figure.js";
@@ -18,6 +18,7 @@ import { drawLimbs } from "./why_drawing.js";
 /** @import { Schemas } from "./api_types" */
 
 const LOAD_MILLISECONDS = 200;
+const SIDES = "sides";
 const STEPS = { "start pose": "start", calibrate: "calibration", masks: "background" };
 
 const panel = byId("panel-why");
@@ -75,6 +76,9 @@ function follow(finding) {
 /** Try what may help. @param {Schemas["ViewAnswer"]["remedies"][number]} remedy */
 async function attempt(remedy) {
   const step = STEPS[remedy.action];
+  if (remedy.action === "correct") { byId("correct").click(); return; }
+  if (remedy.action === "correct sides") { set({ track: SIDES }); return; }
+  if (remedy.action === "look") { set({ panel: "cameras" }); return; }
   if (step) { location.href = `${setupPath({ name: get("session") })}&step=${step}`; return; }
   if (!Object.keys(remedy.settings ?? {}).length) return;
   try {
@@ -86,18 +90,33 @@ async function attempt(remedy) {
 
 const knobWords = (settings) => Object.entries(settings ?? {}).map(([name, value]) => `${name.replaceAll("_", " ")} ${typeof value === "number" ? figureWords(value) : value === "" ? "none" : value}`).join(", ");
 
+const hasSides = () => [...document.querySelectorAll("#track-choice option")].some((one) => /** @type {HTMLOptionElement} */ (one).value === SIDES);
+
+/** What a remedy's button says; "" where there is none. */
+function buttonOf(remedy) {
+  if (STEPS[remedy.action] || remedy.action === "look") return "Go there";
+  if (remedy.action === "correct") return readOnly ? "" : "Correct it";
+  if (remedy.action === "correct sides") return hasSides() ? "Show that track" : "";
+  return Object.keys(remedy.settings ?? {}).length && !readOnly ? "Try it" : "";
+}
+
 /** @param {Schemas["ViewAnswer"]["remedies"][number]} remedy */
-const remedyCard = (remedy) => element("div", { className: "remedy-card" }, element("b", {}, remedy.title), element("p", {}, remedy.words, knobWords(remedy.settings) && ` (${knobWords(remedy.settings)})`),
-  (STEPS[remedy.action] || Object.keys(remedy.settings ?? {}).length > 0) && button(STEPS[remedy.action] ? "Go there" : "Try it", () => attempt(remedy), "small", { ariaLabel: `Try: ${remedy.title}` }));
+const remedyCard = (remedy) => element("div", { className: "remedy-card" },
+  element("b", {}, remedy.title),
+  element("p", {}, remedy.words, knobWords(remedy.settings) && ` (${knobWords(remedy.settings)})`),
+  buttonOf(remedy) && button(buttonOf(remedy), () => attempt(remedy), "small", { ariaLabel: `Try: ${remedy.title}` }));
 
 function draw() {
   const { frame, run } = held;
   held.chosen = chosenNow();
   const findings = frame.findings ?? [];
   const kept = words.scrollTop;
+  const classOf = (finding) => (finding.kind === "fits" ? "fine" : finding.is_cause ? "chief" : "");
+  // What is compared with what comes first: without it no figure below can be read.
   fill(words, element("h2", {}, `Why is frame ${frame.frame} as it is?`),
-    findings.length ? element("ul", { className: "why-findings" }, findings.map((finding, at) => element("li", { className: finding.kind === "fits" ? "fine" : finding.is_cause ? "chief" : "" }, button(finding.words, () => follow(finding), "", { dataset: { key: `finding-${at}` } })))) : hint("Nothing stands out in this frame."),
     frame.notes.map((note) => hint(note)),
+    element("ul", { className: "why-findings" }, findings.map((finding, at) => element("li", { className: classOf(finding) },
+      button(finding.words, () => follow(finding), "", { dataset: { key: `finding-${at}` } })))),
     frame.remedies?.length > 0 && [element("h3", {}, "What may help"), element("div", { className: "remedies" }, frame.remedies.map(remedyCard))]);
   words.scrollTop = kept;
   const tables = Object.fromEntries([...frame.tables, ...run.tables].map((table) => [table.name, records(table)]));

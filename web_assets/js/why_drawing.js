@@ -22,7 +22,7 @@ export function drawLimbs(sheet, /** @type {any} */ { limbs: rows, nearest }, at
     sheet.heat(plot, {
       cells: rows.map((row) => [frames.indexOf(row.frame), names.indexOf(row.limb), row[key] ?? "-"]), low: Math.min(0, low), high, framed: false, ends: [figureWords(high), "0"], key: { left: one.left + one.width + 8, top: 40 },
       click: ({ value }) => ({ frame: frames[value[0]], limb: names[value[1]] }),
-      tip: ({ value }) => { const row = rowOf.get(`${frames[value[0]]}/${names[value[1]]}`); return tipOf(`${row.limb}, frame ${row.frame}`, [["error", row.error === null ? "–" : `${figureWords(row.error)} mm`], ["disagreement with the silhouettes", row.disagreement === null ? "–" : `${figureWords(100 * row.disagreement)} %`], ["lost", row.lost ? "yes" : "no"]]); },
+      tip: ({ value }) => { const row = rowOf.get(`${frames[value[0]]}/${names[value[1]]}`); return tipOf(`${row.limb}, frame ${row.frame}`, [["error", row.error === null ? "–" : `${figureWords(row.error)} mm`], ["disagreement with the silhouettes", row.disagreement === null ? "–" : `${figureWords(100 * row.disagreement)} %`], ["lost", row.lost ? `yes, by the ${row.lost_by}` : "no"]]); },
     });
     sheet.chosen(plot, { column: frames.indexOf(at.frame) < 0 ? null : String(at.frame), row: at.limb && names.includes(at.limb) ? names.indexOf(at.limb) : null });
   } else sheet.words("There are no numbers by limb of this run.", one.left, 40, one.width);
@@ -41,5 +41,5 @@ export function drawLimbs(sheet, /** @type {any} */ { limbs: rows, nearest }, at
   } else sheet.words("There is no reference pose to measure the particles against.", two.left, 40, two.width);
   const limb = at.limb ?? rows.filter((row) => row.frame === at.frame).reduce((worst, row) => ((row[key] ?? -1) > (worst?.[key] ?? -1) ? row : worst), null)?.limb;
   const now = rows.find((row) => row.frame === at.frame && row.limb === limb);
-  return now ? `${now.limb}, frame ${now.frame}: ${now.error === null ? "" : `error ${figureWords(now.error)} mm, `}${now.disagreement === null ? "" : `disagreement with the silhouettes ${figureWords(100 * now.disagreement)} %, `}${now.lost ? "lost" : "not lost"}.` : "";
+  return now ? `${now.limb}, frame ${now.frame}: ${now.error === null ? "" : `error ${figureWords(now.error)} mm, `}${now.disagreement === null ? "" : `disagreement with the silhouettes ${figureWords(100 * now.disagreement)} %, `}${now.lost ? `lost by the ${now.lost_by}` : "not lost"}.` : "";
 }

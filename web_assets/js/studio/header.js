@@ -36,6 +36,7 @@ function State() {
     follow("session"),
     follow("run"),
     follow("connected"),
+    follow("summary"),
   );
   const isCompiling = work?.state === "compiling";
   return html`

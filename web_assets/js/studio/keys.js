@@ -4,14 +4,15 @@ import { lookThrough } from "../cameras.js";
 import { leaveCorrecting } from "../correcting.js";
 import { openList } from "../dialogs.js";
 import { byId } from "../elements.js";
-import { leavePlayback, toggleLoop, togglePlay } from "../playback.js";
+import { leavePlayback, toggleLoop, togglePlay } from "./playback.js";
 import { enterScene } from "../scene_frame.js";
 import { goTo } from "../selection.js";
 import { get } from "../state.js";
-import { goToMark } from "../timeline.js";
+import { goToMark } from "./timeline.js";
 import { stepParameter, stepView, toggleTable } from "../views.js";
 import { toggleLayers } from "./layer_playback.js";
 import { leaveLayers, step as stepLayer } from "./layer_strip.js";
+import { toggleBookmark } from "./notes.js";
 import { frameBody, resetView, toggleFollow } from "./scene_tools.js";
 import { reanneal } from "./tracking.js";
 
@@ -30,7 +31,7 @@ const isArrow = (name, shift) => (event) => event.key === name && event.shiftKey
 const is = (name) => (event) => event.key === name;
 const MARKS =
   "next mark of the timeline: search lost, a limb off, limb lost (truth), no evidence, " +
-  "found again, corrected";
+  "found again, corrected, noted";
 
 /**
  * The key, what it does in words, whether an event is it, and what it does: false where it did nothing.
@@ -70,6 +71,7 @@ const KEYS = [
   ],
   ["t", "the view's numbers as a table, or its drawing", is("t"), toggleTable],
   ["r", "anneal this frame again", is("r"), reanneal],
+  ["b", "a bookmark on this frame; its note, where it has one", is("b"), toggleBookmark],
   ["c", "correct this frame by hand", is("c"), () => byId("correct").click()],
   ["l", "loop", is("l"), toggleLoop],
   ["s", "into the scene's panel; Escape leads back", is("s"), () => enterScene()],

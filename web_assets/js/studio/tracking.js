@@ -56,15 +56,27 @@ function stateLine(work) {
   return parts.join(" · ");
 }
 
+/** How a run stands by what is stored of it: how the tracking process ended elsewhere says nothing of this one. */
+function storedStanding(session, run, summary) {
+  const idle = (words) => ({ name: "idle", words, title: "", share: null });
+  if (!run) return idle(session ? "no run" : "idle");
+  if (!summary) return idle("idle");
+  const [done, all] = [summary.frames.length, summary.last - summary.first];
+  if (!done) return idle("not tracked yet");
+  return done < all ? idle(`${done} of ${all} frames`) : { ...idle("finished"), name: "finished" };
+}
+
 /**
  * The state of tracking as the header shows it. `name`: of its colour; `share`: of the frames that are done, null where
  * no bar is shown.
  */
-export function standing(work, session, run, connected) {
-  const here = isOpen(work, session, run);
+export function standing(work, session, run, connected, summary) {
+  const here = isOpen(work, session, run) && Boolean(run);
   if (connected === false) {
     return { name: "disconnected", words: "disconnected, reconnecting", title: "", share: null };
   }
+  const searches = work && ["tracking", "compiling", "paused", "reannealing"].includes(work.state);
+  if (here ? work.state === "idle" : !searches) return storedStanding(session, run, summary);
   const elsewhere =
     work && !here && work.run && work.state === "tracking" ? `${work.session}: ` : "";
   const isGoingOn = here && CANCELLABLE.includes(work.state);

@@ -1,0 +1,119 @@
+"""Whether a frame fits is decided in one place: timeline, badge, heat map and Why say the same of it."""
+
+import dataclasses
+import math
+import shutil
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from store_records import result_of
+from stored_verdicts import check_that_all_agree
+from toy_session import make_session
+from tracked_runs import finish
+
+from studio.inspection.reading import InspectedRun
+from studio.inspection.tables import Selection
+from studio.inspection.verdict import limbs_off, verdict_on
+from studio.inspection.why import rows
+from studio.runs.new_run import prepare_run
+from studio.runs.tracks import REFINED, Track, write_track
+from studio.sessions.results_store import ResultsWriter
+from studio.sessions.session import Session
+from studio.trackers.tracker import LIMB_LOST, LOST, NO_EVIDENCE, RECOVERED, TRACKED, TRACKING_STATES
+
+OLD = Path(__file__).parent.parent / "old_sessions"
+LIMBS = ("right arm", "left leg", "head", "trunk")
+SHARES = st.dictionaries(st.sampled_from(LIMBS), st.floats(0.0, 1.0))
+PLANTED = (
+    {"tracking": LIMB_LOST, "overlap": 0.9, "disagreement": {"right arm": 0.267, "left leg": 0.01}},
+    {"tracking": RECOVERED, "overlap": 0.9, "disagreement": {"left leg": 0.09}},
+    {"tracking": TRACKED, "disagreement": {"right arm": 0.1}},
+    {"tracking": LOST, "overlap": 0.2, "doubts": 3, "disagreement": {"right arm": 0.5, "head": 0.5}},
+    {"tracking": NO_EVIDENCE, "overlap": 0.0},
+)
+"""What may be stored with a frame: the state, beside what the silhouettes say."""
+
+
+@given(
+    st.sampled_from(TRACKING_STATES),
+    st.sampled_from((math.nan, 0.9)),
+    st.integers(0, 2),
+    SHARES,
+    SHARES,
+    st.lists(st.sampled_from(LIMBS), unique=True),
+)
+def test_a_frame_with_a_lost_limb_never_fits(
+    tracking: str,
+    overlap: float,
+    doubts: int,
+    shares: dict[str, float],
+    loss: dict[str, float],
+    by_truth: list[str],
+) -> None:
+    result = dataclasses.replace(
+        result_of(0), tracking=tracking, overlap=overlap, doubts=doubts, disagreement=shares, limb_loss=loss
+    )
+    found = verdict_on(result, by_truth)
+    assert set(found.lost) == {*by_truth, *limbs_off(result)}
+    assert not (found.fits and (found.lost or found.tracking in (LOST, NO_EVIDENCE, LIMB_LOST)))
+    assert found.fits or found.lost or found.tracking != TRACKED
+    assert {limb for limb in found.lost if found.lost_by(limb)} == set(found.lost)
+    assert tracking in (TRACKED, RECOVERED) or found.tracking == tracking
+    if tracking in (TRACKED, RECOVERED):
+        assert (found.tracking == LIMB_LOST) == bool(found.by_silhouettes)
+
+
+def test_a_tracked_run(run: InspectedRun) -> None:
+    check_that_all_agree(run)
+
+
+@pytest.fixture
+def marked(run: InspectedRun, tmp_path: Path) -> InspectedRun:
+    """The run without a truth, with each of PLANTED stored in a frame; its refined track changes nothing."""
+    shutil.copytree(run.session.path, tmp_path / "marked")
+    shutil.rmtree(tmp_path / "marked" / "truth")
+    session = Session(tmp_path / "marked")
+    stored = session.run(run.run.name)
+    with stored.results() as results:
+        numbers, poses = results.poses()
+        known = [(results.result(frame), results.layers(frame)) for frame in numbers.tolist()]
+    with ResultsWriter(stored.folder) as writer:
+        for (result, layers), planted in zip(known, PLANTED, strict=True):
+            writer.write_frame(dataclasses.replace(result, **planted), layers)
+    write_track(stored, Track(REFINED, numbers, poses, np.ones(len(numbers)), (TRACKED,) * len(numbers)))
+    return InspectedRun(session, stored)
+
+
+def test_what_the_search_marked_is_marked_everywhere(marked: InspectedRun) -> None:
+    check_that_all_agree(marked)
+    found = rows(marked.frame(0), Selection())
+    # The refined track has the limb where the search has it: that it is there tells nothing.
+    assert "Lost by the silhouettes: the right arm (body and silhouettes disagree about 26.7 %" in (
+        found.findings[0].words
+    )
+    assert found.remedies[-1].action == "correct" or found.findings[0].kind == "wrong limb"
+    assert "had lost the body" in rows(marked.frame(3), Selection()).findings[0].words
+    assert "No picture shows a body" in rows(marked.frame(4), Selection()).findings[0].words
+
+
+def test_a_derived_track(marked: InspectedRun) -> None:
+    check_that_all_agree(marked, REFINED, why=(0, 1))
+
+
+def test_a_body_without_sides(tmp_path: Path) -> None:
+    session = make_session(tmp_path / "toy")
+    run = prepare_run(session, knobs={"layers": 2, "particles": 12}, seed=1, fit_shape=False)
+    finish(session, run)
+    check_that_all_agree(InspectedRun(session, run), why=(2,))
+
+
+@pytest.mark.parametrize("name", ["before-checksums", "before-versions"])
+def test_what_older_versions_stored(tmp_path: Path, name: str) -> None:
+    with zipfile.ZipFile(OLD / f"{name}.zip") as packed:
+        packed.extractall(tmp_path)
+    session = Session(tmp_path / "toy")
+    check_that_all_agree(InspectedRun(session, session.run("run-1")), why=(1,))

@@ -1,0 +1,178 @@
+// The first two minutes, in four steps above the scene: what is seen, what the survival rate changes, how it fails, and
+// what comes next. They are there while a session has the two runs that travel with the walk, until they are closed: the
+// studio remembers that.
+
+import { fetchJson, patch, readOnly } from "../api.js";
+import { complain } from "../messages.js";
+import { get } from "../state.js";
+import { openCourse } from "./course_column.js";
+import { follow, html, mount, signal } from "./component.js";
+import { useKnob } from "./knob.js";
+import { playWhenShown, visit } from "./visiting.js";
+
+const TEN = "ten-layers";
+const ONE = "one-layer";
+const FRAME = 9;
+const LOST = 13;
+const PREFERENCE = "first-steps";
+
+const isClosed = signal(true);
+const step = signal(0);
+
+/** @param {string} run @param {number} frame @param {Record<string, string>} shown */
+function look(run, frame, shown) {
+  visit({ session: get("session"), run, frame, ...shown });
+  playWhenShown().catch(complain);
+}
+
+function Seen() {
+  return html`<p>
+    Each dot is the hand, foot or head of one <b>particle</b>: a guess of the whole pose. Ten${" "}
+    <b>layers</b> draw fifty guesses together, from <span class="first-layer">the first</span> to${" "}
+    <span class="last-layer">the last</span>. The chart shows which parameter each layer settled.
+  </p>`;
+}
+
+function Survival() {
+  const knob = useKnob("survival");
+  const move = (/** @type {any} */ event) => knob?.turn(Number(event.target.value));
+  return html`<p>
+      The <b>survival rate</b> is the share of particles that live on into the next layer. Low: the
+      cloud closes at once, on a lucky guess. High: ten layers do not close it. Move it; the frame is
+      searched again as you do.
+    </p>
+    <label class="first-knob">
+      survival rate
+      <input
+        type="range"
+        min="0.05"
+        max="0.95"
+        step="0.05"
+        value=${knob?.value ?? 0.5}
+        disabled=${readOnly || !knob}
+        onInput=${move}
+      />
+      <output>${knob?.value.toFixed(2) ?? "–"}</output>
+    </label>`;
+}
+
+function Failing() {
+  const run = follow("run");
+  const show = (/** @type {string} */ name) => {
+    const other = name === TEN ? ONE : TEN;
+    look(name, LOST, { panel: "compare", compared: `${get("session")}/${other}` });
+  };
+  return html`<p>
+      The same pictures, the same start, 500 evaluations a frame each: <b>one layer</b> has lost the
+      walker by frame ${LOST}, <b>ten layers</b> of fifty hold him. Below, both errors over the frames.
+    </p>
+    <div class="group" role="group" aria-label="Which run is shown">
+      ${[ONE, TEN].map(
+        (name) => html`<button
+          key=${name}
+          class="toggle"
+          aria-pressed=${String(run === name)}
+          onClick=${() => show(name)}
+        >
+          ${name === ONE ? "one layer" : "ten layers"}
+        </button>`,
+      )}
+    </div>`;
+}
+
+function Yours() {
+  return html`<p>
+      Videos, a printed board and eight guided steps make a motion file of your own take. Or go on
+      with the search first.
+    </p>
+    <div class="group">
+      <a class="button primary" href="/way?new">Your own cameras</a>
+      <button onClick=${openCourse}>The course, beside the scene</button>
+      <a class="button" href="/gallery">More sessions</a>
+    </div>`;
+}
+
+const STEPS = [
+  {
+    name: "What you see",
+    part: Seen,
+    open: () => look(TEN, FRAME, { panel: "views", view: "variance" }),
+  },
+  {
+    name: "Change survival",
+    part: Survival,
+    open: () => look(TEN, FRAME, { panel: "views", view: "schedule" }),
+  },
+  {
+    name: "Make it fail",
+    part: Failing,
+    open: () => look(ONE, LOST, { panel: "compare", compared: `${get("session")}/${TEN}` }),
+  },
+  { name: "Now your cameras", part: Yours, open: () => {} },
+];
+
+async function close() {
+  isClosed.value = true;
+  if (!readOnly) await patch("/api/preferences", { [PREFERENCE]: "closed" }).catch(complain);
+}
+
+function FirstSteps() {
+  const session = follow("session");
+  const sessions = follow("sessions") ?? [];
+  const entry = sessions.find((/** @type {any} */ one) => one.name === session);
+  const names = (entry?.runs ?? []).map((/** @type {any} */ one) => one.name);
+  const run = follow("run");
+  const isThere = [TEN, ONE].every((name) => names.includes(name)) && [TEN, ONE].includes(run);
+  if (isClosed.value || !isThere) return null;
+  const go = (/** @type {number} */ to) => {
+    step.value = to;
+    STEPS[to]?.open();
+  };
+  const Part = STEPS[step.value]?.part ?? Seen;
+  return html`<section class="first-steps" aria-label="The first two minutes">
+    <ol>
+      ${STEPS.map(
+        ({ name }, index) => html`<li key=${name}>
+          <button
+            class="quiet"
+            aria-current=${index === step.value ? "step" : null}
+            onClick=${() => go(index)}
+          >
+            <i>${index + 1}</i> ${name}
+          </button>
+        </li>`,
+      )}
+    </ol>
+    <div class="first-words"><${Part} /></div>
+    <div class="first-end">
+      ${
+        step.value < STEPS.length - 1 &&
+        html`<button class="primary" onClick=${() => go(step.value + 1)}>Next</button>`
+      }
+      <button
+        class="icon"
+        aria-label="Close the first steps for good"
+        title="Close for good"
+        onClick=${close}
+      >
+        ×
+      </button>
+    </div>
+  </section>`;
+}
+
+/** Show the steps in their place, unless they were closed, and what the address asks for: `step`, layers that play. */
+export async function startFirstSteps() {
+  const asked = new URLSearchParams(location.search);
+  const plays = asked.get("plays") === "layers";
+  step.value = Math.min(STEPS.length, Math.max(1, Number(asked.get("step")) || 1)) - 1;
+  const place = /** @type {HTMLElement} */ (document.getElementById("first-steps"));
+  mount(place, html`<${FirstSteps} />`);
+  if (plays) playWhenShown().catch(complain);
+  try {
+    const kept = await fetchJson("/api/preferences");
+    isClosed.value = kept[PREFERENCE] === "closed";
+  } catch (error) {
+    complain(error);
+  }
+}

@@ -1,0 +1,34 @@
+// Going to a state of the page from a text, as a link to it would, without leaving the page.
+
+import { fetchJson, post } from "../api.js";
+import { get } from "../state.js";
+
+const TRIES = 12;
+const TRY_MILLISECONDS = 500;
+const RATE = 3;
+
+const wait = (/** @type {number} */ milliseconds) =>
+  new Promise((resolve) => setTimeout(resolve, milliseconds));
+
+/**
+ * Show a state of the page by the names of the address.
+ * @param {Record<string, string | number>} state
+ */
+export function visit(state) {
+  const words = Object.entries(state).map(([name, value]) => [name, String(value)]);
+  history.pushState(null, "", `/?${new URLSearchParams(words)}`);
+  dispatchEvent(new PopStateEvent("popstate"));
+}
+
+/** Play the layers once the scene shows the frame: what the page says of it meanwhile would stop them. */
+export async function playWhenShown() {
+  let seen = 0;
+  for (let tries = 0; tries < TRIES && seen < 2; tries++) {
+    if (get("detail")?.frame === get("frame") && get("frame") !== null) {
+      const now = await fetchJson("/api/scene/play-layers");
+      seen = now.playing ? seen + 1 : 0;
+      if (!now.playing) await post("/api/scene/play-layers", { playing: true, rate: RATE });
+    }
+    await wait(TRY_MILLISECONDS);
+  }
+}
