@@ -38,6 +38,7 @@ from studio.scene.body_trial import TrialView, trial_pose
 from studio.scene.controls import Change
 from studio.scene.floor_view import FloorView, light
 from studio.scene.model import (
+    STEP_RATE,
     LayerPlayback,
     Model,
     Selection,
@@ -73,16 +74,9 @@ from studio.scene.pose_handles import PoseHandles, drag
 from studio.scene.pose_refining import PoseRefining, outcome
 from studio.scene.scene_views import SceneViews, first_view
 from studio.scene.search_view import Pointed
-from studio.scene.viewers import Viewers
-from studio.scene.viewpoint import (
-    Eye,
-    Preset,
-    direction,
-    framed,
-    is_in_sight,
-    is_well_framed,
-    zoomed,
-)
+from studio.scene.twin import Places, differ, following, joining
+from studio.scene.viewers import Viewers, place_viewer
+from studio.scene.viewpoint import Eye, Preset, direction, framed, is_in_sight, is_well_framed, zoomed
 from studio.sessions.workspace import Workspace
 from studio.settings import all_knobs
 
@@ -135,8 +129,10 @@ class SceneController:
         self._theme, self._has_shadows = "", True
         self.bare = False
         """Whether it has no controls."""
-        self.viewers = Viewers(server)
+        self.viewers = Viewers(server, self._placed)
         self._centre: Array | None = None
+        self._twin: SceneController | None = None
+        self._is_leading, self._places = True, Places()
         self._trial: TrialView | None = None
         self._panel_of: Model | None = None
         self._floor: FloorView | None = None
@@ -176,6 +172,52 @@ class SceneController:
     def refused(self, problem: StudioError) -> None:
         """Show a refusal to every viewer."""
         notify(self._server, problem.message, problem.hint, bad=True)
+
+    def lead(self, follower: "SceneController | None") -> None:
+        """Let another scene show the same moment in the same way from now on; None: no longer."""
+        for one in (self._twin, follower):
+            if one is not None:
+                one._twin, one._is_leading = (self if one is follower else None), one is not follower
+        self._twin, self._is_leading = follower, True
+        if follower is not None:
+            self.post(self._bring_along)
+
+    def _bring_along(self, model: Model) -> Model:
+        """Let the twin show what is shown here, seen from where it is seen here."""
+        if self._twin is not None:
+            self._twin.post(self._twin.join, model)
+            for client in self._server.get_clients().values():
+                self._twin.put_viewers(
+                    (*map(float, client.camera.position), *map(float, client.camera.look_at))
+                )
+        return model
+
+    def join(self, model: Model, other: Model) -> Model:
+        """Show what the other of two scenes shows (`twin`)."""
+        if self._is_leading:
+            return joining(model, other)
+        return following(self._open(model, other.selection.session, other.selection.run), other)
+
+    def put_viewers(self, eye: tuple[float, ...]) -> None:
+        """Put this scene's viewers to a place, looking at another (6,) metres; from any thread."""
+        self._places.note(eye)
+        for client in self._server.get_clients().values():
+            place_viewer(client, eye)
+
+    def _placed(self, eye: Eye) -> None:
+        """Viewers were put somewhere: the other scene's come along."""
+        self._places.note(eye)
+        if self._twin is not None:
+            self._twin.put_viewers(eye)
+
+    def _sees(self, camera: viser.CameraHandle) -> None:
+        """A viewer moved: the other scene's come along."""
+        eye = (*map(float, camera.position), *map(float, camera.look_at))
+        if self._twin is None:
+            self.viewers.looking = camera
+        elif not self._places.is_echo(eye):
+            self.viewers.looking = camera
+            self._twin.put_viewers(eye)
 
     # Changes that need more than the model.
 
@@ -387,10 +429,12 @@ class SceneController:
                 self.viewers.put(eye, client)
             if self.views is not None:
                 self.views.cameras.place(client)
+            if self._twin is not None and not self._is_leading:
+                self._twin.post(self._twin._bring_along)
             return model
 
         self.post(place)
-        client.camera.on_update(lambda camera: setattr(self.viewers, "looking", camera))
+        client.camera.on_update(self._sees)
 
     # From where it is looked at.
 
@@ -481,7 +525,8 @@ class SceneController:
 
     def _follow_body(self) -> None:
         """Take the viewers along with the body, where they follow it."""
-        body = self._shown_body() if self.model.options.follows_body else None
+        follows = self.model.options.follows_body and self._is_leading
+        body = self._shown_body() if follows else None
         centre = None if body is None else body.reshape(-1, 3).mean(axis=0)
         before, self._centre = self._centre, centre
         if centre is None or before is None or self.model.selection.look_through is not None:
@@ -517,7 +562,7 @@ class SceneController:
             if self.model.playback.playing:
                 self._happen(advance, (now - before,))
             if self.model.layers.playing or self.model.layers.phase < 1.0:
-                self._happen(advance_layers, (now - before, self._layers_so_far()))
+                self._happen(advance_layers, (self._layers_time(now - before), self._layers_so_far()))
             before = now
             self.viewers.tick(now)
             if self._travelling.is_due(now) and not self._drawings[0].is_wanted and self.views is not None:
@@ -604,7 +649,7 @@ class SceneController:
             self.model = after
         if self.model is before or same_drawing(before, self.model):
             return
-        if self.model.is_looking_at_layers and not before.is_looking_at_layers:
+        if self._is_leading and self.model.is_looking_at_layers and not before.is_looking_at_layers:
             self.model = self._frame_for_layers(self.model)
         through = self.model.selection.look_through
         if through is not None and through != before.selection.look_through:
@@ -620,6 +665,9 @@ class SceneController:
         if self._refining is not None and (edit is None or edit.refining is None):
             self._refining.stop()
             self._refining = None
+        twin = self._twin
+        if twin is not None and change != self.join and differ(before, self.model):
+            twin.post(twin.join, self.model)
         is_moved = announce and self.model.selection != before.selection
         if is_moved or self.model.layers.state != before.layers.state:
             self._moved(self.model.selection, self.model.layers)
@@ -645,10 +693,20 @@ class SceneController:
             track=self.model.options.track,
         )
 
+    def _layers_time(self, seconds: float) -> float:
+        """The time that passes for layers: in a scene that follows, particles travel as fast as in the leading one."""
+        leader = None if self._is_leading else self._twin
+        plays = leader is not None and leader.model.layers.playing
+        return seconds * self.model.layers.rate / STEP_RATE if plays else seconds
+
     def _layers_so_far(self) -> int:
-        """How many layers of the shown frame are there, of whatever search is shown."""
-        moment = self._moment()
-        return max((record.layer + 1 for record in moment.records), default=0) if moment is not None else 0
+        """How many layers of the shown frame are there, of whatever search is shown here or in the twin."""
+        moment, twin = self._moment(), self._twin
+        records = (
+            *(moment.records if moment is not None else ()),
+            *(twin.model.live.records if twin else ()),
+        )
+        return max((record.layer + 1 for record in records), default=0)
 
     def _draw(self) -> None:
         model, tokens = self.model, colour_tokens(self.model.options.dark)

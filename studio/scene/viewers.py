@@ -3,6 +3,7 @@
 viser's camera has no animation of its own and tells of every move, its own and those from here alike.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,12 +31,14 @@ class _Ease:
 
 
 class Viewers:
-    """The viewers of one scene; used by its thread. looking : the camera of the viewer who moved last, set by viser's
-    callbacks. framed : the eye that frames the body, which is the usual one then.
+    """The viewers of one scene; used by its thread.
+
+    looking : the camera of the viewer who moved last, set by viser's callbacks. placed : called with each eye that all
+    viewers are put to. framed : the eye that frames the body, which is the usual one then.
     """
 
-    def __init__(self, server: viser.ViserServer) -> None:
-        self._server = server
+    def __init__(self, server: viser.ViserServer, placed: Callable[[Eye], None] = lambda _: None) -> None:
+        self._server, self._placed = server, placed
         self.looking: viser.CameraHandle | None = None
         self.framed: Eye | None = None
         self._ease: _Ease | None = None
@@ -81,9 +84,16 @@ class Viewers:
 
     def put(self, eye: Eye, client: viser.ClientHandle | None = None) -> None:
         """Put all viewers, or one, there at once."""
+        if client is not None:
+            place_viewer(client, eye)
+            return
         self._ease = None
-        for one in self._server.get_clients().values() if client is None else [client]:
-            _put(one, eye)
+        self._put(eye)
+
+    def _put(self, eye: Eye) -> None:
+        for client in self._server.get_clients().values():
+            place_viewer(client, eye)
+        self._placed(eye)
 
     def ease(self, eye: Eye, now: float) -> None:
         """Let all viewers go there."""
@@ -105,8 +115,7 @@ class Viewers:
             return
         share = (now - self._ease.began) / EASE_SECONDS
         eye = self._ease.end if share >= 1.0 else between(self._ease.start, self._ease.end, share)
-        for client in self._server.get_clients().values():
-            _put(client, eye)
+        self._put(eye)
         if share >= 1.0:
             self._ease, self._settles = None, now + SETTLE_SECONDS
 
@@ -143,7 +152,7 @@ def _shifted(eye: Eye, by: Array) -> Eye:
     return tuple(map(float, np.array(eye) + np.tile(by, 2)))
 
 
-def _put(client: viser.ClientHandle, eye: Eye) -> None:
+def place_viewer(client: viser.ClientHandle, eye: Eye) -> None:
     """Put a viewer's eye at a place, looking at another (6,) metres."""
     with client.atomic():
         client.camera.position, client.camera.look_at = np.array(eye[:3]), np.array(eye[3:])
