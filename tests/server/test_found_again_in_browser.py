@@ -98,7 +98,7 @@ def test_a_fit_is_found_again_wherever_it_is_looked_for(
     page.wait_for_selector(STEP.format("track"))
     page.go_back()
     expect(bar).to_contain_text("fitting lengths and radii")
-    expect(page.locator("#work-list button").first).to_contain_text("fit of the subject 30 %")
+    expect(page.locator("#work-list button").first).to_have_text("1 job 30 %")
 
     # Another window, on the studio's own page, looks into it and stops it.
     other = opened(context, studio, "/?session=take1")
