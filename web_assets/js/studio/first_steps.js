@@ -93,9 +93,21 @@ function Yours() {
 }
 
 const STEPS = [
-  { name: "What you see", part: Seen, open: () => look(TEN, FRAME, { panel: "views", view: "variance" }) },
-  { name: "Change survival", part: Survival, open: () => look(TEN, FRAME, { panel: "views", view: "schedule" }) },
-  { name: "Make it fail", part: Failing, open: () => look(ONE, LOST, { panel: "compare", compared: `${get("session")}/${TEN}` }) },
+  {
+    name: "What you see",
+    part: Seen,
+    open: () => look(TEN, FRAME, { panel: "views", view: "variance" }),
+  },
+  {
+    name: "Change survival",
+    part: Survival,
+    open: () => look(TEN, FRAME, { panel: "views", view: "schedule" }),
+  },
+  {
+    name: "Make it fail",
+    part: Failing,
+    open: () => look(ONE, LOST, { panel: "compare", compared: `${get("session")}/${TEN}` }),
+  },
   { name: "Now your cameras", part: Yours, open: () => {} },
 ];
 

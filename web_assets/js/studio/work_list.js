@@ -102,7 +102,9 @@ function WorkList() {
   if (!lines.value.length) return null;
   const share = going.length === 1 ? shareOf(going[0]) : null;
   const count = going.length === 1 ? "1 job" : `${going.length} jobs`;
-  const words = going.length ? `${count}${share === null ? "" : ` ${Math.round(100 * share)} %`}` : "Jobs";
+  const words = going.length
+    ? `${count}${share === null ? "" : ` ${Math.round(100 * share)} %`}`
+    : "Jobs";
   const title = going.length
     ? going.map((job) => `${nameOf(job)} of ${placeOf(job)}`).join(", ")
     : "Work in the background: how it ended, and where its answer is";
