@@ -11,7 +11,7 @@ _VERBS = {
     "studio.diagnostics_archive": ("diagnostics",),
     "studio.errors": ("StudioError",),
     "studio.operations.behaviours": ("learn", "models"),
-    "studio.operations.cameras": ("align", "board", "calibrate", "unalign"),
+    "studio.operations.cameras": ("align", "board", "calibrate", "level", "unalign"),
     "studio.operations.comparing": ("compare", "sweep"),
     "studio.operations.course": ("course",),
     "studio.operations.footage": (

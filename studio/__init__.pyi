@@ -7,6 +7,7 @@ from studio.operations.behaviours import models as models
 from studio.operations.cameras import align as align
 from studio.operations.cameras import board as board
 from studio.operations.cameras import calibrate as calibrate
+from studio.operations.cameras import level as level
 from studio.operations.cameras import unalign as unalign
 from studio.operations.comparing import compare as compare
 from studio.operations.comparing import sweep as sweep

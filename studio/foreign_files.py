@@ -11,8 +11,10 @@ an OSError for a corrupt archive's offsets), so readers do not list what may com
 `foreign_file`, which reports the error with the file's name.
 """
 
+import codecs
 import errno
 import os
+import re
 import stat
 from collections.abc import Generator, Iterable
 from contextlib import contextmanager, suppress
@@ -30,6 +32,14 @@ LARGEST_RECORD = 16 << 20
 
 NO_ROOM = frozenset((errno.ENOSPC, errno.EDQUOT))
 LONGEST_REASON = 200
+BYTE_ORDER_MARKS = (
+    (codecs.BOM_UTF8, "utf-8-sig"),
+    (codecs.BOM_UTF32_LE, "utf-32"),
+    (codecs.BOM_UTF32_BE, "utf-32"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
+CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f]")
 KINDS = (
     (stat.S_ISFIFO, "a pipe"),
     (stat.S_ISSOCK, "a socket"),
@@ -70,8 +80,12 @@ def read_file(
     more bytes than `most`.
     """
     with open_file(path, wrong, footage=footage) as stream:
-        content = b"" if os.fstat(stream.fileno()).st_size > most else stream.read(most + 1)
-        if (not content and os.fstat(stream.fileno()).st_size) or len(content) > most:
+        size = os.fstat(stream.fileno()).st_size
+        content = b"" if size > most else stream.read(size + 1)
+        if len(content) > size:
+            # It grew meanwhile, or is one of those that say no size.
+            content += stream.read(max(0, most + 1 - len(content)))
+        if size > most or len(content) > most:
             raise wrong(
                 f"'{path.name}' is larger than {_megabytes(most)} MB, more than such a file can have.",
                 "Replace it, or delete it.",
@@ -85,6 +99,21 @@ def read_text(
     """Like `read_file`, as text with line breaks as Python's; also raises UnicodeDecodeError."""
     text = read_file(path, most, wrong).decode(encoding)
     return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def read_foreign_text(path: Path, most: int = LARGEST, wrong: type[StudioError] = SessionError) -> str:
+    """A text file of another program: UTF-8 with or without a byte order mark, UTF-16 and UTF-32 with one, else
+    Windows' Western European, if nothing in it is a control character. Raises UnicodeDecodeError for what is no text,
+    and as `read_file` does.
+    """
+    content = read_file(path, most, wrong)
+    encoding = next((name for mark, name in BYTE_ORDER_MARKS if content.startswith(mark)), "utf-8")
+    try:
+        return content.decode(encoding)
+    except UnicodeDecodeError:
+        if encoding != "utf-8" or CONTROL.search(content):
+            raise
+        return content.decode("cp1252", errors="replace")
 
 
 @contextmanager

@@ -13,7 +13,7 @@ import numpy as np
 from studio.body.definition import WORLD, BodyDefinition, JointEntry, ParameterEntry, StepEntry, split_sign
 from studio.body.model import MOVE, TURN, BodyModel, Joint, Limb, Marker, Parameter, Step
 from studio.errors import BodyError
-from studio.foreign_files import foreign_file, read_text
+from studio.foreign_files import foreign_file, read_foreign_text
 from studio.typed_decoding import decode_toml, is_list
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_ .]*")
@@ -325,7 +325,7 @@ def read_body(path: Path) -> BodyModel:
     Raises BodyError when the file cannot be read, is no TOML, or does not describe a body.
     """
     with foreign_file(path, BodyError, "a body file", "Check that it is a text file, or correct it."):
-        return parse_body(read_text(path), path.stem, path.name)
+        return parse_body(read_foreign_text(path), path.stem, path.name)
 
 
 def parse_body(text: str, name: str, file: str) -> BodyModel:

@@ -39,7 +39,7 @@ from studio.body.dimensions import with_dimensions
 from studio.body.marker_distances import MarkerDistances
 from studio.body.model import BodyModel
 from studio.errors import BodyError
-from studio.foreign_files import foreign_file, read_file
+from studio.foreign_files import foreign_file, read_foreign_text
 from studio.typed_decoding import decode_toml
 
 DEFAULT_BODY = "human31"
@@ -73,7 +73,7 @@ def read_subject(path: Path) -> Subject:
     """The subject of a TOML file. Raises BodyError naming the file, the entry and the remedy."""
     hint = "It holds body, height_mm, [lengths_mm], [dimensions_mm] and [ratios], numbers in mm."
     with foreign_file(path, BodyError, "a subject file", hint):
-        subject = decode_toml(read_file(path), Subject)
+        subject = decode_toml(read_foreign_text(path), Subject)
     _check(subject, f"Subject file {path.name}")
     return subject
 

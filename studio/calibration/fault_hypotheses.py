@@ -42,6 +42,12 @@ def mirrored(camera: Camera) -> Camera:
     return replace(camera, matrix=flip @ camera.matrix)
 
 
+def upside_down(camera: Camera) -> Camera:
+    """The camera whose picture is this one's, turned by half a turn."""
+    turn = np.array([[-1.0, 0.0, camera.width - 1.0], [0.0, -1.0, camera.height - 1.0], [0.0, 0.0, 1.0]])
+    return replace(camera, matrix=turn @ camera.matrix)
+
+
 def rescaled(camera: Camera, factor: float) -> Camera:
     """The camera for a picture of `factor` times the resolution; its nominal size stays."""
     shift = 0.5 * factor - 0.5
@@ -73,7 +79,13 @@ def hypotheses(cameras: Sequence[Camera]) -> tuple[Hypothesis, ...]:
         for number, camera in enumerate(cameras):
             right = (*cameras[:number], everything[number], *cameras[number + 1 :])
             found.append(
-                Hypothesis(code, right, (camera.name,), words.format(f"camera {camera.name}"), remedy)
+                Hypothesis(
+                    code,
+                    right,
+                    (camera.name,),
+                    words.format(f"camera {camera.name}"),
+                    remedy.replace("CAMERA", camera.name),
+                )
             )
         found.append(Hypothesis(code, everything, (), words.format("all cameras"), remedy))
     for one, two in combinations(range(len(cameras)), 2):
@@ -99,6 +111,12 @@ _CHANGES: tuple[tuple[str, Change, str, str], ...] = (
         mirrored,
         "The pictures of {} are mirrored: the views agree once left and right are exchanged.",
         "Switch mirroring off in the camera's program, or flip the footage.",
+    ),
+    (
+        "turned-video",
+        upside_down,
+        "The pictures of {} are upside down against the calibration: the views agree after half a turn.",
+        "Turn them: --rotate CAMERA=180 (studio import, or studio synchronise for a session).",
     ),
     (
         "resolution",

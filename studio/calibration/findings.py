@@ -11,9 +11,10 @@ Severity = Literal["blocks", "warns"]
 class Finding:
     """One thing that a check found.
 
-    code : its kind, lower case with dashes ("mirrored-video", "swapped-cameras", "resolution", "scale", "up-axis",
-    "square-size", "transposed-rotation", ...). severity : "blocks" where results would be wrong, "warns" where
-    they may be. message, remedy : a sentence each, naming cameras and values. cameras : those it is about.
+    code : its kind, lower case with dashes ("mirrored-video", "turned-video", "swapped-cameras", "resolution",
+    "scale", "up-axis", "square-size", "transposed-rotation", ...). severity : "blocks" where results would be wrong,
+    "warns" where they may be. message, remedy : a sentence each, naming cameras and values. cameras : those it is
+    about.
     """
 
     code: str

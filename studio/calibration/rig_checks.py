@@ -8,6 +8,7 @@ from studio.arrays import Array
 from studio.calibration.boards import Board
 from studio.calibration.fault_hypotheses import inverted, transposed
 from studio.calibration.findings import Finding
+from studio.calibration.vertical import Vertical, camera_at_origin, common_vertical
 from studio.capture.sanity import common_target
 from studio.geometry.camera import Camera
 from studio.geometry.rotations import orthonormality_error
@@ -19,7 +20,21 @@ FAR_FROM_AXES = 0.35
 LEVEL, UPRIGHT = 0.3, 0.2
 """Cameras stand upright about an axis if their pictures' rows lie across it within the first (sine) and their
 pictures' up has at least the second of it."""
+TILTED_DEGREES, ASKEW_DEGREES, LYING_DEGREES = 8.0, 40.0, 45.0
+"""From where on Z is said to be off the vertical of level pictures, off that of pictures that are not level, or another
+axis."""
+TILTED, NO_FLOOR, UNIT = "tilted-world", "floor-unknown", "unit"
+ROOM, FAR_ENOUGH = (0.4, 60.0), 6.0
+"""A body is filmed from these multiples of its height, usually from less than the other."""
+SIDE_BY_SIDE = 0.9
+"""Cosine between lines of sight from which on cameras stand side by side, as of a stereo rig."""
+LEVEL_IT = (
+    "Level it: studio level SESSION turns the world to the vertical and finds the floor (by the silhouettes, by the"
+    " feet of a run, or --clicks of floor points); or calibrate with the board on the floor (studio calibrate --floor)."
+)
 AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
+STEREO_MM = 15.0
+"""Cameras side by side lie at least so far from their middle."""
 CENTRED = (0.2, 0.8)
 SIZE_TOLERANCE = 0.02
 ASPECT_TOLERANCE = 0.01
@@ -31,7 +46,7 @@ def rig_findings(cameras: Sequence[Camera]) -> tuple[Finding, ...]:
     if wrong:
         return wrong
     turned = tuple(_transposed(cameras))
-    checks = () if turned else (_up_axis, _floor, _unit, _place)
+    checks = () if turned else (_up_axis, _floor, _origin, _unit, _place)
     return (*turned, *(finding for check in (*checks, _principal) for finding in check(cameras)))
 
 
@@ -127,17 +142,81 @@ def _transposed(cameras: Sequence[Camera]) -> Iterator[Finding]:
 
 
 def _up_axis(cameras: Sequence[Camera]) -> Iterator[Finding]:
+    vertical = common_vertical(cameras)
     if upright_about(cameras, np.array(AXES["Z"])):
+        yield from _tilt(vertical)
         return
     for name, direction in AXES.items():
         for sign, word in ((1.0, ""), (-1.0, "minus ")):
             if upright_about(cameras, sign * np.array(direction)):
-                message = f"The world's {word}{name} axis points up in all pictures, not Z."
-                remedy = (
-                    f"Turn the world so that {word}{name} becomes Z, or export the calibration with Z up."
+                off = vertical.off(sign * np.array(direction)) if vertical is not None else 0.0
+                message = f"The world's {word}{name} axis points up in all pictures, not Z"
+                message += (
+                    f"; the cameras' common vertical is {off:.1f} degrees off it." if off > 1.0 else "."
                 )
-                yield Finding("up-axis", "blocks", message, remedy)
+                yield Finding("up-axis", "blocks", message, _remedy(name, sign))
                 return
+    if vertical is not None and vertical.level and vertical.off(np.array(AXES["Z"])) <= LYING_DEGREES:
+        yield from _tilt(vertical)
+    elif vertical is not None and not _upright_in_turned_pictures(cameras):
+        yield from _lying(vertical)
+
+
+def _tilt(vertical: Vertical | None) -> Iterator[Finding]:
+    """Z is nearly the vertical, and evidently not quite."""
+    off = vertical.off(np.array(AXES["Z"])) if vertical is not None else 0.0
+    if vertical is None or not vertical.level or off <= max(TILTED_DEGREES, 3.0 * vertical.degrees):
+        return
+    message = (
+        f"The world's Z axis is {off:.1f} degrees off the cameras' common vertical: who stands upright leans by that,"
+        " and the floor is tilted."
+    )
+    yield Finding(TILTED, "warns", message, LEVEL_IT)
+
+
+def _lying(vertical: Vertical) -> Iterator[Finding]:
+    """Z is not upright, and no axis is in all pictures."""
+    off = vertical.off(np.array(AXES["Z"]))
+    if off <= ASKEW_DEGREES:
+        return
+    signed = [(sign, name) for name in AXES for sign in (1.0, -1.0)]
+    sign, name = min(signed, key=lambda one: vertical.off(one[0] * np.array(AXES[one[1]])))
+    nearest = vertical.off(sign * np.array(AXES[name]))
+    word = "" if sign > 0.0 else "minus "
+    message = (
+        f"The world's Z axis does not point up in the pictures: it is {off:.0f} degrees off their common up."
+    )
+    if off <= LYING_DEGREES:
+        yield Finding(TILTED, "warns", message, LEVEL_IT)
+        return
+    message = f"{message} {word}{name}".replace(". minus", ". Minus")
+    message += f" is the likeliest, {nearest:.0f} degrees off" + ("." if vertical.level else " (roughly).")
+    yield Finding("up-axis", "blocks", message, _remedy(name, sign))
+
+
+def _remedy(name: str, sign: float) -> str:
+    spelt = f"--up={'' if sign > 0 else '-'}{name.lower()}"
+    return (
+        f"Import it with {spelt} (of x, y, z, -x, -y, -z), or export the calibration with Z up; where that axis is not"
+        " exactly vertical, level it then (studio level)."
+    )
+
+
+def _upright_in_turned_pictures(cameras: Sequence[Camera]) -> bool:
+    """Whether Z is upright once pictures are turned by quarters, as of a camera that was mounted on its side."""
+    up = np.array([camera.rotation[:2, 2] for camera in cameras])
+    seen = up[np.linalg.norm(up, axis=1) > UPRIGHT]
+    if not len(seen):
+        return all(camera.rotation[2, 2] < 0.0 for camera in cameras)
+    off: Array = np.min(np.abs(seen), axis=1) / np.linalg.norm(seen, axis=1)
+    return float(np.sqrt(np.mean(off**2))) < LEVEL
+
+
+def _origin(cameras: Sequence[Camera]) -> Iterator[Finding]:
+    name = camera_at_origin(cameras)
+    if name:
+        message = f"The world's origin is the lens of camera {name}: where the floor is is unknown."
+        yield Finding(NO_FLOOR, "warns", message, LEVEL_IT)
 
 
 def _floor(cameras: Sequence[Camera]) -> Iterator[Finding]:
@@ -159,7 +238,8 @@ def _unit(cameras: Sequence[Camera]) -> Iterator[Finding]:
         return
     centres = np.array([camera.centre for camera in cameras])
     spread = float(np.linalg.norm(centres - centres.mean(axis=0), axis=1).max())
-    if SMALLEST_RIG_MM < spread < LARGEST_RIG_MM:
+    together = min(float(a.rotation[2] @ b.rotation[2]) for a in cameras for b in cameras) > SIDE_BY_SIDE
+    if SMALLEST_RIG_MM < spread < LARGEST_RIG_MM or (together and STEREO_MM < spread <= SMALLEST_RIG_MM):
         return
     message = f"The cameras lie within {spread:.3g} mm of their middle"
     if 0.5 < spread <= SMALLEST_RIG_MM:
@@ -171,6 +251,32 @@ def _unit(cameras: Sequence[Camera]) -> Iterator[Finding]:
     else:
         message, remedy = f"{message}: they are all in one place.", "Calibrate the cameras' positions, too."
     yield Finding("scale", "blocks", message, remedy)
+
+
+def room_findings(cameras: Sequence[Camera], size_mm: float) -> tuple[Finding, ...]:
+    """A rig in which a body of `size_mm` (0: unknown) has no room: another unit was meant."""
+    target = common_target(tuple(cameras))
+    if target is None or size_mm <= 0.0 or looks_at_one_place(cameras):
+        return ()
+    away = float(np.median([np.linalg.norm(camera.centre - target) for camera in cameras]))
+    # Cameras side by side cross their axes anywhere.
+    around = min(float(a.rotation[2] @ b.rotation[2]) for a in cameras for b in cameras) < SIDE_BY_SIDE
+    if not around or ROOM[0] * size_mm <= away <= ROOM[1] * size_mm:
+        return ()
+    units = {"cm": 10.0, "in": 25.4, "m": 1000.0}
+    fitting = [unit for unit, factor in units.items() if ROOM[0] <= factor * away / size_mm <= FAR_ENOUGH]
+    meant = f" --unit {fitting[0]} would make it {units[fitting[0]] * away / 1000:.2g} m." if fitting else ""
+    message = (
+        f"The cameras look at a place {away:.4g} mm in front of them, where a body of {size_mm / 1000:.2f} m has no"
+        " room: the calibration is of another unit, it seems."
+    )
+    if away > ROOM[1] * size_mm:
+        message = (
+            f"The cameras look at a place {away / 1000:.4g} m in front of them, too far for a body of"
+            f" {size_mm / 1000:.2f} m: the calibration is of another unit, it seems."
+        )
+    remedy = f"Import it with --unit mm, cm, m or in, or board=MM (the mm that are 1 in the file).{meant}"
+    return (Finding(UNIT, "warns", message, remedy),)
 
 
 def _place(cameras: Sequence[Camera]) -> Iterator[Finding]:

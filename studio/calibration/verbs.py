@@ -79,7 +79,33 @@ def calibrate(
             "Lenses of a file alone give no cameras.", "Give footage of all cameras at once."
         )
     names = tuple(names) or _names(extrinsics or intrinsics)
-    solving = _Solving(board, names, floor, taken, progress or unheard)
+
+    def solved(pattern: Board) -> Calibrated:
+        solving = _Solving(pattern, names, floor, taken, progress or unheard)
+        return _solved(
+            solving, intrinsics, extrinsics, lenses, footage_sizes, distances_mm, refine_lenses=refine_lenses
+        )
+
+    try:
+        return solved(board)
+    except _NotFound as problem:
+        meant = _meant_board(board, (intrinsics, extrinsics), problem, taken)
+    found = solved(meant)
+    return replace(found, findings=_sorted([*found.findings, _meant_finding(board, meant)]))
+
+
+def _solved(
+    solving: "_Solving",
+    intrinsics: Path | None,
+    extrinsics: Path | None,
+    lenses: Mapping[str, Lens] | None,
+    footage_sizes: Mapping[str, tuple[int, int]] | None,
+    distances_mm: Mapping[tuple[str, str], float] | None,
+    *,
+    refine_lenses: bool,
+) -> Calibrated:
+    """The calibration by one board; parameters as of `calibrate`."""
+    board, names = solving.board, solving.names
     together = solving.together(extrinsics) if extrinsics is not None else []
     used: dict[str, tuple[Sighting, ...]] = {}
     if lenses is None and intrinsics is not None and intrinsics.is_file():
@@ -100,6 +126,59 @@ def calibrate(
         solved.cameras, footage_sizes=footage_sizes, distances_mm=distances_mm, board=board
     )
     return Calibrated(board, lenses, solved, used, _sorted(findings), floor_words)
+
+
+class _NotFound(CalibrationError):
+    """The board is found in too few pictures."""
+
+
+def _meant_board(
+    board: Board, folders: Sequence[Path | None], problem: CalibrationError, taken: HowTaken
+) -> Board:
+    """The board as it may have been meant, where that is found in the first camera's pictures: drawn by OpenCV before
+    4.6 (or after), columns and rows exchanged. Raises `problem` where none is.
+    """
+    folder = next((one for one in folders if one is not None and one.is_dir()), None)
+    if folder is None:
+        raise problem
+    first = list_footage(folder)[0]
+    for meant in _other_spellings(board):
+        finder = BoardFinder(meant, thorough=False, mirrored_too=False)
+        if len(look_for_lens(finder, first.name, first, unheard, taken)) >= FEWEST_PICTURES:
+            return meant
+    raise problem
+
+
+def _other_spellings(board: Board) -> tuple[Board, ...]:
+    turned = replace(board, columns=board.rows, rows=board.columns)
+    if board.kind == "chessboard":
+        fewer = [
+            replace(board, columns=board.columns - less, rows=board.rows - less)
+            for less in (1, -1)
+            if min(board.columns, board.rows) > 3
+        ]
+        return (turned, *fewer)
+    legacy = [replace(one, legacy=not board.legacy) for one in (board, turned)]
+    return (legacy[0], turned, legacy[1])
+
+
+def _meant_finding(given: Board, meant: Board) -> Finding:
+    how = [
+        *(
+            ["with columns and rows exchanged"]
+            if (meant.columns, meant.rows) == (given.rows, given.columns)
+            else []
+        ),
+        *(["as OpenCV before 4.6 drew it (legacy)"] if meant.legacy and not given.legacy else []),
+        *(["as OpenCV since 4.6 draws it (not legacy)"] if given.legacy and not meant.legacy else []),
+    ]
+    what = " and ".join(how) or "with its inner corners counted"
+    return Finding(
+        "board-pattern",
+        "warns",
+        f"The board {given.text} is in no picture; it was found {what}.",
+        f"Give it as --board {meant.text}.",
+    )
 
 
 def _names(folder: Path | None) -> tuple[str, ...]:
@@ -147,9 +226,10 @@ class _Solving:
             finder = BoardFinder(self.board, thorough=entry.video is None)
             seen = look_for_lens(finder, name, entry, self.progress, self.taken)
             if len(seen) < FEWEST_PICTURES:
-                raise CalibrationError(
+                raise _NotFound(
                     f"The board {self.board.text} is found in {len(seen)} pictures of camera {name}.",
-                    "Check the board's kind and numbers (inner corners for a chessboard), light and sharpness.",
+                    "Check the board's kind and numbers (inner corners for a chessboard), light and sharpness. Tried as"
+                    " well: columns and rows exchanged, and ,legacy (OpenCV before 4.6).",
                 )
             found[name] = tuple(chosen_for_lens(seen)[0])
         return found
@@ -159,7 +239,7 @@ class _Solving:
         for number, (name, sightings) in enumerate(used.items()):
             self.progress(f"Solving the lens of camera {name}", number, len(used))
             if not sightings:
-                raise CalibrationError(
+                raise _NotFound(
                     f"The board {self.board.text} is found in no picture of camera {name}.",
                     "Check the board's kind and numbers, or show it to this camera.",
                 )
@@ -175,7 +255,7 @@ class _Solving:
         names = sorted({sighting.camera for sighting in together}, key=natural_key)
         silent = [name for name in lenses if name not in names]
         if silent:
-            raise CalibrationError(
+            raise _NotFound(
                 f"The board is found in no picture of camera {listed(silent)} in the common footage.",
                 "Carry the board through this camera's view.",
             )

@@ -12,7 +12,7 @@ from studio.capture.calibration_parts import FoundCameras
 from studio.capture.naming import natural_key
 from studio.capture.sanity import check_rotation
 from studio.errors import CalibrationError
-from studio.foreign_files import foreign_file, read_text
+from studio.foreign_files import foreign_file, read_file, read_foreign_text
 from studio.geometry.camera import Camera
 from studio.geometry.rotations import rotation_from_vector
 
@@ -36,7 +36,15 @@ def read_bouguet(path: Path) -> FoundCameras:
 def _read_file(path: Path) -> Camera:
     where = f"'{path.name}'"
     with foreign_file(path, CalibrationError, "a list of numbers", "Export it again."):
-        values = np.array([float(word) for word in read_text(path).split()])
+        binary = b"\0" in read_file(path)[:4096]
+    if binary:
+        raise CalibrationError(
+            f"{where} is binary: a .cal of Motive (OptiTrack), it seems, which only Motive reads. Bouguet's is text.",
+            "Export the cameras from Motive as text, or calibrate with a board; read are a Pose2Sim, aniposelib,"
+            " FreeMoCap or Caliscope TOML, EasyMocap's or OpenCV's YAML, a Qualisys .qca.txt, and Bouguet .cal files.",
+        )
+    with foreign_file(path, CalibrationError, "a list of numbers", "Export it again."):
+        values = np.array([float(word) for word in read_foreign_text(path).split()])
     if len(values) != BOUGUET_NUMBERS or not np.all(np.isfinite(values)):
         raise CalibrationError(
             f"{where} holds {np.count_nonzero(np.isfinite(values))} finite numbers, not {BOUGUET_NUMBERS}.",

@@ -6,12 +6,14 @@ determines it: rigs are metres wide, so a number above 50 means mm. Names, rotat
 """
 
 import dataclasses
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from studio.capture.calibration_bouguet import BOUGUET_SUFFIX, bouguet_files, read_bouguet
+from studio.capture.calibration_dannce import DANNCE_SUFFIX, dannce_files, is_label3d, read_dannce
 from studio.capture.calibration_easymocap import (
     EXTRINSICS,
     INTRINSICS,
@@ -57,6 +59,8 @@ __all__ = [
 ]
 
 MM_FROM = 50.0
+UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
+UNIT_PATTERN = r"^(|mm|cm|m|in|board=[0-9]+(\.[0-9]+)?(mm)?)$"
 WORLDS = {
     "x": ((0, 1, 0), (0, 0, 1), (1, 0, 0)),
     "y": ((0, 0, 1), (1, 0, 0), (0, 1, 0)),
@@ -115,8 +119,8 @@ def find_calibrations(folder: Path) -> tuple[Path, ...]:
 def read_calibration(path: Path, unit: str = "", up: str = "z") -> Calibration:
     """The cameras of a file of any format that is known, or of a folder of files that belong together.
 
-    unit : "mm" or "m" overrides the file and the distances. up : the axis of the file's world that points up
-    (x, y, z, -x, -y, -z); the cameras' world has z up.
+    unit : "mm", "cm", "m", "in" or "board=MM" overrides the file and the distances. up : the axis of the file's
+    world that points up (x, y, z, -x, -y, -z); the cameras' world has z up.
     Raises CalibrationError naming file, camera and entry: wrong shapes, numbers that are not finite or no camera's,
     an invalid rotation, a fisheye camera, a name given twice, a damaged file, one that is a pipe.
     """
@@ -134,8 +138,8 @@ def _calibration(path: Path, unit: str, up: str) -> Calibration:
     calibration = Calibration(
         path.name, found.cameras, "", found.sources, found.sizes_known, found.crops, (*found.notes, *notes)
     )
-    if unit not in ("", "mm", "m"):
-        raise CalibrationError(f"'{unit}' is no unit of a calibration.", "Write mm or m.")
+    if unit:
+        mm_of(unit)
     calibration = with_up(calibration, up)
     return _finished(calibration, found.unit, unit, turned=is_canonical(path) and up == "z")
 
@@ -184,6 +188,9 @@ def _of_other_tools(folder: Path) -> list[Path]:
     found = [path for path in files if is_qualisys(path) or added_reader(path)]
     if is_easymocap(folder):
         return [*found, folder / INTRINSICS]
+    if dannce_files(folder):
+        return [*found, folder]
+    found += [path for path in files if is_label3d(path)]
     opened = opencv_files(folder)
     return [*found, *((folder,) if len(opened) > 1 else opened)]
 
@@ -198,6 +205,8 @@ def _read(path: Path) -> FoundCameras:
         return read_bouguet(path)
     if is_qualisys(path):
         return read_qualisys(path)
+    if suffix == DANNCE_SUFFIX:
+        return read_dannce(path)
     if path.name.lower() in (INTRINSICS, EXTRINSICS):
         return read_easymocap(path)
     added = added_reader(path)
@@ -224,6 +233,8 @@ def _read_folder(folder: Path) -> FoundCameras:
         return read_bouguet(folder)
     if is_easymocap(folder):
         return read_easymocap(folder)
+    if dannce_files(folder):
+        return read_dannce(folder)
     if opencv_files(folder):
         return read_opencv(folder)
     raise CalibrationError(
@@ -241,10 +252,7 @@ def _finished(read: Calibration, unit: str, requested: str, turned: bool = False
         )
     scale, note = _unit(read.cameras, unit)
     if requested:
-        scale, note = (
-            (1.0 if requested == "mm" else 1000.0),
-            f"The calibration is taken to be in {requested}, as requested.",
-        )
+        scale, note = mm_of(requested), f"The calibration is taken to be in {requested}, as requested."
     cameras = sorted(read.cameras, key=lambda camera: natural_key(camera.name))
     scaled = [dataclasses.replace(camera, translation=camera.translation * scale) for camera in cameras]
     if not turned:
@@ -252,10 +260,24 @@ def _finished(read: Calibration, unit: str, requested: str, turned: bool = False
     return dataclasses.replace(read, cameras=tuple(scaled), unit_note=note)
 
 
+def mm_of(unit: str) -> float:
+    """Millimetres in a unit: one of UNITS, or board=MM. Raises CalibrationError."""
+    if unit in UNITS:
+        return UNITS[unit]
+    found = re.fullmatch(r"board=([0-9]+(?:\.[0-9]+)?)(?:mm)?", unit)
+    length = float(found[1]) if found else 0.0
+    if not 1e-3 <= length <= 1e5:
+        raise CalibrationError(
+            f"'{unit}' is no unit of a calibration.",
+            f"Write one of {', '.join(UNITS)}, or board=MM: the mm that are 1 in the file.",
+        )
+    return length
+
+
 def _unit(cameras: tuple[Camera, ...], named: str) -> tuple[float, str]:
     """The factor to mm, and its reason as a sentence."""
     if named:
-        return (1.0 if named == "mm" else 1000.0), f"The calibration is in {named}, as the file says."
+        return mm_of(named), f"The calibration is in {named}, as the file says."
     centres = np.array([camera.centre for camera in cameras])
     distance = float(np.median(np.linalg.norm(centres, axis=1)))
     if len(centres) > 1:

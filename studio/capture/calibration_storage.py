@@ -15,7 +15,7 @@ import numpy as np
 
 from studio.arrays import Array
 from studio.errors import CalibrationError
-from studio.foreign_files import read_text
+from studio.foreign_files import read_foreign_text
 
 # A scalar as it is written, a list of scalars, or a map of these. What is nested deeper is kept as an empty map.
 Entry = str | list[str] | dict[str, "Entry"]
@@ -129,7 +129,7 @@ def storage_text(path: Path) -> str | None:
     try:
         if not path.is_file() or path.stat().st_size > LARGEST_FILE:
             return None
-        return read_text(path, encoding="utf-8-sig")
+        return read_foreign_text(path)
     except (OSError, UnicodeDecodeError):
         return None
 

@@ -18,7 +18,7 @@ from studio.arrays import Array
 from studio.capture.calibration_parts import AssumedCrop, FoundCameras, Intrinsics, checked_intrinsics
 from studio.capture.sanity import check_rotation
 from studio.errors import CalibrationError
-from studio.foreign_files import foreign_file, read_text
+from studio.foreign_files import foreign_file, read_foreign_text
 from studio.geometry.camera import Camera
 from studio.typed_decoding import is_table
 
@@ -106,7 +106,7 @@ def is_canonical(path: Path) -> bool:
 def _document(path: Path) -> dict[str, object]:
     """The file's entries. Raises CalibrationError."""
     with foreign_file(path, CalibrationError, "TOML", "Export it again."):
-        return tomllib.loads(read_text(path))
+        return tomllib.loads(read_foreign_text(path))
 
 
 def _camera_tables(document: dict[str, object]) -> dict[str, dict[str, object]]:
@@ -179,7 +179,7 @@ def _crop(where: str, table: dict[str, object]) -> AssumedCrop:
 
 def _unit(metadata: dict[str, object]) -> str:
     """The unit where a file names one: ours, and FreeMoCap's by its board."""
-    if metadata.get("unit") in ("mm", "m"):
+    if metadata.get("unit") in ("mm", "cm", "m", "in"):
         return str(metadata["unit"])
     board = metadata.get("board")
     return "mm" if is_table(board) and "square_length_mm" in board else ""

@@ -137,7 +137,7 @@ class Footage:
         missing = {
             camera.name
             for camera in numbered
-            if not has_picture(self.folder / camera.path, index + camera.offset)
+            if not has_picture(self.folder / camera.path, camera.file_frame(index))
         }
         return frozenset(missing) if len(missing) < len(self.cameras) else frozenset()
 
@@ -201,7 +201,7 @@ def open_footage(source: FootageSource, session_folder: Path) -> Footage:
                 f"The pictures of camera {camera.name} are said to be {camera.width}x{camera.height} pixels.",
                 "Import the session again.",
             )
-        if not 0 <= camera.offset <= camera.frame_count - source.frame_count:
+        if camera.offset < 0 or camera.file_frame(source.frame_count - 1) >= max(1, camera.frame_count):
             raise FootageError(
                 f"Camera {camera.name} has {camera.frame_count} frames, which {source.frame_count} from frame"
                 f" {camera.offset} on are not among.",
@@ -267,7 +267,7 @@ class _Kept:
             if found is not None:
                 return found
             self.read_count += 1
-            picture = turned_picture(self._reader.read(index + self._camera.offset), self._camera.turned)
+            picture = turned_picture(self._reader.read(self._camera.file_frame(index)), self._camera.turned)
             height, width = picture.shape[:2]
             if (width, height) != (self._camera.width, self._camera.height):
                 raise FootageError(

@@ -7,6 +7,8 @@ that opening a session needs no probing and a file that changed afterwards is no
 from dataclasses import dataclass
 from typing import Literal
 
+from studio.capture.frame_pairing import file_frame
+
 Turn = Literal[0, 90, 180, 270]
 TURNS: tuple[Turn, ...] = (0, 90, 180, 270)
 
@@ -22,7 +24,8 @@ class CameraSource:
     none.
     width, height : pixels, as they are after turning. frame_count : frames that decode, whatever the file's header
     claims. offset : the file's frame that was taken at the session's frame 0. turned : degrees clockwise by which the
-    pictures (masks and background too) are turned, in addition to the file's own rotation: 0, 90, 180 or 270.
+    pictures (masks and background too) are turned, in addition to the file's own rotation: 0, 90, 180 or 270. steps :
+    where frames are paired by time, (frame of the session, so many frames further in the file) from that frame on.
     """
 
     name: str
@@ -35,6 +38,11 @@ class CameraSource:
     background: str = ""
     offset: int = 0
     turned: Turn = 0
+    steps: tuple[tuple[int, int], ...] = ()
+
+    def file_frame(self, frame: int) -> int:
+        """The file's frame that belongs to a frame of the session."""
+        return self.offset + file_frame(self.steps, frame)
 
     @property
     def places(self) -> tuple[str, str, str]:
@@ -44,7 +52,7 @@ class CameraSource:
     @property
     def last(self) -> int:
         """Frames of the session that the camera has: those before it lie within its file."""
-        return self.frame_count - self.offset
+        return self.frame_count - self.offset - (self.steps[-1][1] if self.steps else 0)
 
 
 @dataclass(frozen=True, slots=True)

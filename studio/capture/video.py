@@ -22,7 +22,7 @@ import gc
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import av
@@ -193,6 +193,8 @@ VIDEO_SUFFIXES = frozenset((".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".m
 STEADY = 0.6
 """Frames may lie this share of a frame's duration off an even spacing before a frame rate is called
 variable."""
+MOST_GAPS, ROUNDED = 0.1, 5e-4
+"""At most this share of the frames' steps are gaps; measured rates are this near the usual one that they are."""
 FORWARD = 24
 """A jump forward of up to this many frames is decoded through instead of sought."""
 
@@ -201,7 +203,9 @@ FORWARD = 24
 class VideoMeasure:
     """A video measured by decoding all of it. width, height : pixels as shown (the file's rotation applied).
 
-    uneven_frame : the first frame that is not where a constant frame rate puts it, or -1.
+    uneven_frame : the first frame that is not where a constant frame rate puts it, or -1. turned : degrees clockwise by
+    which the file itself says to turn its pictures. interlaced : whether most frames are of two fields. times : (F,)
+    seconds as the file has them, empty where it has none.
     """
 
     width: int
@@ -209,6 +213,9 @@ class VideoMeasure:
     frame_count: int
     fps: float
     uneven_frame: int
+    turned: int = 0
+    interlaced: bool = False
+    times: Array = field(default_factory=lambda: np.zeros(0), compare=False)
 
 
 def measure_video(path: Path, on_frame: Callable[[int, int], None] | None = None) -> VideoMeasure:
@@ -223,13 +230,14 @@ def measure_video(path: Path, on_frame: Callable[[int, int], None] | None = None
 
 def _measured(path: Path, on_frame: Callable[[int, int], None]) -> VideoMeasure:
     times: list[float] = []
-    width = height = 0
+    width = height = turned = fields = 0
     with open_video(path) as container:
         stream = container.streams.video[0]
         announced = announced_frames(container, stream)
         for frame in _decoded(path, container, stream):
-            turned = round(frame.rotation / 90.0) % 2 == 1
-            size = (frame.height, frame.width) if turned else (frame.width, frame.height)
+            turned = round(-frame.rotation / 90.0) % 4 * 90
+            fields += frame.interlaced_frame
+            size = (frame.height, frame.width) if turned in (90, 270) else (frame.width, frame.height)
             if times and size != (width, height):
                 raise FootageError(
                     f"'{path.name}' changes its size at frame {len(times)}.", "Re-encode it with one size."
@@ -242,13 +250,15 @@ def _measured(path: Path, on_frame: Callable[[int, int], None]) -> VideoMeasure:
         nominal = float(stream.average_rate or stream.guessed_rate or 0)
     if not times:
         raise FootageError(f"'{path.name}' holds no frames.", "Record or export the video again.")
-    if len(times) < announced - max(1, announced // 100):
+    if len(times) < announced - max(1, announced // 100) - _hidden_frames(path, announced - len(times)):
         raise FootageError(
             f"'{path.name}' ends at frame {len(times)} of the {announced} that it announces.",
             "The file was cut short: copy or export it again.",
         )
     fps, uneven = _rate(np.array(times), nominal)
-    return VideoMeasure(width, height, len(times), fps, uneven)
+    known = np.array(times)
+    shown_at = known if np.isfinite(known).all() and np.all(np.diff(known) > 0.0) else np.zeros(0)
+    return VideoMeasure(width, height, len(times), fps, uneven, turned, 2 * fields > len(times), shown_at)
 
 
 class VideoReader:
@@ -358,14 +368,29 @@ def _decoded(
 
 
 def _rate(times: Array, nominal: float) -> tuple[float, int]:
-    """Frames per second, and the first frame off an even spacing (-1: none)."""
+    """Frames per second, and the first frame off an even spacing (-1: none), in which lost ones leave gaps."""
     if len(times) < 2 or not np.all(np.isfinite(times)):
         return nominal, -1
+    steps = np.diff(times)
+    usual = float(np.median(steps))
+    gaps = np.maximum(np.round(steps / usual) - 1.0, 0.0) if usual > 0.0 else np.zeros(len(steps))
+    if 0 < np.count_nonzero(gaps) <= MOST_GAPS * len(steps):
+        fps = 1.0 / float(steps[gaps == 0.0].mean())
+        slots = np.arange(len(times)) + np.concatenate([[0.0], np.cumsum(gaps)])
+        off = np.abs((times - times[0]) * fps - slots)
+        if not np.any(off > STEADY):
+            return _rounded(fps), -1
     fps = (len(times) - 1) / float(times[-1] - times[0]) if times[-1] > times[0] else nominal
     if nominal > 0.0 and abs(fps / nominal - 1.0) < 0.005:
         fps = nominal
     off = np.abs((times - times[0]) * fps - np.arange(len(times)))
     return fps, int(np.argmax(off > STEADY)) if np.any(off > STEADY) else -1
+
+
+def _rounded(fps: float) -> float:
+    """A rate that was measured, as the usual one that it is."""
+    usual = min((round(fps), round(fps * 1.001) / 1.001), key=lambda rate: abs(rate - fps))
+    return usual if usual > 0.0 and abs(usual / fps - 1.0) < ROUNDED else fps
 
 
 def _packet_times(path: Path) -> tuple[list[int] | None, list[int]]:
@@ -383,6 +408,18 @@ def _packet_times(path: Path) -> tuple[list[int] | None, list[int]]:
             return [], []
     shown.sort()
     return [time for time, _ in shown], [number for number, (_, key) in enumerate(shown) if key]
+
+
+def _hidden_frames(path: Path, lacking: int) -> int:
+    """Frames that an edit list hides, of those that are lacking: they are only there to decode the others."""
+    hidden = 0
+    with open_video(path) as container:
+        try:
+            for packet in container.demux(container.streams.video[0]):
+                hidden += packet.is_discard and packet.size > 0
+        except av.error.FFmpegError:
+            return 0
+    return min(hidden, lacking)
 
 
 def _again(first: av.VideoFrame, rest: Iterator[av.VideoFrame]) -> Iterator[av.VideoFrame]:

@@ -1,4 +1,4 @@
-"""Cameras: `calibrate`, `board`, `align`."""
+"""Cameras: `calibrate`, `board`, `align`, `level`."""
 
 import click
 
@@ -6,7 +6,16 @@ from studio.calibration.lens_verdict import verdict
 from studio.calibration.report import report_of
 from studio.cli.deriving import Call, command_of
 from studio.errors import CalibrationError
-from studio.operations.cameras import Alignment, Calibration, align, board, calibrate, unalign
+from studio.operations.cameras import (
+    Alignment,
+    Calibration,
+    Levelled,
+    align,
+    board,
+    calibrate,
+    level,
+    unalign,
+)
 
 
 @command_of(calibrate)
@@ -83,4 +92,22 @@ def align_command(call: Call, undo: bool) -> dict[str, object]:
         "frames": list(found.found.found.frames),
         "cameras": cameras,
         "text": "\n".join([*found.found.in_words(), *([said] if said else [])]),
+    }
+
+
+@command_of(level)
+def level_command(call: Call) -> dict[str, object]:
+    found: Levelled = call()
+    done = "The world was turned" if found.changed else "The world would be turned"
+    said = (
+        f"{done} by {found.tilted:.1f} degrees, its old origin lies {found.lowered:.0f} mm above the floor: by"
+        f" {found.how}."
+    )
+    kept = " The calibration before is kept." if found.changed else ""
+    return {
+        "session": found.session.name,
+        "changed": found.changed,
+        "tilted_degrees": found.tilted,
+        "lowered_mm": found.lowered,
+        "text": said + kept,
     }

@@ -26,6 +26,7 @@ COMMANDS = {
     "subjects": ("person_commands", "operations.subjects.subjects"),
     "together": ("person_commands", "operations.subjects.together"),
     "align": ("camera_commands", "operations.cameras.align"),
+    "level": ("camera_commands", "operations.cameras.level"),
     "subject": ("person_commands", "operations.person.subject"),
     "fit-subject": ("person_commands", "operations.person.fit_subject"),
     "initialise": ("person_commands", "operations.person.initialise"),

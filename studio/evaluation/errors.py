@@ -6,6 +6,7 @@ a frame, without any alignment, in mm. Beside it stand the two usual aligned one
 by more than LOST_MM (the threshold of MPI-INF-3DHP's PCK), at a person's size (`scale_of`).
 """
 
+import itertools
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -132,9 +133,9 @@ def evaluate(
 ) -> Evaluation:
     """The errors of poses (K, D) of the given frames (K,) of a body against true markers.
 
-    The truth's first row is frame 0; its other rows belong to the frames nearest to (Time - first Time) ×
-    fps. align : RIGID or SIMILARITY lays a truth of another world on the run first, by one motion for all frames.
-    Raises TruthError when no marker or no frame is common to both.
+    The truth's rows belong to the frames nearest to Time × fps. align : RIGID or SIMILARITY lays a truth of another
+    world on the run first, by one motion for all frames. Raises TruthError when no marker or no frame is common to
+    both.
     """
     names, of_body, of_truth, unmatched = _common_markers(body, truth)
     numbers, kept, truth_points = _common_frames(np.asarray(frames), truth, of_truth, fps)
@@ -174,6 +175,56 @@ def evaluate(
         **_degrees_off(found, truth_points, marker_links(body, names), names),
         **_constant_part(found - truth_points, names),
     )
+
+
+MUCH_NEARER = 0.25
+"""A truth means other axes if those leave less than this share of the distance."""
+OTHER_UNITS = (1.0, 10.0, 100.0, 1000.0, 0.1, 0.01, 0.001)
+
+
+def meant_axes(poses: Array, frames: Indices, body: BodyModel, truth: MarkerMotion, fps: float) -> str:
+    """Which quarter turns (and unit) of a truth, "FILE", lay it on the run where it lies far off without: a sentence
+    with the remedy; "" where none does.
+    """
+    _, of_body, of_truth, _ = _common_markers(body, truth)
+    _, kept, goal = _common_frames(np.asarray(frames), truth, of_truth, fps)
+    found = marker_points(body, np.asarray(poses, dtype=float)[kept])[:, of_body]
+    seen = np.asarray(np.isfinite(goal).all(axis=2))
+    found, goal = found[seen], goal[seen]
+    off = float(np.linalg.norm(found - goal, axis=1).mean())
+    tries = {
+        (unit, number): float(np.linalg.norm(found - unit * goal @ turn.T, axis=1).mean())
+        for unit in OTHER_UNITS
+        for number, turn in enumerate(QUARTER_TURNS)
+    }
+    unit, number = min(tries, key=lambda key: tries[key])
+    if tries[unit, number] > MUCH_NEARER * off:
+        return ""
+    turn = QUARTER_TURNS[number]
+    words = [
+        *(["turned by quarter turns"] if not np.array_equal(turn, np.eye(3)) else []),
+        *([f"with its lengths times {unit:g} (another unit)"] if unit != 1.0 else []),
+    ]
+    remedy = "--align similarity" if unit != 1.0 else "--align rigid, or its vertical with --truth-up"
+    return (
+        f"FILE lies {off:.0f} mm off as it is, and {tries[unit, number]:.1f} mm {' and '.join(words)}: its axes or unit"
+        f" are others than the session's ({remedy})."
+    )
+
+
+def _quarter_turns() -> tuple[Array, ...]:
+    """All 24 rotations that lay axes on axes."""
+    found: list[Array] = []
+    for order in itertools.permutations(range(3)):
+        for signs in itertools.product((1.0, -1.0), repeat=3):
+            turn = np.zeros((3, 3))
+            turn[range(3), order] = signs
+            if np.linalg.det(turn) > 0.0:
+                found.append(turn)
+    return tuple(found)
+
+
+QUARTER_TURNS = _quarter_turns()
 
 
 def _constant_part(off: Array, names: tuple[str, ...]) -> dict[str, Any]:
@@ -235,7 +286,7 @@ def rows_of_frames(truth: MarkerMotion, fps: float) -> dict[int, int]:
     """Frame to the truth's row that is nearest to it in time; frames without a row within half a frame are
     absent.
     """
-    at = (truth.times - truth.times[0]) * fps
+    at = truth.times * fps
     rows: dict[int, int] = {}
     for row, place in enumerate(at):
         frame = round(float(place))
@@ -310,7 +361,7 @@ def _common_frames(
     if not some.size:
         raise TruthError(
             f"No frame of the run has a row in the truth, whose rows are frames {min(rows)} to {max(rows)}.",
-            "Check that the truth belongs to this session and starts with its first frame.",
+            "Check that the truth belongs to this session; its times count from the footage's frame 0.",
         )
     kept = np.array(places, dtype=np.int64)[some]
     return frames[kept], kept, truth_points[some]

@@ -10,6 +10,7 @@ from studio.arrays import Bytes
 from studio.errors import ExportError, NotFoundError
 from studio.export.task import ExportTask, Written
 from studio.runs.overlay_pictures import compose_view
+from studio.sessions.names import free_name, name_from
 
 QUALITY = "21"
 PRESET = "veryfast"
@@ -33,7 +34,10 @@ def write_videos(task: ExportTask) -> Written:
     for index, camera in enumerate(chosen):
         place = task.place
         if not task.options.camera and len(names) > 1:
-            place = place.with_name(f"{place.stem}-{camera}{place.suffix}")
+            own = free_name(
+                f"{place.stem}-{name_from(camera, f'camera-{index + 1}')}", {path.stem for path in files}
+            )
+            place = place.with_name(f"{own}{place.suffix}")
         sizes.append(_write_video(task, place, camera, index * count, len(chosen) * count))
         files.append(place)
     for place, size in zip(files, sizes, strict=True):

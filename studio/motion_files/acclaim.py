@@ -56,10 +56,10 @@ class _Skeleton:
 def read_acclaim(motion: Path, skeleton: Path | None = None) -> RecordedMotion:
     """The motion in an AMC file on the skeleton of an ASF file.
 
-    skeleton : by default the one beside it that is named after the subject ("05_01.amc": "05.asf"). AMC files
-    hold no rate; CMU's is 120. Raises StudioError naming file, line and remedy.
+    skeleton : by default the one beside it that is named after the subject ("05_01.amc": "05.asf") or the motion,
+    upper case or lower. AMC files hold no rate; CMU's is 120. Raises StudioError naming file, line and remedy.
     """
-    beside = skeleton or motion.with_name(f"{motion.stem.split('_')[0]}.asf")
+    beside = skeleton or _skeleton_beside(motion)
     if not beside.is_file():
         raise StudioError(
             f"The skeleton of '{motion.name}', '{beside.name}', is not there.", "Name its ASF file."
@@ -87,6 +87,13 @@ def read_acclaim(motion: Path, skeleton: Path | None = None) -> RecordedMotion:
         axes=UP_FROM_Y_UP,
         scale=tree.unit,
     )
+
+
+def _skeleton_beside(motion: Path) -> Path:
+    """The ASF beside an AMC: the subject's or the motion's own name, its ending in any case."""
+    names = [f"{motion.stem.split('_')[0]}.asf", f"{motion.stem}.asf"]
+    there = {path.name.lower(): path for path in motion.parent.iterdir() if path.suffix.lower() == ".asf"}
+    return next((there[name.lower()] for name in names if name.lower() in there), motion.with_name(names[0]))
 
 
 def _turns(axes: list[int], angles: Array) -> Array:

@@ -1,11 +1,16 @@
 """Motion files in Biovision's BVH: a hierarchy of joints with offsets and channels, then a row of numbers a frame.
 
-Read strictly: unknown input is refused with its line. `read_bvh_file` gives the file's content in its own unit and
+What programs write differently is read as it is meant: blanks in names, six channels on every joint where no joint
+leaves its offset, another number of frames than is announced (`notes`), blank lines, upper-case endings and any text
+encoding. Unknown input is refused with its line. `read_bvh_file` gives the file's content in its own unit and
 axes. As a recording (`read_bvh`) the rest pose is that of all angles zero, y up and facing z, as in the CMU
 clips, and only the root may move. BVH names no unit; the CMU clips' is 25.4 / 0.45 mm.
 """
 
-from dataclasses import dataclass, field
+import itertools
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +31,8 @@ from studio.motion_files.recorded_motion import (
 
 CMU_UNIT = 25.4 / 0.45
 CHANNELS = {f"{axis}{kind}": (kind, "XYZ".index(axis)) for axis in "XYZ" for kind in ("position", "rotation")}
+STRETCH = 0.01
+"""Bones whose ends move by less than this share of the longest offset keep their length: numbers are rounded."""
 REMEDY = "Correct the line, or export the file again."
 
 
@@ -35,7 +42,7 @@ class BvhFile:
 
     names, parents : joints in the file's order, end sites named after their parent with `_end`; is_end : (J,) which
     those are. offsets : (J, 3). moves : (F, J, 3) position channels, 0 where there is none; moved : (J, 3) where there
-    is one. turns : (F, J, 3, 3) in the parent's frame.
+    is one. turns : (F, J, 3, 3) in the parent's frame. notes : where it differs from what it announces, sentences.
     """
 
     names: tuple[str, ...]
@@ -46,6 +53,7 @@ class BvhFile:
     moved: NDArray[np.bool_]
     turns: Array
     fps: float
+    notes: tuple[str, ...] = ()
 
     def followed(self) -> tuple[Array, Array]:
         """Places (F, J, 3) and turns (F, J, 3, 3) of the joints in the file's world, without end sites. A position
@@ -73,16 +81,11 @@ def read_bvh(path: Path, unit_mm: float = CMU_UNIT) -> RecordedMotion:
     Raises StudioError naming file, line and remedy.
     """
     found = read_bvh_file(path)
-    if found.moved[1:].any():
-        joint = found.names[1 + int(found.moved[1:].any(axis=1).argmax())]
-        raise StudioError(
-            f"'{path.name}': joint '{joint}' has position channels, which only the root may have.",
-            "Export with fixed bone lengths.",
-        )
-    return moved_skeleton(
+    offsets = _fixed_offsets(path, found)
+    motion = moved_skeleton(
         found.names,
         found.parents,
-        found.offsets,
+        offsets,
         found.turns,
         found.offsets[0] + found.moves[:, 0],
         fps=found.fps,
@@ -90,13 +93,38 @@ def read_bvh(path: Path, unit_mm: float = CMU_UNIT) -> RecordedMotion:
         axes=UP_FROM_Y_UP,
         scale=unit_mm,
     )
+    return replace(motion, notes=found.notes)
+
+
+def _fixed_offsets(path: Path, found: BvhFile) -> Array:
+    """(J, 3) the offsets of joints that keep their distance. Position channels stand in the offset's place (Blender,
+    MotionBuilder); some programs write what is added to it, zeros throughout. Raises StudioError for bones that
+    stretch.
+    """
+    offsets = found.offsets.copy()
+    reach = max(1.0, float(np.abs(found.offsets).max()))
+    for joint in range(1, len(found.names)):
+        axes = found.moved[joint]
+        if not axes.any():
+            continue
+        places = found.moves[:, joint, axes]
+        middle = np.median(places, axis=0)
+        if np.abs(places - middle).max() > STRETCH * reach:
+            raise StudioError(
+                f"'{path.name}': the position channels of joint '{found.names[joint]}' move it by up to"
+                f" {float(np.abs(places - middle).max()):.3g} against its parent: its bone stretches.",
+                "Export with fixed bone lengths.",
+            )
+        if np.abs(middle).max() > STRETCH * reach:
+            offsets[joint, axes] = middle
+    return offsets
 
 
 def read_bvh_file(path: Path) -> BvhFile:
     """The joints and their motion as they are written. Raises StudioError naming file, line and remedy."""
     lines = text_lines(path)
     hierarchy, at = _read_hierarchy(path, lines)
-    fps, rows = _read_rows(path, lines, at, sum(map(len, hierarchy.channels)))
+    fps, rows, notes = _read_rows(path, lines, at, sum(map(len, hierarchy.channels)))
     count = len(hierarchy.names)
     turns = np.tile(np.eye(3), (len(rows), count, 1, 1))
     moves, moved = np.zeros((len(rows), count, 3)), np.zeros((count, 3), dtype=np.bool_)
@@ -120,13 +148,14 @@ def read_bvh_file(path: Path) -> BvhFile:
         moved,
         turns,
         fps,
+        notes,
     )
 
 
 def _read_hierarchy(path: Path, lines: list[str]) -> tuple[_Hierarchy, int]:
     """The joints, and the number of the line "MOTION" (from 0)."""
     found, open_joints, pending, is_end = _Hierarchy(), list[int](), "", False
-    for index, text in enumerate(lines):
+    for index, text in _pieces(lines):
         words = text.split()
         head, line = (words[0] if words else ""), index + 1
         if head == "MOTION":
@@ -137,7 +166,11 @@ def _read_hierarchy(path: Path, lines: list[str]) -> tuple[_Hierarchy, int]:
             if (head == "ROOT") != (not found.names) or len(words) < 2:
                 raise at_line(path, line, f"'{text.strip()}' does not belong here", REMEDY)
             is_end = head == "End"
-            pending = f"{found.names[open_joints[-1]]}_end" if is_end else words[1]
+            pending = (
+                _free_name(f"{found.names[open_joints[-1]]}_end", found.names)
+                if is_end
+                else " ".join(words[1:])
+            )
         elif head == "{" and pending:
             if pending in found.names:
                 raise at_line(path, line, f"there is a second joint '{pending}'", "Rename one of them.")
@@ -161,36 +194,55 @@ def _read_hierarchy(path: Path, lines: list[str]) -> tuple[_Hierarchy, int]:
     raise StudioError(f"'{path.name}' has no MOTION.", "Give a BVH file with its frames.")
 
 
+def _pieces(lines: list[str]) -> Iterator[tuple[int, str]]:
+    """Lines with their numbers (from 0), braces apart from what stands beside them."""
+    for index, text in enumerate(lines):
+        for piece in re.findall(r"[{}]|[^{}]+", text):
+            yield index, piece
+
+
+def _free_name(name: str, taken: list[str]) -> str:
+    """`name`, or with the first number behind it that makes it another than those `taken`."""
+    numbered = (f"{name}_{number}" for number in itertools.count(2))
+    return name if name not in taken else next(one for one in numbered if one not in taken)
+
+
 def _channels(path: Path, line: int, words: list[str]) -> list[str]:
-    names = words[2:]
+    names = [word.capitalize() for word in words[2:]]
     if len(words) < 2 or words[1] != str(len(names)) or not set(names) <= set(CHANNELS):
         raise at_line(path, line, "the channels do not match their number, or one is unknown", REMEDY)
     return names
 
 
-def _read_rows(path: Path, lines: list[str], at: int, width: int) -> tuple[float, Array]:
-    """Frames a second and (F, width) channel values."""
-    counted, timed = (lines[at + step].split() if at + step < len(lines) else [] for step in (1, 2))
-    if len(counted) != 2 or counted[0] != "Frames:" or not counted[1].isdigit():
-        raise at_line(path, at + 2, "'Frames:' and their number must follow MOTION", REMEDY)
-    if len(timed) != 3 or timed[:2] != ["Frame", "Time:"]:
-        raise at_line(path, at + 3, "'Frame Time:' and the seconds must follow", REMEDY)
-    (step,) = numbers(path, at + 3, timed[2:])
+def _read_rows(path: Path, lines: list[str], at: int, width: int) -> tuple[float, Array, tuple[str, ...]]:
+    """Frames a second, (F, width) channel values, and a sentence where another number of frames is announced."""
+    written = [number for number in range(at + 1, len(lines)) if lines[number].strip()][:2]
+    first, second = (*written, *[len(lines)] * 2)[:2]
+    counted, timed = (
+        lines[number].replace(":", ": ").split() if number < len(lines) else [] for number in (first, second)
+    )
+    if len(counted) != 2 or counted[0].lower() != "frames:" or not counted[1].isdigit():
+        raise at_line(path, first + 1, "'Frames:' and their number must follow MOTION", REMEDY)
+    if len(timed) != 3 or [word.lower() for word in timed[:2]] != ["frame", "time:"]:
+        raise at_line(path, second + 1, "'Frame Time:' and the seconds must follow", REMEDY)
+    (step,) = numbers(path, second + 1, timed[2:])
     if not 1e-4 <= step <= 1.0:
-        raise at_line(path, at + 3, f"a frame time of {step:g} s is not 0.0001 to 1", REMEDY)
+        raise at_line(path, second + 1, f"a frame time of {step:g} s is not 0.0001 to 1", REMEDY)
     rows: list[list[float]] = []
-    for index in range(at + 3, len(lines)):
+    for index in range(second + 1, len(lines)):
         words = lines[index].split()
         if words and len(words) != width:
             what = f"a frame has {len(words)} numbers, the hierarchy {width} channels"
             raise at_line(path, index + 1, what, REMEDY)
         if words:
             rows.append(numbers(path, index + 1, words))
-    if len(rows) != int(counted[1]) or not rows:
-        raise at_line(
-            path, at + 2, f"{counted[1]} frames are announced, {len(rows)} follow", "Fetch the file again."
-        )
-    return _rate(1.0 / step), np.array(rows)
+    announced = int(counted[1])
+    words = f"{announced} frames are announced, {len(rows)} follow"
+    # Programs are a frame off in what they announce; a file that was cut lacks many.
+    if not rows or announced - len(rows) > max(1, announced // 100):
+        raise at_line(path, first + 1, words, "The file was cut short: fetch it again.")
+    notes = (f"'{path.name}': {words}, and are taken.",) if announced != len(rows) else ()
+    return _rate(1.0 / step), np.array(rows), notes
 
 
 def _rate(fps: float) -> float:

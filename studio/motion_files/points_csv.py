@@ -7,7 +7,8 @@ Either a row a point, or a row a frame (as anipose writes them):
 
 Separated by commas, semicolons or tabs. Other columns are ignored. Instead of frames there may be a column of seconds
 (`time`). The unit stands behind x, y and z (`x_mm`, `x_cm`, `x_m`, in rows of frames `Nose_x_mm`); without one it is
-mm. A point that is missing has no row, or blank cells.
+mm. A point that is missing has no row, blank cells or exact zeros. Where columns are separated by semicolons or tabs, a
+comma in a number is a decimal one. Tables of other programs: `points_tables`.
 """
 
 import csv
@@ -19,13 +20,20 @@ from pathlib import Path
 import numpy as np
 
 from studio.errors import TruthError
-from studio.foreign_files import foreign_file, read_text
-from studio.motion_files.trc import MM_PER_UNIT, MarkerMotion, check_reach, number_or_nan
+from studio.foreign_files import foreign_file, read_foreign_text
+from studio.motion_files.points_tables import own_form
+from studio.motion_files.trc import (
+    MISSING,
+    MM_PER_UNIT,
+    MarkerMotion,
+    check_reach,
+    number_or_nan,
+    without_zeros,
+)
 
 FRAME = ("frame", "frames", "frame_number", "fnum", "frame_index")
 TIME = ("time", "time_s", "seconds")
 POINT = ("point", "name", "marker", "label", "bodypart", "keypoint", "node")
-MISSING = ("", "nan", "na", "none", "null")
 SEPARATORS = (",", ";", "\t")
 LAST_FRAME = 500_000
 MOST_NUMBERS = 50_000_000
@@ -53,20 +61,23 @@ def read_points(path: Path, fps: float) -> MarkerMotion:
     file names none. Raises TruthError naming file, line and column.
     """
     with foreign_file(path, TruthError, "a CSV file of points", SHAPE):
-        text = read_text(path, encoding="utf-8-sig")
+        text = read_foreign_text(path)
         lines = text.splitlines()
         first = next((line for line in lines if line.strip()), "")
         separator = max(SEPARATORS, key=first.count)
-        return _motion(path, csv.reader(lines, delimiter=separator, strict=True), fps)
+        rows = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=separator, strict=True)]
+        return _motion(path, own_form(path, rows), fps)
 
 
-def _motion(path: Path, rows: Iterable[list[str]], fps: float) -> MarkerMotion:
+def _motion(path: Path, rows: Iterable[Sequence[str]], fps: float) -> MarkerMotion:
     columns: _Columns | None = None
     found: dict[tuple[int, str], tuple[float, float, float]] = {}
     names: dict[str, None] = {}
     width = 0
     for number, row in enumerate(rows, 1):
-        cells = [cell.strip() for cell in row]
+        cells = list(row)
+        while columns is not None and len(cells) > width and not cells[-1]:
+            cells.pop()
         if not any(cells):
             continue
         if columns is None:
@@ -75,7 +86,7 @@ def _motion(path: Path, rows: Iterable[list[str]], fps: float) -> MarkerMotion:
         if len(cells) != width:
             raise TruthError(
                 f"'{path.name}' line {number} has {len(cells)} columns, the header {width}.",
-                "Write numbers with a point, one cell each, and leave missing ones blank.",
+                "One cell a number, missing ones blank; numbers with a decimal comma need semicolons between cells.",
             )
         frame = _frame(path, number, cells[columns.place], columns.timed, fps)
         for name, axes in columns.axes.items():
@@ -111,7 +122,9 @@ def _filled(
     positions = np.full((count, len(names), 3), np.nan)
     for (frame, name), place in found.items():
         positions[frame, at[name]] = place
-    motion = MarkerMotion(names, np.arange(count) / fps, positions * MM_PER_UNIT[unit or "mm"], unit, fps)
+    positions, notes = without_zeros(path, positions)
+    places = positions * MM_PER_UNIT[unit or "mm"]
+    motion = MarkerMotion(names, np.arange(count) / fps, places, unit, fps, notes)
     check_reach(path, motion, TruthError)
     return motion
 

@@ -11,11 +11,12 @@ from studio.motion_files.recorded_motion import RecordedMotion
 
 def read_recording(path: Path, skeleton: Path | None = None) -> RecordedMotion:
     """The motion in a file, by its ending: .amc, .bvh or .npz. Raises StudioError naming the endings there are."""
-    if path.suffix == ".amc":
+    ending = path.suffix.lower()
+    if ending == ".amc":
         return read_acclaim(path, skeleton)
     readers = {".bvh": read_bvh, ".npz": read_humanoid_arrays}
-    if path.suffix not in readers:
+    if ending not in readers:
         raise StudioError(
             f"'{path.name}' is no motion file that can be read.", "Give an .amc, .bvh or .npz file."
         )
-    return readers[path.suffix](path)
+    return readers[ending](path)

@@ -9,7 +9,7 @@ import numpy as np
 
 from studio.arrays import Array
 from studio.errors import StudioError
-from studio.foreign_files import foreign_file, read_text
+from studio.foreign_files import foreign_file, read_foreign_text
 
 UP_FROM_Y_UP = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """Files with y up and people facing z become z up, facing x: (x, y, z) -> (z, x, y), a proper rotation."""
@@ -22,6 +22,7 @@ class RecordedMotion:
     names, parents : joints, parents before children, -1 at the root; ends of limbs count as joints. rest : (J, 3)
     places in the rest pose, in which every rotation is the identity. rotations : (F, J, 3, 3) what turned each
     joint's segment from the rest pose to where it is in the world. positions : (F, J, 3). source : the file's name.
+    notes : where the file differs from what it announces, sentences.
     """
 
     names: tuple[str, ...]
@@ -31,6 +32,7 @@ class RecordedMotion:
     positions: Array
     fps: float
     source: str
+    notes: tuple[str, ...] = ()
 
     @property
     def seconds(self) -> float:
@@ -109,7 +111,7 @@ def at_line(path: Path, line: int, what: str, remedy: str) -> StudioError:
 def text_lines(path: Path) -> list[str]:
     """The lines of a motion file. Raises StudioError where it cannot be read or is no text."""
     with foreign_file(path, StudioError, "a text file", "Give a motion file as text."):
-        return read_text(path).splitlines()
+        return read_foreign_text(path).splitlines()
 
 
 def numbers(path: Path, line: int, words: list[str]) -> list[float]:

@@ -2,24 +2,27 @@
 
 A TRC is tab-separated text: three lines of header (rates, counts, unit), one of marker names (one for
 every three columns), one of axis labels, then rows `Frame#  Time  X1 Y1 Z1  X2 ...`. Its axes are Y up;
-the studio's world is Z up: (X, Y, Z)_world = (z, x, y)_trc. A missing marker is three blank cells; a
-number that is not finite is refused.
+the studio's world is Z up: (X, Y, Z)_world = (z, x, y)_trc. Files of others may mean another axis
+(`marker_meaning`). A missing marker is three cells that are blank, `nan` or exactly 0. Numbers may have a decimal
+comma.
 """
 
 import math
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from studio.arrays import Array
 from studio.errors import StudioError, TruthError
-from studio.foreign_files import foreign_file, read_text
+from studio.foreign_files import foreign_file, read_foreign_text
 from studio.geometry.reach import FARTHEST_MM, REACH_HINT
+from studio.motion_files.marker_meaning import turned_up
 
 MM_PER_UNIT = {"mm": 1.0, "cm": 10.0, "m": 1000.0}
-WORLD_FROM_TRC = (2, 0, 1)
+MISSING = ("", "nan", "-nan", "na", "n/a", "none", "null", "nan(ind)", "-nan(ind)", "1.#qnan", "-1.#ind")
+"""What stands in the cells of a missing marker, lower case."""
 TRC_FROM_WORLD = (1, 2, 0)
 HEADER_LINES = 5
 FIRST_COLUMNS = 2
@@ -34,7 +37,7 @@ class MarkerMotion:
 
     names : M marker names. times : (F,) seconds, rising. positions : (F, M, 3) mm, world z up; NaN
     where a marker is missing. unit : the unit of the file ("m" or "mm"). rate : rows per second as the
-    header says.
+    header says. notes : what was taken to be meant, sentences.
     """
 
     names: tuple[str, ...]
@@ -42,6 +45,7 @@ class MarkerMotion:
     positions: Array
     unit: str = "m"
     rate: float = 60.0
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,16 +56,17 @@ class _Header:
     rows: int
 
 
-def read_trc(path: Path) -> MarkerMotion:
-    """The motion in a TRC file.
+def read_trc(path: Path, up: str = "y") -> MarkerMotion:
+    """The motion in a TRC file. up : the axis of the file that points up (x, y, z, -x, -y, -z); "" for as the markers
+    show it, y where they do not.
 
     Raises TruthError naming file, line and column for anything that is not a complete, finite table.
     """
     with foreign_file(path, TruthError, "a TRC file", "Export it again."):
-        return _motion(path, read_text(path, encoding="utf-8-sig").splitlines())
+        return _motion(path, read_foreign_text(path).splitlines(), up)
 
 
-def _motion(path: Path, lines: list[str]) -> MarkerMotion:
+def _motion(path: Path, lines: list[str], up: str) -> MarkerMotion:
     header = _header(path, lines)
     rows = [
         _row(path, number, line, header.names)
@@ -81,10 +86,23 @@ def _motion(path: Path, lines: list[str]) -> MarkerMotion:
             f"In '{path.name}' the time of row {at + 1} ({times[at]:g} s) does not rise.",
             "Sort the rows by time and remove repeated ones.",
         )
-    positions = table[:, 1:].reshape(len(rows), len(header.names), 3)[:, :, WORLD_FROM_TRC]
-    motion = MarkerMotion(header.names, times, positions * MM_PER_UNIT[header.unit], header.unit, header.rate)
+    positions, zeros = without_zeros(path, table[:, 1:].reshape(len(rows), len(header.names), 3))
+    read = MarkerMotion(header.names, times, positions * MM_PER_UNIT[header.unit], header.unit, header.rate)
+    motion = turned_up(path, read, up, usual="y")
+    motion = replace(motion, notes=(*zeros, *motion.notes))
     check_reach(path, motion, TruthError)
     return motion
+
+
+def without_zeros(path: Path, positions: Array) -> tuple[Array, tuple[str, ...]]:
+    """(F, M, 3) with NaN for three exact zeros, which is how Vicon, Motive and many converters write a marker that was
+    not seen; and a note of how many there were.
+    """
+    unseen = np.asarray((positions == 0.0).all(axis=2))
+    if not unseen.any():
+        return positions, ()
+    note = f"'{path.name}' has 0 0 0 for a marker {int(unseen.sum())} times: taken for missing."
+    return np.where(unseen[..., None], np.nan, positions), (note,)
 
 
 def check_reach(path: Path, motion: MarkerMotion, wrong: type[StudioError]) -> None:
@@ -140,18 +158,23 @@ def _header(path: Path, lines: list[str]) -> _Header:
     while names and not names[-1]:
         names.pop()
     declared = int(_header_number(path, fields, "NumMarkers"))
-    if len(names) != declared or not names or not all(names) or len(set(names)) != len(names):
+    twice = sorted({name for name in names if name and names.count(name) > 1})
+    if twice:
         raise TruthError(
-            f"'{path.name}' line 4 names {len(set(filter(None, names)))} markers and line 3 says {declared}.",
+            f"'{path.name}' line 4 names marker '{twice[0]}' twice.", "Give each marker its own name."
+        )
+    if len(names) != declared or not names or not all(names):
+        raise TruthError(
+            f"'{path.name}' line 4 names {len(list(filter(None, names)))} markers and line 3 says {declared}.",
             "Give each marker its own name, one for every three columns.",
         )
     return _Header(tuple(names), unit, rate, int(_header_number(path, fields, "NumFrames")))
 
 
 def number_or_nan(text: str) -> float:
-    """A number as a file writes it, NaN where it is none."""
+    """A number as a file writes it, with a decimal point or comma; NaN where it is none."""
     try:
-        return float(text)
+        return float(text.replace(",", ".") if "," in text and "." not in text else text)
     except ValueError:
         return math.nan
 
@@ -178,7 +201,9 @@ def _row(path: Path, number: int, line: str, names: tuple[str, ...]) -> list[flo
         )
     labels = ["Time", *(f"{name} {axis}" for name in names for axis in "XYZ")]
     values = [
-        math.nan if not cell and column > FIRST_COLUMNS else _cell(path, number, column, labels, cell)
+        math.nan
+        if cell.lower() in MISSING and column > FIRST_COLUMNS
+        else _cell(path, number, column, labels, cell)
         for column, cell in enumerate(cells[1:], 2)
     ]
     for index, name in enumerate(names):
@@ -196,6 +221,8 @@ def _cell(path: Path, number: int, column: int, labels: list[str], text: str) ->
     if not math.isfinite(value):
         raise TruthError(
             f"'{path.name}' line {number}, column {column} ({labels[column - 2]}) is '{text}', not a number.",
-            "Leave the three cells of a missing marker blank, or export the file without gaps.",
+            "Correct the time."
+            if column == FIRST_COLUMNS
+            else "Leave the three cells of a missing marker blank.",
         )
     return value

@@ -96,6 +96,7 @@ def learn(
         tested = None
         if tests:
             tested = read_sources(tests, tree, asf, fps=fps, workspace=workspace, progress=report)
+    say(progress, [note for one in (*read, *(tested or ())) for note in one.notes])
     say(progress, [_misfits(one) for one in (*read, *(tested or ())) if one.bad_frames])
     with reporting(progress, "Learning") as report:
         model, learnt = learn_from(read, tree, learning, material, tested, seed=seed, progress=report)

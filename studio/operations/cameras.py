@@ -10,6 +10,7 @@ from pydantic import Field
 from studio.calibration.board_pdf import PAGES, usual_board, write_board_pdf
 from studio.calibration.boards import Board, board_from_text
 from studio.calibration.findings import Finding
+from studio.calibration.floor import read_clicks
 from studio.calibration.verbs import Calibrated
 from studio.declaring import Target, Terminal, Web, operation
 from studio.errors import SettingsError
@@ -17,12 +18,14 @@ from studio.geometry.camera import Camera
 from studio.operations.opening import SessionName, open_session
 from studio.operations.progress import Reporting, reporting, say
 from studio.runs.aligning import SessionAlignment, align_cameras
+from studio.runs.levelling import level_by_clicks, level_by_run, level_by_silhouettes, use_level_world
 from studio.runs.turned_cameras import alignment_words, remember_alignment, turn_back, turn_cameras
 from studio.sessions.board_calibration import keep_boards, place_of_boards, solve_boards
 from studio.sessions.session import Session
 
 SPELLING = (
-    "charuco:5x7,40,30 (squares, square mm, marker mm[, dictionary]) or chessboard:4x7,60 (inner corners)."
+    "charuco:5x7,40,30 (squares, square mm, marker mm[, dictionary][, legacy])"
+    " or chessboard:4x7,60 (inner corners)."
 )
 Frames = Annotated[Sequence[int], Field(max_length=64)]
 
@@ -240,6 +243,62 @@ def unalign(session: SessionName, *, progress: Reporting = None) -> Session:
     change = turn_back(open_session(session))
     say(progress, change.notes)
     return change.session
+
+
+@dataclass(frozen=True, slots=True)
+class Levelled:
+    """A session's world after it was levelled. tilted : degrees that it was off the vertical. lowered : mm that its
+    origin lay above the floor. how : by what. changed : whether the session uses it now. notes : what that means.
+    """
+
+    session: Session
+    tilted: float
+    lowered: float
+    how: str
+    changed: bool
+    notes: tuple[str, ...] = ()
+
+
+@operation
+def level(
+    session: SessionName,
+    *,
+    clicks: Annotated[
+        str | Path | None,
+        Field(description="A .json of clicked floor points, as of calibrate --floor."),
+        Terminal(kind=Path),
+    ] = None,
+    run: Annotated[
+        str,
+        Field(max_length=100, description="A run of the session: its feet show the floor."),
+        Terminal(metavar="RUN"),
+    ] = "",
+    keep: Annotated[
+        bool, Field(description="Let the session use the levelled world."), Terminal("--keep/--dry-run")
+    ] = True,
+    progress: Reporting = None,
+) -> Levelled:
+    """Turn a session's world to the vertical, and put z = 0 on the floor.
+
+    For calibrations whose world is a camera's frame (aniposelib, FreeMoCap) or a guess. By clicked points of the
+    floor, by a run's feet, or by the silhouettes (some centimetres off); the last two take the vertical from the
+    cameras, which stand level. The calibration before is kept.
+
+    Raises CalibrationError where nothing shows the vertical or the floor.
+    """
+    opened = open_session(session)
+    if clicks is not None:
+        found = level_by_clicks(opened, read_clicks(Path(clicks)))
+    elif run:
+        found = level_by_run(opened, opened.run(run))
+    else:
+        with reporting(progress, f"{opened.name}: floor") as report:
+            found = level_by_silhouettes(opened, progress=report)
+    if not keep:
+        return Levelled(opened, found.tilted, found.lowered, found.how, changed=False)
+    change = use_level_world(opened, found)
+    say(progress, change.notes)
+    return Levelled(change.session, found.tilted, found.lowered, found.how, changed=True, notes=change.notes)
 
 
 def _path(given: str | Path | None) -> Path | None:

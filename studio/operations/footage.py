@@ -19,7 +19,13 @@ from studio.jobs.stream_recording import RecordingStanding, StreamRecording, rec
 from studio.operations.opening import SessionName, open_session
 from studio.operations.progress import Reporting, reporting, say
 from studio.progress import Progress
-from studio.sessions.footage_changes import FootageChange, change_footage, recorded_offsets, synchrony_of
+from studio.sessions.footage_changes import (
+    FootageChange,
+    change_footage,
+    pair_by_time,
+    recorded_offsets,
+    synchrony_of,
+)
 from studio.sessions.importers.importing import (
     ImportOptions,
     ImportReport,
@@ -155,6 +161,10 @@ def synchronise(
         Field(description="A recorder's times of the frames (timestamps.csv), instead of an estimate."),
         Terminal(kind=Path),
     ] = None,
+    by_time: Annotated[
+        bool,
+        Field(description="Pair frames by their times, not by number: drift, lost frames. Written at once."),
+    ] = False,
     within: Annotated[
         float, Field(gt=0, le=600, description="Largest offset that is looked for, seconds.")
     ] = MOST_SECONDS,
@@ -176,6 +186,11 @@ def synchronise(
                 "Leave out --apply and --timestamps.",
             )
         change = change_footage(opened, offsets, rotations)
+        return Synchronised(change.session, None, change)
+    if by_time:
+        place = Path(timestamps) if timestamps is not None else None
+        with reporting(progress, "Reading times") as report:
+            change = pair_by_time(opened, place, report)
         return Synchronised(change.session, None, change)
     if timestamps is not None:
         found = recorded_offsets(opened, Path(timestamps))

@@ -13,7 +13,7 @@ from studio.calibration.carried_points import carried
 from studio.capture.calibration_files import read_calibration
 from studio.declaring import Knobs, Terminal, Values, operation
 from studio.errors import TruthError
-from studio.evaluation.errors import RIGID, SIMILARITY, UNALIGNED, Evaluation
+from studio.evaluation.errors import RIGID, SIMILARITY, UNALIGNED, Evaluation, lost_mm, meant_axes
 from studio.evaluation.errors import evaluate as evaluate_poses
 from studio.export.exporting import ExportReport
 from studio.export.exporting import export_run as write_run
@@ -29,7 +29,7 @@ from studio.runs.checking import EVERY, RunCheck, check_run
 from studio.runs.refining import REFINED, SMOOTHED, MadeTrack, refine_run, smooth_run
 from studio.runs.tracks import BEST, Track, best_track, track_names
 from studio.runs.tracks import read_track as read_stored_track
-from studio.runs.verifying import Repair, Verification, repair
+from studio.runs.verifying import Repair, Verification, remove_left_behind, repair
 from studio.runs.verifying import verify as verify_session
 from studio.trackers.refinement import RefinementSettings
 from studio.trackers.smoothing import SmoothingSettings
@@ -152,6 +152,12 @@ def evaluate(
         ),
         Terminal(kind=Path),
     ] = None,
+    truth_up: Annotated[
+        Literal["", "x", "y", "z", "-x", "-y", "-z"],
+        Field(
+            description="The axis of a TRC that points up; default: as its heads and feet show it, else y."
+        ),
+    ] = "",
     align: Annotated[
         Literal["", "none", "rigid", "similarity"],
         Field(
@@ -178,7 +184,8 @@ def evaluate(
         track = best.name
         say(progress, [best.note] if best.note else [])
     chosen = read_stored_track(stored, track)
-    motion = read_truth(path, stored.record.fps)
+    motion = read_truth(path, stored.record.fps, opened.manifest.frame_count, truth_up)
+    say(progress, motion.notes)
     if truth_cameras is not None:
         theirs = read_calibration(Path(truth_cameras)).cameras
         positions, missed = carried(motion.positions, theirs, stored.cameras())
@@ -189,9 +196,13 @@ def evaluate(
         )
     elif not align and path.suffix.lower() in ANY_WORLD:
         align = RIGID if motion.unit else SIMILARITY
-    return evaluate_poses(
+    found = evaluate_poses(
         chosen.poses, chosen.frames, stored.body(), motion, stored.record.fps, align or UNALIGNED
     )
+    if found.alignment == UNALIGNED and found.mean_mm > lost_mm(stored.body()):
+        meant = meant_axes(chosen.poses, chosen.frames, stored.body(), motion, stored.record.fps)
+        say(progress, [meant.replace("FILE", f"'{path.name}'")] if meant else [])
+    return found
 
 
 @operation
@@ -241,7 +252,10 @@ def verify(
     *,
     mend: Annotated[
         bool,
-        Field(description="Track damaged frames again, bit for bit where nothing else has changed."),
+        Field(
+            description="Track damaged frames again, bit for bit where nothing else has changed, and remove what broken"
+            " off work left behind."
+        ),
         Terminal("--repair"),
     ] = False,
     progress: Reporting = None,
@@ -257,5 +271,9 @@ def verify(
         if mend and any(fault.run for fault in found.faults):
             repaired = repair(opened, found.faults, report)
             found = verify_session(opened, report)
+        if mend and found.left:
+            remove_left_behind(opened)
     say(progress, [f"damaged: {fault.place}: {fault.what}. {fault.remedy}" for fault in found.faults])
+    done = "removed" if mend else "to be removed by --repair"
+    say(progress, [f"left behind by something that was broken off, {done}: {place}" for place in found.left])
     return Verified(found, repaired)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from studio.arrays import Bytes
 from studio.body.scale import scale_of
 from studio.calibration.findings import Finding, blocking
-from studio.errors import RunError
+from studio.errors import FootageError, RunError, StudioError
 from studio.evidence.masks import PackedMasks, reduced
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
@@ -24,7 +24,7 @@ from studio.progress import Progress, unheard
 from studio.runs.session_settings import masks_of, session_settings
 from studio.runs.silhouette_doubts import MEASURED, height_of, person_alone, silhouette_doubts
 from studio.runs.subject_masks import count_subjects
-from studio.sessions.provenance import note
+from studio.sessions.provenance import changed_inputs, note, origin_of
 from studio.sessions.session import Session
 from studio.volume.hull import Hull
 from studio.volume.hull_pieces import chosen_voxels, piece_numbers
@@ -46,6 +46,8 @@ JUDGED_SIDE = 480
 """Least shorter side (pixels) of the compared masks: a voxel of the fine hull is wider than one of their pixels."""
 USABLE = 0.9
 """Agreement from which masks are usable (issue 5)."""
+MOST_FILLED = 0.5
+"""Masks that cover more of the picture agree in every view and show nothing."""
 BLAMED = 0.05
 """Share of the other masks that one camera may remove before it is named."""
 
@@ -56,7 +58,7 @@ class ViewQuality:
 
     covered : share of the mask that the hull's silhouette covers. inside : share of the silhouette that lies in the
     mask. denied : share of the other cameras' masks that only this camera's mask removes from the hull. frames :
-    (covered, inside) of each frame; NaN where there is nothing.
+    (covered, inside) of each frame; NaN where there is nothing. filled : share of the picture that the masks cover.
     """
 
     camera: str
@@ -64,6 +66,7 @@ class ViewQuality:
     inside: float
     denied: float
     frames: tuple[tuple[float, float], ...]
+    filled: float = 0.0
 
     @property
     def agreement(self) -> float:
@@ -73,13 +76,16 @@ class ViewQuality:
     @property
     def usable(self) -> bool:
         """Whether the masks agree well enough with the other views."""
-        return self.agreement >= USABLE
+        return self.agreement >= USABLE and self.filled <= MOST_FILLED
 
     def in_words(self) -> str:
         """What the user should check, "" if the masks are good."""
         if np.isnan(self.agreement):
             return "The mask, or the hull that all views allow, is empty: check the masks of all cameras."
         sentences: list[str] = []
+        if self.filled > MOST_FILLED:
+            share = f"{100.0 * self.filled:.0f} %"
+            sentences.append(f"The mask covers {share} of the picture: is it inverted, or of no person?")
         if self.denied > BLAMED:
             share = f"{100.0 * self.denied:.0f} %"
             sentences.append(f"The mask has holes: it alone removes {share} of what the other cameras see.")
@@ -129,6 +135,10 @@ class MaskQuality:
         if self.subjects > 1:
             return f"{self.subjects} subjects are in view: say which of them the masks shall be of"
         least = min(float(np.nan_to_num(view.agreement)) for view in self.views)
+        fullest = max(self.views, key=lambda view: view.filled)
+        if fullest.filled > MOST_FILLED:
+            share = f"{100.0 * fullest.filled:.0f} %"
+            return f"the masks of camera {fullest.camera} cover {share} of the picture: are they inverted?"
         if self.usable:
             return f"every view agrees by {least:.2f} or more"
         # Rounded down: what is below the mark never reads like it.
@@ -160,6 +170,10 @@ def mask_quality(
     scale = scale_of(session.body())
     with masks_of(session, settings) as maker:
         chosen = tuple(frames) or spread_frames(maker.footage.frame_count, FRAMES)
+        if not chosen:
+            raise FootageError(
+                f"Session '{session.name}' has no frame whose masks could be measured.", "Add footage."
+            )
         masks: dict[int, list[Bytes]] = {frame: [] for frame in chosen}
         people = {frame: PackedMasks() for frame in chosen}
         total = (len(cameras) + 1) * len(masks)
@@ -195,6 +209,24 @@ def measure_masks(session: Session, frames: Sequence[int] = (), progress: Progre
     return found
 
 
+def look_before_the_first_run(session: Session, progress: Progress = unheard) -> None:
+    """Measure the masks of imported footage that nothing was tracked of, unless that was done: exchanged cameras, a
+    mirrored video or a wrong unit refuse the run then, instead of losing its frames. Masks that cannot be compared say
+    nothing.
+    """
+    measured = origin_of(session, MEASURED)
+    known = measured is not None and not changed_inputs(session, MEASURED, ("footage", "calibration"))
+    if known or not session.manifest.layout or len(session.manifest.footage.cameras) < 2 or session.runs():
+        return
+    try:
+        found = mask_quality(session, session_settings(session).evidence, progress=progress)
+    except StudioError:
+        return
+    stops = tuple(str(finding) for finding in blocking(found.doubts))
+    if stops:
+        note(session, MEASURED, found.in_words(), found.usable, stops)
+
+
 def spread_frames(count: int, wanted: int) -> tuple[int, ...]:
     """Up to `wanted` frames in the middle of as many equal parts of the footage."""
     parts = min(count, wanted)
@@ -203,13 +235,16 @@ def spread_frames(count: int, wanted: int) -> tuple[int, ...]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameCounts:
-    """Pixels of one frame, (V,) each: of mask, silhouette, both; denied[v]: of the other masks, removed only by v."""
+    """Pixels of one frame, (V,) each: of mask, silhouette, both; denied[v]: of the other masks, removed only by v.
+    pixels : of the picture.
+    """
 
     mask: NDArray[np.int64]
     hull: NDArray[np.int64]
     both: NDArray[np.int64]
     denied: NDArray[np.int64]
     litres: float
+    pixels: NDArray[np.int64] | None = None
 
 
 def count_frame(
@@ -233,7 +268,8 @@ def count_frame(
     if blame and len(cameras) > 2 and box is not None:
         denied = denied_pixels(masks, cameras, Reconstructor(cameras, box, ROUGH))
     hull = np.array([np.count_nonzero(cover) for cover in covers])
-    return FrameCounts(mask, hull, both, denied, 0.0 if whole is None else whole.volume() * 1e-6)
+    pixels = np.array([one.size for one in masks])
+    return FrameCounts(mask, hull, both, denied, 0.0 if whole is None else whole.volume() * 1e-6, pixels)
 
 
 def denied_pixels(
@@ -292,6 +328,7 @@ def summed(frames: tuple[int, ...], names: tuple[str, ...], counted: Sequence[Fr
     both, denied = np.stack([one.both for one in counted]), np.stack([one.denied for one in counted])
     covered, inside = _share(both, mask), _share(both, hull)
     everything = mask.sum()
+    pixels = np.sum([one.mask * 0 if one.pixels is None else one.pixels for one in counted], axis=0)
     views = tuple(
         ViewQuality(
             camera=name,
@@ -299,6 +336,7 @@ def summed(frames: tuple[int, ...], names: tuple[str, ...], counted: Sequence[Fr
             inside=float(_share(both[:, v].sum(), hull[:, v].sum())),
             denied=float(_share(denied[:, v].sum(), everything - mask[:, v].sum())),
             frames=tuple((float(c), float(i)) for c, i in zip(covered[:, v], inside[:, v], strict=True)),
+            filled=float(np.nan_to_num(_share(mask[:, v].sum(), pixels[v]))),
         )
         for v, name in enumerate(names)
     )

@@ -39,6 +39,7 @@ from studio.progress import Progress, unheard
 from studio.runs.behaviour_models import chosen_model
 from studio.runs.initialising import InitialPose, initialise
 from studio.runs.live_request import check_live, live_changes
+from studio.runs.mask_quality import look_before_the_first_run
 from studio.runs.search_space import parameter_names, session_sigma
 from studio.runs.session_settings import session_settings
 from studio.runs.shape_on_the_way import session_shape
@@ -153,6 +154,7 @@ def prepare_run(
 
     Raises StudioError; then nothing was made.
     """
+    look_before_the_first_run(session, progress)
     doubts = accepted_doubts(session, allow_inconsistent)
     tracker = tracker or session.manifest.tracker or DEFAULT_TRACKER
     weighting = weighting or session.manifest.weighting or DEFAULT_WEIGHTING

@@ -202,9 +202,7 @@ class ViewComposer:
     def _truth_lines(self, camera: Camera, frame: int) -> Array:
         if self._truth is None:
             return NO_MARKS.truth
-        rows: Indices = np.round(
-            (self._truth.times - float(self._truth.times[0])) * self._footage.fps
-        ).astype(np.int64)
+        rows: Indices = np.round(self._truth.times * self._footage.fps).astype(np.int64)
         place = int(np.searchsorted(rows, frame))
         links = marker_links(self.body, self._truth.names)
         if place >= len(rows) or rows[place] != frame or not links:

@@ -13,7 +13,7 @@ from studio.errors import RunError, TruthError
 from studio.geometry.reach import within_reach
 from studio.motion_files.trc import read_trc
 from studio.runs.search_space import parameter_names
-from studio.sessions.named_rows import pose_frame, read_pose, write_pose
+from studio.sessions.named_rows import check_radians, pose_frame, read_pose, write_pose
 from studio.sessions.names import free_name
 from studio.sessions.provenance import note
 from studio.sessions.session import START_POSE_NAME, Session
@@ -61,7 +61,7 @@ def start_pose_from_file(path: Path, body: BodyModel, frame: int, fps: float) ->
     """The pose (D,), radians and mm, that a file gives for a frame, and its origin as text.
 
     A CSV has one row, its header the body's parameters. Of a TRC the row whose `Time` × fps is the frame is
-    taken (its first row is frame 0) and the body is fitted to the markers that both have. Raises RunError,
+    taken and the body is fitted to the markers that both have. Raises RunError,
     BodyError, TruthError naming the file.
     """
     if not path.is_file():
@@ -69,9 +69,11 @@ def start_pose_from_file(path: Path, body: BodyModel, frame: int, fps: float) ->
             f"There is no start pose file '{path}'.", "Give a CSV with one row of parameters, or a TRC."
         )
     if path.suffix.lower() != ".trc":
-        return read_pose(path, parameter_names(body), frame), f"file {path.name}"
+        pose = read_pose(path, parameter_names(body), frame)
+        check_radians(path, body, pose)
+        return pose, f"file {path.name}"
     motion = read_trc(path)
-    rows = np.rint((motion.times - motion.times[0]) * fps).astype(int)
+    rows = np.rint(motion.times * fps).astype(int)
     found = np.flatnonzero(rows == frame)
     if not found.size:
         raise TruthError(

@@ -9,11 +9,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
+import numpy as np
+
 from studio.body.forward_kinematics import limb_ends
+from studio.calibration.checks import check_calibration
+from studio.calibration.rig_checks import NO_FLOOR, TILTED, UNIT, room_findings
 from studio.errors import StudioError
 from studio.foreign_files import read_file
 from studio.runs.background_setup import MODEL_OF
 from studio.runs.checking import kept_check
+from studio.runs.levelling import floor_was_set
 from studio.runs.silhouette_doubts import standing_doubts
 from studio.runs.tracks import best_track
 from studio.runs.turned_cameras import misses_in_words
@@ -101,6 +106,11 @@ def calibration_step(session: Session) -> StepStatus:
             words,
             f"The footage of camera {enumerated(other)} is of another size now.",
         )
+    asked = (UNIT,) if floor_was_set(session) else (UNIT, TILTED, NO_FLOOR)
+    findings = (*check_calibration(cameras), *room_findings(cameras, _size_mm(session)))
+    if tilted := [finding for finding in findings if finding.code in asked]:
+        why = " ".join([*(finding.message for finding in tilted), tilted[0].remedy])
+        return StepStatus("calibration", "stale", words, why)
     if doubts := standing_doubts(session):
         return StepStatus("calibration", "stale", words, f"The footage contradicts it: {doubts[0]}")
     return StepStatus(
@@ -150,6 +160,15 @@ def _standing_mm(session: Session) -> float:
     """The standing height of the session's body."""
     body = session.body()
     return float(limb_ends(body, body.neutral)[0, ..., 2].max())
+
+
+def _size_mm(session: Session) -> float:
+    """The longest extent of the session's body, 0 where that cannot be read."""
+    try:
+        body = session.body()
+    except StudioError:
+        return 0.0
+    return float(np.ptp(limb_ends(body, body.neutral)[0].reshape(-1, 3), axis=0).max())
 
 
 def subject_step(session: Session) -> StepStatus:

@@ -535,7 +535,10 @@ class SceneController:
         if model.options.shadows != self._has_shadows:
             self._has_shadows = model.options.shadows
             light(self._server, self._has_shadows)
-        self.panel.show(model, moment, tokens)
+        if self.bare:
+            self.panel.hide()
+        else:
+            self.panel.show(model, moment, tokens)
         if self.views is not None and moment is not None:
             self.views.show(model, moment, tokens)
         if self.handles is not None and model.edit is not None:

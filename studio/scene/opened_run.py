@@ -157,7 +157,7 @@ class OpenedRun:
         """
         if self.truth is None:
             return None
-        rows: Indices = np.round((self.truth.times - float(self.truth.times[0])) * self.fps).astype(np.int64)
+        rows: Indices = np.round(self.truth.times * self.fps).astype(np.int64)
         place = int(np.searchsorted(rows, frame))
         return self.truth.positions[place] if place < len(rows) and rows[place] == frame else None
 

@@ -167,8 +167,9 @@ def _entries(archive: Path) -> Generator[Iterator[_Entry]]:
 
 def _zip_entry(packed: zipfile.ZipFile, info: zipfile.ZipInfo) -> _Entry:
     return _Entry(
-        info.filename.rstrip("/"),
-        info.is_dir(),
+        # Some Windows programs write folders with backslashes, against the format.
+        (info.filename if "/" in info.filename else info.filename.replace("\\", "/")).rstrip("/"),
+        info.is_dir() or info.filename.endswith("\\"),
         info.external_attr >> 16,
         bool(info.flag_bits & 1),
         info.file_size,

@@ -164,15 +164,22 @@ class MadeMasks:
             with atomic_files.writing("The masks in", folder):
                 (folder / self._places[name]).mkdir()
             # Masks are counted as the file's frames are, of which the session's first is not the first.
-            for before in range(-source.offset, 0):
-                self.put(name, before, np.zeros((source.height, source.width), np.uint8))
+            frames = range(session.manifest.frame_count)
+            used = {source.file_frame(frame) for frame in frames} if source.steps else set(frames)
+            last = max(used, default=0) if source.steps else source.offset - 1
+            blank = np.zeros((source.height, source.width), np.uint8)
+            for number in range(last + 1):
+                if not source.steps or number not in used:
+                    self._write(name, f"{number:06d}.png", blank)
 
     def put(self, camera: str, frame: int, mask: Bytes) -> None:
         """Write a mask (H, W), 0 or 255, of a frame of the session, as the camera's file shows it: not turned."""
-        source = self._sources[camera]
+        self._write(camera, mask_name(self._sources[camera], frame), mask)
+
+    def _write(self, camera: str, name: str, mask: Bytes) -> None:
         with atomic_files.writing("The masks in", self.folder):
-            stored = turned_picture(mask, -source.turned % 360)
-            self._path(camera, frame).write_bytes(png_of(stored))
+            stored = turned_picture(mask, -self._sources[camera].turned % 360)
+            (self.folder / self._places[camera] / name).write_bytes(png_of(stored))
 
     def take_over(self, camera: str, frame: int, stored: Path) -> None:
         """Put a mask that lies in the session as this would write it."""
@@ -194,7 +201,7 @@ class MadeMasks:
 
 def mask_name(source: CameraSource, frame: int) -> str:
     """The file of a camera's mask of a frame of the session, counted as its footage's file is."""
-    return f"{source.offset + frame:06d}.png"
+    return f"{source.file_frame(frame):06d}.png"
 
 
 def made_folders(session: Session, home: str) -> list[Path]:

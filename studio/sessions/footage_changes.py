@@ -11,16 +11,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import msgspec
+import numpy as np
 
+from studio.arrays import Array
 from studio.capture.footage import camera_reader
 from studio.capture.footage_source import CameraSource, FootageSource
+from studio.capture.frame_pairing import paired_by_time
 from studio.capture.naming import listed, match_names
 from studio.capture.pictures import list_pictures
 from studio.capture.synchrony import MOST_SECONDS, Synchrony, estimate_synchrony
 from studio.capture.timestamps import TimedOffsets, offsets_from_times, read_timestamps
-from studio.capture.video import probe_video
+from studio.capture.video import measure_video, probe_video
 from studio.errors import FootageError, SessionError
-from studio.progress import Progress
+from studio.progress import Progress, unheard
 from studio.sessions.background_files import (
     MASKS_GONE,
     forget_unused_masks,
@@ -59,7 +62,43 @@ def change_footage(
     if not session.has_footage:
         raise SessionError(f"Session '{session.name}' has no footage yet.", "Add it first.")
     before = session.manifest.footage
-    after = _changed(session, before, dict(offsets or {}), dict(rotations or {}))
+    return _used(session, before, _changed(session, before, dict(offsets or {}), dict(rotations or {})))
+
+
+def pair_by_time(
+    session: Session, timestamps: Path | None = None, progress: Progress = unheard
+) -> FootageChange:
+    """Pair a session's frames by their times from its frame 0 on: a recorder's, else those of its videos.
+
+    Raises FootageError where there are none, masks are too few, SessionError while a run is being tracked.
+    """
+    session.check_idle()
+    before = session.manifest.footage
+    recorded = {} if timestamps is None else _recorded_times(session, timestamps)
+    times: dict[str, Array] = {}
+    for camera in before.cameras:
+        own = recorded.get(camera.name)
+        place = session.path / camera.path
+        if own is None and camera.kind == "video":
+
+            def report(done: int, total: int, name: str = camera.name) -> None:
+                progress(f"times of {name}", done, total)
+
+            own = measure_video(place, report).times
+        if own is None or len(own) < 2:
+            own = np.arange(camera.frame_count) / before.fps
+        times[camera.name] = own[camera.offset : camera.frame_count]
+    steps, count = paired_by_time(times, before.fps)
+    cameras = tuple(dataclasses.replace(camera, steps=steps[camera.name]) for camera in before.cameras)
+    if any(camera.steps != old.steps for camera, old in zip(cameras, before.cameras, strict=True)):
+        cameras = without_made_masks(session, cameras)
+    for camera in cameras:
+        _check_mask_count(session, camera, camera.file_frame(count - 1) + 1)
+    return _used(session, before, dataclasses.replace(before, cameras=cameras, frame_count=count))
+
+
+def _used(session: Session, before: FootageSource, after: FootageSource) -> FootageChange:
+    """Make a description the session's."""
     if after == before:
         return FootageChange(session, ("Nothing changes.",), stale_runs(session))
     adopt(session)
@@ -98,6 +137,11 @@ def synchrony_of(
 
 def recorded_offsets(session: Session, path: Path) -> TimedOffsets:
     """Offsets of a session's cameras by a recorder's times; changes nothing. Raises FootageError."""
+    return offsets_from_times(_recorded_times(session, path))
+
+
+def _recorded_times(session: Session, path: Path) -> dict[str, Array]:
+    """Seconds of all cameras' frames by a recorder. Raises FootageError where a camera has none."""
     times = read_timestamps(path)
     names = [camera.name for camera in session.manifest.footage.cameras]
     matches = match_names(list(times), names, f"cameras of {path.name}", FootageError)
@@ -106,7 +150,7 @@ def recorded_offsets(session: Session, path: Path) -> TimedOffsets:
             f"'{path.name}' has times of {len(matches)} of the {len(names)} cameras.",
             "Give the offsets by hand.",
         )
-    return offsets_from_times({match.camera: times[match.footage] for match in matches})
+    return {match.camera: times[match.footage] for match in matches}
 
 
 def _changed(
@@ -128,7 +172,10 @@ def _changed(
         for camera in source.cameras
     )
     if any(camera.offset != old.offset for camera, old in zip(cameras, source.cameras, strict=True)):
-        cameras = without_made_masks(session, cameras)
+        # What is paired by time counts from the frame 0 of before.
+        cameras = tuple(
+            dataclasses.replace(camera, steps=()) for camera in without_made_masks(session, cameras)
+        )
     count = min(camera.last for camera in cameras)
     if count < 1:
         words = ", ".join(
@@ -138,13 +185,18 @@ def _changed(
             f"With these offsets no frame is left that all cameras have ({words}).", "Correct them."
         )
     for camera in cameras:
-        there = _masks_of(session, camera)
-        if 0 < there < camera.offset + count:
-            raise FootageError(
-                f"Camera {camera.name} has {there} masks, and with these offsets {camera.offset + count} are needed.",
-                "Import the session again with masks of all frames, or without masks.",
-            )
+        _check_mask_count(session, camera, camera.file_frame(count - 1) + 1)
     return dataclasses.replace(source, cameras=cameras, frame_count=count)
+
+
+def _check_mask_count(session: Session, camera: CameraSource, needed: int) -> None:
+    """Raises FootageError for a camera with fewer masks than that."""
+    there = _masks_of(session, camera)
+    if 0 < there < needed:
+        raise FootageError(
+            f"Camera {camera.name} has {there} masks, and with these offsets {needed} are needed.",
+            "Import the session again with masks of all frames, or without masks.",
+        )
 
 
 def _made_before(run: StoredRun, changed: datetime.datetime) -> bool:
@@ -182,7 +234,9 @@ def _consequences(
     session: Session, before: FootageSource, after: FootageSource, stale: tuple[str, ...]
 ) -> list[str]:
     notes = [f"{after.frame_count} frames are in all cameras (there were {before.frame_count})."]
-    moved = any(a.offset != b.offset for a, b in zip(before.cameras, after.cameras, strict=True))
+    moved = any(
+        (a.offset, a.steps) != (b.offset, b.steps) for a, b in zip(before.cameras, after.cameras, strict=True)
+    )
     if any(map(has_made_masks, before.cameras)) and not any(map(has_made_masks, after.cameras)):
         notes.append(MASKS_GONE)
     if (session.path / STROKES_NAME).exists():

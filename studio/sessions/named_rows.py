@@ -14,12 +14,16 @@ from pathlib import Path
 import numpy as np
 
 from studio.arrays import Array, Indices
+from studio.body.model import BodyModel
 from studio.errors import BodyError
-from studio.foreign_files import foreign_file, read_text
+from studio.foreign_files import foreign_file, read_foreign_text
 from studio.geometry.reach import REACH_HINT, within_reach
 from studio.sessions.atomic_files import write_text
 
 FRAME, FPS = "frame", "fps"
+SEPARATORS = (",", ";", "\t")
+MOST_TURNS = 2.0
+"""No start pose is turned further; degrees are."""
 
 
 def read_pose(path: Path, names: tuple[str, ...], frame: int | None = None) -> Array:
@@ -39,6 +43,16 @@ def read_pose(path: Path, names: tuple[str, ...], frame: int | None = None) -> A
         column = header.index(FRAME)
         row = next((found for found in rows if frame is not None and found[column] == frame), rows[0])
     return _ordered(path, header, row, names)
+
+
+def check_radians(path: Path, body: BodyModel, pose: Array) -> None:
+    """Raises BodyError for a file's pose (D,) whose angles can only be degrees."""
+    for entry, value in zip(body.parameters, pose, strict=True):
+        if entry.kind == "angle" and abs(value) > 2.0 * math.pi * MOST_TURNS:
+            raise BodyError(
+                f"'{path.name}' has {value:g} for '{entry.name}': angles are in radians, and these seem to be degrees.",
+                "Multiply the angles by π/180; lengths stay in mm.",
+            )
 
 
 def pose_frame(path: Path) -> int | None:
@@ -98,7 +112,10 @@ def as_csv(rows: Iterable[Iterable[object]]) -> str:
 def _read(path: Path) -> tuple[list[str], list[list[float]]]:
     """Header and rows of numbers; at least one row."""
     with foreign_file(path, BodyError, "a CSV file", "Save it as comma-separated text in UTF-8."):
-        lines = [line for line in csv.reader(read_text(path, encoding="utf-8-sig").splitlines()) if any(line)]
+        text = read_foreign_text(path).splitlines()
+        first = next((line for line in text if line.strip()), "")
+        separator = max(SEPARATORS, key=first.count)
+        lines = [line for line in csv.reader(text, delimiter=separator) if any(line)]
     header = [entry.strip() for entry in lines[0]] if lines else []
     if len(lines) < 2:
         raise BodyError(f"'{path.name}' has no row under its header.", "Give one row of numbers.")
@@ -115,7 +132,7 @@ def _read(path: Path) -> tuple[list[str], list[list[float]]]:
 
 def _number(path: Path, line: int, name: str, entry: str) -> float:
     try:
-        value = float(entry)
+        value = float(entry.replace(",", ".") if "." not in entry else entry)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):

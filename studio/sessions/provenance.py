@@ -106,6 +106,7 @@ def _footage_digest(session: Session) -> str:
     source = session.manifest.footage
     facts = [
         [camera.name, camera.path, camera.width, camera.height, camera.offset, camera.turned]
+        + ([camera.steps] if camera.steps else [])
         for camera in source.cameras
     ]
     return _digest(msgspec.json.encode([source.fps, facts]))

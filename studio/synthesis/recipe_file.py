@@ -12,6 +12,7 @@ import numpy as np
 import tomli_w
 
 from studio.errors import StudioError
+from studio.foreign_files import read_foreign_text
 from studio.geometry.camera import Camera
 from studio.synthesis.cameras import RIGS, placed_camera
 from studio.synthesis.damage import Damage
@@ -182,7 +183,7 @@ def read_recipe(path: Path) -> Recipe:
 
 def _entries(path: Path, chain: int) -> dict[str, Any]:
     """The entries of a file, with those of its `like` recipe. Raises StudioError for an endless chain."""
-    own = tomllib.loads(path.read_text(encoding="utf-8"))
+    own = tomllib.loads(read_foreign_text(path))
     base = own.pop(LIKE, None)
     if base is None:
         return own

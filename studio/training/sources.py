@@ -6,7 +6,7 @@ are fitted by the body in the size given by their distances; a run of the same b
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -57,7 +57,8 @@ class Recording:
     """Motion of a body.
 
     poses : (F, D) at `fps`. rms_mm : distance of the body's markers from the recorded ones over all frames; 0 for
-    unchanged poses. bad_frames : those that fit far worse than the rest (numbers at `fps`).
+    unchanged poses. bad_frames : those that fit far worse than the rest (numbers at `fps`). notes :
+    of the file's reader, sentences.
     """
 
     name: str
@@ -65,6 +66,7 @@ class Recording:
     poses: Array
     rms_mm: float = 0.0
     bad_frames: tuple[int, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def frame_count(self) -> int:
@@ -161,11 +163,11 @@ def _read_file(
     if ending in SKELETON_FILES:
         marker_names(body)
         recorded = read_recording(path, skeleton if ending == ".amc" else None)
-        return _from_recorded(recorded, body, path.stem, fps, progress)
+        return replace(_from_recorded(recorded, body, path.stem, fps, progress), notes=recorded.notes)
     if ending in POINT_FILES:
         marker_names(body)
         motion = read_c3d(path) if ending == ".c3d" else read_trc(path)
-        return _from_points(motion, body, path, fps, progress)
+        return replace(_from_points(motion, body, path, fps, progress), notes=motion.notes)
     raise StudioError(
         f"'{path.name}' is not a motion that can be read.",
         f"Give files ending in {', '.join(MOTION_FILES)}, a recipe, or a run as SESSION/RUN.",

@@ -1,5 +1,6 @@
 """From folders of rendered board footage to a calibration file, by the verb and by the command."""
 
+import dataclasses
 from pathlib import Path
 
 import cv2
@@ -9,7 +10,9 @@ import pytest
 from board_takes import BOARD, FLOOR_PLACE, render_takes, two_cameras
 from click.testing import CliRunner
 
-from studio.calibration.verbs import calibrate
+from studio.calibration.boards import Board
+from studio.calibration.detection import BoardFinder
+from studio.calibration.verbs import _other_spellings, calibrate
 from studio.capture.calibration_files import read_calibration
 from studio.cli.main import main
 from studio.errors import CalibrationError
@@ -170,3 +173,20 @@ def test_the_rigs_own_frame_is_kept_by_names(footage: Path) -> None:
     assert set(near) == {"cam1", "cam2"}
     fit = best_fit(np.array(list(centres.values())), np.array([CAMERAS[0].centre, CAMERAS[1].centre]))
     assert np.isfinite(transform(fit, boards)).all()
+
+
+def test_a_board_that_was_meant_otherwise_is_found_and_named(footage: Path) -> None:
+    given = dataclasses.replace(BOARD, columns=BOARD.rows, rows=BOARD.columns)
+    found = calibrate(given, intrinsics=footage / "intrinsics", names=("cam1", "cam2"))
+    named = {finding.code: finding for finding in found.findings}["board-pattern"]
+    assert "columns and rows exchanged" in named.message
+    assert BOARD.text in named.remedy
+    assert found.board == BOARD
+
+
+def test_boards_of_older_programs_are_tried() -> None:
+    board = Board("charuco", 6, 8, 60.0, 45.0)
+    assert dataclasses.replace(board, legacy=True) in _other_spellings(board)
+    picture = dataclasses.replace(board, legacy=True).opencv_board().generateImage((600, 800))
+    assert BoardFinder(board, mirrored_too=False).find(picture, "a", 0) is None
+    assert BoardFinder(_other_spellings(board)[0]).find(picture, "a", 0) is not None

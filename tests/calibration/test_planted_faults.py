@@ -10,7 +10,7 @@ from calibrated_scenes import CHARUCO, CHESS, person_masks, ring, seen, true_len
 from studio.calibration.board_checks import mirrored_cameras
 from studio.calibration.boards import Board, Sighting
 from studio.calibration.checks import Finding, check_calibration
-from studio.calibration.fault_hypotheses import inverted, rescaled, transposed
+from studio.calibration.fault_hypotheses import inverted, rescaled, transposed, upside_down
 from studio.calibration.silhouette_checks import Masks
 from studio.geometry.camera import Camera
 from studio.geometry.rotations import rotation_from_vector
@@ -150,6 +150,14 @@ def test_mirrored_video_while_calibrating_with_a_chessboard(board: Board) -> Non
     findings = mirrored_cameras(board, spoilt, lenses, names)
     assert code_of(findings) == "mirrored-video"
     assert findings[0].cameras == ("cam3",)
+
+
+@pytest.mark.parametrize("which", [0, 2])
+def test_a_half_turn_is_not_called_mirrored(which: int) -> None:
+    cameras = tuple(upside_down(camera) if number == which else camera for number, camera in enumerate(RIG))
+    findings = with_masks(cameras)
+    assert code_of(findings) == "turned-video"
+    assert f"--rotate {RIG[which].name}=180" in findings[0].remedy
 
 
 def test_half_resolution_by_the_size_of_the_footage() -> None:

@@ -6,7 +6,7 @@ import pytest
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
 from studio.errors import TruthError
-from studio.evaluation.errors import evaluate, limb_of_markers, rows_of_frames
+from studio.evaluation.errors import evaluate, limb_of_markers, meant_axes, rows_of_frames
 from studio.evaluation.report import in_words
 from studio.motion_files.trc import MarkerMotion
 
@@ -84,13 +84,26 @@ def test_one_marker_off_counts_by_its_share_and_loses_its_limb() -> None:
     assert found.lost_limbs == ("left arm",)
 
 
-def test_rows_are_matched_by_time_from_the_first_row() -> None:
+def test_rows_are_matched_by_their_times() -> None:
     poses, truth = moving()
     late = changed(truth, times=truth.times + 3.5)
-    assert rows_of_frames(late, 60.0) == {frame: frame for frame in range(FRAMES)}
-    found = evaluate(poses[3:5], np.array([3, 4]), load_body("human31"), late, 60.0)
+    assert rows_of_frames(late, 60.0) == {210 + frame: frame for frame in range(FRAMES)}
+    found = evaluate(poses[3:5], np.array([213, 214]), load_body("human31"), late, 60.0)
     assert found.mean_mm == pytest.approx(0.0, abs=1e-9)
-    assert found.frames == (3, 4)
+    assert found.frames == (213, 214)
+    with pytest.raises(TruthError, match="rows are frames 210 to 215"):
+        evaluate(poses[3:5], np.array([3, 4]), load_body("human31"), late, 60.0)
+
+
+@pytest.mark.parametrize(("turn", "unit"), [((2, 0, 1), 1.0), ((1, 2, 0), 1.0), ((0, 1, 2), 0.001)])
+def test_a_truth_of_other_axes_or_units_is_told_from_a_bad_run(turn: tuple[int, ...], unit: float) -> None:
+    poses, truth = moving()
+    other = changed(truth, positions=truth.positions[:, :, turn] * unit)
+    words = meant_axes(poses, np.arange(FRAMES), load_body("human31"), other, 60.0)
+    assert "others than the session's" in words
+    assert "0.0 mm" in words
+    assert ("--align similarity" if unit != 1.0 else "--align rigid") in words
+    assert not meant_axes(poses, np.arange(FRAMES), load_body("human31"), truth, 60.0)
     twice = rows_of_frames(changed(truth, times=truth.times / 2.0), 60.0)
     assert [twice[frame] for frame in (0, 1, 2)] == [0, 2, 4]
     half = rows_of_frames(changed(truth, times=truth.times * 2.0), 60.0)

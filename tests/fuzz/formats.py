@@ -20,7 +20,7 @@ from studio.body.subject import Subject, write_subject
 from studio.calibration.floor import clicked_floor, read_clicks
 from studio.capture.calibration_files import find_calibrations, read_calibration, read_intrinsics
 from studio.capture.camera_addresses import camera_address
-from studio.capture.pictures import check_picture, read_picture
+from studio.capture.pictures import check_picture, list_pictures, read_picture
 from studio.capture.stream_files import mend_recording
 from studio.capture.timestamps import offsets_from_times, read_timestamps
 from studio.capture.video import VideoReader, measure_video, probe_video
@@ -28,12 +28,14 @@ from studio.errors import StudioError
 from studio.motion_files.c3d import read_c3d
 from studio.motion_files.reading import read_recording
 from studio.motion_files.trc import read_trc
+from studio.motion_files.truth_files import read_truth
 from studio.runs.new_run import prepare_run
 from studio.runs.session_settings import session_settings
 from studio.runs.tracks import BEST, RAW, read_track, write_track
 from studio.runs.verifying import verify
 from studio.sessions.archives import unpack
 from studio.sessions.importers.bodytrack import read_numbers
+from studio.sessions.importers.mask_forms import form_of_masks
 from studio.sessions.live_recordings import read_sets
 from studio.sessions.named_rows import write_pose, write_sigma
 from studio.sessions.run_log import append_to_log, read_log
@@ -178,9 +180,10 @@ FORMATS: Mapping[str, Format] = {
     "acclaim": Format((_each(read_recording, "*.amc"),)),
     "bvh": Format((_each(read_recording),)),
     "humanoid-npz": Format((_each(read_recording),)),
-    "trc": Format((_each(read_trc),)),
+    "trc": Format((_each(read_trc), _each(lambda path: read_truth(path, 60.0, 2)))),
+    "points": Format((_each(lambda path: read_truth(path, 60.0, 2)),)),
     "c3d": Format((_each(read_c3d),)),
-    "png": Format(PICTURE),
+    "png": Format((*PICTURE, lambda folder: form_of_masks(folder, len(list_pictures(folder))))),
     "jpeg": Format(PICTURE),
     "bmp": Format(PICTURE),
     "tiff": Format(PICTURE),

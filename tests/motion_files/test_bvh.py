@@ -62,10 +62,10 @@ def test_a_small_tree_stands_where_scipy_puts_it(tmp_path: Path) -> None:
         (
             "CHANNELS 3 Yrotation Zrotation",
             "CHANNELS 3 Yposition Zrotation",
-            "joint 'Leg' has position channels",
+            "position channels of joint 'Leg' move it by up to 25",
         ),
         ("JOINT Leg", "JOINT Hips", "second joint 'Hips'"),
-        ("Frames: 2", "Frames: 3", "3 frames are announced, 2 follow"),
+        ("Frames: 2", "Frames: 30", "30 frames are announced, 2 follow"),
         ("Frame Time: .0083333", "Frame Time: 0", "line 18"),
         ("50 60 70", "50 60", "line 19: a frame has 8 numbers, the hierarchy 9 channels"),
         ("MOTION\n", "", "line 16"),

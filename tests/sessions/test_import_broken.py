@@ -113,7 +113,7 @@ def no_footage(source: Path) -> None:
         (wider_calibration, CalibrationError, "differs by 3.0%"),
         (turned_calibration, CalibrationError, "lies on its side"),
         (mirrored_rotation, CalibrationError, "mirrors the world"),
-        (nan_in_truth, TruthError, "column 3 (Hip X) is 'NaN'"),
+        (nan_in_truth, TruthError, "gives only part of marker Hip"),
         (unknown_body, BodyError, "centaur"),
         (body_with_a_missing_parent, BodyError, "nobody"),
         (misspelt_subject, BodyError, "heigth_mm"),

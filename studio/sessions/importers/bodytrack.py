@@ -17,7 +17,7 @@ from studio.body.catalogue import load_body
 from studio.body.subject import subject_from_shape
 from studio.capture.naming import natural_key
 from studio.errors import BodyError
-from studio.foreign_files import foreign_file, read_text
+from studio.foreign_files import foreign_file, read_foreign_text
 from studio.sessions.importers.folder_layout import choose_calibration
 from studio.sessions.importers.plan import SourcePlan
 
@@ -70,7 +70,7 @@ def read_numbers(path: Path, count: int | None = None) -> Array | None:
     if not path.is_file():
         return None
     with foreign_file(path, BodyError, "a list of numbers", "Copy the file again."):
-        values = np.array([float(word) for word in read_text(path).split()])
+        values = np.array([float(word) for word in read_foreign_text(path).split()])
     if not np.all(np.isfinite(values)) or (count is not None and len(values) != count):
         wanted = f"{count} finite numbers" if count is not None else "finite numbers"
         raise BodyError(

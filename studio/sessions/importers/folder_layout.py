@@ -23,7 +23,9 @@ Anything else is read as the studio's own layout (`folder_layout`). A folder abo
 """
 
 import re
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from studio.body.catalogue import body_files
@@ -46,6 +48,28 @@ OTHER_FOLDERS = frozenset(
 MASK_FOLDERS = ("masks", "mask", "mask-schp")
 CAMERA_IN_NAME = re.compile(r"[-_. ]*(?:camera|cam|view|port)[-_ ]*[0-9a-z]{1,4}(?=$|[-_. ])", re.IGNORECASE)
 CALISCOPE_ARRAY = "camera_array.toml"
+CAMERA_FOLDER = re.compile(r"(?:camera|cam|view|port|c)[-_ ]*[0-9a-z]{1,6}$", re.IGNORECASE)
+UNREADABLE = {
+    ".heic": "convert them to JPEG or PNG",
+    ".heif": "convert them to JPEG or PNG",
+    ".avif": "convert them to JPEG or PNG",
+    ".dng": "develop them to JPEG or PNG",
+    ".cr2": "develop them to JPEG or PNG",
+    ".nef": "develop them to JPEG or PNG",
+    ".arw": "develop them to JPEG or PNG",
+    ".gif": "convert them to PNG or a video",
+    ".insv": "export them as flat videos",
+    ".braw": "export them as H.264",
+    ".r3d": "export them as H.264",
+    ".mxf": "export them as H.264",
+    ".wmv": "convert them to H.264 in mp4",
+    ".flv": "convert them to H.264 in mp4",
+    ".3gp": "convert them to H.264 in mp4",
+    ".bag": "export the colour stream as a video",
+    ".svo": "export the left view as a video",
+    ".mkv.part": "the download is not complete",
+}
+DEEPEST_VIDEO = 4
 DEEPEST_TRIAL = 3
 MOST_FOLDERS = 2000
 
@@ -56,7 +80,7 @@ class Layout:
 
     title : of the layout. folder : of everything but the calibration. calibrations : folders
     to look for it, the first one that has any. footage : videos and picture folders, natural order. timestamps : a
-    recorder's times, None without.
+    recorder's times, None without. names : cameras of footage that its folder, not its file, is named after.
     """
 
     title: str
@@ -64,6 +88,7 @@ class Layout:
     footage: tuple[Path, ...]
     calibrations: tuple[Path, ...]
     timestamps: Path | None = None
+    names: Mapping[Path, str] = field(default_factory=dict[Path, str])
 
 
 def recognise(source: Path) -> Layout:
@@ -171,6 +196,72 @@ def calibration_folders(source: Path) -> tuple[Path, ...]:
     )
 
 
+def video_of_a_camera(folder: Path) -> Path | None:
+    """The only video of a folder that a camera's recordings lie in, however deep (a copied card, DANNCE's
+    `Camera1/0.mp4`, OpenCap's `Cam0/InputMedia/walk/walk_sync.mp4`); None where there is none or several.
+    """
+    level, found = [folder], list[Path]()
+    for _ in range(DEEPEST_VIDEO):
+        inside = [path for one in level for path in one.iterdir() if not path.name.startswith(".")]
+        found += [path for path in inside if path.suffix.lower() in VIDEO_SUFFIXES and path.is_file()]
+        level = [
+            path
+            for path in inside
+            if path.is_dir() and not path.is_symlink() and path.name.lower() not in OTHER_FOLDERS
+        ]
+        if len(found) > 1 or len(level) > MOST_FOLDERS:
+            return None
+    return found[0] if found else None
+
+
+def folders_of_cameras(source: Path) -> dict[str, Path]:
+    """Camera → its video, in folders of `source` (or of its folder of videos) that are named after cameras and hold one
+    video each; empty where fewer than two do, or one of them holds several.
+    """
+    places = [
+        path for path in source.iterdir() if path.is_dir() and path.name.lower() in ("videos", "videos-raw")
+    ]
+    for place in (*places, source):
+        folders = [
+            path
+            for path in place.iterdir()
+            if path.is_dir() and not path.is_symlink() and not path.name.startswith(".")
+            and path.name.lower() not in OTHER_FOLDERS and "calib" not in path.name.lower()
+            and path.name.lower() not in FOOTAGE_FOLDERS
+        ]  # fmt: skip
+        named = [path for path in folders if CAMERA_FOLDER.match(path.name)] or folders
+        found = {path.name: video for path in named if (video := video_of_a_camera(path)) is not None}
+        if len(found) > 1 and (len(found) == len(named)):
+            return {name: found[name] for name in sorted(found, key=natural_key)}
+    return {}
+
+
+def what_was_found(source: Path) -> str:
+    """What a folder without footage holds instead, a sentence; "" for nothing of note."""
+    kinds: Counter[str] = Counter()
+    videos: list[str] = []
+    broken: list[str] = []
+    for folder in (source, *_folders_below(source, DEEPEST_VIDEO)):
+        for path in folder.iterdir():
+            ending = path.suffix.lower()
+            if path.is_symlink() and not path.exists():
+                broken.append(path.relative_to(source).as_posix())
+            elif ending in VIDEO_SUFFIXES:
+                videos.append(path.relative_to(source).as_posix())
+            elif ending in UNREADABLE:
+                kinds[ending] += 1
+    sentences: list[str] = []
+    if kinds:
+        ending, count = kinds.most_common(1)[0]
+        sentences.append(f"It has {count} {ending} files, which are not read: {UNREADABLE[ending]}.")
+    if videos:
+        more = f" and {len(videos) - 4} more" if len(videos) > 4 else ""
+        sentences.append(f"Videos lie deeper: {', '.join(videos[:4])}{more}.")
+    if broken:
+        sentences.append(f"'{broken[0]}' is a link to a file that is not there.")
+    return " ".join(sentences)
+
+
 def _caliscope_takes(source: Path) -> list[Layout]:
     calibration = source / "calibration"
     places = (calibration / "extrinsic" / "capture_volume", calibration / "extrinsic", source, calibration)
@@ -256,6 +347,7 @@ def plan_folder(
         notes=(f"Taken for a {layout.title}: '{folder.name}'{above}, {calibration_note}.",),
         layout=layout.title,
         timestamps=layout.timestamps,
+        names=layout.names,
         offsets={camera.name: camera.offset for camera in kept if camera.offset},
         rotations={camera.name: camera.turned for camera in kept if camera.turned},
     )
@@ -278,16 +370,23 @@ def choose_calibration(source: Path, choice: Path | str | None) -> Path:
 def _chosen(source: Path, trial: str | None) -> tuple[Layout, tuple[Path, ...]]:
     """The trial to take and its footage. Raises FootageError."""
     layout = None if is_caliscope(source) else recognise(source)
+    if layout is not None and not layout.footage and not trials_of(source):
+        cameras = folders_of_cameras(source)
+        names = {video: name for name, video in cameras.items()}
+        layout = replace(layout, footage=tuple(cameras.values()), names=names)
+    _check_links(source, layout)
     if layout is None or not layout.footage:
         trials = trials_of(source)
         if not trials:
+            found = what_was_found(source)
             raise FootageError(
-                f"'{source.name}' holds no footage.",
-                "Put one video a camera into 'videos/', or give one folder of pictures a camera.",
+                f"'{source.name}' holds no footage" + (f". {found}" if found else "."),
+                "Put one video a camera into 'videos/' (or into a folder named after the camera, one in each), or give"
+                " one folder of pictures a camera.",
             )
         layout = trials[_one_of(source, tuple(trials), trial)]
         trial = None
-    takes = takes_by_name(layout.footage)
+    takes = takes_by_name(layout.footage) if not layout.names else {}
     if takes:
         return layout, takes[_one_of(layout.folder, tuple(takes), trial)]
     if trial is not None:
@@ -296,6 +395,17 @@ def _chosen(source: Path, trial: str | None) -> tuple[Layout, tuple[Path, ...]]:
             "Leave the trial out, or give its folder.",
         )
     return layout, layout.footage
+
+
+def _check_links(source: Path, layout: Layout | None) -> None:
+    """Raises FootageError for links to videos that are not there, beside the footage."""
+    for place in {path.parent for path in layout.footage} if layout is not None else ():
+        for path in place.iterdir():
+            if path.suffix.lower() in VIDEO_SUFFIXES and path.is_symlink() and not path.exists():
+                raise FootageError(
+                    f"'{path.relative_to(source).as_posix()}' is a link to a file that is not there.",
+                    "Copy the video itself, or remove the link.",
+                )
 
 
 def _one_of(source: Path, names: tuple[str, ...], trial: str | None) -> str:

@@ -13,7 +13,8 @@ import numpy as np
 from pydantic import Field
 
 from studio.calibration.checks import blocking, check_calibration
-from studio.capture.calibration_files import Calibration, read_calibration
+from studio.calibration.rig_checks import room_findings
+from studio.capture.calibration_files import UNIT_PATTERN, Calibration, read_calibration
 from studio.capture.footage_source import CameraSource, FootageSource
 from studio.capture.naming import CameraMatch, listed
 from studio.capture.pictures import check_picture, list_pictures
@@ -40,7 +41,6 @@ from studio.sessions.importers.measuring import (
     check_counts,
     different_rates,
     measure_source,
-    part_name,
 )
 from studio.sessions.importers.plan import SourcePlan
 from studio.sessions.importers.writing import (
@@ -83,10 +83,15 @@ Rotations = Annotated[
 ]
 
 Unit = Annotated[
-    Literal["", "mm", "m"],
+    str,
     Field(
-        description="The calibration's unit, where it is taken wrongly; default: what the file says or its size."
+        pattern=UNIT_PATTERN,
+        max_length=30,
+        description="The calibration's unit, mm, cm, m or in, or board=MM: the mm that are 1 in the file (a square);"
+        " default: what the file says or its size.",
     ),
+    Terminal(metavar="UNIT"),
+    Web(kind=str),
 ]
 Up = Annotated[
     Literal["x", "y", "z", "-x", "-y", "-z"],
@@ -118,6 +123,18 @@ class ImportOptions:
     ] = None
     offsets: Offsets = None
     rotations: Rotations = None
+    by_time: Annotated[
+        bool,
+        Field(
+            description="Pair frames by their times, not by their numbers: cameras of other rates, drift, lost frames."
+        ),
+    ] = False
+    masks: Annotated[
+        Literal["", "inverted"],
+        Field(
+            description="What is the person in the footage's masks; default: white, labels, or opaque alpha."
+        ),
+    ] = ""
     unit: Unit = ""
     up: Up = "z"
     replace: Annotated[bool, Field(description="Forget all cameras that the source does not name.")] = False
@@ -169,8 +186,12 @@ def import_source(
             person = check_person(plan)
             if options.copy:
                 check_room(plan, into)
-            measured = _checked_rig(measure_source(plan, read, options.fps, progress), options)
-            truths, notes = carried_truth(plan, read, measured.fps, options.unit)
+            measured = _checked_rig(
+                measure_source(plan, read, options.fps, progress, by_time=options.by_time),
+                options,
+                person.size_mm,
+            )
+            truths, notes = carried_truth(plan, read, measured.fps, measured.frame_count, options.unit)
             with made_whole(into) as folder:
                 manifest = write_session(
                     folder,
@@ -186,6 +207,8 @@ def import_source(
                 )
                 progress("finishing", 1, 1)
                 note_files(folder)
+    except FileNotFoundError as problem:
+        raise SessionError(f"The file '{problem.filename}' is not there.", "Check the folder.") from None
     except OSError as problem:
         raise SessionError(
             f"The import into '{into.name}' failed: {problem}.", "Check the disk's room and permissions."
@@ -222,10 +245,10 @@ def _added(session: Session, source: Path, options: ImportOptions, report: Progr
     if options.copy:
         check_room(plan, session.path)
     read = _cameras_of(session, plan, options)
-    measured = measure_source(plan, read, options.fps, report)
-    truths, carried_notes = carried_truth(plan, read, measured.fps, options.unit)
+    measured = measure_source(plan, read, options.fps, report, by_time=options.by_time)
+    truths, carried_notes = carried_truth(plan, read, measured.fps, measured.frame_count, options.unit)
     if takes_over:
-        measured = _checked_rig(measured, options)
+        measured = _checked_rig(measured, options, person.size_mm)
     staged = new_folder_beside(session.path / "take", parents=False)
     try:
         footage = write_footage(staged, measured, options.copy, report)
@@ -279,15 +302,20 @@ def _plan(source: Path, options: ImportOptions, *, bare: bool = False) -> Source
         plan,
         offsets={**plan.offsets, **(options.offsets or {})},
         rotations={**plan.rotations, **(options.rotations or {})},
+        masks_inverted=options.masks == "inverted",
     )
 
 
-def _checked_rig(measured: MeasuredSource, options: ImportOptions) -> MeasuredSource:
+def _checked_rig(measured: MeasuredSource, options: ImportOptions, size_mm: float) -> MeasuredSource:
     """The plan with findings on its cameras as warnings: faults that a reprojection error cannot show.
+    size_mm : of the body.
 
     Raises CalibrationError with the first finding that would make results wrong, unless `allow_inconsistent`.
     """
-    findings = check_calibration(tuple(entry.camera for entry in measured.cameras))
+    cameras = tuple(entry.camera for entry in measured.cameras)
+    findings = check_calibration(cameras)
+    if not any(finding.code == "scale" for finding in findings):
+        findings = (*findings, *room_findings(cameras, size_mm))
     wrong = blocking(findings)
     if wrong and not options.allow_inconsistent:
         raise CalibrationError(
@@ -302,7 +330,7 @@ def _cameras_of(session: Session, plan: SourcePlan, options: ImportOptions) -> C
         return replace(known, label=session.manifest.calibration_source or known.label)
     if plan.calibration is not None:
         return read_calibration(plan.calibration, options.unit, options.up)
-    names = [part_name(path) for path in plan.footage]
+    names = [plan.part_name(path) for path in plan.footage]
     twice = sorted(name for name in names if names.count(name) > 1)
     if twice:
         raise FootageError(

@@ -5,11 +5,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
+from studio.arrays import Array
 from studio.capture.calibration_files import Calibration
 from studio.capture.calibration_parts import AssumedCrop
 from studio.capture.footage import background_turn, turned_picture
 from studio.capture.footage_fit import NO_BARS, Margins, black_margins, fit_camera
 from studio.capture.footage_source import TURNS, Turn
+from studio.capture.frame_pairing import Steps, drifts, file_frame, paired_by_time
 from studio.capture.naming import CameraMatch, listed, match_names
 from studio.capture.pictures import (
     PictureReader,
@@ -24,6 +28,7 @@ from studio.errors import CalibrationError, FootageError
 from studio.evidence.backgrounds import check_plate_size
 from studio.geometry.camera import Camera
 from studio.progress import Progress
+from studio.sessions.importers.mask_forms import MaskForm, form_of_masks
 from studio.sessions.importers.plan import SourcePlan
 
 SAME_RATE, ANNOUNCED_RATE = 0.005, 0.02
@@ -37,7 +42,8 @@ class MeasuredCamera:
 
     camera : as fitted to the footage. footage, masks, background : source paths. found : measured by decoding
     the footage, before turning. crop : assumed to make it fit, if any. turned : degrees
-    clockwise. offset : the file's frame that is frame 0 of all cameras.
+    clockwise. offset : the file's frame that is frame 0 of all cameras. steps : as of `CameraSource`.
+    mask_form, mask_count : how the masks are meant, and how many there are.
     """
 
     camera: Camera
@@ -48,6 +54,9 @@ class MeasuredCamera:
     background: Path | None
     turned: Turn = 0
     offset: int = 0
+    steps: Steps = ()
+    mask_form: MaskForm | None = None
+    mask_count: int = 0
 
     @property
     def size(self) -> tuple[int, int]:
@@ -102,15 +111,16 @@ def gap_warnings(measured: tuple[MeasuredCamera, ...]) -> list[str]:
     ]
 
 
-def check_before_decoding(footage: Sequence[Path], fps: float | None) -> None:
-    """Check early what decoding would find only after minutes. fps : None to use the videos' own rates.
+def check_before_decoding(footage: Sequence[Path], fps: float | None, by_time: bool = False) -> None:
+    """Check early what decoding would find only after minutes. fps : None to use the videos' own rates. by_time : rates
+    may differ.
 
     Raises FootageError for videos that are not to be decoded, or whose announced frame rates differ much.
     """
     probes = {path.name: probe_video(path) for path in footage if path.is_file()}
     rates = {name: probe.fps for name, probe in probes.items() if probe.steady}
     known = sorted(rates.values())
-    if fps is None and known and known[-1] / known[0] - 1.0 > ANNOUNCED_RATE:
+    if fps is None and not by_time and known and known[-1] / known[0] - 1.0 > ANNOUNCED_RATE:
         raise different_rates(rates)
 
 
@@ -152,9 +162,15 @@ def check_counts(counts: Mapping[str, int], aligned: bool) -> None:
 
 
 def common_rate(
-    measured: tuple[MeasuredCamera, ...], requested: float | None, known: float | None, warnings: list[str]
+    measured: tuple[MeasuredCamera, ...],
+    requested: float | None,
+    known: float | None,
+    warnings: list[str],
+    by_time: bool = False,
 ) -> float:
-    """Frames per second: the user's, the layout's, or that of the videos, which must agree."""
+    """Frames per second: the user's, the layout's, or that of the videos, which must agree unless frames are paired by
+    time: then the slowest.
+    """
     videos = [
         (entry.footage.name, entry.found) for entry in measured if isinstance(entry.found, VideoMeasure)
     ]
@@ -170,18 +186,19 @@ def common_rate(
                 f" ({', '.join(other) or 'uneven times in ' + listed(uneven)})."
             )
         return requested
-    if uneven:
+    if uneven and not by_time:
         name, frame = next(iter(uneven.items()))
         raise FootageError(
             f"'{name}' has a variable frame rate (frame {frame} is off an even {rates[name]:g} a second).",
-            "Re-encode it with a constant frame rate, or give --fps to take its frames as evenly spaced.",
+            "Pair frames by their times (--by-time), re-encode it with a constant frame rate, or give --fps to take its"
+            " frames as evenly spaced.",
         )
     if known is not None:
         return known
     found = sorted(rates.values())
     if not found or found[0] <= 0.0:
         raise FootageError("The frame rate of the footage is unknown.", "Give the frame rate with --fps.")
-    if found[-1] / found[0] - 1.0 > SAME_RATE:
+    if found[-1] / found[0] - 1.0 > SAME_RATE and not by_time:
         raise different_rates(rates)
     return found[0]
 
@@ -191,7 +208,7 @@ def different_rates(rates: Mapping[str, float]) -> FootageError:
     words = ", ".join(f"{name}: {rate:g}" for name, rate in rates.items())
     return FootageError(
         f"The videos' frame rates differ ({words}), so frames with one number were taken at different moments.",
-        "Resample them to one rate, or give the right one with --fps if the files are wrong.",
+        "Pair them by their times (--by-time), or give the right rate with --fps if the files are wrong.",
     )
 
 
@@ -214,22 +231,28 @@ class MeasuredSource:
 
 
 def measure_source(
-    plan: SourcePlan, calibration: Calibration, fps: float | None, progress: Progress
+    plan: SourcePlan,
+    calibration: Calibration,
+    fps: float | None,
+    progress: Progress,
+    *,
+    by_time: bool = False,
 ) -> MeasuredSource:
-    """Match, decode and compare all footage. fps : the user's, which overrides all others.
+    """Match, decode and compare all footage. fps : the user's, which overrides all others. by_time : pair frames by
+    their times, not by their numbers.
 
     Raises FootageError, CalibrationError.
     """
     names = [camera.name for camera in calibration.cameras]
     matching = match_names(
-        [part_name(path) for path in plan.footage], names, "videos or picture folders", FootageError
+        [plan.part_name(path) for path in plan.footage], names, "videos or picture folders", FootageError
     )
     by_camera = {match.camera: path for match, path in zip(matching, plan.footage, strict=True)}
     used = [camera for camera in calibration.cameras if camera.name in by_camera]
     masks = _matched(plan.masks, used, "masks")
     backgrounds = _matched(plan.backgrounds, used, "backgrounds")
     turns = requested_turns(plan, by_camera)
-    check_before_decoding([by_camera[camera.name] for camera in used], fps or plan.fps)
+    check_before_decoding([by_camera[camera.name] for camera in used], fps or plan.fps, by_time)
     measured = tuple(
         _measure_camera(
             calibration,
@@ -251,14 +274,106 @@ def measure_source(
         *gap_warnings(measured),
         *_without_background(measured),
     ]
-    count = common_frame_count(measured, warnings, aligned)
-    rate = common_rate(measured, fps, plan.fps, warnings)
+    if by_time:
+        rate = common_rate(measured, fps, plan.fps, warnings, by_time)
+        measured, count, paired = with_times(plan, measured, names, rate)
+        notes = (*notes, *paired)
+    else:
+        count = common_frame_count(measured, warnings, aligned)
+        rate = common_rate(measured, fps, plan.fps, warnings)
+        check_in_step(measured, rate, warnings, trusted=fps is not None or plan.timestamps is not None)
+    notes = (*_turned_by_files(measured), *notes)
+    warnings += _interlaced(measured)
+    measured = tuple(
+        _with_masks(entry, entry.masks, count, plan.masks_inverted, progress)
+        if entry.masks is not None
+        else entry
+        for entry in measured
+    )
     for entry in measured:
-        if entry.masks is not None:
-            _check_masks(entry, entry.masks, count, progress)
+        if entry.mask_form is not None:
+            notes = (*notes, *entry.mask_form.words(entry.camera.name))
+            warnings += entry.mask_form.doubts(entry.camera.name)
         if entry.background is not None:
             _check_background(entry, entry.background)
     return MeasuredSource(measured, rate, count, matching, tuple(warnings), notes)
+
+
+def check_in_step(
+    measured: tuple[MeasuredCamera, ...], rate: float, warnings: list[str], *, trusted: bool
+) -> None:
+    """Raises FootageError where pictures with one number come to lie more than half a frame apart by the videos' times;
+    trusted : warns only, as a rate or recorded times were given that say otherwise. A frame lost is a warning.
+    """
+    found = drifts(_own_times(measured, rate), rate)
+    apart = [drift for drift in found if drift.first >= 0]
+    words = " ".join(drift.words(rate) for drift in found)
+    if apart and not trusted:
+        raise FootageError(
+            words,
+            "Pair the frames by their times (--by-time), or give --fps to take them as evenly spaced in all cameras.",
+        )
+    if found:
+        warnings.append(words)
+
+
+def _own_times(measured: tuple[MeasuredCamera, ...], rate: float) -> dict[str, Array]:
+    """Seconds of each camera's frames from its offset on, by its file, else at the common rate."""
+    found: dict[str, Array] = {}
+    for entry in measured:
+        times = entry.found.times if isinstance(entry.found, VideoMeasure) else np.zeros(0)
+        if len(times) != entry.found.frame_count:
+            times = np.arange(entry.found.frame_count) / rate
+        found[entry.camera.name] = times[entry.offset :]
+    return found
+
+
+def with_times(
+    plan: SourcePlan, measured: tuple[MeasuredCamera, ...], known: Sequence[str], rate: float
+) -> tuple[tuple[MeasuredCamera, ...], int, tuple[str, ...]]:
+    """The cameras with their frames paired by time, the frames that all have, and what that came to. By a recorder's
+    times where there are, else by the videos' own.
+    """
+    own = _own_times(measured, rate)
+    if plan.timestamps is not None:
+        recorded = read_timestamps(plan.timestamps)
+        matches = match_names(list(recorded), known, f"cameras of {plan.timestamps.name}", FootageError)
+        for match in matches:
+            entry = next((one for one in measured if one.camera.name == match.camera), None)
+            if entry is not None:
+                own[match.camera] = recorded[match.footage][entry.offset : entry.found.frame_count]
+    steps, count = paired_by_time(own, rate)
+    placed = tuple(dataclasses.replace(entry, steps=steps[entry.camera.name]) for entry in measured)
+    changed = {name: len(one) for name, one in steps.items() if one}
+    words = ", ".join(f"{name} at {number} places" for name, number in changed.items()) or "nowhere"
+    note = f"Frames are paired by time, {count} at {rate:g} a second; copied or left out: {words}."
+    return placed, count, (note,)
+
+
+def _turned_by_files(measured: tuple[MeasuredCamera, ...]) -> tuple[str, ...]:
+    """A note on videos that say themselves how they are to be turned."""
+    turned = {
+        entry.footage.name: entry.found.turned
+        for entry in measured
+        if isinstance(entry.found, VideoMeasure) and entry.found.turned
+    }
+    words = ", ".join(f"{name} by {degrees} degrees" for name, degrees in turned.items())
+    return (f"Turned clockwise as the files themselves say: {words}.",) if turned else ()
+
+
+def _interlaced(measured: tuple[MeasuredCamera, ...]) -> list[str]:
+    """A warning where frames are of two fields, taken at two moments."""
+    names = [
+        entry.footage.name
+        for entry in measured
+        if isinstance(entry.found, VideoMeasure) and entry.found.interlaced
+    ]
+    if not names:
+        return []
+    return [
+        f"{listed(names)} is interlaced: each picture holds two moments in its odd and even lines, which fray what"
+        " moves. Split it into fields before the import: ffmpeg -i IN -vf bwdif=mode=send_field OUT."
+    ]
 
 
 def part_name(path: Path) -> str:
@@ -335,7 +450,10 @@ def _without_background(measured: tuple[MeasuredCamera, ...]) -> list[str]:
     return [f"Camera {listed(bare)} has no background: it is taken from the footage, less reliably."]
 
 
-def _check_masks(entry: MeasuredCamera, masks: Path, count: int, progress: Progress) -> None:
+def _with_masks(
+    entry: MeasuredCamera, masks: Path, count: int, inverted: bool, progress: Progress
+) -> MeasuredCamera:
+    """The camera with how its masks are meant. Raises FootageError where they do not fit the footage."""
     found = _measure(masks, f"reading masks {masks.name}", progress)
     if (found.width, found.height) != (entry.found.width, entry.found.height):
         raise FootageError(
@@ -343,11 +461,14 @@ def _check_masks(entry: MeasuredCamera, masks: Path, count: int, progress: Progr
             f" {entry.found.width}x{entry.found.height}.",
             "Give masks of the footage's size.",
         )
-    if found.frame_count < entry.offset + count:
+    last = entry.offset + file_frame(entry.steps, count - 1)
+    if found.frame_count <= last:
         raise FootageError(
-            f"The masks '{masks.name}' have {found.frame_count} frames, the footage {entry.offset + count}.",
+            f"The masks '{masks.name}' have {found.frame_count} frames, the footage {last + 1}.",
             "Give one mask for every frame.",
         )
+    form = form_of_masks(masks, found.frame_count, inverted)
+    return dataclasses.replace(entry, mask_form=form, mask_count=found.frame_count)
 
 
 def _check_background(entry: MeasuredCamera, background: Path) -> None:

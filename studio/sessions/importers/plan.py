@@ -18,7 +18,8 @@ class SourcePlan:
     values where the layout has its own form for them; the files of the same names otherwise.
     sigma_fps : the rate at which sigma was measured. tracker, weighting : defaults for runs of the session, "" for
     the studio's. layout : name of the recognised folder layout. timestamps : a recorder's times of the frames.
-    offsets, rotations : given by hand, by the name of a camera or its footage.
+    offsets, rotations : given by hand, by the name of a camera or its footage. masks_inverted : black is the person.
+    names : cameras of footage that its folder is named after.
     """
 
     source: Path
@@ -43,6 +44,12 @@ class SourcePlan:
     timestamps: Path | None = None
     offsets: Mapping[str, int] = field(default_factory=dict[str, int])
     rotations: Mapping[str, int] = field(default_factory=dict[str, int])
+    masks_inverted: bool = False
+    names: Mapping[Path, str] = field(default_factory=dict[Path, str])
+
+    def part_name(self, path: Path) -> str:
+        """The name by which a video (without suffix) or folder is matched with a camera."""
+        return self.names.get(path, path.name if path.is_dir() else path.stem)
 
     def without_person(self) -> "SourcePlan":
         """The footage alone: start pose and truth belong to a calibration."""

@@ -5,7 +5,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from studio.body.catalogue import body_file_text, load_body
+from studio.body.forward_kinematics import limb_ends
 from studio.body.subject import DEFAULT_BODY, fit_subject, read_subject, write_subject
 from studio.calibration.carried_points import carried
 from studio.capture.calibration_files import (
@@ -22,10 +25,11 @@ from studio.motion_files.trc import MarkerMotion, read_trc, write_trc
 from studio.motion_files.truth_files import ANY_WORLD, read_truth
 from studio.progress import Progress
 from studio.sessions.atomic_files import write_text
+from studio.sessions.importers.mask_forms import write_meant_masks
 from studio.sessions.importers.measuring import MeasuredSource
 from studio.sessions.importers.plan import SourcePlan
 from studio.sessions.manifest import SessionManifest, now, write_manifest
-from studio.sessions.named_rows import read_pose, read_sigma, write_pose, write_sigma
+from studio.sessions.named_rows import check_radians, read_pose, read_sigma, write_pose, write_sigma
 from studio.sessions.names import free_name, name_from
 
 COPY_CHUNK = 8_000_000
@@ -34,11 +38,12 @@ SPARE_BYTES = 50_000_000
 
 @dataclass(frozen=True, slots=True)
 class CheckedPerson:
-    """The subject's data, read once and checked. notes : of the subject's fit."""
+    """The subject's data, read once and checked. notes : of the subject's fit. size_mm : the body's longest extent."""
 
     body: str
     parameters: tuple[str, ...]
     notes: tuple[str, ...]
+    size_mm: float = 0.0
 
 
 def check_person(plan: SourcePlan) -> CheckedPerson:
@@ -50,36 +55,48 @@ def check_person(plan: SourcePlan) -> CheckedPerson:
     body = load_body(subject.body if subject else DEFAULT_BODY, folders)
     notes: tuple[str, ...] = ()
     if subject is not None:
-        notes = fit_subject(body, subject, folders)[1]
+        fitted, notes = fit_subject(body, subject, folders)
+    else:
+        fitted = body
     names = tuple(entry.name for entry in body.parameters)
     if plan.start_pose_file is not None:
-        read_pose(plan.start_pose_file, names)
+        check_radians(plan.start_pose_file, body, read_pose(plan.start_pose_file, names))
     if plan.sigma_file is not None:
         read_sigma(plan.sigma_file, names, 1.0)
     for path in plan.truth:
         # Others are read by `carried_truth`, before anything is written: their times need the footage's rate.
         if path.suffix.lower() not in ANY_WORLD:
             read_trc(path)
-    return CheckedPerson(body.name, names, notes)
+    size = float(np.ptp(limb_ends(fitted, fitted.neutral)[0].reshape(-1, 3), axis=0).max())
+    return CheckedPerson(body.name, names, notes, size)
 
 
 def carried_truth(
-    plan: SourcePlan, calibration: Calibration, fps: float, unit: str
+    plan: SourcePlan, calibration: Calibration, fps: float, frame_count: int, unit: str
 ) -> tuple[Mapping[str, MarkerMotion], tuple[str, ...]]:
-    """The truths that are in a world of their own, by their files' names, in the session's world; and a note on each.
+    """The truths that are in a world of their own, or mean more than they say, by their files' names, in the session's
+    world; and notes on them.
 
     That world is of a calibration beside them (truth/*.toml and the like), else of the source's calibration as its file
-    has it. unit : of that one, as requested. Raises TruthError, CalibrationError.
+    has it. frame_count : of the footage. unit : of that one, as requested. Raises TruthError, CalibrationError.
     """
     found: dict[str, MarkerMotion] = {}
     notes: list[str] = []
     for path in plan.truth:
-        if path.suffix.lower() not in ANY_WORLD or plan.calibration is None:
+        if path.suffix.lower() not in ANY_WORLD:
+            motion = read_truth(path, fps, frame_count)
+            notes += motion.notes
+            if motion.notes:
+                # What it means is kept, so that nothing has to be judged again.
+                found[path.stem] = motion
+            continue
+        if plan.calibration is None:
             continue
         beside = find_calibrations(path.parent)
         place = beside[0] if beside else plan.calibration
         own = read_calibration(place) if beside else read_calibration(place, unit)
-        motion = read_truth(path, fps)
+        motion = read_truth(path, fps, frame_count)
+        notes += motion.notes
         positions, missed = carried(motion.positions, own.cameras, calibration.cameras)
         found[path.stem] = replace(motion, positions=positions, unit="mm")
         notes.append(
@@ -152,13 +169,25 @@ def write_footage(folder: Path, measured: MeasuredSource, copy: bool, progress: 
     """Copy or refer to all footage, masks and backgrounds; returns their description."""
     sources: list[CameraSource] = []
     taken: set[str] = set()
+    files: set[str] = set()
     for entry in measured.cameras:
         plain = free_name(name_from(entry.camera.name, "camera"), taken)
         taken.add(plain)
         is_folder = entry.footage.is_dir()
-        place = f"pictures/{plain}" if is_folder else f"videos/{_file_name(entry.footage, plain)}"
+        own = _file_name(entry.footage, plain)
+        if own.lower() in files:
+            own = f"{plain}{entry.footage.suffix.lower()}"
+        files.add(own.lower())
+        place = f"pictures/{plain}" if is_folder else f"videos/{own}"
         masks = background = ""
-        if entry.masks is not None:
+        if entry.masks is not None and entry.mask_form is not None and not entry.mask_form.usual:
+            masks = f"masks/{plain}"
+
+            def report(done: int, total: int, name: str = entry.masks.name) -> None:
+                progress(f"writing masks {name}", done, total)
+
+            write_meant_masks(entry.masks, entry.mask_count, entry.mask_form, folder / masks, report)
+        elif entry.masks is not None:
             suffix = "" if entry.masks.is_dir() else entry.masks.suffix.lower()
             masks = _put(entry.masks, folder, f"masks/{plain}{suffix}", copy, progress)
         if entry.background is not None:
@@ -175,6 +204,7 @@ def write_footage(folder: Path, measured: MeasuredSource, copy: bool, progress: 
                 background,
                 entry.offset,
                 entry.turned,
+                entry.steps,
             )
         )
     return FootageSource(measured.fps, measured.frame_count, tuple(sources))
@@ -254,7 +284,7 @@ def write_person(
 
 def _write_truths(place: Path, plan: SourcePlan, truths: Mapping[str, MarkerMotion]) -> None:
     """All true motions as TRC."""
-    kept = [path for path in plan.truth if path.suffix.lower() not in ANY_WORLD]
+    kept = [path for path in plan.truth if path.suffix.lower() not in ANY_WORLD and path.stem not in truths]
     if kept or truths:
         place.mkdir()
     for path in kept:

@@ -1,0 +1,39 @@
+"""Imported footage is compared with its calibration before the first run, without being asked."""
+
+import dataclasses
+from pathlib import Path
+
+import msgspec
+import pytest
+from nudged_camera import make_nudged_session, true_cameras
+
+from studio.capture.calibration_files import write_calibration
+from studio.errors import CalibrationError
+from studio.runs.mask_quality import look_before_the_first_run
+from studio.runs.silhouette_doubts import accepted_doubts, standing_doubts
+from studio.sessions.session import CAMERAS_PATH, Session, described_anew
+
+
+def imported(folder: Path) -> Session:
+    session = make_nudged_session(folder, 0.0)
+    return described_anew(
+        session, msgspec.structs.replace(session.manifest, layout="folder in the studio's layout")
+    )
+
+
+def test_exchanged_cameras_are_found_before_a_frame_is_tracked(tmp_path: Path) -> None:
+    session = imported(tmp_path / "exchanged")
+    first, second, *others = true_cameras()
+    exchanged = (dataclasses.replace(second, name=first.name), dataclasses.replace(first, name=second.name))
+    write_calibration((*exchanged, *others), session.path / CAMERAS_PATH)
+    session = Session(session.path)
+    look_before_the_first_run(session)
+    with pytest.raises(CalibrationError, match="cam1 and cam2 are exchanged"):
+        accepted_doubts(session, allow_inconsistent=False)
+
+
+def test_what_agrees_is_not_remembered_and_stops_nothing(tmp_path: Path) -> None:
+    session = imported(tmp_path / "right")
+    look_before_the_first_run(session)
+    assert standing_doubts(session) == ()
+    assert accepted_doubts(session, allow_inconsistent=False) == ()
