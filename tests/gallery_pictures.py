@@ -45,7 +45,8 @@ def person_picture(recipe: Recipe, folder: Path) -> np.ndarray:
     """The middle frame of a recipe's first camera."""
     rng = np.random.default_rng(recipe.seed)
     skeleton, _ = recipe_person(recipe, folder, rng)
-    cameras = cameras_of(recipe, folder, rng)
+    # A renderer draws the empty room of every camera that it has.
+    cameras = cameras_of(recipe, folder, rng)[:1]
     motion = recipe_motion(recipe, folder, skeleton)
     beside = [
         RenderedPerson(other, person.girth, dressed(person.wardrobe, person.colours))
