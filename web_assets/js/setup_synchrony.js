@@ -73,8 +73,7 @@ export function synchroniser(place, setup, use) {
 
   // An estimate that was begun before this step was shown: how far it is, or what it found.
   findJob({ session: setup.session, kind: "synchrony" }).then((job) => {
-    if (!job || stopped || estimate || job.state === "cancelled") return undefined;
-    return footage ? followEstimate() : setTimeout(followEstimate);
+    if (job && !stopped && !estimate && job.state !== "cancelled") followEstimate();
   }).catch(complain);
 
   return { draw, stop() { stopped = true; } };
