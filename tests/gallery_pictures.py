@@ -54,7 +54,8 @@ def person_picture(recipe: Recipe, folder: Path) -> np.ndarray:
     ]
     renderer = recipe_renderer(recipe, motion, cameras, beside)
     middle = motion.frame_count // 2
-    return renderer.picture(0, middle, renderer.shadow(middle))[0]
+    seen = renderer.picture(0, middle, renderer.shadow(middle))[0]
+    return np.rot90(seen, -cameras[0].quarter_turns)
 
 
 def body_picture(recipe: Recipe, folder: Path) -> np.ndarray:
