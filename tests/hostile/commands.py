@@ -41,6 +41,7 @@ OTHERS = {
     "initialise": "minutes",
     "track": "minutes",
     "batch": "minutes",
+    "level": "a session of several cameras",
     "live": "a clock",
     "record": "cameras",
     "seeds": "minutes",

@@ -5,7 +5,7 @@ import { openPicture } from "./dialogs.js";
 import { button, byId, check, element, fill, showPicture } from "./elements.js";
 import { onEvent } from "./live.js";
 import { complain } from "./messages.js";
-import { comparedRuns } from "./selection.js";
+import { comparedRuns, shownTrial } from "./selection.js";
 import { get, set, watch } from "./state.js";
 import { seriesColour } from "./theme.js";
 
@@ -31,9 +31,9 @@ function source(camera, height) {
   const place = get("run") ? `${runPath(get("session"), get("run"))}/frames/${get("frame")}` : `${sessionPath(get("session"))}/frames/${footageFrame()}`;
   const query = new URLSearchParams({ show: [...shown].join(","), height: String(height) });
   if (get("run")) {
-    const outcome = get("outcome")?.frame === get("frame") ? get("outcome") : null;
+    const tried = shownTrial();
     if (get("track") !== "raw") query.set("track", get("track"));
-    if (outcome) query.set("beside", outcome.result.pose.map((value) => Number(value.toPrecision(7))).join(","));
+    if (tried) query.set("beside", tried.pose.map((value) => Number(value.toPrecision(7))).join(","));
     if (comparedHere().some(Boolean)) query.set("compared", comparedHere().join(","));
   }
   if (age) query.set("age", String(age));
@@ -181,7 +181,7 @@ export function startCameras() {
   });
   let run = get("run");
   watch(["run"], () => { if (run === get("run")) return; run = get("run"); showFootage(); });
-  watch(["frame", "run", "summary", "track", "outcome", "compared"], refresh);
+  watch(["frame", "run", "summary", "track", "trial", "trials", "compared"], refresh);
   onEvent("frame", (event, here) => {
     const seen = get("summary")?.frames.at(-1)?.frame ?? -1;
     if (here && !event.reannealed && event.frame <= seen) { age += 1; refresh(); }

@@ -28,8 +28,12 @@ export function seedTools() {
 
 async function begin() {
   try {
-    const job = await post(`${runPath(get("session"), get("run"))}/frames/${get("frame")}/seeds`, { count });
-    jobs.set(keyOf(job), job);
+    // What is tried is searched as what is stored is, so that both can be drawn.
+    for (const trial of [get("against"), ...(get("trial") ? [get("trial")] : [])]) {
+      const path = `${runPath(get("session"), get("run"))}/frames/${get("frame")}/seeds`;
+      const job = await post(trial ? `${path}?trial=${trial}` : path, { count });
+      jobs.set(keyOf(job), job);
+    }
   } catch (error) { complain(error); }
 }
 
