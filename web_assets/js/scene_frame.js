@@ -66,14 +66,19 @@ function leaveScene(event) {
   byId("track").focus();
 }
 
+/** Let the page's keys work in a scene that was loaded; `takeKey` handles them. */
+export function shareKeys(/** @type {HTMLIFrameElement} */ scene, takeKey) {
+  for (const kind of ["keydown", "keyup"]) scene.contentDocument.body.addEventListener(kind, keepToControls);
+  scene.contentWindow.addEventListener("keydown", first(takeKey), true);
+  scene.contentWindow.addEventListener("keydown", leaveScene, true);
+}
+
 /** Load the scene, dressed as the page; `takeKey` handles the page's keys in it. */
 export function startSceneFrame(takeKey) {
   frame.addEventListener("load", () => {
     if (frame.src.endsWith("about:blank")) return;
     dress();
-    for (const kind of ["keydown", "keyup"]) frame.contentDocument.body.addEventListener(kind, keepToControls);
-    frame.contentWindow.addEventListener("keydown", first(takeKey), true);
-    frame.contentWindow.addEventListener("keydown", leaveScene, true);
+    shareKeys(frame, takeKey);
     // Whoever clicks a tab goes on with the timeline's keys.
     frame.contentWindow.addEventListener("click", (/** @type {any} */ event) => { if (event.detail) event.target.closest?.("[role=tab]")?.blur(); });
   });

@@ -65,7 +65,14 @@ function KnobNumber({ name, words }) {
   };
   const press = (/** @type {any} */ event) => {
     /** @type {Record<string, number>} */
-    const steps = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 };
+    const steps = {
+      ArrowRight: 1,
+      ArrowUp: 1,
+      ArrowLeft: -1,
+      ArrowDown: -1,
+      PageUp: 10,
+      PageDown: -10,
+    };
     const by = steps[event.key];
     if (!by || readOnly) return;
     event.preventDefault();

@@ -93,9 +93,21 @@ function Yours() {
 }
 
 const STEPS = [
-  { name: "What you see", part: Seen, open: () => look(TEN, FRAME, { panel: "views", view: "variance" }) },
-  { name: "Change survival", part: Survival, open: () => look(TEN, FRAME, { panel: "views", view: "schedule" }) },
-  { name: "Make it fail", part: Failing, open: () => look(ONE, LOST, { panel: "compare", compared: `${get("session")}/${TEN}` }) },
+  {
+    name: "What you see",
+    part: Seen,
+    open: () => look(TEN, FRAME, { panel: "views", view: "variance" }),
+  },
+  {
+    name: "Change survival",
+    part: Survival,
+    open: () => look(TEN, FRAME, { panel: "views", view: "schedule" }),
+  },
+  {
+    name: "Make it fail",
+    part: Failing,
+    open: () => look(ONE, LOST, { panel: "compare", compared: `${get("session")}/${TEN}` }),
+  },
   { name: "Now your cameras", part: Yours, open: () => {} },
 ];
 
@@ -149,9 +161,11 @@ function FirstSteps() {
   </section>`;
 }
 
-/** Show the steps in their place, unless they were closed; play the layers where the address asks for it. */
+/** Show the steps in their place, unless they were closed, and what the address asks for: `step`, layers that play. */
 export async function startFirstSteps() {
-  const plays = new URLSearchParams(location.search).get("plays") === "layers";
+  const asked = new URLSearchParams(location.search);
+  const plays = asked.get("plays") === "layers";
+  step.value = Math.min(STEPS.length, Math.max(1, Number(asked.get("step")) || 1)) - 1;
   const place = /** @type {HTMLElement} */ (document.getElementById("first-steps"));
   mount(place, html`<${FirstSteps} />`);
   if (plays) playWhenShown().catch(complain);

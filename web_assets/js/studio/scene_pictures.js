@@ -12,7 +12,8 @@ import { follow, html, mount, signal, useEffect, useState } from "./component.js
 
 const SCALE = 2;
 const PICTURE = "M2 3.5h12v9H2zM3.4 11h9.2L9.4 6.6 7 9.6 5.6 8z";
-const FILM = "M2 3h12v10H2zM3.4 4.4v1.4h1.4V4.4zm0 5.8v1.4h1.4v-1.4zm7.8-5.8v1.4h1.4V4.4zm0 5.8v1.4h1.4v-1.4zM6 4.4v7.2h4V4.4z";
+const FILM =
+  "M2 3h12v10H2zM3.4 4.4v1.4h1.4V4.4zm0 5.8v1.4h1.4v-1.4zm7.8-5.8v1.4h1.4V4.4zm0 5.8v1.4h1.4v-1.4zM6 4.4v7.2h4V4.4z";
 
 /** The film that was begun here, as it stands. @type {import("@preact/signals").Signal<any>} */
 const film = signal(null);
@@ -27,7 +28,10 @@ async function takePicture(transparent) {
     }),
   );
   const layer = get("layer") === null ? "" : `-layer-${get("layer") + 1}`;
-  download(`${get("session")}-${get("run")}-frame-${get("frame")}${layer}.png`, await answer.blob());
+  download(
+    `${get("session")}-${get("run")}-frame-${get("frame")}${layer}.png`,
+    await answer.blob(),
+  );
 }
 
 /** A film of the run that is still being made, begun before the page was loaded. @param {any} session @param {any} run */
@@ -98,8 +102,10 @@ function FilmForm() {
       complain(error);
     }
   };
-  const choose = (/** @type {(value: any) => void} */ set, /** @type {(text: string) => any} */ read) =>
-    (/** @type {any} */ event) => set(read(event.target.value));
+  const choose =
+    (/** @type {(value: any) => void} */ set, /** @type {(text: string) => any} */ read) =>
+    (/** @type {any} */ event) =>
+      set(read(event.target.value));
   const number = (/** @type {string} */ text) => (text === "" ? null : Number(text));
   const choices = of === "layers" ? RATES : SPEEDS;
   const words = (/** @type {number} */ one) =>
