@@ -17,6 +17,8 @@ const LAYERS = [
   ["samples", "sample points", "The points that the likelihood reads"], ["cost", "cost", "The points that the likelihood reads, from cool (fits) to warm (costs most): (1 − p)² of edge map and mask"],
   ["particles", "particles", "The particles of the frame's layers"],
 ];
+/** Those that need no run: outlines are the start pose's then. */
+const BEFORE_A_RUN = ["outline", "mask", "edges"];
 const shown = new Set(JSON.parse(localStorage.getItem("overlays") ?? '["outline"]'));
 let cameras = [];
 let frameCount = 1;  // of the footage
@@ -155,7 +157,8 @@ function showFootage() {
 
 /** The check boxes that stand in the tab line while this panel is open. */
 export function cameraTools() {
-  return [footageSlider(), runColours(), button("Whole pictures", () => { zoom = { scale: 1, x: 0.5, y: 0.5 }; ask(false); showZoom(); }, "quiet small", { title: "No longer zoomed" }), ...LAYERS.map(([name, label, title]) => check(label, {
+  const offered = get("run") ? LAYERS : LAYERS.filter(([name]) => BEFORE_A_RUN.includes(name));
+  return [footageSlider(), runColours(), button("Whole pictures", () => { zoom = { scale: 1, x: 0.5, y: 0.5 }; ask(false); showZoom(); }, "quiet small", { title: "No longer zoomed" }), ...offered.map(([name, label, title]) => check(label, {
     checked: shown.has(name), onchange: ({ target }) => {
       if (target.checked) shown.add(name); else shown.delete(name);
       localStorage.setItem("overlays", JSON.stringify([...shown]));

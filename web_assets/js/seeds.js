@@ -1,6 +1,6 @@
 // A frame searched again with other seeds, in the background; its view is drawn when they are done.
 
-import { post, remove, runPath } from "./api.js";
+import { fetchJson, post, remove, runPath } from "./api.js";
 import { button, dotted, element, number } from "./elements.js";
 import { isGoing, standing, timeLeft } from "./jobs.js";
 import { onEvent } from "./live.js";
@@ -37,8 +37,19 @@ async function begin() {
   } catch (error) { complain(error); }
 }
 
+/** Searches that were begun before this page was loaded, or in another window. */
+async function findSeeds(changed) {
+  const { jobs: listed } = await fetchJson(`/api/jobs?${new URLSearchParams({ kind: "seeds" })}`);
+  for (const line of listed.filter(isGoing)) {
+    const job = await fetchJson(/** @type {any} */ (line.at));
+    jobs.set(keyOf(job), job);
+    if (keyOf(job) === here()) changed(false);
+  }
+}
+
 /** Hear of searches; `changed(ended)` is called when that of the shown frame got further or ended. */
 export function startSeeds(changed) {
+  findSeeds(changed).catch(complain);
   onEvent("seeds", (job) => {
     jobs.set(keyOf(job), job);
     if (job.state === "failed") complain(job);
