@@ -17,7 +17,6 @@ from studio.geometry.reach import within_reach
 from studio.inspection.cloud_outlines import CloudOutline, outline_of
 from studio.inspection.reading import InspectedFrame, InspectedRun
 from studio.inspection.reference import body_points, by_limb, true_points
-from studio.inspection.searches import layers_of_a_search, searches_of
 from studio.inspection.verdict import limbs_off, verdict_on, verdicts
 from studio.runs.live_summary import summary_of
 from studio.runs.tracks import RAW
@@ -312,8 +311,8 @@ def frame_detail(session: OpenSession, run: OpenRun, frame: int) -> FrameDetail:
     return FrameDetail(
         frame=frame,
         finished=finished,
-        search_layers=layers_of_a_search(read),
-        searches=searches_of(read),
+        search_layers=read.search_layers,
+        searches=read.searches,
         parameters=parameter_views(inspected.body),
         layers=[layer_view(inspected.body, camera, layer) for layer in layers],
         pose=estimate.pose.tolist() if estimate else None,
