@@ -80,8 +80,12 @@ def read_file(
     more bytes than `most`.
     """
     with open_file(path, wrong, footage=footage) as stream:
-        content = b"" if os.fstat(stream.fileno()).st_size > most else stream.read(most + 1)
-        if (not content and os.fstat(stream.fileno()).st_size) or len(content) > most:
+        size = os.fstat(stream.fileno()).st_size
+        content = b"" if size > most else stream.read(size + 1)
+        if len(content) > size:
+            # It grew meanwhile, or is one of those that say no size.
+            content += stream.read(max(0, most + 1 - len(content)))
+        if size > most or len(content) > most:
             raise wrong(
                 f"'{path.name}' is larger than {_megabytes(most)} MB, more than such a file can have.",
                 "Replace it, or delete it.",

@@ -1,6 +1,14 @@
 """Numbers and lists as parts of a sentence."""
 
+import re
 from collections.abc import Sequence
+
+CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
+
+
+def printable(text: str) -> str:
+    """A text whose control characters are written out: a terminal obeys those that came with a session."""
+    return CONTROL.sub(lambda one: f"\\x{ord(one[0]):02x}", text)
 
 
 def counted(number: int, one: str, many: str = "") -> str:

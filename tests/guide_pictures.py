@@ -55,7 +55,13 @@ PICTURES = (
     ),
     Picture("course-swarm.jpg", f"{WALK}course-swarm&frame=9&panel=views&view=variance", PANEL, (1280, 1180)),
     Picture("bodies.jpg", "body=mouse", page="/bodies"),
-    Picture("studio.jpg", f"{WALK}course-annealed&frame=30&panel=views&view=variance", "", (1440, 960)),
+    Picture("first-seen.jpg", f"{WALK}ten-layers&frame=9&layer=1&panel=views&view=variance"),
+    Picture("first-survival.jpg", f"{WALK}ten-layers&frame=9&layer=4&panel=views&view=schedule&step=2"),
+    Picture("first-failing.jpg", f"{WALK}one-layer&frame=13&panel=compare&compared=walk/ten-layers&step=3"),
+    Picture("course-docked.jpg", "course=arm"),
+    Picture(
+        "studio.jpg", f"{WALK}ten-layers&frame=9&layer=1&panel=views&view=variance&step=4", "", (1440, 960)
+    ),
 )
 
 

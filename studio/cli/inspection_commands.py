@@ -87,7 +87,8 @@ def _answer(
 
 def tables_csv(tables: Sequence[Table], caption: str) -> str:
     """The tables one after the other: caption and titles as comments, units in the head."""
-    parts = [f"# {caption}\n"]
+    # A line break within, of a run's record, would begin a cell.
+    parts = [f"# {' '.join(caption.split())}\n"]
     for table in tables:
         heads = [f"{one.key} [{one.unit}]" if one.unit else one.key for one in table.columns]
         rows = [["" if cell is None else cell for cell in row] for row in table.for_readers()]

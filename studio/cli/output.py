@@ -3,6 +3,7 @@
 import errno
 import functools
 import os
+import re
 import signal
 import sys
 import threading
@@ -23,6 +24,7 @@ from studio.progress import Progress, TimeLeft, left_in_words
 from studio.registry import Registry
 from studio.sessions.atomic_files import write_bytes
 from studio.typed_decoding import decode_json
+from studio.words import printable
 
 P = ParamSpec("P")
 
@@ -87,11 +89,10 @@ def print_result(result: Mapping[str, object], as_json: bool) -> None:
     values = dict(result)
     text = values.pop("text", None)
     if as_json:
-        click.echo(msgspec.json.encode(values, enc_hook=_plain_value).decode())
+        click.echo(_without_c1(msgspec.json.encode(values, enc_hook=_plain_value).decode()))
     else:
-        click.echo(
-            text if text is not None else "\n".join(f"{key:24} {value}" for key, value in values.items())
-        )
+        lines = "\n".join(f"{key:24} {value}" for key, value in values.items())
+        click.echo(printable(str(text) if text is not None else lines))
 
 
 class TerminatedError(KeyboardInterrupt):
@@ -139,6 +140,12 @@ def errors_in_words() -> Generator[None]:
             where = f"'{error.filename}' cannot be used" if error.filename else "The disk refused"
             _say_wrong(f"{where} ({error.strerror}).", "Check the disk's room and the folder's permissions.")
             sys.exit(WRONG_INPUT)
+        if isinstance(error, MemoryError):
+            _say_wrong(
+                "There is not enough memory for this.",
+                "Close other programs, or raise the limit (ulimit -v).",
+            )
+            sys.exit(WRONG_INPUT)
         _say_wrong(
             f"{type(error).__name__}: {error}",
             f"This is a fault of the studio: set {TRACEBACK_VARIABLE}=1 to see where.",
@@ -153,7 +160,12 @@ def _say_wrong(cause: str, remedy: str) -> None:
 
 
 def _plain(text: str) -> str:
-    return text.replace("[", "\\[")
+    return printable(text).replace("[", "\\[")
+
+
+def _without_c1(text: str) -> str:
+    """JSON with the control characters that its own rules leave as they are."""
+    return re.sub(r"[\x7f-\x9f]", lambda one: f"\\u{ord(one[0]):04x}", text)
 
 
 def _plain_value(value: object) -> object:

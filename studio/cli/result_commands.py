@@ -144,6 +144,8 @@ def _verified(found: Verification) -> str:
         parts.append(f"{counted(len(found.written_again), 'file')} written again since the last time")
     if found.new:
         parts.append(f"{counted(found.new, 'file')} noted for the first time")
+    if found.left:
+        parts.append(f"{counted(len(found.left), 'unfinished part')} left behind")
     return f"{', '.join(parts)}."
 
 

@@ -297,29 +297,36 @@ def rows_of_frames(truth: MarkerMotion, fps: float) -> dict[int, int]:
 
 def limb_of_markers(body: BodyModel) -> dict[str, str]:
     """Marker to the limb it is counted with: all that is neither left nor right is one limb, head and
-    trunk; the others are grouped as the body's parameters are (a person has five limbs).
+    trunk; the others are grouped as the body's parameters are (a person has five limbs). A body without sides, such as
+    a robot's arm, has no trunk: all its limbs are so grouped.
     """
     owned, sides = _limb_of_joints(body), marker_sides(body)
+    middle = "middle" if has_sides(body) else ""
     return {
-        marker.name: TRUNK if sides[marker.name] == "middle" else owned[marker.joint]
-        for marker in body.markers
+        marker.name: TRUNK if sides[marker.name] == middle else owned[marker.joint] for marker in body.markers
     }
+
+
+def has_sides(body: BodyModel) -> bool:
+    """Whether any of a body's limbs is a left or a right one."""
+    return any(limb.side != "middle" for limb in body.drawn)
 
 
 def limb_of_drawn(body: BodyModel) -> dict[str, str]:
     """Drawn limb to the limb that its markers are counted with; in a body without markers each is its own."""
     if not body.markers:
         return {limb.name: limb.name for limb in body.drawn}
-    owned = _limb_of_joints(body)
-    return {limb.name: TRUNK if limb.side == "middle" else owned[limb.joint] for limb in body.drawn}
+    owned, middle = _limb_of_joints(body), "middle" if has_sides(body) else ""
+    return {limb.name: TRUNK if limb.side == middle else owned[limb.joint] for limb in body.drawn}
 
 
 def _limb_of_joints(body: BodyModel) -> dict[int, str]:
     """The limb of the parameters that move each joint, or the one above it."""
     owned: dict[int, str] = {}
+    still = TRUNK if has_sides(body) else body.parameters[0].limb
     for index, joint in enumerate(body.joints):
         moved = [step.parameter for step in joint.steps if step.parameter >= 0]
-        owned[index] = body.parameters[moved[0]].limb if moved else owned.get(joint.parent, TRUNK)
+        owned[index] = body.parameters[moved[0]].limb if moved else owned.get(joint.parent, still)
     return owned
 
 

@@ -37,8 +37,11 @@ def _distances(run: InspectedRun, track: str) -> dict[int, Array]:
     chosen = read_track(run.run, track or RAW)
     if not len(chosen.frames):
         return {}
+    poses = dict(zip(chosen.frames.tolist(), chosen.poses, strict=True))
+    if run.tried is not None:
+        poses[run.tried.number] = run.tried.result.estimate.pose
     found: dict[int, Array] = {}
-    for frame, points in zip(chosen.frames.tolist(), body_points(run.body, chosen.poses), strict=True):
+    for frame, points in zip(poses, body_points(run.body, np.stack(list(poses.values()))), strict=True):
         truth = true_points(run, frame)
         if truth is not None:
             found[frame] = np.linalg.norm(points - truth, axis=1)
@@ -51,17 +54,18 @@ def limbs_too_far(body: BodyModel, distances: Array) -> tuple[str, ...]:
     return tuple(sorted(set(owners[distances > lost_mm(body)].tolist())))
 
 
-def limb_shares(disagreement: Mapping[str, float]) -> dict[str, float]:
+def limb_shares(body: BodyModel, disagreement: Mapping[str, float]) -> dict[str, float]:
     """By limb the disagreeing share, the largest of what is counted as head and trunk."""
     own: dict[str, float] = {}
     for name, share in disagreement.items():
-        own[limb_group(name)] = max(own.get(limb_group(name), 0.0), share)
+        group = limb_group(body, name)
+        own[group] = max(own.get(group, 0.0), share)
     return own
 
 
 def disagreements_of(run: InspectedRun) -> dict[int, dict[str, float]]:
     """By frame and limb the disagreeing share; {} for a frame in which nothing was compared."""
-    return {frame: limb_shares(entry.disagreement) for frame, entry in summaries(run).items()}
+    return {frame: limb_shares(run.body, entry.disagreement) for frame, entry in summaries(run).items()}
 
 
 def verdicts_on(run: InspectedRun, track: str = "") -> dict[int, Verdict]:

@@ -18,7 +18,7 @@ from studio.arrays import Array, Indices, Mask
 from studio.body.model import BodyModel
 from studio.evaluation.errors import lost_mm
 from studio.inspection.over_frames import stamps_of
-from studio.inspection.reading import InspectedFrame, InspectedRun, no_value
+from studio.inspection.reading import InspectedFrame, InspectedRun, TriedFrame, no_value
 from studio.inspection.reference import body_points, by_limb, true_points
 from studio.inspection.tables import Found, Row, Selection, View, table
 from studio.sessions.results_reader import ResultsReader
@@ -233,11 +233,20 @@ def over_run(run: InspectedRun, selection: Selection) -> Found:
         stamps = stamps_of(results.timeline())
         frames = list(stamps)
         chosen = frames[:: max(1, -(-len(frames) // MOST_FRAMES))]
+        if run.tried is not None:
+            chosen = sorted({*chosen, run.tried.number})
+            stamps[run.tried.number] = _stamp_of(run.tried)
         table = [_row_of_frame(run, number, stamps[number], results) for number in chosen]
     notes = (
         () if len(chosen) == len(frames) else (f"Every {len(frames) // len(chosen)}th frame or so is shown.",)
     )
     return Found({"frames": table}, notes)
+
+
+def _stamp_of(tried: TriedFrame) -> tuple[float, float, int]:
+    """As of a stored frame (`stamps_of`)."""
+    result = tried.result
+    return result.estimate.log_weight, result.milliseconds, result.settings_version
 
 
 _lock = threading.Lock()

@@ -125,8 +125,11 @@ _kept = _Kept()
 
 
 def summaries(run: InspectedRun) -> dict[int, FrameSummary]:
-    """What was read of every finished frame."""
-    return _kept.of(run)
+    """What was read of every finished frame, of one that was tried what was found there."""
+    found = _kept.of(run)
+    if run.tried is not None:
+        found[run.tried.number] = summary_of(run.frame(run.tried.number))
+    return found
 
 
 def variance_rows(run: InspectedRun, selection: Selection) -> dict[str, list[Row]]:

@@ -3,7 +3,6 @@
 import math
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from studio.runs.tracks import pose_in_track
 from studio.sessions.results_reader import ResultsReader
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.settings import RunSettings, SettingsHistory, settings_from_values
+from studio.settings import RunSettings, SettingsHistory, settings_from_values, values
 from studio.trackers.annealing import normalised
 from studio.trackers.catalogue import TRACKERS, size_in_words
 from studio.trackers.tracker import FrameResult, LayerRecord
@@ -26,12 +25,31 @@ from studio.words import enumerated
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")
 
 
-class InspectedRun:
-    """A run of a session with what does not change from frame to frame."""
+@dataclass(frozen=True, slots=True, eq=False)
+class TriedFrame:
+    """A frame that was annealed again with other settings and is not stored. name : made of the settings, which with
+    the run's seed give the same search again.
+    """
 
-    def __init__(self, session: Session, run: StoredRun) -> None:
-        self.session, self.run = session, run
+    name: str
+    number: int
+    settings: RunSettings
+    layers: tuple[LayerRecord, ...]
+    result: FrameResult
+
+
+class InspectedRun:
+    """A run of a session with what does not change from frame to frame. tried : stands in the place of the stored
+    frame of its number.
+    """
+
+    def __init__(self, session: Session, run: StoredRun, tried: TriedFrame | None = None) -> None:
+        self.session, self.run, self.tried = session, run, tried
         self._read: dict[int, RunSettings] = {}
+
+    def tried_at(self, frame: int) -> TriedFrame | None:
+        """What was tried in a frame and is looked at in its place."""
+        return self.tried if self.tried is not None and self.tried.number == frame else None
 
     @cached_property
     def body(self) -> BodyModel:
@@ -79,6 +97,8 @@ class InspectedRun:
 
     def settings(self, frame: int, layer: int = 0) -> RunSettings:
         """The settings in use in a layer of a frame; each version is read once."""
+        if tried := self.tried_at(frame):
+            return tried.settings
         record = self.run.record
         entry = self.history.in_use(frame, layer)
         version = entry.version if entry else 0
@@ -94,6 +114,8 @@ class InspectedRun:
 
     def frame(self, frame: int, results: ResultsReader | None = None) -> "InspectedFrame":
         """A frame with its layers, finished or not. results : a reader to use. Raises NotFoundError, DamagedError."""
+        if tried := self.tried_at(frame):
+            return InspectedFrame(self, frame, tried.layers, tried.result)
         if results is None:
             with self.run.results() as opened:
                 return self.frame(frame, opened)
@@ -110,10 +132,11 @@ class InspectedRun:
         """One sentence: session, run, frame, what it was tracked with, and versions."""
         record = self.run.record
         entry = self.history.in_use(frame, 10**6) if frame is not None else None
-        values: dict[str, Any] = dict(entry.values if entry else record.settings)
-        size = size_in_words(record.tracker, values)
-        named = [f"{key} {values[key]:g}" for key in ("survival", "diffusion_scale") if key in values]
-        place = f", frame {frame}" if frame is not None else ""
+        tried = None if frame is None else self.tried_at(frame)
+        used = values(tried.settings) if tried else entry.values if entry else record.settings
+        size = size_in_words(record.tracker, used)
+        named = [f"{key} {used[key]:g}" for key in ("survival", "diffusion_scale") if key in used]
+        place = f", frame {frame}{' tried again, not stored' if tried else ''}" if frame is not None else ""
         made = record.software or "an older studio"
         return (
             f"Session {self.session.name}, run {self.run.name}{place}: "
@@ -203,9 +226,9 @@ class InspectedFrame:
     def estimate(self, track: str = "") -> Array:
         """(D,) the frame's pose, in a track if one is named; in an unfinished frame the last layer's mean.
 
-        Raises NotFoundError for a track that does not have the frame.
+        Raises NotFoundError for a track that does not have the frame. Of a tried frame there are no tracks.
         """
-        if track and track != "raw":
+        if track and track != "raw" and not self.of.tried_at(self.number):
             return pose_in_track(self.of.run, track, self.number)
         return self.layers[-1].mean if self.result is None else self.result.estimate.pose
 

@@ -16,7 +16,7 @@ from studio.body.forward_kinematics import limb_ends, marker_points
 from studio.body.inverse_kinematics import pose_from_markers
 from studio.body.model import BodyModel
 from studio.errors import StudioError
-from studio.evaluation.errors import TRUNK, limb_of_markers, rows_of_frames
+from studio.evaluation.errors import TRUNK, has_sides, limb_of_markers, rows_of_frames
 from studio.evidence.distance_maps import silhouettes_by_camera
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.inspection.reading import InspectedRun
@@ -60,9 +60,11 @@ def limbs_of_points(body: BodyModel) -> tuple[str, ...]:
     return tuple(owner[marker.name] for marker in body.markers)
 
 
-def limb_group(limb: str) -> str:
-    """The limb that a parameter's limb is counted with: itself where it is left or right, else head and trunk."""
-    return limb if "left" in limb or "right" in limb else TRUNK
+def limb_group(body: BodyModel, limb: str) -> str:
+    """The limb that a parameter's limb is counted with: itself where it is left or right or the body has no sides, else
+    head and trunk.
+    """
+    return limb if "left" in limb or "right" in limb or not has_sides(body) else TRUNK
 
 
 def by_limb(body: BodyModel, distances: Array) -> dict[str, Array]:

@@ -526,7 +526,7 @@ def _verdict_sentences(case: Case) -> list[str]:
             f" {_mm(lost_mm(case.run.body))} off."
         )
     if verdict.by_silhouettes:
-        shares = {} if result is None else limb_shares(result.disagreement)
+        shares = {} if result is None else limb_shares(case.run.body, result.disagreement)
         limbs = [f"the {limb}{_share(shares.get(limb))}" for limb in verdict.by_silhouettes]
         found.append(f"Lost by the silhouettes: {enumerated(limbs)}.")
     return found

@@ -10,6 +10,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 from rich.progress import Progress as Bar
 
 from studio.progress import Progress, TimeLeft, left_in_words, unheard
+from studio.words import printable
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +67,7 @@ def bar(console: Console, title: str) -> Generator[Progress]:
             finished = shown.tasks[task]
             shown.update(
                 task,
-                description=step or title,
+                description=printable(step or title),
                 completed=done,
                 total=total or None,
                 left=left_in_words(left.after(step, done, total)),

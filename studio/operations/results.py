@@ -29,7 +29,7 @@ from studio.runs.checking import EVERY, RunCheck, check_run
 from studio.runs.refining import REFINED, SMOOTHED, MadeTrack, refine_run, smooth_run
 from studio.runs.tracks import BEST, Track, best_track, track_names
 from studio.runs.tracks import read_track as read_stored_track
-from studio.runs.verifying import Repair, Verification, repair
+from studio.runs.verifying import Repair, Verification, remove_left_behind, repair
 from studio.runs.verifying import verify as verify_session
 from studio.trackers.refinement import RefinementSettings
 from studio.trackers.smoothing import SmoothingSettings
@@ -252,7 +252,10 @@ def verify(
     *,
     mend: Annotated[
         bool,
-        Field(description="Track damaged frames again, bit for bit where nothing else has changed."),
+        Field(
+            description="Track damaged frames again, bit for bit where nothing else has changed, and remove what broken"
+            " off work left behind."
+        ),
         Terminal("--repair"),
     ] = False,
     progress: Reporting = None,
@@ -268,5 +271,9 @@ def verify(
         if mend and any(fault.run for fault in found.faults):
             repaired = repair(opened, found.faults, report)
             found = verify_session(opened, report)
+        if mend and found.left:
+            remove_left_behind(opened)
     say(progress, [f"damaged: {fault.place}: {fault.what}. {fault.remedy}" for fault in found.faults])
+    done = "removed" if mend else "to be removed by --repair"
+    say(progress, [f"left behind by something that was broken off, {done}: {place}" for place in found.left])
     return Verified(found, repaired)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from studio.arrays import Array
 from studio.body.model import BodyModel
-from studio.errors import RunError
+from studio.errors import RunError, SessionError
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
@@ -162,7 +162,7 @@ def check_run(
     *,
     progress: Progress = unheard,
 ) -> RunCheck:
-    """Measure a track in every `every`-th of its frames and store the result.
+    """Measure a track in every `every`-th of its frames and store the result, if the disk can be written.
 
     Raises RunError for a run without frames, NotFoundError, FootageError.
     """
@@ -200,8 +200,10 @@ def check_run(
         jumps=jumps_of(body, chosen),
         denied=tuple(denied),
     )
-    (run.folder / FOLDER).mkdir(exist_ok=True)
-    _RECORD.write(_path(run, chosen.name), check)
+    # What was measured is told, also where the disk cannot keep it.
+    with contextlib.suppress(OSError, SessionError):
+        (run.folder / FOLDER).mkdir(exist_ok=True)
+        _RECORD.write(_path(run, chosen.name), check)
     return check
 
 

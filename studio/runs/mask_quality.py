@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from studio.arrays import Bytes
 from studio.body.scale import scale_of
 from studio.calibration.findings import Finding, blocking
-from studio.errors import RunError, StudioError
+from studio.errors import FootageError, RunError, StudioError
 from studio.evidence.masks import PackedMasks, reduced
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
@@ -170,6 +170,10 @@ def mask_quality(
     scale = scale_of(session.body())
     with masks_of(session, settings) as maker:
         chosen = tuple(frames) or spread_frames(maker.footage.frame_count, FRAMES)
+        if not chosen:
+            raise FootageError(
+                f"Session '{session.name}' has no frame whose masks could be measured.", "Add footage."
+            )
         masks: dict[int, list[Bytes]] = {frame: [] for frame in chosen}
         people = {frame: PackedMasks() for frame in chosen}
         total = (len(cameras) + 1) * len(masks)

@@ -5,7 +5,10 @@ Files have theirs in `.checksums.json` (`sessions.file_checksums`), frames, laye
 """
 
 import contextlib
+import os
+import time
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +18,7 @@ from studio.progress import Progress, unheard
 from studio.runs.problem_source import ProblemSource
 from studio.runs.run_footage import footage_of
 from studio.runs.tracking_run import TrackingRun
+from studio.sessions.atomic_files import PARTIAL_PREFIX, discard
 from studio.sessions.file_checksums import check_files
 from studio.sessions.results_store import FILE_NAME, ResultsWriter
 from studio.sessions.salvaging import faults_of_database, salvage
@@ -23,6 +27,7 @@ from studio.sessions.stored_run import StoredRun
 from studio.settings import SettingsHistory, settings_from_values
 
 ENDINGS = ("", "cancelled", "finished")
+UNTOUCHED_SECONDS = 3600.0
 COPY = "Put back a copy of the file."
 REPAIR = "Track it again: studio verify --repair, or resume the run."
 
@@ -41,7 +46,8 @@ class Fault:
 @dataclass(frozen=True, slots=True)
 class Verification:
     """The result of a verification. files, frames : read. unchecked : frames without checksums, all of which could be
-    unpacked. written_again : files written since, not faults. new : files with a checksum for the first time.
+    unpacked. written_again : files written since, not faults. new : files with a checksum for the first time. left :
+    places of what something that was broken off left behind, in the session or beside it.
     """
 
     files: int
@@ -50,6 +56,7 @@ class Verification:
     written_again: tuple[str, ...]
     new: int
     faults: tuple[Fault, ...]
+    left: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +90,37 @@ def verify(session: Session, progress: Progress = unheard) -> Verification:
         progress(f"checking run {run.name}", done, len(runs))
         count, without, wrong = _verify_results(run)
         frames, unchecked, faults = frames + count, unchecked + without, faults + wrong
-    return Verification(files, frames, unchecked, tuple(again), new, tuple(faults))
+    left = tuple(str(path) for path in left_behind(session))
+    return Verification(files, frames, unchecked, tuple(again), new, tuple(faults), left)
+
+
+def left_behind(session: Session) -> tuple[Path, ...]:
+    """Unfinished files and folders in a session and beside it, in which nothing has changed for an hour: an import, a
+    mask or a copy that was killed.
+    """
+    found = [*session.path.parent.glob(f"{PARTIAL_PREFIX}*"), *session.path.rglob(f"{PARTIAL_PREFIX}*")]
+    before = time.time() - UNTOUCHED_SECONDS
+    return tuple(sorted(path for path in found if not path.is_symlink() and _newest(path) < before))
+
+
+def remove_left_behind(session: Session) -> None:
+    """Remove `left_behind`. What the disk refuses stays."""
+    for path in left_behind(session):
+        if path.is_dir():
+            discard(path)
+        else:
+            with contextlib.suppress(OSError):
+                path.unlink()
+
+
+def _newest(path: Path) -> float:
+    """When something was last changed in a folder, or the file."""
+    times = [path.lstat().st_mtime]
+    for parent, _, names in os.walk(path):
+        for entry in (parent, *(os.path.join(parent, name) for name in names)):
+            with contextlib.suppress(OSError):
+                times.append(os.lstat(entry).st_mtime)
+    return max(times)
 
 
 def _verify_results(run: StoredRun) -> tuple[int, int, list[Fault]]:

@@ -65,6 +65,7 @@ from studio.scene.pose_edit import begun, edit_of, ended, moved, saved
 from studio.scene.pose_handles import PoseHandles, drag
 from studio.scene.pose_refining import PoseRefining, outcome
 from studio.scene.scene_views import SceneViews, first_view
+from studio.scene.twin import Places, differ, following, joining
 from studio.sessions.workspace import Workspace
 from studio.settings import all_knobs
 
@@ -114,6 +115,8 @@ class SceneController:
         self.bare = False
         """Whether it has no controls."""
         self._looking: viser.CameraHandle | None = None
+        self._twin: SceneController | None = None
+        self._is_leading, self._places = True, Places()
         self._trial: TrialView | None = None
         self._floor: FloorView | None = None
         self.panel = Panel(server, self.post, self.request_knobs, self.refine_pose, self.save_pose)
@@ -152,6 +155,46 @@ class SceneController:
     def refused(self, problem: StudioError) -> None:
         """Show a refusal to every viewer."""
         notify(self._server, problem.message, problem.hint, bad=True)
+
+    def lead(self, follower: "SceneController | None") -> None:
+        """Let another scene show the same moment in the same way from now on; None: no longer."""
+        for one in (self._twin, follower):
+            if one is not None:
+                one._twin, one._is_leading = (self if one is follower else None), one is not follower
+        self._twin, self._is_leading = follower, True
+        if follower is not None:
+            self.post(self._bring_along)
+
+    def _bring_along(self, model: Model) -> Model:
+        """Let the twin show what is shown here, seen from where it is seen here."""
+        if self._twin is not None:
+            self._twin.post(self._twin.join, model)
+            for client in self._server.get_clients().values():
+                self._twin.put_viewers(
+                    (*map(float, client.camera.position), *map(float, client.camera.look_at))
+                )
+        return model
+
+    def join(self, model: Model, other: Model) -> Model:
+        """Show what the other of two scenes shows (`twin`)."""
+        if self._is_leading:
+            return joining(model, other)
+        return following(self._open(model, other.selection.session, other.selection.run), other)
+
+    def put_viewers(self, eye: tuple[float, ...]) -> None:
+        """Put this scene's viewers to a place, looking at another (6,) metres; from any thread."""
+        self._places.note(eye)
+        for client in self._server.get_clients().values():
+            _put(client, eye)
+
+    def _sees(self, camera: viser.CameraHandle) -> None:
+        """A viewer moved: the other scene's come along."""
+        eye = (*map(float, camera.position), *map(float, camera.look_at))
+        if self._twin is None:
+            self._looking = camera
+        elif not self._places.is_echo(eye):
+            self._looking = camera
+            self._twin.put_viewers(eye)
 
     # Changes that need more than the model.
 
@@ -363,10 +406,12 @@ class SceneController:
                 _put(client, model.selection.eye)
             if self.views is not None:
                 self.views.cameras.place(client)
+            if self._twin is not None and not self._is_leading:
+                self._twin.post(self._twin._bring_along)
             return model
 
         self.post(place)
-        client.camera.on_update(lambda camera: setattr(self, "_looking", camera))
+        client.camera.on_update(self._sees)
 
     def look_from(self, model: Model, eye: tuple[float, ...] | None) -> Model:
         """Put the viewers' eyes at a place, looking at another (6,) metres; None: the usual place."""
@@ -496,6 +541,9 @@ class SceneController:
         if self._refining is not None and (edit is None or edit.refining is None):
             self._refining.stop()
             self._refining = None
+        twin = self._twin
+        if twin is not None and change != self.join and differ(before, self.model):
+            twin.post(twin.join, self.model)
         is_moved = announce and self.model.selection != before.selection
         if is_moved or self.model.layers.state != before.layers.state:
             self._moved(self.model.selection, self.model.layers)
@@ -522,9 +570,13 @@ class SceneController:
         )
 
     def _layers_so_far(self) -> int:
-        """How many layers of the shown frame are there, of whatever search is shown."""
-        moment = self._moment()
-        return max((record.layer + 1 for record in moment.records), default=0) if moment is not None else 0
+        """How many layers of the shown frame are there, of whatever search is shown here or in the twin."""
+        moment, twin = self._moment(), self._twin
+        records = (
+            *(moment.records if moment is not None else ()),
+            *(twin.model.live.records if twin else ()),
+        )
+        return max((record.layer + 1 for record in records), default=0)
 
     def _draw(self) -> None:
         model, tokens = self.model, colour_tokens(self.model.options.dark)
@@ -535,7 +587,10 @@ class SceneController:
         if model.options.shadows != self._has_shadows:
             self._has_shadows = model.options.shadows
             light(self._server, self._has_shadows)
-        self.panel.show(model, moment, tokens)
+        if self.bare:
+            self.panel.hide()
+        else:
+            self.panel.show(model, moment, tokens)
         if self.views is not None and moment is not None:
             self.views.show(model, moment, tokens)
         if self.handles is not None and model.edit is not None:

@@ -58,7 +58,8 @@ class Selection:
 class ViewOptions:
     """The choices of the Show tab and of the page.
 
-    body, body_opacity : the answer's cones. stored : the stored result as a grey cage beside a re-annealed one.
+    body, body_opacity : the answer's cones. trials : a frame that is annealed again, in the place of the stored one.
+    stored : the stored result as a grey cage beside it.
     truth : the reference's stick figure. particles : the clouds, at the far ends of `limbs` (names; None: the
     extremities'), coloured by "layer" or "weight". point_size : metres. trails : paths of `trail_markers` (None: the
     extremities') over `trail_frames` frames before and after the shown one (0: all). cameras, pictures : frusta and
@@ -71,6 +72,7 @@ class ViewOptions:
 
     body: bool = True
     body_opacity: float = 0.85
+    trials: bool = True
     stored: bool = True
     truth: bool = True
     particles: bool = True
@@ -518,6 +520,8 @@ def hear(model: Model, event: Event, frames: tuple[int, ...] = ()) -> Model:
         since = event.frame, event.layer
         return replace(model, knobs=replace(model.knobs, settings=settings, since=since, drafts={}))
     if not isinstance(event, LayerFinished | FrameFinished):
+        return model
+    if event.reannealed and not model.options.trials:
         return model
     model = replace(model, live=searched_on(model.live, event))
     if isinstance(event, FrameFinished) and not event.reannealed:

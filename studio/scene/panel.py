@@ -54,6 +54,12 @@ class Panel:
         self.options.show(model, moment, tokens)
         self.pose.show(model)
 
+    def hide(self) -> None:
+        """Show nothing, for who may only look: the page says what stood here, and the scene has the room."""
+        for part in (self.status, self.mark, self.tabs):
+            if part.visible:
+                part.visible = False
+
 
 def dress(server: viser.ViserServer, tokens: ColourTokens) -> None:
     """Give viser the studio's theme: no logo, no sharing, our accent, our background, light or dark."""

@@ -19,6 +19,7 @@ from studio.scene.guarded_server import GuardedServer
 from studio.scene.model import (
     Ghost,
     LayerPlayback,
+    LiveSearch,
     Selection,
     ViewOptions,
     change_options,
@@ -34,6 +35,7 @@ from studio.scene.model import (
 )
 from studio.scene.pose_edit import UNDO, changed_whole
 from studio.scene.scene_pictures import ScenePictures
+from studio.scene.twin import show_trial
 from studio.sessions.workspace import Workspace
 
 
@@ -56,6 +58,10 @@ class SceneServer:
         self._server = GuardedServer()
         self._controller = SceneController(self._server, workspace, process, moved)
         self._controller.bare = bare
+        if bare:
+            # Docked it would take its width from the scene though it is empty.
+            self._server.gui.main_panel.float()
+            self._server.gui.main_panel.minimize()
         self._controller.start()
         self.poses = ScenePoses(self._controller)
         self.pictures = ScenePictures(self._server, self._controller)
@@ -128,6 +134,17 @@ class SceneServer:
     def discard_what_if(self) -> None:
         """Forget the frame that was annealed again."""
         self._controller.post(discard_what_if, announce=False)
+
+    def show_trial(self, trial: LiveSearch | None) -> None:
+        """Show what was tried of a frame in its place; None: what is stored."""
+        self._controller.post(show_trial, trial or LiveSearch(), announce=False)
+
+    def lead(self, follower: "SceneServer | None") -> None:
+        """Let another scene show trials of the moment that this one shows as stored, seen alike; None: no longer."""
+        if follower is not None:
+            follower.set_options(trials=True, stored=False)
+        self.set_options(trials=follower is None)
+        self._controller.lead(None if follower is None else follower._controller)
 
     def show_ghosts(self, ghosts: Sequence[tuple[str, Sequence[float]]]) -> None:
         """Draw bodies beside the answer until another frame is shown: a colour's token and a pose (D,) of each."""

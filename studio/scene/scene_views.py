@@ -133,10 +133,10 @@ class SceneViews:
         records = [record for record in moment.records if selection.layer in (None, record.layer)]
         pictures: dict[str, Bytes] = {}
         # Beside a frame that is annealed again stands the stored result, beside a compared run the others.
-        others = [] if moment.beside is None else [OtherBody(moment.beside, "before")]
+        others = [] if moment.beside is None else [OtherBody(moment.beside, "stored")]
         others += [OtherBody(ghost.pose, ghost.colour) for ghost in model.ghosts]
         own = (
-            "after"
+            "tried"
             if moment.beside is not None
             else "series-0"
             if any(ghost.colour.startswith("series") for ghost in model.ghosts)

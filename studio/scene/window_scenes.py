@@ -16,6 +16,8 @@ from studio.sessions.workspace import Workspace
 
 MOST_SCENES = 32
 """A scene takes two threads, six file descriptors and about 25 MB with four cameras of 640 × 480."""
+TWIN = "-tried"
+"""What is added to a window's name for its second scene, which shows trials."""
 GRACE_SECONDS = 60.0
 """Seconds that a scene outlives its window, so that a reloaded page finds it unchanged."""
 _LOG = logging.getLogger(__name__)
@@ -27,9 +29,12 @@ class TooManyScenesError(StudioError, status=503, code="windows"):
 
 @dataclass(slots=True)
 class _Entry:
+    """is_led : whether it shows what another window's scene leads it to (`SceneServer.lead`)."""
+
     scene: SceneServer
     used: float
     bare: bool
+    is_led: bool = False
 
 
 class WindowScenes:
@@ -74,11 +79,26 @@ class WindowScenes:
                     self._workspace,
                     self._process,
                     lambda shown, layers: self._moved(window, shown, layers),
-                    bare=bare,
+                    bare=bare or window.endswith(TWIN),
                 )
                 entry = self._entries[window] = _Entry(scene, 0.0, bare)
             entry.used = time.monotonic()
             return entry.scene
+
+    def twin(self, window: str) -> SceneServer | None:
+        """The scene that shows trials beside a window's own, None while there is none."""
+        entry = self._entries.get(window + TWIN)
+        return entry.scene if entry is not None and entry.is_led else None
+
+    def split(self, window: str, is_split: bool) -> None:
+        """Let a window have a second scene for trials, beside its own, or no longer. Raises as `scene`."""
+        leader = self.scene(window)
+        if not is_split:
+            if (entry := self._entries.get(window + TWIN)) is not None:
+                entry.is_led = False
+            return leader.lead(None)
+        leader.lead(self.scene(window + TWIN))
+        self._entries[window + TWIN].is_led = True
 
     def open_scenes(self) -> dict[str, SceneServer]:
         """The open scenes by window."""
@@ -92,6 +112,12 @@ class WindowScenes:
                 if window in windows or entry.scene.is_viewed:
                     entry.used = now
             gone = [window for window, entry in self._entries.items() if now - entry.used > self.grace]
+            for window in gone:
+                if (
+                    window.endswith(TWIN)
+                    and (own := self._entries.get(window.removesuffix(TWIN))) is not None
+                ):
+                    own.scene.lead(None)
             closing = [self._entries.pop(window) for window in gone]
         while closing:
             _close(closing.pop())

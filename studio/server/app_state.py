@@ -96,5 +96,6 @@ def release(app: AppState, session: str, run: str = "") -> None:
     for scene in app.scenes.open_scenes().values():
         if scene.shown.session == session and (not run or scene.shown.run == run):
             scene.show_run(session if run else "")
+    app.events.tried.forget(session, run)
     forget_composers()
     forget_evaluations()

@@ -77,6 +77,11 @@ def add_error_handlers(app: FastAPI) -> None:
         wrong.status, wrong.code = 422, "request"
         return error_response(wrong)
 
+    async def too_large(_request: Request, error: Exception) -> Response:
+        wrong = StudioError(f"A number in the request is too large ({error}).", "Give a smaller one.")
+        wrong.status, wrong.code = 422, "request"
+        return error_response(wrong)
+
     async def http_error(request: Request, error: Exception) -> Response:
         status = error.status_code if isinstance(error, HTTPException) else 500
         if status == 400:
@@ -96,6 +101,7 @@ def add_error_handlers(app: FastAPI) -> None:
     app.add_exception_handler(StudioError, studio_error)
     app.add_exception_handler(RequestValidationError, invalid)
     app.add_exception_handler(HTTPException, http_error)
+    app.add_exception_handler(OverflowError, too_large)
 
 
 class ErrorsInWords:

@@ -14,6 +14,7 @@ from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 
 from studio.jobs.control import StudioControl
 from studio.jobs.events import Event, LayerFinished, SettingsApplied, StateChanged
+from studio.jobs.tried_frames import TriedFrames
 from studio.jobs.watchers import Subscription
 from studio.scene.scene_server import SceneServer
 from studio.server.event_encoding import as_json, key_of, message_of
@@ -30,7 +31,8 @@ Watcher = Subscription[str]
 
 class EventStream:
     """Takes the worker's events and the web's own messages to all watchers. scenes : the open ones by window; layers,
-    of which there are many, go to the windows whose scene shows their run. outlines : of the layers' clouds.
+    of which there are many, go to the windows whose scene shows their run. outlines : of the layers' clouds. tried :
+    what was annealed again.
     """
 
     def __init__(
@@ -40,6 +42,7 @@ class EventStream:
         outlines: LayerOutlines | None = None,
     ) -> None:
         self._control, self._scenes, self._outlines = control, scenes, outlines
+        self.tried = TriedFrames()
         self._lock = threading.Lock()
         self._watchers: dict[Watcher, str] = {}
         self._settings: dict[str, object] | None = None
@@ -105,6 +108,8 @@ class EventStream:
             while True:
                 event = await source.next()
                 message = message_of(event)
+                if name := self.tried.hear(event):
+                    message["trial"] = name
                 if isinstance(event, LayerFinished) and self._outlines is not None and self._watchers:
                     message["outline"] = self._outlines.of_event(event)
                 if isinstance(event, SettingsApplied):

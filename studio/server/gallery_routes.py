@@ -79,7 +79,7 @@ def card_picture(card: str, app: App) -> Response:
         content = read_file(place) if place else None
     else:
         shipped = GALLERY_PICTURES / f"{found.name}.jpg"
-        content = shipped.read_bytes() if shipped.is_file() else None
+        content = read_file(shipped) if shipped.is_file() else None
         if found.kind == "sample":
             content = thumbnail_of(Session(sample_folder(found.name)))
     if content is None:

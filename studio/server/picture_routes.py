@@ -93,12 +93,12 @@ def overlay(
     """What a camera saw in a frame, with the run's answer and evidence over it at choice."""
     _check_view(session, frame, camera, run)
     pose = None if track == RAW else pose_in_track(run, track, frame)
-    others = [OtherBody(_numbers(beside, len(run.record.parameters)), "after")] if beside else []
+    others = [OtherBody(_numbers(beside, len(run.record.parameters)), "tried")] if beside else []
     for at, name in enumerate(compared.split(",") if compared else ()):
         # One of another session, whose cameras are others, has its place and colour all the same.
         if name and (found := _body_of(session, name, frame, at + 1)):
             others.append(found)
-    own = "before" if beside else "series-0" if others else ""
+    own = "stored" if beside else "series-0" if others else ""
     picture = compose_view(
         session, run, frame, camera, _layers(show), pose, height=height, beside=others, own=own
     )

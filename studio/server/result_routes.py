@@ -10,13 +10,11 @@ from fastapi import APIRouter, Query, Response
 from pydantic import Field
 
 from studio.body.model import BodyModel
-from studio.errors import NotFoundError, SettingsError, StudioError
+from studio.errors import NotFoundError, StudioError
 from studio.evaluation.errors import Evaluation
 from studio.geometry.camera import Camera
-from studio.geometry.reach import within_reach
 from studio.inspection.cloud_outlines import CloudOutline, outline_of
 from studio.inspection.reading import InspectedFrame, InspectedRun
-from studio.inspection.reference import body_points, by_limb, true_points
 from studio.inspection.verdict import limbs_off, verdict_on, verdicts
 from studio.runs.live_summary import summary_of
 from studio.runs.tracks import RAW
@@ -24,7 +22,7 @@ from studio.server import files
 from studio.server.event_encoding import layer_summary
 from studio.server.run_errors import evaluation_of
 from studio.server.run_routes import RUN, Checked, OpenRun
-from studio.server.schemas import Answer, Number, Numbers, Request, Value
+from studio.server.schemas import Answer, Number, Numbers, Value
 from studio.server.session_routes import OpenSession
 from studio.server.session_views import ParameterView, describe, parameter_views
 from studio.server.setting_views import SettingsChange, changes_of, history_of
@@ -175,30 +173,6 @@ class ParticlesView(Answer):
     log_weights: Numbers
 
 
-class PoseError(Answer):
-    """How far a pose is from the truth, mm. limbs: by limb."""
-
-    error_mm: Number
-    limbs: dict[str, Number]
-
-
-class PoseGiven(Request):
-    """A pose, radians and mm, in the order of the run's parameters."""
-
-    pose: list[float] = Field(max_length=512)
-
-
-class Outcome(Answer):
-    """A frame's stored pose and another one. before, after: null without a truth in this frame."""
-
-    frame: int
-    log_weight: Number
-    evaluations: int
-    milliseconds: Number
-    before: PoseError | None = None
-    after: PoseError | None = None
-
-
 class EvaluationView(Answer):
     """A run against the session's truth, in mm, without alignment unless said.
 
@@ -328,36 +302,6 @@ def frame_detail(session: OpenSession, run: OpenRun, frame: int) -> FrameDetail:
         limbs_lost=list(limbs_off(result)) if result else [],
         notes=list(result.notes) if result else [],
         settings=dict(entry.values if entry else run.record.settings),
-    )
-
-
-@router.post(RUN + "/frames/{frame}/outcome")
-def outcome(session: OpenSession, run: OpenRun, frame: int, given: PoseGiven) -> Outcome:
-    """What another pose would change in a frame: its error and that of the stored pose, in all and by limb."""
-    inspected = InspectedRun(session, run)
-    if len(given.pose) != len(inspected.names) or not within_reach(given.pose):
-        raise SettingsError("The pose is not one of the run's body.", "Give its parameters in order.")
-    with run.results() as results:
-        result = results.result(frame)
-    truth = true_points(inspected, frame)
-    poses = np.stack([result.estimate.pose, np.array(given.pose)])
-    away = None if truth is None else np.linalg.norm(body_points(inspected.body, poses) - truth, axis=2)
-
-    def error_of(at: int) -> PoseError | None:
-        if away is None:
-            return None
-        limbs: dict[str, float | None] = {
-            limb: float(mm) for limb, mm in by_limb(inspected.body, away[at]).items()
-        }
-        return PoseError(error_mm=float(np.nanmean(np.asarray(away[at]))), limbs=limbs)
-
-    return Outcome(
-        frame=frame,
-        log_weight=result.estimate.log_weight,
-        evaluations=result.evaluations,
-        milliseconds=result.milliseconds,
-        before=error_of(0),
-        after=error_of(1),
     )
 
 

@@ -10,22 +10,26 @@ from studio.body.reader import parse_body
 from studio.errors import SettingsError
 from studio.geometry.reach import within_reach
 from studio.operations.own_bodies import MOST_TEXT
-from studio.scene.model import LayerPlayback, Selection
+from studio.scene.model import LayerPlayback, LiveSearch, Selection
 from studio.server.app_state import App, AppState, Scene
 from studio.server.schemas import Request, RunName
+from studio.server.windows import Window
 
 router = APIRouter(prefix="/api/scene", tags=["scene"])
 
 CHOSEN = ("limb", "parameter", "particle", "camera")
 
 
+TrialPlace = Annotated[
+    str | None, Field(max_length=200, description='SESSION/RUN/TRIAL, "" for what is stored.')
+]
 ChosenName = Annotated[str | None, Field(max_length=128)]
 
 
 class GhostBody(Request):
     """A body beside the answer. colour: the name of a colour token. pose: radians and mm."""
 
-    colour: str = Field("ghost", pattern="^(ghost|accent|before|after|truth|series-[0-7]|layer-[0-9])$")
+    colour: str = Field("ghost", pattern="^(ghost|accent|stored|tried|truth|series-[0-7]|layer-[0-9])$")
     pose: list[float] = Field(max_length=512)
 
 
@@ -36,7 +40,10 @@ class SceneRequest(Request):
     the ones that are played go on; a layer that is given is shown by itself, and playing layers ends. follow: whether
     each frame is shown as it is tracked. look_through: a camera's name, null or "" for the free view. options: what is
     drawn, by the names of the scene's own view options (body, truth, particles, trails, cameras, pictures, overlays …).
-    playing, speed (1 is real time), loop: of stored frames.
+    playing, speed (1 is real time), loop: of stored frames. twin: whether trials are shown in a second scene, that of
+    the window's name with "-tried" at its end, which shows the same moment and is seen alike. trial: the one to show in
+    the place of its frame, "" for what is stored; with a twin it is shown there. against: the trial that the window's
+    own scene shows beside a twin, "" for what is stored.
     limb, parameter, particle (a row of the layer's cloud), camera: what else is chosen, null for none. eye: from where
     the scene is looked at and what is looked at, metres; null: the usual place. ghosts: bodies beside the answer, until
     another frame is shown. body: the file of a body that is being made, shown in place of the session's own, or without
@@ -57,6 +64,9 @@ class SceneRequest(Request):
     discard: bool = Field(False, description="Forget the frame that was annealed again.")
     ghosts: list[GhostBody] | None = Field(None, max_length=12)
     dark: bool | None = None
+    twin: bool | None = None
+    trial: TrialPlace = None
+    against: TrialPlace = None
     playing: bool | None = None
     speed: float | None = Field(None, gt=0.0, le=10.0)
     loop: bool | None = None
@@ -66,7 +76,7 @@ class SceneRequest(Request):
 
 
 @router.post("/show", status_code=204)
-def show(request: SceneRequest, app: App, scene: Scene) -> None:
+def show(request: SceneRequest, app: App, scene: Scene, window: Window = "") -> None:
     """Show a moment of a run (or a session without one) in the asking window's scene. Names are checked before
     anything changes.
     """
@@ -88,6 +98,12 @@ def show(request: SceneRequest, app: App, scene: Scene) -> None:
         scene.follow(request.follow)
     if request.discard:
         scene.discard_what_if()
+    if request.twin is not None:
+        app.scenes.split(window, request.twin)
+    if request.trial is not None:
+        (app.scenes.twin(window) or scene).show_trial(_search(app, request.trial))
+    if request.against is not None and app.scenes.twin(window) is not None:
+        scene.show_trial(_search(app, request.against))
     chosen = {name: getattr(request, name) for name in CHOSEN if name in given}
     if chosen:
         scene.select(**chosen)
@@ -118,9 +134,19 @@ def show(request: SceneRequest, app: App, scene: Scene) -> None:
 
 
 @router.post("/view", status_code=204)
-def view(request: SceneRequest, app: App, scene: Scene) -> None:
+def view(request: SceneRequest, app: App, scene: Scene, window: Window = "") -> None:
     """The same under a name that says what it is for: the theme, the camera looked through."""
-    show(request, app, scene)
+    show(request, app, scene, window)
+
+
+def _search(app: AppState, trial: str) -> LiveSearch | None:
+    """The search of a trial, None for "". Raises NotFoundError."""
+    if not trial:
+        return None
+    session, _, rest = trial.partition("/")
+    run, _, name = rest.partition("/")
+    found = app.events.tried.tried(app.workspace.session(session).run(run), session, name)
+    return LiveSearch(found.number, True, found.layers, found.result)
 
 
 class LayerPlaying(Request):

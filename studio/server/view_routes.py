@@ -8,6 +8,7 @@ from pydantic import BeforeValidator, Field
 from studio.errors import RunError
 from studio.inspection.comparing import compare_stored
 from studio.inspection.reading import InspectedRun
+from studio.inspection.seeds import search_seeds
 from studio.inspection.shared_page import shared_page
 from studio.inspection.tables import Column, Remedy, Selection, View, Viewed
 from studio.inspection.views import VIEWS, look, look_over, view_named
@@ -122,6 +123,21 @@ def selection_of(
 Selected = Annotated[Selection, Depends(selection_of)]
 
 
+def inspected_run(
+    session: OpenSession,
+    run: OpenRun,
+    app: App,
+    trial: Annotated[
+        str, Query(max_length=32, description="A trial that is looked at in the place of its frame.")
+    ] = "",
+) -> InspectedRun:
+    """The run that is looked into, with what was tried in one of its frames, as a dependency of routes."""
+    return InspectedRun(session, run, app.events.tried.tried(run, session.name, trial) if trial else None)
+
+
+Inspected = Annotated[InspectedRun, Depends(inspected_run)]
+
+
 @router.get("/views")
 def views() -> ViewList:
     """All views: what each answers, what of the selection it uses, and its tables."""
@@ -129,16 +145,14 @@ def views() -> ViewList:
 
 
 @router.get(RUN + "/frames/{frame}/views/{view}")
-def frame_view(session: OpenSession, run: OpenRun, frame: int, view: str, selection: Selected) -> ViewAnswer:
+def frame_view(inspected: Inspected, frame: int, view: str, selection: Selected) -> ViewAnswer:
     """A view's tables of a frame. Before a job has ended the tables of `seeds` are empty."""
-    inspected = InspectedRun(session, run)
     return _answer(inspected, view, look(inspected, frame, view, selection), frame)
 
 
 @router.get(RUN + "/views/{view}")
-def run_view(session: OpenSession, run: OpenRun, view: str, selection: Selected) -> ViewAnswer:
+def run_view(inspected: Inspected, view: str, selection: Selected) -> ViewAnswer:
     """A view's tables of the whole run; none for a view that shows single frames only."""
-    inspected = InspectedRun(session, run)
     return _answer(inspected, view, look_over(inspected, view, selection), None)
 
 
@@ -165,13 +179,17 @@ def begin_seeds(
     run: OpenRun,
     frame: int,
     arguments: Annotated[Arguments, body_of(seeds, "SeedsRequest", without=("frame",))],
+    inspected: Inspected,
     app: App,
 ) -> SeedsState:
-    """Begin to search a frame with other seeds. Ask for its state, or wait for `seeds` events."""
-    InspectedRun(session, run).frame(frame)
+    """Begin to search a frame, or a trial of it, with other seeds. Ask for its state, or wait for `seeds` events."""
+    inspected.frame(frame)
 
     def work(job: Job) -> dict[str, object]:
-        seeds(run, frame, **arguments, progress=job.report_or_stop)
+        if inspected.tried is None:
+            seeds(run, frame, **arguments, progress=job.report_or_stop)
+        else:
+            search_seeds(inspected, frame, int(arguments["count"]), job.report_or_stop)
         return {}
 
     return app.jobs.begin(SEEDS, SeedsState(session=session.name, run=run.name, frame=frame), work)

@@ -7,17 +7,20 @@ checksums of their own.
 
 import hashlib
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 import msgspec
 
 from studio.errors import SessionError
-from studio.foreign_files import open_file
+from studio.foreign_files import LARGEST, open_file
 from studio.sessions.record_files import RecordFile
 
 NAME = ".checksums.json"
 RUNS = "runs"
+BOUNDED = frozenset((".json", ".jsonl", ".toml", ".csv", ".trc", ".npz", ".png", ".jpg"))
+"""Endings of files that are read whole (`foreign_files.LARGEST`)."""
 STORES = "results."
 WRITTEN_ONCE = (
     "videos/",
@@ -81,6 +84,9 @@ def check_files(folder: Path, *, note: bool = True) -> CheckedFiles:
     again: list[str] = []
     new: list[str] = []
     for name, path in _files(folder):
+        if path.suffix.lower() in BOUNDED and path.stat().st_size > LARGEST:
+            damaged[name] = f"is larger than the {LARGEST >> 20} MB that such a file can have"
+            continue
         try:
             found = _noted(path)
         except OSError as error:
@@ -102,7 +108,9 @@ def check_files(folder: Path, *, note: bool = True) -> CheckedFiles:
             now[name] = known[name]
     count = len(now)
     if note and readable and now != known:
-        _write(folder, now)
+        # A disk that cannot be written is no reason not to compare.
+        with suppress(SessionError):
+            _write(folder, now)
     return CheckedFiles(count, damaged, tuple(again), tuple(new))
 
 

@@ -39,7 +39,7 @@ from studio.trackers.tracker import (
 from studio.typed_decoding import is_table
 
 LEVEL = -1
-LARGEST_BLOB = 256 << 20
+LARGEST_BLOB = 128 << 20
 _NPZ = b"PK"
 """Begins the archives of a store's first version."""
 
@@ -75,6 +75,9 @@ def pack(arrays: Mapping[str, NDArray[Any]]) -> bytes:
 def unpack(blob: bytes) -> dict[str, Array]:
     """The arrays of a blob. Raises SessionError if it is damaged."""
     try:
+        # The limit counts only where the frame does not say its size itself.
+        if zstandard.frame_content_size(blob) > LARGEST_BLOB:
+            raise ValueError(f"it unpacks to more than {LARGEST_BLOB >> 20} MB")
         plain = _ZSTANDARD.decompressor.decompress(blob, max_output_size=LARGEST_BLOB)
         if plain.startswith(_NPZ):
             return read_archive(io.BytesIO(plain))

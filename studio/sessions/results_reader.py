@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
+from types import NoneType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -282,9 +283,11 @@ class ResultsReader:
                 if not (sums or rows) and before is not _NOTHING:
                     # Something else was written, which is rare.
                     before, sums, rows = _NOTHING, self._sums(FRAME), self._rows()
-                by_frame = {row[0]: row for row in rows if _is_frame(row[0])}
-                sums = {frame: text for frame, text in sums.items() if _is_frame(frame)}
                 impossible = _impossible(rows, before.rows)
+                if impossible or not rows:
+                    rows = [row for row in rows if _is_frame(row[0])]
+                    sums = {frame: text for frame, text in sums.items() if _is_frame(frame)}
+                by_frame = {row[0]: row for row in rows}
                 parts = {
                     frame: _damage(known, frame, text, by_frame.get(frame)) for frame, text in sums.items()
                 } | impossible
@@ -534,7 +537,7 @@ def _impossible(rows: Sequence[Row], known: Sequence[Row]) -> dict[int, str]:
     """`NUMBERS` for the frames whose values are not of their columns' types, or whose poses are not finite or not of
     the others' length: SQLite keeps whatever a column is given. known : rows that were found possible before.
     """
-    if not rows:
+    if not rows or _are_plain(rows, known):
         return {}
     sizes = Counter(len(row[6]) for row in (*known[:1], *rows) if isinstance(row[6], bytes))
     size = len(known[0][6]) if known else max(sizes, key=lambda one: sizes[one], default=0)
@@ -549,6 +552,33 @@ def _impossible(rows: Sequence[Row], known: Sequence[Row]) -> dict[int, str]:
     poses = np.frombuffer(b"".join(row[6] for row in whole), "<f8").reshape(len(whole), -1)
     unlike = np.flatnonzero(~np.isfinite(poses).all(axis=1))
     return wrong | {whole[int(index)][0]: NUMBERS for index in unlike}
+
+
+def _are_plain(rows: Sequence[Row], known: Sequence[Row]) -> bool:
+    """Whether all values are of their columns' types: asked of whole columns, since that is nearly always so."""
+    columns = list(zip(*rows, strict=True))
+    counts, reals = (columns[0], *columns[3:6]), (*columns[1:3], columns[8])
+    poses = columns[6]
+    types = [set(map(type, column)) for column in (*counts, *reals, poses, columns[9])]
+    if (
+        any(kinds != {int} for kinds in types[:4])
+        or not types[7] <= {bytes}
+        or not types[8] <= {int, NoneType}
+    ):
+        return False
+    if (
+        any(not kinds <= {int, float, NoneType} for kinds in types[4:7])
+        or None in columns[1]
+        or None in columns[2]
+    ):
+        return False
+    least, most = min(map(min, counts)), max(map(max, counts[1:]))
+    sizes = {len(pose) for pose in (*poses, *(row[6] for row in known[:1]))}
+    if least < 0 or most >= LARGEST_COUNT or max(columns[0]) >= MOST_FRAMES or len(sizes) > 1:
+        return False
+    if not set(columns[7]) <= {None, *TRACKING_STATES} or min(sizes) % 8:
+        return False
+    return bool(np.isfinite(np.frombuffer(b"".join(poses), "<f8")).all())
 
 
 def _are_numbers(row: Row) -> bool:

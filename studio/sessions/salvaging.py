@@ -51,7 +51,8 @@ def salvage(run_folder: Path, first: int, last: int) -> list[int]:
             contextlib.closing(open_database(path)) as broken,
             contextlib.closing(open_database(made)) as whole,
         ):
-            check_tables(broken, path)
+            with contextlib.suppress(*UNREADABLE):
+                check_tables(broken, path)
             whole.executescript(SCHEMA)
             whole.execute("BEGIN")
             lost = _copy(broken, whole, first, last)

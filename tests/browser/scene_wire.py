@@ -10,10 +10,11 @@ from scene_messages import decoded
 
 class SceneWire:
     """Keeps the newest of each thing that the browser was told to draw. viewer : from where it said that it looks.
-    shadows : whether lamps cast any.
+    shadows : whether lamps cast any. of_trials : of the window's second scene, else of its own.
     """
 
-    def __init__(self, page: Page) -> None:
+    def __init__(self, page: Page, *, of_trials: bool = False) -> None:
+        self._of_trials = of_trials
         self.clouds: dict[str, np.ndarray] = {}
         self.visible: dict[str, bool] = {}
         self.camera_moves = 0
@@ -23,7 +24,7 @@ class SceneWire:
         page.on("websocket", self._opened)
 
     def _opened(self, socket: WebSocket) -> None:
-        if "/scene/" in socket.url:
+        if "/scene/" in socket.url and socket.url.endswith("-tried") == self._of_trials:
             socket.on("framereceived", lambda content: self._raw.append(content))
             socket.on("framesent", self._sent)
 

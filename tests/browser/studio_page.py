@@ -41,6 +41,7 @@ class StudioPage:
         self.page: Page = self.context.new_page()
         self.watch = PageWatch(self.page, studio.origin)
         self.wire = SceneWire(self.page)
+        self.tried_wire = SceneWire(self.page, of_trials=True)
         if not with_scene:
             self.page.route(
                 re.compile(r"^https?://[^/]+/scene/"),

@@ -157,10 +157,10 @@ def test_every_panel_view_and_dialog_of_the_studio(window: StudioPage, studio: S
     check(window, "a view as a table")
     window.key("t")
     studio.post(f"{RUN}/settings?frame=2", {"survival": 0.55}, method="PATCH")
-    page.locator("#what-if .outcome").wait_for()
+    page.locator("#trial .outcome").wait_for()
     check(window, "a frame annealed again")
     page.get_by_role("button", name="Put back", exact=True).click()
-    page.locator("#what-if").wait_for(state="hidden")
+    page.locator("#trial").wait_for(state="hidden")
 
     dialog = page.locator("dialog[open]")
     row = page.locator('.run[data-key="walk/seen"]')

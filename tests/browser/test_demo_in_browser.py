@@ -81,14 +81,14 @@ def test_the_first_two_minutes(browser: Browser, demo: StudioServer, artefacts: 
     # The course beside the scene: scrolling drives it, and a number in a sentence is a knob.
     page.get_by_role("button", name="Next", exact=True).click()
     page.get_by_role("button", name="The course, beside the scene", exact=True).click()
-    window.until("get('session') === 'planar_arm' && get('run') === 'arm'")
+    window.until("get('session') === 'planar_arm' && get('run') === 'arm' && get('view') === 'clouds'")
     lesson = page.get_by_role("region", name="Lesson")
     views = set[object]()
     for _ in range(40):
         lesson.evaluate("place => place.scrollBy(0, 120)")
         page.wait_for_timeout(300)
         views.add(window.get("view"))
-    assert {"clouds", "schedule", "variance"} <= views
+    assert {"schedule", "variance", "genealogy"} <= views
     knob = page.get_by_role("slider", name="survival", exact=True).first
     knob.scroll_into_view_if_needed()
     knob.focus()
@@ -190,17 +190,32 @@ def test_the_survival_rate_is_moved_and_new_layers_are_drawn(paused: StudioPage)
     assert {layer["frame"] for layer in layers} == {frame}
     assert {layer["alpha_wanted"] for layer in layers} == {wanted}
 
-    # The first cloud is the same, for only the knob differs; the others are new, and so are the charts.
-    until(paused.page, lambda: differing(paused.wire.layers(), clouds) == set(clouds) - {0})
+    # The scene is split: what is stored at the left; at the right the first cloud is the same, for only the knob
+    # differs, and the others are new, and so are the charts.
+    until(paused.page, lambda: differing(paused.tried_wire.layers(), clouds) == set(clouds) - {0})
+    until(paused.page, lambda: differing(paused.wire.layers(), clouds) == set())
     until(paused.page, lambda: paused.chart("views") != before)
 
     # The arrow key moved the slider and nothing else.
     assert view
     np.testing.assert_allclose(paused.wire.viewer, view, atol=1e-6)
 
-    # The stored answer stays, in the store and beside the new one.
-    assert paused.wire.shown("/stored")
-    paused.page.locator("#what-if", has_text=f"Frame {frame} re-annealed, not stored").wait_for()
+    # The stored answer stays, in the store and at its side of the divider, which the keyboard moves.
+    divider = paused.page.get_by_role("separator", name="Stored at the left, tried at the right")
+    divider.focus()
+    paused.page.keyboard.press("ArrowRight")
+    assert divider.get_attribute("aria-valuenow") == "52"
+    paused.page.keyboard.press("Home")
+    paused.page.keyboard.press("End")
+    assert divider.get_attribute("aria-valuenow") == "96"
+    divider.dblclick()
+    assert divider.get_attribute("aria-valuenow") == "50"
+    boxes = [
+        paused.page.frame_locator(scene).locator("canvas").first.bounding_box()
+        for scene in ("#scene", ".tried-scene")
+    ]
+    assert boxes[0] == pytest.approx(boxes[1], abs=1.0), "both are seen alike"
+    paused.page.locator("#trial", has_text=f"Frame {frame} tried again, not stored").wait_for()
     assert paused.studio.get(f"{run_path(paused)}/frames/{frame}") == stored
 
 
@@ -380,7 +395,7 @@ def test_a_new_answer_can_be_kept(paused: StudioPage) -> None:
     before = paused.studio.get(f"{run_path(paused)}/frames/{last - 2}")
     paused.key("r")
     paused.until("get('whatIf')?.length === get('layerCount') && get('work').state === 'paused'")
-    paused.page.locator("#what-if").get_by_role("button", name="Replace…", exact=True).click()
+    paused.page.locator("#trial").get_by_role("button", name="Replace…", exact=True).click()
     paused.page.locator("dialog form").get_by_role("button", name="Replace it", exact=True).click()
     paused.until(f"get('summary').frames.at(-1).frame === {last - 2} && get('whatIf') === null")
     after = paused.studio.get(f"{run_path(paused)}/frames/{last - 2}")

@@ -407,30 +407,43 @@ def test_a_what_if_says_what_it_changes_and_is_discarded(window: StudioPage, stu
     page.bring_to_front()
     show(window, "schedule")
     studio.post(f"{RUN}/settings?frame={FRAME}", {"survival": 0.55}, method="PATCH")
-    bar = page.locator("#what-if .outcome")
+    bar = page.locator("#trial .outcome")
     bar.wait_for()
-    outcome = window.get("outcome")
-    assert isinstance(outcome, dict)
+    trials = window.get("trials")
+    assert isinstance(trials, dict)
+    before, after = trials["stored"], trials["trials"][-1]
+    assert after["name"] == window.get("trial")
     stored = studio.get(f"{RUN}/frames/{FRAME}")
     line = studio.get(f"{RUN}/frames")["frames"][FRAME]
-    assert outcome["before"]["error_mm"] == pytest.approx(line["error_mm"], rel=1e-6)
-    assert outcome["after"]["error_mm"] != outcome["before"]["error_mm"]
-    assert outcome["stored"]["log_weight"] == pytest.approx(stored["log_weight"])
-    limbs = bar.locator("th").all_inner_texts()
-    assert {"error", "log weight", "evaluations", "time", "left arm", "right leg"} <= set(limbs)
+    assert before["error_mm"] == pytest.approx(line["error_mm"], rel=1e-6)
+    assert after["error_mm"] != before["error_mm"]
+    assert before["log_weight"] == pytest.approx(stored["log_weight"])
+    limbs = bar.locator("tbody th").all_inner_texts()
+    assert limbs == ["error", "log weight", "evaluations", "time", *before["limbs"]]
+    # Bars mean one thing: to the left and in one colour better, to the right and in the other worse.
+    for name, old, new in [("error", before["error_mm"], after["error_mm"])] + [
+        (limb, mm, after["limbs"][limb]) for limb, mm in before["limbs"].items()
+    ]:
+        row = bar.locator("tbody tr", has=page.get_by_role("rowheader", name=name, exact=True))
+        expect(row).to_have_class(f"change {'better' if new < old else 'worse'}")
+    card = page.locator("#trial").bounding_box()
+    stage = page.locator("#stage").bounding_box()
+    assert card
+    assert stage
+    assert card["y"] >= stage["y"] + stage["height"]
     assert "→" in page.locator("#frame-label").inner_text()
     # Both results are outlined in the pictures, and in the charts before stands beside after.
     page.click("[data-panel=cameras]")
     until(page, lambda: "beside=" in str(page.locator(".view img").first.get_attribute("src")))
     drawn = show(window, "schedule")
     window.until("get('whatIf') !== null")
-    assert {"before", "after"} <= {str(one["name"]) for one in drawn}
-    page.locator("#what-if").get_by_role("button", name="Discard", exact=True).click()
-    window.until("get('whatIf') === null && get('outcome') === null")
-    page.locator("#what-if", has_text="re-annealed").wait_for(state="hidden")
+    assert {"stored, reached", "tried, reached", "stored", "tried"} <= {str(one["name"]) for one in drawn}
+    page.locator("#trial").get_by_role("button", name="Discard", exact=True).click()
+    window.until("get('whatIf') === null && get('trial') === null")
+    page.locator("#trial", has_text="tried again").wait_for(state="hidden")
     assert studio.get(f"{RUN}/frames/{FRAME}") == stored
     page.get_by_role("button", name="Put back", exact=True).click()
-    page.locator("#what-if").wait_for(state="hidden")
+    page.locator("#trial").wait_for(state="hidden")
 
 
 def moved_knobs(window: StudioPage) -> dict[str, tuple[object, object]]:
@@ -455,8 +468,9 @@ def test_moved_knobs_are_kept_per_run_until_they_are_put_back(
     wanted = {"survival rate": (SETTINGS["survival"], 0.5), "particles": (PARTICLES, 70)}
     window.until("get('moved')?.length === 2 && get('whatIf')")
     assert moved_knobs(window) == wanted
-    bar = page.locator("#what-if")
-    bar.get_by_text("survival rate 0.3 → 0.5, particles 60 → 70.").wait_for()
+    bar = page.locator("#trial")
+    bar.get_by_text("survival rate 0.3 → 0.5").wait_for()
+    bar.get_by_text("particles 60 → 70").wait_for()
     # Another run, back, and a reload: the knobs of this run are as they were left, what was annealed is not stored.
     page.locator('.run[data-key="walk/beside"]').click()
     window.until("get('run') === 'beside' && get('moved')?.length === 0")
@@ -476,7 +490,7 @@ def test_moved_knobs_are_kept_per_run_until_they_are_put_back(
     for one in (fresh, window):
         one.page.bring_to_front()
         one.until("get('moved')?.length === 0")
-        one.page.locator("#what-if").wait_for(state="hidden")
+        one.page.locator("#trial").wait_for(state="hidden")
     fresh.close()
     page.bring_to_front()
     assert studio.get(f"{RUN}/settings")["values"] == stored

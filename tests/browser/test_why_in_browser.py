@@ -90,17 +90,16 @@ def test_the_cause_is_read_and_its_remedy_tried(
     words.get_by_text("survival 0.3, survival per layer none").wait_for()
     tried = words.get_by_role("button", name=re.compile("^Try: .*survival rate of 0.3"))
     tried.click()
-    page.locator("#what-if .outcome").wait_for()
-    window.until("get('outcome')?.after")
-    outcome = window.get("outcome")
-    assert isinstance(outcome, dict)
-    assert outcome["frame"] == frame
-    assert outcome["after"]["error_mm"] < outcome["before"]["error_mm"]
-    bar = page.locator("#what-if")
+    page.locator("#trial .outcome").wait_for()
+    trials = window.get("trials")
+    assert isinstance(trials, dict)
+    assert trials["frame"] == frame
+    assert trials["trials"][-1]["error_mm"] < trials["stored"]["error_mm"]
+    bar = page.locator("#trial")
     assert limb in bar.locator("th").all_inner_texts()
     bar.get_by_text("survival rate 0.02 → 0.3").wait_for()
     bar.get_by_role("button", name="Discard", exact=True).click()
-    window.until("get('whatIf') === null && get('outcome') === null")
+    window.until("get('whatIf') === null && get('trial') === null")
     assert studio.get(f"{RUN}/frames/{frame}") == stored
     bar.get_by_role("button", name="Put back", exact=True).click()
     bar.wait_for(state="hidden")

@@ -4,6 +4,7 @@ import csv
 import errno
 import json
 import os
+import re
 import tempfile
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import pytest
 from click.testing import CliRunner, Result
 from sample_walk import WALK, copy_of_walk
 
+from studio.cli import output
 from studio.cli.main import COMMANDS, load, main, summary
 from studio.cli.output import progress_lines
 from studio.jobs.open_run import OpenRun
@@ -240,3 +242,26 @@ def test_a_log_file_gets_lines_now_and_then_with_the_time_that_is_left(
         now += 0.5
         report("", done, 600)
     assert "Tracking: 101 of 600, about 250 s left".replace("250 s", "4 min") in capsys.readouterr().err
+
+
+def test_control_characters_of_a_session_do_not_reach_the_terminal(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    title = "a\x1b]0;owned\x07\x1b[31m\x9bb\nline"
+    output.print_result({"text": title}, as_json=False)
+    assert capsys.readouterr().out == "a\\x1b]0;owned\\x07\\x1b[31m\\x9bb\nline\n"
+    output.print_result({"title": title}, as_json=True)
+    shown = capsys.readouterr().out
+    assert json.loads(shown)["title"] == title
+    assert not re.search(r"[\x00-\x09\x0b-\x1f\x7f-\x9f]", shown)
+    output.note(title)
+    assert "\x1b" not in capsys.readouterr().err
+
+
+def test_too_little_memory_is_no_fault_of_the_studio(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended, output.errors_in_words():
+        raise MemoryError
+    assert ended.value.code == output.WRONG_INPUT
+    said = capsys.readouterr().err
+    assert "not enough memory" in said
+    assert "fault" not in said

@@ -3,7 +3,7 @@
 import argparse
 import sys
 
-from hostile.campaign import campaign, table
+from hostile.campaign import HEAD, campaign, line
 from hostile.makers import MAKERS
 
 parser = argparse.ArgumentParser(prog="hostile", description=__doc__)
@@ -13,7 +13,12 @@ parser.add_argument("--seconds", type=float, help="begin no session after so lon
 
 if __name__ == "__main__":
     asked = parser.parse_args()
-    found = campaign(asked.only or list(MAKERS), asked.seconds, few=asked.few)
-    print(table(found))
+    print(HEAD)
+    found = campaign(
+        asked.only or list(MAKERS),
+        asked.seconds,
+        few=asked.few,
+        told=lambda name, tally: print(line(name, tally), flush=True),
+    )
     print(f"{len(found)} of {len(MAKERS)} sessions, {sum(len(one.wrong) for one in found.values())} wrong")
     sys.exit(any(tally.wrong for tally in found.values()))

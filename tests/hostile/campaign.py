@@ -27,6 +27,7 @@ from fuzz.api import LONG, left_to_ask
 # Not under its own name here: the doubles are the server's tests'.
 from web_doubles import TOKEN, RecordingControl, RecordingScenes
 
+from hostile.commands import SESSION_COMMANDS
 from hostile.makers import MAKERS, NAME, RUN, SECRET, make_outside, make_plain
 from studio.cli.main import load, main
 from studio.server.api_document import api_document
@@ -44,27 +45,6 @@ FILLED = {
     "view": "variance",
 }
 DOCUMENT = api_document()
-SESSION_COMMANDS: dict[str, Sequence[Sequence[str]]] = {
-    "runs": (("runs",), ("runs", NAME)),
-    "workflow": (("workflow", NAME),),
-    "verify": (("verify", NAME), ("verify", NAME, "--repair")),
-    "inspect": (("inspect", NAME),),
-    "subject": (("subject", NAME),),
-    "background": (("background", NAME),),
-    "bodies": (("bodies", NAME),),
-    "evaluate": (("evaluate", f"{NAME}/{RUN}"),),
-    "why": (("why", f"{NAME}/{RUN}", "--frame", "1"),),
-    "view": (("view", f"{NAME}/{RUN}", "variance"),),
-    "smooth": (("smooth", f"{NAME}/{RUN}"),),
-    "export": (("export", f"{NAME}/{RUN}", "--as", "csv", "--out", "{out}/motion.csv"),),
-    "upload": (("upload", NAME, "--to", "{out}/put"),),
-    "diagnostics": (("diagnostics", NAME, "--out", "{out}/diagnostics.zip"),),
-    "share": (("share", f"{NAME}/{RUN}", "--out", "{out}/page.html"),),
-    "synchronise": (("synchronise", NAME),),
-    "check": (("check", f"{NAME}/{RUN}"),),
-    "import": (("import", "{session}", "--into", "again"),),
-    "add-footage": (("add-footage", NAME, "{session}"),),
-}
 
 
 @dataclass
@@ -78,9 +58,15 @@ class Tally:
     wrong: list[str] = field(default_factory=list)
 
 
-def campaign(names: Sequence[str], seconds: float | None = None, *, few: bool = False) -> dict[str, Tally]:
+def campaign(
+    names: Sequence[str],
+    seconds: float | None = None,
+    *,
+    few: bool = False,
+    told: Callable[[str, "Tally"], None] = lambda name, tally: None,
+) -> dict[str, Tally]:
     """Try the sessions of these names, each once. seconds : begin none after so long. few : of requests and commands a
-    part, another one for each session.
+    part, another one for each session. told : called after each session.
     """
     found: dict[str, Tally] = {}
     began = time.monotonic()
@@ -94,6 +80,7 @@ def campaign(names: Sequence[str], seconds: float | None = None, *, few: bool = 
             if seconds is not None and time.monotonic() - began > seconds:
                 break
             found[name] = tried(name, plain, Path(folder), number if few else None)
+            told(name, found[name])
     return found
 
 
@@ -225,7 +212,7 @@ def _ask(workspace: Path, _: Path, say: Say, part: int | None) -> None:
                 say(f"wrong {method} {path}: {answer.status_code} {answer.text[:300]}")
             if SECRET in answer.text:
                 say(f"wrong {method} {path} shows what lies outside")
-            if path == "/api/sessions" and b'"other"' not in answer.content:
+            if (method, path) == ("GET", "/api/sessions") and b'"other"' not in answer.content:
                 say(f"wrong the list lacks the other session: {answer.status_code} {answer.text[:300]}")
         say("request GET (closing)")
 
@@ -260,11 +247,18 @@ def _digest(folder: Path) -> str:
     return made.hexdigest()
 
 
-def table(found: dict[str, Tally]) -> str:
-    """The table, and what went wrong below it."""
-    lines = ["| session | requests | commands | s | MB | wrong |", "|---|---|---|---|---|---|"]
-    for name, tally in found.items():
-        numbers = (tally.requests, tally.commands, f"{tally.seconds:.1f}", tally.most_bytes >> 20)
-        lines.append(f"| {name} | {' | '.join(map(str, numbers))} | {len(tally.wrong)} |")
-    lines += [f"{name}: {words}" for name, tally in found.items() for words in tally.wrong]
-    return "\n".join(lines)
+HEAD = "| session | requests | commands | s | MB | wrong |\n|---|---|---|---|---|---|"
+
+
+def line(name: str, tally: Tally) -> str:
+    """A line of the table, and what went wrong below it."""
+    numbers = (
+        tally.requests,
+        tally.commands,
+        f"{tally.seconds:.1f}",
+        tally.most_bytes >> 20,
+        len(tally.wrong),
+    )
+    return "\n".join(
+        [f"| {name} | {' | '.join(map(str, numbers))} |", *(f"  {words}" for words in tally.wrong)]
+    )

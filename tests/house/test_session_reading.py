@@ -28,6 +28,8 @@ OPENS_ITSELF = {
     "studio/kernel_cache.py": "compiled kernels, which have checks of their own",
     "studio/runs/colour_tokens.py": "the package's own colours",
     "studio/runs/self_contained.py": "the package's own pages",
+    "studio/runs/samples.py": "the package's own samples",
+    "studio/scene/scene_pictures.py": "an export, in a folder made for it",
     "studio/self_check.py": "a database of its own, in a temporary folder",
     "studio/server/camera_routes.py": "cameras, not files",
     "studio/jobs/camera_service.py": "cameras, not files",

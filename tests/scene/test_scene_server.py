@@ -560,3 +560,10 @@ def test_a_body_that_is_being_made_stands_alone_and_in_place_of_a_sessions_own(
     stage.look_through(None)
     until(lambda: stage._controller.views is not None and views(stage).body.handles[0].visible)
     until(lambda: stage._controller._trial is None and panel(stage).tabs.visible)
+
+
+def test_who_may_only_look_has_no_panel_that_takes_room(stage: SceneServer) -> None:
+    stage._controller.bare = True
+    open_run(stage)
+    parts = panel(stage).status, panel(stage).mark, panel(stage).tabs
+    until(lambda: not any(part.visible for part in parts))

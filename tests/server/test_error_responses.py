@@ -12,6 +12,7 @@ from studio.errors import StudioError, UnforeseenError
 from studio.server import session_routes
 from studio.server.content_policy import PAGE_POLICY
 from studio.server.error_responses import error_response, validation_words
+from studio.sessions.stored_run import StoredRun
 
 ENTRIES = {"code", "message", "hint", "status"}
 
@@ -33,9 +34,11 @@ def records(caplog: pytest.LogCaptureFixture) -> Iterator[pytest.LogCaptureFixtu
         ("GET", "/api/sessions/take1/runs/none/frames", 404),
         ("GET", "/api/sessions/a.b", 422),
         ("DELETE", "/api/presets/none", 404),
+        ("GET", f"/api/sessions/take1/frames/{2**64}/views/cam1.jpg", 404),
+        ("GET", f"/api/sessions/take1/runs/first/frames/{2**64}", 422),
     ],
 )
-def test_refusals_of_the_api(studio: Studio, method: str, path: str, status: int) -> None:
+def test_refusals_of_the_api(studio: Studio, tracked: StoredRun, method: str, path: str, status: int) -> None:
     answer = studio.client.request(method, path)
     assert answer.status_code == status
     response = answer.json()

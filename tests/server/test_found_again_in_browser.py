@@ -11,13 +11,17 @@ from playwright.sync_api import Browser, BrowserContext, Page, expect
 from web_doubles import TOKEN, Studio, state_of
 
 from studio.body.model import BodyModel
+from studio.errors import RunError
 from studio.jobs.commands import Start
 from studio.operations import person
 from studio.progress import Progress
+from studio.runs.moved_knobs import keep_moved, stored_settings
 from studio.runs.new_run import prepare_run
 from studio.runs.subject_fitting import FitRequest, FittedSize, FittedSubject
+from studio.server import background_routes
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
+from studio.settings import values as settings_values
 
 pytestmark = pytest.mark.browser
 
@@ -67,12 +71,14 @@ def context(browser: Browser, studio: Studio) -> Iterator[BrowserContext]:
     """A browser that opened the printed address; the scene stays blank."""
     made = browser.new_context(viewport={"width": 1280, "height": 800})
     made.set_default_timeout(PATIENCE)
+    expect.set_options(timeout=PATIENCE)
     made.route(f"{studio.base}/scene/**", lambda route: route.fulfill(body="", content_type="text/html"))
     page = made.new_page()
     page.goto(f"{studio.base}/?token={TOKEN}")
     page.close()
     yield made
     made.close()
+    expect.set_options(timeout=5000)
 
 
 def opened(context: BrowserContext, studio: Studio, address: str) -> Page:
@@ -98,7 +104,7 @@ def test_a_fit_is_found_again_wherever_it_is_looked_for(
     page.wait_for_selector(STEP.format("track"))
     page.go_back()
     expect(bar).to_contain_text("fitting lengths and radii")
-    expect(page.locator("#work-list button").first).to_contain_text("fit of the subject 30 %")
+    expect(page.locator("#work-list button").first).to_have_text("1 job 30 %")
 
     # Another window, on the studio's own page, looks into it and stops it.
     other = opened(context, studio, "/?session=take1")
@@ -196,6 +202,46 @@ def test_the_set_up_goes_back_step_by_step_and_tracks_when_it_says_so(
     assert started.session.endswith("/take1")
     [made] = studio.workspace.session("take1").runs()
     assert started.run == str(made.folder)
+
+
+def test_old_masks_are_not_shown_while_new_ones_are_cut(
+    context: BrowserContext, studio: Studio, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    go = threading.Event()
+
+    def sets_up(*_: object, progress: Progress, **__: object) -> None:
+        while not go.wait(0.05):
+            progress("cutting out", 1, 4)
+        raise RunError("It was let go.", "Again.")
+
+    monkeypatch.setattr(background_routes, "set_background", sets_up)
+    page = opened(context, studio, "/way?session=take1&step=background")
+    first = page.locator("#aside .masks img").first
+    expect(first).to_have_attribute("src", re.compile("show=mask"))
+    page.get_by_role("button", name="Set up the background").click()
+    for _ in range(2):
+        expect(page.locator(".masks.cutting")).to_be_visible(timeout=PATIENCE)
+        expect(first).to_have_attribute("src", re.compile("show=&|footage"))
+        expect(page.locator(".background-make .step-progress")).to_contain_text("cutting out")
+        page.reload()
+    go.set()
+    expect(page.locator(".background-make .wrong")).to_contain_text("It was let go.")
+    expect(first).to_have_attribute("src", re.compile("show=mask"))
+
+
+def test_moved_knobs_and_the_chosen_layer_are_found_again(
+    context: BrowserContext, studio: Studio, tracked: StoredRun
+) -> None:
+    version, stored = stored_settings(tracked)
+    assert settings_values(stored)["survival"] == 0.77
+    keep_moved(tracked, version, {"survival": 0.5})
+    address = "/?session=take1&run=first&frame=1&layer=2"
+    page = opened(context, studio, address)
+    for one in (page, opened(context, studio, address)):
+        for _ in range(2):
+            expect(one.locator("#what-if")).to_contain_text("survival rate 0.77 → 0.5")
+            one.wait_for_function("async () => (await import('/assets/js/state.js')).get('layer') === 2")
+            one.reload()
 
 
 def test_find_knows_frames_knobs_limbs_formats_pages_and_help(

@@ -19,7 +19,7 @@ from studio.export.task import ExportTask, Written
 from studio.jobs.commands import ChangeSettings, Command
 from studio.jobs.events import Event, StateChanged
 from studio.jobs.watchers import Subscription, Watchers
-from studio.scene.model import LayerPlayback, Selection
+from studio.scene.model import LayerPlayback, LiveSearch, Selection
 from studio.sessions.workspace import Workspace
 
 NAN = float("nan")
@@ -128,6 +128,9 @@ class RecordingStage:
     def show_ghosts(self, ghosts: Sequence[tuple[str, Sequence[float]]]) -> None:
         self.calls.append(("ghosts", [colour for colour, _ in ghosts]))
 
+    def show_trial(self, trial: LiveSearch | None) -> None:
+        self.calls.append(("trial", None, 0) if trial is None else ("trial", trial.frame, len(trial.records)))
+
     def try_body(self, session: str, body: BodyModel | None) -> None:
         self.calls.append(("try_body", session, body and (body.name, dict(body.dimensions))))
 
@@ -159,6 +162,16 @@ class RecordingScenes:
 
     def scene(self, window: str, bare: bool = False) -> RecordingStage:
         return self.by_window.setdefault(window, RecordingStage() if window else self.plain)
+
+    def twin(self, window: str) -> RecordingStage | None:
+        return self.by_window.get(f"{window}-tried")
+
+    def split(self, window: str, is_split: bool) -> None:
+        self.scene(window).calls.append(("split", is_split))
+        if is_split:
+            self.scene(f"{window}-tried")
+        else:
+            self.by_window.pop(f"{window}-tried", None)
 
     def open_scenes(self) -> Mapping[str, RecordingStage]:
         return self.by_window

@@ -3,19 +3,23 @@
 import contextlib
 import os
 import shutil
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
+import zstandard
 from store_records import layer_of, record_of, result_of
 from toy_session import make_session
 
 from studio.errors import SessionError, StudioError
 from studio.foreign_files import read_file
 from studio.runs.moved_knobs import FILE_NAME as MOVED_NAME
+from studio.runs.verifying import UNTOUCHED_SECONDS, remove_left_behind, verify
 from studio.sessions import atomic_files
 from studio.sessions.foreign_sessions import inspect_place
 from studio.sessions.process_lock import ProcessLock
+from studio.sessions.results_codec import LARGEST_BLOB, unpack
 from studio.sessions.results_store import ResultsReader, ResultsWriter
 from studio.sessions.run_log import append_to_log, read_log
 from studio.sessions.session import Session
@@ -230,3 +234,51 @@ def test_an_archive_is_looked_at_without_being_unpacked(taken: Session, tmp_path
     linked(taken.path / "out", Path("/etc/passwd"))
     tar = Path(shutil.make_archive(str(tmp_path / "packed"), "tar", taken.path))
     assert [one.what for one in inspect_place(tar).oddities] == ["'out' in the archive is a link"]
+
+
+def test_what_is_made_is_as_private_as_its_maker_wants(tmp_path: Path) -> None:
+    before = os.umask(0o077)
+    try:
+        session = make_session(tmp_path / "mine", frames=2)
+        session.new_run(record_of(session, "done"))
+        atomic_files.write_text(session.path / "note", "words")
+        Workspace(tmp_path).duplicate("mine", "copy")
+    finally:
+        os.umask(before)
+    for path in tmp_path.rglob("*"):
+        assert path.stat().st_mode & 0o077 == 0, path
+
+
+def test_verify_names_what_was_left_behind_and_removes_it(taken: Session) -> None:
+    left = [taken.path / ".partial-mask", taken.path.parent / ".partial-import"]
+    for folder in left:
+        (folder / "videos").mkdir(parents=True)
+    going_on = taken.path.parent / ".partial-going-on"
+    going_on.mkdir()
+    long_ago = time.time() - 2 * UNTOUCHED_SECONDS
+    for folder in left:
+        for path in (folder / "videos", folder):
+            os.utime(path, (long_ago, long_ago))
+    assert set(verify(taken).left) == {str(path) for path in left}
+    remove_left_behind(taken)
+    assert verify(taken).left == ()
+    assert going_on.is_dir()
+    assert not any(path.exists() for path in left)
+
+
+def test_a_disk_that_cannot_be_written_is_verified_all_the_same(
+    taken: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*_: object) -> None:
+        raise SessionError("The disk cannot be written.", "")
+
+    monkeypatch.setattr("studio.sessions.record_files.write_bytes", refused)
+    (taken.path / "new").write_text("words")
+    assert verify(taken).faults == ()
+
+
+def test_a_result_unpacks_to_a_bounded_size() -> None:
+    bomb = zstandard.ZstdCompressor().compress(bytes(LARGEST_BLOB + 1))
+    assert len(bomb) < 1 << 20
+    with pytest.raises(SessionError, match="unpacks to more than"):
+        unpack(bomb)

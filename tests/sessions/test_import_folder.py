@@ -175,6 +175,10 @@ def test_a_variable_frame_rate_is_refused_unless_one_is_given(tmp_path: Path) ->
     source = video_source(tmp_path / "source")
     frames = [numbered_frame(number) for number in range(FRAMES)]
     write_video(source / "videos" / "cam02.mp4", frames, fps=60, pts=[*range(6), *range(10, 16)])
+    with pytest.raises(FootageError, match="lost frames: 4 before frame 6"):
+        import_source(source, tmp_path / "made")
+    uneven = [0, 2, 3, 6, 7, 8, 13, 14, 15, 16, 18, 19]
+    write_video(source / "videos" / "cam02.mp4", frames, fps=60, pts=uneven)
     with pytest.raises(FootageError, match="variable frame rate"):
         import_source(source, tmp_path / "made")
     assert import_source(source, tmp_path / "made", ImportOptions(fps=60.0)).warnings

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+WEIGHTS = ROOT / "studio" / "evidence" / "models"
 LOCK, PROJECT, VENDORED = ROOT / "requirements.lock", ROOT / "pyproject.toml", ROOT / "web_assets" / "vendor"
 ENTRY = re.compile(r"^([A-Za-z0-9._-]+)(?:\[[^\]]*\])?==([^\s;\\]+)(?:\s*;\s*([^\\]+?))?\s*\\?$")
 DIGEST = re.compile(r"--hash=sha256:([0-9a-f]{64})")
@@ -151,21 +152,20 @@ def _parts(expression: str) -> set[str]:
 
 
 def _vendored() -> list[Component]:
-    """From the table in the folder's README."""
-    rows = re.findall(
-        r"^\| `([^`]+)` \| ([^:|]+):[^|]*\| ([^|]+) \| ([\w.-]+) ",
-        (VENDORED / "README.md").read_text(encoding="utf-8"),
-        re.M,
-    )
+    """From the tables in the folders' READMEs: what the pages are made of, and the network's weights."""
     found: list[Component] = []
-    for file, what, version, licence in rows:
-        digest = hashlib.sha256((VENDORED / file).read_bytes()).hexdigest()
-        number = version.strip() if re.fullmatch(r"[\d.]+", version.strip()) else digest[:12]
-        found.append(
-            Component(
-                "file", _canonical(what.split(",")[0].replace(" ", "-")), number, licence, (digest,), True
-            )
+    for folder in (VENDORED, WEIGHTS):
+        rows = re.findall(
+            r"^\| `([^`]+)` \| ([^:|]+):[^|]*\| ([^|]+) \| ([\w.-]+) ",
+            (folder / "README.md").read_text(encoding="utf-8"),
+            re.M,
         )
+        for file, what, version, licence in rows:
+            digest = hashlib.sha256((folder / file).read_bytes()).hexdigest()
+            number = re.match(r"[\d.]+$", version.strip())
+            assert number, f"{file}: the README names no version"
+            name = _canonical(what.split(",")[0].replace(" ", "-"))
+            found.append(Component("file", name, number[0], licence, (digest,), True))
     return found
 
 

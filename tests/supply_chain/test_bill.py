@@ -28,8 +28,12 @@ def test_every_part_is_there_once_with_hash_and_licence() -> None:
     running = {one.name for one in found if one.runs}
     assert {"numpy", "llvmlite", "apache-echarts", "inter", "starlette"} <= running
     assert not {"pytest", "mujoco-core", "pyright"} & running
-    vendored = {path.name for path in bills.VENDORED.iterdir() if path.suffix in (".js", ".woff2")}
+    folders = [*bills.VENDORED.iterdir(), *bills.WEIGHTS.iterdir()]
+    vendored = {path.name for path in folders if path.suffix in (".js", ".woff2", ".tflite")}
     assert sum(one.kind == "file" for one in found) == len(vendored)
+    versions = {one.name: one.version for one in found if one.kind == "file"}
+    assert versions["inter"] == "4.001"
+    assert versions["mediapipe-pose"] == "0.5.1675469404"
 
 
 def test_what_is_not_known_or_binds_is_named() -> None:

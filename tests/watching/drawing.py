@@ -67,16 +67,18 @@ class Drawing:
 
     def clear(self) -> None:
         """Forget what was."""
-        self._frame().evaluate(CLEAR)
+        for frame in self._frames():
+            frame.evaluate(CLEAR)
 
     def keys(self) -> list[float]:
         """When keys were pressed in the scene, ms since 1970."""
-        return self._frame().evaluate(READ)["keys"]
+        return self._frames()[0].evaluate(READ)["keys"]
 
     def uploads(self, sizes: set[int]) -> list[Upload]:
-        """Those of some sizes, in order."""
-        found = self._frame().evaluate(READ)["uploads"]
-        return [Upload(one["bytes"], one["drawn"]) for one in found if one["bytes"] in sizes]
+        """Those of some sizes, in order; a trial is drawn in the window's second scene once that is there."""
+        found = [one for frame in self._frames() for one in frame.evaluate(READ)["uploads"]]
+        made = [Upload(one["bytes"], one["drawn"]) for one in found if one["bytes"] in sizes]
+        return sorted(made, key=lambda upload: upload.drawn)
 
     def settled(self, sizes: set[int]) -> list[float]:
         """When uploads of some sizes were drawn, ms since 1970, once there are some and no more come."""
@@ -88,8 +90,10 @@ class Drawing:
                 return found
             before = len(found)
 
-    def _frame(self) -> Frame:
-        return next(frame for frame in self._window.page.frames if "/scene/" in frame.url)
+    def _frames(self) -> list[Frame]:
+        """The window's own scene, and its second one where there is one."""
+        scenes = [frame for frame in self._window.page.frames if "/scene/" in frame.url]
+        return sorted(scenes, key=lambda frame: "-tried" in frame.url)
 
 
 def cloud_sizes(points: int) -> set[int]:

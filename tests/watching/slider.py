@@ -112,8 +112,10 @@ def measure_slider(browser: Browser, folder: Path, moves: int = MOVES) -> Figure
                 whole.append(drawn[-1] - key)
                 parts.append((sent - key, came - sent, drawn[-1] - came))
         after = spent(window.studio.process.pid)
-        if differing(window.wire.layers(), clouds) != set(clouds) - {0}:
+        if differing(window.tried_wire.layers(), clouds) != set(clouds) - {0}:
             found.wrong.append("the clouds that are drawn at the end are not the new ones")
+        if differing(window.wire.layers(), clouds) != set():
+            found.wrong.append("the stored clouds do not stand beside the new ones")
         found.times("slider's move to the first new layer drawn", first)
         found.times("slider's move to the last new layer drawn", whole)
         for name, times in zip(PARTS, zip(*parts, strict=True), strict=True):

@@ -34,6 +34,8 @@ const HELD = [
   { name: "second", kind: word },
   { name: "towards", kind: word },
   { name: "compared", kind: word, step: true },
+  { name: "trial", kind: word },
+  { name: "against", kind: word },
 ];
 
 /** @param {{ usual?: string }} entry */
@@ -105,7 +107,7 @@ function read() {
   const more = session === null ? {} : frameOfFootage(first, chosen, shown);
   if (first.name === get("session") && chosen === get("run")) {
     const { frame, ...rest } = more;
-    set({ ...rest, ...(frame === null || frame === undefined ? {} : { frame, follow: false, whatIf: null }) });
+    set({ ...rest, ...(frame === null || frame === undefined ? {} : { frame, follow: false }) });
   } else openSession(first.name, chosen, more);
   writeNow();
 }

@@ -5,7 +5,7 @@ import { openPicture } from "./dialogs.js";
 import { button, byId, check, element, fill, showPicture } from "./elements.js";
 import { onEvent } from "./live.js";
 import { complain } from "./messages.js";
-import { comparedRuns } from "./selection.js";
+import { comparedRuns, shownTrial } from "./selection.js";
 import { get, set, watch } from "./state.js";
 import { seriesColour } from "./theme.js";
 
@@ -17,6 +17,8 @@ const LAYERS = [
   ["samples", "sample points", "The points that the likelihood reads"], ["cost", "cost", "The points that the likelihood reads, from cool (fits) to warm (costs most): (1 − p)² of edge map and mask"],
   ["particles", "particles", "The particles of the frame's layers"],
 ];
+/** Those that need no run: outlines are the start pose's then. */
+const BEFORE_A_RUN = ["outline", "mask", "edges"];
 const shown = new Set(JSON.parse(localStorage.getItem("overlays") ?? '["outline"]'));
 let cameras = [];
 let frameCount = 1;  // of the footage
@@ -31,9 +33,9 @@ function source(camera, height) {
   const place = get("run") ? `${runPath(get("session"), get("run"))}/frames/${get("frame")}` : `${sessionPath(get("session"))}/frames/${footageFrame()}`;
   const query = new URLSearchParams({ show: [...shown].join(","), height: String(height) });
   if (get("run")) {
-    const outcome = get("outcome")?.frame === get("frame") ? get("outcome") : null;
+    const tried = shownTrial();
     if (get("track") !== "raw") query.set("track", get("track"));
-    if (outcome) query.set("beside", outcome.result.pose.map((value) => Number(value.toPrecision(7))).join(","));
+    if (tried) query.set("beside", tried.pose.map((value) => Number(value.toPrecision(7))).join(","));
     if (comparedHere().some(Boolean)) query.set("compared", comparedHere().join(","));
   }
   if (age) query.set("age", String(age));
@@ -155,7 +157,8 @@ function showFootage() {
 
 /** The check boxes that stand in the tab line while this panel is open. */
 export function cameraTools() {
-  return [footageSlider(), runColours(), button("Whole pictures", () => { zoom = { scale: 1, x: 0.5, y: 0.5 }; ask(false); showZoom(); }, "quiet small", { title: "No longer zoomed" }), ...LAYERS.map(([name, label, title]) => check(label, {
+  const offered = get("run") ? LAYERS : LAYERS.filter(([name]) => BEFORE_A_RUN.includes(name));
+  return [footageSlider(), runColours(), button("Whole pictures", () => { zoom = { scale: 1, x: 0.5, y: 0.5 }; ask(false); showZoom(); }, "quiet small", { title: "No longer zoomed" }), ...offered.map(([name, label, title]) => check(label, {
     checked: shown.has(name), onchange: ({ target }) => {
       if (target.checked) shown.add(name); else shown.delete(name);
       localStorage.setItem("overlays", JSON.stringify([...shown]));
@@ -181,7 +184,7 @@ export function startCameras() {
   });
   let run = get("run");
   watch(["run"], () => { if (run === get("run")) return; run = get("run"); showFootage(); });
-  watch(["frame", "run", "summary", "track", "outcome", "compared"], refresh);
+  watch(["frame", "run", "summary", "track", "trial", "trials", "compared"], refresh);
   onEvent("frame", (event, here) => {
     const seen = get("summary")?.frames.at(-1)?.frame ?? -1;
     if (here && !event.reannealed && event.frame <= seen) { age += 1; refresh(); }

@@ -149,9 +149,10 @@ function drawn(sheet, { curves, runs }, room) {
   });
   for (const one of [plot, difference]) sheet.chosen(one, { column: String(get("frame")) });
   const layered = frames?.runs.filter((one) => one.layers.length) ?? [];
-  const most = Math.max(1, ...layered.map((one) => one.layers.length));
+  // A swarm's layers have no effective number: as many of them as it has do not squeeze the others' together.
+  const most = Math.max(1, ...layered.flatMap((one) => one.layers.filter((row) => row.effective !== null).map((row) => row.layer + 1)));
   const layers = sheet.plot({ ...places[2], top: 0, height }, { title: "Effective number", unit: `by layer, frame ${get("frame")}, log scale`, x: categories(Array.from({ length: most }, (_, at) => String(at + 1)), "layer"), y: logarithmic("", { min: 1 }), over: (points) => tipOf(`layer ${points[0].axisValue}`, points.map((point) => [point.seriesName, point.data])) });
-  for (const { run, layers: rows } of layered) sheet.line(layers, run, rows.map((row) => row.effective), seriesColour(runs.indexOf(run)), { click: ({ dataIndex }) => ({ layer: dataIndex }) });
+  for (const { run, layers: rows } of layered) sheet.line(layers, run, rows.slice(0, most).map((row) => row.effective), seriesColour(runs.indexOf(run)), { click: ({ dataIndex }) => ({ layer: dataIndex }) });
   sheet.chosen(layers, { column: get("layer") === null ? null : String(get("layer") + 1) });
   return runs.map((run) => `${run}: ${figureWords(measured.get(`${run}/${get("frame")}`))}`).join(", ") + ` (${unit}, frame ${get("frame")}).`;
 }

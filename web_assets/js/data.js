@@ -140,7 +140,7 @@ async function showInScene() {
   const request = plays && layer === scene.layer ? others : shown;
   scene = shown;
   requested = moves;
-  const discard = isAnew;
+  const discard = isAnew && !get("trial");
   isAnew = false;
   await post("/api/scene/show", { ...request, eye: eyeOf(shown.eye), request_number: requested, discard }).catch(complain);
 }

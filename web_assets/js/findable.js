@@ -12,7 +12,7 @@ import { showPanel } from "./tabs.js";
 import { useTheme } from "./theme.js";
 import { allViews, saveView, showView, stepView, toggleTable } from "./views.js";
 
-/** @typedef {{ kind: string, words: string, more: string, act: () => void }} Entry */
+/** `also`: what it is found by besides. @typedef {{ kind: string, words: string, more: string, also?: string, act: () => void }} Entry */
 
 const THEMES = /** @type {const} */ ([["light", "Light"], ["dark", "Dark"], ["system", "As the system is"]]);
 const FILES = /** @type {const} */ ([["svg", "SVG"], ["pdf", "PDF"], ["csv", "CSV"], ["link", "link"]]);
@@ -59,7 +59,7 @@ function knobs() {
   if (readOnly || !known || known.session !== get("session") || known.run !== get("run") || get("frame") === null) return [];
   return known.knobs.map((knob) => {
     const value = known.moved[knob.name] ?? known.values[knob.name];
-    return { kind: "Knob", words: upper(knob.label), more: `${value} ${knob.unit ?? ""} · ${knob.name} · ${knob.help}`, act: () => knobForm(knob, value) };
+    return { kind: "Knob", words: upper(knob.label), more: `${value === "" ? "none" : value} ${knob.unit ?? ""}`, also: `${knob.name} ${knob.help}`, act: () => knobForm(knob, value) };
   });
 }
 
@@ -84,7 +84,7 @@ const notes = () => get("notes").map((note) => ({ kind: "Note", words: note.text
 function exports() {
   const views = FILES.map(([kind, word]) => ({ kind: "Export", words: `This view as ${word}`, more: "", act: () => { showPanel("views"); saveView(kind); } }));
   if (!get("run")) return views;
-  return [...views, ...asked.formats.map((form) => ({ kind: "Export", words: form.title, more: `.${form.name} · ${form.opens}`, act: () => { showPanel("export"); chooseFormat(form.name); } }))];
+  return [...views, ...asked.formats.map((form) => ({ kind: "Export", words: form.title, more: `.${form.name}`, also: form.opens, act: () => { showPanel("export"); chooseFormat(form.name); } }))];
 }
 
 function pages() {

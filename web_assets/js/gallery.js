@@ -28,7 +28,7 @@ function draw(place, card, wrong = null) {
   const going = isGoing(card.job);
   const can = !card.there && !card.missing && !readOnly;
   fill(place,
-    element("div", { className: "card-picture" }, card.picture ? element("img", { src: `${pathOf(card.name)}/picture.jpg`, alt: "", loading: "lazy" }) : element("span", {}, card.missing ? "footage elsewhere" : "not imported yet"),
+    element("div", { className: "card-picture" }, card.picture ? element("img", { src: `${pathOf(card.name)}/picture.jpg`, alt: "", loading: "lazy" }) : element("span", {}, card.kind === "recipe" ? "not rendered yet" : card.missing ? "footage elsewhere" : "not imported yet"),
       !card.there && card.kind === "recipe" && card.picture && element("small", { className: "card-note" }, "a frame of it; not rendered here yet")),
     element("div", { className: "card-words" }, element("h2", {}, card.title), hint(dotted(card.there ? "in this workspace" : KINDS[card.kind])), element("p", {}, card.words),
       !card.there && card.data && hint(`Data: ${card.data}`),

@@ -30,3 +30,10 @@ export function liveView(name) {
   const state = detail.finished ? "" : ` in progress, ${detail.layers.length} layers`;
   return { caption: `Session ${get("session")}, run ${get("run")}, frame ${detail.frame}${state}: ${get("summary")?.describe ?? ""}.`, notes: [], tables: LIVE[name](detail.layers, get("parameters")) };
 }
+
+/** A view of the trial that is shown, of the layers that came so far; null for those that the studio has to make. */
+export function triedView(name) {
+  const layers = get("whatIf");
+  if (!LIVE[name] || !layers?.length || !get("parameters")) return null;
+  return { caption: `frame ${layers[0].frame} tried again, ${layers.length} layers, not stored.`, notes: [], tables: LIVE[name](layers, get("parameters")) };
+}

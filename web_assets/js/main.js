@@ -4,7 +4,6 @@ import { startAddress } from "./address.js";
 import { startCameras } from "./cameras.js";
 import { startComparing } from "./comparing.js";
 import { startCorrecting } from "./correcting.js";
-import { startWhatIf } from "./what_if.js";
 import { startCurtain } from "./studio/curtain.js";
 import { startData } from "./data.js";
 import { startExporting } from "./exporting.js";
@@ -21,6 +20,9 @@ import { startNotes } from "./studio/notes.js";
 import { startWorkList } from "./studio/work_list.js";
 import { startSceneFrame } from "./scene_frame.js";
 import { refreshSessions } from "./sessions.js";
+import { startTrialCard } from "./studio/trial_card.js";
+import { startTrials } from "./studio/trials.js";
+import { startTwin } from "./studio/twin.js";
 import { startTabs } from "./tabs.js";
 import { startTheme } from "./theme.js";
 import { startTimeline } from "./studio/timeline.js";
@@ -49,7 +51,8 @@ async function start() {
   startKeys();
   startPalette();
   startCurtain();
-  startWhatIf();
+  startTrials();
+  startTrialCard();
   startMissing();
   startWorkList();
   startNotes();
@@ -60,6 +63,7 @@ async function start() {
   startFirstSteps();
   startScenePictures();
   startSceneFrame(takeKey);
+  startTwin(takeKey);
   await refreshSessions();
   startAddress();
 }

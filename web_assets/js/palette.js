@@ -13,8 +13,8 @@ let chosen = 0;
 let found = [];
 
 /** How well words fit what is looked for; -1: not at all. */
-function fit({ words, more, kind }, wanted) {
-  const text = `${words} ${more} ${kind}`.toLowerCase();
+function fit({ words, more, kind, also = "" }, wanted) {
+  const text = `${words} ${more} ${kind} ${also}`.toLowerCase();
   if (kind === "Frame") return 3;
   if (!wanted.split(" ").every((part) => text.includes(part))) return -1;
   return words.toLowerCase().startsWith(wanted) ? 2 : words.toLowerCase().includes(wanted) ? 1 : 0;

@@ -65,6 +65,7 @@ async function start() {
   startEvents();
   startWorkList();
   fill(byId("content"), element("div", { className: "report-column" }, runner, column));
+  fill(runner, hint("The experiments are being read …"));
   known = await fetchJson("/api/reports/experiments");
   drawRunner();
   await drawReports();

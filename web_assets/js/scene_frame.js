@@ -19,6 +19,7 @@ function look() {
   return `
     body, body * { font-family: "Inter", system-ui, sans-serif !important; letter-spacing: 0 !important; font-variant-numeric: tabular-nums; }
     label, label * { font-size: 11.5px !important; letter-spacing: -.03em !important; }
+    @media (max-width: 620px) { .mantine-Paper-root:has(.mantine-ScrollArea-root) { display: none; } }
     [role="tab"] { padding-inline: 8px !important; font-size: 12.5px !important; }
     * { scrollbar-width: thin; scrollbar-color: ${token("line-strong")} transparent; }
     :root, :root[data-mantine-color-scheme] {
@@ -66,14 +67,19 @@ function leaveScene(event) {
   byId("track").focus();
 }
 
+/** Let the page's keys work in a scene that was loaded; `takeKey` handles them. */
+export function shareKeys(/** @type {HTMLIFrameElement} */ scene, takeKey) {
+  for (const kind of ["keydown", "keyup"]) scene.contentDocument.body.addEventListener(kind, keepToControls);
+  scene.contentWindow.addEventListener("keydown", first(takeKey), true);
+  scene.contentWindow.addEventListener("keydown", leaveScene, true);
+}
+
 /** Load the scene, dressed as the page; `takeKey` handles the page's keys in it. */
 export function startSceneFrame(takeKey) {
   frame.addEventListener("load", () => {
     if (frame.src.endsWith("about:blank")) return;
     dress();
-    for (const kind of ["keydown", "keyup"]) frame.contentDocument.body.addEventListener(kind, keepToControls);
-    frame.contentWindow.addEventListener("keydown", first(takeKey), true);
-    frame.contentWindow.addEventListener("keydown", leaveScene, true);
+    shareKeys(frame, takeKey);
     // Whoever clicks a tab goes on with the timeline's keys.
     frame.contentWindow.addEventListener("click", (/** @type {any} */ event) => { if (event.detail) event.target.closest?.("[role=tab]")?.blur(); });
   });

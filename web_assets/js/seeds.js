@@ -1,6 +1,6 @@
 // A frame searched again with other seeds, in the background; its view is drawn when they are done.
 
-import { post, remove, runPath } from "./api.js";
+import { fetchJson, post, remove, runPath } from "./api.js";
 import { button, dotted, element, number } from "./elements.js";
 import { isGoing, standing, timeLeft } from "./jobs.js";
 import { onEvent } from "./live.js";
@@ -28,13 +28,28 @@ export function seedTools() {
 
 async function begin() {
   try {
-    const job = await post(`${runPath(get("session"), get("run"))}/frames/${get("frame")}/seeds`, { count });
-    jobs.set(keyOf(job), job);
+    // What is tried is searched as what is stored is, so that both can be drawn.
+    for (const trial of [get("against"), ...(get("trial") ? [get("trial")] : [])]) {
+      const path = `${runPath(get("session"), get("run"))}/frames/${get("frame")}/seeds`;
+      const job = await post(trial ? `${path}?trial=${trial}` : path, { count });
+      jobs.set(keyOf(job), job);
+    }
   } catch (error) { complain(error); }
+}
+
+/** Searches that were begun before this page was loaded, or in another window. */
+async function findSeeds(changed) {
+  const { jobs: listed } = await fetchJson(`/api/jobs?${new URLSearchParams({ kind: "seeds" })}`);
+  for (const line of listed.filter(isGoing)) {
+    const job = await fetchJson(/** @type {any} */ (line.at));
+    jobs.set(keyOf(job), job);
+    if (keyOf(job) === here()) changed(false);
+  }
 }
 
 /** Hear of searches; `changed(ended)` is called when that of the shown frame got further or ended. */
 export function startSeeds(changed) {
+  findSeeds(changed).catch(complain);
   onEvent("seeds", (job) => {
     jobs.set(keyOf(job), job);
     if (job.state === "failed") complain(job);

@@ -3,6 +3,8 @@
 
 import { get, set } from "./state.js";
 
+/** @import { Schemas } from "./api_types" */
+
 /** What is chosen beside the frame; null: nothing. */
 const CHOSEN = ["layer", "limb", "parameter", "particle", "camera"];
 /** Nothing chosen. */
@@ -20,7 +22,7 @@ export function goTo(frame) {
   if (!frames?.length) return;
   const [first, last] = [frames[0].frame, frames[frames.length - 1].frame];
   const nearest = Math.max(first, Math.min(last, Math.round(frame)));
-  set({ frame: nearest, follow: nearest === last && get("work")?.state === "tracking", whatIf: null, particle: null });
+  set({ frame: nearest, follow: nearest === last && get("work")?.state === "tracking", whatIf: null, trial: null, against: null, particle: null });
 }
 
 /**
@@ -33,8 +35,9 @@ export function select({ frame, ...changes }) {
   set(changes);
 }
 
-/** The limb that a limb's errors are counted with: itself where it is left or right, else head and trunk (studio/inspection/reference.py). */
-export const limbGroup = (name) => (!name || /left|right/.test(name) ? name : TRUNK);
+const isSided = (name) => /left|right/.test(name);
+/** The limb that a limb's errors are counted with: itself where it is left or right or the body has no sides, else head and trunk (studio/inspection/reference.py). */
+export const limbGroup = (name) => (!name || isSided(name) || !(get("parameters") ?? []).some((one) => isSided(one.limb)) ? name : TRUNK);
 const TRUNK = "head and trunk";
 /** Whether a limb is the one that is chosen. */
 export const isChosenLimb = (name, chosen) => name === chosen || limbGroup(name) === chosen;
@@ -50,6 +53,13 @@ export const toggle = (name, value) => select({ [name]: get(name) === value ? nu
 export const followsSearch = () => Boolean(get("follow")) && ["tracking", "compiling"].includes(get("work")?.state) && get("work").run === get("run") && get("work").session === get("session");
 /** Whether the shown frame has a stored result. */
 export const isStored = () => Boolean(get("summary")?.frames.some((line) => line.frame === get("frame")));
+
+/** The numbers of a trial of the shown frame, null while they are not known. @returns {Schemas["TrialView"] | null} */
+const trialNamed = (name) => (get("trials")?.frame === get("frame") && get("trials").trials.find((one) => one.name === name)) || null;
+/** The trial that is shown. */
+export const shownTrial = () => trialNamed(get("trial"));
+/** What the shown trial is compared with: what is stored, or another trial. @returns {Schemas["FrameNumbers"] | null} */
+export const besideTrial = () => (shownTrial() ? (trialNamed(get("against")) ?? get("trials").stored) : null);
 
 /** How many layers the shown frame has. */
 export const layersShown = () => (get("whatIf") ?? get("detail")?.layers)?.length ?? 0;

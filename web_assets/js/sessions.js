@@ -25,7 +25,7 @@ export function openSession(session, run = undefined, shown = {}) {
   if (session === get("session") && chosen === get("run")) return set({ missing: null });
   const frame = shown.frame ?? null;
   set({
-    missing: null, session, run: chosen, track: "raw", summary: null, detail: null, parameters: null, layerCount: null, settings: null, moved: null, whatIf: null, compared: null, through: null, eye: null,
+    missing: null, session, run: chosen, track: "raw", summary: null, detail: null, parameters: null, layerCount: null, settings: null, moved: null, whatIf: null, trial: null, against: null, trials: null, compared: null, through: null, eye: null,
     ...nothingChosen(), ...shown, frame, follow: frame === null,
   });
   document.body.classList.remove("rail-open");

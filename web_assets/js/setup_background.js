@@ -331,6 +331,7 @@ export function mount(place, setup) {
   load().then(() => {
     if (gone) return;
     quality = background.job?.quality ?? null;
+    if (background.job?.state === "failed") failed = background.job;
     pictures.begin(background);
     drawMake();
     drawQuality();

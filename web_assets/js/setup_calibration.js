@@ -4,7 +4,7 @@ import { accepted, fetchJson, post, remove, sessionPath } from "./api.js";
 import { findingList, plainNumbers, residualBars, rigFromAbove } from "./calibration_drawing.js";
 import { clickFloor } from "./calibration_points.js";
 import { actions, button, check, dotted, download, drawProgress, element, failure, field, files, fill, hint, notice, optional, picture, select, text } from "./elements.js";
-import { isGoing, timeLeft } from "./jobs.js";
+import { findJob, isGoing, timeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
 import { uploadFiles } from "./uploading.js";
 import { boardForm } from "./setup_boards.js";
@@ -197,6 +197,12 @@ export function mount(place, setup) {
   }
 
   setup.on("calibration", hear);
+  // A calibration that was begun before this step was shown goes on to be followed.
+  findJob({ session: setup.session, kind: "calibration" }).then((known) => {
+    if (gone || job || !known) return undefined;
+    if (isGoing(known) || known.state === "failed") { job = known.identifier; return hear(known); }
+    return undefined;
+  }).catch(complain);
   load().catch((error) => {
     view = /** @type {any} */ ({ present: null, earlier: [], formats: {}, footage: [], notes: [], stale_runs: [] });
     tab = "file";

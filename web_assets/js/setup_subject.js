@@ -149,7 +149,7 @@ export function mount(place, setup) {
     const { identifier } = fit;
     if (fit.looks !== looks && fit.frames.length) {
       looks = fit.looks;
-      fill(setup.aside, hint("So far: the body as it is fitted, over the frames that are looked at."), fitPictures());
+      fill(setup.aside, element("div", { className: "pictures-bar" }, hint("So far: the body as it is fitted, over the frames that are looked at.")), fitPictures());
     }
     drawProgress(progress, progressOf(fit, "beginning", () => remove(`/api/subject-fits/${identifier}`).catch(complain)));
   }

@@ -2,7 +2,7 @@
 
 import { accepted, post, remove, sessionPath } from "./api.js";
 import { actions, button, drawProgress, element, failure, files, fill, hint, notice, number, optional, table } from "./elements.js";
-import { followJob, isGoing, progressOf } from "./jobs.js";
+import { findJob, followJob, isGoing, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
 
 /** Draw in `place`; `use(offsets)` applies offsets. @param {import("./setup.js").Setup} setup */
@@ -35,6 +35,7 @@ export function synchroniser(place, setup, use) {
 
   function draw(state = footage) {
     footage = state;
+    if (!footage) return undefined;
     if (footage.cameras.length < 2) return fill(place);
     const bar = optional();
     const apply = button("Apply", () => use(entered()), "apply-offsets", { hidden: true });
@@ -59,12 +60,21 @@ export function synchroniser(place, setup, use) {
   async function begin() {
     from = "";
     failed = null;
+    try { await post(`${here}/synchrony`); } catch (error) { failed = error; return draw(); }
+    return followEstimate();
+  }
+
+  async function followEstimate() {
     try {
-      await post(`${here}/synchrony`);
       estimate = await followJob(`${here}/synchrony`, (job) => { estimate = job; draw(); }, () => stopped);
     } catch (error) { estimate = null; failed = error; }
     if (!stopped) draw();
   }
+
+  // An estimate that was begun before this step was shown: how far it is, or what it found.
+  findJob({ session: setup.session, kind: "synchrony" }).then((job) => {
+    if (job && !stopped && !estimate && job.state !== "cancelled") followEstimate();
+  }).catch(complain);
 
   return { draw, stop() { stopped = true; } };
 }

@@ -194,7 +194,7 @@ function figureOf(data, entry, choose, place) {
   const layers = tables.layers?.length ? Math.max(...tables.layers.map((row) => row.layer)) + 1 : 1;
   // Of the run's layers over the frames the page has one parameter.
   const own = entry.view === "variance" && entry.of === "run" ? { parameter: data.parameter } : {};
-  const known = (room) => ({ ...at, ...own, over: entry.of === "run", layers, label: (name) => labels.get(name) ?? name, room, whatIf: null, score: data.score });
+  const known = (room) => ({ ...at, ...own, over: entry.of === "run", layers, label: (name) => labels.get(name) ?? name, room, tried: null, score: data.score });
   const whyTables = Object.fromEntries([...data.why.tables, ...entry.tables].map((table) => [table.name, records(table)]));
   const draw = entry.view === "why" ? (sheet, room) => drawLimbs(sheet, { limbs: [], nearest: [], ...whyTables }, at, room) : (sheet, room) => drawings[entry.view][entry.of](sheet, tables, known(room));
   const made = new Figure(place);

@@ -28,7 +28,9 @@ const values = {
   settings: null,      // the settings in use, and since when
   whatIf: null,        // layers of a re-annealed frame that is not stored
   moved: null,         // knobs that were moved and that no stored frame uses: [{label, before, after}]
-  outcome: null,       // what the re-annealed frame's result changes
+  trial: null,         // name of the trial that is shown, null while it has none yet
+  against: null,       // name of the trial that it is compared with, null: what is stored
+  trials: null,        // all that was tried of the shown frame, and the numbers of what is stored of it
   notes: [],           // notes and bookmarks on the run's frames: [{frame, text, made}]
   work: null,          // the worker's last state
   connected: null,     // whether the event socket is open, null before it was

@@ -3,7 +3,9 @@
 
 import { axis, figure, token, typeSize } from "./chart_looks.js";
 
-const HEADING = 30, LEGEND = 17;
+const HEADING = 30, LEGEND = 17, WORD = 12;
+const HEAT = ["heat-lowest", "heat-low", "heat-middle", "heat-high"];
+const SPLIT = "stored and tried";
 const FAMILY = "Inter, system-ui, sans-serif";
 
 /**
@@ -103,11 +105,45 @@ export class Sheet {
    * @param {number} plot
    * @param {{ cells: any[], low: number, high: number, colours?: string[], ends?: [string, string], key?: { left: number, top: number, height?: number }, click?: (event: any) => Changes | null, tip: (event: any) => string, framed?: boolean }} more
    */
-  heat(plot, { cells, low, high, colours = ["heat-lowest", "heat-low", "heat-middle", "heat-high"], ends = ["", ""], key = null, click = null, tip, framed = true }) {
+  heat(plot, { cells, low, high, colours = HEAT, ends = ["", ""], key = null, click = null, tip, framed = true }) {
     this.series(plot, {
       type: "heatmap", data: cells, click, tip, progressive: 0, emphasis: { itemStyle: { borderColor: token("text"), borderWidth: 1.5 } },
       itemStyle: framed ? { borderColor: token("surface"), borderWidth: 1 } : { borderWidth: 0 },
     });
+    this.scale({ low, high, colours, ends, key });
+  }
+
+  /**
+   * A map whose cells are split along their diagonal: stored above it, `tried` below it, on one scale; with `tried` null
+   * a map like any other. A column or row that only one of both has is half empty.
+   * @param {number} plot
+   * @param {{ cells: any[], tried: any[] | null, low: number, high: number, colours?: string[],
+   *   ends?: [string, string], key?: { left: number, top: number, height?: number }, framed?: boolean,
+   *   click?: (event: any) => Changes | null, tip: (event: any) => string }} more
+   */
+  splitHeat(plot, { cells, tried, ...more }) {
+    if (!tried) return this.heat(plot, { cells, ...more });
+    const { low, high, colours = HEAT, ends = ["", ""], key = null, framed = true } = more;
+    const found = (list, side) =>
+      list.filter((cell) => Number.isFinite(cell[2])).map((cell) => [...cell.slice(0, 3), side]);
+    this.series(plot, {
+      name: SPLIT, type: "custom", click: more.click, tip: more.tip, progressive: 0, clip: true,
+      encode: { x: 0, y: 1 }, data: [...found(cells, 0), ...found(tried, 1)],
+      renderItem: (_params, api) => {
+        const [x, y] = api.coord([api.value(0), api.value(1)]);
+        const [width, height] = api.size([1, 1]).map((size) => size - (framed ? 1 : 0));
+        const [left, right] = [x - width / 2, x + width / 2];
+        const [top, bottom] = [y - height / 2, y + height / 2];
+        const corner = api.value(3) ? [right, bottom] : [left, top];
+        const points = [[right, top], corner, [left, bottom]];
+        return { type: "polygon", shape: { points }, style: { fill: api.visual("color") } };
+      },
+    });
+    this.scale({ low, high, colours, ends, key });
+  }
+
+  /** The scale of the series that was drawn last, by the third number of its data. */
+  scale({ low, high, colours, ends, key }) {
     this.option.visualMap.push({
       type: "continuous", min: low, max: high === low ? low + 1 : high, seriesIndex: this.option.series.length - 1, dimension: 2, calculable: false, show: Boolean(key), orient: "vertical", itemWidth: 9,
       itemHeight: key?.height ?? 80, left: key?.left, top: key?.top, text: ends, textGap: 4, precision: 2, hoverLink: false,
@@ -115,20 +151,52 @@ export class Sheet {
     });
   }
 
-  /** Lines across a plot at values of its axes, each with a word. @param {{ x?: any, y?: any, word?: string, colour?: string, dashed?: boolean }[]} marks */
-  marks(plot, marks) {
+  /**
+   * Where the words of vertical lines stand so that none covers another: which side of its line, and how many lines of text
+   * below the plot's top.
+   * @param {{ x?: any, word?: string }[]} marks
+   * @param {[number, number]} range of the axis
+   * @param {number} width of the plot, pixels
+   * @returns {Map<any, { side: -1 | 1, level: number }>}
+   */
+  static wordPlaces(marks, [low, high], width) {
+    pen.font = `10px ${FAMILY}`;
+    const taken = [];
+    const places = new Map();
+    for (const mark of [...marks].sort((a, b) => a.x - b.x)) {
+      const at = (width * (mark.x - low)) / (high - low || 1);
+      const size = pen.measureText(mark.word).width + 6;
+      const side = at + size > width ? -1 : 1;
+      const [left, right] = side < 0 ? [at - size, at] : [at, at + size];
+      const meets = (level) =>
+        taken.some((one) => one.level === level && left < one.right && right > one.left);
+      let level = 0;
+      while (meets(level)) level += 1;
+      taken.push({ left, right, level });
+      places.set(mark, { side, level });
+    }
+    return places;
+  }
+
+  /**
+   * Lines across a plot at values of its axes, each with a word. `range`: of the x axis.
+   * @param {number} plot
+   * @param {{ x?: any, y?: any, word?: string, colour?: string, dashed?: boolean }[]} marks
+   * @param {[number, number] | null} range
+   */
+  marks(plot, marks, range = null) {
     const shown = marks.filter((one) => (one.x ?? one.y) !== null && (one.x ?? one.y) !== undefined);
     if (!shown.length) return;
-    // Words of neighbouring lines stand on either side of them.
-    const order = shown.map((one) => one.x).sort((a, b) => a - b);
-    const sides = (x) => (x === order[0] && order.length > 1 ? -1 : 1);
+    const upright = shown.filter((one) => one.x !== undefined && one.word);
+    const width = this.option.grid[plot].width;
+    const places = Sheet.wordPlaces(upright, range ?? extent(upright.map((one) => one.x)), width);
     this.series(plot, {
       type: "line", data: [], silent: true, tooltip: { show: false },
       markLine: {
         symbol: "none", silent: true, animation: false,
-        data: shown.map(({ x, y, word = "", colour = "text-quiet", dashed = false }) => ({
+        data: shown.map((mark) => ({ ...mark, .../** @type {{ side: number, level: number }} */ (places.get(mark) ?? { side: 1, level: 0 }) })).map(({ x, y, word = "", colour = "text-quiet", dashed = false, side, level }) => ({
           ...(x === undefined ? { yAxis: y } : { xAxis: x }), lineStyle: { color: token(colour), width: 1.4, type: dashed ? "dashed" : "solid", opacity: 0.9 },
-          label: { show: Boolean(word), formatter: word, position: x === undefined ? "insideEndTop" : "end", rotate: 0, align: x === undefined ? "right" : sides(x) < 0 ? "right" : "left", color: token(colour), fontSize: typeSize(10), distance: 2 },
+          label: { show: Boolean(word), formatter: word, position: x === undefined ? "insideEndTop" : "end", rotate: 0, offset: [0, WORD * level], align: x === undefined || side < 0 ? "right" : "left", color: token(colour), fontSize: typeSize(10), distance: 2 },
         })),
       },
     });
@@ -139,7 +207,7 @@ export class Sheet {
     const bands = [...(column === null ? [] : [[column, null]]), ...(row === null ? [] : [[null, row]])];
     if (!bands.length) return;
     const [x, y] = [this.option.xAxis[plot], this.option.yAxis[plot]];
-    const isMap = this.option.series.some((one) => one.type === "heatmap" && one.xAxisIndex === plot);
+    const isMap = this.option.series.some((one) => one.xAxisIndex === plot && (one.type === "heatmap" || one.name === SPLIT));
     const place = (axis, value) => (typeof value === "number" || axis.type !== "category" ? value : axis.data.indexOf(value));
     this.series(plot, {
       type: "custom", silent: true, z: 6, tooltip: { show: false }, encode: { x: [], y: [] }, data: bands.map((_, at) => [at]),
@@ -175,6 +243,25 @@ export const categories = (data, name, /** @type {Record<string, any>} */ more =
 export const numbers = (name = "", more = {}) => ({ type: "value", name, nameLocation: "middle", nameGap: 22, scale: true, axisLabel: { formatter: (value) => figure(value) }, ...more });
 /** A logarithmic axis: only where all numbers are above 0. */
 export const logarithmic = (name = "", more = {}) => ({ type: "log", name, nameLocation: "middle", nameGap: 22, axisLabel: { formatter: (value) => figure(value) }, ...more });
+
+/**
+ * What is drawn side by side: what is stored, and beside it what was tried, each with its tables and colour.
+ * @returns {{ name: string, tables: any, colour: string }[]}
+ */
+export const sidesOf = (tables, /** @type {{ tried?: any }} */ { tried = null }, alone = "accent") =>
+  tried
+    ? [{ name: "stored", tables, colour: "stored" }, { name: "tried", tables: tried, colour: "tried" }]
+    : [{ name: "", tables, colour: alone }];
+
+/** The numbers of layers of all sides: as many as the longer one has. */
+export const layersOfAll = (sides, name) =>
+  distinct(sides.flatMap(({ tables }) => tables[name].map((row) => row.layer))).sort((a, b) => a - b);
+
+/** A column of a side's table, layer by layer; null where the side has no such layer. */
+export function byLayer(rows, layers, key) {
+  const known = new Map(rows.map((row) => [row.layer, row[key]]));
+  return layers.map((layer) => known.get(layer) ?? null);
+}
 
 /** The rows of a table by key. */
 export const records = (table) => (table?.rows ?? []).map((row) => Object.fromEntries(table.columns.map((column, at) => [column.key, row[at]])));

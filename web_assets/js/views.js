@@ -6,7 +6,7 @@ import { fetchJson, frameView, post, runView } from "./api.js";
 import { button, byId, element, fill, select as choice } from "./elements.js";
 import { Figure } from "./figure.js";
 import { onEvent } from "./live.js";
-import { liveView } from "./live_views.js";
+import { liveView, triedView } from "./live_views.js";
 import { complain } from "./messages.js";
 import { paced } from "./pacing.js";
 import { followsSearch, isStored, layersShown, select } from "./selection.js";
@@ -36,6 +36,8 @@ let views = [];
 let figure = null;
 /** The newest answer, and what it was requested with. @type {{ key: string, answer: any } | null} */
 let held = null;
+/** The newest answer of what was tried, and what it was requested with. @type {{ key: string, answer: any } | null} */
+let heldTried = null;
 let age = 0;   // rises when what is stored changed
 
 /** All views, for the command palette. */
@@ -49,26 +51,34 @@ const isOfRun = (view) => { const drawing = DRAWINGS[view.name]; return !drawing
 /** Label of a parameter; its name where the run is not known yet. */
 export const labelOf = (name) => get("parameters")?.find((one) => one.name === name)?.label ?? name;
 
-/** What a view's numbers depend on, as its address says it; a limb is marked in the drawing, all the others stay in it. */
-function queryOf(view) {
-  const query = new URLSearchParams();
+/** What a view's numbers depend on, as its address says it; a limb is marked in the drawing, all the others stay in it. `trial`: whose numbers. */
+function queryOf(view, /** @type {string | null} */ trial = get("against")) {
+  const query = new URLSearchParams(trial ? { trial } : {});
   for (const name of view.uses.filter((one) => one !== "limb" && !(view.name === "clouds" && one === "parameter"))) {
-    const value = get(SELECTED[name]);
+    // A layer that only the other search has: the last one stands beside it.
+    const value = name === "layer" && get("layer") >= layersIn(trial) ? null : get(SELECTED[name]);
     if (value !== null && value !== undefined && !(name === "track" && value === "raw")) query.set(name, String(value));
   }
   return String(query);
 }
 
-/** A view's numbers. @returns {Promise<any>} */
-async function numbersOf(view) {
+/** How many layers a trial has; without its name what is stored. @param {string | null} trial */
+function layersIn(trial) {
+  if (trial && trial === get("trial") && get("whatIf")) return get("whatIf").length;
+  const numbers = get("trials")?.trials.find((one) => one.name === trial) ?? get("trials")?.stored;
+  return numbers?.layers ?? get("detail")?.layers.length ?? Infinity;
+}
+
+/** A view's numbers. `parameter`: the one whose clouds are drawn where none is chosen. @returns {Promise<any>} */
+async function numbersOf(view, trial = get("against"), among = null) {
   if (view.name === "frames") return overFrames();
   const [session, run, frame] = [get("session"), get("run"), get("frame")];
-  if (isOfRun(view)) return fetchJson(runView(session, run, view.name, queryOf(view)));
-  const whole = await fetchJson(frameView(session, run, frame, view.name, queryOf(view)));
+  if (isOfRun(view)) return fetchJson(runView(session, run, view.name, queryOf(view, trial)));
+  const whole = await fetchJson(frameView(session, run, frame, view.name, queryOf(view, trial)));
   if (view.name !== "clouds") return whole;
   // All layers of one parameter stand beside the first and last set of them all.
-  const parameter = get("parameter") ?? mostLearnt(records(whole.tables.find((table) => table.name === "summary")));
-  const query = new URLSearchParams([["parameter", parameter], ...new URLSearchParams(queryOf(view))]);
+  const parameter = among ?? get("parameter") ?? mostLearnt(records(whole.tables.find((table) => table.name === "summary")));
+  const query = new URLSearchParams([["parameter", parameter], ...new URLSearchParams(queryOf(view, trial))]);
   const own = await fetchJson(frameView(session, run, frame, view.name, String(query)));
   return { ...whole, tables: [...whole.tables.filter((table) => table.name !== "ridges"), ...own.tables.filter((table) => table.name === "ridges"), ...own.tables.filter((table) => table.name === "summary").map((table) => ({ ...table, name: "own" }))] };
 }
@@ -103,13 +113,13 @@ async function load() {
     if (followsSearch() || !get("detail")) return figure.show(null, "The first layer is being searched.");
   }
   const key = [get("session"), get("run"), view.name, queryOf(view), view.name === "clouds" ? get("parameter") : "", age, isOfRun(view) ? get("summary")?.frames.length : get("frame")].join(" ");
-  if (held?.key === key) return figure.refresh();
+  if (held?.key === key) return showBoth(view, key);
   place.ariaBusy = "true";
   try {
     const answer = await numbersOf(view);
     if (current() !== view) return;
     held = { key, answer };
-    show(view, answer);
+    await showBoth(view, key);
   } catch (error) {
     if (current() !== view || error.name === "AbortError") return;
     held = null;
@@ -117,21 +127,45 @@ async function load() {
   } finally { place.ariaBusy = "false"; }
 }
 
+/** What was tried, in the tables of a view: from the events where they tell all of it, else from the studio; null for nothing tried. */
+async function triedIn(view) {
+  if (!get("whatIf")) return null;
+  const live = !isOfRun(view) && triedView(view.name);
+  if (live) return live;
+  if (!get("trial") || view.name === "frames") return null;
+  const key = [held?.key, get("trial"), queryOf(view, get("trial"))].join(" ");
+  if (heldTried?.key !== key) {
+    const ridges = held?.answer.tables.find((table) => table.name === "ridges");
+    heldTried = { key, answer: await numbersOf(view, get("trial"), ridges ? records(ridges)[0]?.parameter : null) };
+  }
+  return heldTried.answer;
+}
+
+/** Show what is held, and beside it what was tried, once both are there. */
+async function showBoth(view, key) {
+  const tried = await triedIn(view);
+  if (held?.key === key && current() === view) show(view, held.answer, tried);
+}
+
 const loadLater = paced(load, LOAD_MILLISECONDS);
 
 /** What a drawing knows beside its tables. */
 const at = (room) => ({
   layer: get("layer"), limb: get("limb"), parameter: get("parameter"), particle: get("particle"), camera: get("camera"), frame: get("frame"), over: get("over") === "run",
-  layers: Math.max(1, layersShown() || get("layerCount") || 1), label: labelOf, room, whatIf: get("whatIf"), score: get("summary")?.score ?? ["log weight", ""],
+  layers: Math.max(1, layersShown() || get("layerCount") || 1), label: labelOf, room, tried: null, score: get("summary")?.score ?? ["log weight", ""],
 });
 
-function show(view, answer) {
-  const tables = Object.fromEntries(answer.tables.map((table) => [table.name, records(table)]));
-  const main = answer.tables.some((table) => table.rows.length);
+const byName = (answer) => Object.fromEntries(answer.tables.map((table) => [table.name, records(table)]));
+
+function show(view, stored, /** @type {any} */ beside = null) {
+  const tables = byName(stored);
+  const tried = beside?.tables.some((table) => table.rows.length) ? byName(beside) : null;
+  const answer = tried ? { ...stored, caption: `${stored.caption} Beside it: ${beside.caption}`, tables: [...stored.tables, ...beside.tables.map((table) => ({ ...table, title: `${table.title}, tried` }))] } : stored;
+  const main = stored.tables.some((table) => table.rows.length);
   if (!main) return figure.show({ ...shownOf(view, answer), draw: null }, answer.notes.join(" ") || (view.is_job ? "Nothing computed yet: start it with the button above." : "There are no numbers of this frame."));
   const drawing = DRAWINGS[view.name];
   const draw = isOfRun(view) ? drawing.run : drawing.frame;
-  figure.show({ ...shownOf(view, answer), draw: (sheet, room) => draw(sheet, tables, at(room)) });
+  figure.show({ ...shownOf(view, answer), draw: (sheet, room) => draw(sheet, tables, { ...at(room), tried }) });
 }
 
 /**
@@ -233,7 +267,7 @@ export function startViews() {
     document.dispatchEvent(new Event("panel"));
   }).catch(complain);
   watch(["view"], () => { drawList(); figure.isTable = false; });
-  watch(["session", "run", "frame", "layer", "limb", "parameter", "particle", "camera", "track", "over", "second", "towards", "view", "panel", "summary", "whatIf", "parameters", "detail", "follow", "work"], loadLater);
+  watch(["session", "run", "frame", "layer", "limb", "parameter", "particle", "camera", "track", "over", "second", "towards", "view", "panel", "summary", "whatIf", "trial", "against", "trials", "parameters", "detail", "follow", "work"], loadLater);
   onEvent("frame", (event, here) => { if (here && !event.reannealed) age += 1; });
   startSeeds((ended) => { if (ended) age += 1; figure.refresh(); loadLater(); });
   document.addEventListener("panel", () => loadLater());

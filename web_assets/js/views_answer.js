@@ -2,9 +2,12 @@
 // answer, whether another seed agrees, whether the spread predicts the error; and weight and error over the frames.
 
 import { figure, token } from "./chart_looks.js";
+import { limbLook } from "./limb_looks.js";
 import { isChosenLimb, limbGroup } from "./selection.js";
 import { layerColour, seriesColour } from "./theme.js";
-import { categories, distinct, extent, grouped, logarithmic, numbers, onScreen, screenUnit, tipOf, withUnit } from "./view_sheet.js";
+import {
+  categories, distinct, extent, grouped, layersOfAll, logarithmic, numbers, onScreen, screenUnit, sidesOf, tipOf, withUnit,
+} from "./view_sheet.js";
 
 /** @import { Drawing } from "./views_search.js" */
 
@@ -25,14 +28,16 @@ function landscape(sheet, { slice, terms, tempered, plane, rug, marks, ends }, a
   const height = Math.max(130, at.room - 76);
   const x = (name = "") => numbers(name, { scale: true });
   const nameOf = isParameter ? `${at.label(at.parameter)}, ${screenUnit(unit)}` : "from the estimate (0) to the other pose (1)";
+  const tried = at.tried?.slice?.length && (at.tried.slice[0].unit ?? "") === unit ? at.tried : null;
   const range = extent(slice.map((row) => row.at));
   const put = (value) => onScreen(value, unit);
   const back = (value) => (unit === "rad" ? (value * Math.PI) / 180 : value);
   const ghost = (value) => ({ ghosts: [{ colour: "accent", pose: poseAt(ends, value, range) }], place: value });
-  const markSpots = marks.map((row) => ({ x: put(row.at), word: row.name, colour: row.name === "truth" ? "truth" : row.name === "estimate" ? "text" : "accent" }));
+  const inTried = (at.tried?.marks ?? []).filter((row) => row.name === "estimate").map((row) => ({ ...row, name: "tried" }));
+  const markSpots = [...marks, ...inTried].map((row) => ({ x: put(row.at), word: row.name, colour: { truth: "truth", estimate: "text", tried: "tried" }[row.name] ?? "accent" }));
   if (plane.length) return landscapePlane(sheet, { plane, rug, marks }, at, { unit, height, put });
   const [one, two, three] = sheet.columns(3, { gutters: [62, 40, 58], shares: [1.4, 1, 1.2] });
-  const main = sheet.plot({ ...one, top: 0, height }, { title: "Log weight", unit: `${nameOf}; a click moves the body there`, x: x(), y: numbers(""), click: (value) => ghost(back(value)), over: (points) => tipOf(`${figure(points[0].axisValue)}${screenUnit(unit)}`, points.filter((point) => point.seriesName === "log weight").map((point) => ["log weight", nats(point.data[1])])) });
+  const main = sheet.plot({ ...one, top: 0, height }, { title: "Log weight", unit: `${nameOf}; a click moves the body there`, x: x(), y: numbers(""), click: (value) => ghost(back(value)), over: (points) => tipOf(`${figure(points[0].axisValue)}${screenUnit(unit)}`, points.filter((point) => ["log weight", "stored", "tried"].includes(point.seriesName)).map((point) => [point.seriesName, nats(point.data[1])])), names: tried ? ["stored", "tried"] : null });
   const finite = slice.filter((row) => Number.isFinite(row.log_weight));
   const [low, high] = extent(finite.map((row) => row.log_weight));
   const outside = slice.filter((row) => row.possible === false);
@@ -40,22 +45,33 @@ function landscape(sheet, { slice, terms, tempered, plane, rug, marks, ends }, a
     const edges = [slice.find((row) => row.possible !== false)?.at, slice.findLast((row) => row.possible !== false)?.at];
     sheet.marks(main, edges.filter((edge) => edge !== undefined && edge !== range[0] && edge !== range[1]).map((edge) => ({ x: put(edge), word: "limit", dashed: true })));
   }
-  sheet.line(main, "log weight", slice.map((row) => [put(row.at), row.log_weight]), token("accent"), { symbols: false });
+  const curve = (rows) => rows.map((row) => [put(row.at), row.log_weight]);
+  sheet.line(main, tried ? "stored" : "log weight", curve(slice), token(tried ? "stored" : "accent"), { symbols: false });
+  if (tried) sheet.line(main, "tried", curve(tried.slice), token("tried"), { symbols: false });
   const own = rug.filter((row) => at.layer === null || row.layer === at.layer);
   const bounds = extent(slice.map((row) => row.at));
+  if (tried) sheet.series(main, {
+    name: "tried particles", type: "scatter", symbol: "rect", symbolSize: [1.5, 9], itemStyle: { color: token("tried"), opacity: 0.75 },
+    data: tried.rug.filter((row) => row.at >= bounds[0] && row.at <= bounds[1]).map((row) => ({ value: [put(row.at), low - 0.1 * (high - low || 1)], row })),
+    tip: ({ data: { row } }) => tipOf(`tried particle ${row.particle}, layer ${row.layer + 1}`, [["log weight", nats(row.log_weight)]]),
+  });
   sheet.series(main, {
     name: "particles", type: "scatter", symbol: "rect", symbolSize: [1.5, 9], data: own.filter((row) => row.at >= bounds[0] && row.at <= bounds[1]).map((row) => ({ value: [put(row.at), low - 0.04 * (high - low || 1)], row, itemStyle: { color: layerColour(row.layer, at.layers), opacity: 0.75 } })),
     click: ({ data }) => ({ layer: data.row.layer, particle: data.row.particle }), tip: ({ data: { row } }) => tipOf(`particle ${row.particle}, layer ${row.layer + 1}`, [["place", isParameter ? withUnit(row.at, unit) : figure(row.at)], ["log weight", nats(row.log_weight)]]),
   });
-  sheet.marks(main, markSpots);
+  sheet.marks(main, markSpots, [put(range[0]), put(range[1])]);
 
   const layers = [...grouped(tempered, "layer")];
   const most = new Map(layers.map(([layer, rows]) => [layer, Math.max(...rows.map((row) => row.density)) || 1]));
-  const beta = sheet.plot({ ...two, top: 0, height }, { title: "At each layer's β", unit: "density, each to its own height", x: x(), y: numbers("", { scale: false, min: 0, max: 1.05, axisLabel: { show: false } }) });
+  const beta = sheet.plot({ ...two, top: 0, height }, { title: "At each layer's β", unit: `density, each to its own height${tried ? "; dashed: tried" : ""}`, x: x(), y: numbers("", { scale: false, min: 0, max: 1.05, axisLabel: { show: false } }) });
   for (const [layer, rows] of layers) {
     sheet.line(beta, `layer ${layer + 1}`, rows.map((row) => ({ value: [put(row.at), row.density / most.get(layer)], row })), layerColour(layer, at.layers), {
       width: at.layer === layer ? 3 : 1.4, symbols: false, triggerLineEvent: true, click: () => ({ layer }), emphasis: { focus: "series" }, tip: () => tipOf(`layer ${layer + 1}`, [["β", rows[0].beta]]),
     });
+  }
+  for (const [layer, rows] of tried ? grouped(tried.tempered, "layer") : []) {
+    const top = Math.max(...rows.map((row) => row.density)) || 1;
+    sheet.line(beta, `tried, layer ${layer + 1}`, rows.map((row) => [put(row.at), row.density / top]), layerColour(layer, at.layers), { dashed: true, width: at.layer === layer ? 3 : 1.2, symbols: false, tip: () => tipOf(`tried, layer ${layer + 1}`, [["β", rows[0].beta]]) });
   }
   sheet.marks(beta, markSpots.map((one) => ({ ...one, word: "" })));
 
@@ -70,7 +86,8 @@ function landscape(sheet, { slice, terms, tempered, plane, rug, marks, ends }, a
   });
   sheet.marks(part, markSpots.map((one) => ({ ...one, word: "" })));
   const best = finite.reduce((found, row) => (row.log_weight > (found?.log_weight ?? -Infinity) ? row : found), null);
-  return `${best ? `Best along the line: ${nats(best.log_weight)} at ${isParameter ? withUnit(best.at, unit) : figure(best.at)}. ` : ""}${marks.map((row) => `${row.name}: ${nats(row.log_weight)} at ${isParameter ? withUnit(row.at, unit) : figure(row.at)}`).join("; ")}.`;
+  const bestTried = tried?.slice.reduce((found, row) => (row.log_weight > (found?.log_weight ?? -Infinity) ? row : found), null);
+  return `${bestTried ? `Best along the tried one's line: ${nats(bestTried.log_weight)}. ` : ""}${best ? `Best along the line: ${nats(best.log_weight)} at ${isParameter ? withUnit(best.at, unit) : figure(best.at)}. ` : ""}${marks.map((row) => `${row.name}: ${nats(row.log_weight)} at ${isParameter ? withUnit(row.at, unit) : figure(row.at)}`).join("; ")}.`;
 }
 
 /** The landscape over two parameters. */
@@ -89,21 +106,23 @@ function landscapePlane(sheet, { plane, rug, marks }, at, { height, put, unit })
 
 /** Blame: what each camera and term says of each limb, and what the answer would be without it. */
 function blame(sheet, { matrix, left_out: leftOut, areas }, at) {
+  const tried = at.tried;
   const limbs = distinct(matrix.map((row) => row.limb));
   const sources = distinct(matrix.map((row) => `${row.camera} · ${row.term}`));
   const hasReference = matrix.some((row) => row.difference !== null);
   const key = hasReference ? "difference" : "value";
-  const [low, high] = extent(matrix.map((row) => row[key]));
+  const [low, high] = extent([...matrix, ...(tried?.matrix ?? [])].map((row) => row[key]));
   const bound = Math.max(Math.abs(low), Math.abs(high), 1e-9);
   const height = Math.max(limbs.length * LIMB_ROW, at.room - 110);
   const [one, two] = sheet.columns(2, { gutters: [124, 190], shares: [1.3, 1], right: 70 });
   const plot = sheet.plot({ ...one, top: 0, height }, {
-    title: hasReference ? "Pose less reference pose" : "Log-likelihood at the pose", unit: hasReference ? "nats; orange speaks for the pose, blue against it" : "nats", below: 64,
+    title: hasReference ? "Pose less reference pose" : "Log-likelihood at the pose", unit: `${hasReference ? "nats; orange speaks for the pose, blue against it" : "nats"}${tried ? "; ◤ stored, ◢ tried" : ""}`, below: 64,
     x: categories(sources, "", { axisLabel: { interval: 0, rotate: sources.length > 5 ? 28 : 0, fontSize: 10, width: 96, overflow: "truncate" } }), y: categories(limbs, "", { inverse: true, axisLabel: { interval: 0 } }),
   });
   const rowOf = new Map(matrix.map((row) => [`${row.camera} · ${row.term}/${row.limb}`, row]));
-  sheet.heat(plot, {
-    cells: matrix.map((row) => [sources.indexOf(`${row.camera} · ${row.term}`), limbs.indexOf(row.limb), row[key] ?? "-"]), ...(hasReference ? { low: -bound, high: bound, colours: ["less", "none", "more"] } : { low, high }),
+  const cellsOf = (list) => list.map((row) => [sources.indexOf(`${row.camera} · ${row.term}`), limbs.indexOf(row.limb), row[key] ?? "-"]);
+  sheet.splitHeat(plot, {
+    cells: cellsOf(matrix), tried: tried && cellsOf(tried.matrix), ...(hasReference ? { low: -bound, high: bound, colours: ["less", "none", "more"] } : { low, high }),
     ends: [figure(hasReference ? bound : high), figure(hasReference ? -bound : low)], key: { left: one.left + one.width + 12, top: 40 },
     click: ({ value }) => { const row = rowOf.get(`${sources[value[0]]}/${limbs[value[1]]}`); return { limb: row.limb === WHOLE ? null : limbGroup(row.limb), camera: row.camera || null }; },
     tip: ({ value }) => { const row = rowOf.get(`${sources[value[0]]}/${limbs[value[1]]}`); const area = areas.find((one) => one.camera === row.camera && one.limb === row.limb); return tipOf(`${row.limb}: ${sources[value[0]]}`, [["at the pose", nats(row.value)], ["at the reference", nats(row.reference)], ["difference", nats(row.difference)], ...(area ? /** @type {[string, any][]} */ ([["body outside the silhouette", `${figure(area.outside)} mm²`], ["silhouette without body", `${figure(area.bare)} mm²`]]) : [])]); },
@@ -112,8 +131,10 @@ function blame(sheet, { matrix, left_out: leftOut, areas }, at) {
   const nameOf = (row) => `${[row.camera, row.term].filter(Boolean).join(" · ") || "all"}, ${row.factor === 0 ? "left out" : `counts ${figure(row.factor)}`}`;
   const shown = [...leftOut].sort((a, b) => Math.abs(b.change ?? 0) - Math.abs(a.change ?? 0)).slice(0, Math.max(6, Math.floor(height / LIMB_ROW)));
   const bars = sheet.plot({ ...two, top: 0, height: Math.min(height, Math.max(90, shown.length * 22)) }, { title: "When one counts less", unit: "change of preference for the pose, nats", x: numbers("", { scale: false }), y: categories(shown.map(nameOf), "", { inverse: true, axisLabel: { interval: 0, width: 180, overflow: "truncate" } }) });
-  sheet.series(bars, {
-    type: "bar", barMaxWidth: 12, data: shown.map((row) => ({ value: row.change, row, itemStyle: { color: token((row.change ?? 0) < 0 ? "less" : "more"), opacity: at.camera === null || at.camera === row.camera ? 1 : 0.35 } })),
+  const inTried = new Map((tried?.left_out ?? []).map((row) => [nameOf(row), row]));
+  const lists = /** @type {[string, any[]][]} */ (tried ? [["stored", shown], ["tried", shown.map((row) => inTried.get(nameOf(row)) ?? { ...row, change: null })]] : [["", shown]]);
+  for (const [name, list] of lists) sheet.series(bars, {
+    name, type: "bar", barMaxWidth: 12, data: list.map((row) => ({ value: row.change, row, itemStyle: { color: token(name || ((row.change ?? 0) < 0 ? "less" : "more")), opacity: at.camera === null || at.camera === row.camera ? 1 : 0.35 } })),
     click: ({ data }) => (data.row.camera ? { camera: data.row.camera } : null), tip: ({ data: { row } }) => tipOf(nameOf(row), [["at the pose", nats(row.log_weight)], ["at the reference", nats(row.reference)], ["preference", nats(row.preference)], ["change", nats(row.change)]]),
   });
   const [most] = shown;
@@ -121,26 +142,70 @@ function blame(sheet, { matrix, left_out: leftOut, areas }, at) {
   return own.length ? own.map((row) => `${row.limb}, ${row.camera} · ${row.term}: ${nats(row.value)}${row.difference === null ? "" : `, ${figure(row.difference)} beside the reference`}`).slice(0, 4).join("; ") : most ? `${nameOf(most)}: the preference for the pose changes by ${nats(most.change)}.` : "";
 }
 
-/** Modes of a frame: the share of the weight that each cluster of the particles holds, layer by layer. */
-function modesOfFrame(sheet, { modes, layers: rows }, at) {
+/** Modes of a frame: the share of the weight that each cluster of the particles holds, by layer. */
+function modesOfFrame(sheet, tables, at) {
+  const sides = sidesOf(tables, at);
   const [one, two] = sheet.columns(2, { gutters: [52, 60], shares: [1.5, 1], right: 20 });
   const height = Math.max(120, at.room - 76);
-  const names = distinct(rows.map((row) => row.layer)).sort((a, b) => a - b);
-  const numbersOf = distinct([...modes, ...rows].map((row) => row.mode));
-  const plot = sheet.plot({ ...one, top: 0, height }, { title: "Share of the weight", unit: "of each mode, layer by layer", names: numbersOf.map((mode) => `mode ${mode}`), x: categories(names.map((layer) => String(layer + 1)), "layer"), y: numbers("", { scale: false, min: 0, max: 1 }) });
-  numbersOf.forEach((mode, index) => {
-    sheet.series(plot, {
-      name: `mode ${mode}`, type: "bar", stack: "mass", barMaxWidth: 34, itemStyle: { color: seriesColour(index) }, data: names.map((layer) => { const row = rows.find((entry) => entry.layer === layer && entry.mode === mode); return { value: row?.mass ?? 0, row, layer }; }),
-      click: ({ data }) => ({ layer: data.layer }), tip: ({ data }) => tipOf(`mode ${mode}, layer ${data.layer + 1}`, [["share", `${figure(100 * data.value)} %`], ["particles", data.row?.particles ?? 0]]),
+  const layers = layersOfAll(sides, "layers");
+  const all = (name) => sides.flatMap((side) => side.tables[name]);
+  const modes = distinct([...all("modes"), ...all("layers")].map((row) => row.mode));
+  const share = numbers("", { scale: false, min: 0, max: 1 });
+  const plot = sheet.plot({ ...one, top: 0, height }, {
+    title: "Share of the weight",
+    unit: `of each mode, by layer${at.tried ? "; left stored, right tried" : ""}`,
+    names: modes.map((mode) => `mode ${mode}`), y: share,
+    x: categories(layers.map((layer) => String(layer + 1)), "layer"),
+  });
+  for (const { name: side, tables: own } of sides) {
+    modes.forEach((mode, index) => {
+      const rowIn = (layer) => own.layers.find((row) => row.layer === layer && row.mode === mode);
+      sheet.series(plot, {
+        name: `mode ${mode}`, type: "bar", stack: `mass ${side}`, barMaxWidth: 34,
+        itemStyle: {
+          color: seriesColour(index), opacity: side === "stored" ? 0.55 : 1,
+          ...(side ? { borderColor: token(side), borderWidth: 1 } : {}),
+        },
+        data: layers.map((layer) => ({ value: rowIn(layer)?.mass ?? 0, row: rowIn(layer), layer, side })),
+        click: ({ data }) => ({ layer: data.layer }),
+        tip: ({ data }) =>
+          tipOf([side, `mode ${mode}, layer ${data.layer + 1}`].filter(Boolean).join(", "), [
+            ["share", `${figure(100 * data.value)} %`], ["particles", data.row?.particles ?? 0],
+          ]),
+      });
     });
-  });
+  }
   sheet.chosen(plot, { column: at.layer === null ? null : String(at.layer + 1) });
-  const bars = sheet.plot({ ...two, top: 0, height }, { title: "Last layer", unit: "share of the weight; a click draws that mode's body", x: categories(modes.map((row) => String(row.mode)), "mode"), y: numbers("", { scale: false, min: 0, max: 1 }) });
-  sheet.series(bars, {
-    type: "bar", barMaxWidth: 40, data: modes.map((row) => ({ value: row.mass ?? null, row, itemStyle: { color: seriesColour(numbersOf.indexOf(row.mode)) } })), click: ({ data }) => ({ mode: data.row.mode }),
-    tip: ({ data: { row } }) => tipOf(`mode ${row.mode}`, Object.entries(row).filter(([name]) => name !== "mode").map(([name, value]) => [name.replaceAll("_", " "), value])),
+  const numbersOf = distinct(all("modes").map((row) => row.mode));
+  const bars = sheet.plot({ ...two, top: 0, height }, {
+    title: "Last layer", unit: "share of the weight; a click draws that mode's body",
+    x: categories(numbersOf.map(String), "mode"), y: share,
   });
-  return modes.length > 1 ? `${modes.length} modes: ${modes.map((row) => `mode ${row.mode} holds ${figure(100 * (row.mass ?? 0))} %`).join(", ")}.` : "One mode: the particles agree about one pose.";
+  for (const { name: side, tables: own } of sides)
+    sheet.series(bars, {
+      name: side, type: "bar", barMaxWidth: 40,
+      data: numbersOf.map((mode) => {
+        const row = own.modes.find((entry) => entry.mode === mode);
+        const colour = side ? token(side) : seriesColour(modes.indexOf(mode));
+        return { value: row?.mass ?? null, row, itemStyle: { color: colour } };
+      }),
+      click: ({ data }) => (data.row && side !== "tried" ? { mode: data.row.mode } : null),
+      tip: ({ data: { row } }) =>
+        row
+          ? tipOf([side, `mode ${row.mode}`].filter(Boolean).join(", "), Object.entries(row)
+              .filter(([name]) => name !== "mode")
+              .map(([name, value]) => [name.replaceAll("_", " "), value]))
+          : "",
+    });
+  const words = sides.map(({ name, tables: { modes: rows } }) => {
+    const held = rows.map((row) => `mode ${row.mode} holds ${figure(100 * (row.mass ?? 0))} %`);
+    const what =
+      rows.length > 1
+        ? `${rows.length} modes: ${held.join(", ")}`
+        : "one mode: the particles agree about one pose";
+    return name ? `${name}: ${what}` : what[0].toUpperCase() + what.slice(1);
+  });
+  return `${words.join("; ")}.`;
 }
 
 /** Modes of the run: how many there are in each frame, and how far apart. */
@@ -151,6 +216,8 @@ function modesOfRun(sheet, { frames: rows }, at) {
   for (const [column, title, unit, key, more] of /** @type {const} */ ([[0, "Modes", "clusters of the last set", "modes", { min: 0 }], [1, "Heaviest mode", "share of the weight", "first_mass", { min: 0, max: 1 }], [2, "Distance", "of the two heaviest, mm", "distance", { min: 0 }]])) {
     const plot = sheet.plot({ ...places[column], top: 0, height }, { title, unit, x: categories(names, "frame"), y: numbers("", { scale: false, ...more }), over: (points) => tipOf(`frame ${points[0].axisValue}`, [[title, points[0].data], ["farthest limb", rows[points[0].dataIndex]?.farthest]]) });
     sheet.line(plot, title, rows.map((row) => row[key]), token("accent"), { symbols: rows.length < 60, triggerLineEvent: true, click: ({ dataIndex }) => (dataIndex === undefined ? null : { frame: rows[dataIndex].frame }), stepped: key === "modes" });
+    const found = at.tried?.frames.find((one) => one.frame === at.frame);
+    if (found) sheet.series(plot, { name: "tried", type: "scatter", symbol: "diamond", symbolSize: 12, z: 5, itemStyle: { color: token("tried") }, data: [{ value: [String(at.frame), found[key]] }], tip: () => tipOf(`frame ${at.frame}, tried`, [[title, found[key]]]) });
     sheet.chosen(plot, { column: String(at.frame) });
   }
   const row = rows.find((one) => one.frame === at.frame);
@@ -163,12 +230,16 @@ function seeds(sheet, { limbs, seeds: rows, ranks }, at) {
   const height = Math.max(limbs.length * LIMB_ROW, at.room - 76);
   const names = limbs.map((row) => row.limb);
   const plot = sheet.plot({ ...one, top: 0, height }, { title: "Spread", unit: "mm", names: ["within a seed", "between seeds", "Monte-Carlo error"], x: numbers("", { scale: false }), y: categories(names, "", { inverse: true, axisLabel: { interval: 0 } }) });
-  for (const [name, key, colour] of [["within a seed", "within", "text-quiet"], ["between seeds", "between", "series-1"], ["Monte-Carlo error", "error", "accent"]]) {
-    sheet.series(plot, { name, type: "bar", barMaxWidth: 7, barGap: "10%", itemStyle: { color: token(colour) }, data: limbs.map((row) => ({ value: row[key], row })), click: ({ data }) => ({ limb: data.row.limb }), tip: ({ data: { row } }) => tipOf(row.limb, [["within a seed", `${figure(row.within)} mm`], ["between seeds", `${figure(row.between)} mm`], ["Monte-Carlo error of one seed", `${figure(row.error)} mm`], ["R̂", row.r_hat]]) });
+  const inTried = at.tried?.limbs?.length ? at.tried : null;
+  const triedLimbs = inTried && names.map((limb) => inTried.limbs.find((row) => row.limb === limb) ?? { limb });
+  const kinds = [["within a seed", "within", "text-quiet"], ["between seeds", "between", "series-1"], ["Monte-Carlo error", "error", "accent"]];
+  for (const [name, key, colour, list, border] of /** @type {[string, string, string, any[], string][]} */ (kinds.flatMap(([name, key, colour]) => [[name, key, colour, limbs, ""], ...(inTried ? [[`tried, ${name}`, key, colour, triedLimbs, "tried"]] : [])]))) {
+    sheet.series(plot, { name, type: "bar", barMaxWidth: 7, barGap: "10%", itemStyle: { color: token(colour), ...(border ? { borderColor: token(border), borderWidth: 1.5 } : {}) }, data: list.map((row) => ({ value: row[key], row })), click: ({ data }) => ({ limb: data.row.limb }), tip: ({ data: { row } }) => tipOf(row.limb, [["within a seed", `${figure(row.within)} mm`], ["between seeds", `${figure(row.between)} mm`], ["Monte-Carlo error of one seed", `${figure(row.error)} mm`], ["R̂", row.r_hat]]) });
   }
   sheet.chosen(plot, { row: at.limb && names.includes(at.limb) ? names.indexOf(at.limb) : null });
   const bars = sheet.plot({ ...two, top: 0, height }, { title: "Each seed's log weight", unit: "nats", x: categories(rows.map((row) => String(row.seed)), "seed"), y: numbers("") });
   sheet.series(bars, { type: "scatter", symbolSize: 9, data: rows.map((row, index) => ({ value: [String(row.seed), row.log_weight], row, itemStyle: { color: seriesColour(index) } })), click: ({ data }) => ({ seed: data.row.seed }), tip: ({ data: { row } }) => tipOf(`seed ${row.seed}`, [["log weight", nats(row.log_weight)], ["error", row.error === null ? "–" : `${figure(row.error)} mm`], ["evaluations", row.evaluations]]) });
+  if (inTried) sheet.series(bars, { name: "tried", type: "scatter", symbol: "diamond", symbolSize: 10, itemStyle: { color: token("tried") }, data: inTried.seeds.map((row) => ({ value: [String(row.seed), row.log_weight], row })), tip: ({ data: { row } }) => tipOf(`seed ${row.seed}, tried`, [["log weight", nats(row.log_weight)], ["error", row.error === null ? "–" : `${figure(row.error)} mm`]]) });
   const chosen = distinct(ranks.map((row) => row.parameter)).find((name) => name === at.parameter) ?? ranks[0]?.parameter;
   const own = ranks.filter((row) => row.parameter === chosen);
   const rank = sheet.plot({ ...three, top: 0, height }, { title: `Ranks: ${chosen ? at.label(chosen) : ""}`, unit: "of each seed's particles among all; level where seeds agree", x: categories(distinct(own.map((row) => row.bin)).map((bin) => String(bin + 1)), "bin of rank"), y: numbers("", { scale: false, min: 0 }) });
@@ -184,11 +255,16 @@ function coverage(sheet, { frames: rows, correlation, pit }, at) {
   const height = Math.max(120, at.room - 76);
   const limbs = distinct(rows.map((row) => row.limb));
   const known = rows.filter((row) => row.spread > 0 && row.error > 0);
-  const plot = sheet.plot({ ...one, top: 0, height }, { title: "Spread and error", unit: "mm, log scales; on the line the spread is the error", x: logarithmic("spread of the last set, mm"), y: logarithmic("") });
-  limbs.forEach((limb, index) => {
+  const plot = sheet.plot({ ...one, top: 0, height }, { title: "Spread and error", unit: "mm, log scales; on the line the spread is the error", names: [...limbs, ...(at.tried ? ["tried"] : [])], x: logarithmic("spread of the last set, mm"), y: logarithmic("") });
+  limbs.forEach((limb) => {
     const dim = at.limb !== null && at.limb !== limb;
-    sheet.series(plot, { name: limb, type: "scatter", symbolSize: (_value, { data }) => (data.row.frame === at.frame ? 11 : 5), itemStyle: { color: seriesColour(index), opacity: dim ? 0.08 : 0.6 }, data: known.filter((row) => row.limb === limb).map((row) => ({ value: [row.spread, row.error], row })), click: ({ data }) => ({ frame: data.row.frame, limb: data.row.limb }), tip: ({ data: { row } }) => tipOf(`${row.limb}, frame ${row.frame}`, [["spread", `${figure(row.spread)} mm`], ["error", `${figure(row.error)} mm`]]) });
+    const { colour, symbol } = limbLook(limb, limbs);
+    sheet.series(plot, { name: limb, type: "scatter", symbolSize: (_value, { data }) => (data.row.frame === at.frame ? 11 : 5), itemStyle: { color: colour, opacity: dim ? 0.08 : 0.6 }, symbol, data: known.filter((row) => row.limb === limb).map((row) => ({ value: [row.spread, row.error], row })), click: ({ data }) => ({ frame: data.row.frame, limb: data.row.limb }), tip: ({ data: { row } }) => tipOf(`${row.limb}, frame ${row.frame}`, [["spread", `${figure(row.spread)} mm`], ["error", `${figure(row.error)} mm`]]) });
   });
+  // An arrow from what is stored of the shown frame to what was tried in it.
+  const of = (rows) => rows.filter((row) => row.frame === at.frame && row.spread > 0 && row.error > 0);
+  const moved = at.tried ? of(at.tried.frames).map((row) => ({ row, from: of(rows).find((one) => one.limb === row.limb) })).filter(({ from }) => from) : [];
+  if (moved.length) sheet.series(plot, { name: "tried", type: "lines", coordinateSystem: "cartesian2d", z: 5, symbol: ["none", "arrow"], symbolSize: 9, lineStyle: { color: token("tried"), width: 2, opacity: 1 }, data: moved.map(({ row, from }) => ({ coords: [[from.spread, from.error], [row.spread, row.error]], row })), tip: ({ data: { row } }) => tipOf(`${row.limb}, frame ${row.frame}, tried`, [["spread", `${figure(row.spread)} mm`], ["error", `${figure(row.error)} mm`]]) });
   const bounds = extent(known.flatMap((row) => [row.spread, row.error]));
   if (known.length) sheet.line(plot, "", [[bounds[0], bounds[0]], [bounds[1], bounds[1]]], token("text-quiet"), { dashed: true, symbols: false, silent: true });
   const limb = at.limb && pit.some((row) => row.limb === at.limb) ? at.limb : pit[0]?.limb;

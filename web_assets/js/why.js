@@ -26,11 +26,21 @@ const words = element("section", { className: "why-words", ariaLabel: "Why" });
 const place = element("section", { className: "figure", ariaLabel: "Limbs and frames" });
 /** @type {Figure} */
 let figure = null;
-/** What is drawn, and what was chosen when it was. @type {{ key: string, frame: Schemas["ViewAnswer"], run: Schemas["ViewAnswer"], chosen: string } | null} */
+/** What is drawn, and what was chosen when it was. @type {{ key: string, frame: Schemas["ViewAnswer"], run: Schemas["ViewAnswer"], tried: { frame: Schemas["ViewAnswer"], run: Schemas["ViewAnswer"] } | null, chosen: string } | null} */
 let held = null;
 let age = 0;
 
-const query = () => (get("track") && get("track") !== "raw" ? `track=${encodeURIComponent(get("track"))}` : "");
+/** What the answers depend on. `trial`: whose they are, none: of what is stored. */
+function query(trial = get("against")) {
+  const track = get("track") && get("track") !== "raw" ? { track: get("track") } : {};
+  return String(new URLSearchParams({ ...track, ...(trial ? { trial } : {}) }));
+}
+
+/** The answers for a trial, or for what is stored: of the frame, and of the run. */
+async function answersFor(session, run, frame, /** @type {string | null} */ trial) {
+  const [ofFrame, ofRun] = await Promise.all([fetchJson(frameView(session, run, frame, "why", query(trial))), fetchJson(runView(session, run, "why", query(trial)))]);
+  return { frame: ofFrame, run: ofRun };
+}
 
 const chosenNow = () => JSON.stringify([get("frame"), get("limb"), get("layer")]);
 
@@ -40,14 +50,15 @@ async function load() {
   if (!get("run") || get("frame") === null || (!get("summary")?.frames.length && !get("detail"))) { held = null; return drawNothing("No frames yet: track a run, then this says why a frame failed."); }
   if (followsSearch() || !isStored()) { held = null; return drawSearch(); }
   const [session, run, frame] = [get("session"), get("run"), get("frame")];
-  const key = `${session}/${run} ${frame} ${query()} ${age} ${get("summary").frames.length}`;
+  const trial = get("trial");
+  const key = `${session}/${run} ${frame} ${query()} ${trial ?? ""} ${age} ${get("summary").frames.length}`;
   if (held?.key === key) return held.chosen === chosenNow() ? undefined : draw();
   if (held?.frame.session !== session || held?.frame.run !== run) drawNothing(`Frame ${frame} is being looked into ...`);
   words.ariaBusy = "true";
   try {
-    const [ofFrame, ofRun] = await Promise.all([fetchJson(frameView(session, run, frame, "why", query())), fetchJson(runView(session, run, "why", query()))]);
+    const [stored, tried] = await Promise.all([answersFor(session, run, frame, get("against")), trial ? answersFor(session, run, frame, trial) : null]);
     if (frame !== get("frame") || run !== get("run") || session !== get("session")) return;
-    held = { key, frame: ofFrame, run: ofRun, chosen: "" };
+    held = { key, ...stored, tried, chosen: "" };
     draw();
   } catch (error) {
     if (frame === get("frame")) { held = null; drawNothing(`${error.message} ${error.hint ?? ""}`); }
@@ -84,7 +95,7 @@ async function attempt(remedy) {
   try {
     set({ follow: false });
     await patch(`${runPath(get("session"), get("run"))}/settings?frame=${get("frame")}`, remedy.settings);
-    say(`Frame ${get("frame")} is annealed again: ${remedy.title}. Its outcome stands over the scene.`);
+    say(`Frame ${get("frame")} is annealed again: ${remedy.title}. What it changes stands under the knobs.`);
   } catch (error) { complain(error); }
 }
 
@@ -107,7 +118,7 @@ const remedyCard = (remedy) => element("div", { className: "remedy-card" },
   buttonOf(remedy) && button(buttonOf(remedy), () => attempt(remedy), "small", { ariaLabel: `Try: ${remedy.title}` }));
 
 function draw() {
-  const { frame, run } = held;
+  const { frame, run, tried } = held;
   held.chosen = chosenNow();
   const findings = frame.findings ?? [];
   const kept = words.scrollTop;
@@ -117,12 +128,14 @@ function draw() {
     frame.notes.map((note) => hint(note)),
     element("ul", { className: "why-findings" }, findings.map((finding, at) => element("li", { className: classOf(finding) },
       button(finding.words, () => follow(finding), "", { dataset: { key: `finding-${at}` } })))),
+    tried && [element("h3", { className: "tried-words" }, "What was tried"), element("ul", { className: "why-findings" }, (tried.frame.findings ?? []).map((finding, at) => element("li", { className: classOf(finding) }, button(finding.words, () => follow(finding), "", { dataset: { key: `tried-${at}` } }))))],
     frame.remedies?.length > 0 && [element("h3", {}, "What may help"), element("div", { className: "remedies" }, frame.remedies.map(remedyCard))]);
   words.scrollTop = kept;
-  const tables = Object.fromEntries([...frame.tables, ...run.tables].map((table) => [table.name, records(table)]));
+  const tablesOf = (answers) => Object.fromEntries([...answers.frame.tables, ...answers.run.tables].map((table) => [table.name, records(table)]));
+  const tables = tablesOf({ frame, run });
   figure.show({
     name: [get("session"), get("run"), `frame${frame.frame}`, "why"].join("-"), title: "Limbs and frames", question: "Which limb, from when on?", caption: frame.caption, notes: frame.notes,
-    tables: [...frame.tables, ...run.tables], choose: select, link: () => addressOf(), draw: (sheet, room) => drawLimbs(sheet, tables, { frame: get("frame"), limb: get("limb"), layer: get("layer") }, room),
+    tables: [...frame.tables, ...run.tables], choose: select, link: () => addressOf(), draw: (sheet, room) => drawLimbs(sheet, tables, { frame: get("frame"), limb: get("limb"), layer: get("layer"), tried: tried && tablesOf(tried) }, room),
   });
 }
 
@@ -131,7 +144,7 @@ export function startWhy() {
   fill(panel, words, place);
   figure = new Figure(place);
   const later = paced(load, LOAD_MILLISECONDS);
-  watch(["session", "run", "frame", "track", "summary", "panel", "limb", "layer", "follow", "work", "detail", "parameters"], later);
+  watch(["session", "run", "frame", "track", "trial", "against", "summary", "panel", "limb", "layer", "follow", "work", "detail", "parameters"], later);
   onEvent("frame", (event, here) => { if (here && !event.reannealed) age += 1; });
   document.addEventListener("panel", () => later());
 }

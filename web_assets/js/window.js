@@ -15,5 +15,8 @@ addEventListener("pageshow", take);
 /** Where this window's own scene is served. */
 export const scenePath = `/scene/${windowName}/`;
 
+/** Where its second scene is served, which shows trials. */
+export const triedScenePath = `/scene/${windowName}-tried/`;
+
 /** A socket to the studio's events, those of this window's scene among them. */
 export const eventSocket = () => new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/api/events?window=${windowName}`);

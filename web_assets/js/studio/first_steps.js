@@ -161,9 +161,11 @@ function FirstSteps() {
   </section>`;
 }
 
-/** Show the steps in their place, unless they were closed; play the layers where the address asks for it. */
+/** Show the steps in their place, unless they were closed, and what the address asks for: `step`, layers that play. */
 export async function startFirstSteps() {
-  const plays = new URLSearchParams(location.search).get("plays") === "layers";
+  const asked = new URLSearchParams(location.search);
+  const plays = asked.get("plays") === "layers";
+  step.value = Math.min(STEPS.length, Math.max(1, Number(asked.get("step")) || 1)) - 1;
   const place = /** @type {HTMLElement} */ (document.getElementById("first-steps"));
   mount(place, html`<${FirstSteps} />`);
   if (plays) playWhenShown().catch(complain);

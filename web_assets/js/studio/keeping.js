@@ -11,14 +11,15 @@ import { get, set } from "../state.js";
  * run that was shown stays as it is. The frame's result is the one that was tried, for the start and the random numbers are
  * the same.
  * @param {number} frame
+ * @param {Record<string, any>} settings the knobs that it is tracked with; none: those that were moved
  */
-export async function keepAsNewRun(frame) {
+export async function keepAsNewRun(frame, settings = {}) {
   const [session, run] = [get("session"), get("run")];
   try {
-    const made = await post(`${runPath(session, run)}/branch`, { frame });
+    const made = await post(`${runPath(session, run)}/branch`, { frame, settings });
     await refreshSessions();
     openSession(session, made.name);
-    say(`${made.name} is ${run} with the moved knobs from frame ${frame} on; ${run} is unchanged.`);
+    say(`${made.name} is ${run} with these knobs from frame ${frame} on; ${run} is unchanged.`);
     set({ follow: true });
     await post(`${runPath(session, made.name)}/start`);
   } catch (error) {

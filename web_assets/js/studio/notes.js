@@ -163,7 +163,7 @@ function NoteOfFrame() {
                   ${
                     notes.length > 0 &&
                     html`<a class="small" href=${`${runPath(get("session"), get("run"))}/notes.csv`}>
-                      all ${notes.length} as CSV
+                      All notes as CSV
                     </a>`
                   }
                 </div>`

@@ -4,7 +4,7 @@ import { figure } from "../chart_looks.js";
 import { byId, dotted } from "../elements.js";
 import { say } from "../messages.js";
 import { drawSoon } from "../pacing.js";
-import { goTo } from "../selection.js";
+import { goTo, shownTrial } from "../selection.js";
 import { get } from "../state.js";
 import { onTheme } from "../theme.js";
 import { follow, html, mount, useEffect, useLayoutEffect, useRef } from "./component.js";
@@ -77,13 +77,14 @@ function Track() {
 /** The shown frame: its number, its error, and what is to be said of it. */
 function FrameLabel() {
   const [summary, frame, detail] = [follow("summary"), follow("frame"), follow("detail")];
-  const outcome = follow("outcome");
+  follow("trial");
+  follow("trials");
   if (!summary || frame === null) {
     return html`<output class="frame-label" id="frame-label">–</output>`;
   }
   const entry = entryOf(summary, frame);
   const before = entry?.error_mm ?? null;
-  const after = outcome?.frame === frame ? (outcome.after?.error_mm ?? null) : null;
+  const after = shownTrial()?.error_mm ?? null;
   let measured = "";
   if (before !== null) {
     measured = after === null ? figure(before) : `${figure(before)} → ${figure(after)}`;

@@ -3,8 +3,9 @@
 import { fetchJson, post } from "../api.js";
 import { get } from "../state.js";
 
-const TRIES = 12;
+const TRIES = 30;
 const TRY_MILLISECONDS = 500;
+const PATIENCE = 240;
 const RATE = 3;
 
 const wait = (/** @type {number} */ milliseconds) =>
@@ -20,15 +21,19 @@ export function visit(state) {
   dispatchEvent(new PopStateEvent("popstate"));
 }
 
-/** Play the layers once the scene shows the frame: what the page says of it meanwhile would stop them. */
+const isShown = () => get("frame") !== null && get("detail")?.frame === get("frame");
+
+/** Play the layers once the frame is there: what the page says of it to the scene meanwhile would stop them. */
 export async function playWhenShown() {
+  for (let waited = 0; waited < PATIENCE && !isShown(); waited++) await wait(TRY_MILLISECONDS);
+  const wanted = [get("session"), get("run"), get("frame")].join();
   let seen = 0;
   for (let tries = 0; tries < TRIES && seen < 2; tries++) {
-    if (get("detail")?.frame === get("frame") && get("frame") !== null) {
-      const now = await fetchJson("/api/scene/play-layers");
-      seen = now.playing ? seen + 1 : 0;
-      if (!now.playing) await post("/api/scene/play-layers", { playing: true, rate: RATE });
-    }
+    // Who has gone on meanwhile is not followed.
+    if ([get("session"), get("run"), get("frame")].join() !== wanted) return;
+    const now = await fetchJson("/api/scene/play-layers");
+    seen = now.playing ? seen + 1 : 0;
+    if (!now.playing) await post("/api/scene/play-layers", { playing: true, rate: RATE });
     await wait(TRY_MILLISECONDS);
   }
 }

@@ -101,16 +101,20 @@ function WorkList() {
   const going = lines.value.filter(isGoing);
   if (!lines.value.length) return null;
   const share = going.length === 1 ? shareOf(going[0]) : null;
+  const count = going.length === 1 ? "1 job" : `${going.length} jobs`;
   const words = going.length
-    ? `${going.length === 1 ? nameOf(going[0]) : `${going.length} jobs`}${share === null ? "" : ` ${Math.round(100 * share)} %`}`
+    ? `${count}${share === null ? "" : ` ${Math.round(100 * share)} %`}`
     : "Jobs";
+  const title = going.length
+    ? going.map((job) => `${nameOf(job)} of ${placeOf(job)}`).join(", ")
+    : "Work in the background: how it ended, and where its answer is";
   return html`<div class="work-list">
     <button
       type="button"
       class="quiet small"
       data-going=${going.length || null}
       aria-expanded=${String(open.value)}
-      title="Work in the background: how far it is, and where its answer is"
+      title=${title}
       onClick=${() => {
         open.value = !open.value;
       }}

@@ -1,0 +1,198 @@
+// The twin: while a trial is shown, a second scene lies over the first one's canvas, cut off by a divider that can be
+// dragged: stored at its left, tried at its right. The studio keeps both scenes' cameras and choices the same.
+
+import { post, readOnly } from "../api.js";
+import { byId } from "../elements.js";
+import { complain } from "../messages.js";
+import { shareKeys } from "../scene_frame.js";
+import { besideTrial, shownTrial } from "../selection.js";
+import { get } from "../state.js";
+import { triedScenePath } from "../window.js";
+import { effect, follow, html, mount, signal, useEffect, useRef } from "./component.js";
+import { movedWords } from "./trial_card.js";
+import { placeOf } from "./trials.js";
+
+const STEP = 0.02;
+const LEAST = 0.04;
+const LOOK_MILLISECONDS = 100;
+const KEPT = "twin-share";
+
+/** Where the divider stands, as a share of the canvas. */
+const share = signal(Number(localStorage.getItem(KEPT)) || 0.5);
+/** The box of the first scene's canvas in the stage, null while it has none. @type {import("@preact/signals").Signal<DOMRect | null>} */
+const canvasBox = signal(null);
+/** Whether a trial was shown since the page was loaded: from then on the second scene is kept ready. */
+const isNeeded = signal(false);
+/** Whether the second scene draws. */
+const isReady = signal(false);
+/** Whether the scenes are split: then trials are in the second one. */
+const isSplit = signal(false);
+
+/** @param {number} value */
+function moveTo(value) {
+  share.value = Math.max(LEAST, Math.min(1 - LEAST, value));
+  localStorage.setItem(KEPT, share.value.toFixed(3));
+}
+
+/** @param {Document | null} page a scene's */
+const canvasOf = (page) => page?.querySelector("canvas") ?? null;
+
+/** Keep the canvas' box up to date: its panel may be folded, the page's columns may move. */
+function followCanvas() {
+  const frame = /** @type {HTMLIFrameElement} */ (byId("scene"));
+  /** @type {HTMLCanvasElement | null} */
+  let known = null;
+  const measure = () => {
+    const canvas = canvasOf(frame.contentDocument);
+    const box = canvas?.getBoundingClientRect();
+    const before = canvasBox.value;
+    const isSame =
+      box && before && ["x", "y", "width", "height"].every((key) => box[key] === before[key]);
+    if (!isSame) canvasBox.value = box?.width ? box : null;
+    if (canvas && canvas !== known) {
+      known = canvas;
+      observer.observe(canvas);
+    }
+  };
+  const observer = new ResizeObserver(measure);
+  observer.observe(frame);
+  frame.addEventListener("load", () => {
+    const wait = setInterval(() => {
+      measure();
+      if (known) clearInterval(wait);
+    }, LOOK_MILLISECONDS);
+  });
+}
+
+/** Split the scenes, or join them again, on the server. @param {boolean} split */
+async function split(split) {
+  if (split === isSplit.value) return;
+  isSplit.value = split;
+  const places = split
+    ? { trial: placeOf(get("trial")), against: placeOf(get("against")), discard: true }
+    : {};
+  try {
+    await post("/api/scene/show", { ...places, twin: split });
+  } catch (error) {
+    isSplit.value = false;
+    complain(error);
+  }
+}
+
+/** The second scene. @param {{ takeKey: (event: KeyboardEvent) => void }} properties */
+function TriedScene({ takeKey }) {
+  const frame = useRef(/** @type {HTMLIFrameElement | null} */ (null));
+  useEffect(() => {
+    const scene = /** @type {HTMLIFrameElement} */ (frame.current);
+    let wait = 0;
+    scene.addEventListener("load", () => {
+      const page = scene.contentDocument;
+      if (!page) return;
+      shareKeys(scene, takeKey);
+      const style = page.createElement("style");
+      // The first scene has the panel and says what there is to say.
+      style.textContent =
+        "body > *:not(#root) { display: none !important } .mantine-Notifications-root, .mantine-Paper-root { display: none !important }";
+      page.head.append(style);
+      wait = window.setInterval(() => {
+        if (!canvasOf(page)) return;
+        clearInterval(wait);
+        isReady.value = true;
+      }, LOOK_MILLISECONDS);
+    });
+    scene.src = triedScenePath;
+    return () => clearInterval(wait);
+  }, []);
+  const style = { clipPath: `inset(0 0 0 ${100 * share.value}%)` };
+  return html`<iframe
+    ref=${frame}
+    class="tried-scene"
+    style=${style}
+    tabindex="-1"
+    title="3-D scene: what was tried"
+  />`;
+}
+
+function Divider() {
+  /** @param {PointerEvent} event */
+  const drag = (event) => {
+    const box = canvasBox.value;
+    const bar = /** @type {HTMLElement} */ (event.currentTarget);
+    if (!box || !bar.hasPointerCapture(event.pointerId)) return;
+    const left = bar.parentElement?.getBoundingClientRect().left ?? 0;
+    moveTo((event.clientX - left) / box.width);
+  };
+  /** @param {KeyboardEvent} event */
+  const step = (event) => {
+    const to = { ArrowLeft: share.value - STEP, ArrowRight: share.value + STEP, Home: 0, End: 1 };
+    const value = to[/** @type {keyof typeof to} */ (event.key)];
+    if (value === undefined) return;
+    event.preventDefault();
+    event.stopPropagation();
+    moveTo(value);
+  };
+  return html`<div
+    class="divider"
+    role="separator"
+    tabindex="0"
+    aria-orientation="vertical"
+    aria-label="Stored at the left, tried at the right"
+    aria-valuemin="0"
+    aria-valuemax="100"
+    aria-valuenow=${Math.round(100 * share.value)}
+    title="Drag, or use the arrow keys; a double click goes to the middle"
+    style=${{ left: `${100 * share.value}%` }}
+    onPointerDown=${(/** @type {PointerEvent} */ event) => /** @type {HTMLElement} */ (event.currentTarget).setPointerCapture(event.pointerId)}
+    onPointerMove=${drag}
+    onKeyDown=${step}
+    onDblClick=${() => moveTo(0.5)}
+  >
+    <i></i>
+  </div>`;
+}
+
+/** What stands on each side of the divider. */
+function Sides() {
+  follow("trials");
+  follow("trial");
+  follow("against");
+  const [tried, beside] = [shownTrial(), besideTrial()];
+  const left =
+    beside && "moved" in beside
+      ? `tried: ${movedWords(/** @type {any} */ (beside).moved)}`
+      : "stored";
+  const words = tried ? `tried: ${movedWords(tried.moved)}` : "tried";
+  const place = `${100 * share.value}%`;
+  return html`<span class="side stored" style=${{ right: `calc(100% - ${place} + 8px)` }}>${left}</span>
+    <span class="side tried" style=${{ left: `calc(${place} + 8px)` }}>${words}</span>`;
+}
+
+/** @param {{ takeKey: (event: KeyboardEvent) => void }} properties */
+function Twin({ takeKey }) {
+  const box = canvasBox.value;
+  if (!isNeeded.value || !box) return null;
+  const style = {
+    left: `${box.x}px`,
+    top: `${box.y}px`,
+    width: `${box.width}px`,
+    height: `${box.height}px`,
+  };
+  return html`<div class=${`twin-box ${isSplit.value ? "" : "away"}`} style=${style}>
+    <${TriedScene} takeKey=${takeKey} />
+    ${isSplit.value && html`<${Sides} /><${Divider} />`}
+  </div>`;
+}
+
+/** Wire the second scene to the state. @param {(event: KeyboardEvent) => void} takeKey */
+export function startTwin(takeKey) {
+  // Who may only look tries nothing.
+  if (readOnly) return;
+  followCanvas();
+  post("/api/scene/show", { twin: false }).catch(() => {});
+  effect(() => {
+    const isTried = Boolean(follow("whatIf"));
+    if (isTried) isNeeded.value = true;
+    split(isTried && isReady.value && Boolean(canvasBox.value));
+  });
+  mount(byId("twin"), html`<${Twin} takeKey=${takeKey} />`);
+}
