@@ -179,6 +179,8 @@ def evaluate(
 
 MUCH_NEARER = 0.25
 """A truth means other axes if those leave less than this share of the distance."""
+NEAR = 0.05
+"""Nor is anything wrong with the axes of a truth that lies nearer than this share of the markers' spread."""
 OTHER_UNITS = (1.0, 10.0, 100.0, 1000.0, 0.1, 0.01, 0.001)
 
 
@@ -192,6 +194,8 @@ def meant_axes(poses: Array, frames: Indices, body: BodyModel, truth: MarkerMoti
     seen = np.asarray(np.isfinite(goal).all(axis=2))
     found, goal = found[seen], goal[seen]
     off = float(np.linalg.norm(found - goal, axis=1).mean())
+    if off < NEAR * float(np.linalg.norm(found - found.mean(axis=0), axis=1).mean()):
+        return ""
     tries = {
         (unit, number): float(np.linalg.norm(found - unit * goal @ turn.T, axis=1).mean())
         for unit in OTHER_UNITS

@@ -110,6 +110,7 @@ def test_no_body_names_a_file_of_this_machine(schemas: dict[str, Any]) -> None:
         ("new_session", "title"),
         ("edit_body", "title"),
         ("edit_body", "text"),
+        ("note", "text"),
         ("new_run", "start_source"),
         *((verb, name) for verb in ("import_footage", "add_footage") for name in ("calibration", "trial")),
     }
