@@ -21,8 +21,8 @@ _CAGE_SECTIONS, _CAGE_SCALE = 10, (1.03, 1.03, 1.0)
 
 class BodyView:
     """A body at one pose. name : the nodes' path. ghost : a cage, for what stands beside the answer, in the
-    colour of the token `colour`. clicked : called with the name of a limb as errors are counted by, in a
-    thread of viser's.
+    colour of the token `colour`. clicked : called with the name of a limb as errors are counted by and where it was
+    clicked, shares of the view, in a thread of viser's.
     """
 
     def __init__(
@@ -32,9 +32,10 @@ class BodyView:
         *,
         name: str,
         ghost: bool = False,
-        clicked: Callable[[str], None] | None = None,
+        clicked: Callable[[str, tuple[float, float]], None] | None = None,
     ) -> None:
         self._body, self._ghost, self.colour = body, ghost, "ghost"
+        self._shown: tuple[object, ...] = ()
         self.limb_of = limb_of_drawn(body)
         meshes = [limb_mesh(limb, _CAGE_SECTIONS if ghost else SECTIONS) for limb in body.drawn]
         self.handles = [
@@ -54,7 +55,7 @@ class BodyView:
         ]
         if clicked is not None:
             for limb, handle in zip(body.drawn, self.handles, strict=True):
-                handle.on_click(lambda _, name=self.limb_of[limb.name]: clicked(name))
+                handle.on_click(lambda event, name=self.limb_of[limb.name]: clicked(name, event.screen_pos))
 
     def show(
         self, pose: Array | None, tokens: ColourTokens, opacity: float = 1.0, chosen: str | None = None
@@ -62,6 +63,10 @@ class BodyView:
         """Move every limb to a pose (radians, mm); None hides the body. chosen : a limb as errors are counted by; the
         others are dimmed.
         """
+        shown = (pose if pose is None else pose.tobytes(), tokens.name, opacity, chosen, self.colour)
+        if shown == self._shown:
+            return
+        self._shown = shown
         if pose is not None:
             limbs = tuple(self.limb_of.values())
             wxyz, positions = limb_frames(self._body, pose)

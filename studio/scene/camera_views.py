@@ -1,9 +1,10 @@
 """The cameras in the scene: a frame of thin bars as a trimesh mesh, the picture on its plane, a name.
 
-Clicking a camera looks through it: the viewer takes the camera's place and the picture becomes the
-backdrop, so that the body stands in front of its own picture.
+Clicking a camera chooses it; clicking it twice looks through it: the viewer takes the camera's place and the picture
+becomes the backdrop, so that the body stands in front of its own picture.
 """
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
@@ -20,6 +21,8 @@ from studio.scene.camera_placement import PicturePlane, StraightPicture, picture
 DEPTH = 0.8
 BACKDROP_DEPTH = 14.0
 LONGEST_SIDE = 480
+TWICE_SECONDS = 0.5
+"""Between two clicks that count as one double click."""
 _BAR = 0.008
 _LOOK_DISTANCE = 3.0
 _JPEG_QUALITY = 72
@@ -29,10 +32,12 @@ _ASIDE = np.array([0.0, 0.0, 1.0])
 
 
 class CameraView:
-    """One camera. on_click : called when the camera or its picture is clicked, in a thread of viser's."""
+    """One camera. on_click : called when the camera or its picture is clicked, in a thread of viser's, with whether
+    that was the second click of two.
+    """
 
     def __init__(
-        self, server: viser.ViserServer, camera: Camera, on_click: Callable[[], None] = lambda: None
+        self, server: viser.ViserServer, camera: Camera, on_click: Callable[[bool], None] = lambda _: None
     ) -> None:
         self.camera = camera
         self.plane: PicturePlane = picture_plane(camera)
@@ -69,8 +74,15 @@ class CameraView:
         )
         self._straight: dict[int, StraightPicture] = {}
         self._has_picture = False
-        self.bars.on_click(lambda _: on_click())
-        self.picture.on_click(lambda _: on_click())
+        self._on_click, self._clicked = on_click, float("-inf")
+        for handle in (self.bars, self.picture):
+            handle.on_click(self._click)
+
+    async def _click(self, _: object) -> None:
+        now = time.monotonic()
+        is_second = now - self._clicked < TWICE_SECONDS
+        self._clicked = float("-inf") if is_second else now
+        self._on_click(is_second)
 
     def hang(self, picture: Bytes) -> None:
         """Hang a picture (H, W, 3) BGR, as stored or evenly reduced, on the plane."""
@@ -97,13 +109,15 @@ class CameraView:
 
 
 class CameraViews:
-    """All cameras of a session. clicked : called with a camera's name, in a thread of viser's."""
+    """All cameras of a session. clicked : called with a camera's name and whether it was clicked twice, in a thread of
+    viser's.
+    """
 
     def __init__(
         self,
         server: viser.ViserServer,
         cameras: Sequence[Camera],
-        clicked: Callable[[str], None] = lambda _: None,
+        clicked: Callable[[str, bool], None] = lambda camera, twice: None,
     ) -> None:
         self._server = server
         self._through: str | None = None
@@ -126,6 +140,16 @@ class CameraViews:
         self._through = through
         for client in self._server.get_clients().values():
             self.place(client)
+
+    def leave_here(self) -> None:
+        """Let viewers stay where they are when the camera is left, upright and with their own lens."""
+        for client in self._server.get_clients().values():
+            if client.client_id in self._free:
+                _, _, up, fov = self._free[client.client_id]
+                camera = client.camera
+                nearer = np.tan(camera.fov / 2.0) / np.tan(float(fov) / 2.0)
+                place = camera.look_at + nearer * (camera.position - camera.look_at)
+                self._free[client.client_id] = place, camera.look_at, up, fov
 
     def place(self, client: viser.ClientHandle) -> None:
         """Put a viewer into the place of the chosen camera, or back where it was."""

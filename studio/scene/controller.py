@@ -11,9 +11,10 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any, TypeVarTuple
+from typing import Any, Literal, TypeVarTuple
 
 import numpy as np
 import viser
@@ -37,6 +38,7 @@ from studio.scene.body_trial import TrialView, trial_pose
 from studio.scene.controls import Change
 from studio.scene.floor_view import FloorView, light
 from studio.scene.model import (
+    STEP_RATE,
     LayerPlayback,
     Model,
     Selection,
@@ -45,19 +47,25 @@ from studio.scene.model import (
     advance,
     advance_layers,
     camera_clicked,
+    change_options,
     edit_pose,
     hear,
     limb_clicked,
+    look_through,
+    only_phase_differs,
     opened,
+    point_at,
     refuse,
     request,
     same_drawing,
+    same_panel,
     same_pictures,
     scrub,
     select,
     set_playback,
     settle,
     show_frame,
+    stop_layers,
 )
 from studio.scene.opened_run import Moment, OpenedRun
 from studio.scene.panel import Panel, dress, notify
@@ -65,25 +73,31 @@ from studio.scene.pose_edit import begun, edit_of, ended, moved, saved
 from studio.scene.pose_handles import PoseHandles, drag
 from studio.scene.pose_refining import PoseRefining, outcome
 from studio.scene.scene_views import SceneViews, first_view
+from studio.scene.search_view import Pointed
 from studio.scene.twin import Places, differ, following, joining
+from studio.scene.viewers import Viewers, place_viewer
+from studio.scene.viewpoint import Eye, Preset, direction, framed, is_in_sight, is_well_framed, zoomed
 from studio.sessions.workspace import Workspace
 from studio.settings import all_knobs
 
 REDRAW_SECONDS = 1.0 / 30.0
+TRAVEL_SECONDS = 1.0 / 30.0
+"""Between two places of particles that travel from one layer to the next."""
 PICTURE_SECONDS, LIVE_PICTURE_SECONDS = 1.0 / 10.0, 1.0 / 2.0
 """Composing pictures ten times a second costs a third of a core, which a live run needs."""
 PICTURES_WAIT, ANNEALED_PICTURES_WAIT = 0.06, 0.4
 """Seconds without another change after which pictures are composed, so that a burst of changes has its pictures once,
 and a frame that is annealed again its clouds before: a browser that draws in software takes so long for them."""
 IDLE_SECONDS = 0.5
+POINTED_PIXELS = 12.0
+"""Between the pointer and a particle that it is on."""
 SHARES = 0.1, 0.05
 """Of a core's time that a scene and its pictures take while frames are tracked as fast as they can be."""
-EYE_TOLERANCE = 0.02
-"""Metres within which a viewer has not moved."""
 _LOG = logging.getLogger(__name__)
 _WAKE = Event("", "")
 
 
+Move = Preset | Literal["body", "first"]
 Values = TypeVarTuple("Values")
 
 
@@ -109,15 +123,18 @@ class SceneController:
         self._events = process.subscribe(self._concerns)
         self._inbox: deque[tuple[Change, tuple[Any, ...], bool]] = deque()
         self._drawings = Due(REDRAW_SECONDS), Due(PICTURE_SECONDS, PICTURES_WAIT)
+        self._travelling = Due(TRAVEL_SECONDS)
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="scene", daemon=True)
         self._theme, self._has_shadows = "", True
         self.bare = False
         """Whether it has no controls."""
-        self._looking: viser.CameraHandle | None = None
+        self.viewers = Viewers(server, self._placed)
+        self._centre: Array | None = None
         self._twin: SceneController | None = None
         self._is_leading, self._places = True, Places()
         self._trial: TrialView | None = None
+        self._panel_of: Model | None = None
         self._floor: FloorView | None = None
         self.panel = Panel(server, self.post, self.request_knobs, self.refine_pose, self.save_pose)
         server.on_client_connect(self._greet)
@@ -185,15 +202,21 @@ class SceneController:
         """Put this scene's viewers to a place, looking at another (6,) metres; from any thread."""
         self._places.note(eye)
         for client in self._server.get_clients().values():
-            _put(client, eye)
+            place_viewer(client, eye)
+
+    def _placed(self, eye: Eye) -> None:
+        """Viewers were put somewhere: the other scene's come along."""
+        self._places.note(eye)
+        if self._twin is not None:
+            self._twin.put_viewers(eye)
 
     def _sees(self, camera: viser.CameraHandle) -> None:
         """A viewer moved: the other scene's come along."""
         eye = (*map(float, camera.position), *map(float, camera.look_at))
         if self._twin is None:
-            self._looking = camera
+            self.viewers.looking = camera
         elif not self._places.is_echo(eye):
-            self._looking = camera
+            self.viewers.looking = camera
             self._twin.put_viewers(eye)
 
     # Changes that need more than the model.
@@ -229,11 +252,9 @@ class SceneController:
         place, scale = limb_ends(trial.body, trial.pose)[0].reshape(-1, 3), scale_of(trial.body)
         with self._server.atomic():
             self._floor = FloorView(self._server, [place.mean(axis=0)], scale)
-        eye = first_view(place * METRES_PER_MM, [], scale)
         view = self._server.initial_camera
-        view.position, view.look_at = eye
-        for client in self._server.get_clients().values():
-            _put(client, (*map(float, eye[0]), *map(float, eye[1])))
+        view.position, view.look_at = first_view(place * METRES_PER_MM, [], scale)
+        self.viewers.put(self.viewers.first_eye)
 
     def propose_pose(self, model: Model, session: str, pose: Array, text: str, frame: int | None) -> Model:
         """Show a found start pose (D,) without a run, if it fits the session's body.
@@ -357,8 +378,8 @@ class SceneController:
         self.views = SceneViews(
             self._server,
             found,
-            clicked=lambda camera: self.post(camera_clicked, camera),
-            limb_clicked=lambda limb: self.post(limb_clicked, limb),
+            clicked=lambda camera, twice: self.post(camera_clicked, camera, twice),
+            limb_clicked=lambda limb, at: self.post(self._click_limb, limb, at),
             volume_made=lambda: self.post(lambda model: replace(model)),
             failed=lambda problem: self.post(self._fail, problem),
         )
@@ -396,14 +417,16 @@ class SceneController:
             self.opened.close()
         self.views = self.opened = self.handles = self._refining = None
         self._trial = self._floor = None
+        self._centre = self.viewers.framed = None
 
     def _fail(self, _: Model, problem: StudioError) -> Model:
         raise problem
 
     async def _greet(self, client: viser.ClientHandle) -> None:
         def place(model: Model) -> Model:
-            if model.selection.eye is not None:
-                _put(client, model.selection.eye)
+            eye = model.selection.eye or self.viewers.framed
+            if eye is not None:
+                self.viewers.put(eye, client)
             if self.views is not None:
                 self.views.cameras.place(client)
             if self._twin is not None and not self._is_leading:
@@ -413,29 +436,117 @@ class SceneController:
         self.post(place)
         client.camera.on_update(self._sees)
 
-    def look_from(self, model: Model, eye: tuple[float, ...] | None) -> Model:
+    # From where it is looked at.
+
+    def look_from(self, model: Model, eye: Eye | None) -> Model:
         """Put the viewers' eyes at a place, looking at another (6,) metres; None: the usual place."""
         if eye == model.selection.eye:
             return model
-        for client in self._server.get_clients().values():
-            _put(client, self._usual_eye() if eye is None else eye)
+        self.viewers.put(self.viewers.usual_eye if eye is None else eye)
         return select(model, eye=eye)
 
-    def _usual_eye(self) -> tuple[float, ...]:
-        view = self._server.initial_camera
-        return (*map(float, view.position), *map(float, view.look_at))
+    def move_camera(self, model: Model, move: Move) -> Model:
+        """Let the viewers go to where the body is framed, to a preset, or back to the first view."""
+        model = self._leave_camera(model)
+        now = time.monotonic()
+        if move == "first":
+            self.viewers.framed = None
+            self.viewers.ease(self.viewers.first_eye, now)
+            return select(change_options(model, {"follows_body": False}), eye=None)
+        body = self._shown_body()
+        if body is None or self.opened is None:
+            return model
+        eye = self.viewers.eye()
+        toward = (
+            np.array(eye[:3]) - np.array(eye[3:])
+            if move == "body"
+            else direction(move, self.opened.body, body)
+        )
+        self.viewers.framed = framed(body.reshape(-1, 3), toward, *self.viewers.lens())
+        self.viewers.ease(self.viewers.framed, now)
+        return select(model, eye=None)
+
+    def zoom(self, model: Model, factor: float, at: tuple[float, float]) -> Model:
+        """Take the viewers nearer to what is at `at` (shares of the view), or away; the body is never lost."""
+        body = self._shown_body()
+        if body is None:
+            return model
+        model = self._leave_camera(model)
+        eye = zoomed(self.viewers.eye(), factor, at, *self.viewers.lens(), body.reshape(-1, 3))
+        self.viewers.put(eye)
+        return select(model, eye=tuple(round(number, 3) for number in eye))
+
+    def point(
+        self, model: Model, at: tuple[float, float] | None, choose: bool, answer: Future[Pointed | None]
+    ) -> Model:
+        """Draw the line of the particle at `at` (shares of the view; None: the pointer left), or choose it."""
+        found = None if at is None else self._pointed(model, at)
+        answer.set_result(found)
+        if not choose:
+            return point_at(model, None if found is None else found.particle)
+        if found is None:
+            return model
+        model = stop_layers(model)
+        same = found.particle == model.selection.particle
+        return select(model, layer=found.layer, particle=None if same else found.particle)
+
+    def _pointed(self, model: Model, at: tuple[float, float]) -> Pointed | None:
+        if self.views is None or not model.is_looking_at_layers:
+            return None
+        reach = POINTED_PIXELS / self.viewers.height()
+        return self.views.search.pointed(at, self.viewers.eye(), self.viewers.lens(), reach)
+
+    def _click_limb(self, model: Model, limb: str, at: tuple[float, float]) -> Model:
+        """Choose a limb, or let it go; of a body of glass a particle before or behind it comes first."""
+        return model if self._pointed(model, at) is not None else limb_clicked(model, limb)
+
+    def _leave_camera(self, model: Model) -> Model:
+        """Look through no camera any more, from where the viewers are."""
+        if model.selection.look_through is None or self.views is None:
+            return model
+        self.views.cameras.leave_here()
+        return look_through(model, None)
+
+    def _shown_body(self) -> Array | None:
+        """(L, 2, 3) metres: both ends of the shown body's limbs."""
+        moment = self._moment()
+        if self.opened is None or moment is None or moment.pose is None:
+            return None
+        return limb_ends(self.opened.body, moment.pose[None])[0] * METRES_PER_MM
+
+    def _frame_for_layers(self, model: Model) -> Model:
+        """Frame the body as its layers begin to be looked at, unless a viewer chose a place from where it is seen."""
+        body = self._shown_body()
+        if body is None or model.selection.look_through is not None:
+            return model
+        points, eye, lens = body.reshape(-1, 3), self.viewers.eye(), self.viewers.lens()
+        is_chosen = model.selection.eye is not None and is_in_sight(points, eye, *lens)
+        return model if is_chosen or is_well_framed(points, eye, *lens) else self.move_camera(model, "body")
+
+    def _follow_body(self) -> None:
+        """Take the viewers along with the body, where they follow it."""
+        follows = self.model.options.follows_body and self._is_leading
+        body = self._shown_body() if follows else None
+        centre = None if body is None else body.reshape(-1, 3).mean(axis=0)
+        before, self._centre = self._centre, centre
+        if centre is None or before is None or self.model.selection.look_through is not None:
+            return
+        shift = centre - before
+        if float(np.abs(shift).max()) > 1e-4:
+            self.viewers.shift(shift, self.model.selection.eye is None)
 
     def _note_eye(self, model: Model) -> Model:
-        """Note from where a viewer looks, once it looks freely."""
-        camera, self._looking = self._looking, None
-        if camera is None or model.selection.look_through is not None:
+        """Note from where a viewer looks; one who is dragged out of a camera's place looks through it no longer."""
+        through = model.selection.look_through
+        if through is None:
+            moved = self.viewers.moved_eye(model.selection.eye, time.monotonic())
+            return model if moved is None or model.options.follows_body else select(model, eye=moved[0])
+        if self.views is None:
             return model
-        seen = (*map(float, camera.position), *map(float, camera.look_at))
-        is_usual = np.allclose(seen, self._usual_eye(), atol=EYE_TOLERANCE)
-        before = model.selection.eye
-        if before is not None and np.allclose(seen, before, atol=EYE_TOLERANCE):
+        plane = self.views.cameras.views[through].plane
+        if not self.viewers.was_dragged_from(through, plane.position, plane.forward):
             return model
-        return select(model, eye=None if is_usual else tuple(round(number, 2) for number in seen))
+        return self._leave_camera(model)
 
     # The thread.
 
@@ -445,14 +556,18 @@ class SceneController:
             self._pace()
             self._listen(self._patience())
             self._take_posts()
-            if self._looking is not None:
+            if self.viewers.looking is not None:
                 self._happen(self._note_eye, ())
             now = time.monotonic()
             if self.model.playback.playing:
                 self._happen(advance, (now - before,))
-            if self.model.layers.playing:
-                self._happen(advance_layers, (now - before, self._layers_so_far()))
+            if self.model.layers.playing or self.model.layers.phase < 1.0:
+                self._happen(advance_layers, (self._layers_time(now - before), self._layers_so_far()))
             before = now
+            self.viewers.tick(now)
+            if self._travelling.is_due(now) and not self._drawings[0].is_wanted and self.views is not None:
+                self._travelling.done(now)
+                self.views.travel(self.model.layers.phase)
             self._pace()
             for drawing, draw in zip(self._drawings, (self._draw, self._draw_pictures), strict=True):
                 if drawing.is_due(now):
@@ -474,8 +589,9 @@ class SceneController:
     def _patience(self) -> float:
         """Seconds to wait for events: until the next redraw is due."""
         now = time.monotonic()
-        plays = self.model.playback.playing or self.model.layers.playing
-        rest = REDRAW_SECONDS if plays else IDLE_SECONDS
+        layers = self.model.layers
+        moves = self.model.playback.playing or layers.playing or layers.phase < 1.0 or self.viewers.is_moving
+        rest = REDRAW_SECONDS if moves else IDLE_SECONDS
         return min((drawing.waits(now) for drawing in self._drawings if drawing.is_wanted), default=rest)
 
     def _listen(self, patience: float) -> None:
@@ -533,7 +649,15 @@ class SceneController:
             self.model = after
         if self.model is before or same_drawing(before, self.model):
             return
+        if self._is_leading and self.model.is_looking_at_layers and not before.is_looking_at_layers:
+            self.model = self._frame_for_layers(self.model)
+        through = self.model.selection.look_through
+        if through is not None and through != before.selection.look_through:
+            self.viewers.entered()
         now = time.monotonic()
+        if only_phase_differs(before, self.model):
+            self._travelling.want(now)
+            return
         self._drawings[0].want(now)
         if self._drawings[1].is_wanted or not same_pictures(before, self.model):
             self._drawings[1].want(now)
@@ -569,6 +693,12 @@ class SceneController:
             track=self.model.options.track,
         )
 
+    def _layers_time(self, seconds: float) -> float:
+        """The time that passes for layers: in a scene that follows, particles travel as fast as in the leading one."""
+        leader = None if self._is_leading else self._twin
+        plays = leader is not None and leader.model.layers.playing
+        return seconds * self.model.layers.rate / STEP_RATE if plays else seconds
+
     def _layers_so_far(self) -> int:
         """How many layers of the shown frame are there, of whatever search is shown here or in the twin."""
         moment, twin = self._moment(), self._twin
@@ -589,10 +719,12 @@ class SceneController:
             light(self._server, self._has_shadows)
         if self.bare:
             self.panel.hide()
-        else:
+        elif self._panel_of is None or not same_panel(self._panel_of, model):
             self.panel.show(model, moment, tokens)
+            self._panel_of = model
         if self.views is not None and moment is not None:
             self.views.show(model, moment, tokens)
+            self._follow_body()
         if self.handles is not None and model.edit is not None:
             self.handles.show(model.edit, tokens)
         self._draw_trial(model, tokens)
@@ -619,12 +751,6 @@ class SceneController:
         moment = self._moment()
         if self.views is not None and moment is not None:
             self.views.hang_pictures(self.model, moment, colour_tokens(self.model.options.dark))
-
-
-def _put(client: viser.ClientHandle, eye: tuple[float, ...]) -> None:
-    """Put a viewer's eye at a place, looking at another (6,) metres."""
-    with client.atomic():
-        client.camera.position, client.camera.look_at = np.array(eye[:3]), np.array(eye[3:])
 
 
 class Due:

@@ -25,6 +25,8 @@ SEARCHING = ("tracking", "compiling")
 NEAR_THE_END = 3
 """A viewer who goes to one of the last frames while more are tracked keeps following."""
 REMEMBERED = 256
+STEP_RATE = 2.0
+"""Layers a second by which particles travel to a layer that is chosen by hand."""
 MOST_LATE = 0.5
 """Of a layer's time that one which is shown late may begin with; what is later still is not caught up."""
 
@@ -66,6 +68,9 @@ class ViewOptions:
     the pictures on them. hull : the frame's visual hull as voxels. blobs : the blobs fitted to it beside the answer's
     own, in runs that are weighed by them. track : whose poses are drawn, of `runs.tracks`; the search's own stand
     beside as the grey cage. overlays : of `runs.overlay_drawing.OVERLAYS`. dark : the theme.
+    shells : the layers before the one that is looked at, as small points. skeletons : stick figures of its heaviest
+    particles. lines : the ways of the chosen limb's particles through the layers.
+    follows_body : viewers go along with it from frame to frame.
     shadows : cast by the body, and light reflected by its surroundings: what a browser without a graphics card draws
     slowest.
     """
@@ -84,11 +89,15 @@ class ViewOptions:
     trail_frames: int = 60
     cameras: bool = True
     pictures: bool = True
+    shells: bool = True
+    skeletons: bool = True
+    lines: bool = False
     hull: bool = False
     blobs: bool = False
     track: str = RAW
     overlays: tuple[str, ...] = ("outline",)
     dark: bool = True
+    follows_body: bool = False
     shadows: bool = True
 
 
@@ -221,7 +230,7 @@ class Trial:
 class Model:
     """Everything that a scene shows. search : state of the tracking process. subject, knobs, edit : None while nothing
     is open. frames : the stored ones, ascending. ghosts : bodies beside the answer, of the shown frame. trial : a body
-    that is being made.
+    that is being made. pointed : the particle of the shown layer that a viewer's pointer is on, a row of its cloud.
     """
 
     search: StateChanged
@@ -236,6 +245,13 @@ class Model:
     edit: PoseEdit | None = None
     ghosts: tuple[Ghost, ...] = ()
     trial: Trial | None = None
+    pointed: int | None = None
+
+    @property
+    def is_looking_at_layers(self) -> bool:
+        """Whether a single layer's cloud is shown or layers are played: the body is of glass then."""
+        chosen = self.layers.playing or self.selection.layer is not None
+        return chosen and self.options.particles and self.edited_pose is None
 
     @property
     def is_searching(self) -> bool:
@@ -267,7 +283,8 @@ def same_drawing(one: Model, other: Model) -> bool:
 def same_pictures(one: Model, other: Model) -> bool:
     """Whether the pictures on the cameras of two models are the same; layers as they come are not drawn on them."""
     return (
-        (replace(one.selection, eye=None), one.options) == (replace(other.selection, eye=None), other.options)
+        (_pictured(one), one.options) == (_pictured(other), other.options)
+        and one.layers.playing == other.layers.playing
         and one.subject is other.subject
         and one.frames is other.frames
         and one.edit is other.edit
@@ -275,6 +292,31 @@ def same_pictures(one: Model, other: Model) -> bool:
         and one.trial is other.trial
         and one.live.result is other.live.result
         and (one.knobs and one.knobs.settings) is (other.knobs and other.knobs.settings)
+    )
+
+
+def _pictured(model: Model) -> Selection:
+    """What the pictures show of the selection: while layers are played the clouds of all."""
+    layer = None if model.layers.playing else model.selection.layer
+    return replace(model.selection, eye=None, layer=layer)
+
+
+def same_panel(one: Model, other: Model) -> bool:
+    """Whether the panel shows the same: layers that are played pass it by."""
+    passing = {"layer": None, "particle": None, "limb": None, "eye": None, "request_number": 0}
+    return replace(one.selection, **passing) == replace(other.selection, **passing) and all(
+        getattr(one, entry.name) is getattr(other, entry.name)
+        for entry in fields(Model)
+        if entry.name not in ("selection", "layers", "pointed")
+    )
+
+
+def only_phase_differs(one: Model, other: Model) -> bool:
+    """Whether nothing but how far a layer's particles have travelled differs."""
+    return one.layers.state == other.layers.state and all(
+        getattr(one, entry.name) is getattr(other, entry.name)
+        for entry in fields(Model)
+        if entry.name != "layers"
     )
 
 
@@ -319,8 +361,9 @@ def select(model: Model, **changes: object) -> Model:
     after = replace(model.selection, **changes)
     if after == model.selection:
         return model
-    ghosts = model.ghosts if after.frame == model.selection.frame else ()
-    return replace(model, selection=after, ghosts=ghosts)
+    is_same = after.frame == model.selection.frame
+    pointed = model.pointed if is_same and after.layer == model.selection.layer else None
+    return replace(model, selection=after, ghosts=model.ghosts if is_same else (), pointed=pointed)
 
 
 def discard_what_if(model: Model) -> Model:
@@ -365,9 +408,14 @@ def limb_clicked(model: Model, limb: str) -> Model:
     return select(model, limb=None if limb == model.selection.limb else limb)
 
 
-def camera_clicked(model: Model, camera: str) -> Model:
-    """Look through a camera, or stop looking through it."""
-    return look_through(model, None if camera == model.selection.look_through else camera)
+def camera_clicked(model: Model, camera: str, twice: bool = False) -> Model:
+    """Choose a camera, or let it go; clicked twice it is looked through, or no longer."""
+    through = model.selection.look_through
+    if twice:
+        return select(look_through(model, None if camera == through else camera), camera=camera)
+    if through is not None:
+        return model
+    return select(model, camera=None if camera == model.selection.camera else camera)
 
 
 def change_options(model: Model, changes: Mapping[str, object]) -> Model:
@@ -383,6 +431,11 @@ def tick_listed(model: Model, name: str, entry: str, ticked: bool) -> Model:
     )
     kept = tuple(one for one in before or () if one != entry)
     return change_options(model, {name: (*kept, entry) if ticked else kept})
+
+
+def point_at(model: Model, particle: int | None) -> Model:
+    """Note the particle of the shown layer that the pointer is on."""
+    return model if particle == model.pointed else replace(model, pointed=particle)
 
 
 # Playing stored frames.
@@ -465,13 +518,27 @@ def stop_layers(model: Model) -> Model:
 
 
 def scrub(model: Model, layer: int | None) -> Model:
-    """Show one layer's cloud (None: all together), by hand: layers are no longer played."""
-    return select(stop_layers(model), layer=layer)
+    """Show one layer's cloud (None: all together), by hand: layers are no longer played. From one layer to the next the
+    particles travel.
+    """
+    before = model.selection.layer
+    model = select(stop_layers(model), layer=layer)
+    is_next = layer is not None and before is not None and layer == before + 1
+    return replace(model, layers=replace(model.layers, phase=0.0)) if is_next else model
 
 
 def advance_layers(model: Model, seconds: float, count: int) -> Model:
-    """Advance the playback of layers by `seconds`. count : layers of the shown frame that are there so far."""
-    if not model.layers.playing or count < 1:
+    """Advance the playback of layers, or the way to a layer that was chosen, by `seconds`. count : layers of the shown
+    frame that are there so far.
+    """
+    if not model.layers.playing:
+        phase = min(1.0, model.layers.phase + seconds * STEP_RATE)
+        return (
+            model
+            if phase == model.layers.phase
+            else replace(model, layers=replace(model.layers, phase=phase))
+        )
+    if count < 1:
         return model
     layers, layer = played_layers(model.layers, seconds, model.selection.layer, count)
     return select(replace(model, layers=layers), layer=layer)

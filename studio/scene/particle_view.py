@@ -10,14 +10,16 @@ from dataclasses import dataclass
 import numpy as np
 import viser
 
-from studio.arrays import Array
+from studio.arrays import Array, Bytes
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
 from studio.runs.colour_tokens import ColourTokens
 from studio.scene import METRES_PER_MM
+from studio.scene.layer_journey import FAR_END, glow
 from studio.trackers.tracker import LayerRecord
 
-FAR_END = 1
+_DIMMEST, _BRIGHTEST = 0.6, 1.55
+"""Between the background 0, the layer's colour 1 and the truth's 2: the lightest and the heaviest particle."""
 MOST_DRAWN = 4000
 """Particles drawn of a layer; of larger sets every second, third, … (the store keeps 2000 by default)."""
 
@@ -26,7 +28,7 @@ MOST_DRAWN = 4000
 class CloudStyle:
     """limbs : indices into the body's drawn limbs whose far ends are shown. colour_by : "layer" or "weight".
     layer : the only layer to show, None for all. layer_count : layers of a frame (colours). point_size :
-    metres.
+    metres. glows : the layer's own colour is the brighter the more a particle weighs.
     """
 
     limbs: tuple[int, ...]
@@ -34,6 +36,7 @@ class CloudStyle:
     layer: int | None
     layer_count: int
     point_size: float
+    glows: bool = False
 
 
 class ParticleView:
@@ -43,12 +46,13 @@ class ParticleView:
         self._server, self._body = server, body
         self.handles: list[viser.PointCloudHandle] = []
         self._drawn: dict[int, tuple[LayerRecord, tuple[object, ...]]] = {}
+        self._away = set[int]()
 
     def show(self, records: Sequence[LayerRecord], style: CloudStyle, tokens: ColourTokens) -> None:
         """Draw the layers' clouds; layers that are not in `records` vanish."""
         by_layer = {record.layer: record for record in records if len(record.poses)}
         weights = _weight_range(list(by_layer.values()), style.layer) if style.colour_by == "weight" else None
-        look = (style.limbs, style.layer_count, style.point_size, tokens.name, weights)
+        look = (style.limbs, style.layer_count, style.point_size, tokens.name, weights, style.glows)
         for layer in range(len(self.handles), max(by_layer, default=-1) + 1):
             self.handles.append(self._added(layer))
         for layer, handle in enumerate(self.handles):
@@ -58,9 +62,23 @@ class ParticleView:
                 continue
             # While a frame is searched every redraw shows all of its layers, and only the newest one is new.
             before = self._drawn.get(layer)
-            if before is None or before[0] is not record or before[1] != look:
+            is_known = before is not None and before[0] is record and before[1] == look
+            if not is_known or (layer in self._away and not style.glows):
+                self._away.discard(layer)
                 self._drawn[layer] = (record, look)
                 self._draw(handle, record, style, tokens, weights)
+
+    def move(self, record: LayerRecord, points: Array) -> None:
+        """Move a layer's points, (N * limbs, 3) metres, particle by particle: the cloud must be shown."""
+        if record.layer >= len(self.handles) or not self.handles[record.layer].visible:
+            return
+        handle, stride = self.handles[record.layer], -(-len(record.poses) // MOST_DRAWN)
+        if stride > 1:
+            points = points.reshape(len(record.poses), -1, 3)[::stride].reshape(-1, 3)
+        moved = points.astype(np.float32)
+        if handle.points.shape == moved.shape and not np.array_equal(handle.points, moved):
+            handle.points = moved
+            self._away.add(record.layer)
 
     def _added(self, layer: int) -> viser.PointCloudHandle:
         return self._server.scene.add_point_cloud(
@@ -83,7 +101,10 @@ class ParticleView:
     ) -> None:
         stride = -(-len(record.poses) // MOST_DRAWN)
         points = cloud_points(self._body, record.poses[::stride], style.limbs)
-        if weights is None:
+        if style.glows and style.colour_by == "layer":
+            shades = glowing(tokens, record.layer, style.layer_count, glow(record)[::stride])
+            colours = np.repeat(shades, len(style.limbs), axis=0)
+        elif weights is None:
             colours = np.array(tokens.layer(record.layer, style.layer_count), dtype=np.uint8)
         else:
             shares = weight_shares(record.log_weights[::stride], *weights)
@@ -99,6 +120,16 @@ def cloud_points(body: BodyModel, poses: Array, limbs: Sequence[int]) -> Array:
     """(N, D) poses to (N * len(limbs), 3) metres: the far end of each chosen limb, particle by particle."""
     ends = limb_ends(body, np.ascontiguousarray(poses, dtype=np.float64))[:, list(limbs), FAR_END]
     return ends.reshape(-1, 3) * METRES_PER_MM
+
+
+def glowing(tokens: ColourTokens, layer: int, count: int, shares: Array) -> Bytes:
+    """(N, 3) colours of particles that count for 0..1: from a dim shade of their layer's over it to the truth's."""
+    stops = np.array(
+        [tokens["scene-background"], tokens.layer(layer, count), tokens["truth"]], dtype=np.float64
+    )
+    place = _DIMMEST + (_BRIGHTEST - _DIMMEST) * shares
+    channels = [np.interp(place, (0.0, 1.0, 2.0), stops[:, channel]) for channel in range(3)]
+    return np.round(np.stack(channels, axis=-1)).astype(np.uint8)
 
 
 def weight_shares(log_weights: Array, low: float, high: float) -> Array:

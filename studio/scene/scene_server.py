@@ -5,6 +5,8 @@ the request to the scene's own thread and return.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from functools import partial
 
@@ -14,7 +16,7 @@ from studio.arrays import Array
 from studio.body.model import BodyModel
 from studio.errors import SettingsError
 from studio.jobs.control import StudioControl
-from studio.scene.controller import SceneController
+from studio.scene.controller import Move, SceneController
 from studio.scene.guarded_server import GuardedServer
 from studio.scene.model import (
     Ghost,
@@ -35,8 +37,11 @@ from studio.scene.model import (
 )
 from studio.scene.pose_edit import UNDO, changed_whole
 from studio.scene.scene_pictures import ScenePictures
+from studio.scene.search_view import Pointed
 from studio.scene.twin import show_trial
 from studio.sessions.workspace import Workspace
+
+ANSWER_SECONDS = 2.0
 
 
 class SceneServer:
@@ -130,6 +135,24 @@ class SceneServer:
         """Put the viewers' eyes at a place, looking at another: (6,) metres; None: the usual place."""
         place = None if eye is None else tuple(map(float, eye))
         self._controller.post(self._controller.look_from, place, announce=False)
+
+    def move_camera(self, move: Move) -> None:
+        """Let the viewers go to where the body is framed, to its front, side or top, or to the first view."""
+        self._controller.post(self._controller.move_camera, move)
+
+    def zoom(self, factor: float, at: tuple[float, float]) -> None:
+        """Take the viewers nearer to a place of their view (shares of it), or away. factor : of the distance."""
+        self._controller.post(self._controller.zoom, factor, at)
+
+    def point(self, at: tuple[float, float] | None, choose: bool = False) -> Pointed | None:
+        """The particle at a place of the viewers' view (shares of it; None: nowhere), None where there is none: its
+        line is drawn, or it is chosen. Waits for the scene's thread.
+        """
+        answer: Future[Pointed | None] = Future()
+        self._controller.post(self._controller.point, at, choose, answer)
+        with suppress(TimeoutError):
+            return answer.result(timeout=ANSWER_SECONDS)
+        return None
 
     def discard_what_if(self) -> None:
         """Forget the frame that was annealed again."""

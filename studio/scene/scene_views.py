@@ -21,12 +21,16 @@ from studio.scene.line_views import TrailView, TruthView
 from studio.scene.model import Ghost, Model
 from studio.scene.opened_run import Moment, OpenedRun
 from studio.scene.particle_view import CloudStyle, ParticleView
+from studio.scene.search_view import SearchLook, SearchView
 from studio.scene.volume_view import VolumeView
 from studio.trackers.tracker import LOST, NO_EVIDENCE
 
-DOUBTFUL, EDITED, STORED, GHOST = 0.35, 0.6, 0.35, 0.6
+DOUBTFUL, EDITED, STORED, GHOST, GLASS = 0.35, 0.6, 0.35, 0.6, 0.16
 """Opacity of a body that is held or known to be lost, of one being edited (so that handles behind a limb can be
-grasped), of the stored result beside another, and of bodies that were asked for beside the answer."""
+grasped), of the stored result beside another, of bodies that were asked for beside the answer, and of one whose layers
+are looked at: nothing of their clouds is covered."""
+LOOKED_AT_SIZE = 2.0
+"""Width of the points of a layer that is looked at, beside those of all layers together."""
 TRAIL_SECONDS = 1.0
 EVERY_FRAME = 2**40
 """The reach of trails over the whole run."""
@@ -41,8 +45,10 @@ _LOOK_HIGHER = np.array([0.0, 0.0, 0.2])
 class SceneViews:
     """Draws a model of an opened run. Used by the scene's thread only.
 
-    clicked, limb_clicked : called with the name of a camera or limb that is clicked. volume_made, failed : called when
-    a hull was made, or with the reason why it cannot be. All are called in other threads.
+    clicked, limb_clicked : called with the name of a camera, and whether it was clicked twice, or of a limb,
+    and where in the view.
+    volume_made, failed : called when a hull was made, or with the reason why it cannot be. All are called in other
+    threads.
     """
 
     def __init__(
@@ -50,8 +56,8 @@ class SceneViews:
         server: viser.ViserServer,
         opened: OpenedRun,
         *,
-        clicked: Callable[[str], None] = lambda _: None,
-        limb_clicked: Callable[[str], None] = lambda _: None,
+        clicked: Callable[[str, bool], None] = lambda camera, twice: None,
+        limb_clicked: Callable[[str, tuple[float, float]], None] = lambda limb, at: None,
         volume_made: Callable[[], None] = lambda: None,
         failed: Callable[[StudioError], None] = lambda _: None,
     ) -> None:
@@ -63,6 +69,7 @@ class SceneViews:
         self.beside = BodyView(server, body, name="/stored", ghost=True)
         self.ghosts: list[BodyView] = []
         self.particles = ParticleView(server, body)
+        self.search = SearchView(server, body, self.particles)
         self.trails = TrailView(server, body)
         self.volume = VolumeView(server, body)
         self.cameras = CameraViews(server, opened.cameras, clicked)
@@ -88,15 +95,15 @@ class SceneViews:
         wanted = options.hull or (options.blobs and has_blobs(knobs.settings))
         volume = self._volumes.of(moment, knobs.settings, blobs=options.blobs) if wanted else None
         doubtful = moment.tracking in (LOST, NO_EVIDENCE)
-        most = DOUBTFUL if doubtful else EDITED if moment.edited else 1.0
+        looks = model.is_looking_at_layers
+        most = GLASS if looks else DOUBTFUL if doubtful else EDITED if moment.edited else 1.0
+        limbs, size = subject.chosen_limbs(options), options.point_size * (LOOKED_AT_SIZE if looks else 1.0)
         style = CloudStyle(
-            subject.chosen_limbs(options),
-            options.colour_by,
-            model.selection.layer,
-            moment.layer_count,
-            options.point_size,
+            limbs, options.colour_by, model.selection.layer, moment.layer_count, size, glows=looks
         )
-        markers = subject.listed("trail_markers", options) if options.trails else ()
+        # Paths over frames lie on the clouds of hands and feet.
+        has_trails = options.trails and not looks
+        markers = subject.listed("trail_markers", options) if has_trails else ()
         through = model.selection.look_through
         is_free = through is None
         with self._server.atomic():
@@ -108,11 +115,35 @@ class SceneViews:
             self._show_ghosts((*(model.ghosts if is_free else ()), *chosen_particle(model, moment)), tokens)
             self.truth.show(moment.truth if options.truth else None, tokens)
             self.particles.show(moment.records if options.particles else (), style, tokens)
+            self._show_search(model, moment, limbs, size, tokens)
             self.trails.show(moment.frame, markers, int(options.trail_frames), tokens)
             self.volume.show(volume, moment.pose, tokens, hull=options.hull, blobs=options.blobs)
             self.cameras.show(tokens, options.cameras, options.pictures, through)
             # Through a camera the floor is the one in the picture.
             self.floor.show(tokens, is_free, options.shadows)
+
+    def _show_search(
+        self, model: Model, moment: Moment, limbs: tuple[int, ...], size: float, tokens: ColourTokens
+    ) -> None:
+        options, selection = model.options, model.selection
+        names = [self.body.limb_of[limb.name] for limb in self._opened.body.drawn]
+        own = [at for at, name in enumerate(names) if name == selection.limb]
+        look = SearchLook(
+            limbs,
+            moment.layer_count,
+            size,
+            options.shells,
+            options.skeletons,
+            selection.particle if model.pointed is None else model.pointed,
+            tuple(own[-1:]) if options.lines else (),
+        )
+        layer = selection.layer if model.is_looking_at_layers else None
+        self.search.show(moment.records, layer, look, tokens, model.layers.phase)
+
+    def travel(self, phase: float) -> None:
+        """Move the particles of the layer that is looked at to where they are after a share of its time."""
+        with self._server.atomic():
+            self.search.travel(phase)
 
     def _show_ghosts(self, ghosts: Sequence[Ghost], tokens: ColourTokens) -> None:
         """Draw bodies beside the answer; their meshes are made when they are first needed."""
@@ -130,7 +161,9 @@ class SceneViews:
         if subject is None or knobs is None or not (options.pictures or selection.look_through):
             return
         trial = model.trial
-        records = [record for record in moment.records if selection.layer in (None, record.layer)]
+        # While layers are played the pictures are not composed for each.
+        alone = None if model.layers.playing else selection.layer
+        records = [record for record in moment.records if alone in (None, record.layer)]
         pictures: dict[str, Bytes] = {}
         # Beside a frame that is annealed again stands the stored result, beside a compared run the others.
         others = [] if moment.beside is None else [OtherBody(moment.beside, "stored")]

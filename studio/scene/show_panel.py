@@ -26,8 +26,11 @@ SWITCHES = (
     ("truth", "truth", "The reference as a stick figure, where the session has one."),
     ("stored", "stored result", "The stored result as a grey cage while a re-annealed one is shown."),
     ("particles", "particles", "Every layer's own particles at the chosen limb ends."),
-    ("trails", "trails", "Paths of the chosen joints."),
-    ("cameras", "cameras", "The cameras; click one to look through it."),
+    ("shells", "earlier layers", "Beside the layer that is looked at the ones before it, as small points."),
+    ("skeletons", "heaviest particles", "The twenty heaviest particles of that layer as stick figures."),
+    ("lines", "ways of a limb", "The ways of the chosen limb's particles through the layers; click a limb."),
+    ("trails", "trails", "Paths of the chosen joints; hidden while a layer is looked at."),
+    ("cameras", "cameras", "The cameras; click one to choose it, twice to look through it."),
     ("pictures", "pictures", "The pictures on the cameras."),
     ("shadows", "shadows", "Shadows and reflected light; left out at first without a graphics card."),
     (

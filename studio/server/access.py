@@ -46,7 +46,7 @@ HEALTH_PATH = "/health"
 LOOPBACK_NAMES = frozenset(("localhost", "127.0.0.1", "::1"))
 VIEWING: ContextVar[bool] = ContextVar("viewing", default=False)
 """Whether the request that is being answered is a viewer's."""
-VIEWERS_POSTS = frozenset(f"/api/scene/{what}" for what in ("show", "view", "play-layers"))
+VIEWERS_POSTS = frozenset(f"/api/scene/{what}" for what in ("show", "view", "play-layers", "camera", "point"))
 """They change what the caller's own scene shows, and nothing else."""
 MAKING_PAGES = frozenset(("/way", "/recording"))
 """Pages on which there is nothing to look at."""

@@ -15,7 +15,6 @@ from studio.evaluation.errors import Evaluation
 from studio.geometry.camera import Camera
 from studio.inspection.cloud_outlines import CloudOutline, outline_of
 from studio.inspection.reading import InspectedFrame, InspectedRun
-from studio.inspection.searches import layers_of_a_search, searches_of
 from studio.inspection.verdict import limbs_off, verdict_on, verdicts
 from studio.runs.live_summary import summary_of
 from studio.runs.tracks import RAW
@@ -286,8 +285,8 @@ def frame_detail(session: OpenSession, run: OpenRun, frame: int) -> FrameDetail:
     return FrameDetail(
         frame=frame,
         finished=finished,
-        search_layers=layers_of_a_search(read),
-        searches=searches_of(read),
+        search_layers=read.search_layers,
+        searches=read.searches,
         parameters=parameter_views(inspected.body),
         layers=[layer_view(inspected.body, camera, layer) for layer in layers],
         pose=estimate.pose.tolist() if estimate else None,

@@ -12,7 +12,7 @@ from studio.geometry.reach import within_reach
 from studio.operations.own_bodies import MOST_TEXT
 from studio.scene.model import LayerPlayback, LiveSearch, Selection
 from studio.server.app_state import App, AppState, Scene
-from studio.server.schemas import Request, RunName
+from studio.server.schemas import Answer, Number, Request, RunName
 from studio.server.windows import Window
 
 router = APIRouter(prefix="/api/scene", tags=["scene"])
@@ -185,6 +185,59 @@ def layers_played(scene: Scene) -> LayersPlayed:
 
 def _played(layers: LayerPlayback) -> dict[str, object]:
     return {"playing": layers.playing, "rate": layers.rate, "mode": layers.mode}
+
+
+class CameraMove(Request):
+    """Where the viewers of the asking window's scene are to go: one of these, or both one after the other.
+
+    move: body frames the shown body from where it is seen, front, side and top from there, first is the view that a
+    session opens with. zoom: of the distance, less than 1 is nearer. at: what the zoom goes to, shares of the view's
+    width and height from the top left.
+    """
+
+    move: Literal["body", "front", "side", "top", "first"] | None = None
+    zoom: float | None = Field(None, gt=0.01, lt=100.0)
+    at: list[float] = Field(default_factory=lambda: [0.5, 0.5], min_length=2, max_length=2)
+
+
+@router.post("/camera", status_code=204)
+def move_camera(request: CameraMove, scene: Scene) -> None:
+    """Move the viewers of the asking window's scene; the body is never lost on the way."""
+    if request.move is not None:
+        scene.move_camera(request.move)
+    if request.zoom is not None:
+        across, down = (min(1.0, max(0.0, share)) for share in request.at)
+        scene.zoom(request.zoom, (across, down))
+
+
+class Pointer(Request):
+    """Where a viewer's pointer is. at: shares of the view's width and height from the top left, null where it is none.
+    choose: whether the particle that is there is to be chosen, or let go.
+    """
+
+    at: list[float] | None = Field(None, min_length=2, max_length=2)
+    choose: bool = False
+
+
+class PointedParticle(Answer):
+    """The particle at the pointer. particle: a row of the layer's cloud. particles: of the layer. log_weight: raw.
+    weight: its share of all weights. line: the rows that it comes from, by first parents, from its search's first layer
+    on.
+    """
+
+    layer: int
+    particle: int
+    particles: int
+    log_weight: Number
+    weight: Number
+    line: list[int]
+
+
+@router.post("/point")
+def point(request: Pointer, scene: Scene) -> PointedParticle | None:
+    """The particle of the layer that is looked at at the pointer; its line back to the first layer is drawn."""
+    found = scene.point(None if request.at is None else (request.at[0], request.at[1]), request.choose)
+    return None if found is None else PointedParticle.of(found)
 
 
 def report_moves(app: AppState) -> None:

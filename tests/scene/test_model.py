@@ -104,9 +104,13 @@ def test_going_back_while_tracking_stops_following(shown: Model) -> None:
 
 
 def test_cameras_are_looked_through_and_left(shown: Model) -> None:
-    through = scene.camera_clicked(shown, "cam2")
-    assert through.selection.look_through == "cam2"
-    assert scene.camera_clicked(through, "cam2").selection.look_through is None
+    once = scene.camera_clicked(shown, "cam2")
+    assert (once.selection.camera, once.selection.look_through) == ("cam2", None), "one click only chooses it"
+    assert scene.camera_clicked(once, "cam2").selection.camera is None
+    through = scene.camera_clicked(once, "cam2", twice=True)
+    assert (through.selection.camera, through.selection.look_through) == ("cam2", "cam2")
+    assert scene.camera_clicked(through, "cam2") is through, "its picture is the whole background then"
+    assert scene.camera_clicked(through, "cam2", twice=True).selection.look_through is None
     assert scene.look_through(through, "no such camera") is through
     assert scene.look_through(through, None).selection.look_through is None
 
@@ -211,6 +215,23 @@ def test_a_layer_chosen_by_hand_stops_the_layers_and_other_choices_do_not(shown:
     assert (stopped.selection.layer, stopped.layers.phase) == (0, 1.0)
     assert not scene.opened(playing, "s", "q", shown.subject, FRAMES, default_settings()).layers.playing
     assert scene.set_layer_playback(stopped, False) is stopped
+
+
+def test_layers_that_are_played_pass_panel_and_pictures_by(shown: Model) -> None:
+    playing = scene.advance_layers(scene.set_layer_playback(shown, True), 0.1, LAYERS)
+    further = scene.advance_layers(playing, 0.1, LAYERS)
+    assert scene.only_phase_differs(playing, further)
+    assert not scene.same_drawing(playing, further)
+    moved = scene.advance_layers(further, 1.0, LAYERS)
+    assert moved.selection.layer == 1
+    assert not scene.only_phase_differs(further, moved)
+    assert scene.same_panel(playing, moved)
+    assert scene.same_pictures(playing, moved)
+    for other in (scene.show_frame(moved, 2), scene.change_options(moved, {"shells": False})):
+        assert not scene.same_panel(moved, other)
+    assert not scene.same_pictures(moved, scene.stop_layers(moved)), "one layer's clouds are on them then"
+    assert playing.is_looking_at_layers
+    assert not scene.scrub(playing, None).is_looking_at_layers
 
 
 def test_frames_and_layers_are_not_played_at_once(shown: Model) -> None:

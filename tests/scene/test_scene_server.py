@@ -4,8 +4,9 @@ import asyncio
 import dataclasses
 import socket
 import sqlite3
-from contextlib import closing
+from contextlib import closing, nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -34,6 +35,7 @@ from studio.scene.model import Model, Selection
 from studio.scene.panel import Panel
 from studio.scene.scene_server import SceneServer
 from studio.scene.scene_views import SceneViews
+from studio.scene.viewpoint import is_well_framed
 from studio.sessions.results_codec import VERIFIED
 from studio.sessions.results_reader import FILE_NAME
 from studio.sessions.results_store import ResultsWriter
@@ -221,6 +223,108 @@ def test_layers_play_and_each_move_is_told_until_one_is_chosen_by_hand(
     until(lambda: told[-1] == (2, (False, 10.0, "loop")))
     assert stage.shown.layer == 2
     stage.stop()
+
+
+@dataclasses.dataclass
+class FakeCamera:
+    """A viewer's camera, as far as the scene moves and reads it."""
+
+    position: np.ndarray
+    look_at: np.ndarray
+    up_direction: np.ndarray = dataclasses.field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    fov: float = 0.85
+    aspect: float = 2.0
+    image_height: int = 400
+    update_timestamp: float = 1.0
+
+    @property
+    def eye(self) -> tuple[float, ...]:
+        return (*map(float, self.position), *map(float, self.look_at))
+
+
+@pytest.fixture
+def viewer(stage: SceneServer, monkeypatch: pytest.MonkeyPatch) -> FakeCamera:
+    """A viewer's camera, at the scene's first view once a run is open."""
+    camera = FakeCamera(np.zeros(3), np.ones(3))
+    client = SimpleNamespace(client_id=1, camera=camera, atomic=nullcontext)
+    monkeypatch.setattr(stage._server, "get_clients", lambda: {1: client})
+    open_run(stage)
+    stage.move_camera("first")
+    until(lambda: np.allclose(camera.eye, stage._controller.viewers.first_eye, atol=1e-6))
+    return camera
+
+
+def body_points(stage: SceneServer) -> np.ndarray:
+    found = stage._controller._shown_body()
+    assert found is not None
+    return found.reshape(-1, 3)
+
+
+def test_as_layers_begin_to_be_looked_at_the_body_is_of_glass_and_framed(
+    stage: SceneServer, viewer: FakeCamera
+) -> None:
+    limbs = views(stage).body.handles
+    assert limbs[0].opacity > 0.5
+    assert not is_well_framed(body_points(stage), viewer.eye, viewer.fov, viewer.aspect)
+    stage.show_layer(1)
+    until(lambda: is_well_framed(body_points(stage), viewer.eye, viewer.fov, viewer.aspect))
+    until(lambda: limbs[0].opacity < 0.2)
+    assert stage.shown.eye is None, "it is the usual place now, and not one of the address"
+    # Whoever chose a place is left there as long as the body is seen from it.
+    stage.show_layer(None)
+    stage.look_from((*(viewer.look_at + 0.5), *viewer.look_at))
+    until(lambda: stage.shown.eye is not None and limbs[0].opacity > 0.5)
+    near = viewer.eye
+    stage.play_layers(True)
+    until(lambda: stage.shown.layer == 1)
+    assert viewer.eye == near
+    stage.move_camera("first")
+    until(lambda: np.allclose(viewer.eye, stage._controller.viewers.first_eye, atol=1e-6))
+
+
+def test_a_view_that_follows_the_body_goes_along_and_a_zoom_is_noted(
+    stage: SceneServer, viewer: FakeCamera
+) -> None:
+    stage.show_frame(0)
+    until(lambda: stage.shown.frame == 0)
+    stage.set_options(follows_body=True)
+    until(lambda: stage._controller._centre is not None)
+    before, centre = np.array(viewer.eye), body_points(stage).mean(axis=0)
+    stage.show_frame(4)
+    until(lambda: not np.allclose(before, viewer.eye))
+    shift = body_points(stage).mean(axis=0) - centre
+    np.testing.assert_allclose(np.array(viewer.eye) - before, np.tile(shift, 2), atol=1e-6)
+    away = np.linalg.norm(viewer.position - viewer.look_at)
+    stage.zoom(0.5, (0.5, 0.5))
+    until(lambda: np.linalg.norm(viewer.position - viewer.look_at) == pytest.approx(0.5 * away, rel=1e-3))
+    assert stage.shown.eye is not None
+
+
+def test_a_drag_while_looking_through_a_camera_leaves_it_cleanly(
+    stage: SceneServer, viewer: FakeCamera
+) -> None:
+    told: list[str | None] = []
+    stage._controller._moved = lambda shown, _: told.append(shown.look_through)
+    stage.look_through("cam2")
+    plane = views(stage).cameras.views["cam2"].plane
+    until(lambda: np.allclose(viewer.position, plane.position))
+    until(lambda: not views(stage).body.handles[0].visible)
+
+    def report() -> None:
+        stage._controller.viewers.looking = viewer  # pyright: ignore[reportAttributeAccessIssue]
+        stage._controller.post(lambda model: model)
+        until(lambda: stage._controller.viewers.looking is None)
+
+    report()
+    assert stage.shown.look_through == "cam2", "who stands there has not been dragged"
+    viewer.position = viewer.position + 0.3
+    report()
+    until(lambda: stage.shown.look_through is None)
+    until(lambda: views(stage).body.handles[0].visible)
+    until(lambda: views(stage).cameras.views["cam2"].picture.scale == 1.0)
+    until(lambda: viewer.fov == pytest.approx(0.85))
+    np.testing.assert_allclose(viewer.up_direction, [0.0, 0.0, 1.0])
+    assert told[-1] is None, "the page hears of it, so that the address is right"
 
 
 def _alike(found: np.ndarray, wanted: np.ndarray) -> bool:

@@ -8,11 +8,17 @@ from pathlib import Path
 from conftest import ARGUMENTS, chromium
 from playwright.sync_api import sync_playwright
 
+from watching.layers import measure_layers
 from watching.long_run import measure_long_run
 from watching.slider import measure_slider
 from watching.windows import measure_windows
 
-PARTS = {"slider": measure_slider, "windows": measure_windows, "long-run": measure_long_run}
+PARTS = {
+    "slider": measure_slider,
+    "windows": measure_windows,
+    "long-run": measure_long_run,
+    "layers": measure_layers,
+}
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="watching", description=__doc__)

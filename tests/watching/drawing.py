@@ -6,13 +6,20 @@ from playwright.sync_api import Browser, BrowserContext, Frame
 from studio_page import StudioPage
 
 HOOKS = """(() => {
-  const watch = { keys: [], uploads: [] };
+  const watch = { keys: [], uploads: [], pictures: [] };
   window.__watch = watch;
   const now = () => performance.timeOrigin + performance.now();
   addEventListener("keydown", (event) => watch.keys.push(performance.timeOrigin + event.timeStamp), true);
   const proto = window.WebGL2RenderingContext?.prototype;
   if (!proto) return;
-  let waiting = [];
+  let waiting = [], isDrawing = false;
+  const clear = proto.clear;
+  proto.clear = function (...given) {
+    // Shadows are drawn in the same task: it ends with one picture.
+    if (!isDrawing) queueMicrotask(() => { isDrawing = false; watch.pictures.push(now()); });
+    isDrawing = true;
+    return clear.apply(this, given);
+  };
   for (const name of ["bufferData", "bufferSubData"]) {
     const upload = proto[name];
     proto[name] = function (...given) {
@@ -33,7 +40,7 @@ HOOKS = """(() => {
 READ = "() => window.__watch"
 QUIET_MILLISECONDS = 700
 """What was sent is drawn once nothing more was for so long."""
-CLEAR = "() => { window.__watch.keys.length = window.__watch.uploads.length = 0; }"
+CLEAR = "() => { for (const kind of Object.values(window.__watch)) kind.length = 0; }"
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +80,10 @@ class Drawing:
     def keys(self) -> list[float]:
         """When keys were pressed in the scene, ms since 1970."""
         return self._frames()[0].evaluate(READ)["keys"]
+
+    def pictures(self) -> list[float]:
+        """When pictures were drawn, ms since 1970."""
+        return self._frame().evaluate(READ)["pictures"]
 
     def uploads(self, sizes: set[int]) -> list[Upload]:
         """Those of some sizes, in order; a trial is drawn in the window's second scene once that is there."""

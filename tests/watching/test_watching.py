@@ -6,6 +6,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from watching.figures import Figures
+from watching.layers import measure_layers
 from watching.long_run import measure_long_run
 from watching.slider import measure_slider
 from watching.windows import measure_windows
@@ -35,6 +36,15 @@ def test_frames_of_a_long_run_are_looked_at(browser: Browser, tmp_path: Path) ->
     _right(
         measure_long_run(browser, tmp_path, frames=60, looks=2), "60 frames", "its particles drawn: median"
     )
+
+
+@pytest.mark.slow
+@pytest.mark.browser
+def test_layers_that_are_played_are_counted_on_the_wire_and_in_the_browser(
+    browser: Browser, tmp_path: Path
+) -> None:
+    found = measure_layers(browser, tmp_path, seconds=2.0)
+    _right(found, "100 particles at 3 layers", "1000 particles in the browser", "% of a core by the server")
 
 
 def test_what_is_wrong_stands_below_the_times() -> None:

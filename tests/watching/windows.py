@@ -48,7 +48,7 @@ class Window:
     def __init__(self, studio: StudioServer, run: str) -> None:
         self.name, self.run, self.received = f"window-of-{run}", run, 0
         studio.post("/api/scene/show", {"session": "walk", "run": run, "follow": True}, window=self.name)
-        self.scene = PanelReader(_socket(studio, f"/scene/{self.name}", f"viser-v{viser.__version__}"))
+        self.scene = PanelReader(connected(studio, self.name))
         self.events = _socket(studio, f"/api/events?window={self.name}")
         self._threads = [threading.Thread(target=self._drain, args=(self.events,))]
         self._threads[0].start()
@@ -70,6 +70,11 @@ class Window:
         self.scene.socket.close()
         for thread in self._threads:
             thread.join()
+
+
+def connected(studio: StudioServer, window: str) -> ClientConnection:
+    """The socket of a window's scene."""
+    return _socket(studio, f"/scene/{window}", f"viser-v{viser.__version__}")
 
 
 def _socket(studio: StudioServer, path: str, *protocols: str) -> ClientConnection:

@@ -17,7 +17,7 @@ export async function accepted(answer) {
 
 /** Whether this browser may only look: what changes something is refused, and the page does not offer it. */
 export const readOnly = document.documentElement.dataset.access === "view";
-const LOOKING = ["show", "view", "play-layers"].map((what) => `/api/scene/${what}`);
+const LOOKING = ["show", "view", "play-layers", "camera", "point"].map((what) => `/api/scene/${what}`);
 
 /** @param {RequestInit} [options] */
 async function call(method, path, body, options = {}) {

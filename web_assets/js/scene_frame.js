@@ -1,5 +1,6 @@
 // The scene's frame: viser's own page, in the studio's type and colours, with the page's keys working in it.
 
+import { post } from "./api.js";
 import { byId } from "./elements.js";
 import { loadScene } from "./scene_window.js";
 import { onTheme, theme, token } from "./theme.js";
@@ -67,6 +68,56 @@ function leaveScene(event) {
   byId("track").focus();
 }
 
+const WHEEL_MILLISECONDS = 40;
+const WHEEL_STEP = 0.0016;   // of the distance's logarithm, a pixel of the wheel
+const CLICK_PIXELS = 4;
+
+/** Where in the canvas an event is, shares of its width and height; null beside it. */
+function placeOf(event) {
+  if (event.target.tagName !== "CANVAS") return null;
+  const box = event.target.getBoundingClientRect();
+  const [across, down] = [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
+  return across >= 0 && across <= 1 && down >= 0 && down <= 1 ? [across, down] : null;
+}
+
+/** The wheel goes to what is under the pointer and never loses the body: the studio moves the camera, not viser. */
+function zoomWithWheel(page) {
+  let [turned, at, isSending] = [0, [0.5, 0.5], false];
+  const send = async () => {
+    isSending = true;
+    while (turned) {
+      const zoom = Math.exp(Math.max(-1, Math.min(1, turned * WHEEL_STEP)));
+      turned = 0;
+      await post("/api/scene/camera", { zoom, at }).catch(() => {});
+      await new Promise((resolve) => setTimeout(resolve, WHEEL_MILLISECONDS));
+    }
+    isSending = false;
+  };
+  page.addEventListener("wheel", (event) => {
+    const place = placeOf(event);
+    if (!place || event.ctrlKey) return;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    turned += event.deltaY * (event.deltaMode === 1 ? 30 : 1);
+    at = place;
+    if (!isSending) send();
+  }, { capture: true, passive: false });
+}
+
+/** Call `hover(place, event)` as the pointer moves over the scene (null where it leaves), `click(place)` where it is clicked. */
+function followPointer(page, { hover, click }) {
+  let pressed = null;
+  page.addEventListener("pointermove", (event) => { if (!event.buttons) hover(placeOf(event), event); }, true);
+  page.document.addEventListener("pointerleave", (event) => hover(null, event));
+  page.addEventListener("pointerdown", (event) => { pressed = event.button === 0 ? [event.clientX, event.clientY] : null; hover(null, event); }, true);
+  page.addEventListener("pointerup", (event) => {
+    const place = placeOf(event);
+    const isStill = pressed && Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) < CLICK_PIXELS;
+    if (place && isStill) click(place);
+    pressed = null;
+  }, true);
+}
+
 /** Let the page's keys work in a scene that was loaded; `takeKey` handles them. */
 export function shareKeys(/** @type {HTMLIFrameElement} */ scene, takeKey) {
   for (const kind of ["keydown", "keyup"]) scene.contentDocument.body.addEventListener(kind, keepToControls);
@@ -74,12 +125,14 @@ export function shareKeys(/** @type {HTMLIFrameElement} */ scene, takeKey) {
   scene.contentWindow.addEventListener("keydown", leaveScene, true);
 }
 
-/** Load the scene, dressed as the page; `takeKey` handles the page's keys in it. */
-export function startSceneFrame(takeKey) {
+/** Load the scene, dressed as the page; `takeKey` handles the page's keys in it, `pointer` what the pointer does over it. */
+export function startSceneFrame(takeKey, pointer) {
   frame.addEventListener("load", () => {
     if (frame.src.endsWith("about:blank")) return;
     dress();
     shareKeys(frame, takeKey);
+    zoomWithWheel(frame.contentWindow);
+    followPointer(frame.contentWindow, pointer);
     // Whoever clicks a tab goes on with the timeline's keys.
     frame.contentWindow.addEventListener("click", (/** @type {any} */ event) => { if (event.detail) event.target.closest?.("[role=tab]")?.blur(); });
   });

@@ -13,6 +13,7 @@ import { stepParameter, stepView, toggleTable } from "../views.js";
 import { toggleLayers } from "./layer_playback.js";
 import { leaveLayers, step as stepLayer } from "./layer_strip.js";
 import { toggleBookmark } from "./notes.js";
+import { frameBody, resetView, toggleFollow } from "./scene_tools.js";
 import { reanneal } from "./tracking.js";
 
 /** Leave the view through a camera. Whether there was one. */
@@ -53,7 +54,9 @@ const KEYS = [
     (event) => /^[1-9]$/.test(event.key),
     (event) => lookThrough(Number(event.key) - 1),
   ],
-  ["0", "free view", is("0"), () => lookThrough(null)],
+  ["0", "the first view of the scene; free of a camera", is("0"), resetView],
+  ["f", "frame the body in the scene", is("f"), frameBody],
+  ["g", "go along with the body from frame to frame", is("g"), toggleFollow],
   [
     "v",
     "next view; Shift v the one before",
