@@ -16,7 +16,6 @@ from studio.errors import NotFoundError
 from studio.inspection.reading import InspectedFrame, InspectedRun, no_value
 from studio.inspection.reference import body_points, by_limb, true_points
 from studio.inspection.schedule import alarm_of, effective_number
-from studio.inspection.searches import layers_of_a_search
 from studio.inspection.tables import Row, Selection
 from studio.sessions.results_reader import Timeline
 
@@ -70,7 +69,7 @@ def summary_of(frame: InspectedFrame) -> FrameSummary:
         spread,
         ranks,
         {} if frame.result is None else frame.result.disagreement,
-        layers_of_a_search(frame),
+        frame.search_layers,
     )
 
 

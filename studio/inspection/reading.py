@@ -8,7 +8,7 @@ import numpy as np
 
 from studio.arrays import Array, Indices
 from studio.body.model import BodyModel
-from studio.errors import DamagedError, NotFoundError, SettingsError
+from studio.errors import DamagedError, NotFoundError, SettingsError, StudioError
 from studio.inspection.tables import Row, Selection
 from studio.likelihood.hard_priors import HardPriors
 from studio.runs.new_run import software_version
@@ -18,8 +18,11 @@ from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.settings import RunSettings, SettingsHistory, settings_from_values, values
 from studio.trackers.annealing import normalised
-from studio.trackers.catalogue import size_in_words
+from studio.trackers.catalogue import TRACKERS, size_in_words
 from studio.trackers.tracker import FrameResult, LayerRecord
+from studio.words import enumerated
+
+ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -212,6 +215,14 @@ class InspectedFrame:
         drawn = self.layers[layer - 1].parents.shape[1] if layer else 0
         return max(len(record.poses), drawn, record.parents.shape[1], int(record.rows.max(initial=-1)) + 1)
 
+    def _searches_in_words(self) -> str:
+        count = self.search_layers
+        spans = [
+            f"layers {first + 1} to {min(first + count, len(self.layers))} are the {ordinal(number)} search"
+            for number, first in enumerate(range(0, len(self.layers), count), 1)
+        ]
+        return enumerated(spans)
+
     def estimate(self, track: str = "") -> Array:
         """(D,) the frame's pose, in a track if one is named; in an unfinished frame the last layer's mean.
 
@@ -228,9 +239,30 @@ class InspectedFrame:
         found = self.result.estimate.searched
         return self.result.estimate.pose if found is None else found
 
+    @cached_property
+    def search_layers(self) -> int:
+        """Layers of one search of the frame; all of its layers where its tracker is not installed."""
+        layers = len(self.layers)
+        try:
+            counted = TRACKERS[self.of.run.record.tracker].layer_count(self.settings.tracker)
+        except (StudioError, KeyError):
+            return layers
+        # A frame is never searched one and a half times over: such a record is of another version's layers.
+        return counted if self.result is None or layers % counted == 0 else layers
+
+    @property
+    def searches(self) -> int:
+        """How many searches the frame has, those to come counted."""
+        begun = -(-len(self.layers) // self.search_layers)
+        if self.result is not None or self.number != self.of.run.record.first:
+            return begun
+        return max(begun, getattr(self.settings.tracker, "start_repeats", 1))
+
     def notes(self) -> tuple[str, ...]:
         """What a reader has to know of all numbers about the frame's particles."""
         found: list[str] = []
+        if len(self.layers) > self.search_layers:
+            found.append(f"The frame was searched several times over: {self._searches_in_words()}.")
         if not self.is_weighted:
             found.append("This tracker has no β: its particles count equally here.")
         if self.result is None:
@@ -241,6 +273,11 @@ class InspectedFrame:
                 f"Of {whole} particles a layer the {stored} heaviest are stored; weights are among these."
             )
         return tuple(found)
+
+
+def ordinal(number: int) -> str:
+    """A number from 1 as a place in a row: first, second, … 13th."""
+    return ORDINALS[number - 1] if number <= len(ORDINALS) else f"{number}th"
 
 
 def no_value(value: float) -> float | None:

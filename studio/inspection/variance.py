@@ -5,7 +5,6 @@ noise).
 import numpy as np
 
 from studio.inspection.reading import InspectedFrame
-from studio.inspection.searches import layers_of_a_search
 from studio.inspection.tables import Row, Selection, View, table
 
 VIEW = View(
@@ -67,7 +66,7 @@ def settling(frame: InspectedFrame) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 
 def rows(frame: InspectedFrame, selection: Selection) -> dict[str, list[Row]]:
     """The tables of view `variance`."""
-    run, layers, search_layers = frame.of, frame.layers, layers_of_a_search(frame)
+    run, layers, search_layers = frame.of, frame.layers, frame.search_layers
     settled, first, last = settling(frame)
     return {
         "layers": [

@@ -15,7 +15,6 @@ from studio.evaluation.errors import Evaluation
 from studio.geometry.camera import Camera
 from studio.inspection.cloud_outlines import CloudOutline, outline_of
 from studio.inspection.reading import InspectedFrame, InspectedRun
-from studio.inspection.searches import layers_of_a_search, searches_of
 from studio.inspection.verdict import limbs_off, verdict_on, verdicts
 from studio.runs.live_summary import summary_of
 from studio.runs.tracks import RAW
@@ -220,7 +219,7 @@ def frames(
     errors = dict(zip(measured.frames, measured.per_frame_mm, strict=True)) if measured else {}
     lost = dict(zip(measured.frames, measured.lost_by_frame, strict=True)) if measured else {}
     with run.results() as results:
-        said = verdicts(results, run.folder, timeline, lost)
+        said = verdicts(results, run.folder, timeline, lost, run.body())
     lines = [
         FrameLine(
             frame=frame,
@@ -286,8 +285,8 @@ def frame_detail(session: OpenSession, run: OpenRun, frame: int) -> FrameDetail:
     return FrameDetail(
         frame=frame,
         finished=finished,
-        search_layers=layers_of_a_search(read),
-        searches=searches_of(read),
+        search_layers=read.search_layers,
+        searches=read.searches,
         parameters=parameter_views(inspected.body),
         layers=[layer_view(inspected.body, camera, layer) for layer in layers],
         pose=estimate.pose.tolist() if estimate else None,
@@ -300,7 +299,7 @@ def frame_detail(session: OpenSession, run: OpenRun, frame: int) -> FrameDetail:
         tracking=verdict_on(result).tracking if result else None,
         searched=estimate.searched.tolist() if estimate and estimate.searched is not None else None,
         disagreement=dict(result.disagreement) if result else {},
-        limbs_lost=list(limbs_off(result)) if result else [],
+        limbs_lost=list(limbs_off(result, run.body())) if result else [],
         notes=list(result.notes) if result else [],
         settings=dict(entry.values if entry else run.record.settings),
     )

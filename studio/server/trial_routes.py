@@ -11,7 +11,6 @@ from studio.body.forward_kinematics import limb_ends
 from studio.errors import NotFoundError
 from studio.inspection.reading import InspectedRun, TriedFrame
 from studio.inspection.reference import body_points, by_limb, limb_group, true_points
-from studio.inspection.searches import layers_of_a_search, searches_of
 from studio.server.app_state import App
 from studio.server.result_routes import LayerView, layer_view
 from studio.server.run_routes import RUN, OpenRun
@@ -103,8 +102,8 @@ def trial(session: OpenSession, run: OpenRun, trial: str, app: App) -> TrialLaye
     return TrialLayers(
         trial=_view(InspectedRun(session, run), found),
         frame=found.number,
-        search_layers=layers_of_a_search(frame),
-        searches=searches_of(frame),
+        search_layers=frame.search_layers,
+        searches=frame.searches,
         layers=[layer_view(inspected.body, camera, layer) for layer in found.layers],
     )
 

@@ -40,7 +40,7 @@ def window(browser: Browser, studio: StudioServer) -> Iterator[StudioPage]:
 def begun(window: StudioPage, studio: StudioServer) -> None:
     """Make a run whose first frame is searched twice, and open it."""
     studio.post(RUNS, {"name": "one", "start_pose": true_poses()[0].tolist(), "settings": QUICK})
-    window.page.goto(f"{studio.origin}/?session=toy&run=one")
+    window.page.goto(f"{studio.origin}/?session=toy&run=one&panel=why")
     window.until("get('run') === 'one' && get('connected') && get('summary') !== null")
 
 

@@ -446,6 +446,113 @@ def test_a_what_if_says_what_it_changes_and_is_discarded(window: StudioPage, stu
     page.locator("#trial").wait_for(state="hidden")
 
 
+def test_every_view_draws_the_trial_beside_the_stored(window: StudioPage, studio: StudioServer) -> None:
+    page = window.page
+    page.bring_to_front()
+    show(window, "schedule")
+    more = LAYERS + 3
+    changes = {"survival": 0.7, "layers": more, "particles": 40}
+    studio.post(f"{RUN}/settings?frame={FRAME}", changes, method="PATCH")
+    window.until(f"get('trial') && get('whatIf')?.length === {more} && get('trials')")
+    trial = f"?trial={window.get('trial')}"
+    names = list(Workspace(studio.workspace).session("walk").run("seen").record.parameters)
+    stored, tried = layers_of(studio), rows_of(studio, "schedule", "layers", trial)
+    assert len(tried) == more
+
+    # Maps are cut along the diagonal, on one scale: shares of the stored first layer's variance.
+    cells = next(one["data"] for one in show(window, "variance") if one["name"] == "stored and tried")
+    variances = rows_of(studio, "variance", "layers", trial)
+    for side, rows in ((0, rows_of(studio, "variance", "layers")), (1, variances)):
+        drawn = {(cell[0], cell[1]): cell[2] for cell in cells if cell[3] == side}
+        wanted = {
+            (row["layer"], at): math.log10(row["before"] / stored[0].variance_weighed[at])
+            for row in rows
+            for at in [names.index(row["parameter"])]
+        }
+        assert drawn == pytest.approx(wanted, abs=1e-6)
+    lines = {str(one["name"]): one["data"] for one in show(window, "schedule") if one["type"] == "line"}
+    for key, name in (("beta", "tried"), ("alpha_reached", "tried, reached")):
+        assert [row[key] for row in tried] in [
+            one["data"] for one in show(window, "schedule") if one["name"] == name
+        ], key
+    assert len(lines["stored, reached"]) == more, "over the longer number of layers"
+    assert lines["stored, reached"][LAYERS:] == [None] * 3
+
+    points = [one["data"] for one in show(window, "genealogy") if one["type"] == "scatter"]
+    assert [len(data) for data in points] == [LAYERS * PARTICLES, more * 40]
+    sorted_weights = [row["weight"] for row in rows_of(studio, "weights", "sorted", trial)]
+    (curve,) = [
+        one["data"]
+        for one in show(window, "weights")
+        if one["name"] == "tried" and one["type"] == "line" and isinstance(one["data"][0], dict)
+    ]
+    assert [point["value"][1] for point in curve] == pytest.approx([one for one in sorted_weights if one > 0])
+    ridges = {str(one["name"]) for one in show(window, "clouds") if one["type"] == "custom"}
+    assert {f"tried, {layer + 1}" for layer in range(more)} <= ridges
+    coupled = [one["data"] for one in show(window, "coupling") if one["name"] == "tried"]
+    assert {len(data) for data in coupled} == {40}
+    alive = [row for row in rows_of(studio, "survivors", "particles", trial) if row["survives"]]
+    drawn = [
+        one["data"]
+        for one in show(window, "survivors")
+        if (one["name"], one["type"]) == ("tried", "parallel")
+    ]
+    assert [len(data) for data in drawn] == [len(alive)]
+    line = rows_of(studio, "landscape", "slice", trial)
+    (curve,) = [
+        one["data"] for one in show(window, "landscape") if (one["name"], one["type"]) == ("tried", "line")
+    ]
+    assert [point[1] for point in curve] == pytest.approx([row["log_weight"] for row in line])
+    (blamed,) = [one["data"] for one in show(window, "blame") if one["name"] == "stored and tried"]
+    wanted = [row["difference"] for row in rows_of(studio, "blame", "matrix", trial)]
+    assert [cell[2] for cell in blamed if cell[3] == 1] == pytest.approx(wanted)
+    masses = [bar for one in show(window, "modes") for bar in one["data"] if bar.get("side") == "tried"]
+    assert {bar["layer"] for bar in masses} == set(range(more))
+    arrows = [one["data"] for one in show(window, "coverage") if one["type"] == "lines"]
+    (moved,) = [
+        row
+        for row in rows_of(studio, "coverage", "frames", trial, run=True)
+        if (row["frame"], row["limb"]) == (FRAME, "left leg")
+    ]
+    assert [moved["spread"], moved["error"]] in [arrow["coords"][1] for arrow in arrows[0]]
+    page.evaluate(SET, {"panel": "why"})
+    until(
+        page,
+        lambda: any(
+            one["name"] == "stored and tried" for one in page.evaluate(OPTION, "#panel-why .figure-chart")
+        ),
+    )
+    page.locator("#trial").get_by_role("button", name="Discard", exact=True).click()
+    window.until("get('trial') === null && get('whatIf') === null")
+    # The tray keeps it.
+    page.locator("#trial .tile").nth(-1).locator(".tile-body").click()
+    window.until(f"get('trial') && get('whatIf')?.length === {more}")
+    page.locator("#trial").get_by_role("button", name="Put back", exact=True).click()
+    window.until("get('trial') === null")
+
+
+def test_words_of_lines_do_not_cover_each_other_and_limbs_keep_their_looks(window: StudioPage) -> None:
+    places = window.page.evaluate(
+        """async () => {
+          const { Sheet } = await import('/assets/js/view_sheet.js');
+          const marks = ['estimate', 'truth', 'searched'].map((word, at) => ({ word, x: 0.5 + 0.001 * at }));
+          return [...Sheet.wordPlaces(marks, [0, 1], 400).values()]; }"""
+    )
+    assert [one["level"] for one in places] == [0, 1, 2]
+    looks = window.page.evaluate(
+        """async () => {
+          const { limbLook } = await import('/assets/js/limb_looks.js');
+          const { token } = await import('/assets/js/chart_looks.js');
+          const all = ['left arm', 'left leg', 'right arm'];
+          return [token('limb-left'), token('limb-right'), limbLook('left leg', all),
+            limbLook('left leg', ['left leg']), limbLook('right arm', all), limbLook('left arm', all)]; }"""
+    )
+    left, right, leg, alone, other, arm = looks
+    assert leg == alone, "whatever stands beside it"
+    assert (leg["colour"], arm["colour"], other["colour"]) == (left, left, right)
+    assert leg["symbol"] != arm["symbol"]
+
+
 def moved_knobs(window: StudioPage) -> dict[str, tuple[object, object]]:
     """What the page says of knobs that were moved: before and after by label."""
     moved = window.get("moved") or []

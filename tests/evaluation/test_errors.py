@@ -6,7 +6,13 @@ import pytest
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
 from studio.errors import TruthError
-from studio.evaluation.errors import evaluate, limb_of_markers, meant_axes, rows_of_frames
+from studio.evaluation.errors import (
+    evaluate,
+    limb_of_drawn,
+    limb_of_markers,
+    meant_axes,
+    rows_of_frames,
+)
 from studio.evaluation.report import in_words
 from studio.motion_files.trc import MarkerMotion
 
@@ -198,3 +204,17 @@ def test_a_marker_that_is_missing_takes_its_joints_out_of_that_frame_only() -> N
     alone = MarkerMotion(("LKnee",), truth.times, truth.positions[:, [truth.names.index("LKnee")]])
     none = evaluate(poses, np.arange(FRAMES), load_body("human31"), alone, 60.0)
     assert (none.angles_deg, none.mean_angle_deg, none.directions_deg) == ({}, None, {})
+
+
+@pytest.mark.parametrize(
+    ("body", "limbs"),
+    [
+        ("planar_arm4", {"arm"}),
+        ("hand25", {"index", "little", "middle", "ring", "thumb", "wrist"}),
+        ("human31", {"head and trunk", "left arm", "left leg", "right arm", "right leg"}),
+    ],
+)
+def test_only_a_body_with_sides_has_a_head_and_trunk(body: str, limbs: set[str]) -> None:
+    made = load_body(body)
+    assert set(limb_of_markers(made).values()) == limbs
+    assert set(limb_of_drawn(made).values()) == limbs

@@ -5,9 +5,8 @@ from tracked_runs import finish
 
 from studio.inspection.cloud_outlines import outline_of
 from studio.inspection.reading import InspectedRun
-from studio.inspection.searches import layers_of_a_search, searches_of
 from studio.inspection.tables import Selection
-from studio.inspection.views import look_over
+from studio.inspection.views import look, look_over
 from studio.runs.new_run import prepare_run
 from studio.sessions.session import Session
 
@@ -20,8 +19,15 @@ def test_the_searches_of_a_frame_are_counted_and_its_cloud_shrinks(session_on_di
     run = InspectedRun(session_on_disk, prepare_run(session_on_disk, start_pose=start, last=2, knobs=knobs))
     finish(session_on_disk, run.run)
     first, second = run.frame(0), run.frame(1)
-    assert (layers_of_a_search(first), searches_of(first), len(first.layers)) == (LAYERS, 2, 2 * LAYERS)
-    assert (layers_of_a_search(second), searches_of(second)) == (LAYERS, 1)
+    assert (first.search_layers, first.searches, len(first.layers)) == (LAYERS, 2, 2 * LAYERS)
+    assert (second.search_layers, second.searches) == (LAYERS, 1)
+
+    notes = [look(run, frame, "variance", Selection()).notes for frame in (0, 1)]
+    assert notes[0][0] == (
+        "The frame was searched several times over: layers 1 to 3 are the first search and layers 4 to 6 are the"
+        " second search."
+    )
+    assert not any("several times" in note for note in notes[1])
 
     # Over the frames each row says of which search it is, so that a map needs no rows that one frame has alone.
     view = look_over(run, "variance", Selection(parameter=run.names[0]))

@@ -6,12 +6,13 @@
 import { figure } from "../chart_looks.js";
 import { byId } from "../elements.js";
 import { stepLayer } from "../selection.js";
-import { get } from "../state.js";
+import { drawSoon } from "../pacing.js";
+import { get, watch } from "../state.js";
 import { layerColour, onTheme } from "../theme.js";
 import { follow, html, mount, signal, useMemo } from "./component.js";
 import { LayerOutline, scaleOf } from "./layer_outline.js";
 import { layerPlayback, playLayers, RATES, scrubTo, toggleLayers } from "./layer_playback.js";
-import { layersOf, layerWords, searchName, survivorsOf, varianceShare } from "./shown_layers.js";
+import { layerWords, searchName, shownLayers, survivorsOf, varianceShare } from "./shown_layers.js";
 
 const PLAY = "M4 2.5v11l9-5.5z";
 const PAUSE = "M4 3h3v10H4zM9 3h3v10H9z";
@@ -25,6 +26,12 @@ const icon = (path) => html`<svg viewBox="0 0 16 16"><path d=${path} /></svg>`;
 
 /** Rises when the theme changes: the layers' colours are those of the theme. */
 const looks = signal(0);
+
+/** The shown frame's layers, renewed at most ten times a second, however fast they are searched. */
+const shown = signal(shownLayers());
+const renew = () => {
+  shown.value = shownLayers();
+};
 
 /** A layer's numbers in words. */
 function numbersOf(layer) {
@@ -83,11 +90,9 @@ function Tile({ number, layer, first, scale, colour, isChosen, title, isTrial })
 
 /** The tiles, one slider: a drag goes from layer to layer, Escape shows all of them together. */
 function Tiles() {
-  const [whatIf, detail, usual] = [follow("whatIf"), follow("detail"), follow("layerCount")];
   const chosen = follow("layer");
   const theme = looks.value;
-  const shown = layersOf(whatIf, detail, usual);
-  const { layers, count, searchLayers, searches, isTrial } = shown;
+  const { layers, count, searchLayers, searches, isTrial } = shown.value;
   const scale = useMemo(() => scaleOf(layers.map((layer) => layer.outline)), [layers]);
   const colours = useMemo(
     () => Array.from({ length: count }, (_, at) => layerColour(at, count)),
@@ -129,7 +134,7 @@ function Tiles() {
     aria-valuemin="1"
     aria-valuemax=${Math.max(1, layers.length)}
     aria-valuenow=${(chosen ?? Math.max(0, layers.length - 1)) + 1}
-    aria-valuetext=${now ? `${layerWords(chosen, shown)}, ${numbersOf(now)}` : "all layers together"}
+    aria-valuetext=${now ? `${layerWords(chosen, shown.value)}, ${numbersOf(now)}` : "all layers together"}
     onPointerDown=${takePointer}
     onPointerMove=${takePointer}
     onKeyDown=${takeKey}
@@ -152,7 +157,7 @@ function Tiles() {
                 scale=${scale}
                 colour=${colours[layer]}
                 isChosen=${layer === chosen}
-                title=${layerWords(layer, shown)}
+                title=${layerWords(layer, shown.value)}
                 isTrial=${isTrial}
               />`,
           )}
@@ -163,15 +168,10 @@ function Tiles() {
 
 function Tools() {
   const { playing, rate, mode } = layerPlayback.value;
-  const [whatIf, detail, usual, chosen] = [
-    follow("whatIf"),
-    follow("detail"),
-    follow("layerCount"),
-    follow("layer"),
-  ];
-  const shown = layersOf(whatIf, detail, usual);
-  const none = !shown.layers.length;
-  const now = chosen === null ? null : shown.layers[chosen];
+  const chosen = follow("layer");
+  const { layers, isTrial } = shown.value;
+  const none = !layers.length;
+  const now = chosen === null ? null : layers[chosen];
   const isPingpong = mode === "pingpong";
   const back = isPingpong ? "Forth and back" : "In a loop";
   return html`
@@ -226,8 +226,8 @@ function Tools() {
       </button>
     </div>
     <output class="layer-words" id="layer-label">
-      <span>${now ? layerWords(chosen, shown) : "all layers"}</span>
-      <small>${now ? numbersOf(now) : shown.isTrial ? "of the frame annealed again" : ""}</small>
+      <span>${now ? layerWords(chosen, shown.value) : "all layers"}</span>
+      <small>${now ? numbersOf(now) : isTrial ? "of the frame annealed again" : ""}</small>
     </output>
   `;
 }
@@ -250,5 +250,6 @@ export function startLayerStrip() {
   onTheme(() => {
     looks.value += 1;
   });
+  watch(["whatIf", "detail", "layerCount"], () => drawSoon(renew));
   mount(byId("layers"), html`<div class="layer-tools"><${Tools} /></div><${Tiles} />`);
 }

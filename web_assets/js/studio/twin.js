@@ -28,6 +28,9 @@ const isReady = signal(false);
 /** Whether the scenes are split: then trials are in the second one. */
 const isSplit = signal(false);
 
+/** Whether the scenes were split before the trial had ended: then some of its layers were not heard by the second one. */
+let isUnnamed = false;
+
 /** @param {number} value */
 function moveTo(value) {
   share.value = Math.max(LEAST, Math.min(1 - LEAST, value));
@@ -72,8 +75,11 @@ async function split(split) {
     ? { trial: placeOf(get("trial")), against: placeOf(get("against")), discard: true }
     : {};
   try {
+    isUnnamed = split && !get("trial");
     await post("/api/scene/show", { ...places, twin: split });
   } catch (error) {
+    // Not tried again by itself: the trial is shown in the first scene as long as the page is.
+    isReady.value = false;
     isSplit.value = false;
     complain(error);
   }
@@ -193,6 +199,12 @@ export function startTwin(takeKey) {
     const isTried = Boolean(follow("whatIf"));
     if (isTried) isNeeded.value = true;
     split(isTried && isReady.value && Boolean(canvasBox.value));
+  });
+  effect(() => {
+    const trial = follow("trial");
+    if (!trial || !isUnnamed) return;
+    isUnnamed = false;
+    post("/api/scene/show", { trial: placeOf(trial) }).catch(complain);
   });
   mount(byId("twin"), html`<${Twin} takeKey=${takeKey} />`);
 }
