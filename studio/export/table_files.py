@@ -5,6 +5,7 @@
 import csv
 import json
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -51,7 +52,7 @@ def write_csv(task: ExportTask) -> Written:
             if row % ROWS_A_STEP == 0:
                 task.step("writing", row, len(table))
             first = (f"{motion.frames[row]:.12g}", f"{motion.times[row]:.9f}", motion.states[row])
-            note = [remarks.get(float(motion.frames[row]), "")] if remarks else []
+            note = [_remark(remarks, float(motion.frames[row]))] if remarks else []
             writer.writerow([*first, _cell(motion.confidence[row]), *map(_cell, values), *note])
     task.step("reading back", len(table), len(table))
     checked = _read_csv_back(task, heads, places, poses, angle)
@@ -89,6 +90,11 @@ def write_parquet(task: ExportTask) -> Written:
     values = np.stack([read.column(axis).to_numpy() for axis in "xyz"], axis=-1).reshape(places.shape)
     checked = agreed(task.place, apart(task.axes.points_back(values), places))
     return Written((task.place,), checked, point_notes(task, points, "null"))
+
+
+def _remark(remarks: Mapping[int, str], frame: float) -> str:
+    """The note on a frame; "" between frames, where the motion is sampled anew."""
+    return remarks.get(int(frame), "") if frame.is_integer() else ""
 
 
 def _remarks(task: ExportTask) -> dict[str, str]:

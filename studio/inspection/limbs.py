@@ -76,7 +76,7 @@ def verdicts_on(run: InspectedRun, track: str = "") -> dict[int, Verdict]:
 def _verdicts(run: InspectedRun, distances: dict[int, Array]) -> dict[int, Verdict]:
     by_truth = {frame: limbs_too_far(run.body, away) for frame, away in distances.items()}
     with run.run.results() as results:
-        return verdicts(results, run.run.folder, results.timeline(), by_truth)
+        return verdicts(results, run.run.folder, results.timeline(), by_truth, run.body)
 
 
 def limb_rows(run: InspectedRun, selection: Selection) -> dict[str, list[Row]]:

@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from studio.body.model import BodyModel
 from studio.errors import NotFoundError
 from studio.inspection.reference import limb_group
 from studio.sessions.results_reader import ResultsReader, Timeline
@@ -53,29 +54,35 @@ def verdict(tracking: str, by_silhouettes: Iterable[str], by_truth: Iterable[str
     return Verdict(LIMB_LOST if limbs and is_followed else tracking, limbs, tuple(by_truth))
 
 
-def limbs_off(result: FrameResult) -> tuple[str, ...]:
-    """The limbs of a stored frame that the silhouettes contradict, head and trunk as one; () where nothing was seen."""
+def limbs_off(result: FrameResult, body: BodyModel | None = None) -> tuple[str, ...]:
+    """The limbs of a stored frame that the silhouettes contradict; () where nothing was seen. body : by which limbs are
+    counted together, such as head and trunk.
+    """
     if result.tracking == NO_EVIDENCE or _is_settled(result.tracking, result.overlap, result.doubts):
         return ()
     names = result.limbs_lost
     if not names and result.tracking == LIMB_LOST and result.disagreement:
         # Stored when the limit was another one: what was said then holds.
         names = (max(result.disagreement, key=lambda limb: result.disagreement[limb]),)
-    return tuple(dict.fromkeys(map(limb_group, names)))
+    return tuple(dict.fromkeys(name if body is None else limb_group(body, name) for name in names))
 
 
-def verdict_on(result: FrameResult, by_truth: Iterable[str] = ()) -> Verdict:
-    """The verdict on a stored frame."""
-    return verdict(result.tracking, limbs_off(result), by_truth)
+def verdict_on(result: FrameResult, by_truth: Iterable[str] = (), body: BodyModel | None = None) -> Verdict:
+    """The verdict on a stored frame. body : as in `limbs_off`."""
+    return verdict(result.tracking, limbs_off(result, body), by_truth)
 
 
 def verdicts(
-    results: ResultsReader, folder: Path, line: Timeline, by_truth: dict[int, tuple[str, ...]]
+    results: ResultsReader,
+    folder: Path,
+    line: Timeline,
+    by_truth: dict[int, tuple[str, ...]],
+    body: BodyModel,
 ) -> dict[int, Verdict]:
     """By frame the verdict on a run. line : its timeline. by_truth : lost limbs by frame. Results are read of those
     frames only in which there can be a lost limb, and once.
     """
-    limbs = _known.limbs(results, folder, line)
+    limbs = _known.limbs(results, folder, line, body)
     return {
         frame: verdict(state, limbs.get(frame, ()), by_truth.get(frame, ()))
         for frame, state in zip(line.frames.tolist(), line.tracking, strict=True)
@@ -94,7 +101,9 @@ class _KnownLimbs:
         self._lock = threading.Lock()
         self._runs: OrderedDict[Path, dict[int, tuple[object, tuple[str, ...]]]] = OrderedDict()
 
-    def limbs(self, results: ResultsReader, folder: Path, line: Timeline) -> dict[int, tuple[str, ...]]:
+    def limbs(
+        self, results: ResultsReader, folder: Path, line: Timeline, body: BodyModel
+    ) -> dict[int, tuple[str, ...]]:
         """By frame the limbs that the silhouettes contradict; frames without any may be missing."""
         with self._lock:
             before = self._runs.get(folder, {})
@@ -108,7 +117,7 @@ class _KnownLimbs:
                 found[frame] = before[frame]
                 continue
             try:
-                found[frame] = (stamp, limbs_off(results.result(frame)))
+                found[frame] = (stamp, limbs_off(results.result(frame), body))
             except NotFoundError:
                 continue
         with self._lock:

@@ -177,7 +177,7 @@ class Case:
             shown = body_points(self.run.body, self.frame.estimate(self.track)[None])[0]
             lost = limbs_too_far(self.run.body, np.linalg.norm(shown - truth, axis=1))
         result = self.frame.result
-        return verdict(TRACKED, (), lost) if result is None else verdict_on(result, lost)
+        return verdict(TRACKED, (), lost) if result is None else verdict_on(result, lost, self.run.body)
 
     def _reference(self) -> ReferencePose:
         found = reference_pose(self.frame, self.track)

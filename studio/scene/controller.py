@@ -131,6 +131,7 @@ class SceneController:
         """Whether it has no controls."""
         self.viewers = Viewers(server, self._placed)
         self._centre: Array | None = None
+        self._frames_next = False
         self._twin: SceneController | None = None
         self._is_leading, self._places = True, Places()
         self._trial: TrialView | None = None
@@ -429,6 +430,9 @@ class SceneController:
                 self.viewers.put(eye, client)
             if self.views is not None:
                 self.views.cameras.place(client)
+            now = time.monotonic()
+            self.viewers.settle(now)
+            self._drawings[0].want(now)
             if self._twin is not None and not self._is_leading:
                 self._twin.post(self._twin._bring_along)
             return model
@@ -650,7 +654,7 @@ class SceneController:
         if self.model is before or same_drawing(before, self.model):
             return
         if self._is_leading and self.model.is_looking_at_layers and not before.is_looking_at_layers:
-            self.model = self._frame_for_layers(self.model)
+            self._frames_next = True
         through = self.model.selection.look_through
         if through is not None and through != before.selection.look_through:
             self.viewers.entered()
@@ -725,6 +729,10 @@ class SceneController:
         if self.views is not None and moment is not None:
             self.views.show(model, moment, tokens)
             self._follow_body()
+            if self._frames_next and self._server.get_clients():
+                self._frames_next = False
+                if model.is_looking_at_layers:
+                    self.model = self._frame_for_layers(self.model)
         if self.handles is not None and model.edit is not None:
             self.handles.show(model.edit, tokens)
         self._draw_trial(model, tokens)

@@ -33,6 +33,8 @@ FILM_FPS = 15
 """Pictures a second of a film of layers: between two layers the particles travel."""
 HOLD_SECONDS = 1.0
 """For which the last layer stays."""
+STANDING = 1e-9
+"""Layers a second while a picture is drawn: the particles wait on their way, however long that takes."""
 DRAWN_SECONDS, RENDER_SECONDS = 10.0, 60.0
 TITLE_SHARE, LEAST_TITLE = 0.018, 13
 QUALITY = "18"
@@ -136,7 +138,8 @@ class ScenePictures:
 
 def _at(model: Model, layer: int, phase: float) -> Model:
     """One layer, its particles so far on their way (phase 0..1) from their parents' places."""
-    return replace(select(model, layer=layer), layers=replace(model.layers, playing=False, phase=phase))
+    still = replace(model.layers, playing=False, phase=phase, rate=STANDING)
+    return replace(select(model, layer=layer), layers=still)
 
 
 def _as_before(model: Model, before: Model) -> Model:

@@ -27,8 +27,10 @@ MOST_SHELL, MOST_LINES = 60, 150
 SHELL_SIZE, DEAD_SIZE = 0.5, 0.5
 """Widths of points beside the shown layer's."""
 FADES = 4
-_SKELETON, _WAYS, _LINEAGE = 1.4, 1.0, 3.0
+_SKELETON, _WAYS, _LINEAGE = 1.0, 1.0, 3.0
 """Pixels."""
+GHOSTLY = 0.65
+"""How much of its layer's colour a stick figure keeps beside the background: many lie over each other."""
 _FAINT = 0.25
 """How much of its own colour the lightest particle's way keeps beside the background."""
 
@@ -126,7 +128,8 @@ class SearchView:
         self._draw_dead(record.layer, journey, look, tokens, phase)
         if look.skeletons:
             lines = places[heaviest].reshape(-1, 2, 3)
-            colour = np.array(tokens.layer(record.layer, look.count), dtype=np.uint8)
+            own, back = tokens.layer(record.layer, look.count), tokens["scene-background"]
+            colour = np.array(mixed(own, back, GHOSTLY), dtype=np.uint8)
             self.skeletons.draw(lines, np.broadcast_to(colour, lines.shape).copy())
         else:
             self.skeletons.handle.visible = False

@@ -15,6 +15,7 @@ from studio.scene.viewpoint import Eye, between
 EASE_SECONDS = 0.7
 SETTLE_SECONDS = 0.5
 """After an eased move, in which what a slow browser says of it still comes."""
+COMING_SECONDS = 3.0
 EYE_TOLERANCE = 0.02
 """Metres within which a viewer has not moved."""
 DRAGGED = 0.05
@@ -98,6 +99,10 @@ class Viewers:
     def ease(self, eye: Eye, now: float) -> None:
         """Let all viewers go there."""
         self._ease = _Ease(self.eye(), eye, now)
+
+    def settle(self, now: float) -> None:
+        """Note that a viewer has come, whose first words are not of its own choice."""
+        self._settles = now + COMING_SECONDS
 
     def shift(self, by: Array, is_usual: bool) -> None:
         """Take all viewers along by (3,) metres, those on their way too. is_usual : the usual place goes along."""

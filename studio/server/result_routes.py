@@ -219,7 +219,7 @@ def frames(
     errors = dict(zip(measured.frames, measured.per_frame_mm, strict=True)) if measured else {}
     lost = dict(zip(measured.frames, measured.lost_by_frame, strict=True)) if measured else {}
     with run.results() as results:
-        said = verdicts(results, run.folder, timeline, lost)
+        said = verdicts(results, run.folder, timeline, lost, run.body())
     lines = [
         FrameLine(
             frame=frame,
@@ -299,7 +299,7 @@ def frame_detail(session: OpenSession, run: OpenRun, frame: int) -> FrameDetail:
         tracking=verdict_on(result).tracking if result else None,
         searched=estimate.searched.tolist() if estimate and estimate.searched is not None else None,
         disagreement=dict(result.disagreement) if result else {},
-        limbs_lost=list(limbs_off(result)) if result else [],
+        limbs_lost=list(limbs_off(result, run.body())) if result else [],
         notes=list(result.notes) if result else [],
         settings=dict(entry.values if entry else run.record.settings),
     )

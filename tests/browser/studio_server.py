@@ -55,7 +55,7 @@ class StudioServer:
             environment["STUDIO_FOOTAGE_ROOTS"] = str(footage)
         if beside is not None:
             environment["PYTHONPATH"] = os.pathsep.join((str(beside), str(ROOT)))
-        self._output.touch()
+        self._output.write_text("")  # of a server that was here before
         context = PREPARED if beside is None else NEW
         self.process = context.Process(target=_run, args=(command, environment, self._output))
         self.process.start()

@@ -26,7 +26,7 @@ def check_that_all_agree(run: InspectedRun, track: str = RAW, why: tuple[int, ..
             assert all(bool(row[5]) == bool(row[4]) for row in heat)
             assert line.lost == bool(line.lost_limbs)
             assert line.fits == (line.tracking in (TRACKED, RECOVERED) and not lost)
-            detail = frame_detail(run.run, line.frame)
+            detail = frame_detail(run.session, run.run, line.frame)
             assert (detail.tracking, detail.limbs_lost) == (line.tracking, line.limbs_off)
             assert scene.moment(line.frame, LiveSearch(), track=track).tracking == line.tracking
             if why is None or line.frame in why:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from store_records import result_of
 from stored_verdicts import check_that_all_agree
@@ -38,6 +38,7 @@ PLANTED = (
 """What may be stored with a frame: the state, beside what the silhouettes say."""
 
 
+@settings(deadline=None)
 @given(
     st.sampled_from(TRACKING_STATES),
     st.sampled_from((math.nan, 0.9)),

@@ -14,7 +14,15 @@ from PIL import Image
 from studio.arrays import Bytes
 from studio.runs.colour_tokens import colour_tokens
 from studio.scene.model import LayerPlayback, Model, Selection
-from studio.scene.scene_pictures import Film, ScenePictures, UnseenSceneError, captioned, png_of, write_film
+from studio.scene.scene_pictures import (
+    STANDING,
+    Film,
+    ScenePictures,
+    UnseenSceneError,
+    captioned,
+    png_of,
+    write_film,
+)
 
 DARK = colour_tokens(dark=True)
 SIZE = (320, 180)
@@ -45,12 +53,15 @@ class Controller:
         self.opened = None
         self.seen: list[tuple[int | None, float]] = []
         self.layers = 3
+        self.rates: set[float] = set()
 
     def post(self, change: object, *, announce: bool) -> None:
         assert not announce
         self.model = change(self.model)  # pyright: ignore[reportCallIssue]
 
     def draw_now(self, drawn: object) -> None:
+        if self.model.layers.phase not in (0.3, 1.0):
+            self.rates.add(self.model.layers.rate)
         self.seen.append((self.model.selection.layer, self.model.layers.phase))
         drawn(self.layers)  # pyright: ignore[reportCallIssue]
 
@@ -98,6 +109,7 @@ def test_a_film_of_layers_goes_through_all_and_puts_the_scene_back(
     assert count == 9
     assert [layer for layer, _ in controller.seen[1:]] == [0, 0, 0, 1, 1, 1, 2, 2, 2]
     assert [round(phase, 2) for _, phase in controller.seen[1:4]] == [0.33, 0.67, 1.0]
+    assert controller.rates == {STANDING}, "the particles wait for the browser"
     assert reported == [(done, 9) for done in range(9)]
     assert len(browser.asked) == 9
     assert controller.model.selection == before.selection
