@@ -4,8 +4,8 @@ import threading
 import time
 from collections.abc import Callable
 
-PATIENCE = 20.0
-"""Seconds."""
+PATIENCE = 120.0
+"""Seconds: many times what a quiet machine takes, for one that does much else."""
 
 
 def until(condition: Callable[[], object], patience: float = PATIENCE) -> None:

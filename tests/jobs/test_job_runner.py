@@ -9,6 +9,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from waiting import PATIENCE
 
 from studio.errors import FootageError, NotFoundError, RunError, WorkCancelledError
 from studio.jobs import job_runner
@@ -26,7 +27,6 @@ from studio.jobs.job_runner import (
 from studio.progress import TimeLeft
 from studio.server.schemas import Number
 
-PATIENCE = 20.0
 QUEUED, RUNNING, CANCELLING, DONE, FAILED, CANCELLED = JobState
 
 

@@ -4,12 +4,11 @@ import threading
 from types import SimpleNamespace
 
 import pytest
+from waiting import PATIENCE
 
 from studio.capture.frame_clock import Arrival
 from studio.errors import FootageError
 from studio.jobs.open_live_run import LivePipeline
-
-PATIENCE = 20.0
 
 
 class HandSource:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from mjpeg_streams import Streams, jpeg, served
 from sample_walk import STREAM_FPS, STREAMED, copy_of_walk, streamed_pictures
+from waiting import PATIENCE
 
 from studio.capture.camera_addresses import CameraAddress, camera_address
 from studio.capture.timestamps import read_timestamps
@@ -34,7 +35,6 @@ QUICK: dict[str, Any] = dict(
     knobs={"particles": 30, "layers": 3, "recovery": "off"},
 )
 FRAMES = 50
-PATIENCE = 60.0
 
 
 @pytest.fixture(scope="module")

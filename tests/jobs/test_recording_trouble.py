@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from mjpeg_streams import Streams, jpeg, served
 from toy_session import facing_camera
+from waiting import PATIENCE
 
 from studio.capture.calibration_files import write_calibration
 from studio.capture.camera_addresses import camera_address
@@ -33,7 +34,6 @@ from studio.sessions.recordings import check_cameras, import_recording
 from studio.sessions.session import Session
 
 PICTURE = np.random.default_rng(2).integers(0, 255, (120, 160, 3), dtype=np.uint8)
-PATIENCE = 30.0
 
 
 @pytest.fixture

@@ -69,7 +69,7 @@ def test_waiting_in_a_thread_ends_with_an_event_or_the_close() -> None:
     with pytest.raises(queue.Empty):
         subscription.get(timeout=0.01)
     threading.Timer(0.02, put, [subscription, nothing_open()]).start()
-    assert subscription.get(timeout=10.0) == nothing_open()
+    assert subscription.get(timeout=60.0) == nothing_open()
     threading.Timer(0.02, subscription.close).start()
     with pytest.raises(queue.Empty):
         subscription.get()

@@ -188,7 +188,7 @@ def test_socket_with_everything_is_let_in(studio: Studio) -> None:
     address = studio.base.replace("http", "ws") + "/api/events"
     headers = {"cookie": cookie_header(studio.client)}
     with connect(address, origin=studio.base, additional_headers=headers) as socket:
-        assert json.loads(socket.recv(timeout=10))["type"] == "state"
+        assert json.loads(socket.recv(timeout=60))["type"] == "state"
 
 
 def test_get_changes_nothing(studio: Studio) -> None:

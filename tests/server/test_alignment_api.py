@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from nudged_camera import NUDGED, make_nudged_session
+from waiting import PATIENCE
 from web_doubles import Studio
 
 from studio.operations import cameras
@@ -30,7 +31,7 @@ def session(made: Path, studio: Studio) -> Session:
 
 def ended(studio: Studio) -> dict:
     """How measuring ended."""
-    deadline = time.monotonic() + 60.0
+    deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
         job = studio.client.get(PLACE).json()["job"]
         if job is not None and job["state"] not in ("queued", "running", "cancelling"):

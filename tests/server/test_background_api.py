@@ -10,6 +10,7 @@ import pytest
 from patched_ball import FRAMES, patched_ball
 from rendered_people import overlap
 from two_people import two_people
+from waiting import PATIENCE
 from web_doubles import Studio
 
 from studio.errors import FootageError
@@ -26,7 +27,7 @@ PLACE = "/api/sessions/take1"
 
 def ended(studio: Studio, place: str = PLACE) -> dict:
     """The set-up's state when it has ended."""
-    deadline = time.monotonic() + 30.0
+    deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
         job = studio.client.get(f"{place}/background").json()["job"]
         if job["state"] not in ("queued", "running", "cancelling"):
@@ -90,7 +91,7 @@ def test_progress_cancel_and_a_second_one_at_once(studio: Studio, monkeypatch: p
 
     monkeypatch.setattr(masks, "set_up_background", waits)
     assert studio.client.post(f"{PLACE}/background", json={"source": "median"}).status_code == 202
-    assert at_work.wait(20.0)
+    assert at_work.wait(PATIENCE)
     job = studio.client.get(f"{PLACE}/background").json()["job"]
     assert (job["step"], job["total"]) == ("finding empty regions", 4)
     again = studio.client.post(f"{PLACE}/background", json={"source": "median"})

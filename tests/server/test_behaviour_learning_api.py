@@ -6,6 +6,7 @@ import zipfile
 
 import pytest
 from swaying_person import swaying
+from waiting import PATIENCE
 from web_doubles import Studio
 
 from studio.behaviour.settings import LearningSettings
@@ -14,7 +15,6 @@ from studio.runs.behaviour_models import models_folder
 from studio.sessions.stored_run import StoredRun
 from studio.training.oversampling import OversamplingSettings
 
-PATIENCE = 120.0
 FEW = {"most_clusters": 6, "reduced_dimensions": 3, "memory": 3, "smoothings": 2}
 
 

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from board_takes import BOARD, CAMERAS, FLOOR_FRAME, FLOOR_PLACE, render_takes
+from waiting import PATIENCE
 from web_doubles import Studio
 
 from studio.capture.calibration_files import export_calibration, read_calibration, write_calibration
@@ -51,7 +52,7 @@ def solved(studio: Studio, wish: dict, session: str = "fresh") -> dict:
     """The state of a calibration from boards when it has ended."""
     begun = studio.client.post(f"/api/sessions/{session}/calibration/solve", json=wish)
     assert begun.status_code == 202, begun.text
-    deadline = time.monotonic() + 120.0
+    deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
         response = studio.client.get(f"/api/calibrations/{begun.json()['identifier']}").json()
         if response["state"] not in ("queued", "running", "cancelling"):
@@ -269,7 +270,7 @@ def test_solving_can_be_stopped_and_failures_are_in_words(
     monkeypatch.setattr(calibration_solving, "calibrate", waits)
     begun = fresh.client.post(f"{FRESH}/solve", json={"board": BOARD.text, "footage": here}).json()
     assert fresh.client.delete(f"/api/calibrations/{begun['identifier']}").status_code == 202
-    deadline = time.monotonic() + 30.0
+    deadline = time.monotonic() + PATIENCE
     response = begun
     while response["state"] in ("queued", "running", "cancelling") and time.monotonic() < deadline:
         response = fresh.client.get(f"/api/calibrations/{begun['identifier']}").json()

@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 import pytest
 from mjpeg_streams import Streams, jpeg, served
+from waiting import PATIENCE
 from web_doubles import Studio
 
 SECRET = "geheim"
-PATIENCE = 60.0
 
 
 @pytest.fixture

@@ -35,7 +35,7 @@ def compared(studio: Studio) -> Studio:
 
 def until(studio: Studio, name: str, *statuses: str) -> dict:
     """The comparison when it has come to one of these states."""
-    deadline = time.monotonic() + 120.0
+    deadline = time.monotonic() + waiting.PATIENCE
     while time.monotonic() < deadline:
         response = studio.client.get(f"/api/comparisons/walk/{name}").json()
         if response["comparison"]["status"] in statuses:
@@ -115,7 +115,7 @@ def test_an_interrupted_one_is_offered_to_go_on(compared: Studio) -> None:
 
 def test_a_server_that_ends_leaves_it_to_go_on(compared: Studio) -> None:
     compared.client.post("/api/comparisons", json={**WISH, "seeds": 40})
-    deadline = time.monotonic() + 120.0
+    deadline = time.monotonic() + waiting.PATIENCE
     while compared.client.get("/api/comparisons").json()["comparisons"][0]["done"] == 0:
         assert time.monotonic() < deadline
     compared.app.state.studio.jobs.close()

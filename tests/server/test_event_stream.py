@@ -56,7 +56,7 @@ def watching(studio: Studio) -> ClientConnection:
 def next_of(socket: ClientConnection, kind: str) -> dict:
     """The next message of a kind."""
     while True:
-        message = json.loads(socket.recv(timeout=20))
+        message = json.loads(socket.recv(timeout=60))
         if message["type"] == kind:
             return message
 

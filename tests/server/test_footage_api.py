@@ -7,6 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from waiting import PATIENCE
 from web_doubles import Studio
 
 from studio.capture.synchrony import PairLag, Synchrony
@@ -24,7 +25,7 @@ FOUND = Synchrony(
 
 
 def ended(studio: Studio) -> dict:
-    deadline = time.monotonic() + 30.0
+    deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
         response = studio.client.get(SYNCHRONY).json()
         if response["state"] not in ("queued", "running", "cancelling"):
@@ -122,14 +123,14 @@ def test_an_estimate_can_be_stopped(studio: Studio, monkeypatch: pytest.MonkeyPa
 
     def estimate(session: Session, report: object, within: float) -> Synchrony:
         begun.set()
-        assert stopped.wait(30.0)
+        assert stopped.wait(PATIENCE)
         assert callable(report)
         report("motion in cam1", 2, 4)
         raise FootageError("not stopped", "")
 
     monkeypatch.setattr(footage_routes, "synchrony_of", estimate)
     studio.client.post(SYNCHRONY)
-    assert begun.wait(30.0)
+    assert begun.wait(PATIENCE)
     studio.client.delete(SYNCHRONY)
     stopped.set()
     response = ended(studio)
@@ -146,7 +147,7 @@ def test_an_import_puts_cameras_in_step_and_says_whose_layout_it_was(studio: Stu
         "unit": "mm",
     }
     identifier = studio.client.post("/api/imports", json=wish).json()["identifier"]
-    deadline = time.monotonic() + 60.0
+    deadline = time.monotonic() + PATIENCE
     state = {"state": "running"}
     while state["state"] in ("queued", "running", "cancelling") and time.monotonic() < deadline:
         state = studio.client.get(f"/api/imports/{identifier}").json()

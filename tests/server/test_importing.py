@@ -7,6 +7,7 @@ from pathlib import Path
 
 import httpx
 import pytest
+from waiting import PATIENCE
 from web_doubles import Studio, cookie_header
 
 from studio.operations import footage
@@ -16,7 +17,7 @@ from studio.server import body_limit, upload_routes
 
 def finished(studio: Studio, identifier: str) -> dict:
     """The import's state when it has ended."""
-    deadline = time.monotonic() + 60.0
+    deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
         response = studio.client.get(f"/api/imports/{identifier}").json()
         if response["state"] not in ("queued", "running", "cancelling"):

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from waiting import PATIENCE
 from web_doubles import Studio
 
 from studio.body.model import BodyModel
@@ -38,7 +39,7 @@ def found_in(session: Session, frame: int, body: BodyModel) -> InitialPose:
 
 def ended(studio: Studio, identifier: str) -> dict:
     """The search's state when it has ended."""
-    deadline = time.monotonic() + 30.0
+    deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
         response = studio.client.get(f"/api/initialisations/{identifier}").json()
         if response["state"] not in ("queued", "running", "cancelling"):
@@ -131,14 +132,14 @@ def test_a_search_can_be_cancelled(studio: Studio, monkeypatch: pytest.MonkeyPat
 
     def waits(*_: object, progress: Tell, **__: object) -> InitialPose:
         begun.set()
-        deadline = time.monotonic() + 30.0
+        deadline = time.monotonic() + PATIENCE
         while time.monotonic() < deadline:
             progress("searching", 0, 1)
         raise AssertionError("it was not stopped")
 
     monkeypatch.setattr(person, "initialise_session", waits)
     identifier = studio.client.post("/api/sessions/take1/initialise", json={}).json()["identifier"]
-    assert begun.wait(30.0)
+    assert begun.wait(PATIENCE)
     assert studio.client.delete(f"/api/initialisations/{identifier}").status_code == 202
     assert ended(studio, identifier)["code"] == "cancelled"
     assert studio.client.get("/api/initialisations/none").status_code == 404

@@ -6,6 +6,7 @@ import time
 import numpy as np
 import pytest
 from toy_session import make_session, true_poses
+from waiting import PATIENCE
 from web_doubles import Studio
 
 from studio.body.catalogue import load_body
@@ -28,7 +29,7 @@ def toy(workspace: Workspace) -> Session:
 
 
 def ended(studio: Studio, identifier: str) -> dict:
-    deadline = time.monotonic() + 60.0
+    deadline = time.monotonic() + PATIENCE
     while True:
         state = studio.client.get(f"/api/track-jobs/{identifier}").json()
         if state["state"] not in ("queued", "running", "cancelling"):

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 import pytest
+from waiting import PATIENCE
 from web_doubles import Studio
 
 from studio.errors import RunError
@@ -19,7 +20,7 @@ SESSION = "take1"
 
 def ended(studio: Studio, identifier: str) -> dict:
     """The fit's state when it has ended."""
-    deadline = time.monotonic() + 30.0
+    deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
         response = studio.client.get(f"/api/subject-fits/{identifier}").json()
         if response["state"] not in ("queued", "running", "cancelling"):
@@ -127,14 +128,14 @@ def test_a_fit_shows_the_poses_that_it_has(studio: Studio, monkeypatch: pytest.M
     def fits(session: Session, request: FitRequest, shown: Shown, **_: object) -> FittedSubject:
         shown(session.body(), (2,), session.body().neutral[None])
         looked.set()
-        go.wait(30.0)
+        go.wait(PATIENCE)
         return answer(session, request)
 
     assert studio.client.put(f"/api/sessions/{SESSION}/subject", json={"height_mm": 1800}).is_success
     monkeypatch.setattr(person, "fit_session_subject", fits)
     begun = studio.client.post(f"/api/sessions/{SESSION}/fit-subject", json={"keep": False}).json()
     try:
-        assert looked.wait(30.0)
+        assert looked.wait(PATIENCE)
         place = f"/api/subject-fits/{begun['identifier']}"
         state = studio.client.get(place).json()
         assert (state["frames"], state["looks"]) == ([2], 1)

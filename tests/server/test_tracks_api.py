@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from toy_session import make_session, true_poses
 from tracked_runs import finish
+from waiting import PATIENCE
 from web_doubles import Studio
 
 from studio.runs.new_run import prepare_run
@@ -32,7 +33,7 @@ def begun(studio: Studio, verb: str, wish: dict) -> dict:
     answer = studio.client.post(f"{RUN}/{verb}", json=wish)
     assert answer.status_code == 202, answer.text
     identifier = answer.json()["identifier"]
-    deadline = time.monotonic() + 60.0
+    deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
         response = studio.client.get(f"/api/track-jobs/{identifier}").json()
         if response["state"] not in ("queued", "running", "cancelling"):

@@ -126,7 +126,7 @@ def test_sessions_runs_results_and_events_can_be_seen(
     address = f"{studio.base.replace('http', 'ws')}/api/events?window=mine"
     headers = {"cookie": cookie_header(viewer)}
     with connect(address, origin=studio.base, additional_headers=headers) as socket:  # pyright: ignore[reportArgumentType]
-        assert json.loads(socket.recv(timeout=10))["type"] == "state"
+        assert json.loads(socket.recv(timeout=60))["type"] == "state"
         assert studio.app.state.studio.events.windows() == {"view-mine"}
     with pytest.raises(InvalidStatus):
         connect(
