@@ -103,7 +103,7 @@ def serve(
                 control.send(Open(**about(opening.run.folder), warm=True))
             app = _app(workspace, control, (token, viewers_token), hosts, log_path)
             at = f"https://{name}" if name else f"http://{_named(host)}:{listener.getsockname()[1]}"
-            place = {} if opening is None else opening.query
+            place: Mapping[str, str] = {} if opening is None else opening.query
             shown = (address(at, key, place) for key in (token, viewers_token))
             announce(printed(*shown, plainly=allow_remote and not name))
             _serve_until_stopped(app, listener)

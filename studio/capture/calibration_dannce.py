@@ -9,6 +9,7 @@ import io
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import scipy
@@ -69,13 +70,13 @@ def read_dannce(path: Path) -> FoundCameras:
 
 def _params_of(path: Path) -> list[_Params]:
     with foreign_file(path, CalibrationError, "a MATLAB file of cameras", REMEDY):
-        content = io.BytesIO(read_file(path, LARGEST_FILE, CalibrationError))
-        found = scipy.io.loadmat(
-            content, simplify_cells=True, variable_names=["params", "camnames", *ENTRIES]
-        )
+        # SciPy's stubs take paths alone; it reads streams as well.
+        content: Any = io.BytesIO(read_file(path, LARGEST_FILE, CalibrationError))
+        wanted = ["params", "camnames", *ENTRIES]
+        found = scipy.io.loadmat(content, simplify_cells=True, variable_names=wanted)
         several = "params" in found
         entries = np.atleast_1d(np.asarray(found["params"], dtype=object)).tolist() if several else [found]
-        given = np.atleast_1d(found["camnames"]).tolist() if "camnames" in found else []
+        given: list[Any] = np.atleast_1d(found["camnames"]).tolist() if "camnames" in found else []
         if not several:
             named = ONE_CAMERA.search(path.stem)
             given = [named[1] if named else path.stem]

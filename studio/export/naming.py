@@ -6,6 +6,7 @@ The maps are data (`name_maps/*.toml`). A body that lacks a point is exported wi
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -57,7 +58,7 @@ class Points:
 @cache
 def name_map(name: str) -> NameMap:
     """A map by its name. Raises ExportError for one that there is not."""
-    found = files("studio.export") / "name_maps" / f"{name}.toml"
+    found = Path(str(files("studio.export") / "name_maps" / f"{name}.toml"))
     if not name.isalnum() or not found.is_file():
         raise ExportError(
             f"There is no map of names '{name[:40]}'.", "Choose own, halpe26, mixamo or opensim."

@@ -161,20 +161,22 @@ def _cloud(run: InspectedRun, frame: int) -> dict[str, Any]:
         for record in records
     ]
     ends = [limb_ends(run.body, one.poses[rows])[:, tips, 1] for one, rows in zip(records, kept, strict=True)]
-    offset: Array = np.round(np.concatenate([one.reshape(-1, 3) for one in ends]).mean(axis=0))
-    step = max(0.5, max(float(np.abs(one - offset).max()) for one in ends) / 32000.0)
+    everywhere: Array = np.concatenate([one.reshape(-1, 3) for one in ends])
+    offset = np.asarray(np.round(everywhere.mean(axis=0)), dtype=np.float64)
+    step = max(0.5, float(np.abs(everywhere - offset).max()) / 32000.0)
     layers: list[dict[str, Any]] = []
     for at, (record, rows, places) in enumerate(zip(records, kept, ends, strict=True)):
         before = records[at - 1].parents[0] if at else np.zeros(0, dtype=np.int64)
         place_of = {int(row): place for place, row in enumerate(kept[at - 1])} if at else {}
-        heavy = np.exp(record.log_weights[rows] - record.log_weights[rows].max())
+        heavy: Array = np.exp(record.log_weights[rows] - record.log_weights[rows].max())
+        steps: Array = np.round((places - offset) / step)
         layers.append(
             {
                 "layer": record.layer,
                 "beta": _number(record.beta),
-                "points": _packed(np.round((places - offset) / step).astype("<i2")),
+                "points": _packed(steps.astype("<i2")),
                 "parents": [place_of.get(int(before[row]), -1) if row < len(before) else -1 for row in rows],
-                "weights": _packed(np.round(255 * heavy).astype(np.uint8)),
+                "weights": _packed(np.rint(255.0 * heavy).astype(np.uint8)),
                 "of": len(record.poses),
             }
         )

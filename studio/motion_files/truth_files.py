@@ -37,7 +37,7 @@ def _counted_from_0(path: Path, motion: MarkerMotion, fps: float, frame_count: i
     """Rows that count the footage's frames from 1, as its last one shows, a frame earlier; a note where it is
     unknown.
     """
-    there = np.flatnonzero(np.isfinite(motion.positions).all(axis=2).any(axis=1))
+    there = np.flatnonzero(np.asarray(np.isfinite(motion.positions).all(axis=2)).any(axis=1))
     if not len(there):
         return motion
     first, last = (round(float(motion.times[at]) * fps) for at in (there[0], there[-1]))

@@ -35,7 +35,7 @@ from studio.scene.model import (
     show_frame,
     show_ghosts,
 )
-from studio.scene.pose_edit import UNDO, changed_whole
+from studio.scene.pose_edit import UNDO, PoseEdit, changed_whole
 from studio.scene.scene_pictures import ScenePictures
 from studio.scene.search_view import Pointed
 from studio.scene.twin import show_trial
@@ -213,6 +213,10 @@ class Editing:
     steps: int
 
 
+def _undone(edit: PoseEdit) -> PoseEdit:
+    return changed_whole(edit, UNDO, None)
+
+
 class ScenePoses:
     """Poses shown in the scene for review and editing; thread-safe."""
 
@@ -245,7 +249,7 @@ class ScenePoses:
 
     def undo(self) -> None:
         """Take the newest change of the edited pose back."""
-        self._controller.post(edit_pose, lambda edit: changed_whole(edit, UNDO, None))
+        self._controller.post(edit_pose, _undone)
 
     def leave(self) -> None:
         """Stop editing."""

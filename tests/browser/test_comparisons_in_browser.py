@@ -264,8 +264,8 @@ def test_reports_are_empty_until_something_was_reproduced(
 ) -> None:
     page = window.page
     page.get_by_role("link", name="Reports", exact=True).click()
-    page.get_by_role("heading", name="Nothing reproduced yet").wait_for()
-    page.get_by_text("studio reproduce all --quick").wait_for()
+    page.get_by_text("Nothing is reproduced yet").wait_for()
+    page.get_by_role("button", name="Run it", exact=True).wait_for()
     shoot(window, artefacts, "reports-empty")
     folder = studio.workspace / "reproduction"
     folder.mkdir()

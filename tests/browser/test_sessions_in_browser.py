@@ -172,6 +172,8 @@ def test_a_studio_that_is_gone_is_said_and_the_last_state_stays(
     studio.post("/api/samples", {"name": "walk"})
     window = StudioPage(browser, studio, with_scene=False)
     window.until("get('connected') === true && get('session') === 'walk'")
+    # What it still answers while it stops may be cut off (500).
+    window.page.wait_for_load_state("networkidle")
     studio.stop()
     window.until("get('connected') === false")
     window.page.locator("#curtain.banner", has_text="Disconnected").wait_for()

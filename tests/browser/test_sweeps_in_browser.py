@@ -124,7 +124,7 @@ def test_a_run_is_given_away_as_a_page(
     readout = page.locator("[data-key=frames-run] .readout")
     for frame in (0, 2):
         page.get_by_label("Frame", exact=True).fill(str(frame))
-        expect(page.locator(".shared-transport output")).to_have_text(f"frame {frame}")
+        expect(page.locator(".shared-transport:not(.shared-layers) output")).to_have_text(f"frame {frame}")
         expect(readout).to_contain_text(f"Frame {frame}:")
     drawn = (
         "canvas => canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data.some(Boolean)"

@@ -239,7 +239,7 @@ def test_moved_knobs_and_the_chosen_layer_are_found_again(
     page = opened(context, studio, address)
     for one in (page, opened(context, studio, address)):
         for _ in range(2):
-            expect(one.locator("#what-if")).to_contain_text("survival rate 0.77 → 0.5")
+            expect(one.locator("#trial")).to_contain_text("survival rate 0.77 → 0.5")
             one.wait_for_function("async () => (await import('/assets/js/state.js')).get('layer') === 2")
             one.reload()
 

@@ -18,6 +18,8 @@ from studio.capture.video import VideoReader
 from studio.errors import FootageError
 from studio.foreign_files import foreign_file, read_file
 
+Levels = NDArray[np.uint8] | NDArray[np.uint16]
+"""(H, W) or (H, W, C) levels of a picture as its file has them."""
 SAMPLES = 9
 FULL = 0.5
 """Masks that cover more than this share of the picture in every frame are of no person: they are inverted."""
@@ -85,16 +87,15 @@ def form_of_masks(path: Path, frame_count: int, inverted: bool = False) -> MaskF
     return MaskForm(reading, labels, (min(shares), max(shares)), inverted)
 
 
-def meant_mask(picture: NDArray[np.generic], form: MaskForm) -> Bytes:
+def meant_mask(picture: Levels, form: MaskForm) -> Bytes:
     """(H, W) uint8, 255 where the person is, of a picture as its file has it."""
     if form.reading == "alpha":
-        level = picture[..., 3]
-        person = level > np.iinfo(level.dtype).max // 2
+        person = picture[..., 3] > _half(picture)
     elif form.reading == "labels":
         person = _grey(picture) > 0
     else:
         level = _grey(picture)
-        person = level > (MASK_LEVEL if level.dtype == np.uint8 else np.iinfo(level.dtype).max // 2)
+        person = level > (MASK_LEVEL if level.dtype == np.uint8 else _half(level))
     return np.where(person != form.inverted, np.uint8(255), np.uint8(0))
 
 
@@ -116,14 +117,14 @@ class MaskPictures:
         self._folder = list_pictures(path) if path.is_dir() else ()
         self._video = None if path.is_dir() else VideoReader(path, frame_count)
 
-    def __enter__(self) -> Callable[[int], NDArray[np.generic]]:
+    def __enter__(self) -> Callable[[int], Levels]:
         return self._read
 
     def __exit__(self, *_: object) -> None:
         if self._video is not None:
             self._video.close()
 
-    def _read(self, frame: int) -> NDArray[np.generic]:
+    def _read(self, frame: int) -> Levels:
         if self._video is not None:
             return self._video.read(frame)
         path = self._folder[frame]
@@ -131,11 +132,21 @@ class MaskPictures:
             picture = cv2.imdecode(
                 np.frombuffer(read_file(path, footage=True), np.uint8), cv2.IMREAD_UNCHANGED
             )
-            if picture.dtype not in (np.uint8, np.uint16):
-                raise ValueError(f"{picture.dtype} pixels")
-        return picture
+            if picture is None:
+                raise ValueError("no picture")
+            levels = np.asarray(picture)
+            if levels.dtype == np.uint8:
+                return levels.astype(np.uint8, copy=False)
+            if levels.dtype == np.uint16:
+                return levels.astype(np.uint16, copy=False)
+            raise ValueError(f"{levels.dtype} pixels")
 
 
-def _grey(picture: NDArray[np.generic]) -> NDArray[np.generic]:
+def _half(picture: Levels) -> int:
+    """Half of the largest level that the picture's type holds."""
+    return 127 if picture.dtype == np.uint8 else 32767
+
+
+def _grey(picture: Levels) -> Levels:
     """(H, W) the largest of the colours."""
     return picture if picture.ndim == 2 else picture[..., :3].max(axis=2)
