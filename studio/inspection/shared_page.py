@@ -168,7 +168,7 @@ def _cloud(run: InspectedRun, frame: int) -> dict[str, Any]:
     for at, (record, rows, places) in enumerate(zip(records, kept, ends, strict=True)):
         before = records[at - 1].parents[0] if at else np.zeros(0, dtype=np.int64)
         place_of = {int(row): place for place, row in enumerate(kept[at - 1])} if at else {}
-        heavy = np.exp(record.log_weights[rows] - record.log_weights[rows].max())
+        heavy: Array = np.exp(record.log_weights[rows] - record.log_weights[rows].max())
         steps: Array = np.round((places - offset) / step)
         layers.append(
             {
@@ -176,7 +176,7 @@ def _cloud(run: InspectedRun, frame: int) -> dict[str, Any]:
                 "beta": _number(record.beta),
                 "points": _packed(steps.astype("<i2")),
                 "parents": [place_of.get(int(before[row]), -1) if row < len(before) else -1 for row in rows],
-                "weights": _packed(np.round(255 * heavy).astype(np.uint8)),
+                "weights": _packed(np.rint(255.0 * heavy).astype(np.uint8)),
                 "of": len(record.poses),
             }
         )

@@ -23,7 +23,7 @@ def walk() -> Rendered:
 def test_the_vendored_file_is_the_one_that_is_described() -> None:
     folder = resources.files("studio.evidence") / "models"
     digest = hashlib.sha256((folder / MODEL).read_bytes()).hexdigest()
-    assert f"SHA-256 {digest} " in (folder / "README.md").read_text()
+    assert f"SHA-256 {digest}" in (folder / "README.md").read_text()
     assert "Apache License" in (folder / "pose_landmark_full-LICENSE").read_text()
 
 

@@ -63,8 +63,8 @@ async function loadFrames(check) {
     // A search that was paused inside a run's first frame has layers to be looked at already.
     const newest = summary.frames.at(-1)?.frame ?? summary.partial ?? null;
     set({ summary, frame: get("frame") === null || (get("follow") && searching()) ? newest : get("frame") });
-    // An address may name a frame that is not tracked.
-    const known = summary.frames.some((line) => line.frame === get("frame")) || get("detail")?.frame === get("frame");
+    // An address may name a frame that is not tracked; the one in which the search stands has layers.
+    const known = summary.frames.some((line) => line.frame === get("frame")) || [summary.partial, get("detail")?.frame].includes(get("frame"));
     if (get("frame") !== null && !known && !searching()) {
       const asked = get("frame");
       if (summary.frames.length) goTo(asked);
