@@ -118,8 +118,9 @@ def check_reach(path: Path, motion: MarkerMotion, wrong: type[StudioError]) -> N
 
 
 def write_trc(path: Path, motion: MarkerMotion) -> None:
-    """Write a motion, Y up, in its unit; missing markers become blank cells. The file appears whole or
-    not."""
+    """Write a motion, Y up, in its unit; missing markers become blank cells, one in the origin is written a last
+    decimal beside it. The file appears whole or not.
+    """
     count, rate = len(motion.times), f"{motion.rate:g}"
     decimals = 4 if motion.unit == "mm" else 7
     lines = [
@@ -129,7 +130,11 @@ def write_trc(path: Path, motion: MarkerMotion) -> None:
         "Frame#\tTime\t" + "\t\t\t".join(motion.names),
         "\t\t" + "\t".join(f"{axis}{k}" for k in range(1, len(motion.names) + 1) for axis in "XYZ"),
     ]
-    table = motion.positions[:, :, TRC_FROM_WORLD].reshape(count, -1) / MM_PER_UNIT[motion.unit]
+    places = motion.positions[:, :, TRC_FROM_WORLD] / MM_PER_UNIT[motion.unit]
+    # Three zeros would be read as a missing marker: one in the origin is a last decimal beside it.
+    least = 10.0**-decimals
+    places[(np.abs(places) <= least / 2).all(axis=2), 0] = least
+    table = places.reshape(count, -1)
     for row, (time, values) in enumerate(zip(motion.times, table, strict=True), 1):
         cells = "\t".join("" if math.isnan(value) else f"{value:.{decimals}f}" for value in values)
         lines.append(f"{row}\t{time:.8f}\t{cells}")

@@ -51,6 +51,13 @@ def test_what_is_written_is_read_back(tmp_path: Path, unit: str, tolerance: floa
     assert [path.name for path in tmp_path.iterdir()] == ["out.trc"]
 
 
+@pytest.mark.parametrize("unit", ["m", "cm", "mm"])
+def test_a_marker_in_the_origin_is_not_missing(tmp_path: Path, unit: str) -> None:
+    positions = np.zeros((2, 1, 3))
+    write_trc(tmp_path / "out.trc", MarkerMotion(("A",), np.arange(2) / 60.0, positions, unit, 60.0))
+    np.testing.assert_allclose(read_trc(tmp_path / "out.trc").positions, positions, atol=2e-4)
+
+
 def test_a_marker_with_three_blank_cells_is_missing(tmp_path: Path) -> None:
     motion = read_trc(written(tmp_path, ROWS.replace("4.5\t5.5\t6.5", "\t\t")))
     assert np.isnan(motion.positions[1, 1]).all()
