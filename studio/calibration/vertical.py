@@ -17,6 +17,8 @@ MANY_LEVEL_DEGREES = 3.0
 """Phones on tripods are level to about this; the fewer there are, the less their agreement proves."""
 MOST_ROLL_DEGREES = 10.0
 MOST_UNCERTAIN_DEGREES = 10.0
+MOST_APART_DEGREES = 30.0
+"""Rows of a few rolled pictures agree by chance: rolled ones are not believed this far off the pictures' common up."""
 LEAST_COMMON = 0.5
 """Length of the mean of the pictures' ups from which on it says something."""
 ORIGIN_MM = 1.0
@@ -61,7 +63,9 @@ def _of_level_rows(cameras: Sequence[Camera], ups: Array) -> Vertical | None:
     degrees = max(float(roll), least) / max(1e-6, float(np.sqrt(max(values[1], 0.0))))
     if roll > MOST_ROLL_DEGREES or degrees > MOST_UNCERTAIN_DEGREES or (ups @ up).min() <= 0.0:
         return None
-    return Vertical(up, degrees, level=True)
+    mean = ups.mean(axis=0)
+    apart = up @ mean < np.cos(np.radians(MOST_APART_DEGREES)) * np.linalg.norm(mean)
+    return None if apart and roll > least else Vertical(up, degrees, level=True)
 
 
 def camera_at_origin(cameras: Sequence[Camera]) -> str:

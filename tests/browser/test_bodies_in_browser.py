@@ -137,5 +137,5 @@ def test_rendering_from_a_card_shows_its_progress_and_can_be_cancelled(
     card.get_by_role("button", name="Render").click()
     card.locator("[role=status]").wait_for()
     card.get_by_role("button", name="Cancel").click()
-    card.get_by_role("button", name="Render").wait_for()
+    card.get_by_role("button", name="Render").wait_for(timeout=180_000)
     assert not (studio.workspace / "box").exists()

@@ -102,7 +102,7 @@ def test_it_is_watched_cancelled_and_goes_on(window: StudioPage, artefacts: Path
     form.get_by_text("900 trials of 10 frames").wait_for()
     form.get_by_role("button", name="Compare", exact=True).click()
     page.get_by_role("heading", name="annealed, swarm, condensation on walk").wait_for()
-    page.locator(".progress-words", has_text="left · last:").wait_for()
+    page.locator(".progress-words", has_text="left · last:").wait_for(timeout=180_000)
     shoot(window, artefacts, "comparison-running")
     page.get_by_role("button", name="Cancel", exact=True).click()
     page.locator(".card-box .badge", has_text="cancelled").wait_for()
@@ -240,7 +240,7 @@ def test_again_asks_for_the_same(window: StudioPage) -> None:
     assert "particles" not in form.locator("[aria-label=Knobs]").first.input_value()
     form.locator("[aria-label=Line-up]").select_option("improvements")
     assert form.locator(".candidate").count() == 3
-    form.get_by_text("the planned noise of Eq. 13").wait_for()
+    form.get_by_text("Eq. 13 as Deutscher & Reid print it").wait_for()
 
 
 def test_it_is_listed_with_its_session_thrown_away_and_restored(window: StudioPage) -> None:
