@@ -181,6 +181,8 @@ class SceneController:
                 one._twin, one._is_leading = (self if one is follower else None), one is not follower
         self._twin, self._is_leading = follower, True
         if follower is not None:
+            # Before a trial that is to be shown there: a run that is opened after it would drop it.
+            follower.post(follower.join, self.model)
             self.post(self._bring_along)
 
     def _bring_along(self, model: Model) -> Model:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from threading import Event
 
 import numpy as np
 import pytest
@@ -85,6 +86,30 @@ def test_the_stored_stays_at_the_left_and_the_trial_is_at_the_right(
     until(lambda: stored._controller.model.options.trials)
     emit_trial(control, human)
     until(lambda: body_stands_at(stored, human, tried_pose(human)))
+
+
+def test_a_trial_that_is_shown_while_the_first_scene_is_busy_is_kept(
+    scenes: WindowScenes, human: BodyModel
+) -> None:
+    stored = scenes.scene("w")
+    open_run(stored)
+    stored.show_frame(FRAME)
+    until(lambda: stored.shown.frame == FRAME)
+    goes_on = Event()
+
+    def hold(model: Model) -> Model:
+        goes_on.wait(60.0)
+        return model
+
+    stored._controller.post(hold)
+    scenes.split("w", True)
+    tried = scenes.twin("w")
+    assert tried is not None
+    trial = frame_result(human, FRAME, shift=SHIFT)
+    tried.show_trial(LiveSearch(FRAME, True, (cloud_record(human, FRAME, 0),), trial))
+    goes_on.set()
+    until(lambda: tried.shown.frame == FRAME)
+    until(lambda: body_stands_at(tried, human, tried_pose(human)))
 
 
 def test_what_is_chosen_in_either_is_chosen_in_both(scenes: WindowScenes) -> None:
