@@ -67,7 +67,7 @@ def test_a_marker_with_three_blank_cells_is_missing(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("rows", "message"),
     [
-        (ROWS.replace("2.5", "nan"), "line 8, column 4 (Hip Y) is 'nan'"),
+        (ROWS.replace("2.5", "nan"), "line 8 gives only part of marker Hip"),
         (ROWS.replace("2.5", "inf"), "column 4 (Hip Y)"),
         (ROWS.replace("5.5", "five"), "column 7 (Neck Y) is 'five'"),
         (ROWS.replace("0.0166667", ""), "column 2 (Time)"),
@@ -89,7 +89,7 @@ def test_a_broken_row_is_named(tmp_path: Path, rows: str, message: str) -> None:
     ("change", "message"),
     [
         (("{unit}", "feet"), "unit 'feet'"),
-        (("Neck", "Hip"), "1 markers and line 3 says 2"),
+        (("Neck", "Hip"), "marker 'Hip' twice"),
         (("60\t60\t2\t2", "60\t60\t2\t3"), "2 markers and line 3 says 3"),
         (("PathFileType", "Something"), "five header lines"),
         (("60\t60\t2", "x\t60\t2"), "no DataRate"),
