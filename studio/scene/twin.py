@@ -19,6 +19,8 @@ ECHO_SECONDS, ECHO_METRES = 3.0, 0.02
 """How long, and how nearly, a browser may answer with the place that it was put to."""
 
 Eye = tuple[float, ...]
+BROWSERS_OWN: Eye = (3.0, 3.0, 3.0, 0.0, 0.0, 0.0)
+"""Where viser's page stands until it is put somewhere, metres."""
 
 
 def following(model: Model, leader: Model) -> Model:
@@ -67,7 +69,9 @@ class Places:
         self._put.append((time.monotonic(), eye))
 
     def is_echo(self, eye: Eye) -> bool:
-        """Whether a viewer is only where it was put."""
+        """Whether a viewer is only where it was put, or where its browser began."""
+        if np.allclose(eye, BROWSERS_OWN, atol=1e-6):
+            return True
         since = time.monotonic() - ECHO_SECONDS
         return any(
             when > since and np.allclose(eye, place, atol=ECHO_METRES) for when, place in tuple(self._put)

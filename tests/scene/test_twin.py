@@ -150,3 +150,5 @@ def test_each_keeps_what_is_its_own(control: FakeControl) -> None:
     assert (joined.selection.particle, joined.selection.layer) == (3, None)
     assert joined.options is leader.options
     assert not Places().is_echo((0.0,) * 6)
+    # A second scene's browser that opens says where it begins before it is put anywhere.
+    assert Places().is_echo((3.0, 3.0, 2.9999999999999996, 0.0, 0.0, 0.0))
