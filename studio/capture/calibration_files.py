@@ -42,6 +42,7 @@ from studio.capture.sanity import quarter_turns
 from studio.errors import CalibrationError
 from studio.foreign_files import foreign_file
 from studio.geometry.camera import Camera
+from studio.motion_files.marker_meaning import WORLDS
 
 __all__ = [
     "CALIBRATION_FORMATS",
@@ -61,15 +62,6 @@ __all__ = [
 MM_FROM = 50.0
 UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 UNIT_PATTERN = r"^(|mm|cm|m|in|board=[0-9]+(\.[0-9]+)?(mm)?)$"
-WORLDS = {
-    "x": ((0, 1, 0), (0, 0, 1), (1, 0, 0)),
-    "y": ((0, 0, 1), (1, 0, 0), (0, 1, 0)),
-    "z": ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
-    "-x": ((0, 0, 1), (0, 1, 0), (-1, 0, 0)),
-    "-y": ((1, 0, 0), (0, 0, 1), (0, -1, 0)),
-    "-z": ((1, 0, 0), (0, -1, 0), (0, 0, -1)),
-}
-"""By the axis that points up: the new world's axes in the old one, rows."""
 CALIBRATION = ("a calibration", "Export it again, or calibrate again.")
 """The name of the content, and the remedy for an unreadable file."""
 PICKLES = frozenset((".pickle", ".pkl"))
