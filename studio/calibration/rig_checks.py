@@ -159,7 +159,7 @@ def _up_axis(cameras: Sequence[Camera]) -> Iterator[Finding]:
     if vertical is not None and vertical.level and vertical.off(np.array(AXES["Z"])) <= LYING_DEGREES:
         yield from _tilt(vertical)
     elif vertical is not None and not _upright_in_turned_pictures(cameras):
-        yield from _lying(vertical)
+        yield from _lying(cameras, vertical)
 
 
 def _tilt(vertical: Vertical | None) -> Iterator[Finding]:
@@ -174,7 +174,7 @@ def _tilt(vertical: Vertical | None) -> Iterator[Finding]:
     yield Finding(TILTED, "warns", message, LEVEL_IT)
 
 
-def _lying(vertical: Vertical) -> Iterator[Finding]:
+def _lying(cameras: Sequence[Camera], vertical: Vertical) -> Iterator[Finding]:
     """Z is not upright, and no axis is in all pictures."""
     off = vertical.off(np.array(AXES["Z"]))
     if off <= ASKEW_DEGREES:
@@ -189,9 +189,16 @@ def _lying(vertical: Vertical) -> Iterator[Finding]:
     if off <= LYING_DEGREES:
         yield Finding(TILTED, "warns", message, LEVEL_IT)
         return
+    # Pictures that are rolled show only roughly what is up; that all cameras look down from above the floor speaks for Z.
+    looks_down = all(camera.centre[2] > 0.0 and camera.rotation[2, 2] < 0.0 for camera in cameras)
+    doubtful = looks_down and not vertical.level
     message = f"{message} {word}{name}".replace(". minus", ". Minus")
     message += f" is the likeliest, {nearest:.0f} degrees off" + ("." if vertical.level else " (roughly).")
-    yield Finding("up-axis", "blocks", message, _remedy(name, sign))
+    if doubtful:
+        remedy = f"The cameras look down from above the floor, so nothing is to be done if they hang rolled. {_remedy(name, sign)}"
+        yield Finding("up-axis", "warns", message, remedy)
+    else:
+        yield Finding("up-axis", "blocks", message, _remedy(name, sign))
 
 
 def _remedy(name: str, sign: float) -> str:

@@ -5,6 +5,7 @@ process, before the touch is made. Native libraries open their files past this; 
 """
 
 import builtins
+import functools
 import io
 import os
 import shutil
@@ -69,27 +70,38 @@ def watched(folder: Path, act: Act) -> Iterator[list[str]]:
 
         return named
 
-    class Database(sqlite3.Connection):
-        def __init__(self, database: Any, *rest: Any, **named: Any) -> None:  # noqa: ANN401
-            self.place = str(database).removeprefix("file://").partition("?")[0]
-            touch(LOOK, self.place)
-            super().__init__(database, *rest, **named)
+    @functools.cache
+    def touching(kind: type[sqlite3.Connection]) -> type[sqlite3.Connection]:
+        class Database(kind):
+            def __init__(self, database: Any, *rest: Any, **named: Any) -> None:  # noqa: ANN401
+                self.place = str(database).removeprefix("file://").partition("?")[0]
+                touch(LOOK, self.place)
+                super().__init__(database, *rest, **named)
 
-        def execute(self, sql: str, *values: Any) -> sqlite3.Cursor:  # noqa: ANN401
-            # Nothing is behind a ROLLBACK: SQLite has done it by itself where the disk is the reason.
-            if sql != "ROLLBACK":
-                touch(LOOK if sql.startswith(LOOKS) or sql == "BEGIN" else STORE, self.place)
-            return super().execute(sql, *values)
+            def execute(self, sql: str, *values: Any) -> sqlite3.Cursor:  # noqa: ANN401
+                # Nothing is behind a ROLLBACK: SQLite has done it by itself where the disk is the reason.
+                if sql != "ROLLBACK":
+                    touch(LOOK if sql.startswith(LOOKS) or sql == "BEGIN" else STORE, self.place)
+                return super().execute(sql, *values)
 
-        def executescript(self, sql: str) -> sqlite3.Cursor:
-            touch(STORE, self.place)
-            return super().executescript(sql)
+            def executescript(self, sql: str) -> sqlite3.Cursor:
+                touch(STORE, self.place)
+                return super().executescript(sql)
+
+        return Database
+
+    def connect(
+        *at: Any,  # noqa: ANN401
+        factory: type[sqlite3.Connection] = sqlite3.Connection,
+        **named: Any,  # noqa: ANN401
+    ) -> sqlite3.Connection:
+        return real_connect(*at, factory=touching(factory), **named)
 
     real_connect = sqlite3.connect
     patches = [
         mock.patch.object(io, "open", opened),
         mock.patch.object(builtins, "open", opened),
-        mock.patch.object(sqlite3, "connect", lambda *at, **named: real_connect(*at, factory=Database, **named)),
+        mock.patch.object(sqlite3, "connect", connect),
         # Else copies are made past Python's own reads and writes.
         mock.patch.object(shutil, "_USE_CP_SENDFILE", False, create=True),
         *(mock.patch.object(os, name, naming(getattr(os, name))) for name in NAMING),
