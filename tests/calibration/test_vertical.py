@@ -74,7 +74,7 @@ def test_a_line_of_sight_is_not_up_however_the_others_are_rolled(rolls: tuple[fl
 
 
 def test_upside_down_pictures_from_above_only_warn() -> None:
-    """As of the four ceiling cameras of a hall, each rolled its own way: their common up is roughly the floor's down."""
+    """As of four cameras at the ceiling of a hall, each rolled its own way: their common up is roughly down."""
     hung = phones((150.0, 100.0, -160.0, 170.0), high=2550.0)
     findings = check_calibration(hung)
     assert [(finding.code, finding.severity) for finding in findings] == [("up-axis", "warns")]
