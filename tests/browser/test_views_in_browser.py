@@ -98,9 +98,9 @@ def test_variance_and_schedule_are_drawn_as_stored(window: StudioPage, studio: S
             share = getattr(layers[layer], moment)[parameter] / weighed[parameter]
             assert value == pytest.approx(math.log10(share), abs=1e-9)
 
-    lines = {one["name"]: one["data"] for one in show(window, "schedule") if one["type"] == "line"}
-    assert "reached" in lines
-    series = [one["data"] for one in show(window, "schedule") if one["type"] == "line"]
+    schedule = [one for one in show(window, "schedule") if one["type"] == "line"]
+    assert "reached" in [one["name"] for one in schedule]
+    series = [one["data"] for one in schedule]
     wanted = [
         [layer.alpha_wanted for layer in layers],
         [layer.alpha_reached for layer in layers],
@@ -473,11 +473,10 @@ def test_every_view_draws_the_trial_beside_the_stored(window: StudioPage, studio
             for at in [names.index(row["parameter"])]
         }
         assert drawn == pytest.approx(wanted, abs=1e-6)
-    lines = {str(one["name"]): one["data"] for one in show(window, "schedule") if one["type"] == "line"}
+    schedule = show(window, "schedule")
+    lines = {str(one["name"]): one["data"] for one in schedule if one["type"] == "line"}
     for key, name in (("beta", "tried"), ("alpha_reached", "tried, reached")):
-        assert [row[key] for row in tried] in [
-            one["data"] for one in show(window, "schedule") if one["name"] == name
-        ], key
+        assert [row[key] for row in tried] in [one["data"] for one in schedule if one["name"] == name], key
     assert len(lines["stored, reached"]) == more, "over the longer number of layers"
     assert lines["stored, reached"][LAYERS:] == [None] * 3
 
@@ -607,6 +606,7 @@ def test_moved_knobs_are_kept_per_run_until_they_are_put_back(
     assert studio.get(f"{RUN}/settings")["moved"] == {}
 
 
+@pytest.mark.slow
 def test_the_views_look_designed(window: StudioPage, artefacts: Path) -> None:
     page = window.page
     for theme in ("dark", "light"):

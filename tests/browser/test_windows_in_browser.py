@@ -203,8 +203,8 @@ def test_the_arrows_are_the_timeline_s_wherever_the_focus_is(windows: dict[str, 
         if place is places[2] or place is places[3]:
             place.focus()
         else:
-            # By the mouse, as the focus comes there; the view is not dragged.
-            place.click(position={"x": min(20.0, box["width"] / 2), "y": min(60.0, box["height"] / 2)})
+            # By the mouse, as the focus comes there; the view is not dragged. The scene's tools are above.
+            place.click(position={"x": min(20.0, box["width"] / 2), "y": 0.75 * box["height"]})
         window.page.keyboard.press("ArrowRight")
         frame += 1
         window.until(f"get('frame') === {frame}")
