@@ -33,9 +33,10 @@ PLACE = """async ([place, column, row, plot]) => {
   const echarts = await import('/assets/vendor/echarts.esm.min.js');
   const chart = echarts.getInstanceByDom(document.querySelector(place));
   return chart.convertToPixel({ gridIndex: plot }, [column, row]); }"""
-FOCUS = """(at) => {
+FOCUS = """([part, at]) => {
   const links = "a[href]:not(tbody tr:nth-child(n + 4) a)";
-  const all = [...document.querySelectorAll(`${links}, button, select, input, [tabindex='0']`)];
+  const stopsOf = (place) => [...place.querySelectorAll(`${links}, button, select, input, [tabindex='0']`)];
+  const all = [...document.querySelectorAll(part)].flatMap(stopsOf);
   const stops = all.filter((stop) => stop.checkVisibility() && !stop.disabled && !stop.closest("dialog"));
   const stop = stops[at];
   if (!stop) return null;
@@ -261,9 +262,11 @@ def test_every_view_is_used_by_the_keyboard(window: StudioPage, studio: StudioSe
     window.until(f"get('frame') === {FRAME + 1}")
 
 
-@pytest.mark.parametrize("panel", ["why", "views", "compare", "cameras", "log", "export"])
+@pytest.mark.parametrize("panel", ["why", "views", "compare", "cameras", "export"])
 def test_the_arrows_move_the_timeline_from_every_stop_of_the_keyboard(window: StudioPage, panel: str) -> None:
-    """Fields that are typed in, sliders and the list of tabs keep them. Of a table its first rows stand for all."""
+    """Fields that are typed in, sliders and the list of tabs keep them. Of a table its first rows stand for all; what
+    stands around the panels is gone through once.
+    """
     page = window.page
     page.bring_to_front()
     show(window, "variance")
@@ -273,8 +276,9 @@ def test_the_arrows_move_the_timeline_from_every_stop_of_the_keyboard(window: St
     window.until(f"get('panel') === '{panel}' && get('frame') === {FRAME}")
     page.wait_for_timeout(500)
     stops, at, frame = [], 0, FRAME
+    part = "body" if panel == "why" else f"#panel-{panel}, #tab-tools"
     while True:
-        stop = page.evaluate(FOCUS, at)
+        stop = page.evaluate(FOCUS, [part, at])
         at += 1
         if stop is None:
             break
@@ -286,7 +290,7 @@ def test_the_arrows_move_the_timeline_from_every_stop_of_the_keyboard(window: St
         moved = page.evaluate(READ_FRAME)
         assert moved == frame, (stop, key)
         stops.append(stop)
-    assert len(stops) > 20, stops
+    assert len(stops) > (20 if panel == "why" else 0), stops
     if panel == "views":
         window.key("t")
 
