@@ -52,6 +52,9 @@ def test_every_page_is_put_together_whole(studio: Studio, address: str, title: s
     assert "{{" not in text.partition("<main")[0]
     for once in ('charset="utf-8"', 'href="/assets/page.css"', 'id="theme"', 'aria-label="Pages"'):
         assert text.count(once) == 1, once
+    # Work in the background is found again on every page: the two that are no documents show it themselves.
+    shows_work = {"/": "js/main.js", "/way": "js/setup.js"}.get(address, "js/header_of_documents.js")
+    assert (text.count('id="work-list"'), text.count(f'src="/assets/{shows_work}"')) == (1, 1)
     places = re.findall(
         r'<a href="([^"]+)"( aria-current="page")?',
         text.partition('class="places"')[2].partition("</nav>")[0],

@@ -2,12 +2,11 @@
 // run is opened and the old one stays.
 
 import { fault, fetchJson, post, remove, runPath } from "./api.js";
-import { bar, button, byId, element, fill } from "./elements.js";
-import { followJob } from "./jobs.js";
+import { button, byId, element, fill } from "./elements.js";
 import { onEvent } from "./live.js";
-import { complain, say } from "./messages.js";
-import { openSession, refreshSessions } from "./sessions.js";
+import { complain } from "./messages.js";
 import { get, set, watch } from "./state.js";
+import { followTrackJob } from "./studio/track_work.js";
 
 const line = byId("correcting");
 const opener = byId("correct");
@@ -15,7 +14,6 @@ const POSE_PATH = "/api/scene/edit";
 
 let frame = null;      // that is being corrected, null while none is
 let begun = false;     // whether the scene lets it be edited already
-let going = null;      // work in the background: its last state
 
 const busy = () => ["tracking", "compiling", "reannealing"].includes(get("work")?.state) && get("work")?.run === get("run");
 
@@ -38,9 +36,9 @@ function leave() {
   draw();
 }
 
-/** Leave the correction, unless it is being tracked. Whether there was one to leave. */
+/** Leave the correction. Whether there was one to leave. */
 export function leaveCorrecting() {
-  if (frame === null || going) return false;
+  if (frame === null) return false;
   leave();
   return true;
 }
@@ -52,23 +50,9 @@ async function track(back) {
     const edited = await fetchJson(POSE_PATH);
     if (!edited.editing || edited.frame === null) throw fault("The editing was ended in the scene.", "Correct the frame again.");
     const begunJob = await post(`${runPath(session, run)}/correct`, { frame: edited.frame, pose: edited.pose, back_to: back });
-    going = begunJob;
-    draw();
-    const ended = await followJob(`/api/track-jobs/${begunJob.identifier}`, (job) => { going = job; draw(); });
-    const at = edited.frame;
-    frame = going = null;
-    draw();
-    await remove(POSE_PATH);
-    await refreshSessions();
-    openSession(session, ended.made_run);
-    say(`Frame ${at} of ${run} is corrected in ${ended.made_run}${ended.state === "cancelled" ? ", as far as it was tracked" : ""}; ${run} is unchanged.`);
-    if (back === null) await post(`${runPath(session, ended.made_run)}/start`);
-    else set({ frame: at });
-  } catch (error) {
-    going = null;
-    draw();
-    complain(error);
-  }
+    followTrackJob(begunJob, { frame: edited.frame, starts: back === null });
+    leave();
+  } catch (error) { complain(error); }
 }
 
 /** Backwards to which frame: a field and its button. */
@@ -83,10 +67,6 @@ function draw() {
   line.hidden = frame === null;
   opener.disabled = !get("run") || get("frame") === null || !get("summary")?.frames.length || busy() || frame !== null;
   if (frame === null) return fill(line);
-  if (going) {
-    return fill(line, element("span", { role: "status" }, going.total ? `tracking backwards, ${going.done} of ${going.total} frames` : "making the corrected run"), bar(going.total ? going.done / going.total : 0),
-      button("Cancel", () => remove(`/api/track-jobs/${going.identifier}`).catch(complain), "quiet small"));
-  }
   const words = element("span", {}, "Correcting frame ", element("b", {}, frame), ": drag the balls on the limbs");
   fill(line, words, button("Undo", undo, "small", { title: "Take the last change back (Ctrl Z)" }), button("Track on from here", () => track(null), "primary small"), backwards(),
     button("Leave", leave, "quiet small", { title: "Leave it as it was (Escape)" }));
@@ -97,7 +77,7 @@ const undo = () => post(`${POSE_PATH}/undo`).catch(complain);
 
 /** Ctrl Z takes a change back, unless a field or a dialog has the key. */
 function takeKey(event) {
-  if (frame === null || going || event.target.closest?.("input, textarea, dialog, [role=menu]")) return;
+  if (frame === null || event.target.closest?.("input, textarea, dialog, [role=menu]")) return;
   if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z" || event.shiftKey) return;
   event.preventDefault();
   undo();
@@ -108,10 +88,10 @@ export function startCorrecting() {
   opener.onclick = correctFrame;
   document.addEventListener("keydown", takeKey);
   watch(["run", "frame", "summary", "work"], () => { if (frame === null) draw(); });
-  watch(["session", "run"], () => { if (frame !== null && !going) leave(); });
+  watch(["session", "run"], () => { if (frame !== null) leave(); });
   onEvent("scene", (event) => {
     if (frame === null) return;
     if (event.editing) begun = true;
-    else if (begun && !going) { frame = null; draw(); }
+    else if (begun) { frame = null; draw(); }
   });
 }

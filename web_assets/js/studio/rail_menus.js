@@ -10,8 +10,8 @@ import { openSession, refreshSessions, setupPath } from "../sessions.js";
 import { startPoseForm } from "../start_pose.js";
 import { get } from "../state.js";
 import { showPanel } from "../tabs.js";
-import { makeTrackForm } from "../tracks.js";
 import { signal } from "./component.js";
+import { makeTrackForm } from "./track_work.js";
 
 const MOST_RESTORED = 12;
 const MOST_SHARED = 12;
