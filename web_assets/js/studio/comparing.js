@@ -103,6 +103,14 @@ async function load() {
   }
 }
 
+/** The layers of a frame's last search, whose result the frame is, counted in it: however often the frame was searched. */
+function lastSearch({ tables, search_layers: layers, searches }) {
+  const first = layers * (searches - 1);
+  return records(tables[0])
+    .filter((row) => row.layer >= first)
+    .map((row) => ({ ...row, layer: row.layer - first, chosen: row.layer }));
+}
+
 /** The shown frame of a run; none where the run does not have it. */
 async function loadFrame(name, frame) {
   const [session, run] = partsOf(name);
@@ -111,7 +119,7 @@ async function loadFrame(name, frame) {
       fetchJson(`${runPath(session, run)}/frames/${frame}`),
       fetchJson(frameView(session, run, frame, "schedule")),
     ]);
-    return { run: name, pose: detail.pose, layers: records(schedule.tables[0]) };
+    return { run: name, pose: detail.pose, layers: lastSearch(schedule) };
   } catch (error) {
     if (/** @type {any} */ (error).status !== 404) throw error;
     return { run: name, pose: null, layers: [] };
@@ -237,7 +245,7 @@ function figureOf({ runs, tables }) {
   const named = (name) => tables.find((table) => table.name === name);
   const curves = records(named("curves"));
   const [frame, layer] = [follow("frame"), follow("layer")];
-  const layered = frames.value?.runs.filter((one) => one.layers.length) ?? [];
+  const layered = frames.value?.runs ?? [];
   const differing = named("settings")?.rows.map(
     ([name, ...values]) => `${name} ${values.join(" / ")}`,
   );

@@ -28,7 +28,7 @@ const layersOf = (layered) =>
  * Draw them; the numbers of the shown frame in a sentence.
  * @param {any} sheet
  * @param {{ curves: any[], runs: string[], frame: number | null, layer: number | null,
- *   layered: { run: string, layers: any[] }[] }} what `layered`: the layers of the shown frame, by run
+ *   layered: { run: string, layers: any[] }[] }} what `layered`: the layers of the shown frame's last search, by run
  * @param {number} room
  */
 export function drawCompared(sheet, { curves, runs, frame: shown, layer, layered }, room) {
@@ -88,18 +88,20 @@ export function drawCompared(sheet, { curves, runs, frame: shown, layer, layered
     { ...places[2], top: 0, height },
     {
       title: "Effective number",
-      unit: `by layer, frame ${shown}, log scale`,
+      unit: `by layer of the last search, frame ${shown}, log scale`,
       x: categories(layerNames, "layer"),
       y: logarithmic("", { min: 1 }),
       over: tipOfLayer,
     },
   );
-  for (const { run, layers: rows } of layered) {
+  const own = layered[0]?.layers ?? [];
+  const toLayer = ({ dataIndex }) => ({ layer: own[dataIndex]?.chosen ?? null });
+  for (const { run, layers: rows } of layered.filter((one) => one.layers.length)) {
     const values = rows.slice(0, most).map((row) => row.effective);
-    const toLayer = ({ dataIndex }) => ({ layer: dataIndex });
     sheet.line(layers, run, values, seriesColour(runs.indexOf(run)), { click: toLayer });
   }
-  sheet.chosen(layers, { column: layer === null ? null : String(layer + 1) });
+  const chosen = own.findIndex((row) => row.chosen === layer);
+  sheet.chosen(layers, { column: chosen < 0 ? null : chosen });
   const said = runs.map((run) => `${run}: ${figure(measured.get(`${run}/${shown}`))}`);
   return `${said.join(", ")} (${unit}, frame ${shown}).`;
 }

@@ -4,6 +4,7 @@ import { addressOf } from "../address.js";
 import { fetchJson, frameView, patch, readOnly, runPath, runView } from "../api.js";
 import { figure as figureWords } from "../chart_looks.js";
 import { byId } from "../elements.js";
+import { countedIn, onOneAxis } from "../layer_axis.js";
 import { onEvent } from "../live.js";
 import { complain, say } from "../messages.js";
 import { paced } from "../pacing.js";
@@ -231,6 +232,12 @@ function Said() {
 const tablesOf = ({ frame, run }) =>
   Object.fromEntries([...frame.tables, ...run.tables].map((table) => [table.name, records(table)]));
 
+const onAxis = (answers) =>
+  answers && {
+    tables: tablesOf(answers),
+    counted: countedIn(answers.frame, Math.max(1, layersShown())),
+  };
+
 /** The figure beside the words: limbs over the frames; of a frame that is searched its layers. */
 function figureNow() {
   if (subject.value === "searched") {
@@ -240,13 +247,18 @@ function figureNow() {
   const answers = followAnswers();
   if (!answers) return null;
   const { frame, run, tried } = answers;
-  const tables = tablesOf(answers);
+  const axis = onOneAxis(onAxis(answers), onAxis(tried));
   const at = {
+    ...axis.counted,
     frame: follow("frame"),
     limb: follow("limb"),
-    layer: follow("layer"),
-    tried: tried && tablesOf(tried),
+    layer: axis.there(follow("layer")),
+    tried: axis.tried,
   };
+  const choose = (changes) =>
+    select(
+      Number.isInteger(changes.layer) ? { ...changes, layer: axis.back(changes.layer) } : changes,
+    );
   return {
     name: [frame.session, frame.run, `frame${frame.frame}`, "why"].join("-"),
     title: "Limbs and frames",
@@ -254,9 +266,9 @@ function figureNow() {
     caption: frame.caption,
     notes: frame.notes,
     tables: [...frame.tables, ...run.tables],
-    choose: select,
+    choose,
     link: () => addressOf(),
-    draw: (sheet, room) => drawLimbs(sheet, tables, at, room),
+    draw: (sheet, room) => drawLimbs(sheet, axis.stored, at, room),
   };
 }
 
