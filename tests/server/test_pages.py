@@ -19,7 +19,7 @@ from studio.sessions.stored_run import StoredRun
 from studio.settings import RecordingSettings
 from studio.trackers.catalogue import TRACKERS
 
-GUIDE_PAGES = ("python", "verbs", "commands", "adding", "animal", "figures", "reproduction")
+GUIDE_PAGES = ("python", "verbs", "commands", "adding", "animal", "live-out", "figures", "reproduction")
 
 
 def test_the_page_and_all_that_it_names_are_there(studio: Studio) -> None:
