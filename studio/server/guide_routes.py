@@ -52,6 +52,8 @@ TEXTS = {
     "python": ("python.md", "Python"),
     "adding": ("adding.md", "Adding your own"),
     "animal": ("animal.md", "Your own animal in an hour"),
+    "formats": ("formats.md", "Formats"),
+    "live-out": ("live_out.md", "Live out"),
     "commands": ("commands.md", "Commands"),
     "figures": ("figures.md", "How well, how fast"),
     REPRODUCTION: ("reproduction.md", "The papers' claims"),

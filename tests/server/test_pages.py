@@ -19,7 +19,17 @@ from studio.sessions.stored_run import StoredRun
 from studio.settings import RecordingSettings
 from studio.trackers.catalogue import TRACKERS
 
-GUIDE_PAGES = ("python", "verbs", "commands", "adding", "animal", "figures", "reproduction")
+GUIDE_PAGES = (
+    "python",
+    "verbs",
+    "commands",
+    "adding",
+    "animal",
+    "formats",
+    "live-out",
+    "figures",
+    "reproduction",
+)
 
 
 def test_the_page_and_all_that_it_names_are_there(studio: Studio) -> None:
@@ -123,7 +133,7 @@ def test_every_page_that_the_guide_refers_to_is_there(studio: Studio) -> None:
         answer = studio.client.get(place)
         assert answer.status_code == 200, place
         seen[place] = answer.text
-        left += set(re.findall(r'href="(/guide(?:/[a-z]+)?)"', answer.text)) - set(seen) - set(left)
+        left += set(re.findall(r'href="(/guide(?:/[a-z-]+)?)"', answer.text)) - set(seen) - set(left)
     assert set(seen) == {
         "/guide",
         *(f"/guide/{name}" for name in GUIDE_PAGES),

@@ -83,12 +83,27 @@ function takeKey(event) {
   undo();
 }
 
+/** Go on with what this window corrected before it was loaded again. */
+async function goOn() {
+  const edited = await fetchJson(POSE_PATH);
+  if (frame !== null || !edited.editing || edited.frame === null || edited.session !== get("session") || edited.run !== get("run")) return;
+  frame = edited.frame;
+  begun = true;
+  draw();
+}
+
 /** Wire the button, the bar, and what the scene says. */
 export function startCorrecting() {
   opener.onclick = correctFrame;
   document.addEventListener("keydown", takeKey);
   watch(["run", "frame", "summary", "work"], () => { if (frame === null) draw(); });
   watch(["session", "run"], () => { if (frame !== null) leave(); });
+  let isKnown = false;
+  watch(["summary"], () => {
+    if (isKnown || !get("summary")) return;
+    isKnown = true;
+    goOn().catch(complain);
+  });
   onEvent("scene", (event) => {
     if (frame === null) return;
     if (event.editing) begun = true;
