@@ -9,11 +9,7 @@ import { openSession, refreshSessions, setupPath } from "../sessions.js";
 import { startPoseForm } from "../start_pose.js";
 import { get } from "../state.js";
 import { showPanel } from "../tabs.js";
-<<<<<<< HEAD
-=======
-import { makeTrackForm } from "./tracks.js";
 import { compareForm } from "./comparing.js";
->>>>>>> main
 import { signal } from "./component.js";
 import { makeTrackForm } from "./track_work.js";
 

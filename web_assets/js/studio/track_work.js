@@ -10,7 +10,7 @@ import { findJob, isGoing, progressOf, shareOf } from "../jobs.js";
 import { complain, say } from "../messages.js";
 import { openSession, refreshSessions } from "../sessions.js";
 import { get, set, watch } from "../state.js";
-import { loadTracks, RAW, trackWords } from "../tracks.js";
+import { loadTracks, RAW, trackWords } from "./tracks.js";
 import { html, mount, signal } from "./component.js";
 import { VERBS } from "./work_list.js";
 
