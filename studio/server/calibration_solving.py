@@ -37,8 +37,8 @@ class DistanceRequest(Request):
 
 
 class SolveState(NumberedJob):
-    """How a calibration from boards, or its levelling, stands. share: of all, about, null while unknown; seconds_left: of
-    all; proposal: what came of it.
+    """How a calibration from boards, or its levelling, stands. share: of all, about, null while unknown; seconds_left:
+    of all; proposal: what came of it.
     """
 
     share: Number = None
