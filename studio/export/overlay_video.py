@@ -44,7 +44,11 @@ def write_videos(task: ExportTask) -> Written:
     for place, size in zip(files, sizes, strict=True):
         _read_back(place, size, count)
     plain = int((~task.motion.known).sum())
-    notes = [f"The picture stands alone in {counted(plain, 'frame')}: no pose, or the body was lost."] if plain else []
+    notes = (
+        [f"The picture stands alone in {counted(plain, 'frame')}: no pose, or the body was lost."]
+        if plain
+        else []
+    )
     noun = "video reads" if len(files) == 1 else "videos read"
     return Written(tuple(files), f"{len(files)} {noun} back with {count} frames each", tuple(notes))
 
