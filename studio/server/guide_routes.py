@@ -54,6 +54,7 @@ TEXTS = {
     "animal": ("animal.md", "Your own animal in an hour"),
     "formats": ("formats.md", "Formats"),
     "live-out": ("live_out.md", "Live out"),
+    "glossary": ("glossary.md", "Glossary"),
     "commands": ("commands.md", "Commands"),
     "figures": ("figures.md", "How well, how fast"),
     REPRODUCTION: ("reproduction.md", "The papers' claims"),

@@ -27,6 +27,7 @@ GUIDE_PAGES = (
     "animal",
     "formats",
     "live-out",
+    "glossary",
     "figures",
     "reproduction",
 )
