@@ -201,7 +201,9 @@ class CameraService:
         finally:
             recording.close()
         standing = recording.standing
-        words = f"{counted(standing.sets, 'set of pictures', 'sets of pictures')}; {standing.spreads.in_words}"
+        words = (
+            f"{counted(standing.sets, 'set of pictures', 'sets of pictures')}; {standing.spreads.in_words}"
+        )
         return {"step": "", "words": words, "notes": [notice.in_words for notice in standing.notices]}
 
     def _ended(self, job: Job) -> bool:
