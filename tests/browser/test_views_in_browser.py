@@ -458,7 +458,9 @@ def test_a_what_if_says_what_it_changes_and_is_discarded(window: StudioPage, stu
     page.locator("#trial").wait_for(state="hidden")
 
 
+@pytest.mark.slow
 def test_every_view_draws_the_trial_beside_the_stored(window: StudioPage, studio: StudioServer) -> None:
+    """In Chromium; that all of them draw it is seen without one in tests/inspection/test_drawings.py."""
     page = window.page
     page.bring_to_front()
     show(window, "schedule")
