@@ -277,6 +277,7 @@ def test_the_arrows_move_the_timeline_from_every_stop_of_the_keyboard(window: St
     page.wait_for_timeout(500)
     stops, at, frame = [], 0, FRAME
     part = "body" if panel == "why" else f"#panel-{panel}, #tab-tools"
+    until(page, lambda: page.evaluate(FOCUS, [part, 0]) is not None)
     while True:
         stop = page.evaluate(FOCUS, [part, at])
         at += 1
