@@ -1,7 +1,7 @@
 // Importing a session: a folder of the computer that the studio runs on, or an upload from this browser.
 
 import { post } from "./api.js";
-import { openForm } from "./dialogs.js";
+import { openForm } from "./studio/dialogs.js";
 import { NAME } from "./elements.js";
 import { jobDone, standing } from "./jobs.js";
 import { say } from "./messages.js";

@@ -1,7 +1,7 @@
 // Finding a start pose in a frame: progress while it is looked for, what was found and how sure it is.
 
 import { post, remove, sessionPath } from "./api.js";
-import { openForm, whileOpen } from "./dialogs.js";
+import { openForm, whileOpen } from "./studio/dialogs.js";
 import { percent } from "./elements.js";
 import { jobDone, standing } from "./jobs.js";
 import { say } from "./messages.js";

@@ -5,7 +5,7 @@ import { figure } from "../chart_looks.js";
 import { acceptDrops } from "../dropping.js";
 import { byId } from "../elements.js";
 import { importForm } from "../importing.js";
-import { newRunForm } from "../new_run.js";
+import { newRunForm } from "./new_run.js";
 import { lacks, openSession, setupPath, studioPath } from "../sessions.js";
 import { get, watch } from "../state.js";
 import { computed, follow, html, mount, signal, useState } from "./component.js";

@@ -1,7 +1,7 @@
 // The run's tracks: which one scene, charts and views show; refining and smoothing, with progress and a way to stop.
 
 import { fetchJson, post, remove, runPath } from "../api.js";
-import { openForm, whileOpen } from "../dialogs.js";
+import { openForm, whileOpen } from "./dialogs.js";
 import { byId, NAME } from "../elements.js";
 import { followJob, standing } from "../jobs.js";
 import { onEvent } from "../live.js";
