@@ -4,7 +4,7 @@ import { fetchJson, post, runPath, sessionPath } from "../api.js";
 import { dotted, duration } from "../elements.js";
 import { complain } from "../messages.js";
 import { openSession, refreshSessions } from "../sessions.js";
-import { findStartPose, sayFound } from "../start_pose.js";
+import { findStartPose, sayFound } from "./start_pose.js";
 import { set } from "../state.js";
 import { batch, html, useEffect, useSignal } from "./component.js";
 import { Field, Form, openDialog, valuesOf } from "./dialogs.js";

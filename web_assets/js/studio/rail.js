@@ -4,7 +4,7 @@ import { readOnly, sessionPath } from "../api.js";
 import { figure } from "../chart_looks.js";
 import { acceptDrops } from "../dropping.js";
 import { byId } from "../elements.js";
-import { importForm } from "../importing.js";
+import { importForm } from "./importing.js";
 import { newRunForm } from "./new_run.js";
 import { lacks, openSession, setupPath, studioPath } from "../sessions.js";
 import { get, watch } from "../state.js";

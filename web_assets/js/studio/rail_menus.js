@@ -7,7 +7,7 @@ import { NAME } from "../elements.js";
 import { complain, say } from "../messages.js";
 import { newRunForm } from "./new_run.js";
 import { openSession, refreshSessions, setupPath } from "../sessions.js";
-import { startPoseForm } from "../start_pose.js";
+import { startPoseForm } from "./start_pose.js";
 import { get } from "../state.js";
 import { makeTrackForm } from "./tracks.js";
 import { compareForm } from "./comparing.js";
