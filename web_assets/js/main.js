@@ -22,6 +22,7 @@ import { startSceneFrame } from "./scene_frame.js";
 import { refreshSessions } from "./sessions.js";
 import { scenePointer, startSceneTools } from "./studio/scene_tools.js";
 import { startTrialCard } from "./studio/trial_card.js";
+import { startTrackWork } from "./studio/track_work.js";
 import { startTrials } from "./studio/trials.js";
 import { startTwin } from "./studio/twin.js";
 import { startTabs } from "./studio/tabs.js";
@@ -59,6 +60,7 @@ async function start() {
   startNotes();
   startData();
   startTracks();
+  startTrackWork();
   startCorrecting();
   startSceneTools();
   startCourseColumn();

@@ -3,27 +3,18 @@
 
 import { fault, fetchJson, post, remove, runPath } from "../api.js";
 import { byId } from "../elements.js";
-import { followJob } from "../jobs.js";
 import { onEvent } from "../live.js";
-import { complain, say } from "../messages.js";
-import { openSession, refreshSessions } from "../sessions.js";
+import { complain } from "../messages.js";
 import { get, set, watch } from "../state.js";
-import { batch, follow, html, mount, signal, useRef } from "./component.js";
+import { follow, html, mount, signal, useRef } from "./component.js";
+import { followTrackJob } from "./track_work.js";
 
 const POSE_PATH = "/api/scene/edit";
 const BUSY = ["tracking", "compiling", "reannealing"];
 
 /** The frame that is being corrected, null while none is. */
 const corrected = signal(/** @type {number | null} */ (null));
-/** Work in the background: its last state. */
-const going = signal(/** @type {any} */ (null));
 let begun = false; // whether the scene lets it be edited already
-
-const end = () =>
-  batch(() => {
-    corrected.value = null;
-    going.value = null;
-  });
 
 /** Let the shown frame be corrected in the scene, where that can be done now. */
 export async function correctFrame() {
@@ -40,13 +31,13 @@ export async function correctFrame() {
 }
 
 function leave() {
-  end();
+  corrected.value = null;
   remove(POSE_PATH).catch(complain);
 }
 
-/** Leave the correction, unless it is being tracked. Whether there was one to leave. */
+/** Leave the correction. Whether there was one to leave. */
 export function leaveCorrecting() {
-  if (corrected.value === null || going.value) return false;
+  if (corrected.value === null) return false;
   leave();
   return true;
 }
@@ -63,41 +54,16 @@ async function track(back) {
       throw fault("The editing was ended in the scene.", "Correct the frame again.");
     }
     const { frame, pose } = edited;
-    going.value = await post(`${runPath(session, run)}/correct`, { frame, pose, back_to: back });
-    const ended = await followJob(`/api/track-jobs/${going.value.identifier}`, (job) => {
-      going.value = job;
-    });
-    end();
-    await remove(POSE_PATH);
-    await refreshSessions();
-    const made = ended.made_run;
-    openSession(session, made);
-    const partly = ended.state === "cancelled" ? ", as far as it was tracked" : "";
-    say(`Frame ${frame} of ${run} is corrected in ${made}${partly}; ${run} is unchanged.`);
-    if (back === null) await post(`${runPath(session, made)}/start`);
-    else set({ frame });
+    const job = await post(`${runPath(session, run)}/correct`, { frame, pose, back_to: back });
+    followTrackJob(job, { frame, starts: back === null });
+    leave();
   } catch (error) {
-    going.value = null;
     complain(error);
   }
 }
 
 /** Take the last change of the pose back. */
 const undo = () => post(`${POSE_PATH}/undo`).catch(complain);
-
-/** How far tracking backwards is, and a way to stop it. */
-function Going() {
-  const { identifier, total, done } = going.value;
-  const words = total
-    ? `tracking backwards, ${done} of ${total} frames`
-    : "making the corrected run";
-  const cancel = () => remove(`/api/track-jobs/${identifier}`).catch(complain);
-  return html`<span role="status">${words}</span>
-    <div class="progress">
-      <i style=${{ width: `${Math.round(100 * (total ? done / total : 0))}%` }}></i>
-    </div>
-    <button type="button" class="quiet small" onClick=${cancel}>Cancel</button>`;
-}
 
 /** Backwards to which frame: a button and its field. @param {{ frame: number }} properties */
 function Backwards({ frame }) {
@@ -143,7 +109,7 @@ function Correcting() {
   const frame = corrected.value;
   if (frame === null) return null;
   return html`<div class="what-if correcting" id="correcting">
-    ${going.value ? html`<${Going} />` : html`<${Choices} frame=${frame} />`}
+    <${Choices} frame=${frame} />
   </div>`;
 }
 
@@ -165,11 +131,20 @@ const Opener = () => html`<button
 /** Ctrl Z takes a change back, unless a field or a dialog has the key. */
 function takeKey(event) {
   const isElsewhere = event.target.closest?.("input, textarea, dialog, [role=menu]");
-  if (corrected.value === null || going.value || isElsewhere) return;
+  if (corrected.value === null || isElsewhere) return;
   const isUndo = (event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "z";
   if (!isUndo || event.shiftKey) return;
   event.preventDefault();
   undo();
+}
+
+/** Go on with what this window corrected before it was loaded again. */
+async function goOn() {
+  const { editing, session, run, frame } = await fetchJson(POSE_PATH);
+  const isHere = editing && session === get("session") && run === get("run");
+  if (!isHere || frame == null || corrected.value !== null) return;
+  begun = true;
+  corrected.value = frame;
 }
 
 /** Show the button and what it opens, and follow what the scene says. */
@@ -178,9 +153,15 @@ export function startCorrecting() {
   mount(byId("correcting-place"), html`<${Correcting} />`);
   document.addEventListener("keydown", takeKey);
   watch(["session", "run"], leaveCorrecting);
+  let isKnown = false;
+  watch(["summary"], () => {
+    if (isKnown || !get("summary")) return;
+    isKnown = true;
+    goOn().catch(complain);
+  });
   onEvent("scene", (event) => {
     if (corrected.value === null) return;
     if (event.editing) begun = true;
-    else if (begun && !going.value) corrected.value = null;
+    else if (begun) corrected.value = null;
   });
 }

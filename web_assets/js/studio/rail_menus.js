@@ -9,10 +9,10 @@ import { newRunForm } from "./new_run.js";
 import { openSession, refreshSessions, setupPath } from "../sessions.js";
 import { startPoseForm } from "./start_pose.js";
 import { get } from "../state.js";
-import { makeTrackForm } from "./tracks.js";
 import { compareForm } from "./comparing.js";
 import { signal } from "./component.js";
 import { showPanel } from "./panels.js";
+import { makeTrackForm } from "./track_work.js";
 
 const MOST_RESTORED = 12;
 const MOST_SHARED = 12;
