@@ -11,7 +11,7 @@ import { comparedRuns as others, goTo, MOST_COMPARED as MOST, select } from "../
 import { openSession } from "../sessions.js";
 import { get, set, watch } from "../state.js";
 import { records } from "../view_sheet.js";
-import { drawCompared } from "./comparing_drawing.js";
+import { drawCompared, lastSearch } from "./comparing_drawing.js";
 import { follow, html, signal } from "./component.js";
 import { FigurePlace } from "./figure_place.js";
 import { showPanel } from "./panels.js";
@@ -100,14 +100,6 @@ async function load() {
     held.value = null;
     wrong.value = `${message} ${hint}`;
   }
-}
-
-/** The layers of a frame's last search, whose result the frame is, counted in it: however often the frame was searched. */
-function lastSearch({ tables, search_layers: layers, searches }) {
-  const first = layers * (searches - 1);
-  return records(tables[0])
-    .filter((row) => row.layer >= first)
-    .map((row) => ({ ...row, layer: row.layer - first, chosen: row.layer }));
 }
 
 /** The shown frame of a run; none where the run does not have it. */
