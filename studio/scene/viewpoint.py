@@ -13,7 +13,7 @@ from studio.body.model import BodyModel
 Eye = tuple[float, ...]
 Preset = Literal["front", "side", "top"]
 
-FILLED, WIDEST = 0.76, 0.86
+FILLED, WIDEST = 0.8, 0.86
 """Of the view's height that a framed body fills, and at most of its width."""
 WELL_FRAMED = 0.6, 0.9
 """Shares of the height between which a body needs not be framed again."""

@@ -67,7 +67,7 @@ def test_the_first_two_minutes(
     until(page, lambda: demo.get("/api/scene/play-layers", window.name)["playing"])
     seen: set[object] = set()
     until(page, lambda: seen.add(window.get("layer")) or {0, 4, 9} <= seen)
-    assert (window.get("run"), window.get("frame"), window.get("view")) == ("ten-layers", 9, "variance")
+    assert (window.get("run"), window.get("frame"), window.get("view")) == ("ten-layers", 10, "variance")
     until(page, window.charts_drawn)
     keep("1")
 
@@ -113,7 +113,7 @@ def test_the_first_two_minutes(
     keep("course")
     page.get_by_role("button", name="Close the course", exact=True).click()
 
-    page.goto(demo.origin + "/?session=walk&run=ten-layers&frame=9")
+    page.goto(demo.origin + "/?session=walk&run=ten-layers&frame=10")
     page.get_by_role("button", name="Close the first steps for good", exact=True).click()
     page.locator(".first-steps").wait_for(state="detached")
     page.reload()

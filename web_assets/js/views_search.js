@@ -32,6 +32,8 @@ function parameterAxis(names, at) {
 
 /** Decades below the first layer's variance that a colour tells apart: the same in every frame and run. */
 const DECADES = 3;
+/** Pixels below which what stands side by side stands one below the other. */
+const NARROW = 640;
 
 /** Variance reduction of a frame: two maps that share one scale, and the chosen parameter over the layers. */
 function varianceOfFrame(sheet, tables, at) {
@@ -47,9 +49,16 @@ function varianceOfFrame(sheet, tables, at) {
   const reduced = (best, row) => ((row.reduction ?? 0) > (best.reduction ?? 0) ? row : best);
   const chosen =
     at.parameter && names.includes(at.parameter) ? at.parameter : settled.reduce(reduced).parameter;
-  const height = Math.max(names.length * ROW, at.room - 76);
-  const shape = { gutters: [142, 26, 112], shares: [1, 1, 1.1], right: 14 };
-  const [one, two, three] = sheet.columns(3, shape);
+  // Beside a scene there is no room for three: the parameter over the layers stands below its maps.
+  const isNarrow = sheet.width < NARROW;
+  const height = Math.max(names.length * ROW, isNarrow ? 0 : at.room - 76);
+  const shape = isNarrow
+    ? { gutters: [142, -36], right: 58 }
+    : { gutters: [142, 26, 112], shares: [1, 1, 1.1], right: 14 };
+  const [one, two, aside] = sheet.columns(isNarrow ? 2 : 3, shape);
+  const three = isNarrow
+    ? { left: one.left, width: sheet.width - one.left - 24, top: height + 64, height: 120 }
+    : { ...aside, top: 0, height: Math.max(90, at.room - 84) };
   const rowAt = (list, layer, place) =>
     list?.find((entry) => entry.layer === layer && entry.parameter === names[place]);
   const maps = /** @type {const} */ ([
@@ -102,7 +111,7 @@ function varianceOfFrame(sheet, tables, at) {
     ];
     return name ? noise : [["as weighed", of("weighed"), "text-quiet", { dashed: true }], ...noise];
   });
-  const plot = sheet.plot({ ...three, top: 0, height: Math.max(90, at.room - 84) }, {
+  const plot = sheet.plot(three, {
     title: at.label(chosen), unit: `variance, ${unit}²${at.tried ? "; dashed: after noise" : ""}`,
     names: at.tried ? sides.map(({ name }) => name) : lines.map(([name]) => name),
     x: categories(layers.map(layerName), "layer"), y: logarithmic(), over: tipOfLayer,

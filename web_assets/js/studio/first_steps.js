@@ -12,7 +12,7 @@ import { playWhenShown, visit } from "./visiting.js";
 
 const TEN = "ten-layers";
 const ONE = "one-layer";
-const FRAME = 9;
+const FRAME = 10;
 const LOST = 13;
 const PREFERENCE = "first-steps";
 
