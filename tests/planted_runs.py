@@ -34,6 +34,8 @@ from studio.trackers.side_exchange import kinds_of
 FPS, BODY = 60.0, "human31"
 PARTICLES, LAYERS, FRAMES = 40, 4, 5
 """Of the small run of `inspection/conftest.py`."""
+FRAME, MORE_LAYERS, FEWER_PARTICLES = 3, 7, 25
+"""Of what is tried there."""
 CAUSES = ("particles", "survival", "calibration", "masks", "exchange", "noise")
 Damage = Callable[[int, str, NDArray[np.uint8]], NDArray[np.uint8]]
 """damage(frame, camera, mask) is the mask that is stored."""

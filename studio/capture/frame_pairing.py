@@ -25,17 +25,18 @@ Steps = tuple[tuple[int, int], ...]
 class Drift:
     """How far a camera's pictures come to lie from the others' of the same number. first : the frame from which on
     it is more than half a frame, -1 for none. most : the largest distance, frames; behind where positive. fps : its
-    own rate. lost : (frame, how many) before which frames were lost.
+    own rate. others : that of most cameras. lost : (frame, how many) before which frames were lost.
     """
 
     camera: str
     first: int
     most: float
     fps: float
+    others: float
     lost: tuple[tuple[int, int], ...]
 
     def words(self, fps: float) -> str:
-        """What happened, a sentence. fps : the others' rate."""
+        """What happened, a sentence. fps : the session's."""
         sentences: list[str] = []
         if self.lost:
             places = [
@@ -46,7 +47,7 @@ class Drift:
             sentences.append(f"Camera {self.camera} lost frames: {', '.join(places)}{more}")
         if self.first >= 0:
             how = "later" if self.most > 0.0 else "earlier"
-            rate = "" if self.lost else f" ({self.fps:.5g} against {fps:.5g} a second)"
+            rate = "" if self.lost else f" ({self.fps:.5g} against {self.others:.5g} a second)"
             who = "its pictures" if self.lost else f"The pictures of camera {self.camera}"
             since = f"from frame {self.first} ({self.first / fps:.2f} s) on by more than half a frame"
             sentences.append(
@@ -75,9 +76,13 @@ def drifts(times: Mapping[str, Array], fps: float) -> tuple[Drift, ...]:
         if not apart and not lost[name]:
             continue
         most = float(late[np.argmax(np.abs(late))]) if apart else 0.0
-        own = (count - 1) / float(moments[-1]) if count > 1 and moments[-1] > 0.0 else fps
-        found.append(Drift(name, int(off[0]) if apart else -1, most, own, lost[name]))
+        rates = (_rate(moments, fps), _rate(common, fps))
+        found.append(Drift(name, int(off[0]) if apart else -1, most, *rates, lost[name]))
     return tuple(found)
+
+
+def _rate(moments: Array, fps: float) -> float:
+    return (len(moments) - 1) / float(moments[-1]) if len(moments) > 1 and moments[-1] > 0.0 else fps
 
 
 def paired_by_time(times: Mapping[str, Array], fps: float) -> tuple[dict[str, Steps], int]:

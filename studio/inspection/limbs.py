@@ -15,7 +15,10 @@ from studio.inspection.reference import body_points, by_limb, limb_group, limbs_
 from studio.inspection.tables import Row, Selection
 from studio.inspection.verdict import Verdict, verdicts
 from studio.runs.tracks import RAW, read_track
-from studio.trackers.tracker import TRACKED
+from studio.trackers.tracker import LIMB_LOST_SHARE, TRACKED
+
+TIMES_LOST = 2.0
+"""Times the limit of a lost limb: where the colours of the map of limbs end."""
 
 
 def errors_of(run: InspectedRun, track: str = "") -> dict[int, dict[str, float]]:
@@ -80,7 +83,9 @@ def _verdicts(run: InspectedRun, distances: dict[int, Array]) -> dict[int, Verdi
 
 
 def limb_rows(run: InspectedRun, selection: Selection) -> dict[str, list[Row]]:
-    """The run's table of view `why`."""
+    """The run's tables of view `why`: the map of limbs, and its colours, which are those of every frame and run of a
+    body of that size.
+    """
     distances = _distances(run, selection.track)
     errors, shares, said = _means(run, distances), disagreements_of(run), _verdicts(run, distances)
     table: list[Row] = []
@@ -89,7 +94,11 @@ def limb_rows(run: InspectedRun, selection: Selection) -> dict[str, list[Row]]:
         for limb in dict.fromkeys((*off, *share)):
             mm, area = off.get(limb, float("nan")), share.get(limb, float("nan"))
             table.append((frame, limb, no_value(mm), no_value(area), limb in own.lost, own.lost_by(limb)))
-    return {"limbs": table}
+    limits = (("error", "mm", lost_mm(run.body)), ("disagreement", "", LIMB_LOST_SHARE))
+    return {
+        "limbs": table,
+        "scale": [(name, unit, 0.0, lost, TIMES_LOST * lost) for name, unit, lost in limits],
+    }
 
 
 UNKNOWN = Verdict(TRACKED)

@@ -11,34 +11,43 @@ from pathlib import Path
 
 import numpy as np
 
-from studio.arrays import Array, Floats
+from studio.arrays import Array, Floats, Mask
 from studio.errors import NotFoundError
-from studio.inspection.reading import InspectedFrame, InspectedRun, no_value
+from studio.inspection.reading import InspectedFrame, InspectedRun, no_value, ordinal
 from studio.inspection.reference import body_points, by_limb, true_points
 from studio.inspection.schedule import alarm_of, effective_number
-from studio.inspection.tables import Row, Selection
+from studio.inspection.tables import Found, Row, Selection
 from studio.sessions.results_reader import Timeline
+from studio.words import enumerated
 
 MOST_BYTES = 128 << 20
+SOME = 3
+"""Frames that a note names, at most."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameSummary:
     """variances : (L, 3, D) of each layer as weighed, before and after noise. betas, alphas, effective : (L,). alarms :
-    layers with one. spread : (M,) root mean squared distance of the last set's points from their mean, mm. ranks : (M,
-    3) share of the last set's weight below the truth's coordinates, NaN where there is none. disagreement : as in the
-    frame's result. search_layers : layers of one search of the frame.
+    (L,) which layers have one. spread : (M,) root mean squared distance of the last set's points from their mean, mm.
+    ranks : (M, 3) share of the last set's weight below the truth's coordinates, NaN where there is none. disagreement :
+    as in the frame's result. search_layers, searches : layers of one search of the frame, and how many it had.
     """
 
     variances: Floats
     betas: Array
     alphas: Array
     effective: Array
-    alarms: int
+    alarms: Mask
     spread: Array
     ranks: Array
     disagreement: Mapping[str, float]
     search_layers: int
+    searches: int
+
+    @property
+    def last_search(self) -> slice:
+        """The layers of the last search, whose result is the frame's: what frames are compared by."""
+        return slice((self.searches - 1) * self.search_layers, None)
 
     @property
     def size(self) -> int:
@@ -65,11 +74,12 @@ def summary_of(frame: InspectedFrame) -> FrameSummary:
         np.array([record.beta for record in layers]),
         np.array([record.alpha_reached for record in layers]),
         np.array([effective_number(frame.log_weights(layer)) for layer in range(len(layers))]),
-        sum(bool(alarm_of(frame, layer)) for layer in range(len(layers))),
+        np.array([bool(alarm_of(frame, layer)) for layer in range(len(layers))]),
         spread,
         ranks,
         {} if frame.result is None else frame.result.disagreement,
         frame.search_layers,
+        frame.searches,
     )
 
 
@@ -132,11 +142,15 @@ def summaries(run: InspectedRun) -> dict[int, FrameSummary]:
     return found
 
 
-def variance_rows(run: InspectedRun, selection: Selection) -> dict[str, list[Row]]:
-    """The run's tables of view `variance`: first as drawn, last after weighing; one parameter where it is selected."""
+def variance_rows(run: InspectedRun, selection: Selection) -> Found:
+    """The run's tables of view `variance`, of each frame's last search: first as drawn, last after weighing; all
+    layers of one parameter where it is selected.
+    """
     found = summaries(run)
     tables: dict[str, list[Row]] = {
-        "first": [(frame, *map(float, entry.variances[0, 0])) for frame, entry in found.items()],
+        "first": [
+            (frame, *map(float, entry.variances[entry.last_search][0, 0])) for frame, entry in found.items()
+        ],
         "last": [(frame, *map(float, entry.variances[-1, 1])) for frame, entry in found.items()],
         "parameter": [],
     }
@@ -147,24 +161,40 @@ def variance_rows(run: InspectedRun, selection: Selection) -> dict[str, list[Row
             for frame, entry in found.items()
             for layer, moments in enumerate(entry.variances)
         ]
-    return tables
+    return Found(tables, _of_last_searches(found))
 
 
-def schedule_rows(run: InspectedRun, selection: Selection) -> dict[str, list[Row]]:
-    """The run's table of view `schedule`."""
-    return {
-        "frames": [
-            (
-                frame,
-                no_value(float(entry.betas[0])),
-                no_value(float(entry.betas[-1])),
-                no_value(float(entry.alphas.min())),
-                float(entry.effective.min()),
-                entry.alarms,
-            )
-            for frame, entry in summaries(run).items()
-        ]
-    }
+def schedule_rows(run: InspectedRun, selection: Selection) -> Found:
+    """The run's table of view `schedule`, of each frame's last search."""
+    found = summaries(run)
+    return Found(
+        {
+            "frames": [
+                (
+                    frame,
+                    no_value(float(entry.betas[entry.last_search][0])),
+                    no_value(float(entry.betas[-1])),
+                    no_value(float(entry.alphas[entry.last_search].min())),
+                    float(entry.effective[entry.last_search].min()),
+                    int(entry.alarms[entry.last_search].sum()),
+                )
+                for frame, entry in found.items()
+            ]
+        },
+        _of_last_searches(found),
+    )
+
+
+def _of_last_searches(found: Mapping[int, FrameSummary]) -> tuple[str, ...]:
+    """Which search of the frames that have several is meant."""
+    several = [(frame, entry.searches) for frame, entry in found.items() if entry.searches > 1]
+    if not several:
+        return ()
+    named = enumerated([f"frame {frame} by the {ordinal(count)}" for frame, count in several[:SOME]])
+    more = f" and {len(several) - SOME} more frames by their last" if len(several) > SOME else ""
+    return (
+        f"Frames that were searched several times over stand here with their last search: {named}{more}.",
+    )
 
 
 def spread_by_limb(run: InspectedRun, entry: FrameSummary) -> dict[str, float]:

@@ -223,6 +223,12 @@ class InspectedFrame:
         ]
         return enumerated(spans)
 
+    def layer_in_words(self, layer: int) -> str:
+        """A layer, counted from 1 in its search, which is named where the frame has several."""
+        search, within = divmod(layer, self.search_layers)
+        of = f" of the {ordinal(search + 1)} search" if len(self.layers) > self.search_layers else ""
+        return f"layer {within + 1}{of}"
+
     def estimate(self, track: str = "") -> Array:
         """(D,) the frame's pose, in a track if one is named; in an unfinished frame the last layer's mean.
 

@@ -289,6 +289,8 @@ def _over_frames(shown: _Shown) -> dict[str, Any]:
         "title": "Over the frames",
         "question": "How did the run go?",
         "caption": shown.run.caption(),
+        "search_layers": 0,
+        "searches": 0,
         "notes": [],
         "tables": [table],
     }
@@ -303,6 +305,8 @@ def _figure(shown: _Shown, name: str, viewed: Viewed, frame: int | None) -> dict
         "title": view.title if frame is None else f"{view.title}, frame {frame}",
         "question": view.question,
         "caption": shown.run.caption(frame),
+        "search_layers": viewed.search_layers,
+        "searches": viewed.searches,
         "notes": list(viewed.notes),
         "tables": [_table(table, kept) for table in viewed.tables],
     }
@@ -329,6 +333,8 @@ def _why(shown: _Shown) -> dict[str, Any]:
         return {"frame": shown.frame, "notes": [str(error)], "findings": [], "remedies": [], "tables": []}
     return {
         "frame": shown.frame,
+        "search_layers": found.search_layers,
+        "searches": found.searches,
         "notes": list(found.notes),
         "findings": [
             {"kind": one.kind, "words": one.words, "is_cause": one.is_cause} for one in found.findings

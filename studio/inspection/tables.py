@@ -188,12 +188,16 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Viewed:
-    """A view's content. notes : what a reader has to know of the numbers. findings, remedies : of `why` only."""
+    """A view's content. notes : what a reader has to know of the numbers. findings, remedies : of `why` only.
+    search_layers, searches : layers of one search of the frame, and how many searches it has; 0 of a whole run.
+    """
 
     tables: tuple[Table, ...]
     notes: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
     remedies: tuple[Remedy, ...] = ()
+    search_layers: int = 0
+    searches: int = 0
 
     def table(self, name: str) -> Table:
         """A table by its name. Raises ValueError."""

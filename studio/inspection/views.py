@@ -1,6 +1,7 @@
 """The views by name, and their tables for a frame or for a whole run: what each shows is declared in its module."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 from studio.errors import NotFoundError
@@ -61,7 +62,8 @@ def look(run: InspectedRun, frame: int, name: str, selection: Selection) -> View
     """A view's tables of a frame. Raises NotFoundError for a frame, layer, parameter … that is none."""
     entry, opened = _entry(name), run.frame(frame)
     found = entry.of_frame(opened, selection)
-    return _viewed(run, entry.view, entry.view.frame_tables, found, opened.notes())
+    viewed = _viewed(run, entry.view, entry.view.frame_tables, found, opened.notes())
+    return replace(viewed, search_layers=opened.search_layers, searches=opened.searches)
 
 
 def look_over(run: InspectedRun, name: str, selection: Selection) -> Viewed:

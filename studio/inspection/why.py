@@ -89,6 +89,16 @@ VIEW = View(
             ("lost_by", "Lost by"),
             of_run=True,
         ),
+        table(
+            "scale",
+            "Colours of the map of limbs",
+            ("quantity", "Quantity"),
+            "unit",
+            ("low", "First colour"),
+            ("lost", "Lost from"),
+            ("high", "Last colour, also beyond"),
+            of_run=True,
+        ),
     ),
     evaluates=True,
 )
@@ -749,7 +759,8 @@ def _layer_finding(case: Case, limb: str) -> Finding:
             f" {_mm(nearest)}."
         )
         return Finding("never near", words, limb, 0, numbers=numbers)
-    words = f"From layer {layer + 1} on no particle was within {near} of {place}; before, there was one."
+    first = case.frame.layer_in_words(layer)
+    words = f"From {first} on no particle was within {near} of {place}; before, there was one."
     return Finding("left the cloud", words, limb, layer, numbers=numbers)
 
 

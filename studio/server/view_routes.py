@@ -60,7 +60,9 @@ class FindingView(Answer):
 
 
 class ViewAnswer(Answer):
-    """A view's tables, and the sentences and remedies of `why`. frame: null in the answer for a whole run."""
+    """A view's tables, and the sentences and remedies of `why`. frame: null in the answer for a whole run.
+    search_layers, searches: layers of one search of the frame, and how many searches it has; 0 for a whole run.
+    """
 
     view: str
     title: str
@@ -69,6 +71,8 @@ class ViewAnswer(Answer):
     session: str
     run: str
     frame: int | None
+    search_layers: int
+    searches: int
     notes: list[str]
     tables: list[TableView]
     findings: list[FindingView] = Field(default_factory=list[FindingView])
@@ -224,6 +228,8 @@ def _answer(run: InspectedRun, name: str, viewed: Viewed, frame: int | None) -> 
         session=run.session.name,
         run=run.run.name,
         frame=frame,
+        search_layers=viewed.search_layers,
+        searches=viewed.searches,
         notes=list(viewed.notes),
         tables=[TableView.model_validate(table) for table in viewed.tables],
         findings=[FindingView.model_validate(finding) for finding in viewed.findings],

@@ -17,6 +17,8 @@ def test_a_minute_at_another_rate_is_said_by_how_much_and_from_when() -> None:
     assert found.most == pytest.approx(3.6, abs=0.01)
     assert "3.6 frames later" in found.words(FPS)
     assert "59.94 against 60" in found.words(FPS)
+    slower = drifts(times, 60000 / 1001)[0]
+    assert "59.94 against 60" in slower.words(60000 / 1001), "also where the session takes the slower rate"
     assert drifts({"a": EVEN, "b": EVEN * 1.0001}, FPS) == ()
 
 

@@ -1,12 +1,27 @@
-"""A small tracked run of a person drawn as masks, for all tests of the views; nobody changes it."""
+"""A small tracked run of a person drawn as masks, for all tests of the views, which do not change it."""
+
+from collections.abc import Iterator
 
 import pytest
+from drawings import Drawings
 from drawn_people import ring_of_cameras
-from planted_runs import FRAMES, LAYERS, PARTICLES, drawn_session, person_poses
-from tracked_runs import finish
+from planted_runs import (
+    FEWER_PARTICLES,
+    FRAME,
+    FRAMES,
+    LAYERS,
+    MORE_LAYERS,
+    PARTICLES,
+    drawn_session,
+    person_poses,
+)
+from playwright.sync_api import Browser
+from tracked_runs import finish, opened
 
-from studio.inspection.reading import InspectedFrame, InspectedRun
+from studio.inspection.reading import InspectedFrame, InspectedRun, TriedFrame
 from studio.runs.new_run import prepare_run
+from studio.runs.reannealing import Reannealing
+from studio.settings import changed_settings
 
 
 @pytest.fixture(scope="session")
@@ -23,4 +38,31 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> InspectedRun:
 @pytest.fixture
 def frame(run: InspectedRun) -> InspectedFrame:
     """Its fourth frame."""
-    return run.frame(3)
+    return run.frame(FRAME)
+
+
+@pytest.fixture(scope="session")
+def search(run: InspectedRun) -> Reannealing:
+    """The fourth frame annealed again: more layers, fewer particles, more survivors."""
+    with opened(run.session, run.run) as tracking:
+        changes = {"survival": 0.7, "layers": MORE_LAYERS, "particles": FEWER_PARTICLES}
+        again = Reannealing(tracking, FRAME, 5, changed_settings(run.settings(FRAME), changes))
+        while not again.finished:
+            again.step_layer()
+        again.result()
+        return again
+
+
+@pytest.fixture(scope="session")
+def tried(search: Reannealing, run: InspectedRun) -> InspectedRun:
+    """The run with that in the place of its frame."""
+    trial = TriedFrame("3-a", FRAME, search.settings, tuple(search.layers), search.result())
+    return InspectedRun(run.session, run.run, trial)
+
+
+@pytest.fixture(scope="session")
+def drawings(browser: Browser) -> Iterator[Drawings]:
+    """The pages' drawings of the views."""
+    opened = Drawings(browser)
+    yield opened
+    opened.close()

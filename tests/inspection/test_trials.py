@@ -4,12 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted_runs import LAYERS, PARTICLES
-from tracked_runs import opened
+from planted_runs import FEWER_PARTICLES, FRAME, LAYERS, MORE_LAYERS, PARTICLES
 
 from studio.errors import NotFoundError
 from studio.inspection.likelihoods import evaluation_of
-from studio.inspection.reading import InspectedRun, TriedFrame
+from studio.inspection.reading import InspectedRun
 from studio.inspection.reference import body_points, true_points
 from studio.inspection.schedule import effective_number
 from studio.inspection.seeds import search_seeds
@@ -18,29 +17,9 @@ from studio.inspection.views import VIEWS, look, look_over
 from studio.jobs.events import FrameFinished, LayerFinished, SettingsApplied
 from studio.jobs.tried_frames import MOST_OF_A_RUN, TriedFrames
 from studio.runs.reannealing import Reannealing
-from studio.settings import changed_settings, values
+from studio.settings import values
 
-FRAME, MORE_LAYERS, FEWER_PARTICLES = 3, 7, 25
 NOTHING = Selection()
-
-
-@pytest.fixture(scope="module")
-def search(run: InspectedRun) -> Reannealing:
-    """The fourth frame annealed again: more layers, fewer particles, more survivors."""
-    with opened(run.session, run.run) as tracking:
-        changes = {"survival": 0.7, "layers": MORE_LAYERS, "particles": FEWER_PARTICLES}
-        again = Reannealing(tracking, FRAME, 5, changed_settings(run.settings(FRAME), changes))
-        while not again.finished:
-            again.step_layer()
-        again.result()
-        return again
-
-
-@pytest.fixture(scope="module")
-def tried(search: Reannealing, run: InspectedRun) -> InspectedRun:
-    """The run with that in the place of its frame."""
-    trial = TriedFrame("3-a", FRAME, search.settings, tuple(search.layers), search.result())
-    return InspectedRun(run.session, run.run, trial)
 
 
 def rows(run: InspectedRun, view: str, name: str, **chosen: object) -> list[dict[str, Cell]]:

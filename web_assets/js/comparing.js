@@ -78,7 +78,7 @@ async function loadFrame(names) {
     const [session, run] = partsOf(name);
     try {
       const [detail, schedule] = await Promise.all([fetchJson(`${runPath(session, run)}/frames/${frame}`), fetchJson(frameView(session, run, frame, "schedule"))]);
-      return { run: name, pose: detail.pose, layers: records(schedule.tables[0]) };
+      return { run: name, pose: detail.pose, layers: lastSearch(schedule) };
     } catch (error) {
       if (error.status !== 404) throw error;
       return { run: name, pose: null, layers: [] };
@@ -88,6 +88,12 @@ async function loadFrame(names) {
   frames = { key, runs };
   drawBodies();
   figure.refresh();
+}
+
+/** The layers of a frame's last search, whose result the frame is, counted in it: however often the frame was searched. */
+function lastSearch({ tables, search_layers: layers, searches }) {
+  const first = layers * (searches - 1);
+  return records(tables[0]).filter((row) => row.layer >= first).map((row) => ({ ...row, layer: row.layer - first, chosen: row.layer }));
 }
 
 /** The other runs' bodies beside this one's. */
@@ -148,12 +154,14 @@ function drawn(sheet, { curves, runs }, room) {
     sheet.line(difference, run, all.map((frame) => { const [one, other] = [measured.get(`${runs[0]}/${frame}`), measured.get(`${run}/${frame}`)]; return one === undefined || other === undefined || one === null || other === null ? null : other - one; }), seriesColour(at + 1), { symbols: all.length < 3, click });
   });
   for (const one of [plot, difference]) sheet.chosen(one, { column: String(get("frame")) });
+  const ofOpen = frames?.runs[0]?.layers ?? [];
   const layered = frames?.runs.filter((one) => one.layers.length) ?? [];
   // A swarm's layers have no effective number: as many of them as it has do not squeeze the others' together.
   const most = Math.max(1, ...layered.flatMap((one) => one.layers.filter((row) => row.effective !== null).map((row) => row.layer + 1)));
-  const layers = sheet.plot({ ...places[2], top: 0, height }, { title: "Effective number", unit: `by layer, frame ${get("frame")}, log scale`, x: categories(Array.from({ length: most }, (_, at) => String(at + 1)), "layer"), y: logarithmic("", { min: 1 }), over: (points) => tipOf(`layer ${points[0].axisValue}`, points.map((point) => [point.seriesName, point.data])) });
-  for (const { run, layers: rows } of layered) sheet.line(layers, run, rows.slice(0, most).map((row) => row.effective), seriesColour(runs.indexOf(run)), { click: ({ dataIndex }) => ({ layer: dataIndex }) });
-  sheet.chosen(layers, { column: get("layer") === null ? null : String(get("layer") + 1) });
+  const layers = sheet.plot({ ...places[2], top: 0, height }, { title: "Effective number", unit: `by layer of the last search, frame ${get("frame")}, log scale`, x: categories(Array.from({ length: most }, (_, at) => String(at + 1)), "layer"), y: logarithmic("", { min: 1 }), over: (points) => tipOf(`layer ${points[0].axisValue}`, points.map((point) => [point.seriesName, point.data])) });
+  for (const { run, layers: rows } of layered) sheet.line(layers, run, rows.slice(0, most).map((row) => row.effective), seriesColour(runs.indexOf(run)), { click: ({ dataIndex }) => ({ layer: ofOpen[dataIndex]?.chosen ?? null }) });
+  const chosen = ofOpen.findIndex((row) => row.chosen === get("layer"));
+  sheet.chosen(layers, { column: chosen < 0 ? null : chosen });
   return runs.map((run) => `${run}: ${figureWords(measured.get(`${run}/${get("frame")}`))}`).join(", ") + ` (${unit}, frame ${get("frame")}).`;
 }
 

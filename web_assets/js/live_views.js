@@ -28,12 +28,12 @@ export function liveView(name) {
   const detail = get("detail");
   if (!LIVE[name] || !detail?.layers.length || detail.frame !== get("frame") || !get("parameters")) return null;
   const state = detail.finished ? "" : ` in progress, ${detail.layers.length} layers`;
-  return { caption: `Session ${get("session")}, run ${get("run")}, frame ${detail.frame}${state}: ${get("summary")?.describe ?? ""}.`, notes: [], tables: LIVE[name](detail.layers, get("parameters")) };
+  return { caption: `Session ${get("session")}, run ${get("run")}, frame ${detail.frame}${state}: ${get("summary")?.describe ?? ""}.`, notes: [], tables: LIVE[name](detail.layers, get("parameters")), search_layers: detail.search_layers, searches: detail.searches };
 }
 
 /** A view of the trial that is shown, of the layers that came so far; null for those that the studio has to make. */
 export function triedView(name) {
   const layers = get("whatIf");
   if (!LIVE[name] || !layers?.length || !get("parameters")) return null;
-  return { caption: `frame ${layers[0].frame} tried again, ${layers.length} layers, not stored.`, notes: [], tables: LIVE[name](layers, get("parameters")) };
+  return { caption: `frame ${layers[0].frame} tried again, ${layers.length} layers, not stored.`, notes: [], tables: LIVE[name](layers, get("parameters")), search_layers: layers[0].search_layers, searches: layers[0].searches };
 }

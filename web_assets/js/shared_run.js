@@ -3,6 +3,7 @@
 import { BodyDrawing } from "./body_drawing.js";
 import { button, byId, card, element, fill, hint } from "./elements.js";
 import { Figure } from "./figure.js";
+import { countedIn } from "./layer_axis.js";
 import { layerColour, startTheme } from "./theme.js";
 import { records } from "./view_sheet.js";
 import { ANSWER_VIEWS } from "./views_answer.js";
@@ -191,12 +192,12 @@ function figureOf(data, entry, choose, place) {
   const tables = Object.fromEntries(entry.tables.map((table) => [table.name, records(table)]));
   const labels = new Map(data.parameters.map(({ name, label }) => [name, label]));
   const drawings = { ...SEARCH_VIEWS, ...ANSWER_VIEWS };
-  const layers = tables.layers?.length ? Math.max(...tables.layers.map((row) => row.layer)) + 1 : 1;
+  const counted = countedIn(entry, 1);
   // Of the run's layers over the frames the page has one parameter.
   const own = entry.view === "variance" && entry.of === "run" ? { parameter: data.parameter } : {};
-  const known = (room) => ({ ...at, ...own, over: entry.of === "run", layers, label: (name) => labels.get(name) ?? name, room, tried: null, score: data.score });
+  const known = (room) => ({ ...at, ...own, ...counted, over: entry.of === "run", layers: counted.searchLayers * counted.searches, label: (name) => labels.get(name) ?? name, room, tried: null, score: data.score });
   const whyTables = Object.fromEntries([...data.why.tables, ...entry.tables].map((table) => [table.name, records(table)]));
-  const draw = entry.view === "why" ? (sheet, room) => drawLimbs(sheet, { limbs: [], nearest: [], ...whyTables }, at, room) : (sheet, room) => drawings[entry.view][entry.of](sheet, tables, known(room));
+  const draw = entry.view === "why" ? (sheet, room) => drawLimbs(sheet, { limbs: [], nearest: [], ...whyTables }, { ...at, ...countedIn(data.why, 1) }, room) : (sheet, room) => drawings[entry.view][entry.of](sheet, tables, known(room));
   const made = new Figure(place);
   const empty = !entry.tables.some((table) => table.rows.length);
   made.show(empty ? null : {

@@ -6,6 +6,7 @@ import { axis, figure, token, typeSize } from "./chart_looks.js";
 const HEADING = 30, LEGEND = 17, WORD = 12;
 const HEAT = ["heat-lowest", "heat-low", "heat-middle", "heat-high"];
 const SPLIT = "stored and tried";
+const GROUPS = "groups";
 const FAMILY = "Inter, system-ui, sans-serif";
 
 /**
@@ -58,8 +59,9 @@ export class Sheet {
   plot(box, { title = "", unit = "", x, y, below = 34, names = null, over = null, click = null }) {
     const index = this.option.grid.length;
     const { left, width } = box;
-    // A legend, and an axis above the plot, take a line each.
-    const lines = (names ? LEGEND : 0) + (x.position === "top" ? LEGEND : 0);
+    // A legend, an axis above the plot and the names of its groups there take a line each.
+    const above = x.position === "top" ? LEGEND * (x.groups ? 2 : 1) : 0;
+    const lines = (names ? LEGEND : 0) + above;
     const top = box.top + (title ? HEADING : 8) + lines;
     const height = Math.max(40, box.height - lines);
     if (title) this.heading(title, unit, left, box.top, width + 12);
@@ -71,7 +73,34 @@ export class Sheet {
     this.option.yAxis.push(axis({ gridIndex: index, ...y }));
     this.height = Math.max(this.height, top + height + below);
     if (click) this.grounds.push({ box: { left, top, width, height }, index, act: click });
+    if (x.groups) this.groups(index, x.groups, x.position === "top");
     return index;
+  }
+
+  /**
+   * Names of groups of an axis's categories, outside of its numbers, and lines between the groups.
+   * @param {{ name: string, short: string, first: number, last: number }[]} groups
+   */
+  groups(plot, groups, isAbove) {
+    const size = typeSize(10);
+    this.series(plot, {
+      type: "custom", silent: true, z: 5, tooltip: { show: false }, encode: { x: [], y: [] }, clip: false, name: GROUPS,
+      data: groups.map((_, at) => [at]),
+      renderItem: ({ coordSys }, api) => {
+        const { name, short, first, last } = groups[api.value(0)];
+        const half = api.size([1, 0])[0] / 2;
+        const [from, to] = [api.coord([first, 0])[0] - half, api.coord([last, 0])[0] + half];
+        pen.font = `${size}px ${FAMILY}`;
+        const text = pen.measureText(name).width + 6 > to - from ? short : name;
+        const [top, bottom] = [coordSys.y, coordSys.y + coordSys.height];
+        const y = isAbove ? top - LEGEND - 9 : bottom + 25;
+        const words = { type: "text", style: { text, x: (from + to) / 2, y, align: "center", verticalAlign: "middle", fill: token("text-quiet"), fontSize: size, fontFamily: FAMILY } };
+        const [start, end] = isAbove ? [top - 2 * LEGEND, bottom] : [top, bottom + 32];
+        const line = { type: "line", shape: { x1: from, x2: from, y1: start, y2: end }, style: { stroke: token("line-strong"), lineWidth: 1.2 } };
+        return { type: "group", children: first > 0 ? [words, line] : [words] };
+      },
+    });
+    this.option.series.at(-1).isFrame = true;
   }
 
   /** A heading of a plot. */
@@ -254,8 +283,10 @@ export const sidesOf = (tables, /** @type {{ tried?: any }} */ { tried = null },
     : [{ name: "", tables, colour: alone }];
 
 /** The numbers of layers of all sides: as many as the longer one has. */
-export const layersOfAll = (sides, name) =>
-  distinct(sides.flatMap(({ tables }) => tables[name].map((row) => row.layer))).sort((a, b) => a - b);
+export function layersOfAll(sides, name) {
+  const most = Math.max(-1, ...sides.flatMap(({ tables }) => tables[name].map((row) => row.layer)));
+  return Array.from({ length: most + 1 }, (_, layer) => layer);
+}
 
 /** A column of a side's table, layer by layer; null where the side has no such layer. */
 export function byLayer(rows, layers, key) {

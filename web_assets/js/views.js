@@ -6,6 +6,7 @@ import { fetchJson, frameView, post, runView } from "./api.js";
 import { button, byId, element, fill, select as choice } from "./elements.js";
 import { Figure } from "./figure.js";
 import { onEvent } from "./live.js";
+import { countedIn, onOneAxis } from "./layer_axis.js";
 import { liveView, triedView } from "./live_views.js";
 import { complain } from "./messages.js";
 import { paced } from "./pacing.js";
@@ -149,23 +150,23 @@ async function showBoth(view, key) {
 
 const loadLater = paced(load, LOAD_MILLISECONDS);
 
-/** What a drawing knows beside its tables. */
-const at = (room) => ({
-  layer: get("layer"), limb: get("limb"), parameter: get("parameter"), particle: get("particle"), camera: get("camera"), frame: get("frame"), over: get("over") === "run",
-  layers: Math.max(1, layersShown() || get("layerCount") || 1), label: labelOf, room, tried: null, score: get("summary")?.score ?? ["log weight", ""],
+/** What a drawing knows beside its tables. @param {ReturnType<typeof onOneAxis>} axis */
+const at = (room, axis) => ({
+  ...axis.counted, layer: axis.there(get("layer")), limb: get("limb"), parameter: get("parameter"), particle: get("particle"), camera: get("camera"), frame: get("frame"), over: get("over") === "run",
+  layers: axis.counted.searchLayers * axis.counted.searches, label: labelOf, room, tried: axis.tried, score: get("summary")?.score ?? ["log weight", ""],
 });
 
 const byName = (answer) => Object.fromEntries(answer.tables.map((table) => [table.name, records(table)]));
+const onAxis = (answer) => answer && { tables: byName(answer), counted: countedIn(answer, Math.max(1, layersShown() || get("layerCount") || 1)) };
 
 function show(view, stored, /** @type {any} */ beside = null) {
-  const tables = byName(stored);
-  const tried = beside?.tables.some((table) => table.rows.length) ? byName(beside) : null;
-  const answer = tried ? { ...stored, caption: `${stored.caption} Beside it: ${beside.caption}`, tables: [...stored.tables, ...beside.tables.map((table) => ({ ...table, title: `${table.title}, tried` }))] } : stored;
+  const axis = onOneAxis(onAxis(stored), onAxis(beside?.tables.some((table) => table.rows.length) ? beside : null));
+  const answer = axis.tried ? { ...stored, caption: `${stored.caption} Beside it: ${beside.caption}`, tables: [...stored.tables, ...beside.tables.map((table) => ({ ...table, title: `${table.title}, tried` }))] } : stored;
   const main = stored.tables.some((table) => table.rows.length);
   if (!main) return figure.show({ ...shownOf(view, answer), draw: null }, answer.notes.join(" ") || (view.is_job ? "Nothing computed yet: start it with the button above." : "There are no numbers of this frame."));
   const drawing = DRAWINGS[view.name];
   const draw = isOfRun(view) ? drawing.run : drawing.frame;
-  figure.show({ ...shownOf(view, answer), draw: (sheet, room) => draw(sheet, tables, { ...at(room), tried }) });
+  figure.show({ ...shownOf(view, answer, axis.back), draw: (sheet, room) => draw(sheet, axis.stored, at(room, axis)) });
 }
 
 /**
@@ -179,13 +180,13 @@ export function liveFigure(name = "variance") {
   if (!answer || !view) return null;
   const wanted = views.find((one) => one.name === name);
   const notes = own ? [] : [`${wanted?.title ?? "This view"} is drawn of a frame that is finished: choose one, or pause the search.`];
-  const tables = Object.fromEntries(answer.tables.map((table) => [table.name, records(table)]));
-  return { ...shownOf(view, { ...answer, notes }), draw: (sheet, room) => DRAWINGS[view.name].frame(sheet, tables, at(room)) };
+  const axis = onOneAxis(onAxis(answer), null);
+  return { ...shownOf(view, { ...answer, notes }), draw: (sheet, room) => DRAWINGS[view.name].frame(sheet, axis.stored, at(room, axis)) };
 }
 
-const shownOf = (view, answer) => ({
+const shownOf = (view, answer, /** @type {(layer: number) => number} */ back = (layer) => layer) => ({
   name: [get("session"), get("run"), ...(isOfRun(view) ? [] : [`frame${get("frame")}`]), view.name].join("-"), title: view.title, question: view.question, caption: answer.caption,
-  notes: answer.notes, tables: answer.tables, draw: null, choose, link: () => addressOf({ frame: get("frame") }),
+  notes: answer.notes, tables: answer.tables, draw: null, choose: (changes) => choose(Number.isInteger(changes.layer) ? { ...changes, layer: back(changes.layer) } : changes), link: () => addressOf({ frame: get("frame") }),
 });
 
 /** A click in a drawing: what it chooses, or which body it draws beside the answer. */

@@ -2,6 +2,7 @@
 // answer, whether another seed agrees, whether the spread predicts the error; and weight and error over the frames.
 
 import { figure, token } from "./chart_looks.js";
+import { layerAxis, layerInSearch } from "./layer_axis.js";
 import { limbLook } from "./limb_looks.js";
 import { isChosenLimb, limbGroup } from "./selection.js";
 import { layerColour, seriesColour } from "./theme.js";
@@ -13,6 +14,11 @@ import {
 
 const nats = (value) => `${figure(value)} nats`;
 const LIMB_ROW = 18;
+/** Nats at which the colours of a map of log-likelihoods end: in every frame and run the same. */
+const MOST_NATS = 1000;
+
+/** A difference on a log scale to both sides, level between one nat less and one more. */
+const signedDecades = (value) => Math.sign(value) * Math.log10(1 + Math.abs(value));
 const WHOLE = "whole body";
 
 /** Of a line in pose space: a pose at a place of it, from its ends. */
@@ -53,11 +59,11 @@ function landscape(sheet, { slice, terms, tempered, plane, rug, marks, ends }, a
   if (tried) sheet.series(main, {
     name: "tried particles", type: "scatter", symbol: "rect", symbolSize: [1.5, 9], itemStyle: { color: token("tried"), opacity: 0.75 },
     data: tried.rug.filter((row) => row.at >= bounds[0] && row.at <= bounds[1]).map((row) => ({ value: [put(row.at), low - 0.1 * (high - low || 1)], row })),
-    tip: ({ data: { row } }) => tipOf(`tried particle ${row.particle}, layer ${row.layer + 1}`, [["log weight", nats(row.log_weight)]]),
+    tip: ({ data: { row } }) => tipOf(`tried particle ${row.particle}, ${layerInSearch(row.layer, at)}`, [["log weight", nats(row.log_weight)]]),
   });
   sheet.series(main, {
     name: "particles", type: "scatter", symbol: "rect", symbolSize: [1.5, 9], data: own.filter((row) => row.at >= bounds[0] && row.at <= bounds[1]).map((row) => ({ value: [put(row.at), low - 0.04 * (high - low || 1)], row, itemStyle: { color: layerColour(row.layer, at.layers), opacity: 0.75 } })),
-    click: ({ data }) => ({ layer: data.row.layer, particle: data.row.particle }), tip: ({ data: { row } }) => tipOf(`particle ${row.particle}, layer ${row.layer + 1}`, [["place", isParameter ? withUnit(row.at, unit) : figure(row.at)], ["log weight", nats(row.log_weight)]]),
+    click: ({ data }) => ({ layer: data.row.layer, particle: data.row.particle }), tip: ({ data: { row } }) => tipOf(`particle ${row.particle}, ${layerInSearch(row.layer, at)}`, [["place", isParameter ? withUnit(row.at, unit) : figure(row.at)], ["log weight", nats(row.log_weight)]]),
   });
   sheet.marks(main, markSpots, [put(range[0]), put(range[1])]);
 
@@ -66,12 +72,12 @@ function landscape(sheet, { slice, terms, tempered, plane, rug, marks, ends }, a
   const beta = sheet.plot({ ...two, top: 0, height }, { title: "At each layer's β", unit: `density, each to its own height${tried ? "; dashed: tried" : ""}`, x: x(), y: numbers("", { scale: false, min: 0, max: 1.05, axisLabel: { show: false } }) });
   for (const [layer, rows] of layers) {
     sheet.line(beta, `layer ${layer + 1}`, rows.map((row) => ({ value: [put(row.at), row.density / most.get(layer)], row })), layerColour(layer, at.layers), {
-      width: at.layer === layer ? 3 : 1.4, symbols: false, triggerLineEvent: true, click: () => ({ layer }), emphasis: { focus: "series" }, tip: () => tipOf(`layer ${layer + 1}`, [["β", rows[0].beta]]),
+      width: at.layer === layer ? 3 : 1.4, symbols: false, triggerLineEvent: true, click: () => ({ layer }), emphasis: { focus: "series" }, tip: () => tipOf(layerInSearch(layer, at), [["β", rows[0].beta]]),
     });
   }
   for (const [layer, rows] of tried ? grouped(tried.tempered, "layer") : []) {
     const top = Math.max(...rows.map((row) => row.density)) || 1;
-    sheet.line(beta, `tried, layer ${layer + 1}`, rows.map((row) => [put(row.at), row.density / top]), layerColour(layer, at.layers), { dashed: true, width: at.layer === layer ? 3 : 1.2, symbols: false, tip: () => tipOf(`tried, layer ${layer + 1}`, [["β", rows[0].beta]]) });
+    sheet.line(beta, `tried, layer ${layer + 1}`, rows.map((row) => [put(row.at), row.density / top]), layerColour(layer, at.layers), { dashed: true, width: at.layer === layer ? 3 : 1.2, symbols: false, tip: () => tipOf(`tried, ${layerInSearch(layer, at)}`, [["β", rows[0].beta]]) });
   }
   sheet.marks(beta, markSpots.map((one) => ({ ...one, word: "" })));
 
@@ -94,9 +100,10 @@ function landscape(sheet, { slice, terms, tempered, plane, rug, marks, ends }, a
 function landscapePlane(sheet, { plane, rug, marks }, at, { height, put, unit }) {
   const [one] = sheet.columns(1, { gutters: 70, right: 110 });
   const [across, down] = [distinct(plane.map((row) => row.at)), distinct(plane.map((row) => row.second))];
-  const [low, high] = extent(plane.map((row) => row.log_weight));
+  const high = Math.max(...plane.map((row) => row.log_weight).filter(Number.isFinite));
+  const below = (value) => (value === null ? "-" : -signedDecades(high - value));
   const plot = sheet.plot({ ...one, top: 0, height }, { title: "Log weight over two parameters", unit: `${at.label(at.parameter ?? "")}, ${screenUnit(unit)}, and another`, x: categories(across.map((value) => figure(put(value))), at.label(at.parameter ?? "")), y: categories(down.map((value) => figure(value)), "") });
-  sheet.heat(plot, { cells: plane.map((row) => [across.indexOf(row.at), down.indexOf(row.second), row.log_weight ?? "-"]), low, high, framed: false, ends: [figure(high), figure(low)], key: { left: one.left + one.width + 12, top: 40 }, tip: ({ value }) => tipOf(`${figure(put(across[value[0]]))}, ${figure(down[value[1]])}`, [["log weight", nats(value[2])]]) });
+  sheet.heat(plot, { cells: plane.map((row) => [across.indexOf(row.at), down.indexOf(row.second), below(row.log_weight), row.log_weight]), low: -signedDecades(MOST_NATS), high: 0, framed: false, ends: ["best", `${MOST_NATS} nats less`], key: { left: one.left + one.width + 12, top: 40 }, tip: ({ value }) => tipOf(`${figure(put(across[value[0]]))}, ${figure(down[value[1]])}`, [["log weight", nats(value[3])]]) });
   const nearest = (values, value) => values.reduce((best, one, index) => (Math.abs(one - value) < Math.abs(values[best] - value) ? index : best), 0);
   const points = (name, rows, colour, size) => sheet.series(plot, { name, type: "scatter", symbolSize: size, itemStyle: { color: token(colour), opacity: 0.8 }, data: rows.filter((row) => Number.isFinite(row.at) && Number.isFinite(row.second)).map((row) => ({ value: [nearest(across, row.at), nearest(down, row.second)], row })), tip: ({ data: { row } }) => tipOf(row.name ?? `particle ${row.particle}`, [["log weight", nats(row.log_weight)]]) });
   points("particles", rug, "text", 3);
@@ -109,21 +116,18 @@ function blame(sheet, { matrix, left_out: leftOut, areas }, at) {
   const tried = at.tried;
   const limbs = distinct(matrix.map((row) => row.limb));
   const sources = distinct(matrix.map((row) => `${row.camera} · ${row.term}`));
-  const hasReference = matrix.some((row) => row.difference !== null);
-  const key = hasReference ? "difference" : "value";
-  const [low, high] = extent([...matrix, ...(tried?.matrix ?? [])].map((row) => row[key]));
-  const bound = Math.max(Math.abs(low), Math.abs(high), 1e-9);
+  const bound = signedDecades(MOST_NATS);
   const height = Math.max(limbs.length * LIMB_ROW, at.room - 110);
   const [one, two] = sheet.columns(2, { gutters: [124, 190], shares: [1.3, 1], right: 70 });
   const plot = sheet.plot({ ...one, top: 0, height }, {
-    title: hasReference ? "Pose less reference pose" : "Log-likelihood at the pose", unit: `${hasReference ? "nats; orange speaks for the pose, blue against it" : "nats"}${tried ? "; ◤ stored, ◢ tried" : ""}`, below: 64,
+    title: "Pose less reference pose", unit: `nats, log scale; orange speaks for the pose, blue against it${tried ? "; ◤ stored, ◢ tried" : ""}`, below: 64,
     x: categories(sources, "", { axisLabel: { interval: 0, rotate: sources.length > 5 ? 28 : 0, fontSize: 10, width: 96, overflow: "truncate" } }), y: categories(limbs, "", { inverse: true, axisLabel: { interval: 0 } }),
   });
   const rowOf = new Map(matrix.map((row) => [`${row.camera} · ${row.term}/${row.limb}`, row]));
-  const cellsOf = (list) => list.map((row) => [sources.indexOf(`${row.camera} · ${row.term}`), limbs.indexOf(row.limb), row[key] ?? "-"]);
+  const cellsOf = (list) => list.map((row) => [sources.indexOf(`${row.camera} · ${row.term}`), limbs.indexOf(row.limb), row.difference === null ? "-" : signedDecades(row.difference)]);
   sheet.splitHeat(plot, {
-    cells: cellsOf(matrix), tried: tried && cellsOf(tried.matrix), ...(hasReference ? { low: -bound, high: bound, colours: ["less", "none", "more"] } : { low, high }),
-    ends: [figure(hasReference ? bound : high), figure(hasReference ? -bound : low)], key: { left: one.left + one.width + 12, top: 40 },
+    cells: cellsOf(matrix), tried: tried && cellsOf(tried.matrix), low: -bound, high: bound, colours: ["less", "none", "more"],
+    ends: [`≥ ${MOST_NATS}`, `≤ −${MOST_NATS}`], key: { left: one.left + one.width + 12, top: 40 },
     click: ({ value }) => { const row = rowOf.get(`${sources[value[0]]}/${limbs[value[1]]}`); return { limb: row.limb === WHOLE ? null : limbGroup(row.limb), camera: row.camera || null }; },
     tip: ({ value }) => { const row = rowOf.get(`${sources[value[0]]}/${limbs[value[1]]}`); const area = areas.find((one) => one.camera === row.camera && one.limb === row.limb); return tipOf(`${row.limb}: ${sources[value[0]]}`, [["at the pose", nats(row.value)], ["at the reference", nats(row.reference)], ["difference", nats(row.difference)], ...(area ? /** @type {[string, any][]} */ ([["body outside the silhouette", `${figure(area.outside)} mm²`], ["silhouette without body", `${figure(area.bare)} mm²`]]) : [])]); },
   });
@@ -155,7 +159,7 @@ function modesOfFrame(sheet, tables, at) {
     title: "Share of the weight",
     unit: `of each mode, by layer${at.tried ? "; left stored, right tried" : ""}`,
     names: modes.map((mode) => `mode ${mode}`), y: share,
-    x: categories(layers.map((layer) => String(layer + 1)), "layer"),
+    x: layerAxis(layers, at),
   });
   for (const { name: side, tables: own } of sides) {
     modes.forEach((mode, index) => {
@@ -169,13 +173,13 @@ function modesOfFrame(sheet, tables, at) {
         data: layers.map((layer) => ({ value: rowIn(layer)?.mass ?? 0, row: rowIn(layer), layer, side })),
         click: ({ data }) => ({ layer: data.layer }),
         tip: ({ data }) =>
-          tipOf([side, `mode ${mode}, layer ${data.layer + 1}`].filter(Boolean).join(", "), [
+          tipOf([side, `mode ${mode}, ${layerInSearch(data.layer, at)}`].filter(Boolean).join(", "), [
             ["share", `${figure(100 * data.value)} %`], ["particles", data.row?.particles ?? 0],
           ]),
       });
     });
   }
-  sheet.chosen(plot, { column: at.layer === null ? null : String(at.layer + 1) });
+  sheet.chosen(plot, { column: at.layer });
   const numbersOf = distinct(all("modes").map((row) => row.mode));
   const bars = sheet.plot({ ...two, top: 0, height }, {
     title: "Last layer", unit: "share of the weight; a click draws that mode's body",

@@ -2,6 +2,8 @@
 // weight is shared out, what the clouds learnt, which parameters trade off, what the dead had wrong.
 
 import { figure, token } from "./chart_looks.js";
+import { layerAxis, layerInSearch, layerNumber, layerValue } from "./layer_axis.js";
+import { layerWords, searchName } from "./studio/shown_layers.js";
 import { layerColour } from "./theme.js";
 import {
   byLayer, categories, distinct, extent, grouped, layersOfAll, logarithmic, numbers, onScreen, screenUnit, sidesOf, tipOf, withUnit,
@@ -10,20 +12,20 @@ import {
 /** @import { Sheet } from "./view_sheet.js" */
 /**
  * What a drawing knows beside its tables. `label`: of a parameter; `room`: pixels of height that are free; `tried`: the same tables
- * of the trial that is shown, else null.
- * @typedef {{ layer: number | null, limb: string | null, parameter: string | null, particle: number | null, camera: string | null, frame: number, over: boolean,
+ * of the trial that is shown, else null. `searchLayers`, `searches`: how the frame's layers are counted.
+ * @typedef {{ searchLayers: number, searches: number, layer: number | null, limb: string | null, parameter: string | null, particle: number | null, camera: string | null, frame: number, over: boolean,
  *   layers: number, label: (name: string) => string, room: number, tried: any, score: [string, string] }} At
  * @typedef {(sheet: Sheet, tables: any, at: At) => string} Drawing fills a sheet with tables (rows by key); the exact numbers of what is chosen in a sentence
  */
 
 const ROW = 13;
 const FEW = 24;
-const layerName = (layer) => String(layer + 1);
 /** Of what is negative or nothing there is no logarithm. */
 const decades = (value) => (value > 0 ? Math.log10(value) : null);
 
 /** Columns of a map, named above it, where they are seen however long the map is. */
-const aboveMap = (names) => categories(names, "", { position: "top", axisLine: { show: false } });
+const ABOVE = { position: "top", axisLine: { show: false } };
+const aboveMap = (names) => categories(names, "", ABOVE);
 
 /** Rows of a map: parameters under their limbs, in the body's order. */
 function parameterAxis(names, at) {
@@ -70,7 +72,7 @@ function varianceOfFrame(sheet, tables, at) {
       title,
       unit: isLeft ? `share of the first layer's variance${tried ? "; ◤ stored, ◢ tried" : ""}` : "",
       below: 12,
-      x: aboveMap(layers.map(layerName)),
+      x: layerAxis(layers, at, ABOVE),
       y: isLeft ? parameterAxis(names, at) : { ...parameterAxis(names, at), axisLabel: { show: false } },
     });
     const cellsOf = (list) =>
@@ -91,7 +93,7 @@ function varianceOfFrame(sheet, tables, at) {
             .map((entry) => (entry ? figure(entry[name]) : "–"))
             .join(" → ") + ` ${unit}²`;
         const of = row ?? other;
-        return tipOf(`${at.label(parameter)}, layer ${layer + 1} of ${layers.length}`, [
+        return tipOf(`${at.label(parameter)}, ${layerWords(layer, at)}`, [
           ["as weighed", shown("weighed")], ["before noise", shown("before")],
           ["after noise", shown("after")],
           ["of the first", `${figure((100 * of[key]) / first.get(parameter))} %`],
@@ -114,7 +116,7 @@ function varianceOfFrame(sheet, tables, at) {
   const plot = sheet.plot(three, {
     title: at.label(chosen), unit: `variance, ${unit}²${at.tried ? "; dashed: after noise" : ""}`,
     names: at.tried ? sides.map(({ name }) => name) : lines.map(([name]) => name),
-    x: categories(layers.map(layerName), "layer"), y: logarithmic(), over: tipOfLayer,
+    x: layerAxis(layers, at), y: logarithmic(), over: tipOfLayer(at),
   });
   const click = ({ dataIndex }) => ({ layer: layers[dataIndex], parameter: chosen });
   for (const [name, data, colour, more] of lines)
@@ -129,15 +131,15 @@ function varianceOfFrame(sheet, tables, at) {
       : "no such layer";
     return name ? `${name}: ${what}` : what;
   });
-  return `${at.label(chosen)}, layer ${layer + 1} of ${layers.length}: ${words.join("; ")}.`;
+  return `${at.label(chosen)}, ${layerWords(layer, at)}: ${words.join("; ")}.`;
 }
 
 /** What a line is called, of one of both sides. */
 const named = (side, name) => (side ? `${side}, ${name}` : name);
 /** What stands over a layer of a plot. */
-const tipOfLayer = (points) =>
+const tipOfLayer = (/** @type {At} */ at) => (points) =>
   tipOf(
-    `layer ${points[0].axisValue}`,
+    layerInSearch(Number(points[0].axisValue) - 1, at),
     points
       .filter((point) => point.seriesName && !point.seriesName.startsWith("series"))
       .map((point) => [point.seriesName, point.data?.value ?? point.data]),
@@ -153,6 +155,9 @@ export function lastSearches(rows) {
   });
 }
 
+/** Decades to either side of a run's median that a colour tells apart: the same in every run. */
+const DECADES_BESIDE = 1.5;
+
 /** Variance of the run: parameters over the frames, and the chosen parameter as layers over frames. */
 function varianceOfRun(sheet, { last, parameter: searched }, at) {
   const parameter = lastSearches(searched);
@@ -160,13 +165,12 @@ function varianceOfRun(sheet, { last, parameter: searched }, at) {
   const names = Object.keys(last[0] ?? {}).filter((name) => name !== "frame");
   const medians = new Map(names.map((name) => { const own = last.map((row) => row[name]).filter((value) => value > 0).sort((a, b) => a - b); return [name, own[own.length >> 1] ?? 0]; }));
   const cells = last.flatMap((row, column) => names.map((name, place) => [column, place, medians.get(name) > 0 ? decades(row[name] / medians.get(name)) ?? "-" : "-"]));
-  const [low, high] = extent(cells.map((cell) => cell[2]));
-  const bound = Math.max(0.3, Math.abs(low), Math.abs(high));
+  const bound = DECADES_BESIDE;
   const height = Math.max(names.length * ROW, at.room - 60);
   const [one, two] = sheet.columns(2, { gutters: [142, 92], shares: [1.5, 1], right: 16 });
   const whole = sheet.plot({ ...one, top: 0, height }, { title: "Last set, by frame", unit: "variance beside the run's median, log scale", below: 12, x: aboveMap(frames.map(String)), y: parameterAxis(names, at) });
   sheet.heat(whole, {
-    cells, low: -bound, high: bound, colours: ["less", "none", "more"], framed: false, ends: [`${figure(10 ** bound)}×`, `÷ ${figure(10 ** bound)}`], key: { left: one.left + one.width + 10, top: 40 },
+    cells, low: -bound, high: bound, colours: ["less", "none", "more"], framed: false, ends: [`≥ ${figure(10 ** bound)}×`, `≤ ÷ ${figure(10 ** bound)}`], key: { left: one.left + one.width + 10, top: 40 },
     click: ({ value }) => ({ frame: frames[value[0]], parameter: names[value[1]] }),
     tip: ({ value }) => tipOf(`${at.label(names[value[1]])}, frame ${frames[value[0]]}`, [["variance", last[value[0]][names[value[1]]]], ["run's median", medians.get(names[value[1]])]]),
   });
@@ -174,12 +178,13 @@ function varianceOfRun(sheet, { last, parameter: searched }, at) {
   if (!parameter.length) { sheet.words("Choose a parameter: a click on its row shows it layer by layer over the frames.", two.left, 40, two.width); return ""; }
   const levels = Math.max(...parameter.map((row) => row.step)) + 1;
   const own = distinct(parameter.map((row) => row.frame));
-  const logs = parameter.map((row) => decades(row.before)).filter((value) => value !== null);
-  const [least, most] = extent(logs);
-  const plot = sheet.plot({ ...two, top: 0, height }, { title: at.label(at.parameter ?? ""), unit: "variance before noise, layers over frames", x: categories(own.map(String), "frame"), y: categories(Array.from({ length: levels }, (_, layer) => layerName(layer)), "layer", { inverse: true, nameGap: 24 }) });
+  // As in a frame's map: shares of what its first layer's set has.
+  const first = new Map(parameter.filter((row) => row.step === 0).map((row) => [row.frame, row.weighed]));
+  const shareOf = (row) => (first.get(row.frame) > 0 ? decades(row.before / first.get(row.frame)) ?? "-" : "-");
+  const plot = sheet.plot({ ...two, top: 0, height }, { title: at.label(at.parameter ?? ""), unit: "before noise, share of each first layer's variance", x: categories(own.map(String), "frame"), y: categories(Array.from({ length: levels }, (_, layer) => layerValue(layer)), "layer", { inverse: true, nameGap: 24 }) });
   sheet.heat(plot, {
-    cells: parameter.map((row) => [own.indexOf(row.frame), row.step, decades(row.before) ?? "-", row.layer]), low: least, high: most, framed: false,
-    click: ({ value }) => ({ frame: own[value[0]], layer: value[3] }), tip: ({ value }) => tipOf(`frame ${own[value[0]]}, layer ${value[1] + 1}`, [["before noise", 10 ** value[2]]]),
+    cells: parameter.map((row) => [own.indexOf(row.frame), row.step, shareOf(row), row.layer, row.before]), low: -DECADES, high: 0, framed: false,
+    click: ({ value }) => ({ frame: own[value[0]], layer: value[3] }), tip: ({ value }) => tipOf(`frame ${own[value[0]]}, layer ${value[1] + 1}`, [["before noise", value[4]], ["of the first", `${figure(100 * 10 ** value[2])} %`]]),
   });
   sheet.chosen(plot, { column: own.indexOf(at.frame), row: parameter.find((row) => row.frame === at.frame && row.layer === at.layer)?.step ?? null });
   return at.parameter ? `${at.label(at.parameter)}: last variance ${figure(last[frames.indexOf(at.frame)]?.[at.parameter])} in frame ${at.frame}, median of the run ${figure(medians.get(at.parameter))}.` : "";
@@ -189,7 +194,6 @@ function varianceOfRun(sheet, { last, parameter: searched }, at) {
 function scheduleOfFrame(sheet, tables, at) {
   const sides = sidesOf(tables, at);
   const layers = layersOfAll(sides, "layers");
-  const names = layers.map(layerName);
   const height = Math.max(120, at.room - 76);
   const places = sheet.columns(4, { gutters: 52, right: 10 });
   const click = ({ dataIndex }) => ({ layer: layers[dataIndex] });
@@ -197,8 +201,8 @@ function scheduleOfFrame(sheet, tables, at) {
   /** @param {[string, string, string, any][]} kinds name, key, colour of one side alone, style */
   const draw = (column, title, unit, y, kinds) => {
     const box = { ...places[column], top: 0, height };
-    const x = categories(names, "layer");
-    const plot = sheet.plot(box, { title, unit, x, y, over: tipOfLayer });
+    const x = layerAxis(layers, at);
+    const plot = sheet.plot(box, { title, unit, x, y, over: tipOfLayer(at) });
     for (const { name: side, tables: own, colour } of sides) {
       for (const [name, key, alone, more] of kinds) {
         const data = byLayer(own.layers, layers, key);
@@ -211,12 +215,12 @@ function scheduleOfFrame(sheet, tables, at) {
         sheet.series(plot, {
           type: "scatter", name: "alarm", symbol: "triangle", symbolSize: 9,
           itemStyle: { color: token("bad") },
-          data: alarmed.map((row) => ({ value: [layerName(row.layer), row[key]], words: row.alarm })),
+          data: alarmed.map((row) => ({ value: [layerValue(row.layer), row[key]], words: row.alarm })),
           click: ({ dataIndex }) => ({ layer: alarmed[dataIndex].layer }),
           tip: ({ data }) => tipOf("Alarm", [[data.words, ""]]),
         });
     }
-    sheet.chosen(plot, { column: at.layer === null ? null : layerName(at.layer) });
+    sheet.chosen(plot, { column: at.layer });
   };
   const asked = { dashed: true, stepped: true };
   const betas = sides.flatMap((side) => side.tables.layers.map((row) => row.beta));
@@ -238,7 +242,7 @@ function scheduleOfFrame(sheet, tables, at) {
     figure(own.layers.reduce((sum, row) => sum + (row.milliseconds ?? 0), 0)),
   );
   const plot = sheet.plot({ ...places[3], top: 0, height }, {
-    title: "Time", unit: `${spent.join(" and ")} ms in all`, x: categories(names, "layer"),
+    title: "Time", unit: `${spent.join(" and ")} ms in all`, x: layerAxis(layers, at),
     y: numbers("", { scale: false }),
   });
   for (const { name, tables: own, colour } of sides)
@@ -249,13 +253,13 @@ function scheduleOfFrame(sheet, tables, at) {
         itemStyle: { color: name ? token(colour) : layerColour(index, layers.length) },
       })),
       tip: ({ dataIndex, value }) =>
-        tipOf(named(name, `layer ${dataIndex + 1}`), [["time", `${figure(value)} ms`]]),
+        tipOf(named(name, layerInSearch(dataIndex, at)), [["time", `${figure(value)} ms`]]),
     });
-  sheet.chosen(plot, { column: at.layer === null ? null : layerName(at.layer) });
+  sheet.chosen(plot, { column: at.layer });
   if (at.tried) sheet.legend(["stored", "tried"], places[1].left + places[1].width - 110, 8, 110);
   const words = sides.map(({ name, tables: own }) => {
     const row = own.layers.find((one) => one.layer === at.layer) ?? own.layers.at(-1);
-    const what = `layer ${row.layer + 1} of ${own.layers.length}: β ${figure(row.beta)}, α asked ${figure(row.alpha_wanted)}, reached ${figure(row.alpha_reached)}, effective number ${figure(row.effective)} of ${row.particles}${Number.isFinite(row.largest) ? `, largest weight ${figure(100 * row.largest)} %` : ""}${row.alarm ? `. Alarm: ${row.alarm}` : ""}`;
+    const what = `${layerWords(row.layer, at)}: β ${figure(row.beta)}, α asked ${figure(row.alpha_wanted)}, reached ${figure(row.alpha_reached)}, effective number ${figure(row.effective)} of ${row.particles}${Number.isFinite(row.largest) ? `, largest weight ${figure(100 * row.largest)} %` : ""}${row.alarm ? `. Alarm: ${row.alarm}` : ""}`;
     return name ? `${name}: ${what}` : `L${what.slice(1)}`;
   });
   return `${words.join("; ")}.`;
@@ -295,9 +299,9 @@ function familyPlaces(rows) {
 }
 
 /** What stands at a particle of a genealogy. */
-function tipOfParticle(row, side) {
+function tipOfParticle(row, side, /** @type {At} */ at) {
   const second = row.second_parent === null ? [] : [["second parent", row.second_parent]];
-  return tipOf(named(side, `particle ${row.particle} of layer ${row.layer + 1}`), [
+  return tipOf(named(side, `particle ${row.particle} of ${layerInSearch(row.layer, at)}`), [
     ["parent", row.parent ?? "–"], .../** @type {[string, any][]} */ (second),
     ["first ancestor", row.ancestor ?? "–"], ["children", row.children],
     ["weight", `${figure(100 * row.weight)} %`], ["log weight", row.log_weight],
@@ -315,7 +319,7 @@ function genealogy(sheet, tables, at) {
   const plot = sheet.plot({ ...one, top: 0, height }, {
     title: "Particles and their parents",
     unit: "bright: has descendants in the last layer; dashed: crossover's second parent",
-    x: categories(layers.map(layerName), "layer", { axisLine: { onZero: false } }),
+    x: layerAxis(layers, at, { axisLine: { onZero: false } }),
     y: {
       type: "value", min: -0.03, max: 1.03, inverse: true, splitLine: { show: false },
       interval: 0.5 / bands, axisLine: { show: false },
@@ -366,13 +370,13 @@ function genealogy(sheet, tables, at) {
         },
       })),
       click: ({ data }) => ({ layer: data.row.layer, particle: data.row.particle }),
-      tip: ({ data: { row } }) => tipOfParticle(row, side),
+      tip: ({ data: { row } }) => tipOfParticle(row, side, at),
     });
   });
   sheet.chosen(plot, { column: at.layer });
   const count = sheet.plot({ ...two, top: 0, height }, {
     title: "Distinct ancestors", unit: "in the first set, log scale; dashed: with descendants",
-    x: categories(layers.map(layerName), "layer"), y: logarithmic("", { min: 1 }), over: tipOfLayer,
+    x: layerAxis(layers, at), y: logarithmic("", { min: 1 }), over: tipOfLayer(at),
   });
   const click = ({ dataIndex }) => ({ layer: layers[dataIndex] });
   for (const { name, tables: own, colour } of sides) {
@@ -381,15 +385,15 @@ function genealogy(sheet, tables, at) {
     sheet.line(count, named(name, "with descendants"), of("with_descendants"), quiet, { dashed: true, click });
     sheet.line(count, named(name, "ancestors"), of("ancestors"), token(colour), { click });
   }
-  sheet.chosen(count, { column: at.layer === null ? null : layerName(at.layer) });
+  sheet.chosen(count, { column: at.layer });
   const chosen = tables.particles.find(
     (row) => row.particle === at.particle && row.layer === (at.layer ?? tables.ancestors.at(-1).layer),
   );
   if (chosen && !at.tried)
-    return `Particle ${chosen.particle} of layer ${chosen.layer + 1}: parent ${chosen.parent ?? "none"}, first ancestor ${chosen.ancestor ?? "unknown"}, ${chosen.children} children, ${chosen.survives ? "has" : "has no"} descendants in the last layer.`;
+    return `Particle ${chosen.particle} of ${layerInSearch(chosen.layer, at)}: parent ${chosen.parent ?? "none"}, first ancestor ${chosen.ancestor ?? "unknown"}, ${chosen.children} children, ${chosen.survives ? "has" : "has no"} descendants in the last layer.`;
   const words = sides.map(({ name, tables: own }) => {
     const last = own.ancestors.at(-1);
-    const what = `he ${last.particles} particles of layer ${last.layer + 1} descend from ${last.ancestors} of the first set`;
+    const what = `he ${last.particles} particles of ${layerInSearch(last.layer, at)} descend from ${last.ancestors} of the first set`;
     return name ? `${name}: t${what}` : `T${what}`;
   });
   return `${words.join("; ")}.`;
@@ -402,9 +406,9 @@ function weights(sheet, tables, at) {
   const [one, two, three] = sheet.columns(3, { gutters: [60, 56, 50], shares: [1.5, 1, 1] });
   const height = Math.max(120, at.room - 76);
   const layer = tables.sorted[0]?.layer ?? at.layer ?? 0;
-  const shown = sides.map(({ tables: own }) => (own.sorted[0]?.layer ?? 0) + 1);
+  const shown = sides.map(({ tables: own }) => layerInSearch(own.sorted[0]?.layer ?? 0, at));
   const plot = sheet.plot({ ...one, top: 0, height }, {
-    title: `Weights of layer ${distinct(shown).join(" and ")}`, unit: "largest first, log scales",
+    title: `Weights of ${distinct(shown).join(" and ")}`, unit: "largest first, log scales",
     names: at.tried ? ["stored", "tried"] : null,
     x: logarithmic("rank", { min: 1, nameGap: 20 }), y: logarithmic(),
   });
@@ -426,17 +430,16 @@ function weights(sheet, tables, at) {
         ]),
     });
   }
-  const names = layers.map(layerName);
   const click = ({ dataIndex }) => ({ layer: layers[dataIndex] });
   const draw = (place, title, unit, key, y, marks = []) => {
-    const x = categories(names, "layer");
-    const drawn = sheet.plot({ ...place, top: 0, height }, { title, unit, x, y, over: tipOfLayer });
+    const x = layerAxis(layers, at);
+    const drawn = sheet.plot({ ...place, top: 0, height }, { title, unit, x, y, over: tipOfLayer(at) });
     sheet.marks(drawn, marks);
     for (const { name, tables: own, colour } of sides) {
       const data = byLayer(own.layers, layers, key);
       sheet.line(drawn, name || title.toLowerCase(), data, token(colour), { click });
     }
-    sheet.chosen(drawn, { column: at.layer === null ? null : layerName(at.layer) });
+    sheet.chosen(drawn, { column: at.layer });
   };
   draw(two, "Largest weight", "share, log scale", "largest", logarithmic());
   const most = ({ max }) => Math.max(1, Math.ceil(10 * max) / 10);
@@ -446,8 +449,8 @@ function weights(sheet, tables, at) {
   const words = sides.map(({ name, tables: own }) => {
     const now = own.sorted[0]?.layer ?? layer;
     const row = own.layers.find((entry) => entry.layer === now) ?? own.layers.at(-1);
-    const what = `ayer ${row.layer + 1}: the heaviest of ${row.particles} particles holds ${figure(100 * row.largest)} %, ${row.for_90} hold 90 %, effective number ${figure(row.effective)}, k̂ ${figure(row.k_hat)}`;
-    return name ? `${name}: l${what}` : `L${what}`;
+    const what = `${layerInSearch(row.layer, at)}: the heaviest of ${row.particles} particles holds ${figure(100 * row.largest)} %, ${row.for_90} hold 90 %, effective number ${figure(row.effective)}, k̂ ${figure(row.k_hat)}`;
+    return name ? `${name}: ${what}` : `L${what.slice(1)}`;
   });
   return `${words.join("; ")}.`;
 }
@@ -475,7 +478,7 @@ function clouds(sheet, { summary, own: steps, ridges, marks }, at) {
       return { type: "rect", shape: { x: from[0], y: from[1] - thickness / 2 + lower, width: Math.max(1, to[0] - from[0]), height: thickness, r: 2 }, style: { fill: token(colour), opacity: 0.85 } };
     },
     click: ({ data }) => ({ parameter: data.own.parameter }),
-    tip: ({ data: { own } }) => tipOf(`${at.label(own.parameter)}, layer ${own.layer + 1}`, [["median", withUnit(own.median, own.unit)], ["5 %", withUnit(own.q05, own.unit)], ["95 %", withUnit(own.q95, own.unit)], ["deviation", withUnit(own.deviation, own.unit)]]),
+    tip: ({ data: { own } }) => tipOf(`${at.label(own.parameter)}, ${layerInSearch(own.layer, at)}`, [["median", withUnit(own.median, own.unit)], ["5 %", withUnit(own.q05, own.unit)], ["95 %", withUnit(own.q95, own.unit)], ["deviation", withUnit(own.deviation, own.unit)]]),
   });
   bar("first cloud", (own) => own[0], "layer-0", 9);
   bar("last cloud", (own) => own.at(-1), tried ? "stored" : "layer-9", tried ? 3 : 4, tried ? -2 : 0);
@@ -497,11 +500,15 @@ function clouds(sheet, { summary, own: steps, ridges, marks }, at) {
   const own = order.map((set) => /** @type {[number, any[]]} */ ([set, storedSets.get(set) ?? []]));
   const { unit, lower, upper, estimate, truth } = marked.get(chosen) ?? { unit: "" };
   const [least, greatest] = extent([...ridges, ...(tried?.ridges ?? [])].map((row) => row.value));
-  const nameOf = (set) => (set < 0 ? "drawn" : layerName(set));
+  const nameOf = (set) => (set < 0 ? "drawn" : layerNumber(set, at));
   const plot = sheet.plot({ ...two, top: 0, height: Math.max(90, at.room - 66) }, {
     title: at.label(chosen), unit: `${screenUnit(unit)}, density of each layer's set`, x: numbers("", { scale: false, min: onScreen(least, unit), max: onScreen(greatest, unit), axisLabel: { formatter: (value) => figure(value), hideOverlap: true, showMinLabel: false, showMaxLabel: false } }),
     y: { ...numbers("", {}), scale: false, min: 0, max: own.length, interval: 1, axisLabel: { formatter: (value) => (own[own.length - 1 - value] ? nameOf(own[own.length - 1 - value][0]) : "") }, splitLine: { show: false } },
   });
+  // Where a search begins, above its first layer's set; the first set as drawn belongs to the first search.
+  const starts = own.flatMap(([set], index) => (at.searches > 1 && set >= 0 && set % at.searchLayers === 0 ? [{ y: own.length - (set ? index : 0), word: searchName(set / at.searchLayers), dashed: true }] : []));
+  sheet.marks(plot, starts);
+  const setName = (set) => (set < 0 ? "drawn" : layerValue(set));
   own.forEach(([set, stored], index) => { for (const [side, rows] of [stored, triedSets.get(set) ?? []].entries()) {
     if (!rows.length) continue;
     const base = own.length - 1 - index;
@@ -510,14 +517,14 @@ function clouds(sheet, { summary, own: steps, ridges, marks }, at) {
     const colour = tried ? token(side ? "tried" : "stored") : alone;
     const dim = at.layer !== null && at.layer !== set;
     sheet.series(plot, {
-      name: side ? named("tried", nameOf(set)) : nameOf(set), type: "custom", z: 2 + 2 * index + side, encode: { x: 0, y: 1 }, data: [[onScreen(rows[0].value, unit), base]], clip: false,
+      name: side ? named("tried", setName(set)) : setName(set), type: "custom", z: 2 + 2 * index + side, encode: { x: 0, y: 1 }, data: [[onScreen(rows[0].value, unit), base]], clip: false,
       renderItem: (_params, api) => {
         const points = rows.map((row) => api.coord([onScreen(row.value, unit), base + (1.15 * row.density) / most]));
         const ends = [api.coord([onScreen(rows.at(-1).value, unit), base]), api.coord([onScreen(rows[0].value, unit), base])];
         return { type: "polygon", shape: { points: [...points, ...ends] }, style: { fill: colour, opacity: dim ? 0.18 : tried ? 0.45 : 0.6, stroke: colour, lineWidth: dim ? 0.5 : 1.4 } };
       },
       click: () => ({ layer: Math.max(0, set), parameter: chosen }),
-      tip: () => { const row = (side ? tried.own : steps).find((entry) => entry.layer === Math.max(0, set) && Boolean(entry.weighted) === set >= 0); return tipOf(`${at.label(chosen)}, ${set < 0 ? "first set as drawn" : `layer ${set + 1}`}`, [["mean", withUnit(row?.mean, unit)], ["deviation", withUnit(row?.deviation, unit)], ["median", withUnit(row?.median, unit)]]); },
+      tip: () => { const row = (side ? tried.own : steps).find((entry) => entry.layer === Math.max(0, set) && Boolean(entry.weighted) === set >= 0); return tipOf(`${at.label(chosen)}, ${set < 0 ? "first set as drawn" : layerInSearch(set, at)}`, [["mean", withUnit(row?.mean, unit)], ["deviation", withUnit(row?.deviation, unit)], ["median", withUnit(row?.median, unit)]]); },
     });
   } });
   const near = (value) => Number.isFinite(value) && value >= least && value <= greatest;
@@ -565,7 +572,8 @@ function coupling(sheet, { matrix, order, particles }, at) {
     });
   });
   if (!partners.length) sheet.words("Nothing moves together with this parameter.", two.left, 40, two.width);
-  return `${at.label(chosen)} against ${partners.slice(0, 3).map((name) => `${at.label(name)} (${figure(pairs.find((row) => [row.first, row.second].includes(name) && [row.first, row.second].includes(chosen))?.correlation)})`).join(", ")}.`;
+  const withChosen = (list, name) => figure(list.find((row) => row.first !== row.second && [name, chosen].includes(row.first) && [name, chosen].includes(row.second))?.correlation);
+  return `${at.label(chosen)} against ${partners.slice(0, 3).map((name) => `${at.label(name)} (${withChosen(matrix, name)}${tried ? `, tried ${withChosen(tried.matrix, name)}` : ""})`).join(", ")}.`;
 }
 
 const MOST_AXES = 14;

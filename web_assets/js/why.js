@@ -5,6 +5,7 @@ import { fetchJson, frameView, patch, readOnly, runPath, runView } from "./api.j
 import { figure as figureWords } from "./chart_looks.js";
 import { button, byId, element, fill, hint } from "./elements.js";
 import { Figure } from "./figure.js";
+import { countedIn, onOneAxis } from "./layer_axis.js";
 import { onEvent } from "./live.js";
 import { complain, say } from "./messages.js";
 import { paced } from "./pacing.js";
@@ -132,10 +133,12 @@ function draw() {
     frame.remedies?.length > 0 && [element("h3", {}, "What may help"), element("div", { className: "remedies" }, frame.remedies.map(remedyCard))]);
   words.scrollTop = kept;
   const tablesOf = (answers) => Object.fromEntries([...answers.frame.tables, ...answers.run.tables].map((table) => [table.name, records(table)]));
-  const tables = tablesOf({ frame, run });
+  const onAxis = (answers) => answers && { tables: tablesOf(answers), counted: countedIn(answers.frame, Math.max(1, layersShown())) };
+  const axis = onOneAxis(onAxis({ frame, run }), onAxis(tried));
   figure.show({
     name: [get("session"), get("run"), `frame${frame.frame}`, "why"].join("-"), title: "Limbs and frames", question: "Which limb, from when on?", caption: frame.caption, notes: frame.notes,
-    tables: [...frame.tables, ...run.tables], choose: select, link: () => addressOf(), draw: (sheet, room) => drawLimbs(sheet, tables, { frame: get("frame"), limb: get("limb"), layer: get("layer"), tried: tried && tablesOf(tried) }, room),
+    tables: [...frame.tables, ...run.tables], choose: (changes) => select(Number.isInteger(changes.layer) ? { ...changes, layer: axis.back(changes.layer) } : changes),
+    link: () => addressOf(), draw: (sheet, room) => drawLimbs(sheet, axis.stored, { ...axis.counted, frame: get("frame"), limb: get("limb"), layer: axis.there(get("layer")), tried: axis.tried }, room),
   });
 }
 
