@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from studio.scene.model import LiveSearch, Model
+from studio.scene.viewpoint import is_browsers_own
 
 CHOSEN = ("limb", "parameter", "particle", "camera", "look_through", "eye")
 SEEN = ("frame", "layer", *CHOSEN)
@@ -19,8 +20,6 @@ ECHO_SECONDS, ECHO_METRES = 3.0, 0.02
 """How long, and how nearly, a browser may answer with the place that it was put to."""
 
 Eye = tuple[float, ...]
-BROWSERS_OWN: Eye = (3.0, 3.0, 3.0, 0.0, 0.0, 0.0)
-"""Where viser's page stands until it is put somewhere, metres."""
 
 
 def following(model: Model, leader: Model) -> Model:
@@ -70,7 +69,7 @@ class Places:
 
     def is_echo(self, eye: Eye) -> bool:
         """Whether a viewer is only where it was put, or where its browser began."""
-        if np.allclose(eye, BROWSERS_OWN, atol=1e-6):
+        if is_browsers_own(eye):
             return True
         since = time.monotonic() - ECHO_SECONDS
         return any(

@@ -194,13 +194,19 @@ function varianceOfRun(sheet, { last, parameter: searched }, at) {
 function scheduleOfFrame(sheet, tables, at) {
   const sides = sidesOf(tables, at);
   const layers = layersOfAll(sides, "layers");
-  const height = Math.max(120, at.room - 76);
-  const places = sheet.columns(4, { gutters: 52, right: 10 });
+  const isNarrow = sheet.width < NARROW;
+  const whole = Math.max(120, at.room - 76);
+  const height = isNarrow ? Math.max(100, (at.room - 152) / 2) : whole;
+  const columns = sheet.columns(isNarrow ? 2 : 4, { gutters: 52, right: 10 });
+  const places = [0, 1, 2, 3].map((place) => ({
+    ...columns[place % columns.length],
+    top: place < columns.length ? 0 : height + 76,
+  }));
   const click = ({ dataIndex }) => ({ layer: layers[dataIndex] });
   const has = (key) => sides.some((side) => side.tables.layers.some((row) => row[key] !== null));
   /** @param {[string, string, string, any][]} kinds name, key, colour of one side alone, style */
   const draw = (column, title, unit, y, kinds) => {
-    const box = { ...places[column], top: 0, height };
+    const box = { ...places[column], height };
     const x = layerAxis(layers, at);
     const plot = sheet.plot(box, { title, unit, x, y, over: tipOfLayer(at) });
     for (const { name: side, tables: own, colour } of sides) {
@@ -241,7 +247,7 @@ function scheduleOfFrame(sheet, tables, at) {
   const spent = sides.map(({ tables: own }) =>
     figure(own.layers.reduce((sum, row) => sum + (row.milliseconds ?? 0), 0)),
   );
-  const plot = sheet.plot({ ...places[3], top: 0, height }, {
+  const plot = sheet.plot({ ...places[3], height }, {
     title: "Time", unit: `${spent.join(" and ")} ms in all`, x: layerAxis(layers, at),
     y: numbers("", { scale: false }),
   });
