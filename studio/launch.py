@@ -6,7 +6,7 @@ import os
 import re
 import socket
 import threading
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType, MappingProxyType
@@ -20,6 +20,7 @@ from studio.errors import StudioError
 from studio.foreign_files import read_text
 from studio.jobs.commands import Open, about
 from studio.jobs.control import StudioControl
+from studio.jobs.send_addresses import VARIABLE, addresses_from_environment
 from studio.runs.samples import install_prepared_runs, install_sample
 from studio.server.access import HostRule, binding_rule, new_token
 from studio.sessions.atomic_files import write_text
@@ -79,16 +80,21 @@ def serve(
     *,
     first: Callable[[], Opening] | None = None,
     name: str = "",
+    send_poses: Sequence[str] = (),
     announce: Announce = click.echo,
 ) -> None:
     """Serve the studio on a workspace until Ctrl-C.
 
     port : 0 takes a free one. first : what the printed address shows; its run is opened and made ready at once.
     announce : called once with the addresses (`printed`). name : the host name of a proxy with TLS before the studio,
-    which is served at https://NAME/ then. Raises StudioError for a host that needs `allow_remote`, a port that is
-    taken, or a workspace that cannot be written.
+    which is served at https://NAME/ then. send_poses : addresses (`jobs.send_addresses`) to which live runs send
+    their poses. Raises StudioError for one that is none, a host that needs `allow_remote`, a port that is taken, or a
+    workspace that cannot be written.
     """
     hosts = binding_rule(host, allow_remote, name)
+    if send_poses:
+        os.environ[VARIABLE] = ",".join(send_poses)
+        addresses_from_environment()
     workspace = Workspace(workspace_root)
     log_path = _log_to_file(workspace.root / STATE_NAME)
     token, viewers_token = new_token(), new_token()

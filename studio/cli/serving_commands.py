@@ -43,9 +43,21 @@ def demo_command(workspace: Path | None, port: int, as_json: bool) -> None:
 @click.option("--port", type=click.IntRange(0, 65535), default=PORT, show_default=True, help=PORT_HELP)
 @click.option("--allow-remote", is_flag=True, help="Needed for any host but this machine.")
 @click.option("--name", default="", help="Host name of a proxy with TLS before the studio.")
+@click.option(
+    "--send",
+    metavar="ADDRESS",
+    multiple=True,
+    help="Where poses of live runs are sent: osc://HOST:PORT (VMC), ws://HOST:PORT (JSON); again for more.",
+)
 @click.option("--json", "as_json", is_flag=True, help=JSON_HELP)
 def serve_command(
-    workspace: Path | None, host: str, port: int, allow_remote: bool, name: str, as_json: bool
+    workspace: Path | None,
+    host: str,
+    port: int,
+    allow_remote: bool,
+    name: str,
+    send: tuple[str, ...],
+    as_json: bool,
 ) -> None:
     """Open the studio on a workspace: prints the address to open, and one for those who may only look."""
     with errors_in_words():
@@ -55,5 +67,6 @@ def serve_command(
             port=port,
             allow_remote=allow_remote,
             name=name,
+            send_poses=send,
             announce=_announcer(as_json),
         )

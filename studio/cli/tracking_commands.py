@@ -102,7 +102,9 @@ def live_command(call: Call, resume: str | None, again: str | None) -> dict[str,
         raise RunError("Live cameras have no footage to begin in, repeat or go on with.", "Leave that out.")
     if again:
         return _replayed(session, call.do(replay, run=session.run(again), name=call.given.get("name", "")))
-    done: TrackedLive = call.do(resume_live, run=session.run(resume)) if resume else call()
+    done: TrackedLive = (
+        call.do(resume_live, run=session.run(resume), send=call.given["send"]) if resume else call()
+    )
     found, run = done.summary, done.run
     result: dict[str, object] = {
         **_which(run),

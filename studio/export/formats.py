@@ -11,10 +11,13 @@ from studio.export.bvh_writing import write_bvh
 from studio.export.glb_writing import write_glb
 from studio.export.marker_files import write_c3d_file, write_cameras, write_trc_file
 from studio.export.mot_file import write_mot
+from studio.export.nwb_writing import write_nwb
 from studio.export.options import ExportOptions
 from studio.export.overlay_video import write_videos
+from studio.export.sleap_writing import write_sleap
 from studio.export.table_files import write_csv, write_npz, write_parquet
 from studio.export.task import Writer
+from studio.export.usd_writing import write_usd
 from studio.knobs import knobs_of
 from studio.registry import Registry
 
@@ -64,6 +67,16 @@ _OWN = (
         media_type="model/gltf-binary",
     ),
     ExportFormat(
+        "usd",
+        "USD animated body",
+        "Opens in Houdini, Omniverse, Unreal, Blender and usdview; skeleton, cones and motion. Needs the extra usd.",
+        (*FRAMES, "names", "rest"),
+        write_usd,
+        unit="m",
+        up="y",
+        media_type="model/vnd.usd",
+    ),
+    ExportFormat(
         "trc",
         "TRC markers",
         "Opens in OpenSim and Pose2Sim; points over time, gaps left blank.",
@@ -93,8 +106,9 @@ _OWN = (
     ExportFormat(
         "csv",
         "CSV table",
-        "Opens in any spreadsheet, R and pandas; a row a frame with every angle and point.",
-        (*POINTS, "angles"),
+        "Opens in any spreadsheet, R and pandas; a row a frame with every angle and point. Or as DeepLabCut and anipose"
+        " write points (layout).",
+        (*POINTS, "angles", "layout"),
         write_csv,
         unit="mm",
         up="z",
@@ -117,6 +131,26 @@ _OWN = (
         write_npz,
         unit="mm",
         up="z",
+    ),
+    ExportFormat(
+        "nwb",
+        "NWB pose estimates",
+        "Opens in movement, pynwb and DANDI (ndx-pose); points, skeleton and confidence. Needs the extra labs.",
+        POINTS,
+        write_nwb,
+        unit="mm",
+        up="z",
+        media_type="application/x-hdf5",
+    ),
+    ExportFormat(
+        "h5",
+        "SLEAP analysis file",
+        "Opens in movement and keypoint-moseq, as SLEAP's analysis.h5 with three coordinates. Needs the extra labs.",
+        POINTS,
+        write_sleap,
+        unit="mm",
+        up="z",
+        media_type="application/x-hdf5",
     ),
     ExportFormat(
         "mp4",

@@ -12,58 +12,16 @@ import pygltflib as gltf
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from studio.arrays import Array, Indices
-from studio.body.model import Limb
+from studio.arrays import Array
 from studio.export.glb_reading import Packing, read_glb
 from studio.export.naming import joint_names
 from studio.export.options import Axes
 from studio.export.skeleton import Skeleton, skeleton_of
+from studio.export.skinned_cones import cones_at_rest, standing_at_rest
 from studio.export.task import INTERPOLATED, ExportTask, Written, agreed, apart, turned_apart
 from studio.motion_files.recorded_motion import followed
 from studio.runs.colour_tokens import colour_tokens
 
-SECTIONS = 24
-
-
-def cone(limb: Limb) -> tuple[Array, Array, Indices]:
-    """Vertices (V, 3) mm and outward normals (V, 3) in the limb's frame, and faces (T, 3), counter-clockwise as seen
-    from outside: a side with smooth normals and two flat caps with rims of their own.
-    """
-    turn = np.linspace(0.0, 2.0 * np.pi, SECTIONS, endpoint=False)
-    rim = np.column_stack([limb.scale_x * np.cos(turn), limb.scale_y * np.sin(turn), np.zeros(SECTIONS)])
-    top, up = np.array([0.0, 0.0, limb.length]), np.sign(limb.length)
-    near, far = limb.radius_start * rim, limb.radius_end * rim + top
-    vertices = np.concatenate([near, far, near, np.zeros((1, 3)), far, top[None]])
-    down = np.tile([0.0, 0.0, -up], (SECTIONS + 1, 1))
-    normals = np.concatenate([_sides(limb, turn, 0.0), _sides(limb, turn, 1.0), down, -down])
-    here = np.arange(SECTIONS)
-    after, first, second = np.roll(here, -1), 2 * SECTIONS, 3 * SECTIONS + 1
-    near_hub, far_hub = np.full(SECTIONS, first + SECTIONS), np.full(SECTIONS, second + SECTIONS)
-    faces = np.concatenate(
-        [
-            np.column_stack([here, after, after + SECTIONS]),
-            np.column_stack([here, after + SECTIONS, here + SECTIONS]),
-            np.column_stack([near_hub, first + after, first + here]),
-            np.column_stack([far_hub, second + here, second + after]),
-        ]
-    )
-    # A limb of negative length is the same cone mirrored along z: its faces turn the other way round.
-    return vertices, normals, faces if limb.length > 0.0 else faces[:, ::-1]
-
-
-def _sides(limb: Limb, turn: Array, share: float) -> Array:
-    """(sections, 3) unit normals of the side at a share of the length: across both tangents of the surface there."""
-    radius = limb.radius_start + share * (limb.radius_end - limb.radius_start)
-    around = np.column_stack([-limb.scale_x * np.sin(turn), limb.scale_y * np.cos(turn), np.zeros(len(turn))])
-    slope = (limb.radius_end - limb.radius_start) / limb.length
-    along = np.column_stack(
-        [slope * limb.scale_x * np.cos(turn), slope * limb.scale_y * np.sin(turn), np.ones(len(turn))]
-    )
-    across = np.cross(around * max(radius, 1.0), along)
-    return across / np.linalg.norm(across, axis=1, keepdims=True)
-
-
-SIDES = ("left", "right", "middle")
 AXES = Axes("m", "y")
 ROUGH = 0.8
 
@@ -81,7 +39,7 @@ def write_glb(task: ExportTask) -> Written:
         scene=0,
         scenes=[gltf.Scene(nodes=[0])],
     )
-    standing = _standing(skeleton)
+    standing = standing_at_rest(skeleton)
     _add_nodes(document, skeleton, names, standing)
     _add_skin(document, packing, skeleton, standing)
     _add_mesh(document, packing, skeleton, standing)
@@ -103,14 +61,6 @@ def smooth_quaternions(turns: Array) -> Array:
     same = np.sum(quaternions[1:] * quaternions[:-1], axis=-1) >= 0.0
     signs = np.cumprod(np.where(same, 1.0, -1.0), axis=0)
     return np.concatenate([quaternions[:1], quaternions[1:] * signs[..., None]])
-
-
-def _standing(skeleton: Skeleton) -> Array:
-    """(J, 3) mm where the joints are at rest, the body's lowest point on the floor if it stands in a T-pose."""
-    places = skeleton.rest_pivots
-    tips = [place + end for place, end in zip(places, skeleton.ends, strict=True) if end is not None]
-    lowest = min(point[2] for point in (*places, *tips))
-    return places - np.array([0.0, 0.0, lowest if skeleton.kind == "T-pose" else 0.0])
 
 
 def _add_nodes(document: gltf.GLTF2, skeleton: Skeleton, names: tuple[str, ...], standing: Array) -> None:
@@ -137,39 +87,20 @@ def _add_skin(document: gltf.GLTF2, packing: Packing, skeleton: Skeleton, standi
 
 def _add_mesh(document: gltf.GLTF2, packing: Packing, skeleton: Skeleton, standing: Array) -> None:
     """The cones in the rest pose, a primitive for each side's colour."""
-    pivots, frames = (part[0] for part in skeleton.tree.placed(skeleton.body.neutral[None]))
-    origins = skeleton.tree.origins(skeleton.body.neutral[None])[0]
     tokens = colour_tokens(dark=True)
     primitives: list[gltf.Primitive] = []
-    for side in SIDES:
-        vertices, normals, joints, faces = list[Array](), list[Array](), list[Indices](), list[Indices]()
-        count = 0
-        for limb in (limb for limb in skeleton.body.drawn if limb.side == side):
-            joint = skeleton.tree.whole[limb.joint]
-            points, outwards, triangles = cone(limb)
-            shift = frames[joint].T @ (origins[joint] - pivots[joint])
-            vertices.append((points + shift) @ skeleton.turns[joint].T + standing[joint])
-            normals.append(outwards @ skeleton.turns[joint].T)
-            joints.append(np.full(len(points), joint))
-            faces.append(triangles + count)
-            count += len(points)
-        if not count:
-            continue
+    for part in cones_at_rest(skeleton, standing):
         attributes = gltf.Attributes(
-            POSITION=packing.add(
-                AXES.points(np.concatenate(vertices)), gltf.VEC3, gltf.ARRAY_BUFFER, bounds=True
-            ),
-            NORMAL=packing.add(np.concatenate(normals) @ AXES.turn.T, gltf.VEC3, gltf.ARRAY_BUFFER),
-            JOINTS_0=packing.add(_first_of_four(np.concatenate(joints)), gltf.VEC4, gltf.ARRAY_BUFFER, "u2"),
-            WEIGHTS_0=packing.add(_first_of_four(np.ones(count)), gltf.VEC4, gltf.ARRAY_BUFFER),
+            POSITION=packing.add(AXES.points(part.points), gltf.VEC3, gltf.ARRAY_BUFFER, bounds=True),
+            NORMAL=packing.add(part.normals @ AXES.turn.T, gltf.VEC3, gltf.ARRAY_BUFFER),
+            JOINTS_0=packing.add(_first_of_four(part.joints), gltf.VEC4, gltf.ARRAY_BUFFER, "u2"),
+            WEIGHTS_0=packing.add(_first_of_four(np.ones(len(part.points))), gltf.VEC4, gltf.ARRAY_BUFFER),
         )
-        indices = packing.add(
-            np.concatenate(faces).reshape(-1, 1), gltf.SCALAR, gltf.ELEMENT_ARRAY_BUFFER, "u4"
-        )
+        indices = packing.add(part.faces.reshape(-1, 1), gltf.SCALAR, gltf.ELEMENT_ARRAY_BUFFER, "u4")
         primitives.append(
             gltf.Primitive(attributes=attributes, indices=indices, material=len(document.materials))
         )
-        document.materials.append(_material(side, tokens[f"limb-{side}"]))
+        document.materials.append(_material(part.side, tokens[f"limb-{part.side}"]))
     document.meshes.append(gltf.Mesh(name="cones", primitives=primitives))
     document.nodes.append(gltf.Node(name="cones", mesh=0, skin=0))
     document.scenes[0].nodes.append(len(document.nodes) - 1)  # pyright: ignore[reportOptionalMemberAccess]

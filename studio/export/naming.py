@@ -3,6 +3,7 @@
 The maps are data (`name_maps/*.toml`). A body that lacks a point is exported without it, and that is reported.
 """
 
+import itertools
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -53,6 +54,30 @@ class Points:
         """(N, M, 3) mm in the world."""
         frames = joint_frames(body, poses)[:, self.joints]
         return (frames[..., :3] @ self.offsets[..., None])[..., 0] + frames[..., 3]
+
+    def edges(self, body: BodyModel) -> tuple[tuple[int, int], ...]:
+        """Pairs of points to be joined by lines, one tree: each point with the one before it on its joint, the first of
+        a joint with the point of the nearest joint above (where no joint above has one: of any before) that lies
+        closest to where the joint begins, at the neutral pose.
+        """
+        places = self.positions(body, body.neutral[None])[0]
+        origins = joint_frames(body, body.neutral[None])[0][:, :, 3]
+        outwards = np.argsort(np.linalg.norm(self.offsets, axis=1), kind="stable")
+        carried: dict[int, list[int]] = {}
+        for point in map(int, outwards):
+            carried.setdefault(int(self.joints[point]), []).append(point)
+        found: list[tuple[int, int]] = []
+        before: list[int] = []
+        for joint, points in sorted(carried.items()):
+            found += itertools.pairwise(points)
+            above = body.joints[joint].parent
+            while above >= 0 and above not in carried:
+                above = body.joints[above].parent
+            if ends := carried.get(above, before):
+                far = [float(np.linalg.norm(places[point] - origins[joint])) for point in ends]
+                found.append((ends[int(np.argmin(far))], points[0]))
+            before = before + points
+        return tuple(found)
 
 
 @cache

@@ -68,6 +68,12 @@ class ExportOptions:
         help="Of the rotation channels, first applied last.",
     )
     angles: str = knob("degrees", choices=("degrees", "radians"), help="Of the angles in the table.")
+    layout: str = knob(
+        OWN,
+        label="table layout",
+        choices=(OWN, "deeplabcut", "anipose"),
+        help="Of the CSV: the studio's own, with angles; or points alone, as DeepLabCut's or anipose's tools read it.",
+    )
     split: bool = knob(False, help="More frames than the format counts go into several files.")
     camera: str = knob("", help="Only this camera's video; none: one video a camera.")
     height: int = knob(

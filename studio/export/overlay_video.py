@@ -11,6 +11,7 @@ from studio.errors import ExportError, NotFoundError
 from studio.export.task import ExportTask, Written
 from studio.runs.overlay_pictures import compose_view
 from studio.sessions.names import free_name, name_from
+from studio.words import counted
 
 QUALITY = "21"
 PRESET = "veryfast"
@@ -43,7 +44,11 @@ def write_videos(task: ExportTask) -> Written:
     for place, size in zip(files, sizes, strict=True):
         _read_back(place, size, count)
     plain = int((~task.motion.known).sum())
-    notes = [f"{plain} frames show the picture alone: no pose, or the body was lost."] if plain else []
+    notes = (
+        [f"The picture stands alone in {counted(plain, 'frame')}: no pose, or the body was lost."]
+        if plain
+        else []
+    )
     noun = "video reads" if len(files) == 1 else "videos read"
     return Written(tuple(files), f"{len(files)} {noun} back with {count} frames each", tuple(notes))
 

@@ -5,7 +5,8 @@
 import csv
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from studio.arrays import Array, read_archive
 from studio.body.forward_kinematics import joint_frames
 from studio.errors import ExportError
 from studio.export.marker_files import marked_points, point_notes
+from studio.export.naming import Points
 from studio.export.task import ExportTask, Written, agreed, apart
 from studio.runs.notes import notes_by_frame
 
@@ -27,9 +29,11 @@ ROWS_A_STEP = 500
 
 def write_csv(task: ExportTask) -> Written:
     """One row a frame: number, time, state, confidence, the pose's entries, the points, and the note on the frame where
-    the run has notes. The heads name the units.
+    the run has notes. The heads name the units. Other layouts hold the points alone.
     """
     points, places = marked_points(task)
+    if task.options.layout in LAYOUTS:
+        return _write_points(task, points, places, LAYOUTS[task.options.layout])
     motion, options = task.motion, task.options
     poses = np.where(motion.known[:, None], motion.poses, np.nan)
     angle = motion.body.angles
@@ -60,6 +64,63 @@ def write_csv(task: ExportTask) -> Written:
     if options.up == "y":
         notes.append("The pose's entries stay those of the world, z up; the points are turned.")
     return Written((task.place,), checked, (*notes, *point_notes(task, points, "empty cells")))
+
+
+@dataclass(frozen=True, slots=True)
+class PointTable:
+    """heads, rows : of cells. first, step : column of the first point's x, and so many from point to point."""
+
+    heads: list[list[str]]
+    rows: list[list[str]]
+    first: int
+    step: int
+
+
+def _deeplabcut(task: ExportTask, points: Points, converted: Array) -> PointTable:
+    """Three rows of heads, then a row a frame."""
+    names = [name for name in points.names for _ in "xyz"]
+    heads = [["scorer", *["capture studio"] * len(names)], ["bodyparts", *names]]
+    heads.append(["coords", *"xyz" * len(points.names)])
+    numbers = (f"{frame:.12g}" for frame in task.motion.frames)
+    rows = [
+        [number, *map(_cell, row)]
+        for number, row in zip(numbers, converted.reshape(len(converted), -1), strict=True)
+    ]
+    return PointTable(heads, rows, 1, 3)
+
+
+def _anipose(task: ExportTask, points: Points, converted: Array) -> PointTable:
+    """For each point its place, reprojection error (none here), number of cameras and score; then the frame."""
+    parts = ("x", "y", "z", "error", "ncams", "score")
+    heads = [f"{name}_{part}" for name in points.names for part in parts] + ["fnum"]
+    cameras = str(len(task.run.cameras()))
+    rows: list[list[str]] = []
+    for at, places in enumerate(converted):
+        score = _cell(task.motion.confidence[at])
+        cells = [cell for place in places for cell in (*map(_cell, place), "", cameras, score)]
+        rows.append([*cells, f"{task.motion.frames[at]:.12g}"])
+    return PointTable([heads], rows, 0, len(parts))
+
+
+LAYOUTS = {"deeplabcut": _deeplabcut, "anipose": _anipose}
+
+
+def _write_points(
+    task: ExportTask, points: Points, places: Array, layout: Callable[[ExportTask, Points, Array], PointTable]
+) -> Written:
+    table = layout(task, points, task.axes.points(places))
+    task.step("writing", 0, 2)
+    with task.place.open("w", newline="", encoding="utf-8") as stream:
+        csv.writer(stream).writerows(table.heads + table.rows)
+    task.step("reading back", 1, 2)
+    with task.place.open(newline="", encoding="utf-8") as stream:
+        rows = list(csv.reader(stream))[len(table.heads) :]
+    columns = [table.first + table.step * at + axis for at in range(len(points.names)) for axis in range(3)]
+    numbers = [[float(row[column] or math.nan) for column in columns] for row in rows]
+    read = task.axes.points_back(np.array(numbers).reshape(places.shape))
+    checked = agreed(task.place, apart(read, places))
+    note = f"{len(points.names)} points in {task.options.unit}, {task.options.up.upper()} up."
+    return Written((task.place,), checked, (note, *point_notes(task, points, "empty cells")))
 
 
 def write_parquet(task: ExportTask) -> Written:

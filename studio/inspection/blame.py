@@ -12,7 +12,13 @@ import numpy as np
 from studio.arrays import Array
 from studio.body.scale import scale_of
 from studio.evidence.distance_maps import silhouettes_by_camera
-from studio.inspection.likelihoods import FrameEvaluation, evaluation_of, limbs_swapped
+from studio.inspection.likelihoods import (
+    NATS_SCALE,
+    FrameEvaluation,
+    evaluation_of,
+    limbs_swapped,
+    nats_scale,
+)
 from studio.inspection.reading import InspectedFrame
 from studio.inspection.reference import true_pose
 from studio.inspection.tables import Found, Row, Selection, View, table
@@ -78,6 +84,7 @@ VIEW = View(
             ("y", "y", "px"),
             ("cost", "Cost, 0 to 1"),
         ),
+        NATS_SCALE,
     ),
     evaluates=True,
 )
@@ -164,6 +171,7 @@ def rows(frame: InspectedFrame, selection: Selection) -> Found:
             ],
             "areas": _areas(frame, evaluation, pose),
             "samples": _samples(frame, evaluation, pose, selection.camera) if selection.camera else [],
+            "scale": [nats_scale(run)],
         },
         (f"The pose is compared with: {reference.kind}.",),
     )

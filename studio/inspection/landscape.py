@@ -11,7 +11,7 @@ import numpy as np
 
 from studio.arrays import Array
 from studio.errors import NotFoundError
-from studio.inspection.likelihoods import FrameEvaluation, evaluation_of, named_pose
+from studio.inspection.likelihoods import NATS_SCALE, FrameEvaluation, evaluation_of, named_pose, nats_scale
 from studio.inspection.modes import modes_of
 from studio.inspection.reading import InspectedFrame, no_value
 from studio.inspection.reference import true_pose
@@ -79,6 +79,7 @@ VIEW = View(
             ("from", "First"),
             ("to", "Last"),
         ),
+        NATS_SCALE,
     ),
     evaluates=True,
 )
@@ -227,6 +228,7 @@ def rows(frame: InspectedFrame, selection: Selection) -> Found:
                     marks.items(), evaluation.log_weights(np.stack(list(marks.values()))), strict=True
                 )
             ],
+            "scale": [nats_scale(run)],
             "ends": [
                 (name, unit, float(first), float(last))
                 for name, unit, first, last in zip(run.names, run.units, *ends, strict=True)

@@ -1,5 +1,6 @@
 """The likelihood of a stored frame, evaluated again on its evidence; sources of the runs last looked at stay open."""
 
+import math
 import threading
 import time
 from collections import OrderedDict
@@ -12,6 +13,7 @@ from studio.arrays import Array
 from studio.errors import NotFoundError
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.inspection.reading import InspectedFrame, InspectedRun
+from studio.inspection.tables import Row, table
 from studio.likelihood.problem import (
     POOLED,
     WHOLE,
@@ -27,6 +29,14 @@ KEPT = 2
 """Runs whose footage, backgrounds and last frames are kept open."""
 REST_SECONDS = 60.0
 """Those that nobody has looked at for so long are closed."""
+NATS_SCALE = table(
+    "scale",
+    "Colours of maps of log weights",
+    ("level", "Level", "nats"),
+    ("most", "Last colour, also beyond", "nats"),
+)
+TIMES_LEVEL = 100.0
+"""Times the level: where the colours of maps of log weights end."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,6 +122,17 @@ def limbs_swapped(run: InspectedRun, pose: Array, other: Array) -> tuple[tuple[s
     groups = np.array(run.limbs)
     names = tuple(dict.fromkeys(run.limbs))
     return names, np.stack([np.where(groups == name, other, pose) for name in names])
+
+
+def nats_scale(run: InspectedRun) -> Row:
+    """The row of NATS_SCALE, the same in all frames of a run. The level changes a weight of the last layer by about e:
+    1 / β there, in the run's first frame as it is stored, to the nearest power of ten; 1 for a tracker without β.
+    """
+    frames = run.frames()
+    with run.run.results() as results:
+        beta = results.layers(frames[0])[-1].beta if frames else math.nan
+    level = 10.0 ** round(-math.log10(beta)) if math.isfinite(beta) and beta > 0.0 else 1.0
+    return (level, TIMES_LEVEL * level)
 
 
 def named_pose(frame: InspectedFrame, name: str, particle: int | None, layer: int) -> Array:

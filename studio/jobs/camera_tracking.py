@@ -12,6 +12,7 @@ from studio.capture.camera_addresses import CameraAddress
 from studio.errors import RunError, StudioError
 from studio.jobs.camera_readers import CameraReaders
 from studio.jobs.live_tracking import track_live
+from studio.jobs.send_addresses import SendAddress
 from studio.jobs.set_recording import SetRecording, SetStanding
 from studio.progress import Progress
 from studio.runs.live_summary import LiveSummary
@@ -37,13 +38,15 @@ class TrackedCameras:
 class LiveRecordingRequest:
     """into : where the session is made. seconds : at most, None for an hour. fps : sets a second, 0 as measured.
 
-    keep_start : the person begins in the session's start pose; else that is searched in the first set.
+    keep_start : the person begins in the session's start pose; else that is searched in the first set. send_to : where
+    poses are sent; None: as the environment says.
     """
 
     into: Path
     seconds: float | None = None
     fps: float = 0.0
     keep_start: bool = True
+    send_to: Sequence[SendAddress] | None = None
 
 
 def open_recording(base: Session, readers: CameraReaders, request: LiveRecordingRequest) -> SetRecording:
@@ -94,7 +97,7 @@ def track_cameras(
             raise
         said = _Words(recording, report)
         try:
-            summary = track_live(recording.session, made, said)
+            summary = track_live(recording.session, made, said, send_to=request.send_to)
         finally:
             session = recording.close()
     return TrackedCameras(session, session.run(made.name), summary, recording.standing)

@@ -1,6 +1,9 @@
 """A live run tracked in this process, for commands and scripts; Ctrl-C ends it and keeps what is done."""
 
+from collections.abc import Sequence
+
 from studio.jobs.open_live_run import MakeSource, OpenLiveRun
+from studio.jobs.send_addresses import SendAddress
 from studio.progress import Progress
 from studio.runs.live_replay import Comparison, compare, replay
 from studio.runs.live_summary import LiveSummary, summary_of
@@ -11,15 +14,19 @@ from studio.sessions.stored_run import StoredRun
 
 
 def track_live(
-    session: Session, run: StoredRun, report: Progress, make_source: MakeSource | None = None
+    session: Session,
+    run: StoredRun,
+    report: Progress,
+    make_source: MakeSource | None = None,
+    send_to: Sequence[SendAddress] | None = None,
 ) -> LiveSummary:
     """Track a prepared or interrupted live run until its last frame has come.
 
-    make_source : of its sets; None: its footage at its own rate. Raises StudioError; KeyboardInterrupt is passed on
-    after the run was marked as cancelled.
+    make_source : of its sets; None: its footage at its own rate. send_to : as `OpenLiveRun` takes it. Raises
+    StudioError; KeyboardInterrupt is passed on after the run was marked as cancelled.
     """
     record = run.record
-    opened = OpenLiveRun(str(session.path), str(run.folder), make_source)
+    opened = OpenLiveRun(str(session.path), str(run.folder), make_source, send_to)
     try:
         opened.tracking.mark_going_on()
         report("getting ready", 0, record.frame_count)

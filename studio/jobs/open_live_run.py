@@ -2,11 +2,13 @@
 
 import gc
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from studio.capture.frame_clock import Arrival, LiveSource, ReplayClock
 from studio.jobs.open_run import OpenRun
+from studio.jobs.pose_sending import PoseSender
+from studio.jobs.send_addresses import SendAddress, addresses_from_environment
 from studio.numba_in_threads import numba
 from studio.runs.live_problems import LiveProblems, Ready
 from studio.runs.live_run import LiveRun
@@ -107,15 +109,23 @@ class OpenLiveRun(OpenRun):
     """One live run, opened for tracking. Its clock runs from one `step_layer` to `rest`.
 
     make_source : of its sets, for (run, number of cameras); by default those of a recording in progress, else its
-    footage is replayed at its own rate.
+    footage is replayed at its own rate. send_to : where its poses are sent; None: as the environment says.
     """
 
     makes_ahead = False
 
-    def __init__(self, session_folder: str, run_folder: str, make_source: MakeSource | None = None) -> None:
+    def __init__(
+        self,
+        session_folder: str,
+        run_folder: str,
+        make_source: MakeSource | None = None,
+        send_to: Sequence[SendAddress] | None = None,
+    ) -> None:
         self._make_source = make_source or source_of
         self._pipeline: LivePipeline | None = None
         super().__init__(session_folder, run_folder)
+        addresses = addresses_from_environment() if send_to is None else send_to
+        self._sender = PoseSender(addresses, self.stored.record, self.stored.body()) if addresses else None
 
     @property
     def warmed_as(self) -> str:
@@ -133,7 +143,10 @@ class OpenLiveRun(OpenRun):
         """Do the next layer of the frame at hand, else of the newest that is ready; None where none is."""
         if self.live.between_frames and not self._take():
             return None
-        return self.live.step_layer()
+        stepped = self.live.step_layer()
+        if self._sender is not None and stepped.result is not None:
+            self._sender.send(stepped.result)
+        return stepped
 
     def rest(self) -> None:
         """Let no pictures come."""
@@ -144,6 +157,8 @@ class OpenLiveRun(OpenRun):
     def close(self) -> None:
         """Save the search where it stands and release files, pictures and threads."""
         self.rest()
+        if self._sender is not None:
+            self._sender.close()
         try:
             super().close()
         finally:

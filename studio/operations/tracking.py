@@ -1,6 +1,6 @@
 """Tracking: from footage or live cameras, gone on with, again without the clock, corrected."""
 
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +25,7 @@ from studio.errors import RunError, SettingsError, StudioError
 from studio.jobs.batch import BatchResult, track_to_end
 from studio.jobs.camera_tracking import LiveRecordingRequest, track_cameras
 from studio.jobs.live_tracking import replay_live, track_live
+from studio.jobs.send_addresses import SendAddress, send_address
 from studio.jobs.set_recording import SetStanding
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.operations.footage import Cameras, addresses_of
@@ -124,6 +125,16 @@ def _reporting(run: StoredRun, progress: Reporting, how_far: Callable[[], str]) 
         raise
 
 
+SendTo = Annotated[
+    Sequence[str],
+    Field(
+        description="Where the poses are sent as they are found: osc://HOST:PORT (VMC) or ws://HOST:PORT (JSON to who"
+        " connects there); without a host this machine."
+    ),
+    Terminal("--send", "ADDRESS"),
+]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackedLive:
     """A live run that was tracked. summary : which frames came, how fast. standing : of the cameras, where there were
@@ -171,6 +182,7 @@ def live(
         ),
         Terminal("--keep-start/--seek-start"),
     ] = True,
+    send: Annotated[SendTo, Web(left_out=True)] = (),
     progress: Reporting = None,
 ) -> TrackedLive:
     """Track a session as its pictures come: at the footage's own rate, dropping frames rather than falling behind.
@@ -181,6 +193,7 @@ def live(
 
     Raises StudioError.
     """
+    send_to = _send_addresses(send)
     opened = open_session(session)
     options = {
         "tracker": tracker,
@@ -198,7 +211,7 @@ def live(
             raise RunError(
                 "Live cameras have no footage to begin in, repeat or go on with.", "Leave that out."
             )
-        request = LiveRecordingRequest(_place(opened, into), seconds, keep_start=keep_start)
+        request = LiveRecordingRequest(_place(opened, into), seconds, keep_start=keep_start, send_to=send_to)
         with reporting(progress, request.into.name) as report:
             found = track_cameras(opened, addresses_of(cameras), request, options, report)
         _say_notes(found.run, progress)
@@ -211,17 +224,19 @@ def live(
     with reporting(progress, f"{opened.name}: getting ready") as report:
         last = last_of(opened, first, seconds, repeat)
         run = prepare_run(opened, **options, first=first, last=last, ping_pong=repeat, progress=report)  # pyright: ignore[reportArgumentType]
-    return resume_live(run, progress=progress)
+    return resume_live(run, send=send, progress=progress)
 
 
 @operation
-def resume_live(run: RunName, *, progress: Reporting = None) -> TrackedLive:
+def resume_live(
+    run: RunName, *, send: Annotated[SendTo, Web(left_out=True)] = (), progress: Reporting = None
+) -> TrackedLive:
     """Go on with a live run that was ended."""
     stored = open_run(run)
     _say_notes(stored, progress)
     opened = session_of(stored)
     with _reporting(stored, progress, lambda: live_words(summary_of(stored))) as report:
-        return TrackedLive(opened, stored, track_live(opened, stored, report))
+        return TrackedLive(opened, stored, track_live(opened, stored, report, send_to=_send_addresses(send)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -382,6 +397,10 @@ def _tracked(run: StoredRun, result: BatchResult | None) -> Tracked:
         result.evaluations_per_frame if result else 0,
         result.last_beta if result else float("nan"),
     )
+
+
+def _send_addresses(send: Sequence[str]) -> tuple[SendAddress, ...] | None:
+    return tuple(map(send_address, send)) or None
 
 
 def live_words(found: LiveSummary) -> str:

@@ -106,20 +106,22 @@ def level_by_silhouettes(
 
 def use_level_world(session: Session, level: LevelWorld) -> CalibrationChange:
     """Make it the session's; the calibration before is kept. Raises SessionError while a run is being tracked."""
+    return replace_calibration(session, level_calibration(session, level))
+
+
+def level_calibration(session: Session, level: LevelWorld) -> NewCalibration:
+    """The session's calibration in a levelled world."""
     source = session.manifest.calibration_source
     note = (
         f"The world was levelled by {level.how}: turned by {level.tilted:.1f} degrees, the old origin lies"
         f" {level.lowered:.0f} mm above the floor."
     )
-    return replace_calibration(
-        session,
-        NewCalibration(
-            level.cameras,
-            f"{source.split(LEVELLED)[0]}{LEVELLED}{level.how}",
-            matching=session.manifest.matching,
-            notes=(note,),
-            floor=level.how,
-        ),
+    return NewCalibration(
+        level.cameras,
+        f"{source.split(LEVELLED)[0]}{LEVELLED}{level.how}",
+        matching=session.manifest.matching,
+        notes=(note,),
+        floor=level.how,
     )
 
 

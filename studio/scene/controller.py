@@ -218,7 +218,7 @@ class SceneController:
         eye = (*map(float, camera.position), *map(float, camera.look_at))
         if self._twin is None:
             self.viewers.looking = camera
-        elif not self._places.is_echo(eye):
+        elif not self._places.is_echo(eye) and (self._is_leading or self._places.is_reached):
             self.viewers.looking = camera
             self._twin.put_viewers(eye)
 
@@ -386,7 +386,7 @@ class SceneController:
             volume_made=lambda: self.post(lambda model: replace(model)),
             failed=lambda problem: self.post(self._fail, problem),
         )
-        self.views.look_at_person(move_viewers=not same_place)
+        self.views.look_at_person(move_viewers=self._is_leading and not same_place)
         subject = subject_of(found)
         self.handles = PoseHandles(self._server, subject.dragger, self.post)
         if found.results is not None and not found.results.is_checked():
@@ -439,6 +439,7 @@ class SceneController:
                 self._twin.post(self._twin._bring_along)
             return model
 
+        self._places = Places()
         self.post(place)
         client.camera.on_update(self._sees)
 

@@ -11,7 +11,6 @@ from dataclasses import replace
 import numpy as np
 
 from studio.scene.model import LiveSearch, Model
-from studio.scene.viewpoint import is_browsers_own
 
 CHOSEN = ("limb", "parameter", "particle", "camera", "look_through", "eye")
 SEEN = ("frame", "layer", *CHOSEN)
@@ -58,20 +57,28 @@ def show_trial(model: Model, trial: LiveSearch) -> Model:
 
 
 class Places:
-    """Where a scene's viewers were put lately, to tell their own moves from the browsers' answers."""
+    """Where a scene's viewers were put lately, to tell their own moves from the browsers' answers.
+
+    is_reached : whether they stood where they were put; what they said before was not of their own choice.
+    """
 
     def __init__(self) -> None:
         self._put: deque[tuple[float, Eye]] = deque(maxlen=128)
+        self._said: Eye | None = None
+        self.is_reached = False
 
     def note(self, eye: Eye) -> None:
         """Viewers were put there: place and what is looked at (6,) metres."""
         self._put.append((time.monotonic(), eye))
+        self.is_reached |= self._said is not None and _is_near(self._said, eye)
 
     def is_echo(self, eye: Eye) -> bool:
-        """Whether a viewer is only where it was put, or where its browser began."""
-        if is_browsers_own(eye):
-            return True
-        since = time.monotonic() - ECHO_SECONDS
-        return any(
-            when > since and np.allclose(eye, place, atol=ECHO_METRES) for when, place in tuple(self._put)
-        )
+        """Whether a viewer, who says that it is there, is only where it was put."""
+        self._said = eye
+        near = [when for when, place in tuple(self._put) if _is_near(eye, place)]
+        self.is_reached |= bool(near)
+        return bool(near) and near[-1] > time.monotonic() - ECHO_SECONDS
+
+
+def _is_near(eye: Eye, place: Eye) -> bool:
+    return np.allclose(eye, place, atol=ECHO_METRES)

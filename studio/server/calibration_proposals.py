@@ -20,6 +20,7 @@ from studio.capture.sanity import quarter_turns
 from studio.errors import CalibrationError, NotFoundError, StudioError
 from studio.foreign_files import read_file
 from studio.geometry.camera import Camera
+from studio.runs.levelling import LevelWorld, level_calibration
 from studio.sessions.calibration_changes import NewCalibration, fit_to_session
 from studio.sessions.session import CAMERAS_PATH, Session
 
@@ -37,7 +38,8 @@ WITHOUT_PLACES = Finding(
 class Proposal:
     """A calibration of a session, as it would be used. originals : name → content of the file it is of. pictures :
     camera → its picture of a moment of the board footage.
-    in_use : made of the session's own. clicked : the points that its floor was set by.
+    in_use : made of the session's own. clicked : the points that its floor was set by. floor : what it was set by here,
+    as text.
     """
 
     identifier: str
@@ -53,6 +55,7 @@ class Proposal:
     calibrated: Calibrated | None = None
     pictures: Mapping[str, Bytes] = field(default_factory=dict[str, Bytes])
     clicked: ClickedFloor | None = None
+    floor: str = ""
     in_use: bool = False
 
     def checked_new(self, anyway: bool) -> NewCalibration:
@@ -68,7 +71,7 @@ class Proposal:
             self.matching,
             tuple(note for note in (self.unit_note, *self.notes) if note),
             self.calibrated,
-            f"{len(self.clicked.points)} clicked points" if self.in_use and self.clicked is not None else "",
+            self.floor if self.in_use else "",
         )
 
 
@@ -156,6 +159,20 @@ def proposal_in_use(session: Session) -> Proposal:
     )
 
 
+def level_proposal(session: Session, found: LevelWorld) -> Proposal:
+    """The calibration in use, its world levelled."""
+    new = level_calibration(session, found)
+    return dataclasses.replace(
+        proposal_in_use(session),
+        identifier=secrets.token_hex(8),
+        source=new.source,
+        cameras=new.cameras,
+        findings=check_calibration(new.cameras),
+        notes=new.notes,
+        floor=new.floor,
+    )
+
+
 def with_floor(session: Session, base: Proposal, points: Sequence[Click]) -> Proposal:
     """The same cameras in the world that clicked points make; nothing is kept of `base`. Raises CalibrationError."""
     clicked = clicked_floor(Clicks(tuple(points)), base.cameras)
@@ -178,6 +195,7 @@ def with_floor(session: Session, base: Proposal, points: Sequence[Click]) -> Pro
         findings=(*blocking(findings), *(each for each in findings if each.severity != "blocks")),
         calibrated=calibrated,
         clicked=clicked,
+        floor=words,
     )
 
 

@@ -1,4 +1,4 @@
-"""Solving cameras from board footage in the background, with `calibration` events."""
+"""Solving cameras from board footage, and levelling them, in the background, with `calibration` events."""
 
 import asyncio
 from collections.abc import Mapping
@@ -12,10 +12,11 @@ from studio.calibration.board_footage_reading import find_board_footage, list_fo
 from studio.calibration.boards import Board, board_from_text
 from studio.calibration.verbs import calibrate as solve
 from studio.jobs.job_runner import Job, JobKind, NumberedJob
-from studio.operations.cameras import calibrate
+from studio.operations.cameras import calibrate, level
 from studio.progress import Progress, TimeLeft
+from studio.runs.levelling import level_by_run, level_by_silhouettes
 from studio.server.app_state import App, AppState
-from studio.server.calibration_proposals import Proposal, proposal_of_boards
+from studio.server.calibration_proposals import Proposal, level_proposal, proposal_of_boards
 from studio.server.job_routes import add_job_routes
 from studio.server.requests import Arguments, body_of
 from studio.server.safe_paths import FootagePlace, place_of
@@ -36,8 +37,8 @@ class DistanceRequest(Request):
 
 
 class SolveState(NumberedJob):
-    """How a calibration from boards stands. share: of all, about, null while unknown; seconds_left: of all; proposal:
-    what came of it.
+    """How a calibration from boards, or its levelling, stands. share: of all, about, null while unknown; seconds_left:
+    of all; proposal: what came of it.
     """
 
     share: Number = None
@@ -111,6 +112,30 @@ async def begin_solving(
 
     def work(job: Job) -> dict[str, object]:
         proposal = _solved(session, arguments, board, folders, _Progress(job, folders.recordings).report)
+        app.proposals.keep(proposal)
+        return {"proposal": proposal.identifier, "share": 1.0}
+
+    return app.jobs.begin(CALIBRATION, SolveState(session=session.name), work)
+
+
+@router.post("/sessions/{session}/calibration/level", status_code=202)
+def begin_levelling(
+    session: OpenSession,
+    arguments: Annotated[Arguments, body_of(level, "LevelRequest", only=("run",))],
+    app: App,
+) -> SolveState:
+    """Begin to find the vertical and the floor for the calibration in use: by a run's feet, else by the silhouettes.
+    Nothing is changed: what comes of it is a proposal. Ask for its state, or wait for `calibration` events.
+    """
+    run = session.run(arguments["run"]) if arguments.get("run") else None
+
+    def work(job: Job) -> dict[str, object]:
+        found = (
+            level_by_silhouettes(session, progress=job.report_or_stop)
+            if run is None
+            else level_by_run(session, run)
+        )
+        proposal = level_proposal(session, found)
         app.proposals.keep(proposal)
         return {"proposal": proposal.identifier, "share": 1.0}
 

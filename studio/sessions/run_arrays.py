@@ -3,28 +3,18 @@
 xarray is no part of the studio: `pip install "capture-studio[notebook]"` brings it.
 """
 
-import importlib
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
-from studio.errors import RunError, StudioError
+from studio.errors import RunError
+from studio.extras import load_extra
 from studio.sessions.run_record import RunRecord
 from studio.trackers.tracker import FrameResult, LayerRecord
 
 EXTRA = "notebook"
 LARGEST_BYTES = 4 << 30
-
-
-def xarray_module() -> Any:  # noqa: ANN401 - a module that need not be installed
-    """The module xarray. Raises StudioError where it is not installed."""
-    try:
-        return importlib.import_module("xarray")
-    except ImportError:
-        raise StudioError(
-            "xarray is not installed.", f"Install it: pip install 'capture-studio[{EXTRA}]'."
-        ) from None
 
 
 def particles_dataset(
@@ -40,7 +30,7 @@ def particles_dataset(
     for none; estimate (frame, parameter). What is missing is NaN or -1. Raises StudioError without xarray, RunError for
     a run without frames, or one that takes more than 4 GB: name fewer frames.
     """
-    xarray = xarray_module()
+    xarray = load_extra("xarray", EXTRA)
     whole = list(stored)
     if not whole:
         raise RunError(f"Run '{record.name}' has no finished frame.", "Track it first.")

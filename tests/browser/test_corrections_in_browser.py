@@ -92,11 +92,20 @@ def test_a_corrected_frame_is_tracked_on_and_backwards(
     window.close()
 
 
-def test_leaving_the_correction_changes_nothing(browser: Browser, studio: StudioServer) -> None:
+def test_a_correction_goes_on_after_a_reload_and_leaving_it_changes_nothing(
+    browser: Browser, studio: StudioServer
+) -> None:
     window = opened(browser, studio)
     window.key("Home")
     put_right(window, studio, "one", 0)
-    window.page.get_by_role("button", name="Leave").click()
+    # It goes on after a reload; Undo and Escape do what they say.
+    window.page.reload()
+    window.page.locator("#correcting").wait_for()
+    edited(window, lambda response: response["moved"])
+    window.page.get_by_role("button", name="Undo").click()
+    edited(window, lambda response: not response["moved"])
+    assert window.page.locator("#correcting").is_visible()
+    window.key("Escape")
     window.page.locator("#correcting").wait_for(state="hidden")
     edited(window, lambda response: not response["editing"])
     assert len(studio.get(RUN)["runs"]) == 1

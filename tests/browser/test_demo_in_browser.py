@@ -318,6 +318,7 @@ def test_the_survival_rate_is_moved_and_new_layers_are_drawn(paused: StudioPage)
     assert paused.studio.get(f"{run_path(paused)}/frames/{frame}") == stored
 
 
+@pytest.mark.slow
 def test_pictures_of_page_scene_and_charts_are_kept(paused: StudioPage, artefacts: Path) -> None:
     for theme in ("dark", "light"):
         if paused.page.evaluate("document.documentElement.dataset.theme") != theme:

@@ -98,9 +98,9 @@ def test_variance_and_schedule_are_drawn_as_stored(window: StudioPage, studio: S
             share = getattr(layers[layer], moment)[parameter] / weighed[parameter]
             assert value == pytest.approx(math.log10(share), abs=1e-9)
 
-    lines = {one["name"]: one["data"] for one in show(window, "schedule") if one["type"] == "line"}
-    assert "reached" in lines
-    series = [one["data"] for one in show(window, "schedule") if one["type"] == "line"]
+    schedule = [one for one in show(window, "schedule") if one["type"] == "line"]
+    assert "reached" in [one["name"] for one in schedule]
+    series = [one["data"] for one in schedule]
     wanted = [
         [layer.alpha_wanted for layer in layers],
         [layer.alpha_reached for layer in layers],
@@ -346,39 +346,40 @@ def test_a_view_is_taken_along_with_its_caption(window: StudioPage, studio: Stud
     assert page.locator("#paper").count() == 0
 
 
-@pytest.mark.parametrize(
-    "state",
-    [
-        {"panel": "why"},
-        {"panel": "cameras", "camera": "cam2", "through": "cam3", "frame": 2},
-        {"panel": "views", "view": "variance", "layer": 2, "parameter": "pelvis_rz"},
-        {"panel": "views", "view": "variance", "over": "run", "parameter": "pelvis_rx", "frame": 8},
-        {"panel": "views", "view": "genealogy", "layer": 1, "particle": 17},
-        {"panel": "views", "view": "landscape", "parameter": "pelvis_rz", "second": "pelvis_rx"},
-        {"panel": "views", "view": "landscape", "towards": "truth"},
-        {"panel": "views", "view": "blame", "limb": "left arm", "camera": "cam2"},
-        {"panel": "export", "eye": "1.5,2,1.2,0,0,1"},
-    ],
-    ids=lambda state: "-".join(map(str, state.values())),
+STATES = (
+    {"panel": "cameras", "camera": "cam2", "through": "cam3", "frame": 2},
+    {"panel": "views", "view": "variance", "over": "run", "parameter": "pelvis_rx", "frame": 8},
+    {"panel": "views", "view": "genealogy", "layer": 1, "particle": 17, "limb": "left arm"},
+    {"panel": "views", "view": "landscape", "parameter": "pelvis_rz", "second": "pelvis_rx"},
+    {"panel": "views", "view": "landscape", "towards": "truth", "eye": "1.5,2,1.2,0,0,1"},
 )
+
+
 def test_a_copied_address_restores_every_state(
-    browser: Browser, window: StudioPage, studio: StudioServer, state: dict[str, object]
+    browser: Browser, window: StudioPage, studio: StudioServer
 ) -> None:
+    """Whatever the page holds in its address, in another browser and after a reload."""
     nothing = dict.fromkeys(HELD[3:])
-    window.page.bring_to_front()
-    window.page.evaluate(SET, {"frame": FRAME} | nothing | state)
-    window.page.wait_for_timeout(600)
-    wanted = {name: window.get(name) for name in HELD}
-    assert {name: wanted[name] for name in state} == state
-    query = window.page.url.split("?")[1]
-    fresh = StudioPage(browser, studio, open_at=f"{studio.address}&{query}", with_scene=False)
-    fresh.until(f"get('summary')?.frames.length === {FRAMES} && get('detail')?.frame === get('frame')")
-    fresh.page.wait_for_timeout(400)
-    assert {name: fresh.get(name) for name in HELD} == wanted
-    assert fresh.page.url.split("?")[1] == query
-    fresh.page.reload()
-    fresh.until("get('detail')?.frame === get('frame')")
-    assert {name: fresh.get(name) for name in HELD} == wanted
+    fresh = StudioPage(browser, studio, with_scene=False)
+    for state in STATES:
+        window.page.bring_to_front()
+        window.page.evaluate(SET, {"frame": FRAME} | nothing | state)
+        window.page.wait_for_timeout(600)
+        wanted = {name: window.get(name) for name in HELD}
+        assert {name: wanted[name] for name in state} == state
+        query = window.page.url.split("?")[1]
+        for visit in ("copied", "reloaded") if state is STATES[-1] else ("copied",):
+            fresh.page.bring_to_front()
+            if visit == "copied":
+                fresh.page.goto(f"{studio.origin}/?{query}")
+            else:
+                fresh.page.reload()
+            fresh.until(
+                f"get('summary')?.frames.length === {FRAMES} && get('detail')?.frame === get('frame')"
+            )
+            fresh.page.wait_for_timeout(400)
+            assert {name: fresh.get(name) for name in HELD} == wanted, visit
+            assert fresh.page.url.split("?")[1] == query
     fresh.close()
 
 
@@ -472,11 +473,10 @@ def test_every_view_draws_the_trial_beside_the_stored(window: StudioPage, studio
             for at in [names.index(row["parameter"])]
         }
         assert drawn == pytest.approx(wanted, abs=1e-6)
-    lines = {str(one["name"]): one["data"] for one in show(window, "schedule") if one["type"] == "line"}
+    schedule = show(window, "schedule")
+    lines = {str(one["name"]): one["data"] for one in schedule if one["type"] == "line"}
     for key, name in (("beta", "tried"), ("alpha_reached", "tried, reached")):
-        assert [row[key] for row in tried] in [
-            one["data"] for one in show(window, "schedule") if one["name"] == name
-        ], key
+        assert [row[key] for row in tried] in [one["data"] for one in schedule if one["name"] == name], key
     assert len(lines["stored, reached"]) == more, "over the longer number of layers"
     assert lines["stored, reached"][LAYERS:] == [None] * 3
 
@@ -606,6 +606,7 @@ def test_moved_knobs_are_kept_per_run_until_they_are_put_back(
     assert studio.get(f"{RUN}/settings")["moved"] == {}
 
 
+@pytest.mark.slow
 def test_the_views_look_designed(window: StudioPage, artefacts: Path) -> None:
     page = window.page
     for theme in ("dark", "light"):

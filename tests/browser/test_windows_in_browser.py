@@ -151,6 +151,7 @@ def test_what_the_scene_said_before_it_knew_of_a_move_changes_nothing(
     until(window.page, lambda: wishes and wishes[-1]["frame"] == 0)
     number = int(str(wishes[-1]["request_number"]))
     said = {"type": "scene", "session": "left", "run": "of-left", "frame": FRAMES - 1, "follow": True}
+    said["layers"] = studio.get("/api/scene/play-layers", window.name)
     for known, frame in ((number - 1, 0), (number, FRAMES - 1)):
         event = json.dumps(said | {"request_number": known})
         window.page.evaluate("event => window.events.onmessage({ data: event })", event)
@@ -189,7 +190,7 @@ def test_the_arrows_are_the_timeline_s_wherever_the_focus_is(windows: dict[str, 
     window.until("get('frame') === 0")
     frame, view = 0, window.wire.viewer
     places = [
-        window.page.locator("#stage iframe"),
+        window.page.locator("#scene"),
         window.page.locator("[data-panel=views]"),
         window.page.locator("#theme"),
         window.page.locator("#speed"),
@@ -202,8 +203,8 @@ def test_the_arrows_are_the_timeline_s_wherever_the_focus_is(windows: dict[str, 
         if place is places[2] or place is places[3]:
             place.focus()
         else:
-            # By the mouse, as the focus comes there; the view is not dragged.
-            place.click(position={"x": min(20.0, box["width"] / 2), "y": min(60.0, box["height"] / 2)})
+            # By the mouse, as the focus comes there; the view is not dragged. The scene's tools are above.
+            place.click(position={"x": min(20.0, box["width"] / 2), "y": 0.75 * box["height"]})
         window.page.keyboard.press("ArrowRight")
         frame += 1
         window.until(f"get('frame') === {frame}")

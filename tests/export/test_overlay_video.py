@@ -52,7 +52,7 @@ def test_opencv_sees_the_body_over_the_footage(make_run, tmp_path: Path) -> None
         assert lines.sum() > 50
         near, far = (np.abs(picture.astype(float) - each)[lines].mean() for each in (wanted, other))
         assert near < 0.5 * far, frame
-    assert any("1 frames show the picture alone" in note for note in report.notes)
+    assert any("The picture stands alone in 1 frame:" in note for note in report.notes)
 
 
 def test_a_camera_that_there_is_not_is_named(make_run, tmp_path: Path) -> None:

@@ -4,11 +4,13 @@ import dataclasses
 
 import pytest
 from export_runs import MADE, moving_poses, track_of
+from store_records import layer_of, result_of
 
 from studio.export.formats import FORMATS
 from studio.export.kept_exports import export_into_run, exported_files, kept_exports, stale_export
 from studio.runs.tracks import read_track, write_track
 from studio.runs.workflow import StepStatus, export_step
+from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session
 
 
@@ -39,6 +41,8 @@ def test_a_file_older_than_its_track_is_stale(arm) -> None:
 
 def test_the_guided_setup_names_the_old_file(arm) -> None:
     session, run = arm
+    with ResultsWriter(run.folder) as writer:
+        writer.write_frame(result_of(0, layers=1), [layer_of(0, 0)])
     written = export_into_run(session, run, FORMATS["csv"], {"track": MADE})
     track = read_track(run, MADE)
     before = export_of_way(session, run)

@@ -138,7 +138,11 @@ def check_landscape(series: Series, stored: Viewed, tried: Viewed) -> None:
 def check_blame(series: Series, stored: Viewed, tried: Viewed) -> None:
     for side, answer in enumerate((stored, tried)):
         nats = answer.table("matrix").column("difference")
-        wanted = [math.copysign(math.log10(1.0 + abs(float(str(one)))), float(str(one))) for one in nats]
+        [(level, _)] = answer.table("scale").rows
+        wanted = [
+            math.copysign(math.log10(1.0 + abs(float(str(one))) / float(str(level))), float(str(one)))
+            for one in nats
+        ]
         assert cells(series, side) == pytest.approx(wanted)
 
 

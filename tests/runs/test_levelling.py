@@ -7,14 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 from nudged_camera import make_nudged_session, true_cameras
+from store_records import record_of
 
 import studio
+from studio.body.forward_kinematics import limb_ends
 from studio.calibration.extrinsics import moved_cameras
 from studio.calibration.vertical import level_world
 from studio.capture.calibration_files import read_calibration, with_up, write_calibration
 from studio.geometry.projection import project
 from studio.geometry.rigid import rigid
 from studio.runs.levelling import level_by_silhouettes
+from studio.runs.tracks import Track, write_track
 from studio.runs.workflow import calibration_step
 from studio.sessions.session import CAMERAS_PATH, Session
 
@@ -64,6 +67,27 @@ def test_clicked_points_set_the_floor(askew: Session, tmp_path: Path) -> None:
     assert tilt(session) < 0.1
     for camera in session.cameras():
         assert camera.centre[2] == pytest.approx(1700.0, abs=1.0)
+
+
+def test_the_feet_of_a_run_set_the_floor(tmp_path: Path) -> None:
+    """Somebody who stands 400 mm above z = 0 in every frame, one foot now and then in the air."""
+    session = make_nudged_session(tmp_path / "high", 0.0)
+    body = session.body()
+    poses = np.tile(body.neutral, (20, 1))
+    feet = limb_ends(body, poses).reshape(20, -1, 3)[..., 2].min()
+    poses[:, [entry.name for entry in body.parameters].index("pelvis_z")] += 400.0 - feet
+    run = session.new_run(record_of(session, "stood"))
+    states = ("tracked",) * 20
+    write_track(
+        run, Track("refined", np.arange(20), poses, np.ones(20), states, {"verb": "made", "from": "raw"})
+    )
+    found = studio.level(session, run="stood")
+    assert found.how == "the cameras' vertical and the feet of run stood"
+    assert found.lowered == pytest.approx(-400.0, abs=5.0)
+    for camera, before in zip(found.session.cameras(), true_cameras(), strict=True):
+        assert camera.centre[2] == pytest.approx(before.centre[2] - 400.0, abs=5.0)
+    with pytest.raises(studio.StudioError, match="another calibration"):
+        studio.level(found.session, run="stood")
 
 
 def test_pictures_that_are_not_level_show_no_vertical(askew: Session) -> None:

@@ -132,7 +132,11 @@ def test_a_viewer_s_place_goes_across_and_is_not_sent_back(scenes: WindowScenes)
     other.put_viewers = lambda eye: (other._places.note(eye), put.append(eye))
     back: list[tuple[float, ...]] = []
     one.put_viewers = back.append  # type: ignore[method-assign]
+    # The second scene's browser says where it begins, also while it is put elsewhere.
+    other._sees(Camera(position=np.full(3, 3.0)))  # type: ignore[arg-type]
     one._sees(Camera())  # type: ignore[arg-type]
+    other._sees(Camera(position=np.full(3, 3.0)))  # type: ignore[arg-type]
+    assert back == []
     assert put == [(0.0, 0.0, 0.0, 1.0, 1.0, 1.0)]
     other._sees(Camera(look_at=np.ones(3) + 0.005))  # type: ignore[arg-type]
     assert back == [], "a browser's answer is no move"
@@ -150,5 +154,3 @@ def test_each_keeps_what_is_its_own(control: FakeControl) -> None:
     assert (joined.selection.particle, joined.selection.layer) == (3, None)
     assert joined.options is leader.options
     assert not Places().is_echo((0.0,) * 6)
-    # A second scene's browser that opens says where it begins before it is put anywhere.
-    assert Places().is_echo((3.0, 3.0, 2.9999999999999996, 0.0, 0.0, 0.0))

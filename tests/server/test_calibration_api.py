@@ -10,13 +10,16 @@ import cv2
 import numpy as np
 import pytest
 from board_takes import BOARD, CAMERAS, FLOOR_FRAME, FLOOR_PLACE, render_takes
+from nudged_camera import make_nudged_session, true_cameras
 from waiting import PATIENCE
 from web_doubles import Studio
 
+from studio.calibration.extrinsics import moved_cameras
 from studio.capture.calibration_files import export_calibration, read_calibration, write_calibration
 from studio.geometry.projection import project
+from studio.geometry.rigid import rigid
 from studio.server import calibration_solving
-from studio.sessions.session import Session
+from studio.sessions.session import CAMERAS_PATH, Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import begin_session
 
@@ -52,13 +55,37 @@ def solved(studio: Studio, wish: dict, session: str = "fresh") -> dict:
     """The state of a calibration from boards when it has ended."""
     begun = studio.client.post(f"/api/sessions/{session}/calibration/solve", json=wish)
     assert begun.status_code == 202, begun.text
+    return ended_calibration(studio, begun.json())
+
+
+def ended_calibration(studio: Studio, begun: dict) -> dict:
+    """The state of a calibration when it has ended."""
     deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
-        response = studio.client.get(f"/api/calibrations/{begun.json()['identifier']}").json()
+        response = studio.client.get(f"/api/calibrations/{begun['identifier']}").json()
         if response["state"] not in ("queued", "running", "cancelling"):
             return response
         time.sleep(0.05)
     raise AssertionError("the calibration did not end")
+
+
+def test_a_tilted_world_is_levelled_as_a_proposal(studio: Studio) -> None:
+    session = make_nudged_session(studio.workspace.place_for("askew"), 0.0)
+    tilt = rigid(cv2.Rodrigues(np.array([np.radians(12.0), 0.0, 0.0]))[0], np.array([0.0, 0.0, 300.0]))
+    write_calibration(moved_cameras(true_cameras(), tilt), session.path / CAMERAS_PATH)
+    here = "/api/sessions/askew/calibration"
+    assert "tilted-world" in {one["code"] for one in studio.client.get(here).json()["present"]["findings"]}
+    begun = studio.client.post(f"{here}/level", json={})
+    assert begun.status_code == 202, begun.text
+    ended = ended_calibration(studio, begun.json())
+    assert ended["state"] == "done", ended
+    proposal = studio.client.get(f"{here}/proposals/{ended['proposal']}").json()
+    assert proposal["findings"] == []
+    assert "turned by 12.0 degrees" in " ".join(proposal["notes"])
+    used = studio.client.post(f"{here}/proposals/{ended['proposal']}/apply", json={}).json()
+    assert used["present"]["findings"] == []
+    assert "floor from the cameras' vertical" in used["present"]["source"]
+    assert studio.client.post(f"{here}/level", json={"run": "none"}).status_code == 404
 
 
 def decoded(content: bytes) -> np.ndarray:

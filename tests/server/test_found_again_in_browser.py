@@ -3,7 +3,7 @@
 import re
 import threading
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -17,8 +17,10 @@ from studio.operations import person
 from studio.progress import Progress
 from studio.runs.moved_knobs import keep_moved, stored_settings
 from studio.runs.new_run import prepare_run
+from studio.runs.refining import MadeTrack
 from studio.runs.subject_fitting import FitRequest, FittedSize, FittedSubject
-from studio.server import background_routes
+from studio.runs.tracks import RAW, read_track, write_track
+from studio.server import background_routes, track_routes
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.settings import values as settings_values
@@ -129,6 +131,71 @@ def test_a_fit_is_found_again_wherever_it_is_looked_for(
     save.click()
     expect(other.locator(".subject-fit")).to_contain_text("Saved.")
     assert held.begun == 2
+
+
+@pytest.fixture
+def refining(tracked: StoredRun, monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
+    """Refining goes on until this is set; then it makes the track."""
+    go = threading.Event()
+
+    def refines(run: StoredRun, *, progress: Progress, **_: object) -> MadeTrack:
+        while not go.wait(0.05):
+            progress("frame 30", 30, 100)
+        raw = read_track(run, RAW)
+        made = replace(raw, name="refined", made_by={"verb": "refine", "from": RAW})
+        write_track(run, made)
+        return MadeTrack(made, moved=2, jitter_before=3.0, jitter_after=1.5)
+
+    monkeypatch.setattr(track_routes, "refine", refines)
+    yield go
+    go.set()
+
+
+def test_a_run_s_refinement_is_found_again_and_shown_where_it_was_begun(
+    context: BrowserContext, studio: Studio, refining: threading.Event
+) -> None:
+    address = "/?session=take1&run=first"
+    page, other = opened(context, studio, address), opened(context, studio, address)
+    page.get_by_label("More for first").click()
+    page.get_by_role("menuitem", name="Refine…").click()
+    page.locator("#dialog").get_by_role("button", name="Refine", exact=True).click()
+    expect(page.locator("#dialog")).not_to_be_visible()
+    for one in (page, other):
+        expect(one.locator("#track-work")).to_contain_text("Refining of first: frame 30 · 30 %")
+    page.reload()
+    expect(page.locator("#track-work")).to_contain_text("30 %")
+    # On a page that is a document, too; from there back.
+    page.get_by_role("link", name="Bodies").click()
+    expect(page.locator("#work-list button").first).to_have_text("1 job 30 %")
+    page.go_back()
+    expect(page.locator("#track-work")).to_contain_text("30 %")
+
+    # It ends while the window that began it shows another page.
+    page.get_by_role("link", name="Bodies").click()
+    expect(page.locator("#work-list")).to_contain_text("1 job")
+    refining.set()
+    expect(other.locator("#track-work")).to_be_empty()
+    expect(other.locator("#track-choice")).to_have_value(RAW)
+    page.go_back()
+    expect(page.locator("#toasts")).to_contain_text(
+        "Track refined of first is made: 2 frames moved, jitter 3.0 → 1.5 mm a frame²."
+    )
+    expect(page.locator("#track-choice")).to_have_value("refined")
+    page.reload()
+    expect(page.locator("#track-choice")).to_have_value("refined")
+    expect(page.locator("#toasts")).to_be_empty()
+
+
+def test_refining_is_cancelled_from_another_window(
+    context: BrowserContext, studio: Studio, refining: threading.Event
+) -> None:
+    begun = studio.client.post("/api/sessions/take1/runs/first/refine", json={})
+    assert begun.status_code == 202
+    page = opened(context, studio, "/?session=take1&run=first")
+    page.locator("#track-work").get_by_role("button", name="Cancel").click()
+    expect(page.locator("#track-work")).to_be_empty()
+    state = studio.client.get(f"/api/track-jobs/{begun.json()['identifier']}").json()
+    assert state["state"] == "cancelled"
 
 
 def test_a_link_says_what_is_not_there(context: BrowserContext, studio: Studio, tracked: StoredRun) -> None:

@@ -19,7 +19,18 @@ from studio.sessions.stored_run import StoredRun
 from studio.settings import RecordingSettings
 from studio.trackers.catalogue import TRACKERS
 
-GUIDE_PAGES = ("python", "verbs", "commands", "adding", "animal", "figures", "reproduction")
+GUIDE_PAGES = (
+    "python",
+    "verbs",
+    "commands",
+    "adding",
+    "animal",
+    "formats",
+    "live-out",
+    "glossary",
+    "figures",
+    "reproduction",
+)
 
 
 def test_the_page_and_all_that_it_names_are_there(studio: Studio) -> None:
@@ -52,6 +63,9 @@ def test_every_page_is_put_together_whole(studio: Studio, address: str, title: s
     assert "{{" not in text.partition("<main")[0]
     for once in ('charset="utf-8"', 'href="/assets/page.css"', 'id="theme"', 'aria-label="Pages"'):
         assert text.count(once) == 1, once
+    # Work in the background is found again on every page: the two that are no documents show it themselves.
+    shows_work = {"/": "js/main.js", "/way": "js/setup.js"}.get(address, "js/header_of_documents.js")
+    assert (text.count('id="work-list"'), text.count(f'src="/assets/{shows_work}"')) == (1, 1)
     places = re.findall(
         r'<a href="([^"]+)"( aria-current="page")?',
         text.partition('class="places"')[2].partition("</nav>")[0],
@@ -120,7 +134,7 @@ def test_every_page_that_the_guide_refers_to_is_there(studio: Studio) -> None:
         answer = studio.client.get(place)
         assert answer.status_code == 200, place
         seen[place] = answer.text
-        left += set(re.findall(r'href="(/guide(?:/[a-z]+)?)"', answer.text)) - set(seen) - set(left)
+        left += set(re.findall(r'href="(/guide(?:/[a-z-]+)?)"', answer.text)) - set(seen) - set(left)
     assert set(seen) == {
         "/guide",
         *(f"/guide/{name}" for name in GUIDE_PAGES),

@@ -1,9 +1,10 @@
 // The address is the state: what is open, shown and chosen stands in it, so that reload, back, forward, a copied link and a
 // second window show the same.
 
-import { say } from "./messages.js";
+import { complain, say } from "./messages.js";
 import { openSession } from "./sessions.js";
 import { get, set, watch } from "./state.js";
+import { playWhenShown } from "./studio/visiting.js";
 
 const SETTLE_MILLISECONDS = 200;
 
@@ -22,6 +23,7 @@ const HELD = [
   { name: "track", kind: word, usual: "raw", step: true },
   { name: "frame", kind: count },
   { name: "layer", kind: count },
+  { name: "plays", kind: word },
   { name: "limb", kind: word },
   { name: "parameter", kind: word },
   { name: "particle", kind: count },
@@ -54,7 +56,9 @@ export function addressOf(changes = {}) {
   const searched = get("follow") && ["tracking", "compiling"].includes(get("work")?.state);
   for (const one of HELD) {
     const { name } = one;
-    const value = name in changes ? changes[name] : name === "frame" && searched ? null : get(name);
+    // Layers that play are no layer to come back to.
+    const moves = (name === "frame" && searched) || (name === "layer" && get("plays") && !("layer" in changes));
+    const value = name in changes ? changes[name] : moves ? null : get(name);
     if (value !== usualOf(one)) query.set(name, one.kind.write(value));
   }
   return `/?${query}`;
@@ -93,7 +97,7 @@ const writeNow = () => { isDue = true; writeIn(0); };
 function read() {
   restoring = true;
   const sessions = get("sessions") ?? [];
-  const { session, run: named, ...shown } = held();
+  const { session, run: named, plays, ...shown } = held();
   if (!sessions.length) return;
   const first = session === null ? sessions.find((one) => one.runs.length) ?? sessions[0] : sessions.find((one) => one.name === session);
   const isThere = first && (!named || first.runs.some((one) => one.name === named));
@@ -109,6 +113,7 @@ function read() {
     const { frame, ...rest } = more;
     set({ ...rest, ...(frame === null || frame === undefined ? {} : { frame, follow: false }) });
   } else openSession(first.name, chosen, more);
+  if (plays === "layers") playWhenShown().catch(complain);
   writeNow();
 }
 

@@ -201,7 +201,10 @@ function takeFrame(event) {
   const whole = layers.length === event.layers && layers[0].frame === event.frame;
   if (get("follow") && whole && showLive(event.frame, true)) return;
   const changes = get("follow") ? { frame: event.frame } : {};
-  if (get("detail")?.frame === event.frame) Object.assign(changes, { detail: null, whatIf: null });
+  if (get("detail")?.frame === event.frame) {
+    // What was tried of the frame before is no longer of this run.
+    Object.assign(changes, { detail: null, whatIf: null, trial: null, against: null });
+  }
   set(changes);
 }
 

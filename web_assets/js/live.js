@@ -1,7 +1,7 @@
 // What the tracking process says reaches the state here, and only here.
 
 import { listen, startEvents } from "./events.js";
-import { addLine } from "./log.js";
+import { addLine } from "./studio/log.js";
 import { say } from "./messages.js";
 import { get, set } from "./state.js";
 

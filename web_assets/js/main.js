@@ -2,18 +2,18 @@
 
 import { startAddress } from "./address.js";
 import { startCameras } from "./cameras.js";
-import { startComparing } from "./comparing.js";
-import { startCorrecting } from "./correcting.js";
+import { startComparing } from "./studio/comparing.js";
+import { startCorrecting } from "./studio/correcting.js";
 import { startCurtain } from "./studio/curtain.js";
 import { startData } from "./data.js";
-import { startExporting } from "./exporting.js";
+import { startExporting } from "./studio/exporting.js";
 import { startHeader } from "./studio/header.js";
 import { startLayerPlayback } from "./studio/layer_playback.js";
 import { startLayerStrip } from "./studio/layer_strip.js";
 import { startKeys, takeKey } from "./studio/keys.js";
 import { startLive } from "./live.js";
-import { startLog } from "./log.js";
-import { startPalette } from "./palette.js";
+import { startLog } from "./studio/log.js";
+import { startPalette } from "./studio/palette.js";
 import { startRail } from "./studio/rail.js";
 import { startMissing } from "./studio/missing.js";
 import { startNotes } from "./studio/notes.js";
@@ -22,17 +22,18 @@ import { startSceneFrame } from "./scene_frame.js";
 import { refreshSessions } from "./sessions.js";
 import { scenePointer, startSceneTools } from "./studio/scene_tools.js";
 import { startTrialCard } from "./studio/trial_card.js";
+import { startTrackWork } from "./studio/track_work.js";
 import { startTrials } from "./studio/trials.js";
 import { startTwin } from "./studio/twin.js";
 import { startTabs } from "./tabs.js";
 import { startTheme } from "./theme.js";
 import { startTimeline } from "./studio/timeline.js";
-import { startTracks } from "./tracks.js";
+import { startTracks } from "./studio/tracks.js";
 import { startViews } from "./views.js";
 import { startCourseColumn } from "./studio/course_column.js";
 import { startFirstSteps } from "./studio/first_steps.js";
 import { startScenePictures } from "./studio/scene_pictures.js";
-import { startWhy } from "./why.js";
+import { startWhy } from "./studio/why.js";
 
 async function start() {
   startTheme();
@@ -59,6 +60,7 @@ async function start() {
   startNotes();
   startData();
   startTracks();
+  startTrackWork();
   startCorrecting();
   startSceneTools();
   startCourseColumn();

@@ -4,11 +4,10 @@
 import * as echarts from "../vendor/echarts.esm.min.js";
 import { fetchJson, post, readOnly, remove } from "./api.js";
 import { actions, button, byId, card, check, drawProgress, element, failure, field, fill, hint, lead, optional, select } from "./elements.js";
-import { listen, startEvents } from "./events.js";
+import { listen } from "./events.js";
 import { drawFindings } from "./findings.js";
 import { isGoing, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
-import { startWorkList } from "./studio/work_list.js";
 import { startTheme } from "./theme.js";
 
 /** @import { Schemas } from "./api_types" */
@@ -62,8 +61,6 @@ async function drawReports() {
 
 async function start() {
   startTheme();
-  startEvents();
-  startWorkList();
   fill(byId("content"), element("div", { className: "report-column" }, runner, column));
   fill(runner, hint("The experiments are being read …"));
   known = await fetchJson("/api/reports/experiments");

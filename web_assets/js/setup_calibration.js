@@ -91,6 +91,16 @@ export function mount(place, setup) {
     } catch (error) { failed = error; draw(); }
   }
 
+  /** Turn the world of the calibration in use to the vertical, with the floor under the person by the silhouettes. */
+  async function level() {
+    failed = proposal = null;
+    try {
+      const begun = await post(`${here}/level`, {});
+      job = begun.identifier;
+      hear(begun);
+    } catch (error) { failed = error; draw(); }
+  }
+
   /** The calibration that is being computed got further. */
   async function hear(state) {
     if (gone || state.identifier !== job) return;
@@ -182,6 +192,7 @@ export function mount(place, setup) {
       element("figcaption", {}, element("b", {}, `${lens.name}: ${Math.round(100 * lens.coverage)} % covered`), residualBars(lens), element("span", {}, lens.verdict))));
     fill(setup.aside, element("div", { className: "calibrated" },
       element("div", { className: "aside-actions" }, rig.cameras.length > 1 && button("Set the floor by clicks", startClicking, "small"),
+        !proposal && view.present?.cameras.length > 1 && setup.detail.cameras.length > 0 && button("Level it", level, "small", { title: "Turn the world to the cameras' vertical and put z = 0 under the person's feet, by the silhouettes" }),
         proposal && lenses.length > 0 && setup.detail.cameras.length > 0 && button(showsBoard ? "Show the recording" : "Show the board", () => { showsBoard = !showsBoard; drawAside(); }, "small quiet")),
       rig.cameras.length > 0 && rigFromAbove(rig), element("div", { className: "pictures" }, figures),
       coverage.length > 0 && element("h2", {}, "Coverage of the board"), element("div", { className: "pictures" }, coverage)));

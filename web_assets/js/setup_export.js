@@ -2,9 +2,9 @@
 
 import { fetchJson, runPath } from "./api.js";
 import { byId, hint } from "./elements.js";
-import { startExporting } from "./exporting.js";
 import { complain } from "./messages.js";
 import { set } from "./state.js";
+import { startExporting } from "./studio/exporting.js";
 import { viewWall } from "./setup_views.js";
 
 const panel = byId("panel-export");
@@ -17,7 +17,7 @@ export function mount(place, setup) {
   place.append(which, panel);
   panel.hidden = false;
   if (!started) { startExporting(); started = true; }
-  set({ session: setup.session, run: run.name });
+  set({ session: setup.session, run: run.name, panel: "export" });
   fetchJson(`${runPath(setup.session, run.name)}/check`).then(({ usual, note }) => {
     which.textContent = `${run.name}: track "${usual}" is exported unless you choose another. ${note} Frames before the first and after the last tracked one are left out.`;
     wall.show({ run: run.name, frame: Math.max(run.first, Math.floor((run.first + run.tracked_to) / 2)), track: usual === "raw" ? "" : usual, show: "outline" });
@@ -26,7 +26,7 @@ export function mount(place, setup) {
   return () => {
     panel.hidden = true;
     document.body.append(panel);
-    set({ run: null });
+    set({ run: null, panel: null });
     wall.stop();
   };
 }

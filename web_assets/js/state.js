@@ -28,6 +28,7 @@ const values = {
   settings: null,      // the settings in use, and since when
   whatIf: null,        // layers of a re-annealed frame that is not stored
   moved: null,         // knobs that were moved and that no stored frame uses: [{label, before, after}]
+  plays: null,         // "layers" while the scene plays those of the shown frame
   trial: null,         // name of the trial that is shown, null while it has none yet
   against: null,       // name of the trial that it is compared with, null: what is stored
   trials: null,        // all that was tried of the shown frame, and the numbers of what is stored of it

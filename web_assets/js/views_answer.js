@@ -14,11 +14,8 @@ import {
 
 const nats = (value) => `${figure(value)} nats`;
 const LIMB_ROW = 18;
-/** Nats at which the colours of a map of log-likelihoods end: in every frame and run the same. */
-const MOST_NATS = 1000;
-
-/** A difference on a log scale to both sides, level between one nat less and one more. */
-const signedDecades = (value) => Math.sign(value) * Math.log10(1 + Math.abs(value));
+/** A difference on a log scale to both sides, level within `level` of nothing. */
+const signedDecades = (value, level) => Math.sign(value) * Math.log10(1 + Math.abs(value) / level);
 const WHOLE = "whole body";
 
 /** Of a line in pose space: a pose at a place of it, from its ends. */
@@ -28,7 +25,7 @@ function poseAt(ends, place, [first, last]) {
 }
 
 /** Landscape: the log weight along a line or over two parameters, at each layer's β, by camera and term. */
-function landscape(sheet, { slice, terms, tempered, plane, rug, marks, ends }, at) {
+function landscape(sheet, { slice, terms, tempered, plane, rug, marks, ends, scale }, at) {
   const unit = slice[0]?.unit ?? "";
   const isParameter = Boolean(at.parameter) && unit !== "";
   const height = Math.max(130, at.room - 76);
@@ -41,7 +38,7 @@ function landscape(sheet, { slice, terms, tempered, plane, rug, marks, ends }, a
   const ghost = (value) => ({ ghosts: [{ colour: "accent", pose: poseAt(ends, value, range) }], place: value });
   const inTried = (at.tried?.marks ?? []).filter((row) => row.name === "estimate").map((row) => ({ ...row, name: "tried" }));
   const markSpots = [...marks, ...inTried].map((row) => ({ x: put(row.at), word: row.name, colour: { truth: "truth", estimate: "text", tried: "tried" }[row.name] ?? "accent" }));
-  if (plane.length) return landscapePlane(sheet, { plane, rug, marks }, at, { unit, height, put });
+  if (plane.length) return landscapePlane(sheet, { plane, rug, marks, scale }, at, { unit, height, put });
   const [one, two, three] = sheet.columns(3, { gutters: [62, 40, 58], shares: [1.4, 1, 1.2] });
   const main = sheet.plot({ ...one, top: 0, height }, { title: "Log weight", unit: `${nameOf}; a click moves the body there`, x: x(), y: numbers(""), click: (value) => ghost(back(value)), over: (points) => tipOf(`${figure(points[0].axisValue)}${screenUnit(unit)}`, points.filter((point) => ["log weight", "stored", "tried"].includes(point.seriesName)).map((point) => [point.seriesName, nats(point.data[1])])), names: tried ? ["stored", "tried"] : null });
   const finite = slice.filter((row) => Number.isFinite(row.log_weight));
@@ -97,13 +94,13 @@ function landscape(sheet, { slice, terms, tempered, plane, rug, marks, ends }, a
 }
 
 /** The landscape over two parameters. */
-function landscapePlane(sheet, { plane, rug, marks }, at, { height, put, unit }) {
+function landscapePlane(sheet, { plane, rug, marks, scale: [{ level, most }] }, at, { height, put, unit }) {
   const [one] = sheet.columns(1, { gutters: 70, right: 110 });
   const [across, down] = [distinct(plane.map((row) => row.at)), distinct(plane.map((row) => row.second))];
   const high = Math.max(...plane.map((row) => row.log_weight).filter(Number.isFinite));
-  const below = (value) => (value === null ? "-" : -signedDecades(high - value));
+  const below = (value) => (value === null ? "-" : -signedDecades(high - value, level));
   const plot = sheet.plot({ ...one, top: 0, height }, { title: "Log weight over two parameters", unit: `${at.label(at.parameter ?? "")}, ${screenUnit(unit)}, and another`, x: categories(across.map((value) => figure(put(value))), at.label(at.parameter ?? "")), y: categories(down.map((value) => figure(value)), "") });
-  sheet.heat(plot, { cells: plane.map((row) => [across.indexOf(row.at), down.indexOf(row.second), below(row.log_weight), row.log_weight]), low: -signedDecades(MOST_NATS), high: 0, framed: false, ends: ["best", `${MOST_NATS} nats less`], key: { left: one.left + one.width + 12, top: 40 }, tip: ({ value }) => tipOf(`${figure(put(across[value[0]]))}, ${figure(down[value[1]])}`, [["log weight", nats(value[3])]]) });
+  sheet.heat(plot, { cells: plane.map((row) => [across.indexOf(row.at), down.indexOf(row.second), below(row.log_weight), row.log_weight]), low: -signedDecades(most, level), high: 0, framed: false, ends: ["best", `${nats(most)} less`], key: { left: one.left + one.width + 12, top: 40 }, tip: ({ value }) => tipOf(`${figure(put(across[value[0]]))}, ${figure(down[value[1]])}`, [["log weight", nats(value[3])]]) });
   const nearest = (values, value) => values.reduce((best, one, index) => (Math.abs(one - value) < Math.abs(values[best] - value) ? index : best), 0);
   const points = (name, rows, colour, size) => sheet.series(plot, { name, type: "scatter", symbolSize: size, itemStyle: { color: token(colour), opacity: 0.8 }, data: rows.filter((row) => Number.isFinite(row.at) && Number.isFinite(row.second)).map((row) => ({ value: [nearest(across, row.at), nearest(down, row.second)], row })), tip: ({ data: { row } }) => tipOf(row.name ?? `particle ${row.particle}`, [["log weight", nats(row.log_weight)]]) });
   points("particles", rug, "text", 3);
@@ -112,11 +109,11 @@ function landscapePlane(sheet, { plane, rug, marks }, at, { height, put, unit })
 }
 
 /** Blame: what each camera and term says of each limb, and what the answer would be without it. */
-function blame(sheet, { matrix, left_out: leftOut, areas }, at) {
+function blame(sheet, { matrix, left_out: leftOut, areas, scale: [{ level, most }] }, at) {
   const tried = at.tried;
   const limbs = distinct(matrix.map((row) => row.limb));
   const sources = distinct(matrix.map((row) => `${row.camera} · ${row.term}`));
-  const bound = signedDecades(MOST_NATS);
+  const bound = signedDecades(most, level);
   const height = Math.max(limbs.length * LIMB_ROW, at.room - 110);
   const [one, two] = sheet.columns(2, { gutters: [124, 190], shares: [1.3, 1], right: 70 });
   const plot = sheet.plot({ ...one, top: 0, height }, {
@@ -124,10 +121,10 @@ function blame(sheet, { matrix, left_out: leftOut, areas }, at) {
     x: categories(sources, "", { axisLabel: { interval: 0, rotate: sources.length > 5 ? 28 : 0, fontSize: 10, width: 96, overflow: "truncate" } }), y: categories(limbs, "", { inverse: true, axisLabel: { interval: 0 } }),
   });
   const rowOf = new Map(matrix.map((row) => [`${row.camera} · ${row.term}/${row.limb}`, row]));
-  const cellsOf = (list) => list.map((row) => [sources.indexOf(`${row.camera} · ${row.term}`), limbs.indexOf(row.limb), row.difference === null ? "-" : signedDecades(row.difference)]);
+  const cellsOf = (list) => list.map((row) => [sources.indexOf(`${row.camera} · ${row.term}`), limbs.indexOf(row.limb), row.difference === null ? "-" : signedDecades(row.difference, level)]);
   sheet.splitHeat(plot, {
     cells: cellsOf(matrix), tried: tried && cellsOf(tried.matrix), low: -bound, high: bound, colours: ["less", "none", "more"],
-    ends: [`≥ ${MOST_NATS}`, `≤ −${MOST_NATS}`], key: { left: one.left + one.width + 12, top: 40 },
+    ends: [`≥ ${figure(most)}`, `≤ −${figure(most)}`], key: { left: one.left + one.width + 12, top: 40 },
     click: ({ value }) => { const row = rowOf.get(`${sources[value[0]]}/${limbs[value[1]]}`); return { limb: row.limb === WHOLE ? null : limbGroup(row.limb), camera: row.camera || null }; },
     tip: ({ value }) => { const row = rowOf.get(`${sources[value[0]]}/${limbs[value[1]]}`); const area = areas.find((one) => one.camera === row.camera && one.limb === row.limb); return tipOf(`${row.limb}: ${sources[value[0]]}`, [["at the pose", nats(row.value)], ["at the reference", nats(row.reference)], ["difference", nats(row.difference)], ...(area ? /** @type {[string, any][]} */ ([["body outside the silhouette", `${figure(area.outside)} mm²`], ["silhouette without body", `${figure(area.bare)} mm²`]]) : [])]); },
   });
@@ -141,9 +138,9 @@ function blame(sheet, { matrix, left_out: leftOut, areas }, at) {
     name, type: "bar", barMaxWidth: 12, data: list.map((row) => ({ value: row.change, row, itemStyle: { color: token(name || ((row.change ?? 0) < 0 ? "less" : "more")), opacity: at.camera === null || at.camera === row.camera ? 1 : 0.35 } })),
     click: ({ data }) => (data.row.camera ? { camera: data.row.camera } : null), tip: ({ data: { row } }) => tipOf(nameOf(row), [["at the pose", nats(row.log_weight)], ["at the reference", nats(row.reference)], ["preference", nats(row.preference)], ["change", nats(row.change)]]),
   });
-  const [most] = shown;
+  const [strongest] = shown;
   const own = at.limb ? matrix.filter((row) => isChosenLimb(row.limb, at.limb) && (at.camera === null || row.camera === at.camera)) : [];
-  return own.length ? own.map((row) => `${row.limb}, ${row.camera} · ${row.term}: ${nats(row.value)}${row.difference === null ? "" : `, ${figure(row.difference)} beside the reference`}`).slice(0, 4).join("; ") : most ? `${nameOf(most)}: the preference for the pose changes by ${nats(most.change)}.` : "";
+  return own.length ? own.map((row) => `${row.limb}, ${row.camera} · ${row.term}: ${nats(row.value)}${row.difference === null ? "" : `, ${figure(row.difference)} beside the reference`}`).slice(0, 4).join("; ") : strongest ? `${nameOf(strongest)}: the preference for the pose changes by ${nats(strongest.change)}.` : "";
 }
 
 /** Modes of a frame: the share of the weight that each cluster of the particles holds, by layer. */

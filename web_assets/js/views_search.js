@@ -509,7 +509,7 @@ function clouds(sheet, { summary, own: steps, ridges, marks }, at) {
   const nameOf = (set) => (set < 0 ? "drawn" : layerNumber(set, at));
   const plot = sheet.plot({ ...two, top: 0, height: Math.max(90, at.room - 66) }, {
     title: at.label(chosen), unit: `${screenUnit(unit)}, density of each layer's set`, x: numbers("", { scale: false, min: onScreen(least, unit), max: onScreen(greatest, unit), axisLabel: { formatter: (value) => figure(value), hideOverlap: true, showMinLabel: false, showMaxLabel: false } }),
-    y: { ...numbers("", {}), scale: false, min: 0, max: own.length, interval: 1, axisLabel: { formatter: (value) => (own[own.length - 1 - value] ? nameOf(own[own.length - 1 - value][0]) : "") }, splitLine: { show: false } },
+    y: { ...numbers("", {}), scale: false, min: 0, max: own.length, interval: 1, axisLabel: { formatter: (value) => (own[own.length - 1 - value] ? nameOf(own[own.length - 1 - value][0]) : ""), hideOverlap: true }, splitLine: { show: false } },
   });
   // Where a search begins, above its first layer's set; the first set as drawn belongs to the first search.
   const starts = own.flatMap(([set], index) => (at.searches > 1 && set >= 0 && set % at.searchLayers === 0 ? [{ y: own.length - (set ? index : 0), word: searchName(set / at.searchLayers), dashed: true }] : []));

@@ -4,7 +4,7 @@
 import { fetchJson, post, readOnly } from "../api.js";
 import { complain } from "../messages.js";
 import { html, mount, signal, useEffect, useRef, useState } from "./component.js";
-import { playWhenShown, visit } from "./visiting.js";
+import { visit } from "./visiting.js";
 import { useKnob } from "./knob.js";
 
 const PAGES = [
@@ -40,9 +40,7 @@ function show(link, place) {
   for (const one of place.querySelectorAll(".shown")) one.classList.remove("shown");
   (link.closest("p, li") ?? link).classList.add("shown");
   const query = new URL(link.href).searchParams;
-  const plays = query.get("plays") === "layers";
   visit(Object.fromEntries(query));
-  if (plays) playWhenShown().catch(complain);
 }
 
 /** A number in a sentence, dragged or turned by the arrow keys. @param {{ name: string, words: string }} properties */

@@ -161,14 +161,12 @@ function FirstSteps() {
   </section>`;
 }
 
-/** Show the steps in their place, unless they were closed, and what the address asks for: `step`, layers that play. */
+/** Show the steps in their place, unless they were closed, at the one that the address asks for (`step`). */
 export async function startFirstSteps() {
   const asked = new URLSearchParams(location.search);
-  const plays = asked.get("plays") === "layers";
   step.value = Math.min(STEPS.length, Math.max(1, Number(asked.get("step")) || 1)) - 1;
   const place = /** @type {HTMLElement} */ (document.getElementById("first-steps"));
   mount(place, html`<${FirstSteps} />`);
-  if (plays) playWhenShown().catch(complain);
   try {
     const kept = await fetchJson("/api/preferences");
     isClosed.value = kept[PREFERENCE] === "closed";

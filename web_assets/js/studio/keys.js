@@ -1,9 +1,8 @@
 // The keyboard. One table: what it does here is what the list says.
 
 import { lookThrough } from "../cameras.js";
-import { leaveCorrecting } from "../correcting.js";
 import { openList } from "../dialogs.js";
-import { byId } from "../elements.js";
+import { correctFrame, leaveCorrecting } from "./correcting.js";
 import { leavePlayback, toggleLoop, togglePlay } from "./playback.js";
 import { enterScene } from "../scene_frame.js";
 import { goTo } from "../selection.js";
@@ -72,7 +71,7 @@ const KEYS = [
   ["t", "the view's numbers as a table, or its drawing", is("t"), toggleTable],
   ["r", "anneal this frame again", is("r"), reanneal],
   ["b", "a bookmark on this frame; its note, where it has one", is("b"), toggleBookmark],
-  ["c", "correct this frame by hand", is("c"), () => byId("correct").click()],
+  ["c", "correct this frame by hand", is("c"), correctFrame],
   ["l", "loop", is("l"), toggleLoop],
   ["s", "into the scene's panel; Escape leads back", is("s"), () => enterScene()],
   [

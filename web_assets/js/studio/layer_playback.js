@@ -5,7 +5,7 @@ import { fetchJson, post } from "../api.js";
 import { onEvent } from "../live.js";
 import { complain } from "../messages.js";
 import { select } from "../selection.js";
-import { get } from "../state.js";
+import { get, set } from "../state.js";
 import { signal } from "./component.js";
 
 /** Layers a second that are offered. */
@@ -21,6 +21,7 @@ function take(now) {
   const before = layerPlayback.value;
   if (["playing", "rate", "mode"].some((name) => now[name] !== before[name])) {
     layerPlayback.value = now;
+    set({ plays: now.playing ? "layers" : null });
   }
 }
 

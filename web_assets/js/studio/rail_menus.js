@@ -1,7 +1,6 @@
 // What can be done to a session, a run and what lies in the trash, from the rail's menus.
 
 import { fault, fetchJson, patch, post, remove, runPath, sessionPath } from "../api.js";
-import { compareForm } from "../comparing.js";
 import { openForm, openMenu } from "../dialogs.js";
 import { NAME } from "../elements.js";
 import { complain, say } from "../messages.js";
@@ -10,8 +9,9 @@ import { openSession, refreshSessions, setupPath } from "../sessions.js";
 import { startPoseForm } from "../start_pose.js";
 import { get } from "../state.js";
 import { showPanel } from "../tabs.js";
-import { makeTrackForm } from "../tracks.js";
+import { compareForm } from "./comparing.js";
 import { signal } from "./component.js";
+import { makeTrackForm } from "./track_work.js";
 
 const MOST_RESTORED = 12;
 const MOST_SHARED = 12;

@@ -12,7 +12,7 @@ import { html, mount, signal, useEffect, useSignal } from "./component.js";
 
 const PACE_MILLISECONDS = 700;
 /** What a job on a run's poses does. @type {Record<string, string>} */
-const VERBS = {
+export const VERBS = {
   refine: "refining",
   smooth: "smoothing",
   check: "check of the motion",

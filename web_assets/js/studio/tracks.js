@@ -1,0 +1,81 @@
+// The run's tracks: which one scene, charts and views show.
+
+import { fetchJson, post, runPath } from "../api.js";
+import { byId } from "../elements.js";
+import { onEvent } from "../live.js";
+import { complain, say } from "../messages.js";
+import { get, set, watch } from "../state.js";
+import { follow, html, mount, signal } from "./component.js";
+
+/** The track of the poses as searched. */
+export const RAW = "raw";
+
+/** The tracks of the run that is open. */
+const tracks = signal(/** @type {any[]} */ ([]));
+
+/** Whether the open run has a track. @param {string} name */
+export const hasTrack = (name) => tracks.value.some((track) => track.name === name);
+
+/** A track in words. @param {string} name */
+export const trackWords = (name) => (name === RAW ? "as searched" : name);
+const errorWords = ({ mean_mm: mean }) => (mean == null ? "" : ` · ${mean.toPrecision(3)} mm`);
+
+/** Which track is shown: a choice, where there is more than the search's own. */
+function TrackChoice() {
+  const shown = follow("track");
+  return html`<select
+    id="track-choice"
+    hidden=${tracks.value.length < 2}
+    aria-label="Track"
+    title="Whose poses scene, charts and views show"
+    value=${shown}
+    onChange=${({ currentTarget }) => set({ track: currentTarget.value })}
+  >
+    ${tracks.value.map(
+      (track) =>
+        html`<option key=${track.name} value=${track.name} selected=${track.name === shown}>
+          ${trackWords(track.name)}${errorWords(track)}
+        </option>`,
+    )}
+  </select>`;
+}
+
+/** Load which tracks the run has. */
+export async function loadTracks() {
+  const [session, run] = [get("session"), get("run")];
+  if (!run) {
+    tracks.value = [];
+    return;
+  }
+  try {
+    const known = await fetchJson(`${runPath(session, run)}/tracks`);
+    if (session !== get("session") || run !== get("run")) return;
+    tracks.value = known.tracks;
+    if (hasTrack(get("track"))) return;
+    const words = `${run} has no track “${get("track")}”: the poses as searched are shown.`;
+    say(words, { kind: "warning" });
+    set({ track: RAW });
+  } catch (error) {
+    if (/** @type {any} */ (error).status !== 404) complain(error);
+  }
+}
+
+/** Show the choice of the track, and let the scene follow it. */
+export function startTracks() {
+  mount(byId("track-choice-place"), html`<${TrackChoice} />`);
+  let shown = "";
+  watch(["session", "run", "parameters"], () => {
+    // Timeline and frame come first, then what is known of the run.
+    const run = `${get("session")}/${get("run")}`;
+    if (run === shown || (get("run") && !get("parameters"))) return;
+    shown = run;
+    loadTracks();
+  });
+  watch(["track"], () => {
+    if (!get("session")) return;
+    post("/api/scene/show", { options: { track: get("track") } }).catch(complain);
+  });
+  onEvent("track", (event, here) => {
+    if (here && event.state === "done" && event.track) loadTracks();
+  });
+}
