@@ -21,6 +21,13 @@ pytestmark = pytest.mark.browser
 RUNS = "/api/sessions/toy/runs"
 LINE = re.compile(r"^live · \d+\.\d fps · latency \d+ ms · \d+ dropped$")
 FRAMES = 360
+# All that the status line says from now on.
+LISTEN = """() => {
+  window.said = [];
+  const listen = () => said.push(document.getElementById("state-text").textContent);
+  const all = { subtree: true, childList: true, characterData: true };
+  new MutationObserver(listen).observe(document.getElementById("header"), all);
+}"""
 
 
 @pytest.fixture(scope="module")
@@ -33,18 +40,16 @@ def workspace(workspace: Path) -> Path:
 def test_a_live_run_is_ticked_and_says_how_it_keeps_up(browser: Browser, studio: StudioServer) -> None:
     window = StudioPage(browser, studio, open_at=f"{studio.address}&session=toy", with_scene=False)
     page = window.page
+    page.evaluate(LISTEN)
     page.locator(".session.open .new-run").click()
     page.locator("dialog form [name=name]").fill("now")
     page.locator("dialog form [name=live]").check()
     page.locator("dialog form").get_by_role("button", name="Track", exact=True).click()
-    window.until("get('run') === 'now' && get('work')?.live && get('work').state === 'tracking'")
-    words = page.locator("#state-text")
-    line = page.wait_for_function(
-        "() => { const text = document.getElementById('state-text').textContent;"
-        " return /fps · latency/.test(text) && text; }"
-    ).json_value()
-    assert LINE.match(line), line
-    window.until("get('work').state === 'finished'")
+    window.until("get('run') === 'now' && get('work')?.live && get('work').state === 'finished'")
+    words = page.locator("#state-text", has_text="finished (live)")
+    words.wait_for()
+    said = page.evaluate("said")
+    assert any(LINE.match(line) for line in said), said
     assert re.match(r"finished \(live\) · \d+ dropped$", words.inner_text())
     found = studio.get(f"{RUNS}/now/live")
     assert found["tracked"] + len(found["dropped"]) <= FRAMES

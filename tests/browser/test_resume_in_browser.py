@@ -12,7 +12,7 @@ from studio_server import StudioServer
 pytestmark = pytest.mark.browser
 
 RUNS = "/api/sessions/walk/runs"
-FRAMES, SEED = 30, 5
+FRAMES, SEED = 14, 5
 KNOBS = {"start_repeats": 2}
 # Seconds a layer until the process is killed: a frame a second, so that it dies in mid-run.
 PACE = 0.1

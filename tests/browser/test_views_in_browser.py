@@ -33,9 +33,10 @@ PLACE = """async ([place, column, row, plot]) => {
   const echarts = await import('/assets/vendor/echarts.esm.min.js');
   const chart = echarts.getInstanceByDom(document.querySelector(place));
   return chart.convertToPixel({ gridIndex: plot }, [column, row]); }"""
-FOCUS = """(at) => {
+FOCUS = """([part, at]) => {
   const links = "a[href]:not(tbody tr:nth-child(n + 4) a)";
-  const all = [...document.querySelectorAll(`${links}, button, select, input, [tabindex='0']`)];
+  const stopsOf = (place) => [...place.querySelectorAll(`${links}, button, select, input, [tabindex='0']`)];
+  const all = [...document.querySelectorAll(part)].flatMap(stopsOf);
   const stops = all.filter((stop) => stop.checkVisibility() && !stop.disabled && !stop.closest("dialog"));
   const stop = stops[at];
   if (!stop) return null;
@@ -164,6 +165,11 @@ def test_clouds_couplings_and_modes_are_drawn_as_stored(window: StudioPage, stud
             assert bar["value"] == pytest.approx(masses.get((bar["layer"], mode), 0.0))
 
 
+def in_decades(nats: float) -> float:
+    """The map's scale: logarithmic to both sides, level about nothing."""
+    return math.copysign(math.log10(1.0 + abs(nats)), nats)
+
+
 def test_landscape_and_blame_are_what_the_likelihood_says(window: StudioPage, studio: StudioServer) -> None:
     name = "pelvis_rz"
     rows = rows_of(studio, "landscape", "slice", f"?parameter={name}")
@@ -173,7 +179,7 @@ def test_landscape_and_blame_are_what_the_likelihood_says(window: StudioPage, st
     assert [point[1] for point in curve["data"]] == pytest.approx([row["log_weight"] for row in rows])
 
     (heat,) = [one for one in show(window, "blame") if one["type"] == "heatmap"]
-    wanted = [row["difference"] for row in rows_of(studio, "blame", "matrix")]
+    wanted = [in_decades(row["difference"]) for row in rows_of(studio, "blame", "matrix")]
     assert [cell[2] for cell in heat["data"]] == pytest.approx(wanted)
 
 
@@ -256,9 +262,11 @@ def test_every_view_is_used_by_the_keyboard(window: StudioPage, studio: StudioSe
     window.until(f"get('frame') === {FRAME + 1}")
 
 
-@pytest.mark.parametrize("panel", ["why", "views", "compare", "cameras", "log", "export"])
+@pytest.mark.parametrize("panel", ["why", "views", "compare", "cameras", "export"])
 def test_the_arrows_move_the_timeline_from_every_stop_of_the_keyboard(window: StudioPage, panel: str) -> None:
-    """Fields that are typed in, sliders and the list of tabs keep them. Of a table its first rows stand for all."""
+    """Fields that are typed in, sliders and the list of tabs keep them. Of a table its first rows stand for all; what
+    stands around the panels is gone through once.
+    """
     page = window.page
     page.bring_to_front()
     show(window, "variance")
@@ -268,8 +276,9 @@ def test_the_arrows_move_the_timeline_from_every_stop_of_the_keyboard(window: St
     window.until(f"get('panel') === '{panel}' && get('frame') === {FRAME}")
     page.wait_for_timeout(500)
     stops, at, frame = [], 0, FRAME
+    part = "body" if panel == "why" else f"#panel-{panel}, #tab-tools"
     while True:
-        stop = page.evaluate(FOCUS, at)
+        stop = page.evaluate(FOCUS, [part, at])
         at += 1
         if stop is None:
             break
@@ -281,7 +290,7 @@ def test_the_arrows_move_the_timeline_from_every_stop_of_the_keyboard(window: St
         moved = page.evaluate(READ_FRAME)
         assert moved == frame, (stop, key)
         stops.append(stop)
-    assert len(stops) > 20, stops
+    assert len(stops) > (20 if panel == "why" else 0), stops
     if panel == "views":
         window.key("t")
 
@@ -506,7 +515,7 @@ def test_every_view_draws_the_trial_beside_the_stored(window: StudioPage, studio
     ]
     assert [point[1] for point in curve] == pytest.approx([row["log_weight"] for row in line])
     (blamed,) = [one["data"] for one in show(window, "blame") if one["name"] == "stored and tried"]
-    wanted = [row["difference"] for row in rows_of(studio, "blame", "matrix", trial)]
+    wanted = [in_decades(row["difference"]) for row in rows_of(studio, "blame", "matrix", trial)]
     assert [cell[2] for cell in blamed if cell[3] == 1] == pytest.approx(wanted)
     masses = [bar for one in show(window, "modes") for bar in one["data"] if bar.get("side") == "tried"]
     assert {bar["layer"] for bar in masses} == set(range(more))

@@ -140,9 +140,11 @@ async function showInScene() {
   const request = plays && layer === scene.layer ? others : shown;
   scene = shown;
   requested = moves;
-  const discard = isAnew && !get("trial");
+  // A page that is loaded again begins with one scene, and without what was annealed before.
+  const anew = isAnew ? { discard: !get("trial"), twin: false } : {};
   isAnew = false;
-  await post("/api/scene/show", { ...request, eye: eyeOf(shown.eye), request_number: requested, discard }).catch(complain);
+  const moved = { ...request, eye: eyeOf(shown.eye), request_number: requested, ...anew };
+  await post("/api/scene/show", moved).catch(complain);
 }
 
 /** The scene's own controls moved, or it plays: follow them, without sending the change back. What it said before it knew of the page's own last move is old. */

@@ -14,7 +14,7 @@ import { get, set, watch } from "../state.js";
 import { showPanel } from "../tabs.js";
 import { records } from "../view_sheet.js";
 import { drawBeside } from "../views.js";
-import { drawCompared } from "./comparing_drawing.js";
+import { drawCompared, lastSearch } from "./comparing_drawing.js";
 import { follow, html, mount, signal } from "./component.js";
 import { FigurePlace } from "./figure_place.js";
 
@@ -101,14 +101,6 @@ async function load() {
     held.value = null;
     wrong.value = `${message} ${hint}`;
   }
-}
-
-/** The layers of a frame's last search, whose result the frame is, counted in it: however often the frame was searched. */
-function lastSearch({ tables, search_layers: layers, searches }) {
-  const first = layers * (searches - 1);
-  return records(tables[0])
-    .filter((row) => row.layer >= first)
-    .map((row) => ({ ...row, layer: row.layer - first, chosen: row.layer }));
 }
 
 /** The shown frame of a run; none where the run does not have it. */

@@ -2,7 +2,7 @@
 
 import { figure } from "../chart_looks.js";
 import { seriesColour } from "../theme.js";
-import { categories, distinct, logarithmic, numbers, tipOf } from "../view_sheet.js";
+import { categories, distinct, logarithmic, numbers, records, tipOf } from "../view_sheet.js";
 
 const tipOfFrame = (points) =>
   tipOf(
@@ -23,6 +23,17 @@ const layersOf = (layered) =>
       layers.filter((row) => row.effective !== null).map((row) => row.layer + 1),
     ),
   );
+
+/**
+ * The layers of a frame's last search, whose result the frame is, counted in it, however often the frame was searched.
+ * @param {any} schedule the answer of the view
+ */
+export function lastSearch({ tables, search_layers: layers, searches }) {
+  const first = layers * (searches - 1);
+  return records(tables[0])
+    .filter((row) => row.layer >= first)
+    .map((row) => ({ ...row, layer: row.layer - first, chosen: row.layer }));
+}
 
 /**
  * Draw them; the numbers of the shown frame in a sentence.

@@ -194,7 +194,6 @@ export function startTwin(takeKey) {
   // Who may only look tries nothing.
   if (readOnly) return;
   followCanvas();
-  post("/api/scene/show", { twin: false }).catch(() => {});
   effect(() => {
     const isTried = Boolean(follow("whatIf"));
     if (isTried) isNeeded.value = true;
