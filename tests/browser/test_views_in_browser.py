@@ -165,9 +165,9 @@ def test_clouds_couplings_and_modes_are_drawn_as_stored(window: StudioPage, stud
             assert bar["value"] == pytest.approx(masses.get((bar["layer"], mode), 0.0))
 
 
-def in_decades(nats: float) -> float:
-    """The map's scale: logarithmic to both sides, level about nothing."""
-    return math.copysign(math.log10(1.0 + abs(nats)), nats)
+def in_decades(nats: float, level: float) -> float:
+    """The map's scale: logarithmic to both sides, level within `level` of nothing."""
+    return math.copysign(math.log10(1.0 + abs(nats) / level), nats)
 
 
 def test_landscape_and_blame_are_what_the_likelihood_says(window: StudioPage, studio: StudioServer) -> None:
@@ -179,7 +179,9 @@ def test_landscape_and_blame_are_what_the_likelihood_says(window: StudioPage, st
     assert [point[1] for point in curve["data"]] == pytest.approx([row["log_weight"] for row in rows])
 
     (heat,) = [one for one in show(window, "blame") if one["type"] == "heatmap"]
-    wanted = [in_decades(row["difference"]) for row in rows_of(studio, "blame", "matrix")]
+    (scale,) = rows_of(studio, "blame", "scale")
+    differences = [row["difference"] for row in rows_of(studio, "blame", "matrix")]
+    wanted = [in_decades(difference, scale["level"]) for difference in differences]
     assert [cell[2] for cell in heat["data"]] == pytest.approx(wanted)
 
 
