@@ -1,16 +1,16 @@
 // What "Find" knows: all that can be opened, chosen or done, each with its words and what it does.
 
 import { fetchJson, patch, readOnly, runPath } from "../api.js";
-import { openForm } from "../dialogs.js";
+import { openForm } from "./dialogs.js";
 import { complain, say } from "../messages.js";
 import { goTo, limbGroup, range, select } from "../selection.js";
 import { openSession, setupPath } from "../sessions.js";
 import { get, set } from "../state.js";
-import { showPanel } from "../tabs.js";
 import { useTheme } from "../theme.js";
-import { allViews, saveView, showView, stepView, toggleTable } from "../views.js";
 import { chooseFormat } from "./exporting.js";
 import { commands } from "./keys.js";
+import { PANELS, showPanel } from "./panels.js";
+import { allViews, saveView, showView, stepView, toggleTable } from "./views.js";
 
 /**
  * Something that can be found. `also`: what it is found by besides.
@@ -123,6 +123,15 @@ function limbs() {
   }));
 }
 
+const parameters = () =>
+  (get("parameters") ?? []).map(({ name, label }) => ({
+    kind: "Parameter",
+    words: upper(label),
+    more: get("parameter") === name ? "chosen" : "",
+    also: name,
+    act: () => select({ parameter: name }),
+  }));
+
 /** The frame that a number names. @param {string} wanted @returns {Entry[]} */
 function frames(wanted) {
   const number = /^(?:frame\s*)?(\d{1,9})$/.exec(wanted)?.[1];
@@ -203,17 +212,13 @@ function doings() {
   ];
 }
 
-function panels() {
-  const tabs = /** @type {NodeListOf<HTMLElement>} */ (
-    document.querySelectorAll("#tabs [role=tab]")
-  );
-  return [...tabs].map((tab) => ({
+const panels = () =>
+  PANELS.map(([name, words]) => ({
     kind: "Panel",
-    words: tab.textContent,
+    words,
     more: "",
-    act: () => showPanel(tab.dataset.panel),
+    act: () => showPanel(name),
   }));
-}
 
 const views = () =>
   allViews().map((view) => ({
@@ -270,6 +275,7 @@ const KINDS = [
   doings,
   knobs,
   limbs,
+  parameters,
   notes,
   exports,
   pages,

@@ -114,18 +114,18 @@ function Palette() {
   </dialog>`;
 }
 
-function toggle() {
+/** Open it, or close it again. */
+export function togglePalette() {
   search.value = { words: "", chosen: 0 };
   isOpen.value = !isOpen.value;
 }
 
-/** Wire its key and its button. */
+/** Wire its key. */
 export function startPalette() {
   document.addEventListener("keydown", (event) => {
     if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "k") return;
     event.preventDefault();
-    toggle();
+    togglePalette();
   });
-  byId("palette-open").onclick = toggle;
   mount(byId("palette-place"), html`<${Palette} />`);
 }
