@@ -129,6 +129,15 @@ function limbs() {
   }));
 }
 
+const parameters = () =>
+  (get("parameters") ?? []).map(({ name, label }) => ({
+    kind: "Parameter",
+    words: upper(label),
+    more: get("parameter") === name ? "chosen" : "",
+    also: name,
+    act: () => select({ parameter: name }),
+  }));
+
 /** The frame that a number names. @param {string} wanted @returns {Entry[]} */
 function frames(wanted) {
   const number = /^(?:frame\s*)?(\d{1,9})$/.exec(wanted)?.[1];
@@ -272,6 +281,7 @@ const KINDS = [
   doings,
   knobs,
   limbs,
+  parameters,
   notes,
   exports,
   pages,
