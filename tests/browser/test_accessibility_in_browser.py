@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, expect
 from scene_wire import until
 from studio_page import StudioPage
 from studio_server import StudioServer
@@ -226,7 +226,10 @@ def test_every_panel_and_dialog_of_the_studio(window: StudioPage, studio: Studio
     row.hover()
     row.locator(".more").click()
     check(window, "menu")
+    page.keyboard.press("ArrowUp")
+    expect(page.get_by_role("menuitem", name="Delete…")).to_be_focused()
     page.keyboard.press("Escape")
+    expect(row.locator(".more")).to_be_focused()
 
 
 def test_every_step_of_the_guided_set_up(window: StudioPage, studio: StudioServer) -> None:

@@ -165,9 +165,11 @@ def test_clouds_couplings_and_modes_are_drawn_as_stored(window: StudioPage, stud
             assert bar["value"] == pytest.approx(masses.get((bar["layer"], mode), 0.0))
 
 
-def in_decades(nats: float) -> float:
-    """The map's scale: logarithmic to both sides, level about nothing."""
-    return math.copysign(math.log10(1.0 + abs(nats)), nats)
+def differences_drawn(studio: StudioServer, query: str = "") -> list[float]:
+    """The differences on the map's scale: logarithmic to both sides, level within `level` of nothing."""
+    (scale,) = rows_of(studio, "blame", "scale", query)
+    differences = [row["difference"] for row in rows_of(studio, "blame", "matrix", query)]
+    return [math.copysign(math.log10(1.0 + abs(one) / scale["level"]), one) for one in differences]
 
 
 def test_landscape_and_blame_are_what_the_likelihood_says(window: StudioPage, studio: StudioServer) -> None:
@@ -179,7 +181,7 @@ def test_landscape_and_blame_are_what_the_likelihood_says(window: StudioPage, st
     assert [point[1] for point in curve["data"]] == pytest.approx([row["log_weight"] for row in rows])
 
     (heat,) = [one for one in show(window, "blame") if one["type"] == "heatmap"]
-    wanted = [in_decades(row["difference"]) for row in rows_of(studio, "blame", "matrix")]
+    wanted = differences_drawn(studio)
     assert [cell[2] for cell in heat["data"]] == pytest.approx(wanted)
 
 
@@ -518,7 +520,7 @@ def test_every_view_draws_the_trial_beside_the_stored(window: StudioPage, studio
     ]
     assert [point[1] for point in curve] == pytest.approx([row["log_weight"] for row in line])
     (blamed,) = [one["data"] for one in show(window, "blame") if one["name"] == "stored and tried"]
-    wanted = [in_decades(row["difference"]) for row in rows_of(studio, "blame", "matrix", trial)]
+    wanted = differences_drawn(studio, trial)
     assert [cell[2] for cell in blamed if cell[3] == 1] == pytest.approx(wanted)
     masses = [bar for one in show(window, "modes") for bar in one["data"] if bar.get("side") == "tried"]
     assert {bar["layer"] for bar in masses} == set(range(more))

@@ -57,6 +57,19 @@ DRAW = """async ([view, of, stored, tried, selection, written]) => {
   const titles = title.map((one) => one.text);
   return JSON.parse(JSON.stringify({ words, axes: across, texts, layers, series, scales, titles, legends })); }"""
 
+COMPARE = """async ([answers, frame, chosen]) => {
+  const [{ Sheet }, { drawCompared, lastSearch }] =
+    await Promise.all(['js/view_sheet.js', 'js/studio/comparing_drawing.js'].map((name) => import('/' + name)));
+  const sheet = new Sheet(1180);
+  const runs = Object.keys(answers);
+  const layered = runs.map((run) => ({ run, layers: lastSearch(answers[run]) }));
+  const curves = runs.map((run) => ({ run, frame, error: null, log_weight: -1 }));
+  drawCompared(sheet, { curves, runs, frame, layer: chosen, layered }, 300);
+  const axis = sheet.option.xAxis[2].data;
+  const lines = sheet.option.series.filter((one) => one.xAxisIndex === 2 && one.type === 'line');
+  const click = (dataIndex) => sheet.clicks.get(lines[0].id)({ dataIndex }).layer;
+  return { axis, lines: lines.map((one) => one.data), clicked: axis.map((_, at) => click(at)) }; }"""
+
 
 class Drawings:
     """A blank page that has the pages' modules."""
@@ -90,6 +103,13 @@ class Drawings:
         )
         tables = [answered(stored), None if tried is None else answered(tried)]
         return self.page.evaluate(DRAW, [view, of, *tables, {**chosen, "frame": frame}, written])
+
+    def compare(self, answers: dict[str, Viewed], frame: int, layer: int | None = None) -> dict[str, Any]:
+        """How runs are compared layer by layer. answers : their views `schedule` of the frame. axis : the numbers of
+        the layers. lines : by run. clicked : the layer that each place of the first run chooses.
+        """
+        named = {run: answered(viewed) for run, viewed in answers.items()}
+        return self.page.evaluate(COMPARE, [named, frame, layer])
 
 
 def clouds_of(run: InspectedRun, frame: int, selection: Selection) -> Viewed:

@@ -122,6 +122,21 @@ def test_searches_of_different_lengths_stand_below_each_other(drawings: Drawings
     assert "layer 1 of 5, second search" in other["words"]
 
 
+@pytest.mark.browser
+def test_compared_runs_share_an_axis_of_one_search_s_layers(drawings: Drawings, run: InspectedRun) -> None:
+    own = look(run, 0, "schedule", Selection())
+    layers = own.table("layers")
+    # A swarm's many layers have no effective number: they do not squeeze those of the others together.
+    at = [column.key for column in layers.columns].index("effective")
+    swarm = [tuple(None if place == at else cell for place, cell in enumerate(layers.rows[0]))]
+    rows = [(layer, *swarm[0][1:]) for layer in range(57)]
+    other = replace(own, tables=(replace(layers, rows=rows),), search_layers=57, searches=1)
+    drawn = drawings.compare({"toy/one": own, "toy/swarm": other}, frame=0)
+    assert drawn["axis"] == ["1", "2", "3"]
+    assert drawn["lines"][0] == layers.column("effective")[LAYERS:]
+    assert drawn["clicked"] == [3, 4, 5]
+
+
 def looked_at(run: InspectedRun, view: str, frame: int) -> Viewed:
     """A view's tables as the page takes them together."""
     found = look(run, frame, view, Selection())

@@ -4,6 +4,7 @@ import json
 import re
 
 import pytest
+from playwright.sync_api import Browser
 from web_doubles import TOKEN, Studio
 
 from studio.comparison.findings import VERDICTS
@@ -74,6 +75,30 @@ def test_every_page_is_put_together_whole(studio: Studio, address: str, title: s
     assert [to for to, mark in places if mark] == [address]
     for asset in re.findall(r'(?:href|src)="(/assets/[^"]+)"', text):
         assert studio.client.get(asset).status_code == 200, asset
+
+
+@pytest.mark.browser
+def test_four_upright_views_are_seen_without_scrolling(browser: Browser) -> None:
+    folder = assets_folder()
+    styles = "".join((folder / name).read_text() for name in ("tokens.css", "page.css", "setup.css"))
+    upright = "data:image/svg+xml,<svg xmlns='http://www.w3.org/2000/svg' width='1080' height='1920'/>"
+    figure = f'<figure class="picture"><img src="{upright}"><figcaption><b>cam</b></figcaption></figure>'
+    body = (folder / "setup.html").read_text().partition("<body")[2].partition(">")[2]
+    page = browser.new_page(viewport={"width": 1280, "height": 800})
+    page.set_content(
+        f'<html data-theme="dark"><style>{styles}</style><body class="setup">{body}</body></html>'
+    )
+    page.evaluate(
+        "figures => { document.getElementById('aside').innerHTML = `<div class=pictures>${figures}</div>`; }",
+        4 * figure,
+    )
+    page.wait_for_function("[...document.images].every((image) => image.complete)")
+    boxes = [page.locator("#aside img").nth(at).bounding_box() for at in range(4)]
+    page.close()
+    for box in boxes:
+        assert box is not None
+        assert box["height"] > 140
+        assert box["y"] + box["height"] <= 800
 
 
 def test_modules_have_the_type_that_browsers_want_and_are_requested_anew(studio: Studio) -> None:

@@ -1,8 +1,9 @@
-// The curves of runs that are compared: over the frames, their difference from the first, and by layer of a frame.
+// The curves of runs that are compared: over the frames, their difference from the first, and by
+// layer of a frame.
 
 import { figure } from "../chart_looks.js";
 import { seriesColour } from "../theme.js";
-import { categories, distinct, logarithmic, numbers, tipOf } from "../view_sheet.js";
+import { categories, distinct, logarithmic, numbers, records, tipOf } from "../view_sheet.js";
 
 const tipOfFrame = (points) =>
   tipOf(
@@ -15,7 +16,10 @@ const tipOfLayer = (points) =>
     points.map((point) => [point.seriesName, point.data]),
   );
 
-/** How many layers are drawn: a swarm's have no effective number, as many as it has do not squeeze the others' together. */
+/**
+ * How many layers are drawn: a swarm's have no effective number, as many as it has do not squeeze
+ * the others' together.
+ */
 const layersOf = (layered) =>
   Math.max(
     1,
@@ -23,6 +27,18 @@ const layersOf = (layered) =>
       layers.filter((row) => row.effective !== null).map((row) => row.layer + 1),
     ),
   );
+
+/**
+ * The layers of a frame's last search, whose result the frame is, counted in it, however often the
+ * frame was searched.
+ * @param {any} schedule the answer of the view
+ */
+export function lastSearch({ tables, search_layers: layers, searches }) {
+  const first = layers * (searches - 1);
+  return records(tables[0])
+    .filter((row) => row.layer >= first)
+    .map((row) => ({ ...row, layer: row.layer - first, chosen: row.layer }));
+}
 
 /**
  * Draw them; the numbers of the shown frame in a sentence.
