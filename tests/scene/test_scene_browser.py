@@ -59,6 +59,7 @@ def address(stage: SceneServer) -> Iterator[str]:
 @pytest.fixture
 def page(browser: Browser) -> Iterator[Page]:
     made = browser.new_page(viewport={"width": 1280, "height": 800})
+    made.set_default_timeout(PATIENCE * 1000)
     yield made
     made.close()
 
