@@ -203,7 +203,7 @@ def _has_shade(picture: np.ndarray, place: np.ndarray, shades: np.ndarray) -> bo
     """Whether about a place of a picture a pixel has one of some colours."""
     (across, down), reach = place, 4
     near = picture[down - reach : down + reach + 1, across - reach : across + reach + 1].reshape(-1, 1, 3)
-    return bool((np.abs(near - shades[None]).max(axis=2) < 12.0).any())
+    return bool((np.abs(near - shades[None]).max(axis=2) < 40.0).any())
 
 
 @pytest.fixture

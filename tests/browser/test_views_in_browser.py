@@ -165,9 +165,11 @@ def test_clouds_couplings_and_modes_are_drawn_as_stored(window: StudioPage, stud
             assert bar["value"] == pytest.approx(masses.get((bar["layer"], mode), 0.0))
 
 
-def in_decades(nats: float, level: float) -> float:
-    """The map's scale: logarithmic to both sides, level about nothing."""
-    return math.copysign(math.log10(1.0 + abs(nats) / level), nats)
+def differences_drawn(studio: StudioServer) -> list[float]:
+    """The differences on the map's scale: logarithmic to both sides, level within `level` of nothing."""
+    (scale,) = rows_of(studio, "blame", "scale")
+    differences = [row["difference"] for row in rows_of(studio, "blame", "matrix")]
+    return [math.copysign(math.log10(1.0 + abs(one) / scale["level"]), one) for one in differences]
 
 
 def test_landscape_and_blame_are_what_the_likelihood_says(window: StudioPage, studio: StudioServer) -> None:
@@ -179,8 +181,7 @@ def test_landscape_and_blame_are_what_the_likelihood_says(window: StudioPage, st
     assert [point[1] for point in curve["data"]] == pytest.approx([row["log_weight"] for row in rows])
 
     (heat,) = [one for one in show(window, "blame") if one["type"] == "heatmap"]
-    [scale] = rows_of(studio, "blame", "scale")
-    wanted = [in_decades(row["difference"], scale["level"]) for row in rows_of(studio, "blame", "matrix")]
+    wanted = differences_drawn(studio)
     assert [cell[2] for cell in heat["data"]] == pytest.approx(wanted)
 
 
