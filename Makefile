@@ -65,7 +65,7 @@ hostile: env
 soak: env
 	PYTHONPATH=tests $(BIN)/python -m soak $(SOAK)
 
-# From a slider's move to its cloud drawn, ten windows beside a tracked run, a run of 5000 frames; `WATCHING=slider` is one.
+# From a slider's move to its cloud and charts drawn, ten windows beside a tracked run, a run of 5000 frames, layers that play; `WATCHING=slider` is one.
 watching: env browser
 	PYTHONPATH=tests:tests/browser $(BIN)/python -m watching $(WATCHING)
 

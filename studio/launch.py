@@ -45,7 +45,7 @@ DEMO_SHOWS = MappingProxyType(
     {
         "session": "walk",
         "run": DEMO_RUN,
-        "frame": "9",
+        "frame": "10",
         "panel": "views",
         "view": "variance",
         "plays": "layers",

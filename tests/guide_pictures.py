@@ -55,12 +55,12 @@ PICTURES = (
     ),
     Picture("course-swarm.jpg", f"{WALK}course-swarm&frame=9&panel=views&view=variance", PANEL, (1280, 1180)),
     Picture("bodies.jpg", "body=mouse", page="/bodies"),
-    Picture("first-seen.jpg", f"{WALK}ten-layers&frame=9&layer=1&panel=views&view=variance"),
-    Picture("first-survival.jpg", f"{WALK}ten-layers&frame=9&layer=4&panel=views&view=schedule&step=2"),
+    Picture("first-seen.jpg", f"{WALK}ten-layers&frame=10&layer=1&panel=views&view=variance"),
+    Picture("first-survival.jpg", f"{WALK}ten-layers&frame=10&layer=4&panel=views&view=schedule&step=2"),
     Picture("first-failing.jpg", f"{WALK}one-layer&frame=13&panel=compare&compared=walk/ten-layers&step=3"),
     Picture("course-docked.jpg", "course=arm"),
     Picture(
-        "studio.jpg", f"{WALK}ten-layers&frame=9&layer=1&panel=views&view=variance&step=4", "", (1440, 960)
+        "studio.jpg", f"{WALK}ten-layers&frame=10&layer=1&panel=views&view=variance&step=4", "", (1440, 960)
     ),
 )
 
@@ -83,7 +83,7 @@ def take(page: Page, window: StudioPage, picture: Picture) -> None:
     scene = page.frame_locator("iframe")
     scene.locator("canvas").first.wait_for()
     if is_studio:
-        scene.get_by_text("preset").first.wait_for()
+        scene.get_by_text("preset").first.wait_for(state="attached")
     warning = scene.locator("#webgl-software-rendering button")
     for _ in range(60):
         page.wait_for_timeout(500)

@@ -13,7 +13,7 @@ import numpy as np
 from studio.errors import SessionError, SettingsError, StudioError
 from studio.runs.behaviour_models import check_prediction
 from studio.runs.compiling_beside import compiling_beside
-from studio.runs.correcting import copied_beside
+from studio.runs.derived_runs import copied_beside
 from studio.runs.moved_knobs import keep_moved, moved_between, with_moved
 from studio.runs.problem_source import ProblemSource
 from studio.runs.reannealing import Reannealing

@@ -7,14 +7,10 @@ with these knobs has shown.
 
 from collections.abc import Mapping
 
-import msgspec
-
 from studio.errors import SettingsError
-from studio.runs.correcting import check_branching_frame, new_folder
+from studio.runs.derived_runs import check_branching_frame, derived_record, new_folder
 from studio.runs.moved_knobs import FIRST_VERSION, keep_moved, moved_between, settings_with_moved
-from studio.runs.new_run import software_version
-from studio.sessions.manifest import now
-from studio.sessions.session import Session, free_run_name
+from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.settings import (
     RunSettings,
@@ -55,16 +51,12 @@ def prepare_branch(
             f"Leave it, or branch off at the first frame ({record.first}).",
         )
     changed = ", ".join(f"{knob} {value}" for knob, value in moved.items())
-    made = msgspec.structs.replace(
-        record,
-        name=name or free_run_name(session),
-        session=session.name,
-        created=now(),
-        software=software_version(),
-        live=False,
-        made_from=run.name,
+    made = derived_record(
+        session,
+        run,
+        name,
+        f"From frame {frame} on run '{run.name}' with {changed}.",
         settings=dict(values(wanted)) if is_whole else record.settings,
-        notes=(*record.notes, f"From frame {frame} on run '{run.name}' with {changed}."),
     )
 
     def leave_moved(made_run: StoredRun) -> None:

@@ -10,30 +10,20 @@ that result, and so on. Each result replaces the old frame when it is done, so t
 frames done so far.
 """
 
-import shutil
 from collections.abc import Callable
 from contextlib import closing
-from pathlib import Path
-
-import msgspec
 
 from studio.arrays import Array
 from studio.body.branches import within_limits
 from studio.body.model import checked_pose
-from studio.errors import RunError, SessionError
+from studio.errors import RunError
 from studio.progress import Progress, unheard
-from studio.runs.new_run import software_version
+from studio.runs.derived_runs import check_branching_frame, derived_record, new_folder
 from studio.runs.problem_source import ProblemSource
 from studio.runs.reannealing import Reannealing
 from studio.runs.tracking_run import TrackingRun
-from studio.sessions import atomic_files
-from studio.sessions.file_checksums import note_files
-from studio.sessions.manifest import now
-from studio.sessions.names import checked_name
-from studio.sessions.results_store import copy_frames, create_store
-from studio.sessions.run_record import BEHAVIOUR_NAME, CAMERAS_NAME, RunRecord, write_run_record
-from studio.sessions.session import Session, free_run_name
-from studio.sessions.stored_run import BODY_FOLDER, StoredRun
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
 from studio.settings import settings_from_values
 
 
@@ -57,22 +47,15 @@ def prepare_correction(
     given = checked_pose(body, pose, RunError)
     _check_frames(run, frame, backwards_to)
     way = "on" if backwards_to is None else f"backwards to frame {backwards_to}"
-    changed = msgspec.structs.replace(
-        record,
-        name=name or free_run_name(session),
-        session=session.name,
-        created=now(),
-        software=software_version(),
-        live=False,
-        made_from=run.name,
+    changed = derived_record(
+        session,
+        run,
+        name,
+        f"Run '{run.name}', frame {frame} corrected ({source}) and tracked {way} from it.",
         corrected=frame,
         corrected_pose=tuple(within_limits(body, given).tolist()),
         backwards_to=backwards_to,
         first=record.first if backwards_to is None else min(record.first, backwards_to),
-        notes=(
-            *record.notes,
-            f"Run '{run.name}', frame {frame} corrected ({source}) and tracked {way} from it.",
-        ),
     )
     return new_folder(run, changed, frame if backwards_to is None else None)
 
@@ -116,29 +99,6 @@ def _track_again(tracking: TrackingRun, frame: int, cancelled: Callable[[], bool
     return True
 
 
-def check_branching_frame(run: StoredRun, frame: int, *, beyond: bool = True) -> list[int]:
-    """The run's finished frames, if another run can leave it at `frame`. beyond : also at the one after its last.
-
-    Raises RunError.
-    """
-    record = run.record
-    if record.ping_pong:
-        raise RunError(
-            f"Run '{run.name}' plays its footage forwards and backwards.", "Track the footage once instead."
-        )
-    with run.results() as results:
-        frames = results.frames()
-    if not frames:
-        raise RunError(f"Run '{run.name}' has no finished frame.", "Track it first, or start a new run.")
-    latest = min(frames[-1] + 1, record.last - 1) if beyond else frames[-1]
-    if not frames[0] <= frame <= latest:
-        raise RunError(
-            f"Frame {frame} of run '{run.name}' cannot be tracked again.",
-            f"Choose a frame from {frames[0]} to {latest}.",
-        )
-    return frames
-
-
 def _check_frames(run: StoredRun, frame: int, backwards_to: int | None) -> None:
     record = run.record
     frames = check_branching_frame(run, frame, beyond=backwards_to is None)
@@ -155,43 +115,3 @@ def _check_frames(run: StoredRun, frame: int, backwards_to: int | None) -> None:
             f"Frame {missing[0]} of run '{run.name}' was dropped, so the run cannot be tracked back over it.",
             "Go back to a later frame, or track the footage again without dropping frames.",
         )
-
-
-def new_folder(
-    run: StoredRun,
-    record: RunRecord,
-    last: int | None,
-    complete: Callable[[StoredRun], None] = lambda made: None,
-) -> StoredRun:
-    """A run's folder with the old run's snapshots and its frames before `last`; atomic. complete : called with it
-    before it is there.
-    """
-    place = run.folder.parent / checked_name(record.name, "run")
-    folder = copied_beside(run, record, last)
-    try:
-        complete(StoredRun(folder))
-        atomic_files.move_into_place(folder, Path(place))
-    except FileExistsError:
-        raise SessionError(f"Session has a run '{record.name}' already.", "Choose another name.") from None
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-    return StoredRun(place)
-
-
-def copied_beside(run: StoredRun, record: RunRecord, last: int | None = None) -> Path:
-    """A hidden folder beside the run's own with its snapshots, its frames before `last` (None: all) and a record."""
-    folder = atomic_files.new_folder_beside(run.folder, parents=False)
-    try:
-        for part in (CAMERAS_NAME, BEHAVIOUR_NAME):
-            if (run.folder / part).exists():
-                atomic_files.copy_file(run.folder / part, folder / part)
-        if (run.folder / BODY_FOLDER).is_dir():
-            shutil.copytree(run.folder / BODY_FOLDER, folder / BODY_FOLDER)
-        create_store(folder)
-        copy_frames(run.folder, folder, last)
-        write_run_record(folder, record)
-        note_files(folder)
-    except BaseException:
-        shutil.rmtree(folder, ignore_errors=True)
-        raise
-    return folder

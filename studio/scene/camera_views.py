@@ -121,6 +121,7 @@ class CameraViews:
     ) -> None:
         self._server = server
         self._through: str | None = None
+        self._shown: tuple[object, ...] = ()
         self._free: dict[int, tuple[NDArray[np.float64], ...]] = {}
         self.views = {
             camera.name: CameraView(server, camera, partial(clicked, camera.name)) for camera in cameras
@@ -130,11 +131,15 @@ class CameraViews:
         """Hang new pictures, by camera name; they appear with the next `show`."""
         for name, picture in pictures.items():
             self.views[name].hang(picture)
+        self._shown = ()
 
     def show(self, tokens: ColourTokens, visible: bool, pictures: bool, through: str | None = None) -> None:
         """Show or hide cameras and pictures; put the viewers into a camera's place, or back (None)."""
-        for view in self.views.values():
-            view.show(tokens, visible, pictures, through)
+        shown = tokens.name, visible, pictures, through
+        if shown != self._shown:
+            self._shown = shown
+            for view in self.views.values():
+                view.show(tokens, visible, pictures, through)
         if through == self._through:
             return
         self._through = through

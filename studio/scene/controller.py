@@ -469,7 +469,8 @@ class SceneController:
             if move == "body"
             else direction(move, self.opened.body, body)
         )
-        self.viewers.framed = framed(body.reshape(-1, 3), toward, *self.viewers.lens())
+        lens = self.viewers.lens()
+        self.viewers.framed, self.viewers.framed_for = framed(body.reshape(-1, 3), toward, *lens), lens[1]
         self.viewers.ease(self.viewers.framed, now)
         return select(model, eye=None)
 
@@ -530,6 +531,15 @@ class SceneController:
         is_chosen = model.selection.eye is not None and is_in_sight(points, eye, *lens)
         return model if is_chosen or is_well_framed(points, eye, *lens) else self.move_camera(model, "body")
 
+    def _frame_again(self, model: Model) -> Model:
+        """Frame a framed body again where the view took another shape; for the first time once a viewer has come."""
+        if self._frames_next:
+            self._drawings[0].want(time.monotonic())
+        is_framed = self._is_leading and model.selection.eye is None and model.selection.look_through is None
+        if not (is_framed and self.viewers.is_reshaped) or self.viewers.is_moving:
+            return model
+        return self.move_camera(model, "body")
+
     def _follow_body(self) -> None:
         """Take the viewers along with the body, where they follow it."""
         follows = self.model.options.follows_body and self._is_leading
@@ -565,6 +575,7 @@ class SceneController:
             self._take_posts()
             if self.viewers.looking is not None:
                 self._happen(self._note_eye, ())
+                self._happen(self._frame_again, ())
             now = time.monotonic()
             if self.model.playback.playing:
                 self._happen(advance, (now - before,))
@@ -732,7 +743,7 @@ class SceneController:
         if self.views is not None and moment is not None:
             self.views.show(model, moment, tokens)
             self._follow_body()
-            if self._frames_next and self._server.get_clients():
+            if self._frames_next and self.viewers.has_come:
                 self._frames_next = False
                 if model.is_looking_at_layers:
                     self.model = self._frame_for_layers(self.model)

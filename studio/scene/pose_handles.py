@@ -40,6 +40,7 @@ class PoseHandles:
         )
 
         self._grip = ""
+        self._shown: tuple[PoseEdit, str] | None = None
 
         async def limb_dragged(event: viser.TransformControlsEvent) -> None:
             post(drag, self._grip, *_dragged_to(event))
@@ -52,6 +53,9 @@ class PoseHandles:
 
     def show(self, edit: PoseEdit, tokens: ColourTokens) -> None:
         """Move the handles to the body, or hide them while it is not edited."""
+        if self._shown == (edit, tokens.name):
+            return
+        self._shown = edit, tokens.name
         self._grip = edit.grip
         points = self._dragger.points(edit.pose) * METRES_PER_MM
         root = self._dragger.root_frame(edit.pose)

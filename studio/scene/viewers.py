@@ -10,7 +10,7 @@ import numpy as np
 import viser
 
 from studio.arrays import Array
-from studio.scene.viewpoint import Eye, between
+from studio.scene.viewpoint import Eye, between, is_browsers_own
 
 EASE_SECONDS = 0.7
 SETTLE_SECONDS = 0.5
@@ -22,6 +22,8 @@ DRAGGED = 0.05
 """Metres, of place or direction, by which a viewer who looks through a camera has been dragged out of it."""
 _USUAL_HEIGHT = 400
 _USUAL_LENS = 0.85, 16.0 / 9.0
+RESHAPED = 0.06
+"""Share by which a view's width over height has to change for a framed body to be framed again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,13 +37,15 @@ class Viewers:
     """The viewers of one scene; used by its thread.
 
     looking : the camera of the viewer who moved last, set by viser's callbacks. placed : called with each eye that all
-    viewers are put to. framed : the eye that frames the body, which is the usual one then.
+    viewers are put to. framed : the eye that frames the body, which is the usual one then; framed_for : the width over
+    height that it was made for.
     """
 
     def __init__(self, server: viser.ViserServer, placed: Callable[[Eye], None] = lambda _: None) -> None:
         self._server, self._placed = server, placed
         self.looking: viser.CameraHandle | None = None
         self.framed: Eye | None = None
+        self.framed_for = 0.0
         self._ease: _Ease | None = None
         self._settles = float("-inf")
         self._arrived: str | None = None
@@ -62,26 +66,37 @@ class Viewers:
         """Whether viewers are on their way."""
         return self._ease is not None
 
+    @property
+    def has_come(self) -> bool:
+        """Whether a viewer stands where it was put: before, its browser says its own place and lens."""
+        return self._camera() is not None
+
+    @property
+    def is_reshaped(self) -> bool:
+        """Whether the view has another shape than the one that the body was framed for."""
+        return self.framed is not None and abs(self.lens()[1] / self.framed_for - 1.0) > RESHAPED
+
     def lens(self) -> tuple[float, float]:
         """The vertical field of view, radians, and width over height of what a viewer sees."""
-        for client in self._server.get_clients().values():
-            if client.camera.update_timestamp:
-                return float(client.camera.fov), float(client.camera.aspect)
-        return _USUAL_LENS
+        camera = self._camera()
+        return _USUAL_LENS if camera is None else (float(camera.fov), float(camera.aspect))
 
     def height(self) -> int:
         """The height of what a viewer sees, pixels."""
-        for client in self._server.get_clients().values():
-            if client.camera.update_timestamp:
-                return max(1, int(client.camera.image_height))
-        return _USUAL_HEIGHT
+        camera = self._camera()
+        return _USUAL_HEIGHT if camera is None else max(1, int(camera.image_height))
 
     def eye(self) -> Eye:
         """Where a viewer stands now."""
+        camera = self._camera()
+        return self.usual_eye if camera is None else _eye_of(camera)
+
+    def _camera(self) -> viser.CameraHandle | None:
+        """That of a viewer who has come."""
         for client in self._server.get_clients().values():
-            if client.camera.update_timestamp:
-                return (*map(float, client.camera.position), *map(float, client.camera.look_at))
-        return self.usual_eye
+            if client.camera.update_timestamp and not is_browsers_own(_eye_of(client.camera)):
+                return client.camera
+        return None
 
     def put(self, eye: Eye, client: viser.ClientHandle | None = None) -> None:
         """Put all viewers, or one, there at once."""
@@ -129,7 +144,9 @@ class Viewers:
         camera, self.looking = self.looking, None
         if camera is None or self._ease is not None:
             return None
-        seen = (*map(float, camera.position), *map(float, camera.look_at))
+        seen = _eye_of(camera)
+        if is_browsers_own(seen):
+            return None
         if np.allclose(seen, self.usual_eye, atol=EYE_TOLERANCE):
             return None if before is None else (None,)
         if now < self._settles or (before is not None and np.allclose(seen, before, atol=EYE_TOLERANCE)):
@@ -151,6 +168,10 @@ class Viewers:
     def entered(self) -> None:
         """Note that another camera is looked through, or none: who is on the way elsewhere stops."""
         self._arrived = self._ease = None
+
+
+def _eye_of(camera: viser.CameraHandle) -> Eye:
+    return (*map(float, camera.position), *map(float, camera.look_at))
 
 
 def _shifted(eye: Eye, by: Array) -> Eye:

@@ -13,7 +13,9 @@ from studio.body.model import BodyModel
 Eye = tuple[float, ...]
 Preset = Literal["front", "side", "top"]
 
-FILLED, WIDEST = 0.76, 0.86
+BROWSERS_OWN = 3.0, 3.0, 3.0, 0.0, 0.0, 0.0
+"""Where viser's page stands until it is put somewhere, metres."""
+FILLED, WIDEST = 0.8, 0.86
 """Of the view's height that a framed body fills, and at most of its width."""
 WELL_FRAMED = 0.6, 0.9
 """Shares of the height between which a body needs not be framed again."""
@@ -49,6 +51,11 @@ def on_screen(points: Array, eye: Eye, fov: float, aspect: float) -> Array:
     half = np.tan(fov / 2.0) * np.maximum(depth, 1e-6)
     across, down = (away @ right) / (half * aspect), -(away @ up) / half
     return np.stack([(across + 1.0) / 2.0, (down + 1.0) / 2.0, depth], axis=-1)
+
+
+def is_browsers_own(eye: Eye) -> bool:
+    """Whether a viewer stands where its browser began: it was not put anywhere yet, nor moved."""
+    return bool(np.allclose(eye, BROWSERS_OWN, atol=1e-6))
 
 
 def framed(points: Array, toward: Array, fov: float, aspect: float, filled: float = FILLED) -> Eye:

@@ -9,7 +9,8 @@ from scene_messages import decoded
 
 
 class SceneWire:
-    """Keeps the newest of each thing that the browser was told to draw. viewer : from where it said that it looks.
+    """Keeps the newest of each thing that the browser was told to draw. viewer : from where it said that it looks;
+    eye : that and what it looks at; lens : field of view and width over height.
     shadows : whether lamps cast any. of_trials : of the window's second scene, else of its own.
     """
 
@@ -20,6 +21,8 @@ class SceneWire:
         self.camera_moves = 0
         self.shadows = True
         self.viewer: tuple[float, ...] = ()
+        self.eye: tuple[float, ...] = ()
+        self.lens = 0.0, 0.0
         self._raw: list[bytes | str] = []
         page.on("websocket", self._opened)
 
@@ -32,6 +35,8 @@ class SceneWire:
         message = msgspec.msgpack.decode(content) if isinstance(content, bytes) else {}
         if isinstance(message, dict) and message.get("type") == "ViewerCameraMessage":
             self.viewer = tuple(message["position"])
+            self.eye = (*self.viewer, *message["look_at"])
+            self.lens = message["fov"], message["image_width"] / message["image_height"]
 
     def read(self) -> "SceneWire":
         """Take in what came since the last time; returns itself."""

@@ -123,7 +123,7 @@ def test_an_early_frame_may_be_searched_again_after_the_way_back(
 @pytest.mark.parametrize(
     ("frame", "back", "cause"),
     [
-        (-1, None, "Frame -1 of run 'wrong' cannot be corrected"),
+        (-1, None, "Frame -1 of run 'wrong' cannot be tracked again"),
         (99, None, "Frame 99 of run"),
         (4, 4, "frames from 4 back to 4 are not"),
         (4, -2, "frames from 4 back to -2 are not"),

@@ -35,7 +35,7 @@ from studio.scene.model import Model, Selection
 from studio.scene.panel import Panel
 from studio.scene.scene_server import SceneServer
 from studio.scene.scene_views import SceneViews
-from studio.scene.viewpoint import is_well_framed
+from studio.scene.viewpoint import is_well_framed, on_screen
 from studio.sessions.results_codec import VERIFIED
 from studio.sessions.results_reader import FILE_NAME
 from studio.sessions.results_store import ResultsWriter
@@ -280,6 +280,41 @@ def test_as_layers_begin_to_be_looked_at_the_body_is_of_glass_and_framed(
     assert viewer.eye == near
     stage.move_camera("first")
     until(lambda: np.allclose(viewer.eye, stage._controller.viewers.first_eye, atol=1e-6))
+
+
+def test_a_body_is_framed_once_a_viewer_has_come_and_again_in_another_shape(
+    stage: SceneServer, viewer: FakeCamera
+) -> None:
+    """Before, a browser tells its own place and lens, by which head and feet would be cut off."""
+
+    def say() -> None:
+        stage._controller.viewers.looking = viewer  # pyright: ignore[reportAttributeAccessIssue]
+        stage._controller.post(lambda model: model)
+        until(lambda: stage._controller.viewers.looking is None)
+
+    say()
+    until(lambda: not stage._controller.viewers.is_moving)
+    first = viewer.eye
+    viewer.position, viewer.look_at, viewer.fov = np.full(3, 3.0), np.zeros(3), 1.309
+    stage.show_layer(1)
+    until(lambda: views(stage).body.handles[0].opacity < 0.2)
+    say()
+    assert viewer.eye == (3.0, 3.0, 3.0, 0.0, 0.0, 0.0)
+    assert stage.shown.eye is None, "it is no place of the address"
+    viewer.position, viewer.look_at, viewer.fov = np.array(first[:3]), np.array(first[3:]), 0.85
+    say()
+    until(lambda: is_well_framed(body_points(stage), viewer.eye, viewer.fov, viewer.aspect))
+    until(lambda: not stage._controller.viewers.is_moving)
+    viewer.aspect = 0.15
+    assert not is_in_view(body_points(stage), viewer)
+    say()
+    until(lambda: is_in_view(body_points(stage), viewer))
+    assert stage.shown.eye is None
+
+
+def is_in_view(points: np.ndarray, viewer: FakeCamera) -> bool:
+    seen = on_screen(points, viewer.eye, viewer.fov, viewer.aspect)[:, :2]
+    return bool((seen > 0.0).all() and (seen < 1.0).all())
 
 
 def test_a_view_that_follows_the_body_goes_along_and_a_zoom_is_noted(

@@ -7,6 +7,8 @@ from swaying_session import swaying_pose
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
 from studio.scene.viewpoint import (
+    FILLED,
+    WIDEST,
     Preset,
     between,
     direction,
@@ -36,7 +38,7 @@ def test_a_framed_body_is_seen_whole_and_large(
     seen = on_screen(points, eye, FOV, aspect)
     low, high = seen[:, :2].min(axis=0), seen[:, :2].max(axis=0)
     np.testing.assert_allclose((low + high) / 2.0, 0.5, atol=0.06)
-    filled = max((high[1] - low[1]) / 0.76, (high[0] - low[0]) / 0.86)
+    filled = max((high[1] - low[1]) / FILLED, (high[0] - low[0]) / WIDEST)
     assert filled == pytest.approx(1.0, abs=0.01) if toward[2] < 1.0 else 0.1 < filled <= 1.01
     assert seen[:, 2].min() > 0.3, "from above the head is not in the eye"
     assert is_in_sight(points, eye, FOV, aspect)

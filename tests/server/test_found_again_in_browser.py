@@ -326,7 +326,7 @@ def test_find_knows_frames_knobs_limbs_formats_pages_and_help(
 
     for wanted, kind in (
         ("survival", "Knob"), ("bvh", "Export"), ("gallery", "Page"), ("dark", "Theme"), ("lost and", "Help"),
-        ("head", "Limb"),
+        ("head", "Limb"), (str(tracked.record.parameters[0]).replace("_", " "), "Parameter"),
     ):  # fmt: skip
         if kind == "Help":
             wanted = "what the charts show"

@@ -8,6 +8,7 @@ from pathlib import Path
 from conftest import ARGUMENTS, chromium
 from playwright.sync_api import sync_playwright
 
+from watching.first_steps import measure_first_steps
 from watching.layers import measure_layers
 from watching.long_run import measure_long_run
 from watching.slider import measure_slider
@@ -15,6 +16,7 @@ from watching.windows import measure_windows
 
 PARTS = {
     "slider": measure_slider,
+    "first-steps": measure_first_steps,
     "windows": measure_windows,
     "long-run": measure_long_run,
     "layers": measure_layers,

@@ -83,7 +83,7 @@ class Drawing:
 
     def pictures(self) -> list[float]:
         """When pictures were drawn, ms since 1970."""
-        return self._frame().evaluate(READ)["pictures"]
+        return self._frames()[0].evaluate(READ)["pictures"]
 
     def uploads(self, sizes: set[int]) -> list[Upload]:
         """Those of some sizes, in order; a trial is drawn in the window's second scene once that is there."""

@@ -6,7 +6,7 @@ import { drawAutomaton } from "./behaviour_automaton.js";
 import { progressWords, showLearning, showLearningForm, updateLearning } from "./behaviour_learning.js";
 import { walkCard } from "./behaviour_walk.js";
 import { BodyDrawing } from "./body_drawing.js";
-import { openForm } from "./dialogs.js";
+import { openForm } from "./studio/dialogs.js";
 import { bar, button, byId, card, dotted, element, failure, fill, lead, NAME, nothing, pageHead } from "./elements.js";
 import { drawChart } from "./findings_charts.js";
 import { isGoing } from "./jobs.js";

@@ -2,7 +2,7 @@
 // pictures behind it. Every change is made and checked by the studio; what comes back is the body's file, so undo is the text before.
 
 import { fault, fetchJson, post, put, readOnly, remove, sessionPath } from "./api.js";
-import { openForm } from "./dialogs.js";
+import { openForm } from "./studio/dialogs.js";
 import { button, byId, dotted, download, element, failure, field, fill, hint, NAME, notice, offer, optional, pageHead, select, text } from "./elements.js";
 import { complain, say } from "./messages.js";
 import { loadScene } from "./scene_window.js";

@@ -3,7 +3,7 @@
 import { fetchJson, post, remove } from "./api.js";
 import { showForm } from "./comparison_form.js";
 import { badge, clearComparison, isGoing, isSweep, shareOf, showComparison, sizeWords, updateProgress } from "./comparison_result.js";
-import { openForm } from "./dialogs.js";
+import { openForm } from "./studio/dialogs.js";
 import { bar, button, byId, element, fill } from "./elements.js";
 import { complain, say } from "./messages.js";
 import { studioPath } from "./sessions.js";

@@ -142,11 +142,11 @@ export class Figure {
   sheet = null;
   redrawn = () => this.redraw();
 
-  /** @param {HTMLElement} place @param {() => HTMLElement[]} tools what can be chosen of this view */
-  constructor(place, tools = () => []) {
-    this.tools = tools;
+  /** @param {HTMLElement} place */
+  constructor(place) {
     this.title = element("h2", {});
     this.question = element("p", { className: "question" });
+    // What can be chosen of this view is put there by whoever shows it.
     this.own = element("div", { className: "figure-tools" });
     this.numbers = element("output", { className: "readout" });
     this.chartPlace = element("div", { className: "figure-chart", role: "img" });
@@ -178,7 +178,6 @@ export class Figure {
     this.title.textContent = shown?.title ?? "";
     this.title.hidden = !shown;
     this.question.textContent = shown?.question ?? "";
-    fill(this.own, this.tools());
     this.exports.hidden = !shown?.draw;
     this.linkButton.hidden = !shown?.link;
     this.asTable.ariaPressed = String(this.isTable);

@@ -45,7 +45,7 @@ export async function findJob({ session, kind }, fits = (_line) => true) {
 }
 
 /** Like `followJob` for work that nothing follows from when it was cancelled: that too is thrown. */
-export async function jobDone(path, report = undefined, gone = undefined) {
+export async function jobDone(path, report = (_job) => {}, gone = () => false) {
   const job = await followJob(path, report, gone);
   if (job?.state === "cancelled") throw fault(job.message, job.hint, { code: CANCELLED });
   return job;

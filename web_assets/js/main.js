@@ -1,7 +1,7 @@
 // The page starts here: its parts are wired to the state, the state to the server.
 
 import { startAddress } from "./address.js";
-import { startCameras } from "./cameras.js";
+import { startCameras } from "./studio/cameras.js";
 import { startComparing } from "./studio/comparing.js";
 import { startCorrecting } from "./studio/correcting.js";
 import { startCurtain } from "./studio/curtain.js";
@@ -25,11 +25,11 @@ import { startTrialCard } from "./studio/trial_card.js";
 import { startTrackWork } from "./studio/track_work.js";
 import { startTrials } from "./studio/trials.js";
 import { startTwin } from "./studio/twin.js";
-import { startTabs } from "./tabs.js";
+import { startTabs } from "./studio/tabs.js";
 import { startTheme } from "./theme.js";
 import { startTimeline } from "./studio/timeline.js";
 import { startTracks } from "./studio/tracks.js";
-import { startViews } from "./views.js";
+import { startViews } from "./studio/views.js";
 import { startCourseColumn } from "./studio/course_column.js";
 import { startFirstSteps } from "./studio/first_steps.js";
 import { startScenePictures } from "./studio/scene_pictures.js";
@@ -37,6 +37,7 @@ import { startWhy } from "./studio/why.js";
 
 async function start() {
   startTheme();
+  startTabs();
   startLive();
   startHeader();
   startRail();
@@ -49,7 +50,6 @@ async function start() {
   startCameras();
   startLog();
   startExporting();
-  startTabs();
   startKeys();
   startPalette();
   startCurtain();

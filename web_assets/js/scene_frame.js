@@ -20,7 +20,7 @@ function look() {
   return `
     body, body * { font-family: "Inter", system-ui, sans-serif !important; letter-spacing: 0 !important; font-variant-numeric: tabular-nums; }
     label, label * { font-size: 11.5px !important; letter-spacing: -.03em !important; }
-    @media (max-width: 620px) { .mantine-Paper-root:has(.mantine-ScrollArea-root) { display: none; } }
+    @media (max-width: 620px) { .mantine-Paper-root:has(.mantine-ScrollArea-root) { display: none !important; } }
     [role="tab"] { padding-inline: 8px !important; font-size: 12.5px !important; }
     * { scrollbar-width: thin; scrollbar-color: ${token("line-strong")} transparent; }
     :root, :root[data-mantine-color-scheme] {

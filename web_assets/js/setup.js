@@ -5,7 +5,7 @@
 // Enter presses the first that is shown.
 
 import { fetchJson, post, sessionPath } from "./api.js";
-import { closeDialog, openForm } from "./dialogs.js";
+import { closeDialog, openForm } from "./studio/dialogs.js";
 import { actions, button, byId, element, failure, fill, lead, NAME, nothing, notice, offer, spring } from "./elements.js";
 import { listen, startEvents } from "./events.js";
 import { isGoing } from "./jobs.js";

@@ -1,21 +1,22 @@
 // Step Export: the studio's own export panel, which takes the best track.
 
 import { fetchJson, runPath } from "./api.js";
-import { byId, hint } from "./elements.js";
+import { element, hint } from "./elements.js";
 import { complain } from "./messages.js";
 import { set } from "./state.js";
-import { startExporting } from "./studio/exporting.js";
+import { html, mount as show } from "./studio/component.js";
+import { Exporting, startExporting } from "./studio/exporting.js";
 import { viewWall } from "./setup_views.js";
 
-const panel = byId("panel-export");
 let started = false;
 
 /** @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
 export function mount(place, setup) {
   const run = setup.detail.runs.find((one) => one.name === setup.step.run) ?? setup.detail.runs[0];
   const which = hint();
+  const panel = element("div", { className: "panel export", id: "panel-export" });
   place.append(which, panel);
-  panel.hidden = false;
+  show(panel, html`<${Exporting} />`);
   if (!started) { startExporting(); started = true; }
   set({ session: setup.session, run: run.name, panel: "export" });
   fetchJson(`${runPath(setup.session, run.name)}/check`).then(({ usual, note }) => {
@@ -24,8 +25,7 @@ export function mount(place, setup) {
   }).catch(complain);
   const wall = viewWall(setup);
   return () => {
-    panel.hidden = true;
-    document.body.append(panel);
+    show(panel, null);
     set({ run: null, panel: null });
     wall.stop();
   };

@@ -5,7 +5,7 @@ import { fault, fetchJson, post, put, remove, sessionPath } from "./api.js";
 import { actions, button, drawProgress, element, failure, field, fill, hint, notice, number, percent, picture } from "./elements.js";
 import { findJob, followJob, isGoing, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
-import { foundWords, isUnsure } from "./start_pose.js";
+import { foundWords, isUnsure } from "./studio/start_pose.js";
 
 const PICTURE_HEIGHT = 360;
 const REDRAW_MILLISECONDS = 250;

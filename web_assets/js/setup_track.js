@@ -1,7 +1,7 @@
 // Step Track: the short form of a run, how far it is, and the outlines over the pictures as they are found.
 
 import { fetchJson, post, remove, runPath, sessionPath } from "./api.js";
-import { valuesOf } from "./dialogs.js";
+import { valuesOf } from "./studio/dialogs.js";
 import { actions, button, check, dotted, drawProgress, duration, element, failure, field, fill, hint, notice, number, optional, select, sends } from "./elements.js";
 import { findJob, followJob, isGoing, timeLeft } from "./jobs.js";
 import { complain } from "./messages.js";

@@ -1,7 +1,7 @@
 // All cameras' pictures of one frame beside the step, with what a run found drawn over them; or the scene instead.
 
 import { post, runPath } from "./api.js";
-import { openPicture } from "./dialogs.js";
+import { openPicture } from "./studio/dialogs.js";
 import { check, element, fill, picture, showPicture, spring } from "./elements.js";
 import { complain } from "./messages.js";
 import { loadScene } from "./scene_window.js";
@@ -20,7 +20,7 @@ export function viewWall(setup) {
   const open = element("a", { className: "link-button", title: "This run and frame in the studio, where its search can be looked into" }, "Open in the studio");
   const bar = element("div", { className: "pictures-bar" }, slot, label, spring(), open, wantsScene);
   const views = setup.detail.cameras.map(({ name }) => {
-    const image = element("img", { alt: `View of ${name}`, onclick: () => openPicture(name, address(name, LARGE)) });
+    const image = element("img", { alt: `View of ${name}`, onclick: () => openPicture(name, () => address(name, LARGE)) });
     const note = element("span", {});
     return { name, image, note, figure: picture(image, name, note) };
   });

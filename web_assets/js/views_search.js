@@ -34,6 +34,8 @@ function parameterAxis(names, at) {
 
 /** Decades below the first layer's variance that a colour tells apart: the same in every frame and run. */
 const DECADES = 3;
+/** Pixels below which what stands side by side stands one below the other. */
+const NARROW = 640;
 
 /** Variance reduction of a frame: two maps that share one scale, and the chosen parameter over the layers. */
 function varianceOfFrame(sheet, tables, at) {
@@ -49,9 +51,16 @@ function varianceOfFrame(sheet, tables, at) {
   const reduced = (best, row) => ((row.reduction ?? 0) > (best.reduction ?? 0) ? row : best);
   const chosen =
     at.parameter && names.includes(at.parameter) ? at.parameter : settled.reduce(reduced).parameter;
-  const height = Math.max(names.length * ROW, at.room - 76);
-  const shape = { gutters: [142, 26, 112], shares: [1, 1, 1.1], right: 14 };
-  const [one, two, three] = sheet.columns(3, shape);
+  // Beside a scene there is no room for three: the parameter over the layers stands below its maps.
+  const isNarrow = sheet.width < NARROW;
+  const height = Math.max(names.length * ROW, isNarrow ? 0 : at.room - 76);
+  const shape = isNarrow
+    ? { gutters: [142, -36], right: 58 }
+    : { gutters: [142, 26, 112], shares: [1, 1, 1.1], right: 14 };
+  const [one, two, aside] = sheet.columns(isNarrow ? 2 : 3, shape);
+  const three = isNarrow
+    ? { left: one.left, width: sheet.width - one.left - 24, top: height + 64, height: 120 }
+    : { ...aside, top: 0, height: Math.max(90, at.room - 84) };
   const rowAt = (list, layer, place) =>
     list?.find((entry) => entry.layer === layer && entry.parameter === names[place]);
   const maps = /** @type {const} */ ([
@@ -104,7 +113,7 @@ function varianceOfFrame(sheet, tables, at) {
     ];
     return name ? noise : [["as weighed", of("weighed"), "text-quiet", { dashed: true }], ...noise];
   });
-  const plot = sheet.plot({ ...three, top: 0, height: Math.max(90, at.room - 84) }, {
+  const plot = sheet.plot(three, {
     title: at.label(chosen), unit: `variance, ${unit}²${at.tried ? "; dashed: after noise" : ""}`,
     names: at.tried ? sides.map(({ name }) => name) : lines.map(([name]) => name),
     x: layerAxis(layers, at), y: logarithmic(), over: tipOfLayer(at),
@@ -185,13 +194,19 @@ function varianceOfRun(sheet, { last, parameter: searched }, at) {
 function scheduleOfFrame(sheet, tables, at) {
   const sides = sidesOf(tables, at);
   const layers = layersOfAll(sides, "layers");
-  const height = Math.max(120, at.room - 76);
-  const places = sheet.columns(4, { gutters: 52, right: 10 });
+  const isNarrow = sheet.width < NARROW;
+  const whole = Math.max(120, at.room - 76);
+  const height = isNarrow ? Math.max(100, (at.room - 152) / 2) : whole;
+  const columns = sheet.columns(isNarrow ? 2 : 4, { gutters: 52, right: 10 });
+  const places = [0, 1, 2, 3].map((place) => ({
+    ...columns[place % columns.length],
+    top: place < columns.length ? 0 : height + 76,
+  }));
   const click = ({ dataIndex }) => ({ layer: layers[dataIndex] });
   const has = (key) => sides.some((side) => side.tables.layers.some((row) => row[key] !== null));
   /** @param {[string, string, string, any][]} kinds name, key, colour of one side alone, style */
   const draw = (column, title, unit, y, kinds) => {
-    const box = { ...places[column], top: 0, height };
+    const box = { ...places[column], height };
     const x = layerAxis(layers, at);
     const plot = sheet.plot(box, { title, unit, x, y, over: tipOfLayer(at) });
     for (const { name: side, tables: own, colour } of sides) {
@@ -232,7 +247,7 @@ function scheduleOfFrame(sheet, tables, at) {
   const spent = sides.map(({ tables: own }) =>
     figure(own.layers.reduce((sum, row) => sum + (row.milliseconds ?? 0), 0)),
   );
-  const plot = sheet.plot({ ...places[3], top: 0, height }, {
+  const plot = sheet.plot({ ...places[3], height }, {
     title: "Time", unit: `${spent.join(" and ")} ms in all`, x: layerAxis(layers, at),
     y: numbers("", { scale: false }),
   });

@@ -1,22 +1,22 @@
-// Stored runs beside the open one: curves and their difference, settings that differ, layer by layer in the shown frame,
-// the worst frame of each one click away; their bodies in the scene, each in its colour.
+// Stored runs beside the open one: curves and their difference, settings that differ, layer by
+// layer in the shown frame, the worst frame of each one click away; their bodies in the scene, each
+// in its colour.
 
 import { addressOf } from "../address.js";
 import { fault, fetchJson, frameView, runPath } from "../api.js";
 import { figure as figureWords, seriesToken } from "../chart_looks.js";
-import { openForm } from "../dialogs.js";
-import { byId } from "../elements.js";
+import { openForm } from "./dialogs.js";
 import { complain } from "../messages.js";
 import { paced } from "../pacing.js";
 import { comparedRuns as others, goTo, MOST_COMPARED as MOST, select } from "../selection.js";
 import { openSession } from "../sessions.js";
 import { get, set, watch } from "../state.js";
-import { showPanel } from "../tabs.js";
 import { records } from "../view_sheet.js";
-import { drawBeside } from "../views.js";
 import { drawCompared, lastSearch } from "./comparing_drawing.js";
-import { follow, html, mount, signal } from "./component.js";
+import { follow, html, signal } from "./component.js";
 import { FigurePlace } from "./figure_place.js";
+import { showPanel } from "./panels.js";
+import { drawBeside } from "./views.js";
 
 /** @import { Schemas } from "../api_types" */
 
@@ -267,7 +267,8 @@ function Said() {
   return html`<${Words} answer=${held.value.answer} />`;
 }
 
-function Comparing() {
+/** The panel. */
+export function Comparing() {
   const isShown = followOthers().length > 0 && held.value;
   return html`
     <section class="why-words" aria-label="Compared runs"><${Said} /></section>
@@ -279,9 +280,8 @@ function Comparing() {
   `;
 }
 
-/** Show the panel and load what it compares. */
+/** Load what the panel compares. */
 export function startComparing() {
-  mount(byId("panel-compare"), html`<${Comparing} />`);
   const later = paced(() => load().catch(complain), LOAD_MILLISECONDS);
   watch(["session", "run", "frame", "compared", "panel", "summary"], later);
 }

@@ -3,9 +3,9 @@
 
 import { post, runPath } from "../api.js";
 import { byId } from "../elements.js";
-import { importForm } from "../importing.js";
+import { importForm } from "./importing.js";
 import { complain } from "../messages.js";
-import { newRunForm } from "../new_run.js";
+import { newRunForm } from "./new_run.js";
 import { lacks, openSession, refreshSessions, setupPath } from "../sessions.js";
 import { follow, html, mount, useLayoutEffect, useState } from "./component.js";
 

@@ -1,12 +1,12 @@
 // The run's export: format, options, progress, and the files to download. Without a run it says so.
 
 import { fetchJson, post, remove, runPath } from "../api.js";
-import { byId, dotted } from "../elements.js";
+import { dotted } from "../elements.js";
 import { isGoing, standing, timeLeft } from "../jobs.js";
 import { onEvent } from "../live.js";
 import { complain } from "../messages.js";
 import { get, watch } from "../state.js";
-import { follow, html, mount, signal, useRef } from "./component.js";
+import { follow, html, signal, useRef } from "./component.js";
 
 /** @import { Schemas } from "../api_types" */
 /** @typedef {any} Option one of `ExportChoices.options` */
@@ -175,7 +175,9 @@ function Actions({ form }) {
   </div>`;
 }
 
-/** @param {{ form: any, known: Schemas["ExportChoices"], list: Schemas["ExportList"] }} properties */
+/**
+ * @param {{ form: any, known: Schemas["ExportChoices"], list: Schemas["ExportList"] }} properties
+ */
 const Options = ({ form, known, list }) => html`<div class="export-form">
   <p class="hint">${form.opens}</p>
   ${form.takes.includes("track") && list.note && html`<p class="hint">${list.note}</p>`}
@@ -242,7 +244,8 @@ function Files({ files }) {
   </ul>`;
 }
 
-function Exporting() {
+/** The panel. */
+export function Exporting() {
   const [known, list] = [choices.value, listing.value];
   if (!follow("run")) return html`<p class="empty">Open a run to export it.</p>`;
   if (!known || !list) return html`<p class="empty">Its files are listed…</p>`;
@@ -279,9 +282,8 @@ function hear(job) {
   refresh();
 }
 
-/** Show the panel and follow the run that is open. */
+/** Follow the run that is open. */
 export function startExporting() {
-  mount(byId("panel-export"), html`<${Exporting} />`);
   let shown = "";
   watch(["session", "run", "panel"], () => {
     const run = `${get("session")}/${get("run")}`;

@@ -1,16 +1,16 @@
 // What "Find" knows: all that can be opened, chosen or done, each with its words and what it does.
 
 import { fetchJson, patch, readOnly, runPath } from "../api.js";
-import { openForm } from "../dialogs.js";
+import { openForm } from "./dialogs.js";
 import { complain, say } from "../messages.js";
 import { goTo, limbGroup, range, select } from "../selection.js";
 import { openSession, setupPath } from "../sessions.js";
 import { get, set } from "../state.js";
-import { showPanel } from "../tabs.js";
 import { useTheme } from "../theme.js";
-import { allViews, saveView, showView, stepView, toggleTable } from "../views.js";
 import { chooseFormat } from "./exporting.js";
 import { commands } from "./keys.js";
+import { PANELS, showPanel } from "./panels.js";
+import { allViews, saveView, showView, stepView, toggleTable } from "./views.js";
 
 /**
  * Something that can be found. `also`: what it is found by besides.
@@ -35,14 +35,20 @@ const go = (address) => {
 };
 const openBeside = (address, target = "_blank") => window.open(address, target, "noopener");
 
-/** What is asked of the server when "Find" is opened: knobs of the run, formats, headings of the guide. */
+/**
+ * What is asked of the server when "Find" is opened: knobs of the run, formats, headings of the
+ * guide.
+ */
 let asked = {
   knobs: /** @type {any} */ (null),
   formats: /** @type {any[]} */ ([]),
   help: /** @type {any[]} */ ([]),
 };
 
-/** Ask again for what depends on the run; `changed()` when there is more to find. @param {() => void} changed */
+/**
+ * Ask again for what depends on the run; `changed()` when there is more to find.
+ * @param {() => void} changed
+ */
 export async function askForFindable(changed) {
   const [session, run] = [get("session"), get("run")];
   const none = () => null;
@@ -122,6 +128,15 @@ function limbs() {
     act: () => select({ limb }),
   }));
 }
+
+const parameters = () =>
+  (get("parameters") ?? []).map(({ name, label }) => ({
+    kind: "Parameter",
+    words: upper(label),
+    more: get("parameter") === name ? "chosen" : "",
+    also: name,
+    act: () => select({ parameter: name }),
+  }));
 
 /** The frame that a number names. @param {string} wanted @returns {Entry[]} */
 function frames(wanted) {
@@ -203,17 +218,13 @@ function doings() {
   ];
 }
 
-function panels() {
-  const tabs = /** @type {NodeListOf<HTMLElement>} */ (
-    document.querySelectorAll("#tabs [role=tab]")
-  );
-  return [...tabs].map((tab) => ({
+const panels = () =>
+  PANELS.map(([name, words]) => ({
     kind: "Panel",
-    words: tab.textContent,
+    words,
     more: "",
-    act: () => showPanel(tab.dataset.panel),
+    act: () => showPanel(name),
   }));
-}
 
 const views = () =>
   allViews().map((view) => ({
@@ -270,6 +281,7 @@ const KINDS = [
   doings,
   knobs,
   limbs,
+  parameters,
   notes,
   exports,
   pages,
@@ -287,6 +299,10 @@ const act = (entry) => {
   }
 };
 
-/** All that can be found. @param {string} wanted what is looked for, in small letters @returns {Entry[]} */
+/**
+ * All that can be found.
+ * @param {string} wanted what is looked for, in small letters
+ * @returns {Entry[]}
+ */
 export const findable = (wanted) =>
   KINDS.flatMap((kind) => kind(wanted)).map((entry) => ({ ...entry, act: () => act(entry) }));

@@ -1,4 +1,4 @@
-// The first two minutes, in four steps above the scene: what is seen, what the survival rate changes, how it fails, and
+// The first two minutes, in four steps beside the scene: what is seen, what the survival rate changes, how it fails, and
 // what comes next. They are there while a session has the two runs that travel with the walk, until they are closed: the
 // studio remembers that.
 
@@ -12,7 +12,7 @@ import { playWhenShown, visit } from "./visiting.js";
 
 const TEN = "ten-layers";
 const ONE = "one-layer";
-const FRAME = 9;
+const FRAME = 10;
 const LOST = 13;
 const PREFERENCE = "first-steps";
 

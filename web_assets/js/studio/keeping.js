@@ -1,7 +1,7 @@
 // Keeping what was tried of a frame: as a run of its own, or in place of the stored frame.
 
 import { post, runPath } from "../api.js";
-import { openForm } from "../dialogs.js";
+import { openForm } from "./dialogs.js";
 import { complain, say } from "../messages.js";
 import { openSession, refreshSessions } from "../sessions.js";
 import { get, set } from "../state.js";

@@ -1,19 +1,19 @@
 // The keyboard. One table: what it does here is what the list says.
 
-import { lookThrough } from "../cameras.js";
-import { openList } from "../dialogs.js";
+import { openList } from "./dialogs.js";
+import { lookThrough } from "./cameras.js";
 import { correctFrame, leaveCorrecting } from "./correcting.js";
 import { leavePlayback, toggleLoop, togglePlay } from "./playback.js";
 import { enterScene } from "../scene_frame.js";
 import { goTo } from "../selection.js";
 import { get } from "../state.js";
 import { goToMark } from "./timeline.js";
-import { stepParameter, stepView, toggleTable } from "../views.js";
 import { toggleLayers } from "./layer_playback.js";
 import { leaveLayers, step as stepLayer } from "./layer_strip.js";
 import { toggleBookmark } from "./notes.js";
 import { frameBody, resetView, toggleFollow } from "./scene_tools.js";
 import { reanneal } from "./tracking.js";
+import { stepParameter, stepView, toggleTable } from "./views.js";
 
 /** Leave the view through a camera. Whether there was one. */
 function leaveCamera() {

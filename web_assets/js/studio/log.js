@@ -1,9 +1,8 @@
 // The run's log: what the tracking process says, newest below.
 
 import { fetchJson, runPath } from "../api.js";
-import { byId } from "../elements.js";
 import { get, watch } from "../state.js";
-import { follow, html, mount, signal, useLayoutEffect, useRef } from "./component.js";
+import { follow, html, signal, useLayoutEffect, useRef } from "./component.js";
 
 /** @typedef {{ number: number, level: string, time: number, text: string }} Line */
 
@@ -23,7 +22,7 @@ export function addLine(line) {
 }
 
 /** The lines; the newest stays in sight unless another place was scrolled to. */
-function Log() {
+export function Log() {
   const list = useRef(/** @type {HTMLElement | null} */ (null));
   const atEnd = useRef(true);
   const open = follow("panel") === "log";
@@ -58,8 +57,7 @@ async function load() {
   lines.value = stored.lines.map(numbered).slice(-MOST_LINES);
 }
 
-/** Show the log of the run that is open. */
+/** Load the log of the run that is open. */
 export function startLog() {
-  mount(byId("panel-log"), html`<${Log} />`);
   watch(["session", "run"], load);
 }

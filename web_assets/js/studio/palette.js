@@ -13,7 +13,11 @@ const isOpen = signal(false);
 const search = signal({ words: "", chosen: 0 });
 const answers = signal(0); // how often there was more to find
 
-/** How well words fit what is looked for; -1: not at all. @param {Entry} entry @param {string} wanted */
+/**
+ * How well words fit what is looked for; -1: not at all.
+ * @param {Entry} entry
+ * @param {string} wanted
+ */
 function fit({ words, more, kind, also = "" }, wanted) {
   const text = `${words} ${more} ${kind} ${also}`.toLowerCase();
   if (kind === "Frame") return 3;
@@ -114,18 +118,18 @@ function Palette() {
   </dialog>`;
 }
 
-function toggle() {
+/** Open it, or close it again. */
+export function togglePalette() {
   search.value = { words: "", chosen: 0 };
   isOpen.value = !isOpen.value;
 }
 
-/** Wire its key and its button. */
+/** Wire its key. */
 export function startPalette() {
   document.addEventListener("keydown", (event) => {
     if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "k") return;
     event.preventDefault();
-    toggle();
+    togglePalette();
   });
-  byId("palette-open").onclick = toggle;
   mount(byId("palette-place"), html`<${Palette} />`);
 }

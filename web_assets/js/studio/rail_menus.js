@@ -1,16 +1,17 @@
 // What can be done to a session, a run and what lies in the trash, from the rail's menus.
 
 import { fault, fetchJson, patch, post, remove, runPath, sessionPath } from "../api.js";
-import { openForm, openMenu } from "../dialogs.js";
+import { openForm } from "./dialogs.js";
+import { openMenu } from "./menu.js";
 import { NAME } from "../elements.js";
 import { complain, say } from "../messages.js";
-import { newRunForm } from "../new_run.js";
+import { newRunForm } from "./new_run.js";
 import { openSession, refreshSessions, setupPath } from "../sessions.js";
-import { startPoseForm } from "../start_pose.js";
+import { startPoseForm } from "./start_pose.js";
 import { get } from "../state.js";
-import { showPanel } from "../tabs.js";
 import { compareForm } from "./comparing.js";
 import { signal } from "./component.js";
+import { showPanel } from "./panels.js";
 import { makeTrackForm } from "./track_work.js";
 
 const MOST_RESTORED = 12;

@@ -3,7 +3,7 @@
 // in the window that began it, once that shows the studio again.
 
 import { fault, fetchJson, post, readOnly, remove, runPath } from "../api.js";
-import { openForm } from "../dialogs.js";
+import { openForm } from "./dialogs.js";
 import { byId, NAME } from "../elements.js";
 import { listen } from "../events.js";
 import { findJob, isGoing, progressOf, shareOf } from "../jobs.js";

@@ -1,9 +1,9 @@
-// Why a frame is as it is, in words made from the stored search, and a button that tries what may help.
+// Why a frame is as it is, in words made from the stored search, and a button that tries what may
+// help.
 
 import { addressOf } from "../address.js";
 import { fetchJson, frameView, patch, readOnly, runPath, runView } from "../api.js";
 import { figure as figureWords } from "../chart_looks.js";
-import { byId } from "../elements.js";
 import { countedIn, onOneAxis } from "../layer_axis.js";
 import { onEvent } from "../live.js";
 import { complain, say } from "../messages.js";
@@ -12,12 +12,12 @@ import { followsSearch, isStored, layersShown, select } from "../selection.js";
 import { setupPath } from "../sessions.js";
 import { get, set, watch } from "../state.js";
 import { records } from "../view_sheet.js";
-import { liveFigure } from "../views.js";
 import { drawLimbs } from "../why_drawing.js";
-import { computed, follow, html, mount, signal } from "./component.js";
+import { computed, follow, html, signal } from "./component.js";
 import { correctFrame } from "./correcting.js";
 import { FigurePlace } from "./figure_place.js";
 import { hasTrack } from "./tracks.js";
+import { liveFigure } from "./views.js";
 
 /**
  * @import { Schemas } from "../api_types"
@@ -40,7 +40,10 @@ const wrong = signal("");
 const isLoading = signal(false);
 let age = 0; // rises when what is stored changed
 
-/** What there is to speak of: a frame that is "stored" or being "searched", "none" yet, or a run that is being "read". */
+/**
+ * What there is to speak of: a frame that is "stored" or being "searched", "none" yet, or a run
+ * that is being "read".
+ */
 const subject = computed(() => {
   const [run, frame, summary] = [follow("run"), follow("frame"), follow("summary")];
   if (run && !summary) return "read";
@@ -52,7 +55,10 @@ const subject = computed(() => {
   return followsSearch() || !isStored() ? "searched" : "stored";
 });
 
-/** What the answers depend on. @param {string | null} trial whose they are, null: of what is stored */
+/**
+ * What the answers depend on.
+ * @param {string | null} trial whose they are, null: of what is stored
+ */
 function queryOf(trial) {
   const query = new URLSearchParams();
   if (get("track") && get("track") !== "raw") query.set("track", get("track"));
@@ -275,16 +281,16 @@ function figureNow() {
 const Drawn = () =>
   html`<${FigurePlace} panel="why" label="Limbs and frames" shown=${figureNow()} />`;
 
-const Why = () => html`
+/** The panel. */
+export const Why = () => html`
   <section class="why-words" aria-label="Why" aria-busy=${String(isLoading.value)}>
     <${Said} />
   </section>
   <${Drawn} />
 `;
 
-/** Show the panel and load what it says. */
+/** Load what the panel says. */
 export function startWhy() {
-  mount(byId("panel-why"), html`<${Why} />`);
   const later = paced(load, LOAD_MILLISECONDS);
   const names = ["session", "run", "frame", "track", "trial", "against", "summary", "panel"];
   watch([...names, "follow", "work", "detail"], later);
