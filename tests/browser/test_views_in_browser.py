@@ -279,6 +279,7 @@ def test_the_arrows_move_the_timeline_from_every_stop_of_the_keyboard(window: St
     page.wait_for_timeout(500)
     stops, at, frame = [], 0, FRAME
     part = "body" if panel == "why" else f"#panel-{panel}, #tab-tools"
+    until(page, lambda: page.evaluate(FOCUS, [part, 0]) is not None)
     while True:
         stop = page.evaluate(FOCUS, [part, at])
         at += 1
@@ -557,7 +558,9 @@ def test_moved_knobs_are_kept_per_run_until_they_are_put_back(
     bar = page.locator("#trial")
     bar.get_by_text("survival rate 0.3 → 0.5").wait_for()
     bar.get_by_text("particles 60 → 70").wait_for()
-    # Another run, back, and a reload: the knobs of this run are as they were left, what was annealed is not stored.
+    until(page, lambda: "trial=" in page.url)
+    # Another run, back, and a reload: the knobs of this run are as they were left, and what was annealed, which is not
+    # stored, is there as long as the address names it.
     page.locator('.run[data-key="walk/beside"]').click()
     window.until("get('run') === 'beside' && get('moved')?.length === 0")
     bar.wait_for(state="hidden")
@@ -568,10 +571,13 @@ def test_moved_knobs_are_kept_per_run_until_they_are_put_back(
     page.reload()
     window.until("get('moved')?.length === 2")
     assert moved_knobs(window) == wanted
-    assert window.get("whatIf") is None
-    # So does another browser; it may put them back.
+    window.until(f"get('trial') && get('whatIf')?.length === {LAYERS}")
+    bar.get_by_role("button", name="Discard", exact=True).click()
+    window.until("get('trial') === null && get('whatIf') === null")
+    # Another browser has the knobs, too; it may put them back.
     fresh = StudioPage(browser, studio, open_at=f"{studio.address}&session=walk&run=seen", with_scene=False)
-    fresh.until("get('moved')?.length === 2")
+    fresh.until("get('moved')?.length === 2 && get('detail')")
+    assert fresh.get("whatIf") is None
     fresh.page.get_by_role("button", name="Put back", exact=True).click()
     for one in (fresh, window):
         one.page.bring_to_front()
