@@ -20,6 +20,7 @@ from studio.runs.new_run import prepare_run
 from studio.sessions.recordings import check_cameras, import_recording
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
+from studio.words import counted
 
 IDLE_SECONDS = 90.0
 """Cameras that are neither looked at nor recorded are closed after so long."""
@@ -200,7 +201,9 @@ class CameraService:
         finally:
             recording.close()
         standing = recording.standing
-        words = f"{standing.sets} sets of pictures; {standing.spreads.in_words}"
+        words = (
+            f"{counted(standing.sets, 'set of pictures', 'sets of pictures')}; {standing.spreads.in_words}"
+        )
         return {"step": "", "words": words, "notes": [notice.in_words for notice in standing.notices]}
 
     def _ended(self, job: Job) -> bool:

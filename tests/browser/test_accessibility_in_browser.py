@@ -19,6 +19,8 @@ SETTINGS = {"layers": 3, "particles": 40, "recovery": "off"}
 GRAVE = ("serious", "critical")
 # The themes differ in colours alone: everything is checked in the dark one, colours in both.
 RULES = {"dark": {}, "light": {"runOnly": ["color-contrast"]}}
+# Views that have more than a figure.
+OWN_CONTROLS = ("seeds", "landscape")
 IN_DARK = {"dark": RULES["dark"]}
 # The scene's page is viser's.
 WITHOUT = [["#scene"], ["iframe"]]
@@ -164,7 +166,26 @@ def test_what_does_not_fit_is_seen(window: StudioPage) -> None:
     window.page.evaluate("document.getElementById('wide').remove()")
 
 
-def test_every_panel_view_and_dialog_of_the_studio(window: StudioPage, studio: StudioServer) -> None:
+def show_view(window: StudioPage, name: str) -> None:
+    window.page.evaluate(SET, {"panel": "views", "view": name, "layer": 1, "parameter": "pelvis_rz"})
+    until(window.page, lambda: not window.page.locator("[aria-busy=true]").count())
+
+
+@pytest.mark.slow
+def test_every_view(window: StudioPage, studio: StudioServer) -> None:
+    """What differs from view to view is drawn on a canvas, which the checker does not look into, but for words."""
+    page = window.page
+    page.goto(f"{studio.origin}/?session=walk&run=seen&frame=2")
+    window.until(f"get('summary')?.frames.length === {FRAMES} && get('detail')?.frame === 2")
+    for name in [
+        *(one["name"] for one in studio.get("/api/views")["views"] if one["name"] != "why"),
+        "frames",
+    ]:
+        show_view(window, name)
+        check(window, "view", name, rules=IN_DARK)
+
+
+def test_every_panel_and_dialog_of_the_studio(window: StudioPage, studio: StudioServer) -> None:
     page = window.page
     page.goto(f"{studio.origin}/?session=walk&run=seen&frame=2")
     window.until(f"get('summary')?.frames.length === {FRAMES} && get('detail')?.frame === 2")
@@ -173,12 +194,9 @@ def test_every_panel_view_and_dialog_of_the_studio(window: StudioPage, studio: S
         page.click(f"[data-panel={panel}]")
         until(page, lambda: not page.locator("[aria-busy=true]").count())
         check(window, "panel", panel)
-    names = [one["name"] for one in studio.get("/api/views")["views"] if one["name"] != "why"]
-    for name in [*names, "frames"]:
-        page.evaluate(SET, {"panel": "views", "view": name, "layer": 1, "parameter": "pelvis_rz"})
-        until(page, lambda: not page.locator("[aria-busy=true]").count())
-        # What differs from view to view is drawn on a canvas, which the checker does not look into.
-        check(window, "view", name, rules=IN_DARK)
+    for name in OWN_CONTROLS:
+        show_view(window, name)
+        check(window, "view", name)
     window.key("t")
     page.locator("#panel-views table").first.wait_for()
     check(window, "a view as a table")

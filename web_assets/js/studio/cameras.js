@@ -1,4 +1,5 @@
-// The camera views side by side: picture under outlines, mask, edge map, sample points; a click enlarges one.
+// The camera views side by side: picture under outlines, mask, edge map, sample points; a click
+// enlarges one.
 
 import { fetchJson, runPath, sessionPath } from "../api.js";
 import { seriesToken } from "../chart_looks.js";
@@ -54,7 +55,10 @@ const within = (share) => Math.max(0, Math.min(1, share));
 /** The frame of the footage that is looked at before there is a run. */
 const footageFrame = () => Math.max(0, Math.min(frameCount.value - 1, follow("frame") ?? 0));
 
-/** The compared runs that the same cameras saw, those of this session; "" in the places of the others. */
+/**
+ * The compared runs that the same cameras saw, those of this session; "" in the places of the
+ * others.
+ */
 function comparedHere() {
   const session = follow("session");
   follow("run");
@@ -68,7 +72,10 @@ function comparedHere() {
 /** @param {(number | null)[]} pose */
 const poseWords = (pose) => pose.map((value) => Number((value ?? 0).toPrecision(7))).join(",");
 
-/** The pictures that are shown, without camera and height: of the run's frame, or before there is a run of the footage's. */
+/**
+ * The pictures that are shown, without camera and height: of the run's frame, or before there is a
+ * run of the footage's.
+ */
 const wanted = computed(() => {
   const [session, run, frame] = [follow("session"), follow("run"), follow("frame")];
   if (!session || (run && frame === null)) return null;
@@ -245,7 +252,8 @@ export function lookThrough(at) {
   set({ through: at === null ? null : cameras.value[at].name });
 }
 
-// Panels that have nothing to show of a session without a run: its footage is shown instead, until a run is opened.
+// Panels that have nothing to show of a session without a run: its footage is shown instead, until
+// a run is opened.
 const OF_RUNS = ["why", "views", "compare", "export"];
 let instead = ""; // the panel that is shown again with a run
 

@@ -1,5 +1,6 @@
-// Stored runs beside the open one: curves and their difference, settings that differ, layer by layer in the shown frame,
-// the worst frame of each one click away; their bodies in the scene, each in its colour.
+// Stored runs beside the open one: curves and their difference, settings that differ, layer by
+// layer in the shown frame, the worst frame of each one click away; their bodies in the scene, each
+// in its colour.
 
 import { addressOf } from "../address.js";
 import { fault, fetchJson, frameView, runPath } from "../api.js";

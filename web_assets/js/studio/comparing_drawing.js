@@ -1,4 +1,5 @@
-// The curves of runs that are compared: over the frames, their difference from the first, and by layer of a frame.
+// The curves of runs that are compared: over the frames, their difference from the first, and by
+// layer of a frame.
 
 import { figure } from "../chart_looks.js";
 import { seriesColour } from "../theme.js";
@@ -15,7 +16,10 @@ const tipOfLayer = (points) =>
     points.map((point) => [point.seriesName, point.data]),
   );
 
-/** How many layers are drawn: a swarm's have no effective number, as many as it has do not squeeze the others' together. */
+/**
+ * How many layers are drawn: a swarm's have no effective number, as many as it has do not squeeze
+ * the others' together.
+ */
 const layersOf = (layered) =>
   Math.max(
     1,
@@ -25,7 +29,8 @@ const layersOf = (layered) =>
   );
 
 /**
- * The layers of a frame's last search, whose result the frame is, counted in it, however often the frame was searched.
+ * The layers of a frame's last search, whose result the frame is, counted in it, however often the
+ * frame was searched.
  * @param {any} schedule the answer of the view
  */
 export function lastSearch({ tables, search_layers: layers, searches }) {

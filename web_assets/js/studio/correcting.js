@@ -1,5 +1,5 @@
-// A frame corrected by hand: its pose is edited in the scene, then the run is tracked on from it, or backwards; the new
-// run is opened and the old one stays.
+// A frame corrected by hand: its pose is edited in the scene, then the run is tracked on from it,
+// or backwards; the new run is opened and the old one stays.
 
 import { fault, fetchJson, post, remove, runPath } from "../api.js";
 import { byId } from "../elements.js";

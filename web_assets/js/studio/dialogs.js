@@ -65,7 +65,8 @@ export const openPicture = (caption, source) =>
 
 /**
  * A field of a form. `kind`: of its input, or "check", or "file"; `choices`: those of a select, as {value, label} or words;
- * `hint`: stands below it, `help`: where the pointer rests; all else are the input's own attributes.
+ * `hint`: stands below it, `help`: where the pointer rests; all else are the input's own
+ * attributes.
  */
 export function Field(
   /** @type {Record<string, any>} */ {
@@ -117,8 +118,9 @@ export const valuesOf = (form) =>
   );
 
 /**
- * A form with a heading and its buttons. `send(values, report)` may throw an error with message and hint, which is shown
- * in place; the dialog closes when it returns. `changed(name, form)` is called for every field that a person changes.
+ * A form with a heading and its buttons. `send(values, report)` may throw an error with message and
+ * hint, which is shown in place; the dialog closes when it returns. `changed(name, form)` is called
+ * for every field that a person changes.
  * @param {{ heading: string, intro?: string, action: string, danger?: boolean, children?: any,
  *   send: (values: any, report: (words: string) => void) => any,
  *   changed?: (name: string, form: HTMLFormElement) => void }} properties

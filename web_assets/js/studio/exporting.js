@@ -175,7 +175,9 @@ function Actions({ form }) {
   </div>`;
 }
 
-/** @param {{ form: any, known: Schemas["ExportChoices"], list: Schemas["ExportList"] }} properties */
+/**
+ * @param {{ form: any, known: Schemas["ExportChoices"], list: Schemas["ExportList"] }} properties
+ */
 const Options = ({ form, known, list }) => html`<div class="export-form">
   <p class="hint">${form.opens}</p>
   ${form.takes.includes("track") && list.note && html`<p class="hint">${list.note}</p>`}

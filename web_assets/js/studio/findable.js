@@ -35,14 +35,20 @@ const go = (address) => {
 };
 const openBeside = (address, target = "_blank") => window.open(address, target, "noopener");
 
-/** What is asked of the server when "Find" is opened: knobs of the run, formats, headings of the guide. */
+/**
+ * What is asked of the server when "Find" is opened: knobs of the run, formats, headings of the
+ * guide.
+ */
 let asked = {
   knobs: /** @type {any} */ (null),
   formats: /** @type {any[]} */ ([]),
   help: /** @type {any[]} */ ([]),
 };
 
-/** Ask again for what depends on the run; `changed()` when there is more to find. @param {() => void} changed */
+/**
+ * Ask again for what depends on the run; `changed()` when there is more to find.
+ * @param {() => void} changed
+ */
 export async function askForFindable(changed) {
   const [session, run] = [get("session"), get("run")];
   const none = () => null;
@@ -293,6 +299,10 @@ const act = (entry) => {
   }
 };
 
-/** All that can be found. @param {string} wanted what is looked for, in small letters @returns {Entry[]} */
+/**
+ * All that can be found.
+ * @param {string} wanted what is looked for, in small letters
+ * @returns {Entry[]}
+ */
 export const findable = (wanted) =>
   KINDS.flatMap((kind) => kind(wanted)).map((entry) => ({ ...entry, act: () => act(entry) }));

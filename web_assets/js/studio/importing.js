@@ -1,4 +1,5 @@
-// Importing a session: a folder of the computer that the studio runs on, or an upload from this browser.
+// Importing a session: a folder of the computer that the studio runs on, or an upload from this
+// browser.
 
 import { post } from "../api.js";
 import { NAME } from "../elements.js";
@@ -13,7 +14,10 @@ const WHAT =
   "A folder with videos/ and calibration/ (optional: masks, background, truth, subject.toml, " +
   "start_pose.csv), or a bodytrack folder.";
 
-/** What dropped files are called as a session: their folder's name, else that of the only file. @param {File[]} files */
+/**
+ * What dropped files are called as a session: their folder's name, else that of the only file.
+ * @param {File[]} files
+ */
 function nameOf(files) {
   const [{ webkitRelativePath: path, name }] = files;
   const alone = files.length === 1 ? name.replace(/\.[^.]*$/, "") : "take";
@@ -46,7 +50,10 @@ const REFER = [
   [{ name: "refer", kind: "check", label: "use the footage in place instead of copying it" }],
 ];
 
-/** Open the form. `dropped`: files to be imported, from the computer's own windows. @param {File[] | null} [dropped] */
+/**
+ * Open the form. `dropped`: files to be imported, from the computer's own windows.
+ * @param {File[] | null} [dropped]
+ */
 export function importForm(dropped = null) {
   const name = { name: "name", label: "Session name", value: dropped ? nameOf(dropped) : "" };
   const fps = {

@@ -1,5 +1,5 @@
-// Views of a frame whose layers come with the events while it is searched: the same tables as the API's, made of these
-// layers.
+// Views of a frame whose layers come with the events while it is searched: the same tables as the
+// API's, made of these layers.
 
 import { get } from "../state.js";
 
@@ -97,7 +97,10 @@ export function liveView(name) {
   };
 }
 
-/** A view of the trial that is shown, of the layers that came so far; null for those that the studio has to make. */
+/**
+ * A view of the trial that is shown, of the layers that came so far; null for those that the studio
+ * has to make.
+ */
 export function triedView(name) {
   const layers = get("whatIf");
   if (!LIVE[name] || !layers?.length || !get("parameters")) return null;

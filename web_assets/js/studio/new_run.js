@@ -1,4 +1,5 @@
-// A new run: tracker, likelihood, frames, seed and the knobs that matter most; everything else stays at its default.
+// A new run: tracker, likelihood, frames, seed and the knobs that matter most; everything else
+// stays at its default.
 
 import { fetchJson, post, runPath, sessionPath } from "../api.js";
 import { dotted, duration } from "../elements.js";
@@ -20,8 +21,8 @@ const SWITCH = [
   { value: "false", label: "off" },
 ];
 /**
- * What a run costs and how it searches: shown with its value, whatever the preset, and so is what the preset sets; all
- * others stay in the scene's panel.
+ * What a run costs and how it searches: shown with its value, whatever the preset, and so is what
+ * the preset sets; all others stay in the scene's panel.
  */
 const CHIEF = [
   ...["particles", "layers", "survival"],
@@ -39,7 +40,10 @@ const choicesOf = (entries) => entries.map((one) => ({ value: one.name, label: o
 const knobsOf = (tracker, weighting) =>
   fetchJson(`/api/knobs?${new URLSearchParams({ tracker, weighting })}`);
 
-/** How many poses are evaluated in a frame with these values; null where the tracker decides that itself. */
+/**
+ * How many poses are evaluated in a frame with these values; null where the tracker decides that
+ * itself.
+ */
 function evaluationsOf(values) {
   const { layers, particles, stage1_particles: first, stage2_particles: second } = values;
   if (layers && particles) return layers * particles;
@@ -47,7 +51,10 @@ function evaluationsOf(values) {
   return first * values.stage1_iterations + second * values.stage2_iterations;
 }
 
-/** How long an evaluation and a frame take with a tracker and likelihood, by the session's stored runs. */
+/**
+ * How long an evaluation and a frame take with a tracker and likelihood, by the session's stored
+ * runs.
+ */
 const paceOf = (session, tracker, weighting, evaluations) =>
   fetchJson(
     `${sessionPath(session)}/pace?${new URLSearchParams({ tracker, weighting, evaluations })}`,
@@ -74,7 +81,10 @@ function knobValue(knob, value) {
   return knob.kind === "int" || knob.kind === "float" ? Number(value) : value;
 }
 
-/** The presets made for a tracker, which they bring, and of the others those all of whose knobs are among these. */
+/**
+ * The presets made for a tracker, which they bring, and of the others those all of whose knobs are
+ * among these.
+ */
 const presetChoices = (presets, knobs) => [
   { value: "", label: "defaults" },
   ...choicesOf(
@@ -222,7 +232,8 @@ function NewRun({ entry, like, known, detail, first }) {
   };
 
   const [warning] = detail.doubts;
-  // Bodies whose every parameter has limits may begin anywhere between them; the others need a pose.
+  // Bodies whose every parameter has limits may begin anywhere between them; the others need a
+  // pose.
   const isOpenEnded = ({ lower, upper }) => lower === null || upper === null;
   const needsPose = !detail.has_start_pose && detail.body.parameters.some(isOpenEnded);
   const own = { value: "", label: `the session's (${entry.body})` };

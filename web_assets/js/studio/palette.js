@@ -13,7 +13,11 @@ const isOpen = signal(false);
 const search = signal({ words: "", chosen: 0 });
 const answers = signal(0); // how often there was more to find
 
-/** How well words fit what is looked for; -1: not at all. @param {Entry} entry @param {string} wanted */
+/**
+ * How well words fit what is looked for; -1: not at all.
+ * @param {Entry} entry
+ * @param {string} wanted
+ */
 function fit({ words, more, kind, also = "" }, wanted) {
   const text = `${words} ${more} ${kind} ${also}`.toLowerCase();
   if (kind === "Frame") return 3;

@@ -11,7 +11,8 @@ import { follow, html, signal } from "./component.js";
 const USUAL = 8;
 
 /**
- * The newest state of the search of each run and frame, by which it is still seen after the page was loaded again.
+ * The newest state of the search of each run and frame, by which it is still seen after the page
+ * was loaded again.
  * @type {import("@preact/signals").Signal<Record<string, any>>}
  */
 const jobs = signal({});
@@ -82,7 +83,10 @@ async function findSeeds() {
   }
 }
 
-/** Hear of searches; `ended()` is called when that of the shown frame has ended. @param {() => void} ended */
+/**
+ * Hear of searches; `ended()` is called when that of the shown frame has ended.
+ * @param {() => void} ended
+ */
 export function startSeeds(ended) {
   findSeeds().catch(complain);
   onEvent("seeds", (job) => {

@@ -1,4 +1,5 @@
-// Finding a start pose in a frame: progress while it is looked for, what was found and how sure it is.
+// Finding a start pose in a frame: progress while it is looked for, what was found and how sure it
+// is.
 
 import { post, remove, sessionPath } from "../api.js";
 import { percent } from "../elements.js";
@@ -28,7 +29,9 @@ export async function findStartPose(session, request, report) {
 /** Whether a pose that was found may be wrong. */
 export const isUnsure = (found) => found.confidence < UNSURE;
 
-/** How sure a pose is, and how much of the masks it covers: two numbers that say different things. */
+/**
+ * How sure a pose is, and how much of the masks it covers: two numbers that say different things.
+ */
 export function foundWords({ confidence, overlap }) {
   const sure = `confidence ${percent(confidence)} that it is right`;
   return overlap == null ? sure : `${sure}, it agrees with ${percent(overlap)} of the masks`;

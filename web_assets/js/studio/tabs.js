@@ -1,4 +1,5 @@
-// The tabs under the timeline: one panel at a time, each with its tools; all of it can be folded away.
+// The tabs under the timeline: one panel at a time, each with its tools; all of it can be folded
+// away.
 
 import { byId } from "../elements.js";
 import { get, set, watch } from "../state.js";
@@ -164,7 +165,9 @@ function Panels() {
   });
 }
 
-/** Show the tabs and their panels: the one that is in the address, else the one that was open last. */
+/**
+ * Show the tabs and their panels: the one that is in the address, else the one that was open last.
+ */
 export function startTabs() {
   const isKnown = (name) => PANELS.some(([one]) => one === name);
   const remembered = Number(localStorage.getItem("panels-height"));

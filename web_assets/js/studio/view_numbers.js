@@ -1,4 +1,5 @@
-// The numbers of a view: from the API, of what is stored or of a trial; those over the frames from the page's own summary.
+// The numbers of a view: from the API, of what is stored or of a trial; those over the frames from
+// the page's own summary.
 
 import { fetchJson, frameView, runView } from "../api.js";
 import { get } from "../state.js";
@@ -42,7 +43,8 @@ function layersIn(trial) {
 }
 
 /**
- * What a view's numbers depend on, as its address says it; a limb is marked in the drawing, all the others stay in it.
+ * What a view's numbers depend on, as its address says it; a limb is marked in the drawing, all the
+ * others stay in it.
  * @param {{ name: string, uses: string[] }} view @param {string | null} trial whose numbers
  */
 export function queryOf(view, trial) {

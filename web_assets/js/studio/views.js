@@ -1,5 +1,5 @@
-// The views of a run's search: a list of them, and the one that is shown, as a figure. Their numbers come from the API;
-// what is clicked in one of them is chosen everywhere.
+// The views of a run's search: a list of them, and the one that is shown, as a figure. Their
+// numbers come from the API; what is clicked in one of them is chosen everywhere.
 
 import { addressOf } from "../address.js";
 import { fetchJson, post } from "../api.js";
@@ -96,7 +96,10 @@ async function load() {
   }
 }
 
-/** What was tried, in a view's tables: from the events where they tell all of it, else from the studio; null: nothing. */
+/**
+ * What was tried, in a view's tables: from the events where they tell all of it, else from the
+ * studio; null: nothing.
+ */
 async function triedIn(view, stored) {
   if (!get("whatIf")) return null;
   const live = !isOfRun(view) && triedView(view.name);
@@ -118,7 +121,11 @@ async function showBoth(view, stored) {
   if (held?.key === stored.key && current() === view) show(view, stored.answer, tried);
 }
 
-/** What a drawing knows beside its tables. @param {number} room @param {ReturnType<typeof onOneAxis>} axis */
+/**
+ * What a drawing knows beside its tables.
+ * @param {number} room
+ * @param {ReturnType<typeof onOneAxis>} axis
+ */
 const at = (room, axis) => ({
   ...axis.counted,
   layer: axis.there(get("layer")),
@@ -170,8 +177,8 @@ function show(view, stored, /** @type {any} */ tried) {
 }
 
 /**
- * The layers that there are of the frame that is searched, as a figure: in that view, or as their variance where the view
- * needs the frame's stored result; null without a layer.
+ * The layers that there are of the frame that is searched, as a figure: in that view, or as their
+ * variance where the view needs the frame's stored result; null without a layer.
  * @returns {Shown | null}
  */
 export function liveFigure(name = "variance") {
@@ -221,7 +228,10 @@ function choose(
   return drawBeside([{ colour: "accent", pose: parameters.map(({ name }) => row[name]) }]);
 }
 
-/** Draw bodies beside the answer in the scene. @param {{ colour: string, pose: number[] }[]} ghosts */
+/**
+ * Draw bodies beside the answer in the scene.
+ * @param {{ colour: string, pose: number[] }[]} ghosts
+ */
 export const drawBeside = (ghosts) => post("/api/scene/show", { ghosts }).catch(complain);
 
 /** A choice among a view's own values. */

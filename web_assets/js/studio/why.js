@@ -1,4 +1,5 @@
-// Why a frame is as it is, in words made from the stored search, and a button that tries what may help.
+// Why a frame is as it is, in words made from the stored search, and a button that tries what may
+// help.
 
 import { addressOf } from "../address.js";
 import { fetchJson, frameView, patch, readOnly, runPath, runView } from "../api.js";
@@ -39,7 +40,10 @@ const wrong = signal("");
 const isLoading = signal(false);
 let age = 0; // rises when what is stored changed
 
-/** What there is to speak of: a frame that is "stored" or being "searched", "none" yet, or a run that is being "read". */
+/**
+ * What there is to speak of: a frame that is "stored" or being "searched", "none" yet, or a run
+ * that is being "read".
+ */
 const subject = computed(() => {
   const [run, frame, summary] = [follow("run"), follow("frame"), follow("summary")];
   if (run && !summary) return "read";
@@ -51,7 +55,10 @@ const subject = computed(() => {
   return followsSearch() || !isStored() ? "searched" : "stored";
 });
 
-/** What the answers depend on. @param {string | null} trial whose they are, null: of what is stored */
+/**
+ * What the answers depend on.
+ * @param {string | null} trial whose they are, null: of what is stored
+ */
 function queryOf(trial) {
   const query = new URLSearchParams();
   if (get("track") && get("track") !== "raw") query.set("track", get("track"));
