@@ -33,7 +33,7 @@ from studio.sessions.workspace import Workspace
 
 ANSWER_SECONDS = 180.0
 """How long an acknowledgement may take: as long as a start and the first compilation on a busy machine."""
-CLOSING_SECONDS = 5.0
+CLOSING_SECONDS = 2.5
 REFUSALS = (RunError, SettingsError, NotFoundError, SessionError, BodyError, CalibrationError, FootageError)
 
 Value = bool | int | float | str

@@ -4,10 +4,12 @@ import dataclasses
 import math
 import shutil
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+import stored_verdicts
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from store_records import result_of
@@ -15,14 +17,19 @@ from stored_verdicts import check_that_all_agree
 from toy_session import make_session
 from tracked_runs import finish
 
+from studio.inspection import limbs, why
+from studio.inspection.limbs import verdicts_on
 from studio.inspection.reading import InspectedRun
-from studio.inspection.tables import Selection
+from studio.inspection.tables import Finding, Selection
 from studio.inspection.verdict import limbs_off, verdict_on
 from studio.inspection.why import rows
 from studio.runs.new_run import prepare_run
+from studio.runs.samples import install_prepared_runs, install_sample
 from studio.runs.tracks import REFINED, Track, write_track
+from studio.server import result_routes
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session
+from studio.sessions.workspace import Workspace
 from studio.trackers.tracker import LIMB_LOST, LOST, NO_EVIDENCE, RECOVERED, TRACKED, TRACKING_STATES
 
 OLD = Path(__file__).parent.parent / "old_sessions"
@@ -118,3 +125,52 @@ def test_what_older_versions_stored(tmp_path: Path, name: str) -> None:
         packed.extractall(tmp_path)
     session = Session(tmp_path / "toy")
     check_that_all_agree(InspectedRun(session, session.run("run-1")), why=(1,))
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory: pytest.TempPathFactory) -> Session:
+    """The walk with the runs that the demo opens on."""
+    session = install_sample(Workspace(tmp_path_factory.mktemp("demo")), "walk")
+    install_prepared_runs(session, "walk")
+    return session
+
+
+def test_the_runs_of_the_demo(demo: Session) -> None:
+    for run in demo.runs():
+        inspected = InspectedRun(demo, run)
+        said = verdicts_on(inspected)
+        lost = [frame for frame, verdict in said.items() if not verdict.fits]
+        # The run with one layer loses the walker, the one with ten does not.
+        assert bool(lost) == (run.name == "one-layer")
+        check_that_all_agree(inspected, why=tuple(lost[-1:]))
+
+
+def twisted(kind: str) -> Callable[..., object]:
+    """What says it, made to say another thing than the others."""
+    if kind == "timeline":
+        return lambda *given: _changed(
+            result_routes.frames(*given), fits=True, tracking=TRACKED, limbs_off=[]
+        )
+    if kind == "badge":
+        return lambda *given: result_routes.frame_detail(*given).model_copy(update={"tracking": TRACKED})
+    if kind == "heat map":
+        return lambda *given: {"limbs": [(*row[:4], False, "") for row in limbs.limb_rows(*given)["limbs"]]}
+    fits = Finding("fits", "The frame fits.")
+    return lambda *given: dataclasses.replace(why.rows(*given), findings=(fits,))
+
+
+def _changed(answer: result_routes.FramesSummary, **changes: object) -> result_routes.FramesSummary:
+    lines = [line.model_copy(update=changes) for line in answer.frames]
+    return answer.model_copy(update={"frames": lines})
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [("timeline", "frames"), ("badge", "frame_detail"), ("heat map", "limb_rows"), ("why", "rows")],
+)
+def test_a_contradiction_is_noticed(
+    marked: InspectedRun, monkeypatch: pytest.MonkeyPatch, kind: str, name: str
+) -> None:
+    monkeypatch.setattr(stored_verdicts, name, twisted(kind))
+    with pytest.raises(AssertionError):
+        check_that_all_agree(marked, why=(0,))
