@@ -236,42 +236,30 @@ def _serve_until_stopped(app: object, listener: socket.socket) -> None:
         ws_per_message_deflate=False,
         timeout_graceful_shutdown=SECONDS_TO_CLOSE,
     )
-    server = _EndingServer(config)
     try:
-        server.run(sockets=[listener])
+        _EndingServer(config).run(sockets=[listener])
     except KeyboardInterrupt:
         return
-    finally:
-        if server.patience is not None:
-            server.patience.cancel()
 
 
 class _EndingServer(uvicorn.Server):
-    """Ends the process so many seconds after the signal to end, where a thread keeps the server from ending: of what is
-    stored nothing is lost by it, and the tracking process ends with this one.
+    """Ends the process so many seconds after the signal to end, whatever a thread is waiting for: of what is stored
+    nothing is lost by it, and the tracking process ends with this one.
     """
-
-    patience: threading.Timer | None = None
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """Begin to end."""
-        if self.patience is None:
-            self.patience = end_the_process_in(SECONDS_TO_END, sig)
+        if not self.should_exit:
+            timer = threading.Timer(SECONDS_TO_END, _end_now, (sig,))
+            timer.daemon = True
+            timer.start()
         super().handle_exit(sig, frame)
-
-
-def end_the_process_in(seconds: float, number: int = 0) -> threading.Timer:
-    """Let the process end then, whatever its threads wait for. number : of the signal that asked for it."""
-    timer = threading.Timer(seconds, _end_now, (number,))
-    timer.daemon = True
-    timer.start()
-    return timer
 
 
 def _end_now(number: int) -> None:
     logging.getLogger("studio.launch").warning("a thread did not end; the server ended without it")
     logging.shutdown()
-    os._exit(128 + number if number else 0)
+    os._exit(128 + number)
 
 
 def _log_to_file(folder: Path) -> Path:

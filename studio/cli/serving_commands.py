@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from studio.cli.output import errors_in_words, print_result
-from studio.launch import PORT, SECONDS_TO_END, Announce, demo, end_the_process_in, serve
+from studio.launch import PORT, Announce, demo, serve
 from studio.sessions.workspace import workspace_root
 
 PORT_HELP = "Port to listen on; 0 takes a free one."
@@ -35,7 +35,6 @@ def demo_command(workspace: Path | None, port: int, as_json: bool) -> None:
     click.echo(PREPARING, err=True)
     with errors_in_words():
         demo(workspace or workspace_root(), port=port, announce=_announcer(as_json))
-    end_the_process_in(SECONDS_TO_END)
 
 
 @click.command("serve")
@@ -71,4 +70,3 @@ def serve_command(
             send_poses=send,
             announce=_announcer(as_json),
         )
-    end_the_process_in(SECONDS_TO_END)

@@ -26,7 +26,9 @@ from studio.settings import knob_table
 ROOT = Path(__file__).resolve().parents[2]
 GUIDE = ROOT / "web_assets" / "guide"
 STATES = set(re.findall(r'\{ name: "(\w+)"', (ROOT / "web_assets" / "js" / "address.js").read_text()))
-PANELS = set(re.findall(r'data-panel="(\w+)"', (ROOT / "web_assets" / "index.html").read_text()))
+PANELS = set(
+    re.findall(r'^  \["(\w+)", "', (ROOT / "web_assets" / "js" / "studio" / "panels.js").read_text(), re.M)
+)
 SMALL = (
     CourseRun("course-a", "one layer", knobs={"layers": 1, "particles": 10}),
     CourseRun("course-b", "two layers", knobs={"layers": 2, "particles": 10}),
