@@ -191,14 +191,11 @@ def _lying(cameras: Sequence[Camera], vertical: Vertical) -> Iterator[Finding]:
         return
     # Rolled pictures show only roughly what is up; that all cameras look down from above the floor speaks for Z.
     looks_down = all(camera.centre[2] > 0.0 and camera.rotation[2, 2] < 0.0 for camera in cameras)
-    doubtful = looks_down and not vertical.level
+    if looks_down and not vertical.level:
+        return
     message = f"{message} {word}{name}".replace(". minus", ". Minus")
     message += f" is the likeliest, {nearest:.0f} degrees off" + ("." if vertical.level else " (roughly).")
-    if doubtful:
-        remedy = "Nothing is to be done if they hang rolled: all look down from above the floor. Else: "
-        yield Finding("up-axis", "warns", message, remedy + _remedy(name, sign))
-    else:
-        yield Finding("up-axis", "blocks", message, _remedy(name, sign))
+    yield Finding("up-axis", "blocks", message, _remedy(name, sign))
 
 
 def _remedy(name: str, sign: float) -> str:

@@ -38,17 +38,19 @@ READ: Mapping[str, str] = {
     "axe-playwright-python": "MIT AND MPL-2.0",
     "colorama": "BSD-3-Clause",
     "ezc3d": "MIT",
+    "python-osc": "Unlicense",
     "tzdata": "Apache-2.0",
 }
 """Read from the projects' own licence files: their metadata says nothing, or they are for other systems only."""
 FREE = frozenset((
     "0BSD", "Apache-2.0", "Apache-2.0 WITH LLVM-exception", "BSD-2-Clause", "BSD-3-Clause", "CC0-1.0", "MIT", "MIT-0",
-    "MIT-CMU", "OFL-1.1", "PSF-2.0", "Zlib",
+    "LicenseRef-TOST-1.0", "MIT-CMU", "OFL-1.1", "PSF-2.0", "Unlicense", "Zlib",
 ))  # fmt: skip
 WEAK = frozenset(("LGPL-3.0-only", "MPL-2.0"))
 """Their own files stay under them; what imports them unchanged does not."""
 NOTES: Mapping[str, str] = {
     "av": "its wheel holds FFmpeg with libx264, under the GPL: who passes the wheel on does so under its terms",
+    "usd-core": "the Tomorrow Open Source Technology License 1.0: Apache 2.0 with another clause on trademarks",
     "fpdf2": "used unchanged, as a package that can be replaced",
 }
 
