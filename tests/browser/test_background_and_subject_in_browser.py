@@ -11,7 +11,7 @@ from studio_server import StudioServer
 
 from studio.sessions.workspace import Workspace
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 PATIENCE = 240_000
 expect.set_options(timeout=PATIENCE)

@@ -9,7 +9,7 @@ from playwright.sync_api import Browser
 from studio_page import StudioPage
 from studio_server import StudioServer
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 RUNS = "/api/sessions/walk/runs"
 FRAMES, SEED = 14, 5

@@ -13,7 +13,7 @@ from studio.sessions.session import Session
 from studio.sessions.stroke_files import read_strokes
 from studio.sessions.workspace import Workspace
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 PATIENCE = 240_000
 expect.set_options(timeout=PATIENCE)

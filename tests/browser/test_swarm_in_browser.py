@@ -10,7 +10,7 @@ from scene_wire import until
 from studio_page import PATIENCE, StudioPage
 from studio_server import StudioServer
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 RUNS = "/api/sessions/walk/runs"
 SEED = 3

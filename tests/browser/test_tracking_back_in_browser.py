@@ -22,7 +22,7 @@ from studio.sessions.provenance import note
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 PATIENCE = 60_000
 START, LAST = 4, 10

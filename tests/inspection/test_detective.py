@@ -70,6 +70,7 @@ def test_the_planted_cause_is_named(tmp_path: Path, calm: Array, fast: Array, ca
     check_that_all_agree(inspected, why=(worst_frame(inspected),))
 
 
+@pytest.mark.slow
 def test_a_run_without_a_fault_has_no_cause(tmp_path: Path, fast: Array) -> None:
     # Half as fast as the calm walk, whose hidden arm the search loses with one seed or another.
     session, run = planted(tmp_path / "sound", "", person_poses("walk", 20, 18, 1), fast, seed=7)

@@ -178,6 +178,7 @@ def test_any_executor_gives_the_same_outcomes(tmp_path: Path, name: str, alone: 
     assert {label for label, result in found.items() if result.failure} == {"plain, seed 1", "clever, seed 1"}
 
 
+@pytest.mark.slow
 def test_a_lost_process_fails_only_its_trial_after_a_second_try(tmp_path: Path) -> None:
     found = run_with(jobs_of(tmp_path / "log", seed1="die"), tmp_path, None)
     assert [label for label, result in found.items() if result.failure] == ["plain, seed 1"]

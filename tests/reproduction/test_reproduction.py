@@ -257,6 +257,7 @@ def has_ended(identifier: int) -> bool:
     return Path(f"/proc/{identifier}/stat").read_text().split()[2] == "Z"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sign", [signal.SIGKILL, signal.SIGINT])
 def test_a_killed_commands_finished_trials_are_kept(tmp_path: Path, sign: int) -> None:
     process = start_waiting(tmp_path)

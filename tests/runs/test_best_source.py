@@ -79,6 +79,7 @@ def test_borders_on_edges_are_supported() -> None:
     assert border_support(picture, np.zeros_like(mask)) == 0.0
 
 
+@pytest.mark.slow
 def test_all_sources_of_a_session_are_tried_and_the_best_is_used(tmp_path: Path) -> None:
     made_ball = patched_ball(tmp_path / "ball")
     session = made_ball.session

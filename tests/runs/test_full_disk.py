@@ -149,6 +149,7 @@ def test_the_store_is_behind_the_search_and_readers_of_the_run_wait_for_it(sessi
         assert tracking._reader.frames() == [0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", [BEFORE, ROLLED_BACK, STUCK])
 def test_a_frame_that_cannot_be_saved_halfway_leaves_what_was_saved_before(
     session_on_disk: Session, way: str

@@ -191,6 +191,7 @@ class Shown:
         return {one.frame: one for one in found}
 
 
+@pytest.mark.slow
 def test_somebody_comes_and_goes(walk: Rendered) -> None:
     """Nobody in frames 0 and 4; he is found in frame 2 and followed back to 1; a camera stops in frame 3."""
     cameras = walk.cameras[1:3]

@@ -71,6 +71,7 @@ def through(black: Session) -> tuple[StoredRun, list[FrameResult]]:
     return run, tracked(black, run)
 
 
+@pytest.mark.slow
 def test_black_frames_are_held_and_the_body_is_found_after_them(
     black: Session, walk: Session, through: tuple[StoredRun, list[FrameResult]]
 ) -> None:

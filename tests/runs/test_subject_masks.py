@@ -182,6 +182,7 @@ def test_each_gets_a_session_with_what_is_known_of_him(people: TwoPeople) -> Non
     assert (made[0].path / picture).samefile(people.session.path / picture)
 
 
+@pytest.mark.slow
 def test_bodies_tracked_at_once_keep_apart_and_each_has_his_masks(people: TwoPeople) -> None:
     one, other = subjects(people.session, at=people.places()).sessions
     rough = [

@@ -85,6 +85,7 @@ def studio(root: Path, *words: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow
 def test_the_command_line_tracks_and_exports_with_them(
     installed: Path, toy_root: Path, tmp_path: Path
 ) -> None:
@@ -224,6 +225,7 @@ def test_a_knob_that_means_two_things_is_refused(installed: Path) -> None:
         default_settings("random", "inside")
 
 
+@pytest.mark.slow
 def test_a_run_of_a_tracker_that_is_not_installed_is_named(installed: Path, toy_root: Path) -> None:
     session = Workspace(toy_root).session("toy")
     prepare_run(session, tracker="random", weighting="inside", last=2, name="own", fit_shape=False)

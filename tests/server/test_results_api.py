@@ -224,6 +224,7 @@ def test_the_timeline_is_there_before_all_is_checked_and_then_says_what_is_damag
     assert known == [(False, [0, 1], {}, 2), *[(True, [0], {"1": "layer 1"}, 1)] * 2]
 
 
+@pytest.mark.slow
 def test_every_flip_in_a_store_is_a_named_gap_and_no_fault_of_the_server(
     studio: Studio, tracked: StoredRun
 ) -> None:

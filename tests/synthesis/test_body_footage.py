@@ -129,6 +129,7 @@ def test_flat_ends_are_those_of_the_tree(tmp_path: Path) -> None:
         footage.close()
 
 
+@pytest.mark.slow
 def test_a_robot_arm_is_followed(tmp_path: Path) -> None:
     recipe = smaller(tmp_path, "robot-arm", 0.75, frames=3)
     session = Session(synthesize(recipe, tmp_path / "made"))

@@ -166,6 +166,7 @@ def test_unreadable_sources_are_named(tmp_path: Path, session_on_disk: Session) 
         read_source(tmp_path / "fine.c3d", load_body("dog"))
 
 
+@pytest.mark.slow
 @pytest.mark.real_data
 def test_a_dance_clip_on_several_bodies(real_data: Path) -> None:
     path = real_data / "cmu-motion" / "05_03.amc"
