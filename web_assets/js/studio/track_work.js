@@ -239,11 +239,13 @@ export function startTrackWork() {
     if (now === at) return;
     at = now;
     find().catch(complain);
+    if (get("connected") && get("run")) catchUp();
   });
   // What this window began before it was loaded again, or while the studio was out of reach, may have ended meanwhile.
   watch(["connected"], () => {
     if (!get("connected")) return;
-    catchUp();
+    // What came of it is shown once the run that the address names is open.
+    if (get("run") || !new URLSearchParams(location.search).get("run")) catchUp();
     find().catch(complain);
   });
 }
