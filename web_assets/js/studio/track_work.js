@@ -36,6 +36,9 @@ const MAKING = {
 /** The newest job on the open run that goes on. */
 const job = signal(/** @type {TrackJob | null} */ (null));
 
+/** Jobs that were heard to end: an answer that was under way meanwhile does not bring them back. */
+const ended = new Set();
+
 /** By identifier the jobs that this window began and what it does after them. @returns {Record<string, After>} */
 const begun = () => JSON.parse(sessionStorage.getItem(KEY) ?? "{}");
 
@@ -104,10 +107,10 @@ async function show(ended) {
   set({ track: ended.track });
 }
 
-/** Take a job's line away, and show what came of it. @param {TrackJob} ended */
-function end(ended) {
-  if (job.value?.identifier === ended.identifier) job.value = null;
-  return show(ended);
+/** Take a job's line away, and show what came of it. @param {TrackJob} state */
+function end(state) {
+  if (job.value?.identifier === state.identifier) job.value = null;
+  return show(state);
 }
 
 /** Find what goes on of the open run. */
@@ -119,7 +122,7 @@ async function find() {
     { session, kind: "track" },
     (line) => line.run === run && isGoing(line),
   );
-  if (found && isHere(found) && isGoing(found)) job.value = found;
+  if (found && isHere(found) && isGoing(found) && !ended.has(found.identifier)) job.value = found;
 }
 
 /** What ended while this window showed another page, or none. */
@@ -231,6 +234,7 @@ export function startTrackWork() {
       if (isHere(state)) job.value = state;
       return;
     }
+    ended.add(state.identifier);
     end(state).catch(complain);
   });
   let at = "";
