@@ -123,9 +123,15 @@ class OpenLiveRun(OpenRun):
     ) -> None:
         self._make_source = make_source or source_of
         self._pipeline: LivePipeline | None = None
-        super().__init__(session_folder, run_folder)
+        self._sender: PoseSender | None = None
         addresses = addresses_from_environment() if send_to is None else send_to
-        self._sender = PoseSender(addresses, self.stored.record, self.stored.body()) if addresses else None
+        super().__init__(session_folder, run_folder)
+        try:
+            if addresses:
+                self._sender = PoseSender(addresses, self.stored.record, self.stored.body())
+        except BaseException:
+            self.close()
+            raise
 
     @property
     def warmed_as(self) -> str:

@@ -159,6 +159,18 @@ def test_a_receiver_that_is_not_there_stops_nothing(session_on_disk: Session) ->
     assert track_live(session_on_disk, run, lambda *_: None, send_to=away).tracked
 
 
+def test_a_run_whose_poses_cannot_be_sent_is_free_again(session_on_disk: Session) -> None:
+    run = live_run(session_on_disk)
+    first = PoseSender([free_socket()], RECORD, BODY)
+    try:
+        taken = SendAddress("ws", "127.0.0.1", first._receivers[0]._server.socket.getsockname()[1])
+        with pytest.raises(RunError, match="cannot be offered"):
+            track_live(session_on_disk, run, lambda *_: None, send_to=[taken])
+    finally:
+        first.close()
+    assert track_live(session_on_disk, run, lambda *_: None).tracked
+
+
 def test_a_taken_port_and_a_wrong_address_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
     first = PoseSender([free_socket()], RECORD, BODY)
     port = first._receivers[0]._server.socket.getsockname()[1]
