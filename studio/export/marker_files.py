@@ -38,7 +38,7 @@ def write_trc_file(task: ExportTask) -> Written:
     if read.names != points.names:
         raise ExportError(f"'{task.place.name}' names other points than were written.", "Export it again.")
     checked = agreed(task.place, apart(read.positions, written))
-    return Written((task.place,), checked, _notes(points, task, "blank cells"))
+    return Written((task.place,), checked, unit_and_point_notes(task, points, "blank cells"))
 
 
 def write_c3d_file(task: ExportTask) -> Written:
@@ -69,10 +69,11 @@ def write_c3d_file(task: ExportTask) -> Written:
         write_c3d(place, part_of_it, up=task.options.up, source=task.source)
         worst = max(worst, apart(task.axes.points_back(read_c3d_points(place)), places[first:last]))
         files.append(place)
-    return Written(tuple(files), agreed(files[0], worst), _notes(points, task, "residual -1"))
+    return Written(tuple(files), agreed(files[0], worst), unit_and_point_notes(task, points, "residual -1"))
 
 
-def _notes(points: Points, task: ExportTask, how: str) -> tuple[str, ...]:
+def unit_and_point_notes(task: ExportTask, points: Points, how: str) -> tuple[str, ...]:
+    """`point_notes`, after how many points there are, in which unit and with which axis up."""
     lengths = f"{len(points.names)} points in {task.options.unit}, {task.options.up.upper()} up."
     return (lengths, *point_notes(task, points, how))
 

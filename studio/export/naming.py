@@ -66,18 +66,18 @@ class Points:
         carried: dict[int, list[int]] = {}
         for point in map(int, outwards):
             carried.setdefault(int(self.joints[point]), []).append(point)
-        found: list[tuple[int, int]] = []
+        lines: list[tuple[int, int]] = []
         before: list[int] = []
         for joint, points in sorted(carried.items()):
-            found += itertools.pairwise(points)
+            lines += itertools.pairwise(points)
             above = body.joints[joint].parent
             while above >= 0 and above not in carried:
                 above = body.joints[above].parent
             if ends := carried.get(above, before):
                 far = [float(np.linalg.norm(places[point] - origins[joint])) for point in ends]
-                found.append((ends[int(np.argmin(far))], points[0]))
+                lines.append((ends[int(np.argmin(far))], points[0]))
             before = before + points
-        return tuple(found)
+        return tuple(lines)
 
 
 @cache

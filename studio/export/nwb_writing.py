@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from studio.arrays import Array
-from studio.export.marker_files import marked_points, point_notes
+from studio.export.marker_files import marked_points, unit_and_point_notes
 from studio.export.naming import Points
 from studio.export.task import ExportTask, Written, agreed, apart
 from studio.extras import load_extra
@@ -71,11 +71,8 @@ def write_nwb(task: ExportTask) -> Written:
     task.step("reading back", 1, 2)
     read = _read_points(task.place, nwb, points.names)
     checked = agreed(task.place, apart(task.axes.points_back(read), places))
-    notes = (
-        f"{len(points.names)} points in {task.options.unit}, {task.options.up.upper()} up; the session's start is when"
-        " the run was made.",
-    )
-    return Written((task.place,), checked, (*notes, *point_notes(task, points, "NaN")))
+    notes = unit_and_point_notes(task, points, "NaN")
+    return Written((task.place,), checked, (*notes, "The session's start is when the run was made."))
 
 
 def _times(task: ExportTask) -> dict[str, float]:

@@ -9,7 +9,7 @@ import json
 
 import numpy as np
 
-from studio.export.marker_files import marked_points, point_notes
+from studio.export.marker_files import marked_points, unit_and_point_notes
 from studio.export.task import ExportTask, Written, agreed, apart
 from studio.extras import load_extra
 
@@ -51,8 +51,5 @@ def write_sleap(task: ExportTask) -> Written:
     with h5.File(task.place, "r") as file:
         read = np.asarray(file["tracks"])[0].transpose(2, 1, 0)
     checked = agreed(task.place, apart(task.axes.points_back(read), places))
-    notes = (
-        f"{len(names)} points in {task.options.unit}, {task.options.up.upper()} up; row 0 is frame"
-        f" {task.motion.frames[0]:g}.",
-    )
-    return Written((task.place,), checked, (*notes, *point_notes(task, points, "NaN")))
+    notes = unit_and_point_notes(task, points, "NaN")
+    return Written((task.place,), checked, (*notes, f"Row 0 is frame {task.motion.frames[0]:g}."))

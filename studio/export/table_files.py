@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from studio.arrays import Array, read_archive
 from studio.body.forward_kinematics import joint_frames
 from studio.errors import ExportError
-from studio.export.marker_files import marked_points, point_notes
+from studio.export.marker_files import marked_points, point_notes, unit_and_point_notes
 from studio.export.naming import Points
 from studio.export.task import ExportTask, Written, agreed, apart
 from studio.runs.notes import notes_by_frame
@@ -119,8 +119,7 @@ def _write_points(
     numbers = [[float(row[column] or math.nan) for column in columns] for row in rows]
     read = task.axes.points_back(np.array(numbers).reshape(places.shape))
     checked = agreed(task.place, apart(read, places))
-    note = f"{len(points.names)} points in {task.options.unit}, {task.options.up.upper()} up."
-    return Written((task.place,), checked, (note, *point_notes(task, points, "empty cells")))
+    return Written((task.place,), checked, unit_and_point_notes(task, points, "empty cells"))
 
 
 def write_parquet(task: ExportTask) -> Written:
