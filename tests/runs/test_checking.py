@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from store_records import layer_of, result_of
 from toy_session import FRAMES, make_session, true_poses
 
 from studio.body.catalogue import load_body
@@ -12,6 +13,7 @@ from studio.runs.new_run import prepare_run
 from studio.runs.refining import SMOOTHED
 from studio.runs.tracks import Track, best_track, write_track
 from studio.runs.workflow import check_step, workflow_of
+from studio.sessions.results_store import ResultsWriter
 
 
 def step(session, name):
@@ -40,6 +42,8 @@ def test_the_true_poses_fit_and_others_do_not(session):
     run = prepare_run(session, start_pose=true_poses()[0])
     with pytest.raises(RunError, match="no finished frame"):
         check_run(session, run)
+    with ResultsWriter(run.folder) as writer:
+        writer.write_frame(result_of(0, layers=1), [layer_of(0, 0)])
     kept(run, true_poses())
     assert best_track(run).name == SMOOTHED
     found = check_run(session, run, every=3)
