@@ -1,18 +1,19 @@
 """What the routes need of the storeys below: the tracking process, the scenes, and where things lie."""
 
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
 from fastapi import Depends, Request
 
+from studio.foreign_files import MANIFEST_NAME
 from studio.inspection.likelihoods import forget_evaluations
 from studio.jobs.camera_service import CameraService
 from studio.jobs.commands import Close
 from studio.jobs.control import StudioControl
-from studio.jobs.job_runner import JobRunner
+from studio.jobs.job_runner import JobRunner, SessionJob
 from studio.runs.overlay_pictures import forget_composers
 from studio.scene.scene_server import SceneServer
 from studio.scene.window_scenes import WindowScenes
@@ -21,7 +22,8 @@ from studio.server.calibration_proposals import Proposals
 from studio.server.event_stream import EventStream
 from studio.server.windows import Window
 from studio.sessions.session import RUNS_NAME
-from studio.sessions.workspace import STATE_NAME, Workspace
+from studio.sessions.work_under_way import STATE_NAME, working_on
+from studio.sessions.workspace import Workspace
 
 
 @dataclass(slots=True)
@@ -46,8 +48,15 @@ class AppState:
 
     def __post_init__(self) -> None:
         """Give all work beside the routes its place, which reports its progress to all watchers."""
-        self.jobs = JobRunner(self.events.publish, self.log_path)
+        self.jobs = JobRunner(self.events.publish, self.log_path, self._working)
         self.cameras = CameraService(self.jobs)
+
+    def _working(self, noun: str, state: SessionJob) -> AbstractContextManager[None]:
+        """What keeps other processes from moving a job's session, where it is there and not only being made."""
+        session = self.workspace.root / state.session
+        if not state.session or not (session / MANIFEST_NAME).is_file():
+            return nullcontext()
+        return working_on(session.resolve(), noun, str(getattr(state, "run", "")))
 
     @property
     def state_folder(self) -> Path:

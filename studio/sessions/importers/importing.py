@@ -55,8 +55,9 @@ from studio.sessions.importers.writing import (
 from studio.sessions.manifest import FASTEST, SessionManifest
 from studio.sessions.names import free_name
 from studio.sessions.provenance import adopt
-from studio.sessions.session import CAMERAS_PATH, THUMBNAIL_NAME, Session, described_anew
+from studio.sessions.session import CAMERAS_PATH, THUMBNAIL_NAME, Session, check_unchanged, described_anew
 from studio.sessions.stroke_files import OUTDATED, STROKES_NAME
+from studio.sessions.work_under_way import one_at_a_time
 
 OWN_PARTS = ("videos", "pictures", "masks", "background")
 PERSON_PARTS = ("calibration", "subject.toml", "start_pose.csv", "sigma.csv", "truth", "bodies")
@@ -257,8 +258,14 @@ def _added(session: Session, source: Path, options: ImportOptions, report: Progr
             write_calibrations(staged, read, measured)
             write_person(staged, plan, person, truths)
         report("finishing", 1, 1)
-        adopt(session)
-        placed = _moved_in(session, staged, footage, without_made_masks(session, stay))
+        with one_at_a_time(session.path):
+            check_unchanged(session, "footage", "calibration_changed")
+            adopt(session)
+            placed = _moved_in(session, staged, footage, without_made_masks(session, stay))
+            manifest = _described(session, plan, read, measured, placed, person.body if takes_over else "")
+            changed = described_anew(session, manifest)
+            _forget_old(changed, session.manifest.footage)
+            forget_unused_masks(changed)
     except OSError as problem:
         raise SessionError(
             f"The footage could not be added to '{session.name}': {problem}.",
@@ -266,10 +273,6 @@ def _added(session: Session, source: Path, options: ImportOptions, report: Progr
         ) from None
     finally:
         discard(staged)
-    manifest = _described(session, plan, read, measured, placed, person.body if takes_over else "")
-    changed = described_anew(session, manifest)
-    _forget_old(changed, session.manifest.footage)
-    forget_unused_masks(changed)
     gone = (MASKS_GONE,) if any(map(has_made_masks, session.manifest.footage.cameras)) else ()
     if session.has_footage and (session.path / STROKES_NAME).exists():
         gone = (*gone, OUTDATED)
