@@ -5,7 +5,7 @@ from typing import Annotated
 from pydantic import Field
 
 from studio.declaring import Terminal, Web, operation
-from studio.operations.opening import RunName, keeping_in_place, open_run
+from studio.operations.opening import RunName, open_run
 from studio.runs.notes import LONGEST, Note, notes_of, remove_note, write_note
 
 
@@ -19,7 +19,6 @@ def notes(run: RunName) -> tuple[Note, ...]:
 
 
 @operation
-@keeping_in_place
 def note(
     run: RunName,
     frame: Annotated[int, Field(ge=0, description="The frame that it is about."), Terminal("--frame")],

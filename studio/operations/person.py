@@ -28,7 +28,6 @@ from studio.runs.subject_fitting import (
 
 
 @operation
-@keeping_in_place
 def subject(
     session: SessionName,
     height_mm: Annotated[

@@ -56,7 +56,8 @@ class AppState:
         session = self.workspace.root / state.session
         if not state.session or not (session / MANIFEST_NAME).is_file():
             return nullcontext()
-        return working_on(session.resolve(), noun, str(getattr(state, "run", "")))
+        verb = str(getattr(state, "verb", "") or noun)
+        return working_on(session.resolve(), verb, str(getattr(state, "run", "") or ""))
 
     @property
     def state_folder(self) -> Path:

@@ -15,7 +15,7 @@ from pathlib import Path
 import httpx
 import numpy as np
 import psutil
-from faults.process_kinds import until
+from faults.process_kinds import PATIENCE, until
 from faults.stage import DONE, FRAMES, NEW, frames_of
 
 from races.stage import GONE, MARK, Outcome, Stage
@@ -136,11 +136,20 @@ def _strike(stage: Stage, rng: np.random.Generator, fired: Sequence[str]) -> Cal
         return None
     share = rng.random()
     if share < SERVER_KILLED:
-        return stage.served.process.kill
+        return lambda: _kill_server(stage)
     if share < 4 * SERVER_KILLED or not any(verb in PYTHON for verb in fired):
         return lambda: _kill_tracker(stage)
     chosen = [place for place, verb in enumerate(fired) if verb in PYTHON]
     return stage.others[int(rng.choice(chosen))].kill
+
+
+def _kill_server(stage: Stage) -> None:
+    process = psutil.Process(stage.served.process.pid)
+    children = process.children()
+    process.kill()
+    stage.served.process.wait()
+    # What it tracked with ends by itself.
+    psutil.wait_procs(children, PATIENCE)
 
 
 def _kill_tracker(stage: Stage) -> None:
@@ -250,7 +259,7 @@ def _judged(
             yield f"session '{session.name}' is called '{session.manifest.name}' in its description"
     if not sessions:
         yield "the session is gone"
-    yield from _runs_wrong(stage, runs, fired)
+    yield from _runs_wrong(stage, runs, fired, killed=killed)
     yield from _locked(stage.root)
     there = There(tuple(sessions), tuple(runs))
     for place, (verb, outcome) in enumerate(zip(fired, outcomes, strict=True)):
@@ -268,7 +277,9 @@ def _judged(
     yield from _movable(stage, given)
 
 
-def _runs_wrong(stage: Stage, runs: Sequence[StoredRun], fired: Sequence[str]) -> Iterator[str]:
+def _runs_wrong(
+    stage: Stage, runs: Sequence[StoredRun], fired: Sequence[str], *, killed: bool
+) -> Iterator[str]:
     marked = [run for run in runs if MARK in [note.text for note in notes_of(run)]]
     whole = [run for run in marked if frames_of(run) == stage.frames]
     copies = sum(plain(verb) == "duplicate" for verb in fired)
@@ -282,7 +293,8 @@ def _runs_wrong(stage: Stage, runs: Sequence[StoredRun], fired: Sequence[str]) -
             yield f"run '{run.name}' is said to be tracked"
         if (summary.status == "finished") != (summary.done == FRAMES):
             yield f"run '{run.name}' is {summary.status} with {summary.done} frames"
-        if run.folder.parent.name == RUNS_NAME and run.record.name != run.name:
+        # A kill between the two steps of renaming leaves the old name, which is read nowhere but in the trash.
+        if not killed and run.folder.parent.name == RUNS_NAME and run.record.name != run.name:
             yield f"run '{run.name}' is called '{run.record.name}' in its record"
     if sum(run.record.name == GONE for run in runs) > 1 + copies:
         yield "a run was brought back twice"

@@ -3,7 +3,6 @@
 import multiprocessing
 import os
 import shutil
-import signal
 import traceback
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -18,6 +17,7 @@ from faults.stage import DONE, FRAMES, NEW, TOY, Place, build_session, build_sou
 from races.verbs import PYTHON, Given
 from studio.errors import StudioError, UnforeseenError
 from studio.runs.notes import write_note
+from studio.runs.verifying import verify
 from studio.sessions.work_under_way import STATE_NAME
 from studio.sessions.workspace import TRASH_NAME, VARIABLE, Workspace
 
@@ -62,12 +62,11 @@ class OtherProcess:
 
     def kill(self) -> None:
         """kill -9, whatever it does."""
-        if self._process.pid is not None:
-            os.kill(self._process.pid, signal.SIGKILL)
+        self._process.kill()
+        self._process.join()
 
     def revive(self) -> None:
         """Another process, if this one was killed."""
-        self._process.join(0.0 if self._process.is_alive() else None)
         if not self._process.is_alive():
             self._here.close()
             self._start()
@@ -117,6 +116,7 @@ class Stage:
         first = Place(self.folder / "first")
         build_session(first, (DONE, GONE), NEW)
         build_source(first)
+        verify(first.session)
         write_note(first.run(DONE), FRAMES - 1, MARK)
         self.frames = frames_of(first.run(DONE))
         self.root.mkdir(parents=True)

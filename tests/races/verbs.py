@@ -78,6 +78,10 @@ class There:
         return any(fits(session) for session in self.sessions)
 
 
+# Python's verbs are imported on first use: here for all processes, before they are forked.
+for _verb in dir(studio):
+    getattr(studio, _verb)
+
 Request = tuple[str, str, object]
 """Method, path after the session's address, and body."""
 
