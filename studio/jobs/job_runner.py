@@ -255,8 +255,10 @@ class JobRunner:
         with self._lock:
             for kind, state in self._going_on(session):
                 if not run or getattr(state, "run", run) in ("", run):
+                    verb = getattr(state, "verb", "")
+                    what = f"'{verb}' of run '{getattr(state, 'run', '')}'" if verb else f"its {kind.noun}"
                     raise RunError(
-                        f"Session '{session}' stays as it is while its {kind.noun} is under way.",
+                        f"Session '{session}' stays as it is while {what} is under way.",
                         "Wait for it, or cancel it.",
                     )
             self._moving.append(session)

@@ -8,6 +8,7 @@ from typing import Annotated
 
 from fastapi import Depends, Request
 
+from studio.errors import RunError
 from studio.foreign_files import MANIFEST_NAME
 from studio.inspection.likelihoods import forget_evaluations
 from studio.jobs.camera_service import CameraService
@@ -102,7 +103,12 @@ def release(app: AppState, session: str, run: str = "") -> None:
     state, folder = app.control.state, app.workspace.root / session
     # Else the process itself knows whether that is what it has open; a search elsewhere is not waited for.
     if state.state != "lost" and (state.session == session or state.state not in ("tracking", "compiling")):
-        app.control.request(Close(session=str(folder), run=str(folder / RUNS_NAME / run) if run else ""))
+        try:
+            app.control.request(Close(session=str(folder), run=str(folder / RUNS_NAME / run) if run else ""))
+        except RunError:
+            # A process that died meanwhile has nothing open any more.
+            if app.control.state.state != "lost":
+                raise
     for scene in app.scenes.open_scenes().values():
         if scene.shown.session == session and (not run or scene.shown.run == run):
             scene.show_run(session if run else "")

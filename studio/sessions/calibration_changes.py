@@ -28,6 +28,7 @@ from studio.errors import CalibrationError, FootageError, NotFoundError, Session
 from studio.foreign_files import LARGEST_RECORD, read_file
 from studio.geometry.camera import Camera
 from studio.sessions import atomic_files, provenance
+from studio.sessions.file_checksums import forget_files
 from studio.sessions.manifest import SessionManifest
 from studio.sessions.names import inside
 from studio.sessions.run_record import CAMERAS_NAME
@@ -100,6 +101,10 @@ def _replaced(session: Session, new: NewCalibration) -> CalibrationChange:
     before = read_calibration(place).cameras if _readable(place) else ()
     place.parent.mkdir(exist_ok=True)
     kept = _keep(place.parent) if place.exists() else None
+    # The earlier originals lie with the calibration that is kept; here they are not lost but replaced.
+    forget_files(
+        session.path, (part.relative_to(session.path).as_posix() for part in _own_parts(place.parent))
+    )
     _write(place, new)
     manifest = _described(session.manifest, new)
     (session.path / THUMBNAIL_NAME).unlink(missing_ok=True)

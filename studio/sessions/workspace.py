@@ -19,6 +19,7 @@ from studio.errors import NotFoundError, SessionError, StudioError
 from studio.progress import Progress, unheard
 from studio.sessions import atomic_files
 from studio.sessions.atomic_files import made_whole, write_text
+from studio.sessions.file_checksums import note_again
 from studio.sessions.manifest import FILE_NAME, SessionManifest, now, write_manifest
 from studio.sessions.names import checked_name, free_name, inside, is_name
 from studio.sessions.object_stores import folder_of, is_address
@@ -210,6 +211,7 @@ class Workspace:
             record = msgspec.structs.replace(run.record, name=new_name)
             os.rename(run.folder, place)
             write_run_record(place, record)
+            note_again(place, RECORD_NAME)
             return session.run(new_name)
 
     def to_trash(self, path: Path, label: str) -> Path:
@@ -254,6 +256,7 @@ class Workspace:
                 (session.path / RUNS_NAME).mkdir(exist_ok=True)
                 name = free_name(record.name, {entry.name for entry in (session.path / RUNS_NAME).iterdir()})
                 write_run_record(path, msgspec.structs.replace(record, name=name))
+                note_again(path, RECORD_NAME)
                 os.rename(path, inside(session.path / RUNS_NAME, name, "run"))
                 return session.run(name)
         raise NotFoundError(f"Session '{owners[0]}' of this run is missing.", "Restore the session first.")

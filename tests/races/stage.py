@@ -11,6 +11,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from types import TracebackType
 
+import msgspec
 from faults.process_kinds import Served, server, until
 from faults.stage import DONE, FRAMES, NEW, TOY, Place, build_session, build_source, frames_of
 
@@ -18,6 +19,8 @@ from races.verbs import PYTHON, Given
 from studio.errors import StudioError, UnforeseenError
 from studio.runs.notes import write_note
 from studio.runs.verifying import verify
+from studio.sessions.manifest import write_manifest
+from studio.sessions.session import Session
 from studio.sessions.work_under_way import STATE_NAME
 from studio.sessions.workspace import TRASH_NAME, VARIABLE, Workspace
 
@@ -164,6 +167,8 @@ class Stage:
         """A fresh session for a group; afterwards nothing of it is left."""
         given = Given(self.root, f"toy{number}", self.root / SOURCE, self.folder / "out", number)
         shutil.copytree(self.folder / "first" / "workspace" / TOY, given.session)
+        session = Session(given.session)
+        write_manifest(session.path, msgspec.structs.replace(session.manifest, name=given.name))
         given.out.mkdir()
         given = given.with_trashed(self.workspace.trash_run(given.name, GONE).name)
         try:

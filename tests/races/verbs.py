@@ -135,13 +135,13 @@ SERVED: Mapping[str, Callable[[Given], Request]] = {
     "served make a run": lambda at: (
         "POST",
         "/runs",
-        {"start_pose": POSE, "knobs": QUICK},
+        {"start_pose": POSE, "settings": QUICK},
     ),
     "served track": lambda at: ("POST", f"/runs/{NEW}/start", None),
     "served branch": lambda at: (
         "POST",
         f"{RUN}/branch",
-        {"frame": 2, "knobs": {"survival": 0.4}, "name": at.called("branched")},
+        {"frame": 2, "settings": {"survival": 0.4}, "name": at.called("branched")},
     ),
     "served correct": lambda at: (
         "POST",

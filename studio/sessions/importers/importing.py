@@ -32,7 +32,7 @@ from studio.sessions.background_files import (
     has_made_masks,
     without_made_masks,
 )
-from studio.sessions.file_checksums import note_files
+from studio.sessions.file_checksums import forget_files, note_files
 from studio.sessions.importers.bodytrack import is_bodytrack, plan_bodytrack
 from studio.sessions.importers.folder_layout import plan_folder
 from studio.sessions.importers.measuring import (
@@ -408,15 +408,18 @@ def _forget_old(session: Session, before: FootageSource) -> None:
     """Remove files of the session's own that no camera refers to any more, and the small picture."""
     (session.path / THUMBNAIL_NAME).unlink(missing_ok=True)
     used = {path for camera in session.manifest.footage.cameras for path in camera.places}
-    for path in (path for camera in before.cameras for path in camera.places):
-        if path and path not in used and not Path(path).is_absolute():
-            place = session.path / path
-            if leads_out(place):
-                continue
-            if place.is_dir() and not place.is_symlink():
-                shutil.rmtree(place, ignore_errors=True)
-            else:
-                place.unlink(missing_ok=True)
+    before_it = {path for camera in before.cameras for path in camera.places}
+    forgotten = [path for path in before_it - used if path and not Path(path).is_absolute()]
+    # Else what was removed on purpose would be taken for lost.
+    forget_files(session.path, forgotten)
+    for path in forgotten:
+        place = session.path / path
+        if leads_out(place):
+            continue
+        if place.is_dir() and not place.is_symlink():
+            shutil.rmtree(place, ignore_errors=True)
+        else:
+            place.unlink(missing_ok=True)
 
 
 def _described(
