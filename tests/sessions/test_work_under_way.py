@@ -1,5 +1,6 @@
 """What goes on in a session keeps it where it is, and what others changed meanwhile is not written over."""
 
+import shutil
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -13,6 +14,7 @@ from studio.errors import NotFoundError, RunError, SessionError
 from studio.runs.initialising import InitialPose, keep_pose
 from studio.runs.new_run import prepare_run
 from studio.runs.notes import notes_of, write_note
+from studio.runs.verifying import verify
 from studio.sessions import atomic_files, work_under_way
 from studio.sessions.atomic_files import NameTakenError
 from studio.sessions.background_files import use_masks
@@ -22,7 +24,7 @@ from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session, described_anew
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.work_under_way import one_at_a_time, under_way, working_on
-from studio.sessions.workspace import Workspace
+from studio.sessions.workspace import VARIABLE, Workspace
 
 START = true_poses()[0]
 
@@ -38,7 +40,8 @@ def run(session: Session) -> StoredRun:
 
 
 @pytest.fixture
-def workspace(session: Session) -> Workspace:
+def workspace(session: Session, monkeypatch: pytest.MonkeyPatch) -> Workspace:
+    monkeypatch.setenv(VARIABLE, str(session.path.parent))
     return Workspace(session.path.parent)
 
 
@@ -162,6 +165,25 @@ def test_who_changes_what_others_have_changed_is_refused_before_anything_is_writ
         replace_calibration(now, NewCalibration(cameras, "three"))
     assert len(list((opened.path / "calibration" / EARLIER).iterdir())) == kept
     assert workspace.session("toy").manifest.calibration_source == "two"
+
+
+def test_what_is_replaced_or_renamed_on_purpose_is_no_damage(
+    workspace: Workspace, run: StoredRun, tmp_path: Path
+) -> None:
+    session = workspace.session("toy")
+    (session.path / "calibration" / "original.toml").write_text("of another program")
+    assert not verify(session).faults
+    source = tmp_path / "source"
+    shutil.copytree(session.path / "calibration", source / "calibration")
+    shutil.copytree(session.path / "pictures" / "front", source / "front")
+    replace_calibration(session, NewCalibration(session.cameras(), "one"))
+    studio.add_footage("toy", source, replace=True, fps=60.0)
+    workspace.rename_run("toy", "one", "new")
+    trashed = workspace.trash_run("toy", "new").name
+    prepare_run(workspace.session("toy"), name="new", start_pose=START)
+    assert workspace.restore_run(trashed).name == "new-2"
+    assert not (session.path / "pictures" / "front").exists()
+    assert not verify(workspace.session("toy")).faults
 
 
 def test_notes_of_two_at_once_are_both_kept(run: StoredRun) -> None:
