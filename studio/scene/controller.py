@@ -366,7 +366,10 @@ class SceneController:
         if (session, run) == (model.selection.session, model.selection.run):
             return model
         same_place = model.subject is not None and model.selection.session == session
+        framed = self.viewers.framed if same_place else None
         self._close()
+        # Layers that are looked at already are those of another body now.
+        self.viewers.framed, self._frames_next = framed, self._is_leading
         self.model = nothing = opened(model, "", "", None)
         with self._server.atomic():
             self._server.scene.reset()
