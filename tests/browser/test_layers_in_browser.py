@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
-from studio_page import PATIENCE, StudioPage
+from studio_page import StudioPage
 from studio_server import StudioServer
 from toy_session import FRAMES, make_session, true_poses
 
@@ -29,11 +29,7 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def window(browser: Browser, studio: StudioServer) -> Iterator[StudioPage]:
     """One window on the session before it has a run; the tests go on from one another."""
     opened = StudioPage(browser, studio, open_at=f"{studio.address}&session=toy", with_scene=False)
-    expect.set_options(timeout=PATIENCE)
-    try:
-        yield opened
-    finally:
-        expect.set_options(timeout=5_000)  # Playwright's own
+    yield opened
     opened.close()
 
 
