@@ -58,10 +58,13 @@ def window(browser: Browser, studio: StudioServer) -> Iterator[StudioPage]:
 
 
 @pytest.fixture(scope="module")
-def page(window: StudioPage, request: pytest.FixtureRequest) -> Page:
-    """The page of that window, waited for with the file's PATIENCE."""
-    window.context.set_default_timeout(request.module.PATIENCE)
-    return window.page
+def page(window: StudioPage, request: pytest.FixtureRequest) -> Iterator[Page]:
+    """The page of that window, waited for with the file's PATIENCE where it has one."""
+    patience = getattr(request.module, "PATIENCE", EXPECTED_MILLISECONDS)
+    window.context.set_default_timeout(patience)
+    expect.set_options(timeout=patience)
+    yield window.page
+    expect.set_options(timeout=EXPECTED_MILLISECONDS)
 
 
 @pytest.fixture(scope="module")
