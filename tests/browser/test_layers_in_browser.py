@@ -75,7 +75,9 @@ def test_the_first_frame_shows_the_layers_that_there_are(
     expect(page.locator("#panel-why .figure-chart canvas").first).to_be_visible()
 
 
-def test_layers_are_played_stepped_and_left(window: StudioPage, studio: StudioServer, page: Page) -> None:
+def test_layers_are_played_stepped_and_left(
+    browser: Browser, window: StudioPage, studio: StudioServer, page: Page
+) -> None:
     studio.pace(0.0)
     page.click("#track-toggle")
     window.until(f"get('work').state === 'finished' && get('summary')?.frames.length === {FRAMES}")
@@ -91,6 +93,15 @@ def test_layers_are_played_stepped_and_left(window: StudioPage, studio: StudioSe
     window.until(f"get('layer') === {2 * LAYERS - 1}")
     expect(words).to_have_text(f"layer {LAYERS} of {LAYERS}, second search")
     window.until("get('layer') === 0")
+    # So they do in a window that the copied link opens, and after a reload.
+    assert "plays=layers" in page.url
+    beside = StudioPage(browser, studio, open_at=page.url, with_scene=False, beside=window)
+    beside.until("get('plays') === 'layers' && get('layer') === 3")
+    beside.until("get('layer') === 1")
+    beside.close()
+    page.reload()
+    window.until("get('plays') === 'layers' && get('layer') === 3")
+    window.until("get('layer') === 1")
     # A drag scrubs, and what plays stops.
     box = page.locator(TILES).nth(LAYERS).bounding_box()
     assert box
