@@ -36,9 +36,8 @@ class _Ease:
 class Viewers:
     """The viewers of one scene; used by its thread.
 
-    looking : the camera of the viewer who moved last, set by viser's callbacks. is_answer : whether it only says where it
-    was put, perhaps in another shape. placed : called with each eye that all
-    viewers are put to. framed : the eye that frames the body, which is the usual one then; framed_for : the width over
+    looking : the camera of the viewer who moved last, set by viser's callbacks. is_answer : whether it only says where
+    it was put, perhaps in another shape. placed : called with each eye that all viewers are put to. framed : the eye that frames the body, which is the usual one then; framed_for : the width over
     height that it was made for.
     """
 
