@@ -32,6 +32,7 @@ from studio.sessions.session import (
     SUBJECT_NAME,
     THUMBNAIL_NAME,
     Session,
+    start_pose_files,
 )
 
 TRUTH, TRUTH_NAME = "truth", "truth.trc"
@@ -100,8 +101,9 @@ def _linked(session: Session, place: Path, number: int, owner: Path | None) -> S
             },
         )
         if owner != session.path:
-            for name in (SUBJECT_NAME, START_POSE_NAME) if owner is not None or _knows(session) else ():
-                (folder / name).unlink(missing_ok=True)
+            if owner is not None or _knows(session):
+                for path in (folder / SUBJECT_NAME, *start_pose_files(folder)):
+                    path.unlink(missing_ok=True)
             shutil.rmtree(folder / TRUTH, ignore_errors=True)
         if owner is not None and owner != session.path:
             for name in (SUBJECT_NAME, START_POSE_NAME):
