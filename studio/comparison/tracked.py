@@ -135,7 +135,7 @@ def track(
     session = cache.session(trial.footage)
     if session.truth_path is None:
         raise TruthError(f"Session '{session.name}' has no truth.", "Take one made by 'studio synthesize'.")
-    subject = read_subject(session.path / trial.subject) if trial.subject else None
+    subject = read_subject(session.path / trial.subject, session.manifest.body) if trial.subject else None
     body = session.body(trial.body or None, subject)
     changes = {**AS_PUBLISHED, **trial.changes}
     settings = changed_settings(default_settings(trial.tracker, trial.weighting), changes)

@@ -143,7 +143,9 @@ def _stands(session: Session, folder: Path) -> Array | None:
     if not path.is_file() or (pose_frame(path) or 0) != 0:
         return None
     try:
-        body = session.body(subject=read_subject(measures) if measures.is_file() else None)
+        body = session.body(
+            subject=read_subject(measures, session.manifest.body) if measures.is_file() else None
+        )
         pose = read_pose(path, parameter_names(body))
     except StudioError:
         return None

@@ -144,7 +144,7 @@ class Session:
     def subject(self) -> Subject | None:
         """The person's measures, if the session has them. Raises BodyError."""
         path = self.path / SUBJECT_NAME
-        return read_subject(path) if path.exists() else None
+        return read_subject(path, self.manifest.body) if path.exists() else None
 
     def body(self, name: str | None = None, subject: Subject | None = None) -> BodyModel:
         """The body `name` (default: the session's) scaled to `subject` (default: the session's). Raises
