@@ -262,16 +262,14 @@ def test_a_start_pose_in_degrees_is_noticed(tmp_path: Path) -> None:
 
 def test_a_source_that_names_no_body_has_the_usual_one_or_that_of_its_start_pose(tmp_path: Path) -> None:
     source = video_source(tmp_path / "source")
-    assert imported(source).session.manifest.body == "human34"
-    other = load_body("human31")
+    assert imported(source).session.manifest.body == "human31"
+    other = load_body("human34")
     write_pose(source / "start_pose.csv", tuple(one.name for one in other.parameters), other.neutral)
-    (source / "subject.toml").write_text(
-        "[dimensions_mm]\nleft_foot_length = 250\n[ratios]\nhead_scale_y = 0.9\n"
-    )
+    (source / "subject.toml").write_text("[dimensions_mm]\npelvis_length = 190\n")
     session = imported(source).session
-    assert session.manifest.body == "human31"
+    assert session.manifest.body == "human34"
     assert session.start_pose() is not None
-    assert session.body().dimensions["head_scale_y"] == 0.9
+    assert session.body().dimensions["pelvis_length"] == 190.0
 
 
 def test_causes_are_named(tmp_path: Path) -> None:
