@@ -30,7 +30,7 @@ from studio.volume.hull import Hull
 from studio.volume.hull_pieces import chosen_voxels, piece_numbers
 from studio.volume.hull_settings import HullSettings
 from studio.volume.hull_silhouette import silhouette
-from studio.volume.reconstruction import Reconstructor
+from studio.volume.reconstruction import Reconstructor, check_views
 from studio.volume.tracking_space import Box, box_of
 
 FRAMES = 5
@@ -131,7 +131,7 @@ class MaskQuality:
     def in_words(self) -> str:
         """The agreement of the worst camera, as text."""
         if stops := blocking(self.doubts):
-            return f"the calibration is in doubt: {stops[0].message}"
+            return _doubted(stops[0])
         if self.subjects > 1:
             return f"{self.subjects} subjects are in view: say which of them the masks shall be of"
         least = min(float(np.nan_to_num(view.agreement)) for view in self.views)
@@ -144,6 +144,10 @@ class MaskQuality:
         # Rounded down: what is below the mark never reads like it.
         least = np.floor(1000.0 * least) / 1000.0
         return f"least agreement {least:.3f}, below the mark of {USABLE:g}: check camera {self.worst}"
+
+
+def _doubted(finding: Finding) -> str:
+    return f"the calibration is in doubt: {finding.message}"
 
 
 def mask_quality(
@@ -166,6 +170,7 @@ def mask_quality(
             f"Session '{session.name}' has one camera: masks cannot be compared between views.",
             "Check its masks by eye instead.",
         )
+    check_views(cameras)
     small = tuple(camera.reduced(JUDGED_SIDE) for camera in cameras)
     scale = scale_of(session.body())
     with masks_of(session, settings) as maker:
@@ -219,12 +224,24 @@ def look_before_the_first_run(session: Session, progress: Progress = unheard) ->
     if known or not session.manifest.layout or len(session.manifest.footage.cameras) < 2 or session.runs():
         return
     try:
-        found = mask_quality(session, session_settings(session).evidence, progress=progress)
+        doubts = _doubts_by_silhouettes(session, progress)
     except StudioError:
         return
-    stops = tuple(str(finding) for finding in blocking(found.doubts))
-    if stops:
-        note(session, MEASURED, found.in_words(), found.usable, stops)
+    if stops := blocking(doubts):
+        note(session, MEASURED, _doubted(stops[0]), False, tuple(map(str, stops)))
+
+
+def _doubts_by_silhouettes(session: Session, progress: Progress) -> tuple[Finding, ...]:
+    """What the silhouettes say against the calibration: the part of `mask_quality` that takes little time."""
+    cameras = session.cameras()
+    with masks_of(session, session_settings(session).evidence) as maker:
+        people = {frame: PackedMasks() for frame in spread_frames(maker.footage.frame_count, FRAMES)}
+        for done, camera in enumerate(cameras):
+            for number, (frame, masks) in enumerate(people.items()):
+                progress("comparing masks", done * len(people) + number, len(cameras) * len(people))
+                masks.put(camera.name, person_alone(maker.view(camera.name, frame).mask))
+            maker.release(camera.name)
+    return silhouette_doubts(cameras, people, height_of(session), scale_of(session.body()))
 
 
 def spread_frames(count: int, wanted: int) -> tuple[int, ...]:

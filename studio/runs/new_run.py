@@ -47,7 +47,7 @@ from studio.runs.silhouette_doubts import accepted_doubts
 from studio.runs.start_pose_file import frame_of_file, start_pose_from_file
 from studio.sessions.manifest import now
 from studio.sessions.run_record import RunRecord
-from studio.sessions.session import Session, free_run_name
+from studio.sessions.session import Session, free_run_name, numbered
 from studio.sessions.stored_run import StoredRun
 from studio.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, knob_table, values
 from studio.trackers.catalogue import TRACKERS
@@ -212,7 +212,8 @@ def prepare_run(
         subject_dimensions=before if before != tree.dimensions else {},
     )
     text = body_file_text(body or tree.name, session.body_folders)
-    return session.new_run(record, text, model.path if model else None)
+    path = model.path if model else None
+    return numbered(session, record, name, lambda record: session.new_run(record, text, path))
 
 
 def given_pose(

@@ -33,9 +33,16 @@ from studio.sessions.background_files import (
 from studio.sessions.importers.measuring import checked_turn, in_step
 from studio.sessions.provenance import adopt
 from studio.sessions.run_record import FILE_NAME as RUN_FILE_NAME
-from studio.sessions.session import THUMBNAIL_NAME, Session, described_anew, start_pose_files
+from studio.sessions.session import (
+    THUMBNAIL_NAME,
+    Session,
+    check_unchanged,
+    described_anew,
+    start_pose_files,
+)
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.stroke_files import OUTDATED, STROKES_NAME
+from studio.sessions.work_under_way import one_at_a_time
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,13 +108,15 @@ def _used(session: Session, before: FootageSource, after: FootageSource) -> Foot
     """Make a description the session's."""
     if after == before:
         return FootageChange(session, ("Nothing changes.",), stale_runs(session))
-    adopt(session)
-    manifest = msgspec.structs.replace(
-        session.manifest, footage=after, footage_changed=datetime.datetime.now(datetime.UTC).isoformat()
-    )
-    (session.path / THUMBNAIL_NAME).unlink(missing_ok=True)
-    changed = described_anew(session, manifest)
-    forget_unused_masks(changed)
+    with one_at_a_time(session.path):
+        check_unchanged(session, "footage")
+        adopt(session)
+        manifest = msgspec.structs.replace(
+            session.manifest, footage=after, footage_changed=datetime.datetime.now(datetime.UTC).isoformat()
+        )
+        (session.path / THUMBNAIL_NAME).unlink(missing_ok=True)
+        changed = described_anew(session, manifest)
+        forget_unused_masks(changed)
     stale = stale_runs(changed)
     return FootageChange(changed, tuple(_consequences(changed, before, after, stale)), stale)
 

@@ -6,10 +6,12 @@ Folder: `session.json`, `videos/` or `pictures/<camera>/`, `masks/<camera>/`, `b
 `subject.toml`, `start_pose.csv`, `truth.trc`), `runs/<run>/`.
 """
 
+from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
 
 import av
+import msgspec
 import numpy as np
 
 from studio.body.branches import within_limits
@@ -22,7 +24,7 @@ from studio.errors import NotFoundError, SessionError, StudioError
 from studio.foreign_files import check_links, read_file
 from studio.geometry.camera import Camera
 from studio.sessions import atomic_files
-from studio.sessions.atomic_files import writing
+from studio.sessions.atomic_files import NameTakenError, writing
 from studio.sessions.file_checksums import note_files
 from studio.sessions.manifest import SessionManifest, read_manifest, write_manifest
 from studio.sessions.named_rows import Array, named_columns, pose_frame, read_pose, read_sigma
@@ -30,6 +32,7 @@ from studio.sessions.names import checked_name, free_name, inside
 from studio.sessions.results_store import create_store
 from studio.sessions.run_record import BEHAVIOUR_NAME, CAMERAS_NAME, RunRecord, write_run_record
 from studio.sessions.stored_run import BODY_FOLDER, StoredRun
+from studio.sessions.work_under_way import check_there, one_at_a_time
 
 WIDTH = 320
 QUALITY = 5
@@ -261,7 +264,7 @@ class Session:
         """
         place = self.path / RUNS_NAME / checked_name(record.name, "run")
         if place.exists():
-            raise SessionError(f"Session '{self.name}' has a run '{record.name}'.", "Choose another name.")
+            raise NameTakenError(f"Session '{self.name}' has a run '{record.name}'.", "Choose another name.")
         with writing("The run", place), atomic_files.made_whole(place, parents=False) as folder:
             atomic_files.write_bytes(folder / CAMERAS_NAME, self.calibration_of_footage())
             if body_text:
@@ -294,6 +297,21 @@ def start_pose_files(folder: Path) -> tuple[Path, ...]:
     return (*((own,) if own.is_file() else ()), *sorted(folder.glob(OTHERS_START_POSE.format("*"))))
 
 
+def numbered(
+    session: Session, record: RunRecord, name: str, make: Callable[[RunRecord], StoredRun]
+) -> StoredRun:
+    """The run that is made of a record. name : that was requested; without one, another number is taken where
+    somebody else took the record's meanwhile. Raises what `make` raises.
+    """
+    while True:
+        try:
+            return make(record)
+        except NameTakenError:
+            if name:
+                raise
+            record = msgspec.structs.replace(record, name=free_run_name(session))
+
+
 def free_run_name(session: Session) -> str:
     """A name for the session's next run: run-1, run-2, …"""
     folder = session.path / RUNS_NAME
@@ -302,9 +320,38 @@ def free_run_name(session: Session) -> str:
 
 
 def described_anew(session: Session, manifest: SessionManifest) -> Session:
-    """Write a changed manifest and return the new session."""
-    write_manifest(session.path, manifest)
-    return Session(session.path)
+    """Write what differs from a session's description, and return the new session; what others have changed since it
+    was opened stays. Raises SessionError where they have changed the same.
+    """
+    with one_at_a_time(session.path):
+        now = _described_now(session)
+        names = manifest.__struct_fields__
+        changes = {
+            name: getattr(manifest, name) for name in names if _differs(name, manifest, session.manifest)
+        }
+        check_unchanged(session, *(name for name in changes if _differs(name, manifest, now)))
+        write_manifest(session.path, msgspec.structs.replace(now, **changes))
+        return Session(session.path)
+
+
+def check_unchanged(session: Session, *names: str) -> None:
+    """Raise SessionError where others have changed one of these entries of the description since it was opened."""
+    now = _described_now(session)
+    changed = [name for name in names if _differs(name, now, session.manifest)]
+    if changed:
+        raise SessionError(
+            f"The {changed[0].replace('_', ' ')} of session '{session.name}' was changed by other work meanwhile.",
+            "Do this again: it then begins from what there is now.",
+        )
+
+
+def _described_now(session: Session) -> SessionManifest:
+    check_there(session.path)
+    return read_manifest(session.path)
+
+
+def _differs(name: str, one: SessionManifest, other: SessionManifest) -> bool:
+    return getattr(one, name) != getattr(other, name)
 
 
 def _is_run(path: Path) -> bool:

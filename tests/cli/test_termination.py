@@ -16,7 +16,7 @@ from studio.runs.new_run import prepare_run
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 
-SLOW = {"particles": 2000, "layers": 3, "start_repeats": 1}
+SLOW = {"particles": 600, "layers": 3, "start_repeats": 1}
 FRAMES = 60
 
 
