@@ -10,7 +10,7 @@ TOOLS := node_modules/.package-lock.json
 # Compiled modules are kept: every process that a test starts would compile some 500 of them anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: env browser demo gallery-pictures test test-fast test-slow faults fuzz hostile soak watching audit test-opencv-4 check check-types check-style check-pages bench growth lock guide pictures wheel-test clean
+.PHONY: env browser demo gallery-pictures test test-fast test-slow faults fuzz hostile races soak watching audit test-opencv-4 check check-types check-style check-pages bench growth lock guide pictures wheel-test clean
 
 env: $(READY)
 
@@ -60,6 +60,11 @@ fuzz: env
 # Sessions made to harm who opens them, through all commands and addresses; `HOSTILE="--few"` takes a part of these.
 hostile: env
 	PYTHONPATH=tests:tests/server $(BIN)/python -m hostile $(HOSTILE)
+
+# Every verb beside every other on one session, by a server and other processes, some of which are killed;
+# `RACES="--seed 7 --groups 1"` fires a group again.
+races: env
+	PYTHONPATH=tests $(BIN)/python -m races $(or $(RACES),--groups 2000)
 
 # 25 viewers, a run of eight hours, ten thousand runs, two thousand looks at a large store; `SOAK="--scale 1"` is unscaled.
 soak: env

@@ -34,7 +34,8 @@ from studio.sessions.atomic_files import taken, write_bytes
 from studio.sessions.run_log import read_log
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.sessions.workspace import STATE_NAME, Workspace
+from studio.sessions.work_under_way import STATE_NAME
+from studio.sessions.workspace import Workspace
 from studio.typed_decoding import is_list, is_table
 
 USUAL_NAME = Path("studio-diagnostics.zip")

@@ -27,7 +27,8 @@ from studio.sessions.atomic_files import write_text
 from studio.sessions.process_lock import ProcessLock
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.sessions.workspace import STATE_NAME, Workspace
+from studio.sessions.work_under_way import STATE_NAME
+from studio.sessions.workspace import Workspace
 
 Announce = Callable[[str], None]
 

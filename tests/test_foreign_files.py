@@ -118,6 +118,16 @@ def test_any_exception_names_the_file(tmp_path: Path, problem: Exception, said: 
     assert len(caught.value.message) < 300
 
 
+def test_a_file_whose_folder_was_moved_meanwhile_is_no_wrong_path(tmp_path: Path) -> None:
+    path = tmp_path / "renamed" / "cameras.toml"
+    with (
+        pytest.raises(CalibrationError, match=r"cameras\.toml' is no longer there") as caught,
+        foreign_file(path, CalibrationError, "a calibration", "Copy it again."),
+    ):
+        path.read_bytes()
+    assert "new name" in caught.value.hint
+
+
 def test_what_says_itself_what_is_wrong_passes(tmp_path: Path) -> None:
     with (
         pytest.raises(CalibrationError, match=r"^camera 3 Look"),

@@ -34,6 +34,8 @@ from studio.sessions.workspace import Workspace
 ANSWER_SECONDS = 180.0
 """How long an acknowledgement may take: as long as a start and the first compilation on a busy machine."""
 CLOSING_SECONDS = 2.5
+DIED = "died"
+"""Code of an answer that no process gave."""
 REFUSALS = (RunError, SettingsError, NotFoundError, SessionError, BodyError, CalibrationError, FootageError)
 
 Value = bool | int | float | str
@@ -115,6 +117,10 @@ class StudioControl:
         finally:
             with self._lock:
                 self._answers.pop(command.identifier, None)
+        if event.code == DIED:
+            what = f"run '{Path(command.run).name}' of " if command.run else ""
+            of = f" about {what}session '{Path(command.session).name}'" if command.session else ""
+            raise RunError(f"{event.message}{of}.", event.hint)
         if not event.ok:
             raise _refusal(event)
         return event
@@ -242,9 +248,9 @@ class StudioControl:
 
 
 def _leave_unanswered(answers: Mapping[str, Future[Acknowledged]]) -> None:
-    text = "The tracking process died before it answered."
+    text = "The tracking process died before it answered"
     for identifier, answer in answers.items():
-        answer.set_result(Acknowledged("", "", identifier, "", False, text, LOST_HINT, "run"))
+        answer.set_result(Acknowledged("", "", identifier, "", False, text, LOST_HINT, DIED))
 
 
 def _refusal(event: Acknowledged) -> StudioError:

@@ -10,7 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Generator, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -86,6 +86,8 @@ State = TypeVar("State", bound=SessionJob)
 SomeState = TypeVar("SomeState", bound=SessionJob, covariant=True)
 Work = Callable[["Job"], Mapping[str, object]]
 """work(job) does it, in a thread; what it returns goes into the state, which is "done" unless that says otherwise."""
+During = Callable[[str, SessionJob], AbstractContextManager[None]]
+"""during(noun, state) is entered while a job goes on."""
 Publish = Callable[[dict[str, object]], None]
 
 
@@ -198,11 +200,16 @@ class Job:
 
 class JobRunner:
     """All jobs of a server; may be used from any thread. publish : sends an event to all who watch. log_path : where
-    faults are written.
+    faults are written. during : what tells other processes.
     """
 
-    def __init__(self, publish: Publish, log_path: Path | None = None) -> None:
-        self._publish, self._log_path = publish, log_path
+    def __init__(
+        self,
+        publish: Publish,
+        log_path: Path | None = None,
+        during: During = lambda noun, state: nullcontext(),
+    ) -> None:
+        self._publish, self._log_path, self._during = publish, log_path, during
         self._lock = threading.RLock()
         self._jobs: dict[str, dict[str, Job]] = {}
         self._moving: list[str] = []
@@ -224,8 +231,15 @@ class JobRunner:
             over = [key for key, known in jobs.items() if not known.state.state.is_going]
             for key in over[: max(0, len(jobs) - KEPT)]:
                 del jobs[key]
-            self._threads.submit(job.do, work, self._log_path)
+            self._threads.submit(job.do, self._known_to_others(work), self._log_path)
         return state
+
+    def _known_to_others(self, work: Work) -> Work:
+        def known(job: Job) -> Mapping[str, object]:
+            with self._during(job.kind.noun, job.state):
+                return work(job)
+
+        return known
 
     def check_free(self, kind: JobKind[State]) -> None:
         """Raise RunError where another of the kind cannot begin."""
@@ -241,8 +255,10 @@ class JobRunner:
         with self._lock:
             for kind, state in self._going_on(session):
                 if not run or getattr(state, "run", run) in ("", run):
+                    verb = getattr(state, "verb", "")
+                    what = f"'{verb}' of run '{getattr(state, 'run', '')}'" if verb else f"its {kind.noun}"
                     raise RunError(
-                        f"Session '{session}' stays as it is while its {kind.noun} is under way.",
+                        f"Session '{session}' stays as it is while {what} is under way.",
                         "Wait for it, or cancel it.",
                     )
             self._moving.append(session)

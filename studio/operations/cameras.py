@@ -15,7 +15,7 @@ from studio.calibration.verbs import Calibrated
 from studio.declaring import Target, Terminal, Web, operation
 from studio.errors import SettingsError
 from studio.geometry.camera import Camera
-from studio.operations.opening import SessionName, open_session
+from studio.operations.opening import SessionName, keeping_in_place, open_session
 from studio.operations.progress import Reporting, reporting, say
 from studio.runs.aligning import SessionAlignment, align_cameras
 from studio.runs.levelling import level_by_clicks, level_by_run, level_by_silhouettes, use_level_world
@@ -52,6 +52,7 @@ class Calibration:
 
 
 @operation
+@keeping_in_place
 def calibrate(
     source: Annotated[
         SessionName,
@@ -194,6 +195,7 @@ class Alignment:
 
 
 @operation
+@keeping_in_place
 def align(
     session: SessionName,
     frames: Annotated[Frames, Field(description="To look at; default: sixteen, evenly spread.")] = (),
@@ -260,6 +262,7 @@ class Levelled:
 
 
 @operation
+@keeping_in_place
 def level(
     session: SessionName,
     *,

@@ -32,7 +32,7 @@ from studio.jobs.cluster import Cluster, chosen_executor
 from studio.jobs.comparison_run import Found, done_before, run_comparison
 from studio.jobs.process_executor import cores
 from studio.likelihood.catalogue import WEIGHTINGS
-from studio.operations.opening import AnySession, open_session
+from studio.operations.opening import AnySession, keeping_in_place, open_session
 from studio.operations.progress import Reporting, reporting, say
 from studio.runs.behaviour_models import needs_model
 from studio.runs.new_run import own_knobs
@@ -62,6 +62,7 @@ class Compared:
 
 
 @operation
+@keeping_in_place
 def compare(
     session: AnySession,
     *,
@@ -147,6 +148,7 @@ class SweptGrid:
 
 
 @operation
+@keeping_in_place
 def sweep(
     session: AnySession,
     *,

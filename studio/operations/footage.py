@@ -16,7 +16,7 @@ from studio.errors import FootageError, SessionError
 from studio.footage_recipes import synthesize as synthesize_recipe
 from studio.jobs.camera_readers import CameraReaders
 from studio.jobs.stream_recording import RecordingStanding, StreamRecording, recording_folder
-from studio.operations.opening import SessionName, open_session
+from studio.operations.opening import SessionName, keeping_in_place, open_session
 from studio.operations.progress import Reporting, reporting, say
 from studio.progress import Progress
 from studio.sessions.footage_changes import (
@@ -97,6 +97,7 @@ def import_footage(
 
 @operation
 @taking(ImportOptions)
+@keeping_in_place
 def add_footage(
     session: SessionName,
     source: Source,
@@ -151,6 +152,7 @@ class Synchronised:
 
 
 @operation
+@keeping_in_place
 def synchronise(
     session: SessionName,
     *,

@@ -13,7 +13,7 @@ from studio.inspection.reading import InspectedRun
 from studio.inspection.seeds import search_seeds
 from studio.inspection.tables import Selection, Viewed
 from studio.inspection.views import VIEWS, look, look_over
-from studio.operations.opening import RunName, open_run, session_of
+from studio.operations.opening import RunName, keeping_in_place, open_run, session_of
 from studio.operations.progress import Reporting, reporting
 
 ViewName = Annotated[
@@ -83,6 +83,7 @@ def worst_frame(run: InspectedRun) -> int:
 
 
 @operation
+@keeping_in_place
 def seeds(
     run: RunName,
     frame: Frame,

@@ -11,7 +11,7 @@ from pydantic import Field
 from studio.capture.pictures import painted_picture, png_of
 from studio.declaring import Knobs, Terminal, Values, Web, operation
 from studio.foreign_files import read_file
-from studio.operations.opening import SessionName, open_session
+from studio.operations.opening import SessionName, keeping_in_place, open_session
 from studio.operations.progress import Reporting, reporting, say
 from studio.runs.background_setup import BackgroundSetup, BackgroundSource, set_up_background
 from studio.runs.mask_quality import MaskQuality, measure_masks
@@ -21,6 +21,7 @@ from studio.sessions.stroke_files import strokes_of_file
 
 
 @operation
+@keeping_in_place
 def background(
     session: SessionName,
     source: Annotated[
@@ -110,6 +111,7 @@ def background(
 
 
 @operation
+@keeping_in_place
 def mask_quality(
     session: SessionName,
     frames: Annotated[

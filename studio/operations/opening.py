@@ -1,9 +1,11 @@
 """Sessions and runs as a person names them, and what there is."""
 
-from collections.abc import Iterable
+import functools
+import inspect
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,13 +13,16 @@ from numpy.typing import NDArray
 from studio.body.catalogue import list_bodies, load_body
 from studio.body.model import BodyModel
 from studio.declaring import Target, operation
-from studio.errors import RunError
+from studio.errors import RunError, SessionError
 from studio.export.kept_exports import exported_files
 from studio.runs.tracks import Track
 from studio.runs.workflow import Workflow, run_to_use, workflow_of
 from studio.sessions.session import BODIES_NAME, RUNS_NAME, Session
 from studio.sessions.stored_run import RunSummary, StoredRun
+from studio.sessions.work_under_way import working_on
 from studio.sessions.workspace import Workspace
+
+P, R = ParamSpec("P"), TypeVar("R")
 
 SessionName = Annotated[Session | str | Path, Target("session")]
 """A session that was opened, its name in the workspace (STUDIO_WORKSPACE), or its folder."""
@@ -72,6 +77,26 @@ def open_session(session: AnySession, *, remote: bool = False) -> Session:
     if isinstance(session, Session):
         return Session(session.path)
     return Workspace().resolve(session, remote=remote)
+
+
+def keeping_in_place(function: Callable[P, R]) -> Callable[P, R]:
+    """Let the session, or the run, that a verb is about (its first parameter) stay where it is while the verb goes on,
+    whatever other processes do. What is no session of this machine is left to the verb.
+    """
+    about_run = next(iter(inspect.signature(function).parameters)) == "run"
+
+    @functools.wraps(function)
+    def call(*args: P.args, **kwargs: P.kwargs) -> R:
+        about: Any = args[0]
+        try:
+            folder = open_run(about).folder if about_run else open_session(about).path
+        except SessionError:
+            return function(*args, **kwargs)
+        session, run = (folder.parent.parent, folder.name) if about_run else (folder, "")
+        with working_on(session, function.__name__, run):
+            return function(*args, **kwargs)
+
+    return call
 
 
 def list_sessions() -> tuple[str, ...]:

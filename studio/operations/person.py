@@ -11,7 +11,7 @@ from studio.body.model import BodyModel
 from studio.body.subject import Subject
 from studio.declaring import Body, Model, OneOf, Seed, Terminal, Web, operation, taking
 from studio.likelihood.catalogue import WEIGHTINGS
-from studio.operations.opening import SessionName, open_session
+from studio.operations.opening import SessionName, keeping_in_place, open_session
 from studio.operations.progress import Reporting, reporting, say
 from studio.runs.initialising import WEIGHTING, InitialPose, keep_pose
 from studio.runs.initialising import initialise as initialise_session
@@ -66,6 +66,7 @@ def subject(
 
 @operation
 @taking(FitRequest, without=("particles", "layers"))
+@keeping_in_place
 def fit_subject(
     session: SessionName,
     *,
@@ -103,6 +104,7 @@ def fit_subject(
 
 
 @operation
+@keeping_in_place
 def initialise(
     session: SessionName,
     frame: Annotated[

@@ -17,7 +17,7 @@ from studio.errors import RunError
 from studio.jobs.cluster import Cluster, chosen_executor
 from studio.jobs.swept_runs import measure_run_of_batch
 from studio.jobs.trials import TrialResult, run_jobs
-from studio.operations.opening import SessionName, open_session
+from studio.operations.opening import SessionName, keeping_in_place, open_session
 from studio.operations.progress import Reporting, reporting, say
 from studio.runs.new_run import prepare_run
 from studio.sessions import remote_sessions
@@ -33,6 +33,7 @@ Address = Annotated[
 
 
 @operation
+@keeping_in_place
 def upload(
     session: SessionName,
     to: Annotated[Address, Terminal("--to", "ADDRESS")],

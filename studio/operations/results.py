@@ -23,7 +23,14 @@ from studio.export.task import Writer
 from studio.knobs import changed, knobs_of
 from studio.motion_files.trc import MarkerMotion
 from studio.motion_files.truth_files import ANY_WORLD, read_truth
-from studio.operations.opening import RunName, SessionName, open_run, open_session, session_of
+from studio.operations.opening import (
+    RunName,
+    SessionName,
+    keeping_in_place,
+    open_run,
+    open_session,
+    session_of,
+)
 from studio.operations.progress import Reporting, reporting, say
 from studio.runs.checking import EVERY, RunCheck, check_run
 from studio.runs.refining import REFINED, SMOOTHED, MadeTrack, refine_run, smooth_run
@@ -68,6 +75,7 @@ def markers(run: RunName, track: TrackName = BEST) -> MarkerMotion:
 
 
 @operation
+@keeping_in_place
 def refine(
     run: RunName,
     *,
@@ -95,6 +103,7 @@ def refine(
 
 
 @operation
+@keeping_in_place
 def smooth(
     run: RunName,
     *,
@@ -116,6 +125,7 @@ def smooth(
 
 
 @operation
+@keeping_in_place
 def check(
     run: RunName,
     track: Annotated[TrackName, Terminal("--track", "NAME")] = BEST,
@@ -136,6 +146,7 @@ def check(
 
 
 @operation
+@keeping_in_place
 def evaluate(
     run: RunName,
     *,
@@ -206,6 +217,7 @@ def evaluate(
 
 
 @operation
+@keeping_in_place
 def export_run(
     run: RunName,
     to: Annotated[
@@ -247,6 +259,7 @@ class Verified:
 
 
 @operation
+@keeping_in_place
 def verify(
     session: SessionName,
     *,

@@ -10,7 +10,7 @@ from pydantic import Field
 from studio.declaring import Terminal, operation
 from studio.inspection.shared_page import shared_page
 from studio.operations.inspecting import inspected, worst_frame
-from studio.operations.opening import RunName
+from studio.operations.opening import RunName, keeping_in_place
 from studio.operations.progress import Reporting, reporting
 from studio.sessions.atomic_files import write_text, writing
 
@@ -25,6 +25,7 @@ class Shared:
 
 
 @operation
+@keeping_in_place
 def share(
     run: RunName,
     to: Annotated[

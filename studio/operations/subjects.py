@@ -9,7 +9,7 @@ from pydantic import Field
 
 from studio.declaring import Terminal, Web, operation
 from studio.errors import SessionError
-from studio.operations.opening import SessionName, open_session
+from studio.operations.opening import SessionName, keeping_in_place, open_session
 from studio.operations.progress import Reporting, reporting, say
 from studio.runs.subject_masks import SeenSubject, seen_subjects
 from studio.runs.subject_sessions import make_subject_sessions
@@ -31,6 +31,7 @@ class Subjects:
 
 
 @operation
+@keeping_in_place
 def subjects(
     session: SessionName,
     *,
@@ -75,6 +76,7 @@ def subjects(
 
 
 @operation
+@keeping_in_place
 def together(
     session: SessionName,
     beside: Annotated[

@@ -34,6 +34,7 @@ from studio.operations.opening import (
     RunName,
     SessionName,
     Tracked,
+    keeping_in_place,
     open_run,
     open_session,
     session_of,
@@ -67,6 +68,7 @@ def of_new_run(
 
 @operation
 @of_new_run(prepare_run)
+@keeping_in_place
 def new_run(session: AnySession, *, progress: Reporting = None, **options: object) -> StoredRun:
     """A new run, ready to be tracked; what is left out is the session's own or the studio's default.
 
@@ -92,6 +94,7 @@ def track(session: AnySession, *, progress: Reporting = None, **options: object)
 
 
 @operation
+@keeping_in_place
 def go_on(run: RunName, *, progress: Reporting = None) -> Tracked:
     """Track a run on that was interrupted: bit for bit what it would have been."""
     stored = open_run(run)
@@ -228,6 +231,7 @@ def live(
 
 
 @operation
+@keeping_in_place
 def resume_live(
     run: RunName, *, send: Annotated[SendTo, Web(left_out=True)] = (), progress: Reporting = None
 ) -> TrackedLive:
@@ -249,6 +253,7 @@ class Replayed:
 
 
 @operation
+@keeping_in_place
 def replay(
     run: RunName,
     *,
@@ -341,6 +346,7 @@ def branch(
     return go_on(branched_run(run, frame, knobs, name), progress=progress)
 
 
+@keeping_in_place
 def branched_run(
     run: RunName, frame: int, knobs: Mapping[str, object] | None = None, name: str = ""
 ) -> StoredRun:
@@ -349,6 +355,7 @@ def branched_run(
     return prepare_branch(session_of(stored), stored, frame, knobs, name)
 
 
+@keeping_in_place
 def corrected_run(
     run: StoredRun,
     frame: int,

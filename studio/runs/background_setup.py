@@ -23,6 +23,7 @@ import msgspec
 from studio.arrays import Bytes
 from studio.body.scale import scale_of
 from studio.capture.footage import Footage
+from studio.capture.footage_source import FootageSource
 from studio.capture.pictures import is_picture, png_of
 from studio.errors import FootageError, RunError, StudioError, WorkCancelledError
 from studio.evidence.backgrounds import FEWEST_FRAMES, Backgrounds
@@ -188,7 +189,7 @@ def set_up_background(
     except BaseException:
         if strokes is not None:
             restore_strokes(session, had_strokes)
-        described_anew(session, manifest)
+        _with_footage(session, manifest.footage)
         if had_evidence:
             write_evidence(session, evidence)
         else:
@@ -317,7 +318,13 @@ class _SetUp:
     def restored(self, session: Session) -> Session:
         """The session as the source left it."""
         write_evidence(session, self.evidence)
-        return described_anew(session, self.manifest)
+        return _with_footage(session, self.manifest.footage)
+
+
+def _with_footage(session: Session, footage: FootageSource) -> Session:
+    """The session as it is now, with its footage described so."""
+    now = Session(session.path)
+    return described_anew(now, msgspec.structs.replace(now.manifest, footage=footage))
 
 
 def _set_up_best(session: Session, wanted: _Wanted, progress: Progress) -> BackgroundSetup:
@@ -364,7 +371,7 @@ def _set_up_best(session: Session, wanted: _Wanted, progress: Progress) -> Backg
             for frame, view in _views_of(left, every, by_source[source], progress):
                 made.put(view.camera, frame, view.mask)
         # The masks that came with the footage are those of the session as it was found.
-        described_anew(session, manifest)
+        _with_footage(session, manifest.footage)
         write_evidence(session, evidence)
     own: dict[str, Knob] = {"background_model": MODEL_OF["best"]}
     now = Session(session.path)

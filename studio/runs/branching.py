@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from studio.errors import SettingsError
 from studio.runs.derived_runs import check_branching_frame, derived_record, new_folder
 from studio.runs.moved_knobs import FIRST_VERSION, keep_moved, moved_between, settings_with_moved
-from studio.sessions.session import Session
+from studio.sessions.session import Session, numbered
 from studio.sessions.stored_run import StoredRun
 from studio.settings import (
     RunSettings,
@@ -63,7 +63,7 @@ def prepare_branch(
         if not is_whole:
             keep_moved(made_run, version, moved)
 
-    return new_folder(run, made, frame, leave_moved)
+    return numbered(session, made, name, lambda record: new_folder(run, record, frame, leave_moved))
 
 
 def _settings_before(run: StoredRun, frame: int) -> tuple[int, RunSettings]:

@@ -38,7 +38,7 @@ from studio.progress import Progress, unheard
 from studio.sessions.session import Session
 from studio.volume.hull_settings import HullSettings
 from studio.volume.hull_silhouette import silhouette
-from studio.volume.reconstruction import Reconstructor
+from studio.volume.reconstruction import Reconstructor, check_views
 from studio.volume.tracking_space import Box, box_of
 
 Part = TypeVar("Part")
@@ -139,6 +139,7 @@ class _Cleaning:
 
     def run(self, folder: Path) -> Mapping[str, CleanPlate]:
         """folder : on a disk with room for one camera's frames."""
+        check_views(self.cameras)
         firsts: list[_First] = []
         pictures: list[Bytes] = []
         masks: list[list[Bytes]] = []

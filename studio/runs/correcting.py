@@ -22,7 +22,7 @@ from studio.runs.derived_runs import check_branching_frame, derived_record, new_
 from studio.runs.problem_source import ProblemSource
 from studio.runs.reannealing import Reannealing
 from studio.runs.tracking_run import TrackingRun
-from studio.sessions.session import Session
+from studio.sessions.session import Session, numbered
 from studio.sessions.stored_run import StoredRun
 from studio.settings import settings_from_values
 
@@ -57,7 +57,8 @@ def prepare_correction(
         backwards_to=backwards_to,
         first=record.first if backwards_to is None else min(record.first, backwards_to),
     )
-    return new_folder(run, changed, frame if backwards_to is None else None)
+    last = frame if backwards_to is None else None
+    return numbered(session, changed, name, lambda record: new_folder(run, record, last))
 
 
 def track_backwards(

@@ -7,9 +7,10 @@ from typing import Any
 
 import msgspec
 
-from studio.errors import RunError, SessionError
+from studio.errors import RunError
 from studio.runs.new_run import software_version
 from studio.sessions import atomic_files
+from studio.sessions.atomic_files import taken
 from studio.sessions.file_checksums import note_files
 from studio.sessions.manifest import now
 from studio.sessions.names import checked_name
@@ -76,12 +77,14 @@ def new_folder(
     before it is there.
     """
     place = run.folder.parent / checked_name(record.name, "run")
+    if place.exists():
+        raise taken(place)
     folder = copied_beside(run, record, last)
     try:
         complete(StoredRun(folder))
         atomic_files.move_into_place(folder, Path(place))
     except FileExistsError:
-        raise SessionError(f"Session has a run '{record.name}' already.", "Choose another name.") from None
+        raise taken(place) from None
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     return StoredRun(place)

@@ -30,7 +30,7 @@ from studio.volume.hull import Hull
 from studio.volume.hull_pieces import chosen_voxels, piece_numbers
 from studio.volume.hull_settings import HullSettings
 from studio.volume.hull_silhouette import silhouette
-from studio.volume.reconstruction import Reconstructor
+from studio.volume.reconstruction import Reconstructor, check_views
 from studio.volume.tracking_space import Box, box_of
 
 FRAMES = 5
@@ -170,6 +170,7 @@ def mask_quality(
             f"Session '{session.name}' has one camera: masks cannot be compared between views.",
             "Check its masks by eye instead.",
         )
+    check_views(cameras)
     small = tuple(camera.reduced(JUDGED_SIDE) for camera in cameras)
     scale = scale_of(session.body())
     with masks_of(session, settings) as maker:

@@ -9,6 +9,7 @@ from studio.errors import NotFoundError, SettingsError
 from studio.sessions.manifest import now
 from studio.sessions.record_files import RecordFile
 from studio.sessions.stored_run import StoredRun
+from studio.sessions.work_under_way import one_at_a_time
 
 FILE_NAME = "notes.json"
 LONGEST = 2000
@@ -56,12 +57,14 @@ def write_note(run: StoredRun, frame: int, text: str = "") -> tuple[Note, ...]:
         )
     if len(text) > LONGEST:
         raise SettingsError(f"The note has {len(text)} characters.", f"Write at most {LONGEST}.")
-    return _keep(run, (*_others(run, frame), Note(frame, text.strip(), now())))
+    with one_at_a_time(run.folder.parent.parent):
+        return _keep(run, (*_others(run, frame), Note(frame, text.strip(), now())))
 
 
 def remove_note(run: StoredRun, frame: int) -> tuple[Note, ...]:
     """Take a frame's note away, if it has one; those that are left."""
-    return _keep(run, _others(run, frame))
+    with one_at_a_time(run.folder.parent.parent):
+        return _keep(run, _others(run, frame))
 
 
 def _others(run: StoredRun, frame: int) -> tuple[Note, ...]:

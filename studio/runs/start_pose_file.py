@@ -13,10 +13,11 @@ from studio.errors import RunError, TruthError
 from studio.geometry.reach import within_reach
 from studio.motion_files.trc import read_trc
 from studio.runs.search_space import parameter_names
+from studio.sessions.atomic_files import keep_before
 from studio.sessions.named_rows import check_radians, pose_frame, read_pose, write_pose
-from studio.sessions.names import free_name
 from studio.sessions.provenance import note
 from studio.sessions.session import START_POSE_NAME, Session
+from studio.sessions.work_under_way import one_at_a_time
 
 FEWEST_MARKERS = 4
 
@@ -43,11 +44,10 @@ def keep_start_pose(session: Session, body: BodyModel, pose: Array, frame: int |
             f"It has frames 0 to {session.manifest.frame_count - 1}.",
         )
     own = session.path / START_POSE_NAME
-    if own.exists():
-        taken = {path.stem for path in session.path.glob("*.csv")}
-        own.rename(session.path / f"{free_name(f'{own.stem}-before', taken)}.csv")
-    write_pose(own, parameter_names(body), given, of)
-    note(session, "start-pose", f"set by hand in frame {of}")
+    with one_at_a_time(session.path):
+        keep_before(own)
+        write_pose(own, parameter_names(body), given, of)
+        note(session, "start-pose", f"set by hand in frame {of}")
     return own
 
 

@@ -34,9 +34,10 @@ from studio.runs.search_space import parameter_names
 from studio.runs.session_settings import masks_of
 from studio.runs.subject_frames import varied_frames
 from studio.runs.tracks import REFINED, SIDES, best_track, read_track
+from studio.sessions.atomic_files import keep_before
 from studio.sessions.calibration_changes import stale_runs
-from studio.sessions.names import free_name
 from studio.sessions.session import SUBJECT_NAME, Session
+from studio.sessions.work_under_way import one_at_a_time
 from studio.trackers.shape_prior import ShapePrior, ShapeSpreads
 from studio.trackers.shape_refinement import RefinedShape, ShapeRefiner
 from studio.trackers.shape_search import ShapeSearch, ShapeSearchSettings
@@ -196,10 +197,9 @@ def keep_subject(session: Session, found: FittedSubject, into: Path | None = Non
 def replace_subject(session: Session, subject: Subject) -> Path:
     """Write a session's subject; the old one is kept as subject-before.toml."""
     own = session.path / SUBJECT_NAME
-    if own.exists():
-        taken = {path.stem for path in session.path.glob("*.toml")}
-        own.rename(session.path / f"{free_name('subject-before', taken)}.toml")
-    write_subject(subject, own)
+    with one_at_a_time(session.path):
+        keep_before(own)
+        write_subject(subject, own)
     return own
 
 

@@ -1,18 +1,20 @@
 """What the routes need of the storeys below: the tracking process, the scenes, and where things lie."""
 
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
 from fastapi import Depends, Request
 
+from studio.errors import RunError
+from studio.foreign_files import MANIFEST_NAME
 from studio.inspection.likelihoods import forget_evaluations
 from studio.jobs.camera_service import CameraService
 from studio.jobs.commands import Close
 from studio.jobs.control import StudioControl
-from studio.jobs.job_runner import JobRunner
+from studio.jobs.job_runner import JobRunner, SessionJob
 from studio.runs.overlay_pictures import forget_composers
 from studio.scene.scene_server import SceneServer
 from studio.scene.window_scenes import WindowScenes
@@ -21,7 +23,8 @@ from studio.server.calibration_proposals import Proposals
 from studio.server.event_stream import EventStream
 from studio.server.windows import Window
 from studio.sessions.session import RUNS_NAME
-from studio.sessions.workspace import STATE_NAME, Workspace
+from studio.sessions.work_under_way import STATE_NAME, working_on
+from studio.sessions.workspace import Workspace
 
 
 @dataclass(slots=True)
@@ -46,8 +49,16 @@ class AppState:
 
     def __post_init__(self) -> None:
         """Give all work beside the routes its place, which reports its progress to all watchers."""
-        self.jobs = JobRunner(self.events.publish, self.log_path)
+        self.jobs = JobRunner(self.events.publish, self.log_path, self._working)
         self.cameras = CameraService(self.jobs)
+
+    def _working(self, noun: str, state: SessionJob) -> AbstractContextManager[None]:
+        """What keeps other processes from moving a job's session, where it is there and not only being made."""
+        session = self.workspace.root / state.session
+        if not state.session or not (session / MANIFEST_NAME).is_file():
+            return nullcontext()
+        verb = str(getattr(state, "verb", "") or noun)
+        return working_on(session.resolve(), verb, str(getattr(state, "run", "") or ""))
 
     @property
     def state_folder(self) -> Path:
@@ -92,7 +103,12 @@ def release(app: AppState, session: str, run: str = "") -> None:
     state, folder = app.control.state, app.workspace.root / session
     # Else the process itself knows whether that is what it has open; a search elsewhere is not waited for.
     if state.state != "lost" and (state.session == session or state.state not in ("tracking", "compiling")):
-        app.control.request(Close(session=str(folder), run=str(folder / RUNS_NAME / run) if run else ""))
+        try:
+            app.control.request(Close(session=str(folder), run=str(folder / RUNS_NAME / run) if run else ""))
+        except RunError:
+            # A process that died meanwhile has nothing open any more.
+            if app.control.state.state != "lost":
+                raise
     for scene in app.scenes.open_scenes().values():
         if scene.shown.session == session and (not run or scene.shown.run == run):
             scene.show_run(session if run else "")

@@ -47,6 +47,7 @@ from studio.sessions.names import place_in, relative_path
 from studio.sessions.provenance import origin_of
 from studio.sessions.session import Session
 from studio.sessions.stroke_files import read_strokes
+from studio.sessions.work_under_way import one_at_a_time
 from studio.settings import values
 
 router = APIRouter(prefix="/api/sessions/{session}", tags=["masks"])
@@ -233,8 +234,9 @@ def evidence(session: OpenSession) -> EvidenceAnswer:
 def put_evidence(session: OpenSession, request: dict[str, Value]) -> EvidenceAnswer:
     """Let new runs of the session begin with these knobs; runs that are there keep theirs."""
     session_settings(session, changes=request)
-    stored = read_evidence(session)
-    write_evidence(session, msgspec.structs.replace(stored, knobs=dict(request)))
+    with one_at_a_time(session.path):
+        stored = read_evidence(session)
+        write_evidence(session, msgspec.structs.replace(stored, knobs=dict(request)))
     return EvidenceAnswer(knobs=dict(request))
 
 

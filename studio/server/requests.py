@@ -90,7 +90,8 @@ def _field(entry: Parameter, key: str) -> tuple[Any, Any]:
     if get_origin(kind) in (list, dict) and default is not REQUIRED:
         default = list[object]() if get_origin(kind) is list else dict[str, object]()
     return (
-        entry.limited(kind),
+        # A name has limits of its own, and none at all has no length.
+        kind if kind is MaybeName else entry.limited(kind),
         Field(... if default is REQUIRED else default, alias=key, description=entry.help),
     )
 

@@ -16,8 +16,9 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
-from studio.errors import SessionError
+from studio.errors import NotFoundError, SessionError
 from studio.foreign_files import NO_ROOM, check_file, check_inside, read_file
+from studio.sessions.names import free_name
 from studio.sessions.session_databases import check_tables, open_database
 
 _one_at_a_time = threading.Lock()
@@ -57,6 +58,13 @@ def copy_file(source: Path, path: Path) -> None:
             f"'{source}' cannot be read ({_reason(error)}).", "Check the disk and the folder's permissions."
         ) from None
     write_bytes(path, content)
+
+
+def keep_before(path: Path) -> None:
+    """Keep what a file holds beside it, as NAME-before.ENDING, numbered if there are more. Raises SessionError."""
+    if path.exists():
+        taken_names = {entry.stem for entry in path.parent.glob(f"*{path.suffix}")}
+        copy_file(path, path.with_stem(free_name(f"{path.stem}-before", taken_names)))
 
 
 def copy_part(source: Path, target: Path) -> None:
@@ -116,7 +124,13 @@ def move_into_place(folder: Path, path: Path) -> None:
     if path.exists() or path.is_symlink():
         raise FileExistsError(path)
     with writing("The folder", path):
-        os.rename(folder, path)
+        try:
+            os.rename(folder, path)
+        except OSError as error:
+            # Another process was faster.
+            if error.errno in (errno.ENOTEMPTY, errno.EEXIST):
+                raise FileExistsError(path) from None
+            raise
     sync_folder(path.parent)
 
 
@@ -149,9 +163,13 @@ def made_whole(place: Path, parents: bool = True) -> Generator[Path]:
         discard(folder)
 
 
-def taken(place: Path) -> SessionError:
+class NameTakenError(SessionError):
+    """Something of that name is there."""
+
+
+def taken(place: Path) -> NameTakenError:
     """The error for a place where something is."""
-    return SessionError(
+    return NameTakenError(
         f"There is something at '{place}' already.", "Choose another name, or delete what is there first."
     )
 
@@ -176,6 +194,11 @@ NO_ROOM_BYTES = 64 * 1024
 
 def unwritable(what: str, path: Path, error: OSError | sqlite3.Error | UnicodeDecodeError) -> SessionError:
     """The error to raise. what : "The results in", to be followed by the path."""
+    if isinstance(error, FileNotFoundError | sqlite3.OperationalError) and not path.parent.is_dir():
+        return NotFoundError(
+            f"{what} '{path}' cannot be written: its folder is no longer there.",
+            "Where it was renamed meanwhile, do this again under its new name.",
+        )
     if is_full(path, error):
         return SessionError(
             f"{what} '{path}' cannot be written: disk full ({_reason(error)}).",

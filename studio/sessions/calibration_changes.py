@@ -28,10 +28,18 @@ from studio.errors import CalibrationError, FootageError, NotFoundError, Session
 from studio.foreign_files import LARGEST_RECORD, read_file
 from studio.geometry.camera import Camera
 from studio.sessions import atomic_files, provenance
+from studio.sessions.file_checksums import forget_files
 from studio.sessions.manifest import SessionManifest
 from studio.sessions.names import inside
 from studio.sessions.run_record import CAMERAS_NAME
-from studio.sessions.session import CAMERAS_PATH, THUMBNAIL_NAME, Session, described_anew
+from studio.sessions.session import (
+    CAMERAS_PATH,
+    THUMBNAIL_NAME,
+    Session,
+    check_unchanged,
+    described_anew,
+)
+from studio.sessions.work_under_way import one_at_a_time
 from studio.typed_decoding import decode_json, is_list, is_table
 
 EARLIER = "earlier"
@@ -75,6 +83,12 @@ def replace_calibration(session: Session, new: NewCalibration) -> CalibrationCha
 
     Raises SessionError while a run is being tracked, CalibrationError where a camera of the footage is missing.
     """
+    with one_at_a_time(session.path):
+        check_unchanged(session, "footage", "calibration_changed")
+        return _replaced(session, new)
+
+
+def _replaced(session: Session, new: NewCalibration) -> CalibrationChange:
     session.check_idle()
     names = {camera.name for camera in new.cameras}
     missing = [source.name for source in session.manifest.footage.cameras if source.name not in names]
@@ -87,6 +101,10 @@ def replace_calibration(session: Session, new: NewCalibration) -> CalibrationCha
     before = read_calibration(place).cameras if _readable(place) else ()
     place.parent.mkdir(exist_ok=True)
     kept = _keep(place.parent) if place.exists() else None
+    # The earlier originals lie with the calibration that is kept; here they are not lost but replaced.
+    forget_files(
+        session.path, (part.relative_to(session.path).as_posix() for part in _own_parts(place.parent))
+    )
     _write(place, new)
     manifest = _described(session.manifest, new)
     (session.path / THUMBNAIL_NAME).unlink(missing_ok=True)

@@ -6,7 +6,7 @@ checksums of their own.
 """
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -74,6 +74,26 @@ class CheckedFiles:
 def note_files(folder: Path) -> None:
     """Store the checksums of all files. Raises OSError."""
     _write(folder, {name: _noted(path) for name, path in _files(folder)})
+
+
+def forget_files(folder: Path, places: Iterable[str]) -> None:
+    """Drop the checksums of files that were removed on purpose. places : paths in the folder, of files or folders."""
+    known, readable = _read(folder)
+    gone = tuple(places)
+    kept = {name: one for name, one in known.items() if not any(_is_at(name, place) for place in gone)}
+    if readable and len(kept) < len(known):
+        _write(folder, kept)
+
+
+def note_again(folder: Path, name: str) -> None:
+    """Store the checksum of a file that was written again on purpose, where the folder has checksums."""
+    known, readable = _read(folder)
+    if readable and known:
+        _write(folder, known | {name: _noted(folder / name)})
+
+
+def _is_at(name: str, place: str) -> bool:
+    return name == place or name.startswith(f"{place}/")
 
 
 def check_files(folder: Path, *, note: bool = True) -> CheckedFiles:

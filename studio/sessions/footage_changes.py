@@ -33,9 +33,16 @@ from studio.sessions.background_files import (
 from studio.sessions.importers.measuring import checked_turn, in_step
 from studio.sessions.provenance import adopt
 from studio.sessions.run_record import FILE_NAME as RUN_FILE_NAME
-from studio.sessions.session import START_POSE_NAME, THUMBNAIL_NAME, Session, described_anew
+from studio.sessions.session import (
+    THUMBNAIL_NAME,
+    Session,
+    check_unchanged,
+    described_anew,
+    start_pose_files,
+)
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.stroke_files import OUTDATED, STROKES_NAME
+from studio.sessions.work_under_way import one_at_a_time
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,13 +108,15 @@ def _used(session: Session, before: FootageSource, after: FootageSource) -> Foot
     """Make a description the session's."""
     if after == before:
         return FootageChange(session, ("Nothing changes.",), stale_runs(session))
-    adopt(session)
-    manifest = msgspec.structs.replace(
-        session.manifest, footage=after, footage_changed=datetime.datetime.now(datetime.UTC).isoformat()
-    )
-    (session.path / THUMBNAIL_NAME).unlink(missing_ok=True)
-    changed = described_anew(session, manifest)
-    forget_unused_masks(changed)
+    with one_at_a_time(session.path):
+        check_unchanged(session, "footage")
+        adopt(session)
+        manifest = msgspec.structs.replace(
+            session.manifest, footage=after, footage_changed=datetime.datetime.now(datetime.UTC).isoformat()
+        )
+        (session.path / THUMBNAIL_NAME).unlink(missing_ok=True)
+        changed = described_anew(session, manifest)
+        forget_unused_masks(changed)
     stale = stale_runs(changed)
     return FootageChange(changed, tuple(_consequences(changed, before, after, stale)), stale)
 
@@ -246,7 +255,7 @@ def _consequences(
             f"Run {listed(stale)} was tracked before this change: its poses stay, but pictures and overlays now"
             " show other frames. Track again."
         )
-    if moved and (session.path / START_POSE_NAME).exists():
+    if moved and start_pose_files(session.path):
         notes.append("The start pose belongs to the old frame 0: find it again with 'studio initialise'.")
     if moved and session.truth_path is not None:
         notes.append("The truth counts its time from the old frame 0: check it before you evaluate.")

@@ -17,14 +17,14 @@ class ProcessLock:
     connection: sqlite3.Connection
 
     @staticmethod
-    def take(path: Path) -> "ProcessLock | None":
-        """Acquire the lock of the file `path` (created if missing); None while another holds it.
+    def take(path: Path, patience: float = 0.0) -> "ProcessLock | None":
+        """Acquire the lock of the file `path` (created if missing); None while another holds it, after so many seconds.
 
         It needs no room on the disk but for the file's name. Raises SessionError where the file cannot be made or
         written.
         """
         # Nothing is ever written, so nothing has to be undone from a file.
-        return _begun(path, 0.0, "PRAGMA journal_mode = MEMORY", "BEGIN EXCLUSIVE")
+        return _begun(path, patience, "PRAGMA journal_mode = MEMORY", "BEGIN EXCLUSIVE")
 
     @staticmethod
     def share(path: Path, patience: float = 0.0) -> "ProcessLock | None":

@@ -16,6 +16,7 @@ from studio.foreign_files import read_file
 from studio.sessions.background_files import EVIDENCE_NAME
 from studio.sessions.record_files import RecordFile
 from studio.sessions.session import CAMERAS_PATH, START_POSE_NAME, SUBJECT_NAME, Session
+from studio.sessions.work_under_way import one_at_a_time
 
 FILE_NAME = "made_from.json"
 SCHEMA_VERSION = 1
@@ -70,7 +71,8 @@ def note(
 ) -> None:
     """Record that a part was made now from the current inputs. part : a key of INPUTS; the rest as in `Origin`."""
     origin = Origin(_own(session, part), digests(session, INPUTS[part]), words, good, stops)
-    _write(session, {**_read(session).parts, part: origin})
+    with one_at_a_time(session.path):
+        _write(session, {**_read(session).parts, part: origin})
 
 
 def origin_of(session: Session, part: str) -> Origin | None:

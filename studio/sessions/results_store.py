@@ -18,7 +18,7 @@ import numpy as np
 
 from studio.arrays import Array
 from studio.errors import RunError, SessionError
-from studio.foreign_files import check_file
+from studio.foreign_files import MANIFEST_NAME, check_file
 from studio.sessions.atomic_files import unwritable
 from studio.sessions.process_lock import ProcessLock
 from studio.sessions.results_codec import (
@@ -40,6 +40,7 @@ from studio.sessions.results_reader import (
     time_from,
 )
 from studio.sessions.session_databases import check_tables, open_database
+from studio.sessions.work_under_way import check_there, one_at_a_time
 from studio.trackers.tracker import FrameResult, LayerRecord
 
 Value = bool | int | float | str
@@ -132,6 +133,23 @@ def copy_frames(source: Path, into: Path, last: int | None = None) -> None:
         connection.close()
 
 
+def _alone(run_folder: Path) -> ProcessLock:
+    """The lock of a run's store, taken while the run is not being moved. Raises RunError, NotFoundError."""
+    session = run_folder.parent.parent
+    if not (session / MANIFEST_NAME).is_file():
+        lock = ProcessLock.take(run_folder / LOCK_NAME)
+    else:
+        with one_at_a_time(session):
+            check_there(session, run_folder.name)
+            lock = ProcessLock.take(run_folder / LOCK_NAME)
+    if lock is None:
+        raise RunError(
+            f"Run '{run_folder.name}' is being tracked by another process.",
+            "Stop it there first, or start a new run.",
+        )
+    return lock
+
+
 class ResultsWriter:
     """The one writer of a run's store; a second one, in this process or another, is refused with RunError.
 
@@ -139,13 +157,7 @@ class ResultsWriter:
     """
 
     def __init__(self, run_folder: Path) -> None:
-        lock = ProcessLock.take(run_folder / LOCK_NAME)
-        if lock is None:
-            raise RunError(
-                f"Run '{run_folder.name}' is being tracked by another process.",
-                "Stop it there first, or start a new run.",
-            )
-        self._lock = lock
+        self._lock = lock = _alone(run_folder)
         self._path = run_folder / FILE_NAME
         self._one_at_a_time, self._within = threading.RLock(), False
         try:

@@ -6,10 +6,12 @@ Folder: `session.json`, `videos/` or `pictures/<camera>/`, `masks/<camera>/`, `b
 `subject.toml`, `start_pose.csv`, `truth.trc`), `runs/<run>/`.
 """
 
+from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
 
 import av
+import msgspec
 import numpy as np
 
 from studio.body.branches import within_limits
@@ -22,14 +24,15 @@ from studio.errors import NotFoundError, SessionError, StudioError
 from studio.foreign_files import check_links, read_file
 from studio.geometry.camera import Camera
 from studio.sessions import atomic_files
-from studio.sessions.atomic_files import writing
+from studio.sessions.atomic_files import NameTakenError, writing
 from studio.sessions.file_checksums import note_files
 from studio.sessions.manifest import SessionManifest, read_manifest, write_manifest
-from studio.sessions.named_rows import Array, pose_frame, read_pose, read_sigma
+from studio.sessions.named_rows import Array, named_columns, pose_frame, read_pose, read_sigma
 from studio.sessions.names import checked_name, free_name, inside
 from studio.sessions.results_store import create_store
 from studio.sessions.run_record import BEHAVIOUR_NAME, CAMERAS_NAME, RunRecord, write_run_record
 from studio.sessions.stored_run import BODY_FOLDER, StoredRun
+from studio.sessions.work_under_way import check_there, one_at_a_time
 
 WIDTH = 320
 QUALITY = 5
@@ -69,6 +72,7 @@ def jpeg(picture: np.ndarray, longest: int = WIDTH) -> bytes:
 
 CAMERAS_PATH = Path("calibration") / "cameras.toml"
 SUBJECT_NAME, START_POSE_NAME, SIGMA_NAME = "subject.toml", "start_pose.csv", "sigma.csv"
+OTHERS_START_POSE = "start_pose-of-{}.csv"
 THUMBNAIL_NAME, BODIES_NAME, RUNS_NAME = "thumbnail.jpg", "bodies", "runs"
 BESIDE = "beside"
 """Folder of what is known of other subjects in view, a folder each: `subject.toml`, `start_pose.csv`, `truth.trc`."""
@@ -143,7 +147,7 @@ class Session:
     def subject(self) -> Subject | None:
         """The person's measures, if the session has them. Raises BodyError."""
         path = self.path / SUBJECT_NAME
-        return read_subject(path) if path.exists() else None
+        return read_subject(path, self.manifest.body) if path.exists() else None
 
     def body(self, name: str | None = None, subject: Subject | None = None) -> BodyModel:
         """The body `name` (default: the session's) scaled to `subject` (default: the session's). Raises
@@ -165,25 +169,37 @@ class Session:
         folders = (self.path / BODIES_NAME, self.path.parent / BODIES_NAME)
         return tuple(folder for folder in folders if folder.is_dir())
 
+    def start_pose_path(self, body: str = "") -> Path:
+        """Where the start pose of a body (a name, "" for the session's) lies, if there is one."""
+        own = not body or body == self.manifest.body
+        return self.path / (START_POSE_NAME if own else OTHERS_START_POSE.format(body))
+
     def start_pose(self, body: BodyModel | None = None) -> Array | None:
-        """(D,) the session's own start pose in the order of the body's parameters, None without one.
+        """(D,) the session's start pose in the order of the body's parameters, None without one of this body.
 
         Its angles are rewritten into the body's limits (`body.branches`), the attitude stays. Raises BodyError if
-        it does not name this body's parameters.
+        the session's own does not name its body's parameters.
         """
-        path = self.path / START_POSE_NAME
+        model = body or self.body()
+        path, names = self._start_pose_file(model.name), _parameter_names(model)
         if not path.exists():
             return None
-        model = body or self.body()
-        return within_limits(model, read_pose(path, _parameter_names(model)))
+        if model.name != self.manifest.body and not set(names) <= set(named_columns(path)):
+            return None
+        return within_limits(model, read_pose(path, names))
 
-    def start_pose_frame(self) -> int:
-        """The frame of the start pose, in which tracking begins by default; 0 if it is not given or outside the
-        footage. Raises BodyError.
+    def start_pose_frame(self, body: str = "") -> int:
+        """The frame of a body's start pose (a name, "" for the session's), in which tracking begins by default; 0 if it
+        is not given or outside the footage. Raises BodyError.
         """
-        path = self.path / START_POSE_NAME
+        path = self._start_pose_file(body)
         frame = pose_frame(path) if path.exists() else None
         return frame if frame is not None and 0 <= frame < self.manifest.frame_count else 0
+
+    def _start_pose_file(self, body: str) -> Path:
+        """A body's start pose; the session's own where there is none: bodies of other sizes or limits share it."""
+        path = self.start_pose_path(body)
+        return path if path.exists() else self.path / START_POSE_NAME
 
     def sigma(self, fps: float | None = None, body: BodyModel | None = None) -> Array | None:
         """(D,) the session's own σ0 from frame to frame at `fps` (default: its own), None without one.
@@ -248,7 +264,7 @@ class Session:
         """
         place = self.path / RUNS_NAME / checked_name(record.name, "run")
         if place.exists():
-            raise SessionError(f"Session '{self.name}' has a run '{record.name}'.", "Choose another name.")
+            raise NameTakenError(f"Session '{self.name}' has a run '{record.name}'.", "Choose another name.")
         with writing("The run", place), atomic_files.made_whole(place, parents=False) as folder:
             atomic_files.write_bytes(folder / CAMERAS_NAME, self.calibration_of_footage())
             if body_text:
@@ -275,6 +291,27 @@ class Session:
         return calibration_text(kept, known.crops).encode()
 
 
+def start_pose_files(folder: Path) -> tuple[Path, ...]:
+    """The start poses in a session's folder, of its body and of others."""
+    own = folder / START_POSE_NAME
+    return (*((own,) if own.is_file() else ()), *sorted(folder.glob(OTHERS_START_POSE.format("*"))))
+
+
+def numbered(
+    session: Session, record: RunRecord, name: str, make: Callable[[RunRecord], StoredRun]
+) -> StoredRun:
+    """The run that is made of a record. name : that was requested; without one, another number is taken where
+    somebody else took the record's meanwhile. Raises what `make` raises.
+    """
+    while True:
+        try:
+            return make(record)
+        except NameTakenError:
+            if name:
+                raise
+            record = msgspec.structs.replace(record, name=free_run_name(session))
+
+
 def free_run_name(session: Session) -> str:
     """A name for the session's next run: run-1, run-2, …"""
     folder = session.path / RUNS_NAME
@@ -283,9 +320,38 @@ def free_run_name(session: Session) -> str:
 
 
 def described_anew(session: Session, manifest: SessionManifest) -> Session:
-    """Write a changed manifest and return the new session."""
-    write_manifest(session.path, manifest)
-    return Session(session.path)
+    """Write what differs from a session's description, and return the new session; what others have changed since it
+    was opened stays. Raises SessionError where they have changed the same.
+    """
+    with one_at_a_time(session.path):
+        now = _described_now(session)
+        names = manifest.__struct_fields__
+        changes = {
+            name: getattr(manifest, name) for name in names if _differs(name, manifest, session.manifest)
+        }
+        check_unchanged(session, *(name for name in changes if _differs(name, manifest, now)))
+        write_manifest(session.path, msgspec.structs.replace(now, **changes))
+        return Session(session.path)
+
+
+def check_unchanged(session: Session, *names: str) -> None:
+    """Raise SessionError where others have changed one of these entries of the description since it was opened."""
+    now = _described_now(session)
+    changed = [name for name in names if _differs(name, now, session.manifest)]
+    if changed:
+        raise SessionError(
+            f"The {changed[0].replace('_', ' ')} of session '{session.name}' was changed by other work meanwhile.",
+            "Do this again: it then begins from what there is now.",
+        )
+
+
+def _described_now(session: Session) -> SessionManifest:
+    check_there(session.path)
+    return read_manifest(session.path)
+
+
+def _differs(name: str, one: SessionManifest, other: SessionManifest) -> bool:
+    return getattr(one, name) != getattr(other, name)
 
 
 def _is_run(path: Path) -> bool:

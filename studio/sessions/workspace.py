@@ -19,6 +19,7 @@ from studio.errors import NotFoundError, SessionError, StudioError
 from studio.progress import Progress, unheard
 from studio.sessions import atomic_files
 from studio.sessions.atomic_files import made_whole, write_text
+from studio.sessions.file_checksums import note_again
 from studio.sessions.manifest import FILE_NAME, SessionManifest, now, write_manifest
 from studio.sessions.names import checked_name, free_name, inside, is_name
 from studio.sessions.object_stores import folder_of, is_address
@@ -28,11 +29,10 @@ from studio.sessions.run_record import FILE_NAME as RECORD_NAME
 from studio.sessions.run_record import read_run_record, write_run_record
 from studio.sessions.session import BODIES_NAME, RUNS_NAME, THUMBNAIL_NAME, Session, described_anew
 from studio.sessions.stored_run import RunSummary, StoredRun
+from studio.sessions.work_under_way import moving, one_at_a_time, working_on
 
 VARIABLE = "STUDIO_WORKSPACE"
 TRASH_NAME = ".trash"
-STATE_NAME = ".studio"
-"""Folder of a served workspace for what the server keeps."""
 APPLICATION = "capture-studio"
 
 
@@ -145,30 +145,33 @@ class Workspace:
 
     def rename(self, name: str, new_name: str) -> Session:
         """Give a session another name. Raises SessionError if it is taken or a run of it is being tracked."""
-        session = self._idle(name)
-        place = self._free(new_name)
-        os.rename(session.path, place)
-        atomic_files.sync_folder(self.root)
-        manifest = session.manifest
-        title = new_name if manifest.title in ("", name) else manifest.title
-        return described_anew(Session(place), msgspec.structs.replace(manifest, name=new_name, title=title))
+        with moving(self.session(name).path):
+            session = self._idle(name)
+            place = self._free(new_name)
+            os.rename(session.path, place)
+            atomic_files.sync_folder(self.root)
+            moved = Session(place)
+            title = new_name if moved.manifest.title in ("", name) else moved.manifest.title
+            return described_anew(moved, msgspec.structs.replace(moved.manifest, name=new_name, title=title))
 
     def retitle(self, name: str, title: str) -> Session:
         """Change the text that people see. Raises SessionError if it is empty or longer than 200
         characters."""
-        session, words = self.session(name), " ".join(title.split())
+        words = " ".join(title.split())
         if not 0 < len(words) <= 200:
             raise SessionError(
                 f"A title of {len(words)} characters cannot be shown.", "Use 1 to 200 characters."
             )
-        return described_anew(session, msgspec.structs.replace(session.manifest, title=words))
+        with one_at_a_time(self.session(name).path):
+            session = self.session(name)
+            return described_anew(session, msgspec.structs.replace(session.manifest, title=words))
 
     def duplicate(self, name: str, new_name: str | None = None) -> Session:
         """Copy a session with its runs, atomically; results being written are copied in their current state."""
         session = self.session(name)
         wanted = new_name or free_name(name, {path.name for path in self.root.iterdir()})
         place = self._free(wanted)
-        with atomic_files.made_whole(place) as folder:
+        with working_on(session.path, "duplicate"), atomic_files.made_whole(place) as folder:
             try:
                 shutil.copytree(session.path, folder, symlinks=True, dirs_exist_ok=True, ignore=_transient)
             except shutil.Error as error:
@@ -185,27 +188,31 @@ class Workspace:
     def trash(self, name: str) -> Path:
         """Move a session to the trash folder and return where it lies. Raises SessionError while it is
         tracked."""
-        return self.to_trash(self._idle(name).path, name)
+        with moving(self.session(name).path):
+            return self.to_trash(self._idle(name).path, name)
 
     def trash_run(self, session_name: str, run_name: str) -> Path:
         """Move a run to the trash folder. Raises SessionError while it is tracked."""
         run = self.session(session_name).run(run_name)
-        _check_idle(run)
-        return self.to_trash(run.folder, f"{session_name}--{run_name}")
+        with moving(run.folder.parent.parent, run_name):
+            _check_idle(run)
+            return self.to_trash(run.folder, f"{session_name}--{run_name}")
 
     def rename_run(self, session_name: str, run_name: str, new_name: str) -> StoredRun:
         """Give a run another name. Raises SessionError if it is taken or the run is being tracked."""
         session = self.session(session_name)
         run = session.run(run_name)
-        _check_idle(run)
         place = inside(session.path / RUNS_NAME, new_name, "run")
-        taken = {entry.name.lower() for entry in place.parent.iterdir() if entry.name != run_name}
-        if new_name.lower() in taken:
-            raise SessionError(f"There is a run '{new_name}' already.", "Choose another name.")
-        record = msgspec.structs.replace(run.record, name=new_name)
-        os.rename(run.folder, place)
-        write_run_record(place, record)
-        return session.run(new_name)
+        with moving(session.path, run_name):
+            _check_idle(run)
+            taken = {entry.name.lower() for entry in place.parent.iterdir() if entry.name != run_name}
+            if new_name.lower() in taken:
+                raise SessionError(f"There is a run '{new_name}' already.", "Choose another name.")
+            record = msgspec.structs.replace(run.record, name=new_name)
+            os.rename(run.folder, place)
+            write_run_record(place, record)
+            note_again(place, RECORD_NAME)
+            return session.run(new_name)
 
     def to_trash(self, path: Path, label: str) -> Path:
         """Move a folder to the trash under a free name that begins with `label`; where it lies then."""
@@ -230,13 +237,17 @@ class Workspace:
             raise NotFoundError(
                 f"There is no session '{trashed_name}' in the trash.", "List its content first."
             )
-        name = free_name(Session(path).manifest.name, {entry.name for entry in self.root.iterdir()})
-        os.rename(path, inside(self.root, name))
-        return self.session(name)
+        with one_at_a_time(self.root / trashed_name):
+            name = free_name(Session(path).manifest.name, {entry.name for entry in self.root.iterdir()})
+            os.rename(path, inside(self.root, name))
+            return self.session(name)
 
     def restore_run(self, trashed_name: str) -> StoredRun:
         """Bring a run back into its session, under its own name or one like it. Raises NotFoundError."""
-        path = inside(self.root / TRASH_NAME, trashed_name)
+        with one_at_a_time(self.root / trashed_name):
+            return self._restored_run(inside(self.root / TRASH_NAME, trashed_name), trashed_name)
+
+    def _restored_run(self, path: Path, trashed_name: str) -> StoredRun:
         record = read_run_record(path)
         owners = [name for name in (trashed_name.partition("--")[0], record.session) if is_name(name)]
         for owner in owners:
@@ -245,6 +256,7 @@ class Workspace:
                 (session.path / RUNS_NAME).mkdir(exist_ok=True)
                 name = free_name(record.name, {entry.name for entry in (session.path / RUNS_NAME).iterdir()})
                 write_run_record(path, msgspec.structs.replace(record, name=name))
+                note_again(path, RECORD_NAME)
                 os.rename(path, inside(session.path / RUNS_NAME, name, "run"))
                 return session.run(name)
         raise NotFoundError(f"Session '{owners[0]}' of this run is missing.", "Restore the session first.")

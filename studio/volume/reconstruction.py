@@ -47,15 +47,20 @@ VOXELS_A_THREAD, BLOCKS_A_THREAD = 512, 16
 """Least voxels, and blocks of pixels, for which another thread pays."""
 
 
+def check_views(cameras: Sequence[Camera]) -> None:
+    """Raise FootageError for no camera or more than 32: before their pictures are read, which takes a while."""
+    if not 0 < len(cameras) <= MOST_VIEWS:
+        raise FootageError(
+            f"A hull cannot be carved from {len(cameras)} cameras.", f"Use 1 to {MOST_VIEWS} cameras."
+        )
+
+
 class Reconstructor:
     """Carves hulls for some cameras, a tracking space and settings; built once, used for every frame."""
 
     def __init__(self, cameras: tuple[Camera, ...], box: Box, settings: HullSettings) -> None:
         """Raises FootageError for no camera or more than 32."""
-        if not 0 < len(cameras) <= MOST_VIEWS:
-            raise FootageError(
-                f"A hull cannot be carved from {len(cameras)} cameras.", f"Use 1 to {MOST_VIEWS} cameras."
-            )
+        check_views(cameras)
         self.cameras, self.box, self.settings = cameras, box, settings
         self._table = camera_table(cameras, picture_limit)
         sizes = np.array([(camera.width, camera.height) for camera in cameras], dtype=np.int64)

@@ -4,7 +4,7 @@ import contextlib
 import hashlib
 import json
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -170,7 +170,12 @@ class Stage:
 
     def __post_init__(self) -> None:
         first = Place(self.folder / "first")
-        self._build(first)
+        session = build_session(first, (DONE, DAMAGED), NEW)
+        rng = np.random.default_rng(1)
+        while verify(session).faults == ():
+            flip_stored(session.run(DAMAGED).folder / "results.sqlite", rng)
+        build_source(first)
+        (first.folder / "exports").mkdir()
         self.frames = frames_of(first.run(DONE))
         self.files = files_of(first)
         self.touches, self.afters = {}, {}
@@ -187,21 +192,24 @@ class Stage:
         shutil.copytree(self.folder / "first", self.folder / name)
         return Place(self.folder / name)
 
-    def _build(self, at: Place) -> None:
-        session = make_session(at.workspace.place_for(TOY), FRAMES)
-        for name in (DONE, DAMAGED):
-            track(session, new_run(session, name))
-        rng = np.random.default_rng(1)
-        while verify(session).faults == ():
-            flip_stored(session.run(DAMAGED).folder / "results.sqlite", rng)
-        new_run(session, NEW)
-        (at.folder / "exports").mkdir()
-        source = at.folder / "source"
-        shutil.copytree(session.path / "calibration", source / "calibration")
-        (source / "front").mkdir()
+
+def build_session(at: Place, tracked: Sequence[str], fresh: str) -> Session:
+    """The small session. tracked, fresh : the names of its runs, tracked to their end and not begun."""
+    session = make_session(at.workspace.place_for(TOY), FRAMES)
+    for name in tracked:
+        track(session, new_run(session, name))
+    new_run(session, fresh)
+    return session
+
+
+def build_source(at: Place) -> None:
+    """A folder of footage and calibration that can be imported."""
+    source = at.folder / "source"
+    shutil.copytree(at.session.path / "calibration", source / "calibration")
+    (source / "front").mkdir()
+    with contextlib.closing(at.session.footage()) as footage:
         for frame in range(FRAMES):
-            picture = session.footage().picture("front", frame)
-            cv2.imwrite(str(source / "front" / f"{frame:04d}.png"), picture)
+            cv2.imwrite(str(source / "front" / f"{frame:04d}.png"), footage.picture("front", frame))
 
 
 def files_of(at: Place) -> dict[str, bytes]:

@@ -154,9 +154,10 @@ def test_a_command_that_the_process_dies_of_is_answered(
     process = psutil.Process(control.process_identifier)
     process.suspend()
     watching = control.subscribe()
-    command = commands.Pause()
+    command = commands.Close(session=str(session_on_disk.path), run=str(session_on_disk.path / "runs" / "a"))
     threading.Timer(0.3, process.kill).start()
-    with pytest.raises(RunError, match=r"^The tracking process died before it answered\. "):
+    about = f"run 'a' of session '{session_on_disk.name}'"
+    with pytest.raises(RunError, match=f"^The tracking process died before it answered about {about}"):
         control.request(command)
     assert wait_for(watching, in_state("lost"))
 

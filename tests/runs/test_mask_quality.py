@@ -1,11 +1,19 @@
 """Masks judged by the views' agreement: a body of cones seen by four cameras, with planted faults."""
 
+import dataclasses
+from pathlib import Path
+
 import numpy as np
 import pytest
+from toy_session import make_session
 
+from studio.errors import FootageError
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project
 from studio.runs import mask_quality as quality
+from studio.runs.initialising import initialise
+from studio.runs.problem_source import ProblemSource
+from studio.sessions.session import Session
 from studio.synthesis.cameras import placed_camera
 
 CENTRE, RADIUS = np.array([0.0, 0.0, 900.0]), 350.0
@@ -48,6 +56,23 @@ def test_good_masks_agree_in_every_view() -> None:
         assert view.in_words() == ""
     exact = 4.0 / 3.0 * np.pi * RADIUS**3 * 1e-6
     assert exact < found.hull_litres[0] < 1.5 * exact
+
+
+def test_more_cameras_than_a_hull_can_have_are_refused_before_a_picture_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = make_session(tmp_path / "toy", 1)
+    cameras = tuple(dataclasses.replace(session.cameras()[0], name=f"c{n}") for n in range(33))
+    monkeypatch.setattr(Session, "cameras", lambda _: cameras)
+    monkeypatch.setattr(Session, "footage", lambda _: pytest.fail("footage is opened"))
+    with pytest.raises(FootageError, match="33 cameras"):
+        quality.measure_masks(session)
+    # A start pose asks the footage who has a picture, and reads none.
+    monkeypatch.undo()
+    monkeypatch.setattr(ProblemSource, "cameras_in", lambda *_: cameras)
+    monkeypatch.setattr(ProblemSource, "evidence", lambda *_: pytest.fail("a picture is read"))
+    with pytest.raises(FootageError, match="33 cameras"):
+        initialise(session)
 
 
 def test_a_bystander_in_one_view_is_reported_for_that_view_only() -> None:

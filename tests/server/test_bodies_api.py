@@ -53,6 +53,12 @@ def test_a_body_has_everything_that_can_be_changed(studio: Studio) -> None:
     assert studio.client.get("/api/bodies/planar_arm4").json()["sided"] is False
 
 
+def test_an_empty_name_saves_nothing(studio: Studio) -> None:
+    assert edit(studio, "mouse", save_as="")["saved"] == ""
+    assert edit(studio, "mouse", save_as="", session="")["saved"] == ""
+    assert edit(studio, "mouse", 422, save_as="a" * 65)["code"] == "request"
+
+
 def test_changes_go_from_text_to_text_and_back(studio: Studio) -> None:
     first = edit(studio, "mouse", sizes={"left haunch.radius_start": 14.5})
     second = edit(studio, "mouse", text=first["text"], limits={"head_nod.upper": "inf"}, mirror="left")

@@ -32,7 +32,7 @@ from studio.sessions.background_files import (
     has_made_masks,
     without_made_masks,
 )
-from studio.sessions.file_checksums import note_files
+from studio.sessions.file_checksums import forget_files, note_files
 from studio.sessions.importers.bodytrack import is_bodytrack, plan_bodytrack
 from studio.sessions.importers.folder_layout import plan_folder
 from studio.sessions.importers.measuring import (
@@ -55,8 +55,9 @@ from studio.sessions.importers.writing import (
 from studio.sessions.manifest import FASTEST, SessionManifest
 from studio.sessions.names import free_name
 from studio.sessions.provenance import adopt
-from studio.sessions.session import CAMERAS_PATH, THUMBNAIL_NAME, Session, described_anew
+from studio.sessions.session import CAMERAS_PATH, THUMBNAIL_NAME, Session, check_unchanged, described_anew
 from studio.sessions.stroke_files import OUTDATED, STROKES_NAME
+from studio.sessions.work_under_way import one_at_a_time
 
 OWN_PARTS = ("videos", "pictures", "masks", "background")
 PERSON_PARTS = ("calibration", "subject.toml", "start_pose.csv", "sigma.csv", "truth", "bodies")
@@ -257,8 +258,14 @@ def _added(session: Session, source: Path, options: ImportOptions, report: Progr
             write_calibrations(staged, read, measured)
             write_person(staged, plan, person, truths)
         report("finishing", 1, 1)
-        adopt(session)
-        placed = _moved_in(session, staged, footage, without_made_masks(session, stay))
+        with one_at_a_time(session.path):
+            check_unchanged(session, "footage", "calibration_changed")
+            adopt(session)
+            placed = _moved_in(session, staged, footage, without_made_masks(session, stay))
+            manifest = _described(session, plan, read, measured, placed, person.body if takes_over else "")
+            changed = described_anew(session, manifest)
+            _forget_old(changed, session.manifest.footage)
+            forget_unused_masks(changed)
     except OSError as problem:
         raise SessionError(
             f"The footage could not be added to '{session.name}': {problem}.",
@@ -266,10 +273,6 @@ def _added(session: Session, source: Path, options: ImportOptions, report: Progr
         ) from None
     finally:
         discard(staged)
-    manifest = _described(session, plan, read, measured, placed, person.body if takes_over else "")
-    changed = described_anew(session, manifest)
-    _forget_old(changed, session.manifest.footage)
-    forget_unused_masks(changed)
     gone = (MASKS_GONE,) if any(map(has_made_masks, session.manifest.footage.cameras)) else ()
     if session.has_footage and (session.path / STROKES_NAME).exists():
         gone = (*gone, OUTDATED)
@@ -405,15 +408,18 @@ def _forget_old(session: Session, before: FootageSource) -> None:
     """Remove files of the session's own that no camera refers to any more, and the small picture."""
     (session.path / THUMBNAIL_NAME).unlink(missing_ok=True)
     used = {path for camera in session.manifest.footage.cameras for path in camera.places}
-    for path in (path for camera in before.cameras for path in camera.places):
-        if path and path not in used and not Path(path).is_absolute():
-            place = session.path / path
-            if leads_out(place):
-                continue
-            if place.is_dir() and not place.is_symlink():
-                shutil.rmtree(place, ignore_errors=True)
-            else:
-                place.unlink(missing_ok=True)
+    before_it = {path for camera in before.cameras for path in camera.places}
+    forgotten = [path for path in before_it - used if path and not Path(path).is_absolute()]
+    # Else what was removed on purpose would be taken for lost.
+    forget_files(session.path, forgotten)
+    for path in forgotten:
+        place = session.path / path
+        if leads_out(place):
+            continue
+        if place.is_dir() and not place.is_symlink():
+            shutil.rmtree(place, ignore_errors=True)
+        else:
+            place.unlink(missing_ok=True)
 
 
 def _described(
