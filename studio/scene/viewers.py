@@ -37,8 +37,8 @@ class Viewers:
     """The viewers of one scene; used by its thread.
 
     looking : the camera of the viewer who moved last, set by viser's callbacks. is_answer : whether it only says where
-    it was put, perhaps in another shape. placed : called with each eye that all viewers are put to. framed : the eye that frames the body, which is the usual one then; framed_for : the width over
-    height that it was made for.
+    it was put, perhaps in another shape. placed : called with each eye that all viewers are put to. framed : the eye
+    that frames the body, which is the usual one then; framed_for : the width over height that it was made for.
     """
 
     def __init__(self, server: viser.ViserServer, placed: Callable[[Eye], None] = lambda _: None) -> None:
