@@ -69,11 +69,17 @@ class Subject(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     ratios: Mapping[str, float] = {}
 
 
-def read_subject(path: Path) -> Subject:
-    """The subject of a TOML file. Raises BodyError naming the file, the entry and the remedy."""
+def read_subject(path: Path, body: str = DEFAULT_BODY) -> Subject:
+    """The subject of a TOML file; `body` is its body where the file names none.
+
+    Raises BodyError naming the file, the entry and the remedy.
+    """
     hint = "It holds body, height_mm, [lengths_mm], [dimensions_mm] and [ratios], numbers in mm."
     with foreign_file(path, BodyError, "a subject file", hint):
-        subject = decode_toml(read_foreign_text(path), Subject)
+        text = read_foreign_text(path)
+        subject = decode_toml(text, Subject)
+        if "body" not in decode_toml(text, dict[str, object]):
+            subject = msgspec.structs.replace(subject, body=body)
     _check(subject, f"Subject file {path.name}")
     return subject
 

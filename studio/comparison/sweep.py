@@ -161,8 +161,9 @@ def plan_sweep(
         own = changed_settings(settings, point)
         evaluations = TRACKERS[tracker].evaluations(own.tracker)
         points.append(Candidate(point_name(point), tracker, weighting, evaluations, {**fixed, **point}))
-    begin, end = checked_frames(session, session.start_pose_frame() if first is None else first, last)
     model = session.body(body or None)
+    first = session.start_pose_frame(model.name) if first is None else first
+    begin, end = checked_frames(session, first, last)
     guided = next((one.settings() for one in points if needs_model(tracker, one.settings().tracker)), None)
     chosen = chosen_model(session, model, guided, behaviour) if guided else None
     evaluations = max(one.evaluations for one in points)

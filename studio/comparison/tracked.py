@@ -135,7 +135,7 @@ def track(
     session = cache.session(trial.footage)
     if session.truth_path is None:
         raise TruthError(f"Session '{session.name}' has no truth.", "Take one made by 'studio synthesize'.")
-    subject = read_subject(session.path / trial.subject) if trial.subject else None
+    subject = read_subject(session.path / trial.subject, session.manifest.body) if trial.subject else None
     body = session.body(trial.body or None, subject)
     changes = {**AS_PUBLISHED, **trial.changes}
     settings = changed_settings(default_settings(trial.tracker, trial.weighting), changes)
@@ -151,7 +151,7 @@ def track(
         kind, pictures = WEIGHTINGS[name].edge_kind, WEIGHTINGS[name].reads_pictures
         return spoilt.evidence(cache.evidence(session, cameras, frame, settings.evidence, kind, pictures))
 
-    start = _start_pose(session, body, trial.first, fps)
+    start = _start_pose(session, body, trial.first)
     if trial.shape_frames and start is not None:
         sigma, first = session_sigma(session, body, rate), frames[: trial.shape_frames]
         of_shape = partial(evidence, name=WEIGHTING)
@@ -242,24 +242,27 @@ def _cameras(session: Session, names: tuple[str, ...]) -> tuple[Camera, ...]:
 
 def start_of_trial(session: Session, body: str, first: int) -> tuple[float, ...] | None:
     """The pose that a trial starts from. body : a name, "" for the session's own."""
-    return _start_pose(session, session.body(body or None), first, session.manifest.fps)
+    return _start_pose(session, session.body(body or None), first)
 
 
-def _start_pose(session: Session, body: BodyModel, first: int, fps: float) -> tuple[float, ...] | None:
+def _start_pose(session: Session, body: BodyModel, first: int) -> tuple[float, ...] | None:
     """The session's start pose; for a later first frame, and for a body other than the session's, the pose
     fitted to the true markers of that frame.
     """
     is_own = body.name == session.manifest.body
     own = session.start_pose(body) if is_own else None
-    pose = own if first == 0 and is_own else _pose_on_truth(session, body, first, fps, own)
+    pose = own if first == 0 and is_own else pose_on_truth(session, body, first, own)
     return None if pose is None else tuple(float(value) for value in pose)
 
 
-def _pose_on_truth(session: Session, body: BodyModel, frame: int, fps: float, near: Array | None) -> Array:
-    """(D,) the pose whose markers come closest to the true ones of a frame, angles near `near` where given."""
+def pose_on_truth(session: Session, body: BodyModel, frame: int, near: Array | None = None) -> Array:
+    """(D,) the pose whose markers come closest to the true ones of a frame, angles near `near` where given.
+
+    Raises TruthError where the truth lacks the frame.
+    """
     assert session.truth_path is not None
     truth = read_trc(session.truth_path)
-    rows = rows_of_frames(truth, fps)
+    rows = rows_of_frames(truth, session.manifest.fps)
     if frame not in rows:
         raise TruthError(f"The truth has no row for frame {frame}.", "Start at a frame that it has.")
     kept, names = known_markers(body, truth.names)

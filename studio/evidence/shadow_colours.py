@@ -80,6 +80,8 @@ def learn_shadow_colours(
             if view is None:
                 continue
             rows, columns = np.nonzero(view.alike)
+            if not len(rows):
+                continue
             taken = slice(None, None, max(1, len(rows) // SAMPLED))
             rows, columns = rows[taken], columns[taken]
             others = [one for one in cameras if one is not camera and one.name in widened]

@@ -11,6 +11,7 @@ from studio.comparison.trials import Plain, Scale, Trial, TrialJob, is_mapping, 
 from studio.errors import StudioError
 from studio.reproduction.experiment import Experiment
 from studio.sessions.manifest import read_manifest
+from studio.synthesis.real_data import PREFIX
 from studio.synthesis.recipe_file import find_recipe, read_recipe
 from studio.synthesis.recipes import RECIPE_COPY
 from studio.typed_decoding import is_list
@@ -75,9 +76,11 @@ def trial_key(experiment: Experiment, trial: Trial, recipes: Mapping[str, str]) 
 
 
 def footage_of(experiment: Experiment, trial: Trial) -> tuple[str, ...]:
-    """The experiment's footage named in a trial's arguments; all of it where they name none."""
-    named = tuple(name for name in experiment.footage if name in _texts(trial.arguments))
-    return named or experiment.footage
+    """The experiment's recipes named in a trial's arguments; all of them where they name neither one nor real data."""
+    texts = _texts(trial.arguments)
+    named = tuple(name for name in experiment.footage if name in texts)
+    is_real = any(text.startswith(PREFIX) for text in texts)
+    return named if named or is_real else experiment.footage
 
 
 def each_once(planned: Iterable[PlannedExperiment]) -> dict[str, TrialJob]:

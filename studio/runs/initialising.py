@@ -32,7 +32,7 @@ from studio.sessions.atomic_files import keep_before
 from studio.sessions.named_rows import write_pose
 from studio.sessions.names import free_name
 from studio.sessions.provenance import note
-from studio.sessions.session import START_POSE_NAME, Session
+from studio.sessions.session import Session
 from studio.sessions.work_under_way import one_at_a_time
 from studio.settings import DEFAULT_TRACKER, RunSettings
 from studio.trackers.initialisation import (
@@ -194,17 +194,18 @@ def trust(most: float) -> float:
 def keep_pose(session: Session, found: InitialPose, replace: bool = False) -> Path:
     """Write a found pose into the session's folder; returns the file.
 
-    It becomes the session's start pose if there is none, or with `replace` (the old one is kept beside it as
-    start_pose-before.csv, numbered if there are more). Otherwise, and for any other body than the session's, it is a
-    separate file for `--start-pose`, named after its frame.
+    It becomes the start pose of its body if there is none, or with `replace` (the old one is kept beside it as
+    start_pose-before.csv, numbered if there are more): start_pose.csv of the session's body, start_pose-of-BODY.csv of
+    another one. Otherwise it is a separate file for `--start-pose`, named after its frame.
     """
-    own, taken = session.path / START_POSE_NAME, {path.name for path in session.path.glob("*.csv")}
-    if found.body == session.manifest.body and (replace or not own.exists()):
+    own, taken = session.start_pose_path(found.body), {path.name for path in session.path.glob("*.csv")}
+    if replace or not own.exists():
         with one_at_a_time(session.path):
             keep_before(own)
             write_pose(own, found.names, found.pose, found.frame)
-            words = f"found in frame {found.frame}, confidence {100 * found.confidence:.0f} %"
-            note(session, "start-pose", words)
+            if found.body == session.manifest.body:
+                words = f"found in frame {found.frame}, confidence {100 * found.confidence:.0f} %"
+                note(session, "start-pose", words)
         return own
     place = session.path / _free(f"{own.stem}-frame-{found.frame}", taken)
     write_pose(place, found.names, found.pose, found.frame)

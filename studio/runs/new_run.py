@@ -166,17 +166,17 @@ def prepare_run(
         tree, fps = session.body(body or None, measures), session.manifest.fps
         given, start_source, first = given_pose(start_pose, start_source, tree, fps, first)
     own_start = given is None and not live
-    first, last = checked_frames(session, _first(session, first, last, own_start), last, endless=ping_pong)
+    tree, notes = session.body_with_notes(body or None, measures)
+    of = session.start_pose_frame(tree.name) if own_start else 0
+    first, last = checked_frames(session, _first(session, first, last, of), last, endless=ping_pong)
     if not 0 <= seed < 2**63:
         raise RunError(f"The seed {seed} cannot be used.", "Give a whole number of 0 or more.")
-    tree, notes = session.body_with_notes(body or None, measures)
     notes = (*([note] if note else []), *notes, *(f"{DESPITE}{doubt}" for doubt in doubts))
     model = chosen_model(session, tree, settings, behaviour)
     if model is not None and model.note:
         notes = (*notes, model.note)
     start, source = start_of(session, tree, given, start_source)
-    if own_start and start is not None and first != session.start_pose_frame():
-        of = session.start_pose_frame()
+    if own_start and start is not None and first != of:
         notes = (*notes, f"The run begins in frame {first}, the session's start pose is of frame {of}.")
     if start is None and not _limited(tree):
         path = str(model.path) if model else ""
@@ -231,11 +231,11 @@ def given_pose(
     return np.asarray(pose, dtype=np.float64), source or "given", frame
 
 
-def _first(session: Session, first: int | None, last: int | None, own_start: bool) -> int:
-    """The frame that a run begins in. Raises RunError where it would end before its start pose."""
+def _first(session: Session, first: int | None, last: int | None, of: int) -> int:
+    """The frame that a run begins in. of : that of its start pose. Raises RunError where it would end before it."""
     if first is not None:
         return first
-    first = session.start_pose_frame() if own_start else 0
+    first = of
     if first and last is not None and last <= first:
         raise RunError(
             f"The start pose of session '{session.name}' is of frame {first}, after the last requested frame"

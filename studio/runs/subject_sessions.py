@@ -32,6 +32,7 @@ from studio.sessions.session import (
     SUBJECT_NAME,
     THUMBNAIL_NAME,
     Session,
+    start_pose_files,
 )
 
 TRUTH, TRUTH_NAME = "truth", "truth.trc"
@@ -100,8 +101,9 @@ def _linked(session: Session, place: Path, number: int, owner: Path | None) -> S
             },
         )
         if owner != session.path:
-            for name in (SUBJECT_NAME, START_POSE_NAME) if owner is not None or _knows(session) else ():
-                (folder / name).unlink(missing_ok=True)
+            if owner is not None or _knows(session):
+                for path in (folder / SUBJECT_NAME, *start_pose_files(folder)):
+                    path.unlink(missing_ok=True)
             shutil.rmtree(folder / TRUTH, ignore_errors=True)
         if owner is not None and owner != session.path:
             for name in (SUBJECT_NAME, START_POSE_NAME):
@@ -141,7 +143,9 @@ def _stands(session: Session, folder: Path) -> Array | None:
     if not path.is_file() or (pose_frame(path) or 0) != 0:
         return None
     try:
-        body = session.body(subject=read_subject(measures) if measures.is_file() else None)
+        body = session.body(
+            subject=read_subject(measures, session.manifest.body) if measures.is_file() else None
+        )
         pose = read_pose(path, parameter_names(body))
     except StudioError:
         return None

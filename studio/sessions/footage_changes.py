@@ -34,11 +34,11 @@ from studio.sessions.importers.measuring import checked_turn, in_step
 from studio.sessions.provenance import adopt
 from studio.sessions.run_record import FILE_NAME as RUN_FILE_NAME
 from studio.sessions.session import (
-    START_POSE_NAME,
     THUMBNAIL_NAME,
     Session,
     check_unchanged,
     described_anew,
+    start_pose_files,
 )
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.stroke_files import OUTDATED, STROKES_NAME
@@ -255,7 +255,7 @@ def _consequences(
             f"Run {listed(stale)} was tracked before this change: its poses stay, but pictures and overlays now"
             " show other frames. Track again."
         )
-    if moved and (session.path / START_POSE_NAME).exists():
+    if moved and start_pose_files(session.path):
         notes.append("The start pose belongs to the old frame 0: find it again with 'studio initialise'.")
     if moved and session.truth_path is not None:
         notes.append("The truth counts its time from the old frame 0: check it before you evaluate.")

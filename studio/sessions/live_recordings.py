@@ -35,10 +35,10 @@ from studio.sessions.session import (
     BODIES_NAME,
     CAMERAS_PATH,
     SIGMA_NAME,
-    START_POSE_NAME,
     SUBJECT_NAME,
     Session,
     described_anew,
+    start_pose_files,
 )
 
 LIVE, SETS_NAME, GO_NAME, LOCK_NAME = "live", "sets.csv", "go", "lock"
@@ -262,7 +262,8 @@ def _check_backgrounds(base: Session, sources: list[CameraSource]) -> None:
 
 
 def _copy_known(base: Session, folder: Path, keep_start: bool) -> None:
-    for entry in (*COPIED, *((START_POSE_NAME,) if keep_start else ())):
+    starts = [path.name for path in start_pose_files(base.path)] if keep_start else []
+    for entry in (*COPIED, *starts):
         path = base.path / entry
         if path.exists():
             atomic_files.copy_part(path, folder / entry)

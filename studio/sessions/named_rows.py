@@ -61,6 +61,11 @@ def pose_frame(path: Path) -> int | None:
     return int(rows[0][header.index(FRAME)]) if FRAME in header else None
 
 
+def named_columns(path: Path) -> tuple[str, ...]:
+    """The names of a CSV file's columns. Raises BodyError."""
+    return tuple(_read(path)[0])
+
+
 def write_pose(path: Path, names: tuple[str, ...], pose: Array, frame: int | None = None) -> None:
     """Write one pose under its parameters' names, in one step. pose : (D,) radians and mm. frame : it is of."""
     head, first = ([], []) if frame is None else ([FRAME], [str(frame)])

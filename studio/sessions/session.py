@@ -27,7 +27,7 @@ from studio.sessions import atomic_files
 from studio.sessions.atomic_files import NameTakenError, writing
 from studio.sessions.file_checksums import note_files
 from studio.sessions.manifest import SessionManifest, read_manifest, write_manifest
-from studio.sessions.named_rows import Array, pose_frame, read_pose, read_sigma
+from studio.sessions.named_rows import Array, named_columns, pose_frame, read_pose, read_sigma
 from studio.sessions.names import checked_name, free_name, inside
 from studio.sessions.results_store import create_store
 from studio.sessions.run_record import BEHAVIOUR_NAME, CAMERAS_NAME, RunRecord, write_run_record
@@ -72,6 +72,7 @@ def jpeg(picture: np.ndarray, longest: int = WIDTH) -> bytes:
 
 CAMERAS_PATH = Path("calibration") / "cameras.toml"
 SUBJECT_NAME, START_POSE_NAME, SIGMA_NAME = "subject.toml", "start_pose.csv", "sigma.csv"
+OTHERS_START_POSE = "start_pose-of-{}.csv"
 THUMBNAIL_NAME, BODIES_NAME, RUNS_NAME = "thumbnail.jpg", "bodies", "runs"
 BESIDE = "beside"
 """Folder of what is known of other subjects in view, a folder each: `subject.toml`, `start_pose.csv`, `truth.trc`."""
@@ -146,7 +147,7 @@ class Session:
     def subject(self) -> Subject | None:
         """The person's measures, if the session has them. Raises BodyError."""
         path = self.path / SUBJECT_NAME
-        return read_subject(path) if path.exists() else None
+        return read_subject(path, self.manifest.body) if path.exists() else None
 
     def body(self, name: str | None = None, subject: Subject | None = None) -> BodyModel:
         """The body `name` (default: the session's) scaled to `subject` (default: the session's). Raises
@@ -168,25 +169,37 @@ class Session:
         folders = (self.path / BODIES_NAME, self.path.parent / BODIES_NAME)
         return tuple(folder for folder in folders if folder.is_dir())
 
+    def start_pose_path(self, body: str = "") -> Path:
+        """Where the start pose of a body (a name, "" for the session's) lies, if there is one."""
+        own = not body or body == self.manifest.body
+        return self.path / (START_POSE_NAME if own else OTHERS_START_POSE.format(body))
+
     def start_pose(self, body: BodyModel | None = None) -> Array | None:
-        """(D,) the session's own start pose in the order of the body's parameters, None without one.
+        """(D,) the session's start pose in the order of the body's parameters, None without one of this body.
 
         Its angles are rewritten into the body's limits (`body.branches`), the attitude stays. Raises BodyError if
-        it does not name this body's parameters.
+        the session's own does not name its body's parameters.
         """
-        path = self.path / START_POSE_NAME
+        model = body or self.body()
+        path, names = self._start_pose_file(model.name), _parameter_names(model)
         if not path.exists():
             return None
-        model = body or self.body()
-        return within_limits(model, read_pose(path, _parameter_names(model)))
+        if model.name != self.manifest.body and not set(names) <= set(named_columns(path)):
+            return None
+        return within_limits(model, read_pose(path, names))
 
-    def start_pose_frame(self) -> int:
-        """The frame of the start pose, in which tracking begins by default; 0 if it is not given or outside the
-        footage. Raises BodyError.
+    def start_pose_frame(self, body: str = "") -> int:
+        """The frame of a body's start pose (a name, "" for the session's), in which tracking begins by default; 0 if it
+        is not given or outside the footage. Raises BodyError.
         """
-        path = self.path / START_POSE_NAME
+        path = self._start_pose_file(body)
         frame = pose_frame(path) if path.exists() else None
         return frame if frame is not None and 0 <= frame < self.manifest.frame_count else 0
+
+    def _start_pose_file(self, body: str) -> Path:
+        """A body's start pose; the session's own where there is none: bodies of other sizes or limits share it."""
+        path = self.start_pose_path(body)
+        return path if path.exists() else self.path / START_POSE_NAME
 
     def sigma(self, fps: float | None = None, body: BodyModel | None = None) -> Array | None:
         """(D,) the session's own σ0 from frame to frame at `fps` (default: its own), None without one.
@@ -276,6 +289,12 @@ class Session:
         if len(kept) == len(known.cameras):
             return read_file(path)
         return calibration_text(kept, known.crops).encode()
+
+
+def start_pose_files(folder: Path) -> tuple[Path, ...]:
+    """The start poses in a session's folder, of its body and of others."""
+    own = folder / START_POSE_NAME
+    return (*((own,) if own.is_file() else ()), *sorted(folder.glob(OTHERS_START_POSE.format("*"))))
 
 
 def numbered(

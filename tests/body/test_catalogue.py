@@ -16,6 +16,7 @@ COUNTS = {
     "human31": (31, 10),
     "human29": (29, 17),
     "human34": (34, 17),
+    "human35": (35, 17),
     "human25": (25, 14),
     "planar_arm4": (4, 4),
     "branched_arms6": (6, 6),
@@ -23,7 +24,7 @@ COUNTS = {
     "mouse": (29, 15),
     "hand25": (25, 20),
 }
-HUMANS = ("human31", "human29", "human34", "human25")
+HUMANS = ("human31", "human29", "human34", "human35", "human25")
 MARKERS = {"Hip", "Neck", "Head"} | {
     side + joint for side in "RL" for joint in ("Hip", "Knee", "Ankle", "Shoulder", "Elbow", "Wrist")
 }
@@ -56,6 +57,7 @@ def test_trunk_and_head_are_named_where_there_are_any() -> None:
         "human25": one_torso,
         "human29": pelvis_and_thorax,
         "human34": pelvis_and_thorax,
+        "human35": pelvis_and_thorax,
         "dog": {"loin": "trunk", "chest": "trunk", "head": "head"},
         "mouse": {"rump": "trunk", "seat": "trunk", "loin": "trunk", "chest": "trunk", "head": "head"},
         "planar_arm4": {},
@@ -94,7 +96,7 @@ def test_humans_carry_the_fifteen_markers_and_stand_upright_facing_x(name: str) 
     assert places["LWrist"][0] > places["LElbow"][0]
 
 
-@pytest.mark.parametrize("name", ["human29", "human34", "human25"])
+@pytest.mark.parametrize("name", ["human29", "human34", "human35", "human25"])
 def test_humans_with_feet_point_them_forward_with_the_sole_on_the_floor(name: str) -> None:
     body = load_body(name)
     ends = dict(zip([limb.name for limb in body.drawn], limb_ends(body, body.neutral)[0], strict=True))
@@ -106,7 +108,7 @@ def test_humans_with_feet_point_them_forward_with_the_sole_on_the_floor(name: st
         assert toe[2] - limb.radius_end == pytest.approx(0.0, abs=3.0)
 
 
-@pytest.mark.parametrize("name", ["human29", "human34", "human25"])
+@pytest.mark.parametrize("name", ["human29", "human34", "human35", "human25"])
 def test_positive_angles_mean_the_same_on_both_sides(name: str) -> None:
     body = load_body(name)
     pose = body.neutral
@@ -132,7 +134,7 @@ def test_positive_angles_mean_the_same_on_both_sides(name: str) -> None:
     ("lean_right", "Head", 1, -1),
 ])  # fmt: skip
 def test_angles_turn_as_their_names_indicate(parameter: str, marker: str, axis: int, sign: int) -> None:
-    for name in ("human29", "human34", "human25"):
+    for name in ("human29", "human34", "human35", "human25"):
         body = load_body(name)
         pose = body.neutral
         pose[[entry.name for entry in body.parameters].index(parameter)] += 0.4
@@ -150,6 +152,17 @@ def test_human29_couples_its_clavicles_and_human34_does_not() -> None:
     assert drivers("human29", "left_clavicle") == drivers("human29", "right_clavicle")
     assert not drivers("human34", "left_clavicle") & drivers("human34", "right_clavicle")
     assert len(drivers("human34", "left_clavicle")) == 2
+
+
+def test_the_chest_of_human35_twists_against_its_pelvis() -> None:
+    """A positive twist turns the chest to the left, hips and head's height stay."""
+    body = load_body("human35")
+    pose, names = body.neutral, [marker.name for marker in body.markers]
+    pose[[entry.name for entry in body.parameters].index("back_twist")] = 0.5
+    moved = marker_points(body, pose)[0] - marker_points(body, body.neutral)[0]
+    assert moved[names.index("RShoulder"), 0] > 50.0 > -50.0 > moved[names.index("LShoulder"), 0]
+    still = [names.index(name) for name in ("Hip", "LHip", "RAnkle", "Neck", "Head")]
+    np.testing.assert_allclose(moved[still], 0.0, atol=1e-9)
 
 
 def test_human25_has_nineteen_bounded_angles_at_most_two_a_joint() -> None:

@@ -35,7 +35,7 @@ def some_pose(body: BodyModel) -> np.ndarray:
 # The third is a person as measured: neck to shoulder differs by 64 mm.
 @pytest.mark.parametrize(
     ("name", "uneven"),
-    [("human25", 2.0), ("human29", 2.0), ("human31", 80.0), ("human34", 2.0), ("dog", 2.0)],
+    [("human25", 2.0), ("human29", 2.0), ("human31", 80.0), ("human34", 2.0), ("human35", 2.0), ("dog", 2.0)],
 )
 def test_distances_between_markers_are_their_twins(name: str, uneven: float) -> None:
     """All distances between markers of the mirrored pose are those of their twins: it is a mirror image."""

@@ -17,7 +17,7 @@ PUBLISHED = {
 }
 
 
-@pytest.mark.parametrize("name", ["human25", "human29", "human31", "human34"])
+@pytest.mark.parametrize("name", ["human25", "human29", "human31", "human34", "human35"])
 def test_a_height_gives_published_lengths_and_that_height(name: str) -> None:
     body, notes = fit_subject(load_body(name), Subject(body=name, height_mm=1800.0))
     assert not notes

@@ -33,13 +33,13 @@ def _distance(body: BodyModel, pair: str, seed: int | None = None) -> float:
     return float(np.linalg.norm(points[one] - points[two]))
 
 
-@pytest.mark.parametrize("name", ["human31", "human29", "human34", "human25"])
+@pytest.mark.parametrize("name", ["human31", "human29", "human34", "human35", "human25"])
 def test_lengths_are_met_in_every_pose(name: str) -> None:
     rng = np.random.default_rng(2)
     lengths = {f"{one}_{two}": float(rng.uniform(220, 480)) for one, two in LIMBS}
     lengths |= {"Hip_Neck": 530.0, "Neck_Head": 250.0, "Neck_RShoulder": 190.0, "RHip_LHip": 210.0}
     body, notes = fit_subject(load_body(name), Subject(name, HEIGHT, lengths))
-    bends = {"Hip_Neck"} if name == "human34" else set()
+    bends = {"Hip_Neck"} if name in ("human34", "human35") else set()
     for pair, length in lengths.items():
         seed = None if pair in bends else 5
         assert _distance(body, pair, seed) == pytest.approx(length, abs=1e-3), pair
@@ -115,7 +115,7 @@ def test_an_empty_subject_leaves_the_body_unchanged(human31: BodyModel) -> None:
 def test_dimensions_are_used_unchanged(human31: BodyModel) -> None:
     given = {"left_foot_length": 0.0, "right_thigh_length": 400.0}
     subject = Subject(
-        height_mm=HEIGHT, lengths_mm={"RHip_RKnee": 500.0}, dimensions_mm=given, ratios={"head_scale_y": 0.9}
+        "human31", HEIGHT, {"RHip_RKnee": 500.0}, dimensions_mm=given, ratios={"head_scale_y": 0.9}
     )
     body, notes = fit_subject(human31, subject)
     assert body.dimensions["right_thigh_length"] == 400.0
@@ -175,10 +175,13 @@ def test_a_subject_file_comes_back_as_written(tmp_path: Path) -> None:
         assert read_subject(path) == subject
 
 
-def test_an_empty_subject_file_is_human31(tmp_path: Path) -> None:
+def test_an_empty_subject_file_is_of_the_usual_body_or_its_sessions(tmp_path: Path) -> None:
     path = tmp_path / "subject.toml"
     path.write_text("")
     assert read_subject(path) == Subject(body="human31")
+    assert read_subject(path, "human25") == Subject(body="human25")
+    path.write_text('body = "human29"\n')
+    assert read_subject(path, "human25").body == "human29"
 
 
 @pytest.mark.parametrize(("text", "words"), [

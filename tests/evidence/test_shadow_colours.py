@@ -1,5 +1,7 @@
 """The colours of a room's shadows are learnt where no body can be; skin on a floor of its colour is none of them."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 from toy_footage import looking_at
@@ -84,6 +86,15 @@ def test_too_few_cameras_or_no_floor_below_them_leave_it_to_the_tolerances() -> 
     assert learn_shadow_colours(low, frames_of(low)) is None
     same = tuple(looking_at(f"same{k}", (3000.0, k, 1500.0), (0.0, k, 1500.0)) for k in range(3))
     assert learn_shadow_colours(same, frames_of(same)) is None
+
+
+def test_a_view_in_which_nothing_may_be_shadow_says_nothing() -> None:
+    empty = np.zeros((CAMERAS[0].height, CAMERAS[0].width), np.bool_)
+    frames = frames_of(CAMERAS)
+    nothing = {name: replace(view, changed=empty, alike=empty) for name, view in frames[0].items()}
+    assert np.array_equal(
+        learn_shadow_colours(CAMERAS, [nothing, *frames]), learn_shadow_colours(CAMERAS, frames)
+    )
 
 
 def test_colours_that_only_shadows_have_stay_shadow_and_those_never_seen_too() -> None:

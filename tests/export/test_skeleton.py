@@ -33,7 +33,7 @@ def test_every_marker_rides_on_its_joint(name: str, rest: str) -> None:
         np.testing.assert_allclose(local, np.broadcast_to(local[0], local.shape), atol=1e-9)
 
 
-@pytest.mark.parametrize("name", ["human25", "human29", "human31", "human34"])
+@pytest.mark.parametrize("name", ["human25", "human29", "human31", "human34", "human35"])
 def test_people_rest_in_a_t_pose(name: str) -> None:
     body = load_body(name)
     skeleton = skeleton_of(body)

@@ -12,7 +12,7 @@ from studio.comparison.trials import Outcome, Scale, Trial
 from studio.reproduction.catalogue import EXPERIMENTS
 from studio.reproduction.experiment import group_of
 from studio.reproduction.open_questions.generalisation import ENTRIES
-from studio.reproduction.plan import frames_of
+from studio.reproduction.plan import footage_of, frames_of
 from studio.reproduction.tracking import by_group, curves, spells
 from studio.synthesis.drawn_recipes import KINDS
 
@@ -32,6 +32,7 @@ TRACKED = (
     "robustness-fewer-cameras",
     "robustness-fewer-frames",
     "generalisation",
+    "other-people",
     "evaluations",
 )
 SCALE, FIVE = Scale(seeds=(0, 1, 2)), Scale(seeds=(0, 1, 2, 3, 4))
@@ -212,6 +213,38 @@ def test_generalisation_counts_frames_with_a_limb_lost() -> None:
     frames = sum(450 if kind != "walk-20hz" else 150 for kind in KINDS)
     assert numbers["named of other frames, condensation, choosing"] == pytest.approx(100.0 / (frames - 3))
     assert numbers["named of other frames, swarm, choosing"] == 0.0
+
+
+def test_other_people_are_kept_apart_from_both_halves_and_lost_limbs_are_counted() -> None:
+    experiment = EXPERIMENTS["other-people"]
+    is_wood = "human34 on data:drawn-elsewhere/wood"
+    outcomes = [
+        made(
+            trial,
+            20.0 if "drawn-elsewhere" in trial.label else 50.0,
+            lost=(3, 4, 5) if trial.label.startswith(is_wood) else (),
+        )
+        for trial in experiment.trials(SCALE)
+    ]
+    findings = experiment.conclude(outcomes)
+    numbers = {entry.name: entry.ours for entry in findings.numbers}
+    assert numbers["mean error, human34, clips of others"] == pytest.approx(20.0, abs=0.2)
+    assert numbers["mean error, human34, choosing half"] == pytest.approx(50.0, abs=0.2)
+    assert numbers["named of frames with a limb lost, human34, clips of others"] == pytest.approx(200.0 / 3)
+    # What cannot become the default says nothing on the half that only reports.
+    assert "mean error, human31, reporting half" in numbers
+    assert "mean error, human31, shadows learnt, reporting half" not in numbers
+    others = next(table for table in findings.tables if table.title.startswith("clips of others"))
+    row = next(row for row in others.rows if row[0] == "human34")
+    # Three seeds of three frames each; the tracker notices a frame late.
+    assert str(row[1]).endswith("/ 9 / 6")
+
+
+def test_trials_on_real_data_need_no_recipe() -> None:
+    experiment = EXPERIMENTS["other-people"]
+    needed = {trial.label: footage_of(experiment, trial) for trial in experiment.trials(Scale((0,)))}
+    assert needed["human34 on data:drawn-elsewhere/tiles, seed 0"] == ()
+    assert needed["human34 on choosing-kick, seed 0"] == ("choosing-kick",)
 
 
 def test_generalisation_is_measured_with_a_model_where_one_is_needed() -> None:

@@ -23,7 +23,7 @@ from studio.runs.initialising import (
 from studio.runs.new_run import prepare_run
 from studio.runs.search_space import default_sigma, parameter_names, search_space
 from studio.runs.start_pose_file import start_pose_from_file
-from studio.sessions.session import Session
+from studio.sessions.session import Session, start_pose_files
 from studio.settings import default_settings
 from studio.synthesis.motions import make_motion
 from studio.synthesis.person import marker_lengths, skeleton_of_height
@@ -121,7 +121,24 @@ def test_the_session_gets_a_start_pose_once_and_nothing_is_lost(session_on_disk:
     assert keep_pose(session, found(session, 1), replace=True) == first
     assert (session.path / "start_pose-before.csv").read_text() == "mine"
     assert (session.path / "start_pose-before-2.csv").is_file()
-    assert keep_pose(session, found(session, 2, "human25"), replace=True).name == "start_pose-frame-2.csv"
+
+
+def test_the_start_pose_of_another_body_is_one_that_track_takes(session_on_disk: Session) -> None:
+    """What `initialise --body X` finds is where `track --body X` begins, and the session's own pose stays its own."""
+    keep_pose(session_on_disk, found(session_on_disk, 1))
+    other = load_body("human25")
+    assert session_on_disk.start_pose(other) is None
+    place = keep_pose(session_on_disk, found(session_on_disk, 2, "human25"))
+    assert place.name == "start_pose-of-human25.csv"
+    assert start_pose_files(session_on_disk.path) == (session_on_disk.path / "start_pose.csv", place)
+    run = prepare_run(session_on_disk, body="human25", fit_shape=False)
+    assert (run.record.start_source, run.record.first) == ("the session's start pose", 2)
+    assert prepare_run(session_on_disk, fit_shape=False).record.first == 1
+    # A second one replaces it only on request; the first then stays beside it.
+    assert keep_pose(session_on_disk, found(session_on_disk, 4, "human25")) != place
+    assert keep_pose(session_on_disk, found(session_on_disk, 5, "human25"), replace=True) == place
+    assert session_on_disk.start_pose_frame("human25") == 5
+    assert (session_on_disk.path / "start_pose-of-human25-before.csv").is_file()
 
 
 def test_the_source_of_a_pose_names_its_confidence(session_on_disk: Session) -> None:

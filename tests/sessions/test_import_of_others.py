@@ -14,12 +14,14 @@ from sources import BODY, FRAMES, video_source, write_pose2sim
 from toy_footage import number_of, numbered_frame, rig, write_pictures, write_video
 
 import studio
+from studio.body.catalogue import load_body
 from studio.capture.calibration_files import read_calibration
 from studio.capture.video import measure_video
 from studio.errors import BodyError, CalibrationError, FootageError
 from studio.runs.workflow import calibration_step
 from studio.sessions.background_files import mask_name
 from studio.sessions.importers.importing import ImportOptions, ImportReport, import_source
+from studio.sessions.named_rows import write_pose
 from studio.sessions.session import Session
 
 
@@ -256,6 +258,18 @@ def test_a_start_pose_in_degrees_is_noticed(tmp_path: Path) -> None:
     (source / "start_pose.csv").write_text(";".join(names) + "\n" + ";".join(rows).replace(".", ",") + "\n")
     with pytest.raises(BodyError, match=f"90 for '{angle}': angles are in radians"):
         imported(source)
+
+
+def test_a_source_that_names_no_body_has_the_usual_one_or_that_of_its_start_pose(tmp_path: Path) -> None:
+    source = video_source(tmp_path / "source")
+    assert imported(source).session.manifest.body == "human31"
+    other = load_body("human34")
+    write_pose(source / "start_pose.csv", tuple(one.name for one in other.parameters), other.neutral)
+    (source / "subject.toml").write_text("[dimensions_mm]\npelvis_length = 190\n")
+    session = imported(source).session
+    assert session.manifest.body == "human34"
+    assert session.start_pose() is not None
+    assert session.body().dimensions["pelvis_length"] == 190.0
 
 
 def test_causes_are_named(tmp_path: Path) -> None:

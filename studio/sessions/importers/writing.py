@@ -5,11 +5,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
-from studio.body.catalogue import body_file_text, load_body
+from studio.body.catalogue import body_file_text, load_body, packaged_bodies
 from studio.body.forward_kinematics import limb_ends
-from studio.body.subject import DEFAULT_BODY, fit_subject, read_subject, write_subject
+from studio.body.subject import DEFAULT_BODY, Subject, fit_subject, read_subject, write_subject
 from studio.calibration.carried_points import carried
 from studio.capture.calibration_files import (
     Calibration,
@@ -29,7 +30,14 @@ from studio.sessions.importers.mask_forms import write_meant_masks
 from studio.sessions.importers.measuring import MeasuredSource
 from studio.sessions.importers.plan import SourcePlan
 from studio.sessions.manifest import SessionManifest, now, write_manifest
-from studio.sessions.named_rows import check_radians, read_pose, read_sigma, write_pose, write_sigma
+from studio.sessions.named_rows import (
+    check_radians,
+    named_columns,
+    read_pose,
+    read_sigma,
+    write_pose,
+    write_sigma,
+)
 from studio.sessions.names import free_name, name_from
 
 COPY_CHUNK = 8_000_000
@@ -50,9 +58,11 @@ def check_person(plan: SourcePlan) -> CheckedPerson:
     """Read everything about the person and the truth. Raises BodyError, TruthError."""
     subject = plan.subject
     if subject is None and plan.subject_file is not None:
-        subject = read_subject(plan.subject_file)
+        subject = read_subject(plan.subject_file, "")
     folders = (plan.source / "bodies",) if plan.bodies else ()
-    body = load_body(subject.body if subject else DEFAULT_BODY, folders)
+    body = load_body(_body_of(plan, subject), folders)
+    if subject is not None:
+        subject = msgspec.structs.replace(subject, body=body.name)
     notes: tuple[str, ...] = ()
     if subject is not None:
         fitted, notes = fit_subject(body, subject, folders)
@@ -69,6 +79,22 @@ def check_person(plan: SourcePlan) -> CheckedPerson:
             read_trc(path)
     size = float(np.ptp(limb_ends(fitted, fitted.neutral)[0].reshape(-1, 3), axis=0).max())
     return CheckedPerson(body.name, names, notes, size)
+
+
+def _body_of(plan: SourcePlan, subject: Subject | None) -> str:
+    """The body that a source names; where it names none the usual one, or the first that has the dimensions of its
+    subject and the parameters of its start pose.
+    """
+    if subject is not None and subject.body:
+        return subject.body
+    own = set(subject.dimensions_mm) | set(subject.ratios) if subject is not None else set[str]()
+    columns = set(named_columns(plan.start_pose_file)) if plan.start_pose_file is not None else None
+    for name in (DEFAULT_BODY, *packaged_bodies()):
+        body = load_body(name)
+        posed = columns is None or {entry.name for entry in body.parameters} <= columns
+        if own <= set(body.dimensions) and posed:
+            return name
+    return DEFAULT_BODY
 
 
 def carried_truth(
