@@ -340,7 +340,7 @@ def check_unchanged(session: Session, *names: str) -> None:
     changed = [name for name in names if _differs(name, now, session.manifest)]
     if changed:
         raise SessionError(
-            f"The {changed[0].replace('_', ' ')} of session '{session.name}' was changed by other work meanwhile.",
+            f"The {changed[0].removesuffix('_changed').replace('_', ' ')} of session '{session.name}' was changed by other work meanwhile.",
             "Do this again: it then begins from what there is now.",
         )
 
