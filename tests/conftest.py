@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Playwright, sync_playwright
+from playwright.sync_api import Browser, Playwright, expect, sync_playwright
 from toy_session import make_session
+from waiting import EXPECTED_MILLISECONDS
 
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
@@ -63,6 +64,7 @@ def browser() -> Iterator[Browser]:
     """Chromium, drawing in software: one for all files, as a thread has room for one Playwright; each
     window in a context of its own.
     """
+    expect.set_options(timeout=EXPECTED_MILLISECONDS)
     with sync_playwright() as playwright:
         launched = playwright.chromium.launch(
             executable_path=chromium(playwright), headless=True, args=ARGUMENTS

@@ -5,6 +5,8 @@ import time
 from collections.abc import Callable
 
 PATIENCE = 120.0
+EXPECTED_MILLISECONDS = 60_000
+"""So long a page may take to look as expected: the machine does much else."""
 """Seconds: many times what a quiet machine takes, for one that does much else."""
 
 

@@ -216,10 +216,13 @@ class SceneController:
     def _sees(self, camera: viser.CameraHandle) -> None:
         """A viewer moved: the other scene's come along."""
         eye = (*map(float, camera.position), *map(float, camera.look_at))
-        if self._twin is None:
-            self.viewers.looking = camera
-        elif not self._places.is_echo(eye) and (self._is_leading or self._places.is_reached):
-            self.viewers.looking = camera
+        is_own = not self._places.is_echo(eye)
+        if self._twin is not None and is_own and not (self._is_leading or self._places.is_reached):
+            return
+        self.viewers.looking, self.viewers.is_answer = camera, not is_own
+        if is_own:
+            self._places.note(eye)
+        if self._twin is not None and is_own:
             self._twin.put_viewers(eye)
 
     # Changes that need more than the model.
@@ -366,7 +369,10 @@ class SceneController:
         if (session, run) == (model.selection.session, model.selection.run):
             return model
         same_place = model.subject is not None and model.selection.session == session
+        framed = self.viewers.framed if same_place else None
         self._close()
+        # Layers that are looked at already are those of another body now.
+        self.viewers.framed, self._frames_next = framed, self._is_leading
         self.model = nothing = opened(model, "", "", None)
         with self._server.atomic():
             self._server.scene.reset()
@@ -554,6 +560,9 @@ class SceneController:
 
     def _note_eye(self, model: Model) -> Model:
         """Note from where a viewer looks; one who is dragged out of a camera's place looks through it no longer."""
+        if self.viewers.is_answer:
+            self.viewers.looking = None
+            return model
         through = model.selection.look_through
         if through is None:
             moved = self.viewers.moved_eye(model.selection.eye, time.monotonic())

@@ -73,11 +73,12 @@ class Places:
         self.is_reached |= self._said is not None and _is_near(self._said, eye)
 
     def is_echo(self, eye: Eye) -> bool:
-        """Whether a viewer, who says that it is there, is only where it was put."""
+        """Whether a viewer, who says that it is there, is only where it was put: last, or a moment ago."""
         self._said = eye
-        near = [when for when, place in tuple(self._put) if _is_near(eye, place)]
+        put = tuple(self._put)
+        near = [when for when, place in put if _is_near(eye, place)]
         self.is_reached |= bool(near)
-        return bool(near) and near[-1] > time.monotonic() - ECHO_SECONDS
+        return bool(near) and (near[-1] == put[-1][0] or near[-1] > time.monotonic() - ECHO_SECONDS)
 
 
 def _is_near(eye: Eye, place: Eye) -> bool:

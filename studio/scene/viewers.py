@@ -36,14 +36,15 @@ class _Ease:
 class Viewers:
     """The viewers of one scene; used by its thread.
 
-    looking : the camera of the viewer who moved last, set by viser's callbacks. placed : called with each eye that all
-    viewers are put to. framed : the eye that frames the body, which is the usual one then; framed_for : the width over
-    height that it was made for.
+    looking : the camera of the viewer who moved last, set by viser's callbacks. is_answer : whether it only says where
+    it was put, perhaps in another shape. placed : called with each eye that all viewers are put to. framed : the eye
+    that frames the body, which is the usual one then; framed_for : the width over height that it was made for.
     """
 
     def __init__(self, server: viser.ViserServer, placed: Callable[[Eye], None] = lambda _: None) -> None:
         self._server, self._placed = server, placed
         self.looking: viser.CameraHandle | None = None
+        self.is_answer = False
         self.framed: Eye | None = None
         self.framed_for = 0.0
         self._ease: _Ease | None = None

@@ -10,6 +10,7 @@ from playwright.sync_api import Browser, Page, expect
 from studio_page import StudioPage
 from studio_server import StudioServer
 from toy_session import make_session
+from waiting import EXPECTED_MILLISECONDS
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 
@@ -57,20 +58,21 @@ def window(browser: Browser, studio: StudioServer) -> Iterator[StudioPage]:
 
 
 @pytest.fixture(scope="module")
-def page(window: StudioPage, request: pytest.FixtureRequest) -> Page:
-    """The page of that window, waited for with the file's PATIENCE."""
-    window.context.set_default_timeout(request.module.PATIENCE)
-    return window.page
+def page(window: StudioPage, request: pytest.FixtureRequest) -> Iterator[Page]:
+    """The page of that window, waited for with the file's PATIENCE where it has one."""
+    patience = getattr(request.module, "PATIENCE", EXPECTED_MILLISECONDS)
+    window.context.set_default_timeout(patience)
+    expect.set_options(timeout=patience)
+    yield window.page
+    expect.set_options(timeout=EXPECTED_MILLISECONDS)
 
 
 @pytest.fixture(scope="module")
 def guided(window: StudioPage, artefacts: Path, request: pytest.FixtureRequest) -> Iterator[GuidedSetup]:
     """The guided set-up, for all tests of a file, which names the folder of its `PICTURES`."""
     expect.set_options(timeout=PATIENCE)
-    try:
-        yield GuidedSetup(window, artefacts / request.module.PICTURES)
-    finally:
-        expect.set_options(timeout=5_000)  # Playwright's own
+    yield GuidedSetup(window, artefacts / request.module.PICTURES)
+    expect.set_options(timeout=EXPECTED_MILLISECONDS)
 
 
 @pytest.fixture(scope="session")

@@ -14,7 +14,6 @@ from studio.sessions.workspace import Workspace
 pytestmark = pytest.mark.browser
 
 PATIENCE = 60_000
-expect.set_options(timeout=PATIENCE)
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
-from studio_page import PATIENCE, StudioPage
+from studio_page import StudioPage
 from studio_server import StudioServer
 from toy_session import FRAMES, make_session, true_poses
 
@@ -29,11 +29,7 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def window(browser: Browser, studio: StudioServer) -> Iterator[StudioPage]:
     """One window on the session before it has a run; the tests go on from one another."""
     opened = StudioPage(browser, studio, open_at=f"{studio.address}&session=toy", with_scene=False)
-    expect.set_options(timeout=PATIENCE)
-    try:
-        yield opened
-    finally:
-        expect.set_options(timeout=5_000)  # Playwright's own
+    yield opened
     opened.close()
 
 
@@ -79,7 +75,9 @@ def test_the_first_frame_shows_the_layers_that_there_are(
     expect(page.locator("#panel-why .figure-chart canvas").first).to_be_visible()
 
 
-def test_layers_are_played_stepped_and_left(window: StudioPage, studio: StudioServer, page: Page) -> None:
+def test_layers_are_played_stepped_and_left(
+    browser: Browser, window: StudioPage, studio: StudioServer, page: Page
+) -> None:
     studio.pace(0.0)
     page.click("#track-toggle")
     window.until(f"get('work').state === 'finished' && get('summary')?.frames.length === {FRAMES}")
@@ -95,6 +93,15 @@ def test_layers_are_played_stepped_and_left(window: StudioPage, studio: StudioSe
     window.until(f"get('layer') === {2 * LAYERS - 1}")
     expect(words).to_have_text(f"layer {LAYERS} of {LAYERS}, second search")
     window.until("get('layer') === 0")
+    # So they do in a window that the copied link opens, and after a reload.
+    assert "plays=layers" in page.url
+    beside = StudioPage(browser, studio, open_at=page.url, with_scene=False, beside=window)
+    beside.until("get('plays') === 'layers' && get('layer') === 3")
+    beside.until("get('layer') === 1")
+    beside.close()
+    page.reload()
+    window.until("get('plays') === 'layers' && get('layer') === 3")
+    window.until("get('layer') === 1")
     # A drag scrubs, and what plays stops.
     box = page.locator(TILES).nth(LAYERS).bounding_box()
     assert box

@@ -14,7 +14,6 @@ from studio.reproduction.report_document import report_html
 pytestmark = pytest.mark.browser
 SEEDS = tuple(range(12))
 PATIENCE = 120_000  # milliseconds, for a machine that does much else
-expect.set_options(timeout=30_000)
 
 
 @pytest.fixture(scope="module")

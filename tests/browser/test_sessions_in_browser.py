@@ -29,8 +29,9 @@ def footage(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def window(browser: Browser, studio: StudioServer) -> Iterator[StudioPage]:
     """One window for all tests of this file."""
     opened = StudioPage(browser, studio)
-    # Sessions are renamed and thrown away here: the scene may be asked for one just when its folder moves.
+    # Sessions are renamed and thrown away here: scene or panel may ask for one just when its folder moves.
     opened.watch.allow(404, "/api/scene/show")
+    opened.watch.allow(422, "/frames/2/views/why")
     yield opened
     opened.close()
 

@@ -16,7 +16,6 @@ from studio.sessions.workspace import Workspace
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 PATIENCE = 240_000
-expect.set_options(timeout=PATIENCE)
 
 
 @pytest.fixture(scope="module")

@@ -27,7 +27,6 @@ pytestmark = [pytest.mark.browser, pytest.mark.slow]
 PATIENCE = 60_000
 START, LAST = 4, 10
 QUICK = {"particles": 60, "layers": 4}
-expect.set_options(timeout=PATIENCE)
 
 
 @pytest.fixture(scope="module")

@@ -2,6 +2,7 @@
 
 import asyncio
 import dataclasses
+import shutil
 import socket
 import sqlite3
 from contextlib import closing, nullcontext
@@ -280,6 +281,19 @@ def test_as_layers_begin_to_be_looked_at_the_body_is_of_glass_and_framed(
     assert viewer.eye == near
     stage.move_camera("first")
     until(lambda: np.allclose(viewer.eye, stage._controller.viewers.first_eye, atol=1e-6))
+
+
+def test_the_body_of_another_session_is_framed_where_layers_are_looked_at_already(
+    stage: SceneServer, viewer: FakeCamera, workspace: Workspace
+) -> None:
+    shutil.copytree(workspace.root / "swaying", workspace.root / "other")
+    stage.show_layer(1)
+    until(lambda: is_well_framed(body_points(stage), viewer.eye, viewer.fov, viewer.aspect))
+    until(lambda: not stage._controller.viewers.is_moving)
+    stage.show_run("other", "run-1", None, 1)
+    until(lambda: stage.shown.session == "other" and (views(stage).body.handles[0].opacity or 1.0) < 0.2)
+    until(lambda: is_well_framed(body_points(stage), viewer.eye, viewer.fov, viewer.aspect))
+    assert stage.shown.eye is None
 
 
 def test_a_body_is_framed_once_a_viewer_has_come_and_again_in_another_shape(

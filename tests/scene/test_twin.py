@@ -154,3 +154,16 @@ def test_each_keeps_what_is_its_own(control: FakeControl) -> None:
     assert (joined.selection.particle, joined.selection.layer) == (3, None)
     assert joined.options is leader.options
     assert not Places().is_echo((0.0,) * 6)
+
+
+def test_a_viewer_who_is_slow_to_say_where_it_was_put_did_not_move(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = [100.0]
+    monkeypatch.setattr("studio.scene.twin.time.monotonic", lambda: clock[0])
+    places, here, there = Places(), (1.0,) * 6, (2.0,) * 6
+    places.note(here)
+    clock[0] += 60.0
+    assert places.is_echo(here)
+    assert not places.is_echo(there)
+    places.note(there)
+    clock[0] += 60.0
+    assert not places.is_echo(here), "it went back by itself"

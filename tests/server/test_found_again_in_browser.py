@@ -73,14 +73,12 @@ def context(browser: Browser, studio: Studio) -> Iterator[BrowserContext]:
     """A browser that opened the printed address; the scene stays blank."""
     made = browser.new_context(viewport={"width": 1280, "height": 800})
     made.set_default_timeout(PATIENCE)
-    expect.set_options(timeout=PATIENCE)
     made.route(f"{studio.base}/scene/**", lambda route: route.fulfill(body="", content_type="text/html"))
     page = made.new_page()
     page.goto(f"{studio.base}/?token={TOKEN}")
     page.close()
     yield made
     made.close()
-    expect.set_options(timeout=5000)
 
 
 def opened(context: BrowserContext, studio: Studio, address: str) -> Page:

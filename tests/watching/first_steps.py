@@ -39,7 +39,10 @@ def measure_first_steps(browser: Browser, folder: Path, moves: int = MOVES) -> F
             window.until("get('view') === 'schedule'")
             slider = page.locator(".first-knob input:enabled")
             slider.wait_for()
-            page.evaluate("async () => (await import('/assets/js/state.js')).set({ layer: 4 })")
+            # The step plays the layers once they are shown; they stand still while it is measured.
+            window.until("get('plays') === 'layers'")
+            page.evaluate("async () => (await import('/assets/js/studio/layer_playback.js')).scrubTo(4)")
+            window.until("get('plays') === null && get('layer') === 4")
             page.evaluate(WATCH)
             # The first move opens the second scene, and compiles what none later has to.
             slider.focus()

@@ -6,6 +6,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from watching.figures import Figures
+from watching.first_steps import measure_first_steps
 from watching.layers import measure_layers
 from watching.long_run import measure_long_run
 from watching.slider import measure_slider
@@ -23,6 +24,15 @@ def _right(found: Figures, *words: str) -> None:
 def test_a_moved_slider_is_timed_until_its_clouds_are_drawn(browser: Browser, tmp_path: Path) -> None:
     found = measure_slider(browser, tmp_path, moves=2)
     _right(found, "to the last new layer drawn: median", "(2 times)", "other programs used")
+
+
+@pytest.mark.slow
+@pytest.mark.browser
+def test_a_moved_survival_rate_of_the_first_steps_changes_scene_and_charts(
+    browser: Browser, tmp_path: Path
+) -> None:
+    found = measure_first_steps(browser, tmp_path, moves=2)
+    _right(found, "survival moved to its cloud drawn", "survival moved to Schedule drawn anew: median")
 
 
 @pytest.mark.slow

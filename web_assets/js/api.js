@@ -40,7 +40,7 @@ export const post = (path, body) => call("POST", path, body ?? {});
 /** @type {<const P extends string>(path: Address<P, "put">, body: Body<P, "put">) => Promise<Answer<P, "put">>} */
 export const put = (path, body) => call("PUT", path, body);
 /** @type {<const P extends string>(path: Address<P, "patch">, body: Body<P, "patch">) => Promise<Answer<P, "patch">>} */
-export const patch = (path, body) => call("PATCH", path, body);
+export const patch = (path, body) => call("PATCH", path, body, { keepalive: true }); // also when the page is left at once
 /** @type {<const P extends string>(path: Address<P, "delete">) => Promise<Answer<P, "delete">>} */
 export const remove = (path) => call("DELETE", path);
 /** Send raw bytes. */

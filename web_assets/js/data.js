@@ -35,6 +35,7 @@ let showsAgain = 0;    // timer that shows them
 let asking = "";       // the frame whose layers are on their way
 let isOpening = false; // whether the run's frames are on their way: the scene is built after that
 let plays = false;     // whether the scene plays layers: it goes on with them unless one is chosen here
+let isHeld = false;    // whether a layer was chosen by hand since the scene was last asked: what plays stops at it
 let isAnew = true;     // whether the page was loaded since: a frame that was annealed again before is not shown on it
 
 const sceneLater = paced(() => showInScene(), SCENE_MILLISECONDS);
@@ -131,13 +132,21 @@ const eyeOf = (text) => text?.split(",").map(Number) ?? null;
 const wantedNow = () => shownNow(get("follow") && searching() ? null : get("frame"));
 const isElsewhere = (shown) => Object.keys(shown).some((name) => shown[name] !== scene[name]);
 
+/** Hold the scene at the layer that the page shows, also where it said that one last and has gone on since. */
+export function holdLayer() {
+  isHeld = true;
+  moves += 1;
+  sceneLater();
+}
+
 /** Move the scene to what the page shows. */
 async function showInScene() {
   if (!get("session") || isOpening) return;
   const shown = wantedNow();
   if (!isElsewhere(shown) && requested === moves) return;
   const { layer, ...others } = shown;
-  const request = plays && layer === scene.layer ? others : shown;
+  const request = plays && !isHeld && layer === scene.layer ? others : shown;
+  isHeld = false;
   scene = shown;
   requested = moves;
   // A page that is loaded again begins with one scene, and without what was annealed before.

@@ -2,6 +2,7 @@
 // move; frames rest meanwhile.
 
 import { fetchJson, post } from "../api.js";
+import { holdLayer } from "../data.js";
 import { onEvent } from "../live.js";
 import { complain } from "../messages.js";
 import { select } from "../selection.js";
@@ -42,8 +43,10 @@ export const toggleLayers = () => playLayers({ playing: !layerPlayback.value.pla
 
 /** Show one layer by hand, null for all together: what is played stops. @param {number | null} layer */
 export function scrubTo(layer) {
-  if (layerPlayback.value.playing) playLayers({ playing: false });
+  const played = layerPlayback.value.playing;
+  if (played) playLayers({ playing: false });
   if (layer !== get("layer")) select({ layer });
+  if (played) holdLayer();
 }
 
 /** Follow what the scene says; one that was open before the page was loaded may play already. */
