@@ -256,7 +256,8 @@ class JobRunner:
             for kind, state in self._going_on(session):
                 if not run or getattr(state, "run", run) in ("", run):
                     verb = getattr(state, "verb", "")
-                    of = f" of run '{name}'" if (name := getattr(state, "run", "")) else ""
+                    name = getattr(state, "run", "")
+                    of = f" of run '{name}'" if name else ""
                     what = f"'{verb}'{of}" if verb else f"its {kind.noun}"
                     raise RunError(
                         f"Session '{session}' stays as it is while {what} is under way.",
