@@ -69,8 +69,9 @@ def campaign(
     each: Callable[[str], None] = lambda line: None,
 ) -> Tally:
     """A group for each seed. seconds : begin none after that. each : called with what is wrong, as it comes."""
-    tally, began = Tally(), time.monotonic()
+    tally = Tally()
     with Stage(folder) as stage:
+        began = time.monotonic()
         for seed in seeds:
             if time.monotonic() - began > seconds:
                 break
