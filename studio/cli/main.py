@@ -68,6 +68,8 @@ COMMANDS = {
     "bench": ("bench_commands", "cli.bench_commands.bench_command"),
 }
 ROOT = Path(__file__).parents[1]
+NO_MEMORY = re.compile(r"failed to map segment|cannot allocate memory", re.IGNORECASE)
+"""What the system's loader says of a library that does not fit."""
 
 
 def load(name: str) -> click.Command:
@@ -77,6 +79,12 @@ def load(name: str) -> click.Command:
     gc.disable()
     try:
         return getattr(importlib.import_module(f"studio.cli.{module}"), f"{name.replace('-', '_')}_command")
+    except (ImportError, MemoryError) as error:
+        if not (isinstance(error, MemoryError) or NO_MEMORY.search(str(error))):
+            raise
+        raise click.UsageError(
+            "There is not enough memory to load the studio. Close other programs, or raise the limit (ulimit -v)."
+        ) from None
     finally:
         gc.enable()
 

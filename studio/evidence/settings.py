@@ -72,8 +72,9 @@ class EvidenceSettings:
         label="shadow colour tolerance",
         help="How far a shadow's colour may lie from the background's, as a share of its brightness.",
     )
-    # Off until the suite was tracked with it: on `wood` and `tiles`, two clips drawn by others, five frames each, true
-    # body called background 14.9 -> 2.3 and 4.0 -> 0.4 % of the body, background called body 2.0 -> 4.0 and 1.8 -> 4.2.
+    # Off: on two clips drawn by others (`wood`, `tiles`) 33.5 -> 26.3 and 31.6 -> 27.9 mm, frames with a limb lost
+    # 13 -> 3 and 0 -> 0; but on five clips of the choosing half (40 frames, one seed) 18.2 -> 18.4 mm and 18 -> 24:
+    # worse on *arms*, of three cameras, and *hard*, of a wrong calibration.
     mask_shadow_learnt: bool = next_frame_knob(
         False,
         label="learn the shadows' colours",

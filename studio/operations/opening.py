@@ -22,7 +22,8 @@ from studio.sessions.stored_run import RunSummary, StoredRun
 from studio.sessions.work_under_way import working_on
 from studio.sessions.workspace import Workspace
 
-P, R = ParamSpec("P"), TypeVar("R")
+P = ParamSpec("P")
+R = TypeVar("R")
 
 SessionName = Annotated[Session | str | Path, Target("session")]
 """A session that was opened, its name in the workspace (STUDIO_WORKSPACE), or its folder."""

@@ -25,6 +25,7 @@ from studio.runs.subject_fitting import (
     fit_session_subject,
     keep_subject,
 )
+from studio.sessions.atomic_files import check_writable
 
 
 @operation
@@ -95,6 +96,8 @@ def fit_subject(
     Raises RunError where nothing is to be seen in a frame, or nothing may change.
     """
     opened = open_session(session)
+    if keep or into is not None:
+        check_writable(opened.path if into is None else Path(into).absolute().parent)
     with reporting(progress, f"{opened.name}: subject") as report:
         watched = {} if shown is None else {"shown": shown}
         found = fit_session_subject(opened, FitRequest(**options), progress=report, **watched)

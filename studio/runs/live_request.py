@@ -15,8 +15,16 @@ from studio.trackers.recovery_settings import SPREAD
 
 
 def live_changes(changes: Mapping[str, object]) -> dict[str, object]:
-    """The knobs of a live run that differ from the defaults: the requested ones and a quick recovery."""
-    return {"recovery": SPREAD, **changes}
+    """The knobs of a live run that differ from the defaults: the requested ones, a quick recovery, and the shadow test
+    by its tolerances alone: the footage from which the colours of shadows are learnt is not there yet.
+    """
+    return {"recovery": SPREAD, "mask_shadow_learnt": False, **changes}
+
+
+TOLERANCES_ALONE = (
+    "Live, the colours of shadows are not learnt, for the footage is not there yet: the two tolerances of the shadow"
+    " test decide alone."
+)
 
 
 def check_live(settings: RunSettings, *, live: bool, ping_pong: bool) -> None:

@@ -25,6 +25,12 @@ _one_at_a_time = threading.Lock()
 PARTIAL_PREFIX = ".partial-"
 
 
+def check_writable(folder: Path) -> None:
+    """Raise SessionError where nothing can be written into a folder: before work whose result would be lost."""
+    if not os.access(folder, os.W_OK):
+        raise SessionError(f"The folder '{folder}' cannot be written.", "Check the folder's permissions.")
+
+
 def write_bytes(path: Path, content: bytes) -> None:
     """Write `content` to `path`, atomically. Raises SessionError; then the old file is unchanged."""
     check_inside(path.parent)

@@ -20,12 +20,14 @@ BROKEN = ".broken"
 
 
 def faults_of_database(run_folder: Path) -> list[str]:
-    """SQLite's report on a damaged store file; empty if it is intact."""
+    """SQLite's report on a damaged store file; empty if it is intact, also where the disk cannot be written."""
     path = run_folder / FILE_NAME
     if not path.exists():
         return []
     try:
-        with contextlib.closing(open_database(path, "ro")) as connection:
+        # Where nothing can be written nobody writes, and SQLite can make no shared memory to read with.
+        mode = "ro" if os.access(run_folder, os.W_OK) else "immutable"
+        with contextlib.closing(open_database(path, mode)) as connection:
             check_tables(connection, path)
             found = [str(row[0]) for row in connection.execute("PRAGMA integrity_check(20)")]
     except UNREADABLE as error:

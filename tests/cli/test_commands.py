@@ -258,6 +258,16 @@ def test_control_characters_of_a_session_do_not_reach_the_terminal(
     assert "\x1b" not in capsys.readouterr().err
 
 
+def test_too_little_memory_to_load_a_command_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    def load(name: str) -> object:
+        raise ImportError(f"{name}.so: failed to map segment from shared object")
+
+    monkeypatch.setattr("importlib.import_module", load)
+    result = CliRunner().invoke(main, ["runs"])
+    assert result.exit_code == 2
+    assert "not enough memory to load the studio" in result.stderr
+
+
 def test_too_little_memory_is_no_fault_of_the_studio(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended, output.errors_in_words():
         raise MemoryError

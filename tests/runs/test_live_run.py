@@ -11,6 +11,7 @@ from studio.runs.live_summary import summary_of
 from studio.runs.new_run import prepare_run
 from studio.runs.problem_source import ProblemSource
 from studio.runs.run_footage import footage_of
+from studio.sessions.background_files import SessionEvidence, write_evidence
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.settings import changed_settings
@@ -151,6 +152,17 @@ def test_a_live_run_recovers_quickly_by_default(session_on_disk: Session) -> Non
     asked = live_run(session_on_disk, "b", knobs={"recovery": INITIALISE})
     assert asked.record.settings["recovery"] == INITIALISE
     assert prepare_run(session_on_disk, name="c").record.settings["recovery"] == INITIALISE
+
+
+def test_a_live_run_learns_no_shadows_and_says_so(session_on_disk: Session) -> None:
+    """Its footage is not there yet; what is tracked without the clock learns them where its session does."""
+    write_evidence(session_on_disk, SessionEvidence(knobs={"mask_shadow_learnt": True}))
+    record = live_run(session_on_disk, "a").record
+    assert record.settings["mask_shadow_learnt"] is False
+    assert any("colours of shadows are not learnt" in note for note in record.notes)
+    later = prepare_run(session_on_disk, name="b").record
+    assert later.settings["mask_shadow_learnt"] is True
+    assert not any("colours of shadows" in note for note in later.notes)
 
 
 def test_what_cannot_be_done_live_is_refused(session_on_disk: Session) -> None:

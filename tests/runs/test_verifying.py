@@ -1,6 +1,7 @@
 """Damage on the disk is named, shown as a gap, and tracked again bit for bit."""
 
 import contextlib
+import os
 import sqlite3
 from pathlib import Path
 
@@ -10,12 +11,16 @@ from flipped_bytes import flip_in_file, flip_stored
 from toy_session import true_poses
 from tracked_runs import finish, opened, poses_of
 
+import studio
 from studio.errors import DamagedError, SessionError
 from studio.runs.new_run import prepare_run
 from studio.runs.verifying import repair, verify
+from studio.sessions import salvaging
 from studio.sessions.file_checksums import note_files
 from studio.sessions.results_store import FILE_NAME, ResultsWriter
+from studio.sessions.salvaging import faults_of_database
 from studio.sessions.session import Session
+from studio.sessions.session_databases import open_database
 from studio.sessions.stored_run import StoredRun
 
 QUICK = {"particles": 20, "layers": 2, "start_repeats": 2}
@@ -47,6 +52,22 @@ def change(run: StoredRun, sql: str) -> None:
     with contextlib.closing(sqlite3.connect(run.folder / FILE_NAME)) as connection:
         connection.execute(sql)
         connection.commit()
+
+
+def test_a_disk_that_cannot_be_written_is_no_damage(
+    session_on_disk: Session, run: StoredRun, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def read_only(path: Path, mode: str = "rwc", **rest: bool) -> sqlite3.Connection:
+        if mode != "immutable":
+            raise sqlite3.OperationalError("unable to open database file")
+        return open_database(path, mode, **rest)
+
+    monkeypatch.setattr(salvaging, "open_database", read_only)
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    assert not faults_of_database(run.folder)
+    with pytest.raises(SessionError, match="cannot be written"):
+        # Before the minutes that a fit takes.
+        studio.fit_subject(session_on_disk, progress=lambda *_: pytest.fail("the fit has begun"))
 
 
 @pytest.mark.parametrize(
