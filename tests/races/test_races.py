@@ -7,7 +7,6 @@ import pytest
 from races.campaign import campaign, table
 from races.verbs import VERBS, plain
 
-
 # Footage that is replaced while another process reads it is refused there with words that do not name the replacing.
 SHORT = [verb for verb in VERBS if plain(verb) != "add footage"]
 
