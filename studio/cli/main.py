@@ -82,11 +82,9 @@ def load(name: str) -> click.Command:
     except (ImportError, MemoryError) as error:
         if not (isinstance(error, MemoryError) or NO_MEMORY.search(str(error))):
             raise
-        wrong = click.ClickException(
+        raise click.UsageError(
             "There is not enough memory to load the studio. Close other programs, or raise the limit (ulimit -v)."
-        )
-        wrong.exit_code = 2
-        raise wrong from None
+        ) from None
     finally:
         gc.enable()
 

@@ -256,7 +256,9 @@ class JobRunner:
             for kind, state in self._going_on(session):
                 if not run or getattr(state, "run", run) in ("", run):
                     verb = getattr(state, "verb", "")
-                    what = f"'{verb}' of run '{getattr(state, 'run', '')}'" if verb else f"its {kind.noun}"
+                    name = getattr(state, "run", "")
+                    of = f" of run '{name}'" if name else ""
+                    what = f"'{verb}'{of}" if verb else f"its {kind.noun}"
                     raise RunError(
                         f"Session '{session}' stays as it is while {what} is under way.",
                         "Wait for it, or cancel it.",

@@ -339,8 +339,9 @@ def check_unchanged(session: Session, *names: str) -> None:
     now = _described_now(session)
     changed = [name for name in names if _differs(name, now, session.manifest)]
     if changed:
+        what = changed[0].removesuffix("_changed").replace("_", " ")
         raise SessionError(
-            f"The {changed[0].replace('_', ' ')} of session '{session.name}' was changed by other work meanwhile.",
+            f"The {what} of session '{session.name}' was changed by other work meanwhile.",
             "Do this again: it then begins from what there is now.",
         )
 

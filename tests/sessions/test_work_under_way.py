@@ -161,7 +161,7 @@ def test_who_changes_what_others_have_changed_is_refused_before_anything_is_writ
     now = workspace.session("toy")
     replace_calibration(now, NewCalibration(cameras, "two"))
     kept = len(list((opened.path / "calibration" / EARLIER).iterdir()))
-    with pytest.raises(SessionError, match="calibration changed of session 'toy' was changed"):
+    with pytest.raises(SessionError, match="calibration of session 'toy' was changed"):
         replace_calibration(now, NewCalibration(cameras, "three"))
     assert len(list((opened.path / "calibration" / EARLIER).iterdir())) == kept
     assert workspace.session("toy").manifest.calibration_source == "two"

@@ -195,12 +195,14 @@ function scheduleOfFrame(sheet, tables, at) {
   const sides = sidesOf(tables, at);
   const layers = layersOfAll(sides, "layers");
   const isNarrow = sheet.width < NARROW;
-  const whole = Math.max(120, at.room - 76);
-  const height = isNarrow ? Math.max(100, (at.room - 152) / 2) : whole;
+  // Stored and tried are told apart by a legend of its own line, above all four.
+  const above = at.tried ? 18 : 0;
+  const whole = Math.max(120, at.room - 76 - above);
+  const height = isNarrow ? Math.max(100, (at.room - 152 - above) / 2) : whole;
   const columns = sheet.columns(isNarrow ? 2 : 4, { gutters: 52, right: 10 });
   const places = [0, 1, 2, 3].map((place) => ({
     ...columns[place % columns.length],
-    top: place < columns.length ? 0 : height + 76,
+    top: above + (place < columns.length ? 0 : height + 76),
   }));
   const click = ({ dataIndex }) => ({ layer: layers[dataIndex] });
   const has = (key) => sides.some((side) => side.tables.layers.some((row) => row[key] !== null));
@@ -262,7 +264,7 @@ function scheduleOfFrame(sheet, tables, at) {
         tipOf(named(name, layerInSearch(dataIndex, at)), [["time", `${figure(value)} ms`]]),
     });
   sheet.chosen(plot, { column: at.layer });
-  if (at.tried) sheet.legend(["stored", "tried"], places[1].left + places[1].width - 110, 8, 110);
+  if (at.tried) sheet.legend(["stored", "tried"], columns[0].left, 4, 160);
   const words = sides.map(({ name, tables: own }) => {
     const row = own.layers.find((one) => one.layer === at.layer) ?? own.layers.at(-1);
     const what = `${layerWords(row.layer, at)}: β ${figure(row.beta)}, α asked ${figure(row.alpha_wanted)}, reached ${figure(row.alpha_reached)}, effective number ${figure(row.effective)} of ${row.particles}${Number.isFinite(row.largest) ? `, largest weight ${figure(100 * row.largest)} %` : ""}${row.alarm ? `. Alarm: ${row.alarm}` : ""}`;
