@@ -81,10 +81,14 @@ def working_on(session: Path, verb: str, run: str = "") -> Generator[None]:
     with one_at_a_time(session):
         check_there(session, run)
         lock = _begun(session, verb, run)
+    own: set[Path] = _mine.__dict__.setdefault("work", set())
+    if lock is not None:
+        own.add(lock.path)
     try:
         yield
     finally:
         if lock is not None:
+            own.discard(lock.path)
             lock.end()
 
 
@@ -138,12 +142,27 @@ def gone(what: str) -> NotFoundError:
     return NotFoundError(f"{what} was renamed or deleted meanwhile.", "Do it again under its new name.")
 
 
+def check_alone(session: Path) -> None:
+    """Raise RunError where anything but this thread's own work goes on in a session: it may be reading the footage."""
+    own: set[Path] = _mine.__dict__.get("work", set())
+    for path, work in _at_work(session):
+        if path not in own:
+            raise RunError(
+                f"Session '{session.name}' keeps its footage while {work.in_words()}.",
+                "Wait for it, or end it.",
+            )
+
+
 def under_way(session: Path) -> Iterator[Work]:
     """What goes on in a session, of all processes. What ended without saying so is removed."""
+    return (work for _, work in _at_work(session))
+
+
+def _at_work(session: Path) -> Iterator[tuple[Path, Work]]:
     folder = session.parent / STATE_NAME / FOLDER
     for path in sorted(folder.glob(f"{session.name}{BETWEEN}*{ENDING}")):
         if ProcessLock.is_held(path):
-            yield Work(*path.name.split(BETWEEN)[:4])
+            yield path, Work(*path.name.split(BETWEEN)[:4])
         else:
             with contextlib.suppress(OSError):
                 path.unlink()

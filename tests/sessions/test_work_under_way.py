@@ -68,6 +68,24 @@ def test_a_session_that_is_worked_on_is_not_moved_and_the_work_is_named(
     assert [one.name for one in workspace.session("new").runs()] == ["new"]
 
 
+def test_footage_is_not_replaced_under_work_that_reads_it(workspace: Workspace, tmp_path: Path) -> None:
+    session = workspace.session("toy")
+    source = tmp_path / "again"
+    for part in ("pictures", "calibration"):
+        shutil.copytree(session.path / part, source / part)
+    before = session.manifest
+    with (
+        ThreadPoolExecutor(1) as other,
+        working_on(session.path, "view"),
+        pytest.raises(RunError, match="Session 'toy' keeps its footage while 'view' works on it"),
+    ):
+        other.submit(studio.add_footage, "toy", source, replace=True, fps=60.0).result()
+    assert workspace.session("toy").manifest == before
+    # Its own work is no other's.
+    studio.add_footage("toy", source, replace=True, fps=60.0)
+    assert workspace.session("toy").manifest != before
+
+
 def test_work_on_a_session_that_was_moved_says_so(workspace: Workspace, run: StoredRun) -> None:
     opened = workspace.session("toy")
     workspace.rename("toy", "new")

@@ -57,7 +57,7 @@ from studio.sessions.names import free_name
 from studio.sessions.provenance import adopt
 from studio.sessions.session import CAMERAS_PATH, THUMBNAIL_NAME, Session, check_unchanged, described_anew
 from studio.sessions.stroke_files import OUTDATED, STROKES_NAME
-from studio.sessions.work_under_way import one_at_a_time
+from studio.sessions.work_under_way import check_alone, one_at_a_time
 
 OWN_PARTS = ("videos", "pictures", "masks", "background")
 PERSON_PARTS = ("calibration", "subject.toml", "start_pose.csv", "sigma.csv", "truth", "bodies")
@@ -228,11 +228,13 @@ def add_footage(
 
     A session that is calibrated keeps its calibration, which has to name every camera; else the source's is taken
     over where it has one (and subject, start pose and truth, where the session has none). An existing camera
-    gets the new footage. All is read before anything changes; on failure the session is unchanged. Raises StudioError.
+    gets the new footage. All is read before anything changes, and no other work in the session is under way then; on
+    failure the session is unchanged. Raises StudioError.
     """
     options = options or ImportOptions()
     _check_request(source, options)
     session.check_idle()
+    check_alone(session.path)
     with folder_of(source.resolve(), FOOTAGE_PARTS, session.path / "take") as folder:
         return _added(session, folder, options, progress)
 
@@ -259,6 +261,7 @@ def _added(session: Session, source: Path, options: ImportOptions, report: Progr
             write_person(staged, plan, person, truths)
         report("finishing", 1, 1)
         with one_at_a_time(session.path):
+            check_alone(session.path)
             check_unchanged(session, "footage", "calibration_changed")
             adopt(session)
             placed = _moved_in(session, staged, footage, without_made_masks(session, stay))
