@@ -532,7 +532,7 @@ def _verdict_sentences(case: Case) -> list[str]:
     found = [STATE_WORDS[verdict.tracking]] if verdict.tracking in STATE_WORDS else []
     if verdict.by_truth:
         found.append(
-            f"Lost by the truth: the {enumerated(verdict.by_truth)}, with a marker more than"
+            f"Against the truth this is lost: the {enumerated(verdict.by_truth)}, with a marker more than"
             f" {_mm(lost_mm(case.run.body))} off."
         )
     if verdict.by_silhouettes:

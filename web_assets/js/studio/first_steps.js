@@ -27,8 +27,9 @@ function look(run, frame, shown) {
 
 function Seen() {
   return html`<p>
-    Each dot is the hand, foot or head of one <b>particle</b>: a guess of the whole pose. Ten${" "}
-    <b>layers</b> draw fifty guesses together, from <span class="first-layer">the first</span> to${" "}
+    Each dot is the hand, foot or head of one <b>particle</b>: a guess of the whole pose.${" "}
+    <b>Annealing</b>: each of ten layers scores fifty guesses, keeps the best and draws new ones around
+    them, ever more sharply (β), from <span class="first-layer">the first</span> to${" "}
     <span class="last-layer">the last</span>. The chart shows which parameter each layer settled.
   </p>`;
 }

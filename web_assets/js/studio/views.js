@@ -19,6 +19,7 @@ import { DRAWINGS, isOfRun, numbersOf, OVER_FRAMES, queryOf } from "./view_numbe
 /** @import { Figure, Shown } from "../figure.js" */
 
 const LOAD_MILLISECONDS = 120;
+const LATE_MILLISECONDS = 800;
 const TOWARDS = [
   ["truth", "from estimate to truth"],
   ["mode", "from estimate to the best particle"],
@@ -37,6 +38,7 @@ let held = /** @type {{ key: string, answer: any } | null} */ (null);
 let heldTried = /** @type {{ key: string, answer: any } | null} */ (null);
 let figure = /** @type {Figure | null} */ (null);
 let age = 0; // rises when what is stored changed
+let drawnView = ""; // whose figure it is
 
 /** All views, for the command palette. */
 export const allViews = () => views.value;
@@ -59,6 +61,10 @@ async function load() {
   if (get("panel") !== "views" || !views.value.length) return;
   const view = current();
   const isFound = get("summary")?.frames.length || get("detail");
+  if (get("run") && !get("summary") && !isFound) {
+    held = null;
+    return draw(null, "The run is being read.");
+  }
   if (!get("run") || get("frame") === null || !isFound) {
     held = null;
     return draw(null, "No frames yet: track a run to look into its search.");
@@ -81,6 +87,11 @@ async function load() {
   ].join(" ");
   if (held?.key === key) return showBoth(view, held);
   isLoading.value = true;
+  // Another view's figure does not stand under this one's name for long.
+  const late = setTimeout(() => {
+    const isOther = drawn.value.shown && drawnView !== view.name;
+    if (isOther && current() === view) draw(null, `${view.title} is being computed.`);
+  }, LATE_MILLISECONDS);
   try {
     const answer = await numbersOf(view, against);
     if (current() !== view) return;
@@ -92,6 +103,7 @@ async function load() {
     held = null;
     draw(null, `${message} ${hint}`);
   } finally {
+    clearTimeout(late);
     isLoading.value = false;
   }
 }
@@ -162,6 +174,7 @@ const beside = (stored, tried) => ({
 });
 
 function show(view, stored, /** @type {any} */ tried) {
+  drawnView = view.name;
   const axis = onOneAxis(onAxis(stored), hasRows(tried) ? onAxis(tried) : null);
   const answer = axis.tried ? beside(stored, tried) : stored;
   if (!hasRows(stored)) {
