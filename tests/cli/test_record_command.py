@@ -55,7 +55,10 @@ def test_live_cameras_are_tracked(walk: Session, pictures: dict[str, list[bytes]
         refused = run("live", str(walk.path), *cameras, "--repeat")
     assert result.exit_code == 0, result.stderr
     printed = json.loads(result.stdout)
-    assert (printed["session"], printed["ended"], printed["stopped"]) == ("take", "its time was over", [])
+    assert (printed["session"], printed["ended"]) == ("take", "its time was over")
+    # A machine that does much else reads a camera late, and says so; none stays away.
+    last = {notice["camera"]: notice["state"] for notice in printed["stopped"]}
+    assert set(last.values()) <= {"running"}, printed["stopped"]
     assert printed["frames"] >= 1
     assert printed["frames"] + len(printed["dropped"]) <= printed["sets"]
     again = json.loads(run("live", str(tmp_path / "take"), "--replay", printed["run"], "--json").stdout)

@@ -101,7 +101,7 @@ def test_two_mjpeg_streams_are_tracked_and_recorded_and_one_that_stops_is_left_o
     assert taken.sets[0].left_out == ()
     alone = [one.frame for one in taken.sets if one.left_out == ("cam2",)]
     tracked = summary_of(run).tracked
-    assert len([frame for frame in tracked if frame in alone]) >= 8, "it went on with the other"
+    assert len([frame for frame in tracked if frame in alone]) >= 3, "it went on with the other"
     assert alone[-1] == taken.sets[-1].frame
     assert run.summary().status == "cancelled"
     again = prepare_replay(take, run)
