@@ -7,7 +7,7 @@ the other masks that is then covered is removed by this camera alone.
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ from studio.body.scale import scale_of
 from studio.calibration.findings import Finding, blocking
 from studio.errors import FootageError, RunError, StudioError
 from studio.evidence.masks import PackedMasks, reduced
+from studio.evidence.pipeline import EvidenceMaker
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
 from studio.progress import Progress, unheard
@@ -171,8 +172,8 @@ def mask_quality(
             "Check its masks by eye instead.",
         )
     check_views(cameras)
-    small = tuple(camera.reduced(JUDGED_SIDE) for camera in cameras)
-    scale = scale_of(session.body())
+    lenses = {camera.name: camera.reduced(JUDGED_SIDE) for camera in cameras}
+    small, scale = tuple(lenses.values()), scale_of(session.body())
     with masks_of(session, settings) as maker:
         chosen = tuple(frames) or spread_frames(maker.footage.frame_count, FRAMES)
         if not chosen:
@@ -182,14 +183,10 @@ def mask_quality(
         masks: dict[int, list[Bytes]] = {frame: [] for frame in chosen}
         people = {frame: PackedMasks() for frame in chosen}
         total = (len(cameras) + 1) * len(masks)
-        for camera, lens in zip(cameras, small, strict=True):
-            for frame in sorted(masks):
-                progress("comparing masks", len(masks[frame]) * len(masks), total)
-                mask = maker.view(camera.name, frame).mask
-                masks[frame].append(reduced(mask, lens))
-                if blame:
-                    people[frame].put(camera.name, person_alone(mask))
-            maker.release(camera.name)
+        for camera, frame, mask in _each_mask(maker, cameras, sorted(masks), total, progress):
+            masks[frame].append(reduced(mask, lenses[camera.name]))
+            if blame:
+                people[frame].put(camera.name, person_alone(mask))
         counted: list[FrameCounts] = []
         seen: list[int] = []
         for done, frame in enumerate(chosen):
@@ -200,6 +197,17 @@ def mask_quality(
     doubts = silhouette_doubts(cameras, people, height_of(session), scale) if blame else ()
     subjects = sorted(seen, reverse=True)[:2][-1] if seen else 0
     return dataclasses.replace(found, doubts=doubts, subjects=subjects)
+
+
+def _each_mask(
+    maker: EvidenceMaker, cameras: tuple[Camera, ...], frames: Sequence[int], total: int, progress: Progress
+) -> Iterator[tuple[Camera, int, Bytes]]:
+    """The mask (H, W) of every camera and frame, camera by camera: only one camera's pictures are held."""
+    for done, camera in enumerate(cameras):
+        for number, frame in enumerate(frames):
+            progress("comparing masks", done * len(frames) + number, total)
+            yield camera, frame, maker.view(camera.name, frame).mask
+        maker.release(camera.name)
 
 
 def measure_masks(session: Session, frames: Sequence[int] = (), progress: Progress = unheard) -> MaskQuality:
@@ -234,13 +242,12 @@ def look_before_the_first_run(session: Session, progress: Progress = unheard) ->
 def _doubts_by_silhouettes(session: Session, progress: Progress) -> tuple[Finding, ...]:
     """What the silhouettes say against the calibration: the part of `mask_quality` that takes little time."""
     cameras = session.cameras()
+    check_views(cameras)
     with masks_of(session, session_settings(session).evidence) as maker:
         people = {frame: PackedMasks() for frame in spread_frames(maker.footage.frame_count, FRAMES)}
-        for done, camera in enumerate(cameras):
-            for number, (frame, masks) in enumerate(people.items()):
-                progress("comparing masks", done * len(people) + number, len(cameras) * len(people))
-                masks.put(camera.name, person_alone(maker.view(camera.name, frame).mask))
-            maker.release(camera.name)
+        total = len(cameras) * len(people)
+        for camera, frame, mask in _each_mask(maker, cameras, tuple(people), total, progress):
+            people[frame].put(camera.name, person_alone(mask))
     return silhouette_doubts(cameras, people, height_of(session), scale_of(session.body()))
 
 

@@ -237,14 +237,13 @@ def _first(session: Session, first: int | None, last: int | None, of: int) -> in
     """The frame that a run begins in. of : that of its start pose. Raises RunError where it would end before it."""
     if first is not None:
         return first
-    first = of
-    if first and last is not None and last <= first:
+    if of and last is not None and last <= of:
         raise RunError(
-            f"The start pose of session '{session.name}' is of frame {first}, after the last requested frame"
+            f"The start pose of session '{session.name}' is of frame {of}, after the last requested frame"
             f" ({last - 1}).",
             "Give the first frame, too, or find a start pose in an earlier frame.",
         )
-    return first
+    return of
 
 
 def checked_frames(

@@ -221,9 +221,7 @@ class SceneController:
             return
         self.viewers.looking, self.viewers.is_answer = camera, not is_own
         if is_own:
-            self._places.note(eye)
-        if self._twin is not None and is_own:
-            self._twin.put_viewers(eye)
+            self._placed(eye)
 
     # Changes that need more than the model.
 

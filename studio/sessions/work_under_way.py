@@ -46,7 +46,7 @@ class Work(NamedTuple):
 def one_at_a_time(session: Path) -> Generator[None]:
     """Inside, no other process and no other thread is here, of all sessions in the folder in which this one lies.
 
-    Where nothing can be written nothing is changed either, and nobody is waited for. Raises SessionError where another
+    Where nothing can be written nothing is changed either, and no other is waited for. Raises RunError where another
     one stays here.
     """
     folder = session.parent / STATE_NAME / FOLDER
