@@ -14,6 +14,7 @@ from studio.errors import NotFoundError
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.inspection.reading import InspectedFrame, InspectedRun
 from studio.inspection.tables import Row, table
+from studio.inspection.wanted import stop_if_left
 from studio.likelihood.problem import (
     POOLED,
     WHOLE,
@@ -52,11 +53,13 @@ class FrameEvaluation:
         return tuple(view.camera for view in self.evidence.views)
 
     def log_weights(self, poses: Array) -> Array:
-        """(N,) of poses (N, D)."""
+        """(N,) of poses (N, D). Raises LeftError."""
+        stop_if_left()
         return self.problem.log_likelihood(poses)
 
     def shares(self, poses: Array) -> Shares:
-        """What each camera and term adds to the log-weights of poses (N, D)."""
+        """What each camera and term adds to the log-weights of poses (N, D). Raises LeftError."""
+        stop_if_left()
         if isinstance(self.problem, BaseFrameLikelihood):
             return self.problem.shares(poses)
         return Shares((POOLED,), (WHOLE,), self.problem.log_likelihood(poses)[:, None, None])

@@ -10,6 +10,7 @@ from studio.arrays import Array, Indices
 from studio.body.model import BodyModel
 from studio.errors import DamagedError, NotFoundError, SettingsError, StudioError
 from studio.inspection.tables import Row, Selection
+from studio.inspection.wanted import stop_if_left
 from studio.likelihood.hard_priors import HardPriors
 from studio.runs.new_run import software_version
 from studio.runs.tracks import pose_in_track
@@ -113,7 +114,10 @@ class InspectedRun:
             return results.frames()
 
     def frame(self, frame: int, results: ResultsReader | None = None) -> "InspectedFrame":
-        """A frame with its layers, finished or not. results : a reader to use. Raises NotFoundError, DamagedError."""
+        """A frame with its layers, finished or not. results : a reader to use. Raises NotFoundError, DamagedError,
+        LeftError.
+        """
+        stop_if_left()
         if tried := self.tried_at(frame):
             return InspectedFrame(self, frame, tried.layers, tried.result)
         if results is None:

@@ -13,6 +13,7 @@ from studio.arrays import Array
 from studio.evidence.distance_maps import silhouettes_by_camera
 from studio.inspection.likelihoods import source_of
 from studio.inspection.reading import InspectedRun
+from studio.inspection.wanted import stop_if_left
 from studio.knobs import Value, knobs_of
 from studio.runs.frame_steps import FrameHistory, space_over
 from studio.runs.run_behaviour import RunBehaviour
@@ -51,12 +52,15 @@ class Retracking:
             self._problems[frame] = self._source.problem(frame, self._settings[frame])
 
     def results(self, change: Change, start: Array | None = None) -> list[FrameResult]:
-        """The results of all frames. start : (D,) a pose at which the first begins. Raises SettingsError."""
+        """The results of all frames. start : (D,) a pose at which the first begins. Raises SettingsError,
+        LeftError.
+        """
         carried = self._carried if start is None else _state_at(start, self._carried)
         seed = self.run.run.record.seed + change.seed
         refiner = FrameRefiner(self.run.body, self._source.cameras, seed)
         found: list[FrameResult] = []
         for frame in self.frames:
+            stop_if_left()
             settings = changed_settings(self._settings[frame], change.settings)
             found.append(self._tracked(frame, carried, settings, seed, refiner))
             carried = found[-1].carried

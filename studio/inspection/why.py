@@ -13,7 +13,9 @@ Then it is asked, in this order; the first that holds is the cause:
    the first set (noise)? Did so few particles carry the weight (effective number, Deutscher & Reid 2005, Eq. 11) that a
    layer's choice is luck: with a usual survival rate they would not be as few (survival), or would (particles)?
 5. Does the likelihood prefer the wrong pose, both settled nearby? Then which camera and term (`blame`)?
-6. Else the stretch is tracked again with more particles and with more noise, and what helps names the cause.
+6. Else the stretch is tracked again: a search of few layers with as many evaluations in the usual number of layers (its
+   one step from broad to narrow is too long, Deutscher & Reid 2005, section 3), any with more particles and with more
+   noise. What helps names the cause; where nothing does and the likelihood prefers the reference, the search missed it.
 
 Stretches are always tracked again with the remedy, and what became of the limb is said. What these rules cannot tell
 apart: a survival rate that is too low and too few particles where both are so; a camera that is moved and one whose
@@ -44,11 +46,13 @@ from studio.inspection.retracking import Change, Retracking, more_evaluations
 from studio.inspection.schedule import effective_number
 from studio.inspection.tables import Finding, Found, Remedy, Row, Selection, View, table
 from studio.inspection.verdict import STATE_WORDS, Verdict, verdict, verdict_on
+from studio.inspection.wanted import LeftError
 from studio.knobs import Value, knobs_of
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.runs.run_footage import filmed_cameras
 from studio.runs.tracks import RAW, best_track, track_stamp
 from studio.settings import RunSettings
+from studio.trackers.catalogue import TRACKERS
 from studio.trackers.tracker import TRACKED
 from studio.words import enumerated
 
@@ -114,6 +118,8 @@ fast runs have up to 2.3."""
 FEW, USUAL_SURVIVAL, LOW_SURVIVAL = 6.0, 0.3, 0.1
 """Effective number below which a choice is luck; the survival rate that a remedy sets; one that counts as low."""
 TIMES_PARTICLES, TIMES_NOISE = 8.0, 3.0
+FEW_LAYERS, USUAL_LAYERS = 4, 10
+"""Layers of a search that hardly anneals, and of one that does: what such a search is tried with."""
 HELPS = 0.75
 """Share of the error that is left at most where a change helped."""
 LONGEST, LONGEST_AGO = 8, 64
@@ -165,6 +171,7 @@ class Case:
         self.frame, self.run, self.track = frame, frame.of, track
         self.evaluation: FrameEvaluation = evaluation_of(frame)
         self._made: dict[int, Array] = {}
+        self._tried: dict[str, Trial] = {}
         self.size = scale_of(frame.of.body)
         self.pose = judged_pose(frame, track)
         self.verdict = self._verdict()
@@ -179,6 +186,12 @@ class Case:
         """mm by limb from the reference, and the limbs that are off."""
         errors = self.all_errors(self.pose)
         return errors, [limb for limb, mm in errors.items() if mm > WRONG_MM * self.size]
+
+    @property
+    def drifting(self) -> list[str]:
+        """The limbs that are not right any more, farthest first."""
+        off = [limb for limb, mm in self.errors.items() if mm > RIGHT_MM * self.size]
+        return sorted(off, key=lambda limb: -self.errors[limb])
 
     def _verdict(self) -> Verdict:
         """What the page says of the frame, in the track that it shows."""
@@ -265,12 +278,24 @@ class Case:
             place = self._place(number) if number in tracked else None
             if place is None:
                 break
-            away = np.linalg.norm(body_points(self.run.body, self._judged(number)[None])[0] - place, axis=1)
-            errors = by_limb(self.run.body, away)
-            if max(float(errors[limb]) for limb in self.wrong) <= RIGHT_MM * self.size:
+            if max(self._off(number, place).values()) <= RIGHT_MM * self.size:
                 break
             began = number
         return began, max(began, self.frame.number - LONGEST + 1)
+
+    def _off(self, number: int, place: Array) -> dict[str, float]:
+        """mm by limb that is wrong, from where the body was in another frame."""
+        away = np.linalg.norm(body_points(self.run.body, self._judged(number)[None])[0] - place, axis=1)
+        errors = by_limb(self.run.body, away)
+        return {limb: float(errors[limb]) for limb in self.wrong}
+
+    @cached_property
+    def beginning(self) -> tuple[str, float]:
+        """The limb that was farthest off where the failure began, and how far, mm."""
+        place = self._place(self.stretch[0])
+        off = self._off(self.stretch[0], place) if place is not None else self.errors
+        limb = max(off, key=lambda name: off[name])
+        return limb, off[limb]
 
     def _judged(self, number: int) -> Array:
         """(D,) the pose that is asked about, of another frame."""
@@ -315,6 +340,8 @@ class Case:
                 pose = self.run.frame(number).estimate(
                     "" if self.reference.kind == "refined" else self.reference.kind
                 )
+        except LeftError:
+            raise
         except StudioError:
             return None
         return body_points(self.run.body, pose[None])[0]
@@ -398,19 +425,16 @@ class Case:
 
     def trials(self, wanted: Sequence[tuple[str, Mapping[str, Value]]]) -> list[Trial]:
         """The stretch tracked again with other seeds and each of these changes."""
-        again = Retracking(self.run, self.stretch[1], self.frame.number)
-        return [
-            Trial(
-                what,
-                settings,
-                float(
-                    np.mean(
-                        [self.error(again.poses(Change(settings, seed))[-1], self.wrong) for seed in SEEDS]
-                    )
-                ),
-            )
-            for what, settings in wanted
-        ]
+        for what, settings in wanted:
+            if what not in self._tried:
+                ends = [self._retracking.poses(Change(settings, seed))[-1] for seed in SEEDS]
+                left = float(np.mean([self.error(pose, self.wrong) for pose in ends]))
+                self._tried[what] = Trial(what, settings, left)
+        return [self._tried[what] for what, _ in wanted]
+
+    @cached_property
+    def _retracking(self) -> Retracking:
+        return Retracking(self.run, self.stretch[1], self.frame.number)
 
 
 def more_noise(settings: RunSettings) -> dict[str, Value]:
@@ -420,6 +444,19 @@ def more_noise(settings: RunSettings) -> dict[str, Value]:
         return {}
     wanted, high = TIMES_NOISE * settings.tracker.diffusion_scale, limits["diffusion_scale"].high
     return {"diffusion_scale": wanted if high is None else min(wanted, float(high))}
+
+
+def usual_layers(settings: RunSettings) -> dict[str, Value]:
+    """Knobs with which a search of few layers has the usual number of them and as many evaluations; {} for a search
+    that has enough, or whose tracker has no layers to choose.
+    """
+    tracker = TRACKERS[settings.tracker_name]
+    has_layers = "layers" in {entry.name for entry in knobs_of(settings.tracker)}
+    evaluations = tracker.evaluations(settings.tracker)
+    few = tracker.layer_count(settings.tracker) < FEW_LAYERS
+    if not has_layers or not few or evaluations < tracker.least_evaluations(USUAL_LAYERS):
+        return {}
+    return dict(tracker.evaluation_knobs(evaluations, USUAL_LAYERS))
 
 
 def usual_survival(settings: RunSettings) -> dict[str, Value]:
@@ -468,6 +505,8 @@ def _explained(case: Case) -> Found:
     if case.wrong:
         limb = max(case.wrong, key=lambda name: case.errors[name])
         _add_search(case, limb, findings, remedies, cause_known=fault is not None)
+    elif case.drifting and case.verdict.fits:
+        findings += [_layer_finding(case, case.drifting[0]), _preference_finding(case)]
     if not case.verdict.fits and not remedies:
         remedies.append(BY_HAND)
     table: list[Row] = [(one.kind, one.words, one.limb, one.layer, one.camera, one.term) for one in findings]
@@ -515,6 +554,10 @@ def _first_finding(case: Case) -> Finding:
         kind = "mended" if mended and case.verdict.fits else "wrong limb"
         return Finding(kind, " ".join([*said, words]), named[0], numbers=numbers)
     farthest = _mm(case.errors[worst])
+    if case.verdict.fits and case.drifting:
+        parts = [f"the {limb} by {_mm(case.errors[limb])}" for limb in case.drifting]
+        words = f"No limb is lost. Off from {reference}: {enumerated(parts)}.{mended}"
+        return Finding("drifting", words, worst, numbers=numbers)
     if case.verdict.fits:
         words = f"The frame fits: no limb is farther than {farthest} from {reference}."
         return Finding("fits", words, worst, numbers=numbers)
@@ -595,13 +638,14 @@ def _add_search(
     known = case.reference.kind != REFINED_NOW or not cause_known
     began = case.stretch[0] if known else case.frame.number
     if began < case.frame.number:
-        words = f"It began in frame {began}: look at that frame first."
-        findings.append(Finding("began", words, limb, numbers={"frame": began}, frame=began))
+        first, mm = case.beginning
+        words = f"It began in frame {began}, where the {first} was {_mm(mm)} off: look at that frame first."
+        findings.append(Finding("began", words, first, numbers={"frame": began, "off": mm}, frame=began))
     cause = None if cause_known else _cause(case, limb, remedies)
     if cause is not None:
         findings.append(cause)
     findings.append(_layer_finding(case, limb))
-    if cause is None or cause.kind != "likelihood":
+    if cause is None or cause.kind not in ("likelihood", "missed"):
         findings.append(_preference_finding(case))
     if cause is None or cause.kind not in TRIED:
         return
@@ -616,7 +660,7 @@ def _add_search(
         findings.append(Finding("trial", words, limb, numbers={"before": before, "after": trial.left}))
 
 
-TRIED = ("noise", "survival", "particles")
+TRIED = ("noise", "survival", "particles", "layers")
 """Causes with a remedy of knobs, which is tried."""
 
 
@@ -667,12 +711,8 @@ def _cause(case: Case, limb: str, remedies: list[Remedy]) -> Finding | None:
     preference = case.preference
     if preference.is_for_the_pose:
         remedies.append(_against(case, preference))
-        words = (
-            f"The likelihood prefers the wrong pose, by {preference.nats:.3f} nats: most of all camera"
-            f" {preference.camera} by its {preference.term} term ({preference.share:+.3f})."
-        )
         return Finding(
-            "likelihood", words, limb, camera=preference.camera, term=preference.term,
+            "likelihood", _preference_words(case), limb, camera=preference.camera, term=preference.term,
             numbers={"nats": preference.nats, "share": preference.share}, is_cause=True,
         )  # fmt: skip
     return _by_trial(case, limb, remedies)
@@ -703,20 +743,35 @@ def _few(case: Case, limb: str, remedies: list[Remedy]) -> Finding:
 
 def _by_trial(case: Case, limb: str, remedies: list[Remedy]) -> Finding:
     """The cause as what helps: more particles, or more noise."""
-    more, noise, before = (
+    more, noise, layers = (
         _more_particles(case.settings),
         more_noise(case.settings),
-        case.error(case.pose, case.wrong),
+        usual_layers(case.settings),
     )
+    before = case.error(case.pose, case.wrong)
+    spread = Remedy(
+        f"{USUAL_LAYERS} layers of as many evaluations",
+        "The cloud is led to the peak in small steps, at no cost.",
+        layers,
+    )
+    if layers:
+        [trial] = case.trials([(spread.title, layers)])
+        if trial.left <= HELPS * before:
+            remedies.append(spread)
+            return Finding("layers", _few_layers_words(case, before, trial), limb, is_cause=True)
     wanted = [(more.title, more.settings)]
     if noise:
         wanted.append((f"{TIMES_NOISE:g} times the noise", noise))
     best = min(case.trials(wanted), key=lambda trial: trial.left)
     errors = f"the error of what is off goes from {_mm(before)} to {_mm(best.left)}"
+    numbers = {"before": before, "after": best.left}
     if best.left > HELPS * before:
-        tried = " or ".join(_lowered(title) for title, _ in wanted)
-        words = f"The cause is unknown: tracked again with {tried}, {errors} at best."
-        return Finding("unknown", words, limb, numbers={"before": before, "after": best.left}, is_cause=True)
+        titles = [*([spread.title] if layers else []), *(title for title, _ in wanted)]
+        tried = f"Tracked again with {' or '.join(_lowered(title) for title in titles)}, {errors} at best."
+        if case.preference.is_for_the_reference:
+            words = f"{_preference_words(case)} Why it does is unknown. {tried}"
+            return Finding("missed", words, limb, numbers=numbers, is_cause=True)
+        return Finding("unknown", f"The cause is unknown. {tried}", limb, numbers=numbers, is_cause=True)
     if best.what == more.title:
         remedies.append(more)
         words = f"There are too few particles for this frame: with {_lowered(more.title)} {errors}."
@@ -724,6 +779,16 @@ def _by_trial(case: Case, limb: str, remedies: list[Remedy]) -> Finding:
     remedies.append(Remedy(best.what, "The first layer's particles reach farther then.", best.settings))
     words = f"The search did not look far enough: with {_lowered(best.what)} {errors}."
     return Finding("noise", words, limb, is_cause=True)
+
+
+def _few_layers_words(case: Case, before: float, trial: Trial) -> str:
+    """That a search in few layers does not anneal."""
+    count = TRACKERS[case.settings.tracker_name].layer_count(case.settings.tracker)
+    layers = "One layer is" if count == 1 else f"{count} layers are"
+    return (
+        f"{layers} too few: one step leads from the broad cloud to the narrow peak, and most of the particles miss it."
+        f" With {_lowered(trial.what)} the error of what is off goes from {_mm(before)} to {_mm(trial.left)}."
+    )
 
 
 def _more_particles(settings: RunSettings) -> Remedy:
@@ -750,6 +815,9 @@ def _layer_finding(case: Case, limb: str) -> Finding:
     numbers = {"nearest": nearest}
     place = f"where {_of(case.reference.kind)} has the {limb}"
     near = _mm(NEAR_MM * case.size)
+    if len(case.frame.layers) == 1 and layer is None:
+        words = f"There was a particle near {place}: the nearest {_mm(nearest)} away. No second layer went on from it."
+        return Finding("near to the end", words, limb, numbers=numbers)
     if layer is None:
         words = f"Down to the last layer particles were near {place}: the nearest {_mm(nearest)} away."
         return Finding("near to the end", words, limb, numbers=numbers)
@@ -765,18 +833,26 @@ def _layer_finding(case: Case, limb: str) -> Finding:
 
 
 def _preference_finding(case: Case) -> Finding:
-    found, reference = case.preference, _of(case.reference.kind)
+    found = case.preference
     numbers = {"nats": found.nats, "share": found.share}
-    if found.is_for_the_pose:
-        words = (
-            f"The likelihood prefers the wrong pose, by {found.nats:.3f} nats; most of all camera {found.camera} by its"
-            f" {found.term} term."
-        )
-    elif found.is_for_the_reference:
-        words = f"The likelihood prefers {reference}, by {-found.nats:.3f} nats: the search missed it."
-    else:
-        words = f"The likelihood hardly tells the pose from {reference} ({found.nats:+.3f} nats)."
+    words = _preference_words(case)
     return Finding("preference", words, camera=found.camera, term=found.term, numbers=numbers)
+
+
+def _preference_words(case: Case) -> str:
+    """Which pose the likelihood prefers. The views compare the poses themselves: their nats are others."""
+    found, reference = case.preference, _of(case.reference.kind)
+    settled = f"each at its best within {_mm(KEPT_WITHIN_MM * case.size)}"
+    if found.is_for_the_pose:
+        return (
+            f"The likelihood prefers the wrong pose, by {found.nats:.3g} nats, {settled}; most of all camera"
+            f" {found.camera} by its {found.term} term ({found.share:+.3g})."
+        )
+    if found.is_for_the_reference:
+        return (
+            f"The search missed it: the likelihood prefers {reference}, by {-found.nats:.3g} nats, {settled}."
+        )
+    return f"The likelihood hardly tells the pose from {reference} ({found.nats:+.3g} nats, {settled})."
 
 
 def _of(kind: str) -> str:

@@ -333,7 +333,9 @@ def branch(
         Field(description="Any other knob."),
         Knobs(own_knobs, others=True, with_defaults=False),
     ] = None,
-    name: Annotated[str, Field(description="Of the new run; default: numbered.")] = "",
+    name: Annotated[
+        str, Field(description="Of the new run; default: the run's own, with what is changed.")
+    ] = "",
     progress: Reporting = None,
 ) -> Tracked:
     """Track a frame and all after it again with other knobs, into a new run; the old one stays.

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from studio.errors import SettingsError
 from studio.runs.derived_runs import check_branching_frame, derived_record, new_folder
 from studio.runs.moved_knobs import FIRST_VERSION, keep_moved, moved_between, settings_with_moved
+from studio.sessions.names import free_name, name_from
 from studio.sessions.session import Session, numbered
 from studio.sessions.stored_run import StoredRun
 from studio.settings import (
@@ -54,7 +55,7 @@ def prepare_branch(
     made = derived_record(
         session,
         run,
-        name,
+        name or _name_of(session, run, moved),
         f"From frame {frame} on run '{run.name}' with {changed}.",
         settings=dict(values(wanted)) if is_whole else record.settings,
     )
@@ -64,6 +65,19 @@ def prepare_branch(
             keep_moved(made_run, version, moved)
 
     return numbered(session, made, name, lambda record: new_folder(run, record, frame, leave_moved))
+
+
+MOST_NAMED = 2
+"""Knobs that a run's name says, at most."""
+
+
+def _name_of(session: Session, run: StoredRun, moved: Mapping[str, object]) -> str:
+    """What the run is called after: the one it leaves, and what was changed, such as "walk-1-survival-0-8"."""
+    changed = [part for knob, value in moved.items() for part in (knob, value)]
+    if len(moved) > MOST_NAMED:
+        changed = [len(moved), "knobs"]
+    wanted = name_from("-".join(str(part).replace("_", "-") for part in (run.name, *changed)), "run")
+    return free_name(wanted, {one.name for one in session.runs()})
 
 
 def _settings_before(run: StoredRun, frame: int) -> tuple[int, RunSettings]:

@@ -168,13 +168,11 @@ class SceneViews:
         # Beside a frame that is annealed again stands the stored result, beside a compared run the others.
         others = [] if moment.beside is None else [OtherBody(moment.beside, "stored")]
         others += [OtherBody(ghost.pose, ghost.colour) for ghost in model.ghosts]
-        own = (
-            "tried"
-            if moment.beside is not None
-            else "series-0"
-            if any(ghost.colour.startswith("series") for ghost in model.ghosts)
-            else ""
-        )
+        own = "" if moment.beside is None else "tried"
+        series = {ghost.colour for ghost in model.ghosts if ghost.colour.startswith("series")}
+        if series and not own:
+            # Compared runs have one colour each: this one has what the others leave.
+            own = next(f"series-{at}" for at in range(len(series) + 1) if f"series-{at}" not in series)
         for camera in self._opened.cameras:
             is_behind = camera.name == selection.look_through
             overlays = (*options.overlays, "outline") if is_behind else options.overlays

@@ -65,6 +65,7 @@ from studio.server.content_policy import PolicyHeaders
 from studio.server.error_responses import ErrorsInWords, add_error_handlers, log
 from studio.server.event_stream import EventStream
 from studio.server.layer_outlines import LayerOutlines
+from studio.server.left_requests import LeftRequests
 from studio.server.schemas import ErrorAnswer
 from studio.server.viewers_budget import ViewersBudget
 from studio.sessions.workspace import Workspace
@@ -179,6 +180,7 @@ def build_app(
     app.mount("/assets", StaticFiles(directory=assets_folder()), name="assets")
     # The last one added is the first to see a request.
     app.add_middleware(BodyLimit)
+    app.add_middleware(LeftRequests)
     app.add_middleware(ViewersBudget, tracking=lambda: control.state.state == "tracking")
     app.add_middleware(
         AccessGuard,

@@ -10,7 +10,7 @@ from studio.scene.opened_run import OpenedRun
 from studio.server.result_routes import frame_detail, frames
 from studio.trackers.tracker import RECOVERED, TRACKED
 
-FITTING = ("fits", "mended")
+FITTING = ("fits", "mended", "drifting")
 
 
 def check_that_all_agree(run: InspectedRun, track: str = RAW, why: tuple[int, ...] | None = None) -> None:

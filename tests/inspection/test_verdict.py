@@ -145,6 +145,22 @@ def test_the_runs_of_the_demo(demo: Session) -> None:
         check_that_all_agree(inspected, why=tuple(lost[-1:]))
 
 
+def test_one_layer_is_blamed_and_ten_are_tried(demo: Session) -> None:
+    run = InspectedRun(demo, demo.run("one-layer"))
+    found = rows(run.frame(13), Selection())
+    [cause] = [finding for finding in found.findings if finding.is_cause]
+    assert cause.kind == "layers"
+    assert dict(found.remedies[0].settings) == {"layers": 10, "particles": 50}
+    [*_, tried] = [finding for finding in found.findings if finding.kind == "trial"]
+    assert tried.numbers["after"] < 0.5 * tried.numbers["before"]
+    # The frame where it began is lost nowhere, and is not called right.
+    [began] = [finding for finding in found.findings if finding.kind == "began"]
+    assert began.frame is not None
+    first = rows(run.frame(began.frame), Selection()).findings[0]
+    assert first.kind == "drifting"
+    assert "fits" not in first.words
+
+
 def twisted(kind: str) -> Callable[..., object]:
     """What says it, made to say another thing than the others."""
     if kind == "timeline":

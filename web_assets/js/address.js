@@ -38,6 +38,7 @@ const HELD = [
   { name: "compared", kind: word, step: true },
   { name: "trial", kind: word },
   { name: "against", kind: word },
+  { name: "step", kind: count },
 ];
 
 /** @param {{ usual?: string }} entry */

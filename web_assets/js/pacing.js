@@ -40,6 +40,27 @@ export function drawSoon(draw) {
   if (!busy) serve();
 }
 
+/**
+ * What is asked about one subject at a time: a question about another aborts it, one about the same is asked (`again`) once
+ * it is answered, so that what changes all the time is shown as often as answers come.
+ * @param {() => void} again
+ */
+export function askingAbout(again) {
+  /** @type {{ subject: string, control: AbortController, more: boolean } | null} */
+  let now = null;
+  const stop = () => { now?.control.abort(); now = null; };
+  /** @param {string} subject @param {(signal: AbortSignal) => Promise<void>} work */
+  const ask = async (subject, work) => {
+    if (now?.subject === subject) { now.more = true; return; }
+    stop();
+    const own = { subject, control: new AbortController(), more: false };
+    now = own;
+    try { await work(own.control.signal); } finally { if (now === own) now = null; }
+    if (own.more && !own.control.signal.aborted) again();
+  };
+  return { ask, stop };
+}
+
 /** A function that requests `work` (may be asynchronous): never twice at once, not more often than allowed, the last request always served. */
 export function paced(work, milliseconds) {
   let wanted = false;

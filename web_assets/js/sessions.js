@@ -2,7 +2,7 @@
 
 import { fetchJson } from "./api.js";
 import { complain } from "./messages.js";
-import { nothingChosen } from "./selection.js";
+import { comparedRuns, MOST_COMPARED, nothingChosen } from "./selection.js";
 import { get, set } from "./state.js";
 
 /** Ask the server for the list again. */
@@ -24,11 +24,19 @@ export function openSession(session, run = undefined, shown = {}) {
   const chosen = run === undefined ? newest : run;
   if (session === get("session") && chosen === get("run")) return set({ missing: null });
   const frame = shown.frame ?? null;
+  const isHere = session === get("session");
   set({
-    missing: null, session, run: chosen, track: "raw", summary: null, detail: null, parameters: null, layerCount: null, settings: null, moved: null, whatIf: null, trial: null, against: null, trials: null, compared: null, through: null, eye: null,
-    ...nothingChosen(), ...shown, frame, follow: frame === null,
+    missing: null, session, run: chosen, track: "raw", summary: null, detail: null, parameters: null, layerCount: null, settings: null, moved: null, whatIf: null, trial: null, against: null, trials: null, compared: isHere ? comparedWith(chosen) : null, through: null, eye: null,
+    ...nothingChosen(), ...shown, frame, follow: frame === null, step: shown.step ?? (isHere ? get("step") : null),
   });
   document.body.classList.remove("rail-open");
+}
+
+/** The comparison that is shown, as it goes on with another run of the session: the run that was open takes its place. */
+function comparedWith(run) {
+  const [others, open, next] = [comparedRuns(), `${get("session")}/${get("run")}`, `${get("session")}/${run}`];
+  if (!others.length || get("panel") !== "compare" || !run) return null;
+  return [open, ...others.filter((one) => one !== next)].slice(0, MOST_COMPARED - 1).join(",");
 }
 
 /** What a session is called in a list. */

@@ -33,6 +33,7 @@ const values = {
   against: null,       // name of the trial that it is compared with, null: what is stored
   trials: null,        // all that was tried of the shown frame, and the numbers of what is stored of it
   notes: [],           // notes and bookmarks on the run's frames: [{frame, text, made}]
+  step: null,          // which of the first steps is shown, counted from 1
   work: null,          // the worker's last state
   connected: null,     // whether the event socket is open, null before it was
   stranger: false,     // whether the studio was started anew and does not know this browser

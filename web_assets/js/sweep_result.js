@@ -128,16 +128,16 @@ function drawMap(sheet, own, room) {
   // The far end of the colours is the one that stands out from the page, whatever the theme.
   const stands = (mean) => (high > low ? (measure.more_is_better ? high - mean : mean - low) / (high - low) : 0) > 0.6;
   const cells = found.map((row) => ({ label: { color: token(stands(row.mean) ? "surface" : "text") }, value: [columns.findIndex((one) => sameValue(one, row[chosen.across])), rows.findIndex((one) => sameValue(one, row[chosen.other])), row.mean], row }));
-  const [box] = sheet.columns(1, { gutters: 110, right: 90 });
+  const [box] = sheet.columns(1, { height: Math.max(120, room - 76), gutters: 110, right: 90 });
   const width = Math.min(box.width, columns.length * 180);
-  const plot = sheet.plot({ left: box.left, width, top: 0, height: Math.max(120, room - 76) }, {
+  const plot = sheet.plot({ ...box, width }, {
     title: measure.label, unit: dotted(measure.unit, "mean over seeds", ...Object.entries(fixed).map(([name, value]) => `${labelOf(name)} ${value}`)),
     x: categories(columns.map(String), labelOf(chosen.across)), y: categories(rows.map(String), labelOf(chosen.other), { nameGap: 56 }),
   });
   const pointOf = (row) => ({ ...fixed, [chosen.across]: row[chosen.across], [chosen.other]: row[chosen.other] });
   const shades = measure.more_is_better ? [...SHADES].reverse() : SHADES;
   sheet.heat(plot, {
-    cells, low, high, colours: shades, ends: [words(high), words(low)], key: { left: box.left + width + 18, top: 60, height: 110 }, click: ({ data }) => ({ run: runsAt(own, pointOf(data.row))[0] }),
+    cells, low, high, colours: shades, ends: [words(high), words(low)], key: 110, click: ({ data }) => ({ run: runsAt(own, pointOf(data.row))[0] }),
     tip: ({ data: { row } }) => tipOf(`${labelOf(chosen.across)} ${row[chosen.across]}, ${labelOf(chosen.other)} ${row[chosen.other]}`, [["mean", row.mean], ["95 % interval", `${words(row.low)} to ${words(row.high)}`], ["opens", runsAt(own, pointOf(row))[0].run]]),
   });
   sheet.option.series.at(-1).label = { show: cells.length <= 80, formatter: ({ data: { row } }) => words(row.mean), fontSize: typeSize(11) };
@@ -153,8 +153,8 @@ function drawCurve(sheet, own, room) {
   const place = (value) => (isNumber ? value : String(value));
   const lines = chosen.other ? inOrder(result.vary[chosen.other]) : [null];
   const name = (value) => (value === null ? measure.label : `${labelOf(chosen.other)} ${value}`);
-  const [box] = sheet.columns(1, { gutters: 66, right: 24 });
-  const plot = sheet.plot({ ...box, top: 0, height: Math.max(120, room - 76) }, {
+  const [box] = sheet.columns(1, { height: Math.max(120, room - 76), gutters: 66, right: 24 });
+  const plot = sheet.plot(box, {
     title: measure.label, unit: dotted(measure.unit, "mean and 95 % interval over seeds; a dot is a run", ...Object.entries(fixed).map(([knob, value]) => `${labelOf(knob)} ${value}`)), names: chosen.other ? lines.map(name) : null,
     x: isNumber ? numbers(labelOf(chosen.across)) : categories(across.map(String), labelOf(chosen.across)), y: numbers(""),
   });

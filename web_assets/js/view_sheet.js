@@ -4,13 +4,20 @@
 import { axis, figure, token, typeSize } from "./chart_looks.js";
 
 const HEADING = 30, LEGEND = 17, WORD = 12;
+/** Pixels below which what stands side by side stands one below the other, and how high it is there at least. */
+export const NARROW = 640;
+const STACKED = 150;
+const KEY_GAP = 10;
+/** How high the key of a map's colours is. */
+export const KEY = 80;
 const HEAT = ["heat-lowest", "heat-low", "heat-middle", "heat-high"];
 const SPLIT = "stored and tried";
 const GROUPS = "groups";
 const FAMILY = "Inter, system-ui, sans-serif";
 
 /**
- * @typedef {{ left: number, top: number, width: number, height: number }} Box pixels of the plot itself, without its labels
+ * @typedef {{ left: number, top?: number, width: number, height: number, isBelow?: boolean }} Box pixels of the plot itself, without its
+ *   labels; `isBelow`: it stands below all that is on the sheet so far
  * @typedef {Record<string, any>} Changes of the selection
  */
 
@@ -36,16 +43,26 @@ export class Sheet {
 
   constructor(width) { this.width = width; }
 
-  /** Columns of equal (or given) shares of the width, each with room for labels at its left. @returns {{ left: number, width: number }[]} */
-  columns(count, { gutters = 58, right = 16, shares = Array(count).fill(1) } = {}) {
-    const rooms = Array.isArray(gutters) ? gutters : Array(count).fill(gutters);
+  /**
+   * Places of plots side by side, of equal (or given) shares of the width, each with room for labels at its left; on a narrow
+   * sheet one below the other, unless `stacks` is false. `height`: of all, or of each; `least`: that each needs where it stands alone.
+   * @param {number} count
+   * @param {{ height?: number | number[], least?: number | number[], gutters?: number | number[], right?: number, shares?: number[], stacks?: boolean }} [how]
+   * @returns {Box[]}
+   */
+  columns(count, { height = STACKED, least = 0, gutters = 58, right = 16, shares = Array(count).fill(1), stacks = true } = {}) {
+    const each = (value) => (Array.isArray(value) ? value : Array(count).fill(value));
+    const [rooms, heights, needed] = [each(gutters), each(height), each(least)];
+    if (stacks && count > 1 && this.width < NARROW) {
+      return rooms.map((room, at) => ({ left: room, width: Math.max(40, this.width - room - right), height: Math.max(STACKED, needed[at]), isBelow: true }));
+    }
     const free = this.width - rooms.reduce((sum, one) => sum + one, 0) - right * count;
     const whole = shares.reduce((sum, one) => sum + one, 0);
     let left = 0;
     return shares.map((share, at) => {
       left += rooms[at];
       const width = Math.max(40, (free * share) / whole);
-      const made = { left, width };
+      const made = { left, width, height: heights[at] };
       left += width + right;
       return made;
     });
@@ -59,13 +76,14 @@ export class Sheet {
   plot(box, { title = "", unit = "", x, y, below = 34, names = null, over = null, click = null }) {
     const index = this.option.grid.length;
     const { left, width } = box;
+    const start = box.top ?? (box.isBelow ? this.height : 0);
     // A legend, an axis above the plot and the names of its groups there take a line each.
     const above = x.position === "top" ? LEGEND * (x.groups ? 2 : 1) : 0;
     const lines = (names ? LEGEND : 0) + above;
-    const top = box.top + (title ? HEADING : 8) + lines;
+    const top = start + (title ? HEADING : 8) + lines;
     const height = Math.max(40, box.height - lines);
-    if (title) this.heading(title, unit, left, box.top, width + 12);
-    if (names) this.legend(names, left, box.top + HEADING - 7, width);
+    if (title) this.heading(title, unit, left, start, width + 12);
+    if (names) this.legend(names, left, start + HEADING - 7, width);
     this.option.grid.push({
       left, top, width, height, ...(over ? { tooltip: { trigger: "axis", formatter: (points) => over(Array.isArray(points) ? points : [points]) } } : {}),
     });
@@ -130,11 +148,12 @@ export class Sheet {
   }
 
   /**
-   * A map of cells [column, row, value] on two axes of categories; the colours run from `low` to `high`.
+   * A map of cells [column, row, value] on two axes of categories; the colours run from `low` to `high`. `key`: how high their key
+   * beside it is; 0 for none.
    * @param {number} plot
-   * @param {{ cells: any[], low: number, high: number, colours?: string[], ends?: [string, string], key?: { left: number, top: number, height?: number }, click?: (event: any) => Changes | null, tip: (event: any) => string, framed?: boolean }} more
+   * @param {{ cells: any[], low: number, high: number, colours?: string[], ends?: [string, string], key?: number, click?: (event: any) => Changes | null, tip: (event: any) => string, framed?: boolean }} more
    */
-  heat(plot, { cells, low, high, colours = HEAT, ends = ["", ""], key = null, click = null, tip, framed = true }) {
+  heat(plot, { cells, low, high, colours = HEAT, ends = ["", ""], key = 0, click = null, tip, framed = true }) {
     this.series(plot, {
       type: "heatmap", data: cells, click, tip, progressive: 0, emphasis: { itemStyle: { borderColor: token("text"), borderWidth: 1.5 } },
       itemStyle: framed ? { borderColor: token("surface"), borderWidth: 1 } : { borderWidth: 0 },
@@ -147,12 +166,12 @@ export class Sheet {
    * a map like any other. A column or row that only one of both has is half empty.
    * @param {number} plot
    * @param {{ cells: any[], tried: any[] | null, low: number, high: number, colours?: string[],
-   *   ends?: [string, string], key?: { left: number, top: number, height?: number }, framed?: boolean,
+   *   ends?: [string, string], key?: number, framed?: boolean,
    *   click?: (event: any) => Changes | null, tip: (event: any) => string }} more
    */
   splitHeat(plot, { cells, tried, ...more }) {
     if (!tried) return this.heat(plot, { cells, ...more });
-    const { low, high, colours = HEAT, ends = ["", ""], key = null, framed = true } = more;
+    const { low, high, colours = HEAT, ends = ["", ""], key = 0, framed = true } = more;
     const found = (list, side) =>
       list.filter((cell) => Number.isFinite(cell[2])).map((cell) => [...cell.slice(0, 3), side]);
     this.series(plot, {
@@ -173,9 +192,10 @@ export class Sheet {
 
   /** The scale of the series that was drawn last, by the third number of its data. */
   scale({ low, high, colours, ends, key }) {
+    const { left, top, width } = this.option.grid[this.option.series.at(-1).xAxisIndex];
     this.option.visualMap.push({
       type: "continuous", min: low, max: high === low ? low + 1 : high, seriesIndex: this.option.series.length - 1, dimension: 2, calculable: false, show: Boolean(key), orient: "vertical", itemWidth: 9,
-      itemHeight: key?.height ?? 80, left: key?.left, top: key?.top, text: ends, textGap: 4, precision: 2, hoverLink: false,
+      itemHeight: key, left: left + width + KEY_GAP, top: top + KEY_GAP, text: ends, textGap: 4, precision: 2, hoverLink: false,
       inRange: { color: colours.map(token) }, textStyle: { color: token("text-quiet"), fontSize: typeSize(10) },
     });
   }
@@ -259,8 +279,9 @@ export class Sheet {
     this.option.legend.push({ type: "scroll", width, left, top, data: names, itemWidth: 14, itemHeight: 8, itemGap: 10, padding: 0, textStyle: { color: token("text-quiet"), fontSize: typeSize(11) }, pageIconColor: token("text"), pageTextStyle: { color: token("text-quiet") }, pageIconSize: 9 });
   }
 
-  /** Words in place of a plot that has nothing to draw. */
-  words(text, left, top, width) {
+  /** Words in place of a plot that has nothing to draw. @param {string} text @param {Box} place */
+  words(text, { left, width, isBelow }) {
+    const top = isBelow ? this.height + KEY_GAP : HEADING + KEY_GAP;
     this.option.title.push({ left, top, padding: 0, text, textStyle: { color: token("text-quiet"), fontSize: typeSize(12), fontWeight: 450, fontFamily: FAMILY, width, overflow: "break", lineHeight: 17 } });
     this.height = Math.max(this.height, top + 40);
   }

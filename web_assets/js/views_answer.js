@@ -7,7 +7,7 @@ import { limbLook } from "./limb_looks.js";
 import { isChosenLimb, limbGroup } from "./selection.js";
 import { layerColour, seriesColour } from "./theme.js";
 import {
-  categories, distinct, extent, grouped, layersOfAll, logarithmic, numbers, onScreen, screenUnit, sidesOf, tipOf, withUnit,
+  categories, distinct, extent, grouped, KEY, layersOfAll, logarithmic, numbers, onScreen, screenUnit, sidesOf, tipOf, withUnit,
 } from "./view_sheet.js";
 
 /** @import { Drawing } from "./views_search.js" */
@@ -39,8 +39,8 @@ function landscape(sheet, { slice, terms, tempered, plane, rug, marks, ends, sca
   const inTried = (at.tried?.marks ?? []).filter((row) => row.name === "estimate").map((row) => ({ ...row, name: "tried" }));
   const markSpots = [...marks, ...inTried].map((row) => ({ x: put(row.at), word: row.name, colour: { truth: "truth", estimate: "text", tried: "tried" }[row.name] ?? "accent" }));
   if (plane.length) return landscapePlane(sheet, { plane, rug, marks, scale }, at, { unit, height, put });
-  const [one, two, three] = sheet.columns(3, { gutters: [62, 40, 58], shares: [1.4, 1, 1.2] });
-  const main = sheet.plot({ ...one, top: 0, height }, { title: "Log weight", unit: `${nameOf}; a click moves the body there`, x: x(), y: numbers(""), click: (value) => ghost(back(value)), over: (points) => tipOf(`${figure(points[0].axisValue)}${screenUnit(unit)}`, points.filter((point) => ["log weight", "stored", "tried"].includes(point.seriesName)).map((point) => [point.seriesName, nats(point.data[1])])), names: tried ? ["stored", "tried"] : null });
+  const [one, two, three] = sheet.columns(3, { height, gutters: [62, 40, 58], shares: [1.4, 1, 1.2] });
+  const main = sheet.plot(one, { title: "Log weight", unit: `${nameOf}; a click moves the body there`, x: x(), y: numbers(""), click: (value) => ghost(back(value)), over: (points) => tipOf(`${figure(points[0].axisValue)}${screenUnit(unit)}`, points.filter((point) => ["log weight", "stored", "tried"].includes(point.seriesName)).map((point) => [point.seriesName, nats(point.data[1])])), names: tried ? ["stored", "tried"] : null });
   const finite = slice.filter((row) => Number.isFinite(row.log_weight));
   const [low, high] = extent(finite.map((row) => row.log_weight));
   const outside = slice.filter((row) => row.possible === false);
@@ -66,7 +66,7 @@ function landscape(sheet, { slice, terms, tempered, plane, rug, marks, ends, sca
 
   const layers = [...grouped(tempered, "layer")];
   const most = new Map(layers.map(([layer, rows]) => [layer, Math.max(...rows.map((row) => row.density)) || 1]));
-  const beta = sheet.plot({ ...two, top: 0, height }, { title: "At each layer's β", unit: `density, each to its own height${tried ? "; dashed: tried" : ""}`, x: x(), y: numbers("", { scale: false, min: 0, max: 1.05, axisLabel: { show: false } }) });
+  const beta = sheet.plot(two, { title: "At each layer's β", unit: `density, each to its own height${tried ? "; dashed: tried" : ""}`, x: x(), y: numbers("", { scale: false, min: 0, max: 1.05, axisLabel: { show: false } }) });
   for (const [layer, rows] of layers) {
     sheet.line(beta, `layer ${layer + 1}`, rows.map((row) => ({ value: [put(row.at), row.density / most.get(layer)], row })), layerColour(layer, at.layers), {
       width: at.layer === layer ? 3 : 1.4, symbols: false, triggerLineEvent: true, click: () => ({ layer }), emphasis: { focus: "series" }, tip: () => tipOf(layerInSearch(layer, at), [["β", rows[0].beta]]),
@@ -79,7 +79,7 @@ function landscape(sheet, { slice, terms, tempered, plane, rug, marks, ends, sca
   sheet.marks(beta, markSpots.map((one) => ({ ...one, word: "" })));
 
   const groups = [...grouped(terms.map((row) => ({ ...row, name: [row.camera, row.term].filter(Boolean).join(" · ") })), "name")];
-  const part = sheet.plot({ ...three, top: 0, height }, { title: "By camera and term", unit: "log-likelihood beside its best, nats", names: groups.map(([name]) => name), x: x(), y: numbers("") });
+  const part = sheet.plot(three, { title: "By camera and term", unit: "log-likelihood beside its best, nats", names: groups.map(([name]) => name), x: x(), y: numbers("") });
   groups.forEach(([name, rows], index) => {
     const best = Math.max(...rows.map((row) => row.value).filter(Number.isFinite));
     const dim = at.camera !== null && rows[0].camera !== at.camera;
@@ -95,12 +95,12 @@ function landscape(sheet, { slice, terms, tempered, plane, rug, marks, ends, sca
 
 /** The landscape over two parameters. */
 function landscapePlane(sheet, { plane, rug, marks, scale: [{ level, most }] }, at, { height, put, unit }) {
-  const [one] = sheet.columns(1, { gutters: 70, right: 110 });
+  const [one] = sheet.columns(1, { height, gutters: 70, right: 110 });
   const [across, down] = [distinct(plane.map((row) => row.at)), distinct(plane.map((row) => row.second))];
   const high = Math.max(...plane.map((row) => row.log_weight).filter(Number.isFinite));
   const below = (value) => (value === null ? "-" : -signedDecades(high - value, level));
-  const plot = sheet.plot({ ...one, top: 0, height }, { title: "Log weight over two parameters", unit: `${at.label(at.parameter ?? "")}, ${screenUnit(unit)}, and another`, x: categories(across.map((value) => figure(put(value))), at.label(at.parameter ?? "")), y: categories(down.map((value) => figure(value)), "") });
-  sheet.heat(plot, { cells: plane.map((row) => [across.indexOf(row.at), down.indexOf(row.second), below(row.log_weight), row.log_weight]), low: -signedDecades(most, level), high: 0, framed: false, ends: ["best", `${nats(most)} less`], key: { left: one.left + one.width + 12, top: 40 }, tip: ({ value }) => tipOf(`${figure(put(across[value[0]]))}, ${figure(down[value[1]])}`, [["log weight", nats(value[3])]]) });
+  const plot = sheet.plot(one, { title: "Log weight over two parameters", unit: `${at.label(at.parameter ?? "")}, ${screenUnit(unit)}, and another`, x: categories(across.map((value) => figure(put(value))), at.label(at.parameter ?? "")), y: categories(down.map((value) => figure(value)), "") });
+  sheet.heat(plot, { cells: plane.map((row) => [across.indexOf(row.at), down.indexOf(row.second), below(row.log_weight), row.log_weight]), low: -signedDecades(most, level), high: 0, framed: false, ends: ["best", `${nats(most)} less`], key: KEY, tip: ({ value }) => tipOf(`${figure(put(across[value[0]]))}, ${figure(down[value[1]])}`, [["log weight", nats(value[3])]]) });
   const nearest = (values, value) => values.reduce((best, one, index) => (Math.abs(one - value) < Math.abs(values[best] - value) ? index : best), 0);
   const points = (name, rows, colour, size) => sheet.series(plot, { name, type: "scatter", symbolSize: size, itemStyle: { color: token(colour), opacity: 0.8 }, data: rows.filter((row) => Number.isFinite(row.at) && Number.isFinite(row.second)).map((row) => ({ value: [nearest(across, row.at), nearest(down, row.second)], row })), tip: ({ data: { row } }) => tipOf(row.name ?? `particle ${row.particle}`, [["log weight", nats(row.log_weight)]]) });
   points("particles", rug, "text", 3);
@@ -115,8 +115,9 @@ function blame(sheet, { matrix, left_out: leftOut, areas, scale: [{ level, most 
   const sources = distinct(matrix.map((row) => `${row.camera} · ${row.term}`));
   const bound = signedDecades(most, level);
   const height = Math.max(limbs.length * LIMB_ROW, at.room - 110);
-  const [one, two] = sheet.columns(2, { gutters: [124, 190], shares: [1.3, 1], right: 70 });
-  const plot = sheet.plot({ ...one, top: 0, height }, {
+  const shownMost = Math.max(6, Math.floor(height / LIMB_ROW));
+  const [one, two] = sheet.columns(2, { height, least: limbs.length * LIMB_ROW, gutters: [124, 190], shares: [1.3, 1], right: 70 });
+  const plot = sheet.plot(one, {
     title: "Pose less reference pose", unit: `nats, log scale; orange speaks for the pose, blue against it${tried ? "; ◤ stored, ◢ tried" : ""}`, below: 64,
     x: categories(sources, "", { axisLabel: { interval: 0, rotate: sources.length > 5 ? 28 : 0, fontSize: 10, width: 96, overflow: "truncate" } }), y: categories(limbs, "", { inverse: true, axisLabel: { interval: 0 } }),
   });
@@ -124,14 +125,14 @@ function blame(sheet, { matrix, left_out: leftOut, areas, scale: [{ level, most 
   const cellsOf = (list) => list.map((row) => [sources.indexOf(`${row.camera} · ${row.term}`), limbs.indexOf(row.limb), row.difference === null ? "-" : signedDecades(row.difference, level)]);
   sheet.splitHeat(plot, {
     cells: cellsOf(matrix), tried: tried && cellsOf(tried.matrix), low: -bound, high: bound, colours: ["less", "none", "more"],
-    ends: [`≥ ${figure(most)}`, `≤ −${figure(most)}`], key: { left: one.left + one.width + 12, top: 40 },
+    ends: [`≥ ${figure(most)}`, `≤ −${figure(most)}`], key: KEY,
     click: ({ value }) => { const row = rowOf.get(`${sources[value[0]]}/${limbs[value[1]]}`); return { limb: row.limb === WHOLE ? null : limbGroup(row.limb), camera: row.camera || null }; },
     tip: ({ value }) => { const row = rowOf.get(`${sources[value[0]]}/${limbs[value[1]]}`); const area = areas.find((one) => one.camera === row.camera && one.limb === row.limb); return tipOf(`${row.limb}: ${sources[value[0]]}`, [["at the pose", nats(row.value)], ["at the reference", nats(row.reference)], ["difference", nats(row.difference)], ...(area ? /** @type {[string, any][]} */ ([["body outside the silhouette", `${figure(area.outside)} mm²`], ["silhouette without body", `${figure(area.bare)} mm²`]]) : [])]); },
   });
   for (const limb of limbs) if (at.limb && isChosenLimb(limb, at.limb)) sheet.chosen(plot, { row: limbs.indexOf(limb) });
   const nameOf = (row) => `${[row.camera, row.term].filter(Boolean).join(" · ") || "all"}, ${row.factor === 0 ? "left out" : `counts ${figure(row.factor)}`}`;
-  const shown = [...leftOut].sort((a, b) => Math.abs(b.change ?? 0) - Math.abs(a.change ?? 0)).slice(0, Math.max(6, Math.floor(height / LIMB_ROW)));
-  const bars = sheet.plot({ ...two, top: 0, height: Math.min(height, Math.max(90, shown.length * 22)) }, { title: "When one counts less", unit: "change of preference for the pose, nats", x: numbers("", { scale: false }), y: categories(shown.map(nameOf), "", { inverse: true, axisLabel: { interval: 0, width: 180, overflow: "truncate" } }) });
+  const shown = [...leftOut].sort((a, b) => Math.abs(b.change ?? 0) - Math.abs(a.change ?? 0)).slice(0, shownMost);
+  const bars = sheet.plot({ ...two, height: Math.min(two.height, Math.max(90, shown.length * 22)) }, { title: "When one counts less", unit: "change of preference for the pose, nats", x: numbers("", { scale: false }), y: categories(shown.map(nameOf), "", { inverse: true, axisLabel: { interval: 0, width: 180, overflow: "truncate" } }) });
   const inTried = new Map((tried?.left_out ?? []).map((row) => [nameOf(row), row]));
   const lists = /** @type {[string, any[]][]} */ (tried ? [["stored", shown], ["tried", shown.map((row) => inTried.get(nameOf(row)) ?? { ...row, change: null })]] : [["", shown]]);
   for (const [name, list] of lists) sheet.series(bars, {
@@ -146,13 +147,12 @@ function blame(sheet, { matrix, left_out: leftOut, areas, scale: [{ level, most 
 /** Modes of a frame: the share of the weight that each cluster of the particles holds, by layer. */
 function modesOfFrame(sheet, tables, at) {
   const sides = sidesOf(tables, at);
-  const [one, two] = sheet.columns(2, { gutters: [52, 60], shares: [1.5, 1], right: 20 });
-  const height = Math.max(120, at.room - 76);
+  const [one, two] = sheet.columns(2, { height: Math.max(120, at.room - 76), gutters: [52, 60], shares: [1.5, 1], right: 20 });
   const layers = layersOfAll(sides, "layers");
   const all = (name) => sides.flatMap((side) => side.tables[name]);
   const modes = distinct([...all("modes"), ...all("layers")].map((row) => row.mode));
   const share = numbers("", { scale: false, min: 0, max: 1 });
-  const plot = sheet.plot({ ...one, top: 0, height }, {
+  const plot = sheet.plot(one, {
     title: "Share of the weight",
     unit: `of each mode, by layer${at.tried ? "; left stored, right tried" : ""}`,
     names: modes.map((mode) => `mode ${mode}`), y: share,
@@ -178,7 +178,7 @@ function modesOfFrame(sheet, tables, at) {
   }
   sheet.chosen(plot, { column: at.layer });
   const numbersOf = distinct(all("modes").map((row) => row.mode));
-  const bars = sheet.plot({ ...two, top: 0, height }, {
+  const bars = sheet.plot(two, {
     title: "Last layer", unit: "share of the weight; a click draws that mode's body",
     x: categories(numbersOf.map(String), "mode"), y: share,
   });
@@ -211,11 +211,10 @@ function modesOfFrame(sheet, tables, at) {
 
 /** Modes of the run: how many there are in each frame, and how far apart. */
 function modesOfRun(sheet, { frames: rows }, at) {
-  const places = sheet.columns(3, { gutters: 52 });
-  const height = Math.max(110, at.room - 76);
+  const places = sheet.columns(3, { height: Math.max(110, at.room - 76), gutters: 52 });
   const names = rows.map((row) => String(row.frame));
   for (const [column, title, unit, key, more] of /** @type {const} */ ([[0, "Modes", "clusters of the last set", "modes", { min: 0 }], [1, "Heaviest mode", "share of the weight", "first_mass", { min: 0, max: 1 }], [2, "Distance", "of the two heaviest, mm", "distance", { min: 0 }]])) {
-    const plot = sheet.plot({ ...places[column], top: 0, height }, { title, unit, x: categories(names, "frame"), y: numbers("", { scale: false, ...more }), over: (points) => tipOf(`frame ${points[0].axisValue}`, [[title, points[0].data], ["farthest limb", rows[points[0].dataIndex]?.farthest]]) });
+    const plot = sheet.plot(places[column], { title, unit, x: categories(names, "frame"), y: numbers("", { scale: false, ...more }), over: (points) => tipOf(`frame ${points[0].axisValue}`, [[title, points[0].data], ["farthest limb", rows[points[0].dataIndex]?.farthest]]) });
     sheet.line(plot, title, rows.map((row) => row[key]), token("accent"), { symbols: rows.length < 60, triggerLineEvent: true, click: ({ dataIndex }) => (dataIndex === undefined ? null : { frame: rows[dataIndex].frame }), stepped: key === "modes" });
     const found = at.tried?.frames.find((one) => one.frame === at.frame);
     if (found) sheet.series(plot, { name: "tried", type: "scatter", symbol: "diamond", symbolSize: 12, z: 5, itemStyle: { color: token("tried") }, data: [{ value: [String(at.frame), found[key]] }], tip: () => tipOf(`frame ${at.frame}, tried`, [[title, found[key]]]) });
@@ -227,10 +226,10 @@ function modesOfRun(sheet, { frames: rows }, at) {
 
 /** Seeds: what differs within a seed and between them, and whose particles lie where among all. */
 function seeds(sheet, { limbs, seeds: rows, ranks }, at) {
-  const [one, two, three] = sheet.columns(3, { gutters: [124, 54, 54], shares: [1.2, 1, 1.2], right: 18 });
   const height = Math.max(limbs.length * LIMB_ROW, at.room - 76);
+  const [one, two, three] = sheet.columns(3, { height, least: [limbs.length * LIMB_ROW, 0, 0], gutters: [124, 54, 54], shares: [1.2, 1, 1.2], right: 18 });
   const names = limbs.map((row) => row.limb);
-  const plot = sheet.plot({ ...one, top: 0, height }, { title: "Spread", unit: "mm", names: ["within a seed", "between seeds", "Monte-Carlo error"], x: numbers("", { scale: false }), y: categories(names, "", { inverse: true, axisLabel: { interval: 0 } }) });
+  const plot = sheet.plot(one, { title: "Spread", unit: "mm", names: ["within a seed", "between seeds", "Monte-Carlo error"], x: numbers("", { scale: false }), y: categories(names, "", { inverse: true, axisLabel: { interval: 0 } }) });
   const inTried = at.tried?.limbs?.length ? at.tried : null;
   const triedLimbs = inTried && names.map((limb) => inTried.limbs.find((row) => row.limb === limb) ?? { limb });
   const kinds = [["within a seed", "within", "text-quiet"], ["between seeds", "between", "series-1"], ["Monte-Carlo error", "error", "accent"]];
@@ -238,12 +237,12 @@ function seeds(sheet, { limbs, seeds: rows, ranks }, at) {
     sheet.series(plot, { name, type: "bar", barMaxWidth: 7, barGap: "10%", itemStyle: { color: token(colour), ...(border ? { borderColor: token(border), borderWidth: 1.5 } : {}) }, data: list.map((row) => ({ value: row[key], row })), click: ({ data }) => ({ limb: data.row.limb }), tip: ({ data: { row } }) => tipOf(row.limb, [["within a seed", `${figure(row.within)} mm`], ["between seeds", `${figure(row.between)} mm`], ["Monte-Carlo error of one seed", `${figure(row.error)} mm`], ["R̂", row.r_hat]]) });
   }
   sheet.chosen(plot, { row: at.limb && names.includes(at.limb) ? names.indexOf(at.limb) : null });
-  const bars = sheet.plot({ ...two, top: 0, height }, { title: "Each seed's log weight", unit: "nats", x: categories(rows.map((row) => String(row.seed)), "seed"), y: numbers("") });
+  const bars = sheet.plot(two, { title: "Each seed's log weight", unit: "nats", x: categories(rows.map((row) => String(row.seed)), "seed"), y: numbers("") });
   sheet.series(bars, { type: "scatter", symbolSize: 9, data: rows.map((row, index) => ({ value: [String(row.seed), row.log_weight], row, itemStyle: { color: seriesColour(index) } })), click: ({ data }) => ({ seed: data.row.seed }), tip: ({ data: { row } }) => tipOf(`seed ${row.seed}`, [["log weight", nats(row.log_weight)], ["error", row.error === null ? "–" : `${figure(row.error)} mm`], ["evaluations", row.evaluations]]) });
   if (inTried) sheet.series(bars, { name: "tried", type: "scatter", symbol: "diamond", symbolSize: 10, itemStyle: { color: token("tried") }, data: inTried.seeds.map((row) => ({ value: [String(row.seed), row.log_weight], row })), tip: ({ data: { row } }) => tipOf(`seed ${row.seed}, tried`, [["log weight", nats(row.log_weight)], ["error", row.error === null ? "–" : `${figure(row.error)} mm`]]) });
   const chosen = distinct(ranks.map((row) => row.parameter)).find((name) => name === at.parameter) ?? ranks[0]?.parameter;
   const own = ranks.filter((row) => row.parameter === chosen);
-  const rank = sheet.plot({ ...three, top: 0, height }, { title: `Ranks: ${chosen ? at.label(chosen) : ""}`, unit: "of each seed's particles among all; level where seeds agree", x: categories(distinct(own.map((row) => row.bin)).map((bin) => String(bin + 1)), "bin of rank"), y: numbers("", { scale: false, min: 0 }) });
+  const rank = sheet.plot(three, { title: `Ranks: ${chosen ? at.label(chosen) : ""}`, unit: "of each seed's particles among all; level where seeds agree", x: categories(distinct(own.map((row) => row.bin)).map((bin) => String(bin + 1)), "bin of rank"), y: numbers("", { scale: false, min: 0 }) });
   [...grouped(own, "seed")].forEach(([seed, entries], index) => { sheet.line(rank, `seed ${seed}`, entries.map((row) => row.count), seriesColour(index), { stepped: true, symbols: false, tip: () => tipOf(`seed ${seed}`, []) }); });
   if (own.length) sheet.marks(rank, [{ y: own[0].expected, word: "expected", dashed: true }]);
   const row = limbs.find((entry) => entry.limb === at.limb) ?? limbs.reduce((worst, entry) => ((entry.error ?? 0) > (worst?.error ?? -1) ? entry : worst), null);
@@ -252,11 +251,10 @@ function seeds(sheet, { limbs, seeds: rows, ranks }, at) {
 
 /** Coverage: spread against error, and the rank of the truth in the last set. */
 function coverage(sheet, { frames: rows, correlation, pit }, at) {
-  const [one, two] = sheet.columns(2, { gutters: [62, 56], shares: [1.25, 1], right: 20 });
-  const height = Math.max(120, at.room - 76);
+  const [one, two] = sheet.columns(2, { height: Math.max(120, at.room - 76), least: [220, 0], gutters: [62, 56], shares: [1.25, 1], right: 20 });
   const limbs = distinct(rows.map((row) => row.limb));
   const known = rows.filter((row) => row.spread > 0 && row.error > 0);
-  const plot = sheet.plot({ ...one, top: 0, height }, { title: "Spread and error", unit: "mm, log scales; on the line the spread is the error", names: [...limbs, ...(at.tried ? ["tried"] : [])], x: logarithmic("spread of the last set, mm"), y: logarithmic("") });
+  const plot = sheet.plot(one, { title: "Spread and error", unit: "mm, log scales; on the line the spread is the error", names: [...limbs, ...(at.tried ? ["tried"] : [])], x: logarithmic("spread of the last set, mm"), y: logarithmic("") });
   limbs.forEach((limb) => {
     const dim = at.limb !== null && at.limb !== limb;
     const { colour, symbol } = limbLook(limb, limbs);
@@ -270,7 +268,7 @@ function coverage(sheet, { frames: rows, correlation, pit }, at) {
   if (known.length) sheet.line(plot, "", [[bounds[0], bounds[0]], [bounds[1], bounds[1]]], token("text-quiet"), { dashed: true, symbols: false, silent: true });
   const limb = at.limb && pit.some((row) => row.limb === at.limb) ? at.limb : pit[0]?.limb;
   const own = pit.filter((row) => row.limb === limb);
-  const bars = sheet.plot({ ...two, top: 0, height }, { title: `Rank of the truth: ${limb ?? ""}`, unit: "level where the spread is right; band: 95 % of luck", x: categories(own.map((row) => String(row.bin + 1)), "bin of rank"), y: numbers("", { scale: false, min: 0 }) });
+  const bars = sheet.plot(two, { title: `Rank of the truth: ${limb ?? ""}`, unit: "level where the spread is right; band: 95 % of luck", x: categories(own.map((row) => String(row.bin + 1)), "bin of rank"), y: numbers("", { scale: false, min: 0 }) });
   sheet.series(bars, { type: "bar", barMaxWidth: 30, data: own.map((row) => ({ value: row.count, row, itemStyle: { color: token(row.count > row.upper ? "bad" : row.count < row.lower ? "warn" : "accent") } })), tip: ({ data: { row } }) => tipOf(`bin ${row.bin + 1}`, [["share", row.count], ["expected", row.expected], ["band", `${figure(row.lower)} to ${figure(row.upper)}`]]) });
   if (own.length) sheet.marks(bars, [{ y: own[0].expected, word: "expected" }, { y: own[0].lower, dashed: true }, { y: own[0].upper, dashed: true }]);
   const row = correlation.find((entry) => entry.limb === at.limb) ?? correlation[0];
@@ -280,12 +278,11 @@ function coverage(sheet, { frames: rows, correlation, pit }, at) {
 /** Weight and, with truth, error over the frames. */
 function overFrames(sheet, { frames: rows }, at) {
   const measured = rows.some((row) => row.error_mm !== null);
-  const places = sheet.columns(measured ? 3 : 2, { gutters: 62 });
-  const height = Math.max(110, at.room - 76);
+  const places = sheet.columns(measured ? 3 : 2, { height: Math.max(110, at.room - 76), gutters: 62 });
   const names = rows.map((row) => String(row.frame));
   const click = ({ dataIndex }) => (dataIndex === undefined ? null : { frame: rows[dataIndex].frame });
   const draw = (column, title, unit, key, colour, y) => {
-    const plot = sheet.plot({ ...places[column], top: 0, height }, { title, unit, x: categories(names, "frame"), y: numbers("", y), click: (x) => (rows[Math.round(x)] ? { frame: rows[Math.round(x)].frame } : null), over: (points) => tipOf(`frame ${points[0].axisValue}`, [[title, `${figure(points[0].data)} ${unit}`]]) });
+    const plot = sheet.plot(places[column], { title, unit, x: categories(names, "frame"), y: numbers("", y), click: (x) => (rows[Math.round(x)] ? { frame: rows[Math.round(x)].frame } : null), over: (points) => tipOf(`frame ${points[0].axisValue}`, [[title, `${figure(points[0].data)} ${unit}`]]) });
     sheet.line(plot, title, rows.map((row) => row[key]), token(colour), { symbols: rows.length < 3, triggerLineEvent: true, click });
     sheet.chosen(plot, { column: String(at.frame) });
   };

@@ -6,7 +6,7 @@ import { layerAxis, layerInSearch, layerNumber, layerValue } from "./layer_axis.
 import { layerWords, searchName } from "./studio/shown_layers.js";
 import { layerColour } from "./theme.js";
 import {
-  byLayer, categories, distinct, extent, grouped, layersOfAll, logarithmic, numbers, onScreen, screenUnit, sidesOf, tipOf, withUnit,
+  byLayer, categories, distinct, extent, grouped, KEY, layersOfAll, logarithmic, NARROW, numbers, onScreen, screenUnit, sidesOf, tipOf, withUnit,
 } from "./view_sheet.js";
 
 /** @import { Sheet } from "./view_sheet.js" */
@@ -34,8 +34,6 @@ function parameterAxis(names, at) {
 
 /** Decades below the first layer's variance that a colour tells apart: the same in every frame and run. */
 const DECADES = 3;
-/** Pixels below which what stands side by side stands one below the other. */
-const NARROW = 640;
 
 /** Variance reduction of a frame: two maps that share one scale, and the chosen parameter over the layers. */
 function varianceOfFrame(sheet, tables, at) {
@@ -57,10 +55,8 @@ function varianceOfFrame(sheet, tables, at) {
   const shape = isNarrow
     ? { gutters: [142, -36], right: 58 }
     : { gutters: [142, 26, 112], shares: [1, 1, 1.1], right: 14 };
-  const [one, two, aside] = sheet.columns(isNarrow ? 2 : 3, shape);
-  const three = isNarrow
-    ? { left: one.left, width: sheet.width - one.left - 24, top: height + 64, height: 120 }
-    : { ...aside, top: 0, height: Math.max(90, at.room - 84) };
+  const [one, two, aside] = sheet.columns(isNarrow ? 2 : 3, { ...shape, height: [height, height, Math.max(90, at.room - 84)], stacks: false });
+  const three = aside ?? { left: one.left, width: sheet.width - one.left - 24, height: 120, isBelow: true };
   const rowAt = (list, layer, place) =>
     list?.find((entry) => entry.layer === layer && entry.parameter === names[place]);
   const maps = /** @type {const} */ ([
@@ -68,7 +64,7 @@ function varianceOfFrame(sheet, tables, at) {
     [two, "after", "After noise", false],
   ]);
   for (const [column, key, title, isLeft] of maps) {
-    const plot = sheet.plot({ ...column, top: 0, height }, {
+    const plot = sheet.plot(column, {
       title,
       unit: isLeft ? `share of the first layer's variance${tried ? "; ◤ stored, ◢ tried" : ""}` : "",
       below: 12,
@@ -81,9 +77,7 @@ function varianceOfFrame(sheet, tables, at) {
       cells: cellsOf(rows), tried: tried && cellsOf(tried), low: -DECADES, high: 0,
       framed: layers.length <= FEW && names.length <= 2 * FEW,
       ends: ["100 %", `${figure(100 * 10 ** -DECADES)} %`],
-      key: isLeft
-        ? null
-        : { left: two.left + two.width + 10, top: 46, height: Math.min(90, height - 40) },
+      key: isLeft ? 0 : Math.min(90, height - 40),
       click: ({ value }) => ({ layer: value[0], parameter: names[value[1]] }),
       tip: ({ value: [layer, place] }) => {
         const [row, other] = [rowAt(rows, layer, place), rowAt(tried, layer, place)];
@@ -167,21 +161,21 @@ function varianceOfRun(sheet, { last, parameter: searched }, at) {
   const cells = last.flatMap((row, column) => names.map((name, place) => [column, place, medians.get(name) > 0 ? decades(row[name] / medians.get(name)) ?? "-" : "-"]));
   const bound = DECADES_BESIDE;
   const height = Math.max(names.length * ROW, at.room - 60);
-  const [one, two] = sheet.columns(2, { gutters: [142, 92], shares: [1.5, 1], right: 16 });
-  const whole = sheet.plot({ ...one, top: 0, height }, { title: "Last set, by frame", unit: "variance beside the run's median, log scale", below: 12, x: aboveMap(frames.map(String)), y: parameterAxis(names, at) });
+  const [one, two] = sheet.columns(2, { height, least: [names.length * ROW, 0], gutters: [142, 92], shares: [1.5, 1], right: 16 });
+  const whole = sheet.plot({ ...one, width: one.width - (one.isBelow ? 50 : 0) }, { title: "Last set, by frame", unit: "variance beside the run's median, log scale", below: 12, x: aboveMap(frames.map(String)), y: parameterAxis(names, at) });
   sheet.heat(whole, {
-    cells, low: -bound, high: bound, colours: ["less", "none", "more"], framed: false, ends: [`≥ ${figure(10 ** bound)}×`, `≤ ÷ ${figure(10 ** bound)}`], key: { left: one.left + one.width + 10, top: 40 },
+    cells, low: -bound, high: bound, colours: ["less", "none", "more"], framed: false, ends: [`≥ ${figure(10 ** bound)}×`, `≤ ÷ ${figure(10 ** bound)}`], key: KEY,
     click: ({ value }) => ({ frame: frames[value[0]], parameter: names[value[1]] }),
     tip: ({ value }) => tipOf(`${at.label(names[value[1]])}, frame ${frames[value[0]]}`, [["variance", last[value[0]][names[value[1]]]], ["run's median", medians.get(names[value[1]])]]),
   });
   sheet.chosen(whole, { column: frames.indexOf(at.frame), row: at.parameter ? names.indexOf(at.parameter) : null });
-  if (!parameter.length) { sheet.words("Choose a parameter: a click on its row shows it layer by layer over the frames.", two.left, 40, two.width); return ""; }
+  if (!parameter.length) { sheet.words("Choose a parameter: a click on its row shows it layer by layer over the frames.", two); return ""; }
   const levels = Math.max(...parameter.map((row) => row.step)) + 1;
   const own = distinct(parameter.map((row) => row.frame));
   // As in a frame's map: shares of what its first layer's set has.
   const first = new Map(parameter.filter((row) => row.step === 0).map((row) => [row.frame, row.weighed]));
   const shareOf = (row) => (first.get(row.frame) > 0 ? decades(row.before / first.get(row.frame)) ?? "-" : "-");
-  const plot = sheet.plot({ ...two, top: 0, height }, { title: at.label(at.parameter ?? ""), unit: "before noise, share of each first layer's variance", x: categories(own.map(String), "frame"), y: categories(Array.from({ length: levels }, (_, layer) => layerValue(layer)), "layer", { inverse: true, nameGap: 24 }) });
+  const plot = sheet.plot(two, { title: at.label(at.parameter ?? ""), unit: "before noise, share of each first layer's variance", x: categories(own.map(String), "frame"), y: categories(Array.from({ length: levels }, (_, layer) => layerValue(layer)), "layer", { inverse: true, nameGap: 24 }) });
   sheet.heat(plot, {
     cells: parameter.map((row) => [own.indexOf(row.frame), row.step, shareOf(row), row.layer, row.before]), low: -DECADES, high: 0, framed: false,
     click: ({ value }) => ({ frame: own[value[0]], layer: value[3] }), tip: ({ value }) => tipOf(`frame ${own[value[0]]}, layer ${value[1] + 1}`, [["before noise", value[4]], ["of the first", `${figure(100 * 10 ** value[2])} %`]]),
@@ -199,7 +193,7 @@ function scheduleOfFrame(sheet, tables, at) {
   const above = at.tried ? 18 : 0;
   const whole = Math.max(120, at.room - 76 - above);
   const height = isNarrow ? Math.max(100, (at.room - 152 - above) / 2) : whole;
-  const columns = sheet.columns(isNarrow ? 2 : 4, { gutters: 52, right: 10 });
+  const columns = sheet.columns(isNarrow ? 2 : 4, { height, gutters: 52, right: 10, stacks: false });
   const places = [0, 1, 2, 3].map((place) => ({
     ...columns[place % columns.length],
     top: above + (place < columns.length ? 0 : height + 76),
@@ -208,9 +202,8 @@ function scheduleOfFrame(sheet, tables, at) {
   const has = (key) => sides.some((side) => side.tables.layers.some((row) => row[key] !== null));
   /** @param {[string, string, string, any][]} kinds name, key, colour of one side alone, style */
   const draw = (column, title, unit, y, kinds) => {
-    const box = { ...places[column], height };
     const x = layerAxis(layers, at);
-    const plot = sheet.plot(box, { title, unit, x, y, over: tipOfLayer(at) });
+    const plot = sheet.plot(places[column], { title, unit, x, y, over: tipOfLayer(at) });
     for (const { name: side, tables: own, colour } of sides) {
       for (const [name, key, alone, more] of kinds) {
         const data = byLayer(own.layers, layers, key);
@@ -249,7 +242,7 @@ function scheduleOfFrame(sheet, tables, at) {
   const spent = sides.map(({ tables: own }) =>
     figure(own.layers.reduce((sum, row) => sum + (row.milliseconds ?? 0), 0)),
   );
-  const plot = sheet.plot({ ...places[3], height }, {
+  const plot = sheet.plot(places[3], {
     title: "Time", unit: `${spent.join(" and ")} ms in all`, x: layerAxis(layers, at),
     y: numbers("", { scale: false }),
   });
@@ -275,12 +268,11 @@ function scheduleOfFrame(sheet, tables, at) {
 
 /** Schedule of the run: the ends of each frame's annealing over the frames. */
 function scheduleOfRun(sheet, { frames: rows }, at) {
-  const places = sheet.columns(3, { gutters: 58 });
-  const height = Math.max(110, at.room - 76);
+  const places = sheet.columns(3, { height: Math.max(110, at.room - 76) });
   const names = rows.map((row) => String(row.frame));
   const click = ({ dataIndex }) => ({ frame: rows[dataIndex].frame });
   const draw = (column, title, unit, y, lines) => {
-    const plot = sheet.plot({ ...places[column], top: 0, height }, { title, unit, x: categories(names, "frame"), y, over: (points) => tipOf(`frame ${points[0].axisValue}`, points.filter((point) => point.data !== undefined).map((point) => [point.seriesName, point.data?.value ?? point.data])) });
+    const plot = sheet.plot(places[column], { title, unit, x: categories(names, "frame"), y, over: (points) => tipOf(`frame ${points[0].axisValue}`, points.filter((point) => point.data !== undefined).map((point) => [point.seriesName, point.data?.value ?? point.data])) });
     for (const [name, key, colour] of lines) sheet.line(plot, name, rows.map((row) => row[key]), token(colour), { symbols: rows.length < 3, click, triggerLineEvent: true });
     sheet.chosen(plot, { column: String(at.frame) });
   };
@@ -321,10 +313,10 @@ function tipOfParticle(row, side, /** @type {At} */ at) {
 function genealogy(sheet, tables, at) {
   const sides = sidesOf(tables, at);
   const layers = layersOfAll(sides, "particles");
-  const [one, two] = sheet.columns(2, { gutters: [at.tried ? 48 : 30, 62], shares: [2.4, 1] });
   const height = Math.max(130, at.room - 76);
+  const [one, two] = sheet.columns(2, { height, least: [220, 0], gutters: [at.tried ? 48 : 30, 62], shares: [2.4, 1] });
   const bands = sides.length;
-  const plot = sheet.plot({ ...one, top: 0, height }, {
+  const plot = sheet.plot(one, {
     title: "Particles and their parents",
     unit: "bright: has descendants in the last layer; dashed: crossover's second parent",
     x: layerAxis(layers, at, { axisLine: { onZero: false } }),
@@ -382,7 +374,7 @@ function genealogy(sheet, tables, at) {
     });
   });
   sheet.chosen(plot, { column: at.layer });
-  const count = sheet.plot({ ...two, top: 0, height }, {
+  const count = sheet.plot(two, {
     title: "Distinct ancestors", unit: "in the first set, log scale; dashed: with descendants",
     x: layerAxis(layers, at), y: logarithmic("", { min: 1 }), over: tipOfLayer(at),
   });
@@ -411,11 +403,10 @@ function genealogy(sheet, tables, at) {
 function weights(sheet, tables, at) {
   const sides = sidesOf(tables, at);
   const layers = layersOfAll(sides, "layers");
-  const [one, two, three] = sheet.columns(3, { gutters: [60, 56, 50], shares: [1.5, 1, 1] });
-  const height = Math.max(120, at.room - 76);
+  const [one, two, three] = sheet.columns(3, { height: Math.max(120, at.room - 76), gutters: [60, 56, 50], shares: [1.5, 1, 1] });
   const layer = tables.sorted[0]?.layer ?? at.layer ?? 0;
   const shown = sides.map(({ tables: own }) => layerInSearch(own.sorted[0]?.layer ?? 0, at));
-  const plot = sheet.plot({ ...one, top: 0, height }, {
+  const plot = sheet.plot(one, {
     title: `Weights of ${distinct(shown).join(" and ")}`, unit: "largest first, log scales",
     names: at.tried ? ["stored", "tried"] : null,
     x: logarithmic("rank", { min: 1, nameGap: 20 }), y: logarithmic(),
@@ -441,7 +432,7 @@ function weights(sheet, tables, at) {
   const click = ({ dataIndex }) => ({ layer: layers[dataIndex] });
   const draw = (place, title, unit, key, y, marks = []) => {
     const x = layerAxis(layers, at);
-    const drawn = sheet.plot({ ...place, top: 0, height }, { title, unit, x, y, over: tipOfLayer(at) });
+    const drawn = sheet.plot(place, { title, unit, x, y, over: tipOfLayer(at) });
     sheet.marks(drawn, marks);
     for (const { name, tables: own, colour } of sides) {
       const data = byLayer(own.layers, layers, key);
@@ -471,13 +462,13 @@ function clouds(sheet, { summary, own: steps, ridges, marks }, at) {
   const marked = new Map(marks.map((row) => [row.parameter, row]));
   const chosen = ridges[0]?.parameter ?? names[0];
   const height = Math.max(names.length * ROW, at.room - 76);
-  const [one, two] = sheet.columns(2, { gutters: [142, 40], shares: [1.15, 1] });
+  const [one, two] = sheet.columns(2, { height: [height, Math.max(90, at.room - 66)], least: [names.length * ROW, 260], gutters: [142, 40], shares: [1.15, 1] });
   const places = new Map(names.map((name) => {
     const first = byParameter.get(name)[0];
     const half = (first.q95 - first.q05) / 2;
     return [name, (value) => (half > 0 && Number.isFinite(value) ? (value - first.median) / half : null)];
   }));
-  const all = sheet.plot({ ...one, top: 0, height }, { title: "5 % to 95 % of the particles", unit: "in half widths of the first cloud", names: ["first cloud", "last cloud", ...(tried ? ["tried"] : []), "estimate", "truth"], below: 12, x: numbers("", { scale: false, min: -2, max: 2, interval: 1, position: "top" }), y: parameterAxis(names, at) });
+  const all = sheet.plot(one, { title: "5 % to 95 % of the particles", unit: "in half widths of the first cloud", names: ["first cloud", "last cloud", ...(tried ? ["tried"] : []), "estimate", "truth"], below: 12, x: numbers("", { scale: false, min: -2, max: 2, interval: 1, position: "top" }), y: parameterAxis(names, at) });
   const bar = (name, which, colour, thickness, lower = 0) => sheet.series(all, {
     name, type: "custom", encode: { x: [0, 1], y: 2 }, clip: true, itemStyle: { color: token(colour) },
     data: names.flatMap((parameter, row) => { const own = which(byParameter.get(parameter), parameter); const place = places.get(parameter); const ends = [place(own.q05), place(own.q95)]; return ends[0] === null ? [] : [{ value: [...ends, row], own }]; }),
@@ -509,7 +500,7 @@ function clouds(sheet, { summary, own: steps, ridges, marks }, at) {
   const { unit, lower, upper, estimate, truth } = marked.get(chosen) ?? { unit: "" };
   const [least, greatest] = extent([...ridges, ...(tried?.ridges ?? [])].map((row) => row.value));
   const nameOf = (set) => (set < 0 ? "drawn" : layerNumber(set, at));
-  const plot = sheet.plot({ ...two, top: 0, height: Math.max(90, at.room - 66) }, {
+  const plot = sheet.plot(two, {
     title: at.label(chosen), unit: `${screenUnit(unit)}, density of each layer's set`, x: numbers("", { scale: false, min: onScreen(least, unit), max: onScreen(greatest, unit), axisLabel: { formatter: (value) => figure(value), hideOverlap: true, showMinLabel: false, showMaxLabel: false } }),
     y: { ...numbers("", {}), scale: false, min: 0, max: own.length, interval: 1, axisLabel: { formatter: (value) => (own[own.length - 1 - value] ? nameOf(own[own.length - 1 - value][0]) : ""), hideOverlap: true }, splitLine: { show: false } },
   });
@@ -551,12 +542,12 @@ function coupling(sheet, { matrix, order, particles }, at) {
   const tried = at.tried;
   const names = [...order].sort((a, b) => a.place - b.place).map((row) => row.parameter);
   const size = Math.max(at.room - 76, Math.min(names.length * 12, 520));
-  const [one, two] = sheet.columns(2, { gutters: [142, 30], shares: [1, 1.15] });
-  const plot = sheet.plot({ left: one.left, width: one.width - 50, top: 0, height: size }, { title: "Correlation", unit: `in the order of settling${tried ? "; ◤ stored, ◢ tried" : ""}`, below: 16, x: categories(names, "", { axisLabel: { show: false } }), y: parameterAxis(names, at) });
+  const [one, two] = sheet.columns(2, { height: size, least: Math.min(names.length * 12, 520), gutters: [142, 30], shares: [1, 1.15] });
+  const plot = sheet.plot({ ...one, width: one.width - 50 }, { title: "Correlation", unit: `in the order of settling${tried ? "; ◤ stored, ◢ tried" : ""}`, below: 16, x: categories(names, "", { axisLabel: { show: false } }), y: parameterAxis(names, at) });
   const cellsOf = (list) => list.map((row) => [names.indexOf(row.second), names.indexOf(row.first), row.correlation ?? "-"]);
   sheet.splitHeat(plot, {
     cells: cellsOf(matrix), tried: tried && cellsOf(tried.matrix),
-    low: -1, high: 1, colours: ["less", "none", "more"], ends: ["+1", "−1"], key: { left: one.left + one.width - 40, top: 40 }, framed: names.length < FEW,
+    low: -1, high: 1, colours: ["less", "none", "more"], ends: ["+1", "−1"], key: KEY, framed: names.length < FEW,
     click: ({ value }) => ({ parameter: names[value[1]] }), tip: ({ value }) => tipOf(`${at.label(names[value[1]])} × ${at.label(names[value[0]])}`, [[value[3] === undefined ? "correlation" : value[3] ? "correlation, tried" : "correlation, stored", value[2]]]),
   });
   const of = (row) => Math.abs(row.correlation ?? 0);
@@ -567,10 +558,11 @@ function coupling(sheet, { matrix, order, particles }, at) {
   const partners = distinct(pairs.filter((row) => [row.first, row.second].includes(chosen)).sort((a, b) => of(b) - of(a)).map((row) => (row.first === chosen ? row.second : row.first))).slice(0, 6);
   const unitOf = (name) => order.find((row) => row.parameter === name)?.unit ?? "";
   const [across, down] = two.width > 560 ? [3, 2] : [2, 3];
-  const [width, height] = [two.width / across - 44, size / down - 60];
+  const [width, height] = [two.width / across - 44, two.height / down - 60];
+  const start = two.isBelow ? sheet.height : 0;
   const most = Math.max(...particles.map((row) => row.weight ?? 0)) || 1;
   partners.slice(0, across * down).forEach((partner, index) => {
-    const small = sheet.plot({ left: two.left + 20 + (index % across) * (width + 44), top: Math.floor(index / across) * (height + 60), width, height: Math.max(40, height) }, {
+    const small = sheet.plot({ left: two.left + 20 + (index % across) * (width + 44), top: start + Math.floor(index / across) * (Math.max(40, height) + 60), width, height: Math.max(40, height) }, {
       title: at.label(partner), unit: figure(pairs.find((row) => [row.first, row.second].includes(partner) && [row.first, row.second].includes(chosen))?.correlation), x: numbers("", { axisLabel: { show: false }, splitLine: { show: false } }), y: numbers("", { axisLabel: { show: false }, splitLine: { show: false } }), below: 12,
     });
     for (const [cloud, name, colour] of tried ? [[particles, "stored", "stored"], [tried.particles, "tried", "tried"]] : [[particles, "", "accent"]]) sheet.series(small, {
@@ -579,27 +571,29 @@ function coupling(sheet, { matrix, order, particles }, at) {
       tip: ({ data: { row } }) => tipOf(`particle ${row.particle}`, [[at.label(chosen), withUnit(row[chosen], unitOf(chosen))], [at.label(partner), withUnit(row[partner], unitOf(partner))], ["weight", `${figure(100 * row.weight)} %`]]),
     });
   });
-  if (!partners.length) sheet.words("Nothing moves together with this parameter.", two.left, 40, two.width);
+  if (!partners.length) sheet.words("Nothing moves together with this parameter.", two);
   const withChosen = (list, name) => figure(list.find((row) => row.first !== row.second && [name, chosen].includes(row.first) && [name, chosen].includes(row.second))?.correlation);
   return `${at.label(chosen)} against ${partners.slice(0, 3).map((name) => `${at.label(name)} (${withChosen(matrix, name)}${tried ? `, tried ${withChosen(tried.matrix, name)}` : ""})`).join(", ")}.`;
 }
 
 const MOST_AXES = 14;
+const AXIS_ROOM = 56;
 const MOST_LINES = 300;
 
 /** Survivors and dead: parallel coordinates of a layer's particles, and how far the two groups lie apart. */
 function survivors(sheet, { particles, difference }, at) {
   const tried = at.tried;
   const ranked = [...difference].sort((a, b) => Math.abs(b.difference ?? 0) - Math.abs(a.difference ?? 0));
-  const names = ranked.slice(0, MOST_AXES).map((row) => row.parameter);
   const unitOf = (name) => difference.find((row) => row.parameter === name)?.unit ?? "";
-  const [one, two] = sheet.columns(2, { gutters: [24, 150], shares: [2.3, 1], right: 20 });
   const height = Math.max(150, at.room - 92);
+  const [one, two] = sheet.columns(2, { height: Math.max(height, MOST_AXES * 14), least: [200, MOST_AXES * 14], gutters: [24, 150], shares: [2.3, 1], right: 20 });
+  const names = ranked.slice(0, Math.min(MOST_AXES, Math.floor(one.width / AXIS_ROOM))).map((row) => row.parameter);
   sheet.heading("Particles of the layer", `${tried ? "survivors, stored and tried" : "coloured: survive, grey: die"}; the parameters that differ most first`, one.left, 0);
   const heaviest = (list) => [...list].sort((a, b) => a.rank - b.rank).slice(0, MOST_LINES);
   const kept = heaviest(particles);
-  sheet.option.parallel = { left: one.left + 10, top: 74, width: one.width - 30, height: height - 46, parallelAxisDefault: { type: "value", scale: true, nameTextStyle: { color: token("text-quiet"), fontSize: 10, width: 74, overflow: "truncate" }, axisLine: { lineStyle: { color: token("line-strong") } }, axisTick: { show: false }, axisLabel: { show: false }, splitLine: { show: false } } };
+  sheet.option.parallel = { left: one.left + 10, top: 74, width: one.width - 30, height: (one.isBelow ? one.height : height) - 46, parallelAxisDefault: { type: "value", scale: true, nameTextStyle: { color: token("text-quiet"), fontSize: 10, width: 74, overflow: "truncate" }, axisLine: { lineStyle: { color: token("line-strong") } }, axisTick: { show: false }, axisLabel: { show: false }, splitLine: { show: false } } };
   sheet.option.parallelAxis = [...names.map((name, dim) => ({ dim, name: at.label(name), nameRotate: names.length > 7 ? 18 : 0, nameGap: 12, nameLocation: "end", axisLabel: { formatter: () => "" } })), { dim: names.length, name: "log weight", nameRotate: names.length > 7 ? 18 : 0, nameGap: 12, nameLocation: "end", axisLabel: { formatter: () => "" } }];
+  sheet.height = Math.max(sheet.height, 74 + (one.isBelow ? one.height : height) - 30);
   const lines = (name, chosen, style, z, list = kept) => {
     const own = list.filter(chosen);
     const id = `p${sheet.option.series.length}`;
@@ -612,7 +606,7 @@ function survivors(sheet, { particles, difference }, at) {
   lines(tried ? "stored" : "survivors", (row) => row.survives, style(tried ? token("stored") : alone), 2);
   if (tried) lines("tried", (row) => row.survives, style(token("tried")), 3, heaviest(tried.particles));
   const shown = ranked.slice(0, MOST_AXES).map((row) => row.parameter);
-  const plot = sheet.plot({ ...two, top: 0, height: Math.max(height, shown.length * 14) }, { title: "Survivors less dead", unit: "in deviations of the layer", x: numbers("", { scale: false }), y: parameterAxis(shown, at) });
+  const plot = sheet.plot(two, { title: "Survivors less dead", unit: "in deviations of the layer", x: numbers("", { scale: false }), y: parameterAxis(shown, at) });
   const byName = tried && new Map(tried.difference.map((row) => [row.parameter, row]));
   for (const [name, list] of /** @type {[string, any[]][]} */ (tried ? [["stored", ranked], ["tried", ranked.map((row) => byName.get(row.parameter))]] : [["", ranked]])) sheet.series(plot, {
     name, type: "bar", barMaxWidth: 10, data: list.slice(0, MOST_AXES).map((row) => ({ value: row.difference, row, itemStyle: { color: token(name || ((row.difference ?? 0) < 0 ? "less" : "more")), opacity: (row.p_value ?? 1) < 0.05 ? 1 : 0.35 } })),

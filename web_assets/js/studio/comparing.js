@@ -12,7 +12,7 @@ import { comparedRuns as others, goTo, MOST_COMPARED as MOST, select } from "../
 import { openSession } from "../sessions.js";
 import { get, set, watch } from "../state.js";
 import { records } from "../view_sheet.js";
-import { drawCompared, lastSearch } from "./comparing_drawing.js";
+import { coloursOf, drawCompared, lastSearch } from "./comparing_drawing.js";
 import { follow, html, signal } from "./component.js";
 import { FigurePlace } from "./figure_place.js";
 import { showPanel } from "./panels.js";
@@ -37,9 +37,12 @@ const wrong = signal("");
 const own = () => `${get("session")}/${get("run")}`;
 const partsOf = (name) => name.split("/");
 
-/** The runs that have frames, those of the session first, as fields of a form. */
+/** The runs of the same body that have frames, those of the session first, as fields of a form. */
 function runFields(session, run, chosen) {
-  return (get("sessions") ?? [])
+  const sessions = get("sessions") ?? [];
+  const body = sessions.find((entry) => entry.name === session)?.body;
+  return sessions
+    .filter((entry) => entry.body === body)
     .flatMap((entry) => entry.runs.map((one) => ({ entry, one })))
     .filter(({ one, entry }) => one.done > 0 && !(entry.name === session && one.name === run))
     .sort((a, b) => Number(b.entry.name === session) - Number(a.entry.name === session))
@@ -55,7 +58,7 @@ function runFields(session, run, chosen) {
 export function compareForm(session, run) {
   const isOpen = session === get("session") && run === get("run");
   const fields = runFields(session, run, isOpen ? others() : []);
-  const none = "There is no other run that has frames.";
+  const none = "There is no other run of this body that has frames.";
   openForm({
     heading: `Compare ${run} with`,
     intro: fields.length ? `One to ${MOST - 1} stored runs.` : none,
@@ -128,10 +131,11 @@ async function loadFrames(names) {
     if (frame !== get("frame")) return;
     frames.value = { key, runs };
   }
+  const colours = coloursOf(names);
   drawBeside(
     frames.value.runs
       .slice(1)
-      .flatMap(({ pose }, at) => (pose ? [{ colour: `series-${at + 1}`, pose }] : [])),
+      .flatMap(({ run, pose }) => (pose ? [{ colour: `series-${colours.get(run)}`, pose }] : [])),
   );
 }
 
@@ -142,8 +146,8 @@ function open(name) {
   openSession(session, run, { frame: get("frame"), compared: beside, panel: "compare" });
 }
 
-/** The worst frame of each run. @param {{ rows: any[] }} properties */
-const Worst = ({ rows }) => html`<table class="figures compared">
+/** The worst frame of each run. @param {{ rows: any[], colours: Map<string, number> }} properties */
+const Worst = ({ rows, colours }) => html`<table class="figures compared">
   <thead>
     <tr>
       ${["Run", "Worst frame", "Error", "Limb"].map((head) => html`<th key=${head}>${head}</th>`)}
@@ -154,7 +158,7 @@ const Worst = ({ rows }) => html`<table class="figures compared">
       ({ run, frame, error, limb }, at) =>
         html`<tr key=${run}>
           <td>
-            <i class="swatch" style=${{ background: `var(--${seriesToken(at)})` }}></i>
+            <i class="swatch" style=${{ background: `var(--${seriesToken(colours.get(run) ?? 0)})` }}></i>
             ${
               at
                 ? html`<button
@@ -226,7 +230,7 @@ function Words({ answer: { runs, tables } }) {
       <button type="button" class="small" onClick=${chooseHere}>Choose…</button>
       <button type="button" class="quiet small" onClick=${end}>End</button>
     </div>
-    <${Worst} rows=${records(named("worst"))} />
+    <${Worst} rows=${records(named("worst"))} colours=${coloursOf(runs)} />
     <h3>Settings that differ</h3>
     <${Settings} runs=${runs} rows=${named("settings")?.rows ?? []} />
   `;

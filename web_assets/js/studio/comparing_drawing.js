@@ -17,6 +17,13 @@ const tipOfLayer = (points) =>
   );
 
 /**
+ * The colour's number of each run: it stays with the run, whichever of them is open.
+ * @param {string[]} runs
+ * @returns {Map<string, number>}
+ */
+export const coloursOf = (runs) => new Map([...runs].sort().map((run, at) => [run, at]));
+
+/**
  * How many layers are drawn: a swarm's have no effective number, as many as it has do not squeeze
  * the others' together.
  */
@@ -53,68 +60,60 @@ export function drawCompared(sheet, { curves, runs, frame: shown, layer, layered
   const all = distinct(curves.map((row) => row.frame)).sort((a, b) => a - b);
   const measured = new Map(curves.map((row) => [`${row.run}/${row.frame}`, row[key]]));
   const measuredAt = (run, frame) => measured.get(`${run}/${frame}`) ?? null;
-  const places = sheet.columns(3, { gutters: 58 });
-  const height = Math.max(110, room - 76);
+  const [first, second, third] = sheet.columns(3, { height: Math.max(110, room - 76) });
   const names = all.map(String);
   const toFrame = (at) => (all[at] === undefined ? null : { frame: all[at] });
   const click = ({ dataIndex }) => toFrame(dataIndex);
   const common = { over: tipOfFrame, click: (x) => toFrame(Math.round(x)) };
   const symbols = all.length < 3;
+  const colours = coloursOf(runs);
+  const colourOf = (/** @type {string} */ run) => seriesColour(colours.get(run) ?? 0);
 
-  const plot = sheet.plot(
-    { ...places[0], top: 0, height },
-    {
-      ...common,
-      title: "Over the frames",
-      unit,
-      names: runs,
-      x: categories(names, "frame"),
-      y: numbers("", key === "error" ? { scale: false, min: 0 } : {}),
-    },
-  );
-  runs.forEach((run, at) => {
+  const plot = sheet.plot(first, {
+    ...common,
+    title: "Over the frames",
+    unit,
+    names: runs,
+    x: categories(names, "frame"),
+    y: numbers("", key === "error" ? { scale: false, min: 0 } : {}),
+  });
+  runs.forEach((run) => {
     const values = all.map((frame) => measuredAt(run, frame));
-    sheet.line(plot, run, values, seriesColour(at), { symbols, click });
+    sheet.line(plot, run, values, colourOf(run), { symbols, click });
   });
 
   const nearer = key === "error" ? "nearer" : "lower";
-  const difference = sheet.plot(
-    { ...places[1], top: 0, height },
-    {
-      ...common,
-      title: "Difference",
-      unit: `from ${runs[0]}; below 0 the other is ${nearer}`,
-      x: categories(names, "frame"),
-      y: numbers("", { scale: false }),
-    },
-  );
+  const difference = sheet.plot(second, {
+    ...common,
+    title: "Difference",
+    unit: `from ${runs[0]}; below 0 the other is ${nearer}`,
+    x: categories(names, "frame"),
+    y: numbers("", { scale: false }),
+  });
   sheet.marks(difference, [{ y: 0 }]);
-  runs.slice(1).forEach((run, at) => {
+  runs.slice(1).forEach((run) => {
     const values = all.map((frame) => {
       const [one, other] = [measuredAt(runs[0], frame), measuredAt(run, frame)];
       return one === null || other === null ? null : other - one;
     });
-    sheet.line(difference, run, values, seriesColour(at + 1), { symbols, click });
+    sheet.line(difference, run, values, colourOf(run), { symbols, click });
   });
   for (const one of [plot, difference]) sheet.chosen(one, { column: String(shown) });
 
   const most = layersOf(layered);
   const layerNames = Array.from({ length: most }, (_, at) => String(at + 1));
-  const layers = sheet.plot(
-    { ...places[2], top: 0, height },
-    {
-      title: "Effective number",
-      unit: `by layer of the last search, frame ${shown}, log scale`,
-      x: categories(layerNames, "layer"),
-      y: logarithmic("", { min: 1 }),
-      over: tipOfLayer,
-    },
-  );
+  const layers = sheet.plot(third, {
+    title: "Effective number",
+    unit: `by layer of the last search, frame ${shown}, log scale`,
+    x: categories(layerNames, "layer"),
+    y: logarithmic("", { min: 1 }),
+    over: tipOfLayer,
+  });
   const own = layered[0]?.layers ?? [];
   const toLayer = ({ dataIndex }) => ({ layer: own[dataIndex]?.chosen ?? null });
   for (const { run, layers: rows } of layered.filter((one) => one.layers.length)) {
     const values = rows.slice(0, most).map((row) => row.effective);
-    sheet.line(layers, run, values, seriesColour(runs.indexOf(run)), { click: toLayer });
+    sheet.line(layers, run, values, colourOf(run), { click: toLayer });
   }
   const chosen = own.findIndex((row) => row.chosen === layer);
   sheet.chosen(layers, { column: chosen < 0 ? null : chosen });

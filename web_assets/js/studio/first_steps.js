@@ -4,10 +4,11 @@
 
 import { fetchJson, patch, readOnly } from "../api.js";
 import { complain } from "../messages.js";
-import { get } from "../state.js";
+import { get, set } from "../state.js";
 import { openCourse } from "./course_column.js";
 import { follow, html, mount, signal } from "./component.js";
 import { useKnob } from "./knob.js";
+import { putBack } from "./trials.js";
 import { playWhenShown, visit } from "./visiting.js";
 
 const TEN = "ten-layers";
@@ -17,11 +18,10 @@ const LOST = 13;
 const PREFERENCE = "first-steps";
 
 const isClosed = signal(true);
-const step = signal(0);
 
-/** @param {string} run @param {number} frame @param {Record<string, string>} shown */
-function look(run, frame, shown) {
-  visit({ session: get("session"), run, frame, ...shown });
+/** @param {number} step counted from 0 @param {string} run @param {number} frame @param {Record<string, string>} shown */
+function look(step, run, frame, shown) {
+  visit({ session: get("session"), run, frame, ...shown, step: step + 1 });
   playWhenShown().catch(complain);
 }
 
@@ -61,7 +61,7 @@ function Failing() {
   const run = follow("run");
   const show = (/** @type {string} */ name) => {
     const other = name === TEN ? ONE : TEN;
-    look(name, LOST, { panel: "compare", compared: `${get("session")}/${other}` });
+    look(2, name, LOST, { panel: "compare", compared: `${get("session")}/${other}` });
   };
   return html`<p>
       The same pictures, the same start, 500 evaluations a frame each: <b>one layer</b> has lost the
@@ -93,27 +93,47 @@ function Yours() {
     </div>`;
 }
 
+/** The steps; `runs`: those that a step's words are about, any for none. */
 const STEPS = [
   {
     name: "What you see",
     part: Seen,
-    open: () => look(TEN, FRAME, { panel: "views", view: "variance" }),
+    runs: [TEN],
+    open: () => look(0, TEN, FRAME, { panel: "views", view: "variance" }),
   },
   {
     name: "Change survival",
     part: Survival,
-    open: () => look(TEN, FRAME, { panel: "views", view: "schedule" }),
+    runs: [TEN],
+    open: async () => {
+      // What an earlier try moved is not what the layers on the screen were searched with.
+      if (get("run") === TEN && get("moved")?.length) await putBack();
+      look(1, TEN, FRAME, { panel: "views", view: "schedule" });
+    },
   },
   {
     name: "Make it fail",
     part: Failing,
-    open: () => look(ONE, LOST, { panel: "compare", compared: `${get("session")}/${TEN}` }),
+    runs: [TEN, ONE],
+    open: () => look(2, ONE, LOST, { panel: "compare", compared: `${get("session")}/${TEN}` }),
   },
-  { name: "Now your cameras", part: Yours, open: () => {} },
+  {
+    name: "Now your cameras",
+    part: Yours,
+    runs: /** @type {string[]} */ ([]),
+    open: () => set({ step: 4 }),
+  },
 ];
+
+/** What stands in a step's place while another run is open than those it is about. @param {{ runs: string[], again: () => void }} properties */
+const Elsewhere = ({ runs, again }) => html`<p>
+    You are looking at <b>${follow("run")}</b>; this step is about <b>${runs.join(" and ")}</b>.
+  </p>
+  <div class="group"><button onClick=${again}>Back to this step</button></div>`;
 
 async function close() {
   isClosed.value = true;
+  set({ step: null });
   if (!readOnly) await patch("/api/preferences", { [PREFERENCE]: "closed" }).catch(complain);
 }
 
@@ -123,20 +143,20 @@ function FirstSteps() {
   const entry = sessions.find((/** @type {any} */ one) => one.name === session);
   const names = (entry?.runs ?? []).map((/** @type {any} */ one) => one.name);
   const run = follow("run");
-  const isThere = [TEN, ONE].every((name) => names.includes(name)) && [TEN, ONE].includes(run);
-  if (isClosed.value || !isThere) return null;
-  const go = (/** @type {number} */ to) => {
-    step.value = to;
-    STEPS[to]?.open();
-  };
-  const Part = STEPS[step.value]?.part ?? Seen;
+  const isThere = [TEN, ONE].every((name) => names.includes(name)) && run;
+  const at = Math.min(STEPS.length, Math.max(1, follow("step") ?? 1)) - 1;
+  const step = STEPS[at];
+  if (isClosed.value || !isThere || !step) return null;
+  const go = (/** @type {number} */ to) => STEPS[to]?.open();
+  const isAbout = !step.runs.length || step.runs.includes(run);
+  const Part = step.part;
   return html`<section class="first-steps" aria-label="The first two minutes">
     <ol>
       ${STEPS.map(
         ({ name }, index) => html`<li key=${name}>
           <button
             class="quiet"
-            aria-current=${index === step.value ? "step" : null}
+            aria-current=${index === at ? "step" : null}
             onClick=${() => go(index)}
           >
             <i>${index + 1}</i> ${name}
@@ -144,11 +164,13 @@ function FirstSteps() {
         </li>`,
       )}
     </ol>
-    <div class="first-words"><${Part} /></div>
+    <div class="first-words">
+      ${isAbout ? html`<${Part} />` : html`<${Elsewhere} runs=${step.runs} again=${() => go(at)} />`}
+    </div>
     <div class="first-end">
       ${
-        step.value < STEPS.length - 1 &&
-        html`<button class="primary" onClick=${() => go(step.value + 1)}>Next</button>`
+        at < STEPS.length - 1 &&
+        html`<button class="primary" onClick=${() => go(at + 1)}>Next</button>`
       }
       <button
         class="icon"
@@ -162,10 +184,8 @@ function FirstSteps() {
   </section>`;
 }
 
-/** Show the steps in their place, unless they were closed, at the one that the address asks for (`step`). */
+/** Show the steps in their place, unless they were closed, at the one that the address names (`step`). */
 export async function startFirstSteps() {
-  const asked = new URLSearchParams(location.search);
-  step.value = Math.min(STEPS.length, Math.max(1, Number(asked.get("step")) || 1)) - 1;
   const place = /** @type {HTMLElement} */ (document.getElementById("first-steps"));
   mount(place, html`<${FirstSteps} />`);
   try {

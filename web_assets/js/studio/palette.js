@@ -20,10 +20,13 @@ const answers = signal(0); // how often there was more to find
  */
 function fit({ words, more, kind, also = "" }, wanted) {
   const text = `${words} ${more} ${kind} ${also}`.toLowerCase();
-  if (kind === "Frame") return 3;
+  if (kind === "Frame") return 4;
   if (!wanted.split(" ").every((part) => text.includes(part))) return -1;
-  if (words.toLowerCase().startsWith(wanted)) return 2;
-  return words.toLowerCase().includes(wanted) ? 1 : 0;
+  const name = words.toLowerCase();
+  if (name.startsWith(wanted)) return 3;
+  // A word of its name that begins so comes before letters inside of one, and those before what only its help says.
+  if (` ${name}`.includes(` ${wanted}`)) return 2;
+  return name.includes(wanted) ? 1 : 0;
 }
 
 /** The best of what can be found. @param {string} wanted */

@@ -17,7 +17,8 @@ const SKETCH = 64;
 
 /**
  * A quantity of both results. `share`: how much worse the tried one is, from -1 (better by a whole bar) to 1.
- * @typedef {{ name: string, stored: any, tried: any, unit: string, share: number | null }} Line
+ * `isCost`: more of it is neither better nor worse.
+ * @typedef {{ name: string, stored: any, tried: any, unit: string, share: number | null, isCost?: boolean }} Line
  */
 
 /** @param {any} value */
@@ -72,6 +73,7 @@ function linesOf(stored, tried, inShares, scale) {
     tried: tried[key],
     unit,
     share: dearer(stored[key], tried[key]),
+    isCost: true,
   });
   const limbs = Object.keys(stored.limbs).map((limb) => {
     const [before, after] = [stored.limbs[limb], tried.limbs[limb]];
@@ -104,10 +106,11 @@ function linesOf(stored, tried, inShares, scale) {
 
 /** A line: both values, and the change as a bar from the middle. @param {{ line: Line }} properties */
 function ChangeLine({ line }) {
-  const { name, stored, tried, unit, share } = line;
-  const kind = !share ? "same" : share < 0 ? "better" : "worse";
+  const { name, stored, tried, unit, share, isCost } = line;
+  const [less, more] = isCost ? ["less", "more"] : ["better", "worse"];
+  const kind = !share ? "same" : share < 0 ? less : more;
   const size = `${50 * Math.abs(share ?? 0)}%`;
-  const style = kind === "better" ? { right: "50%", width: size } : { left: "50%", width: size };
+  const style = kind === less ? { right: "50%", width: size } : { left: "50%", width: size };
   return html`<tr class=${`change ${kind}`}>
     <th scope="row">${name}</th>
     <td class="value">${figure(stored)}</td>

@@ -71,9 +71,9 @@ function mostLearnt(summary) {
   return best.parameter;
 }
 
-async function overFrames() {
+async function overFrames(signal) {
   const { frames, score } = get("summary");
-  const { caption } = await fetchJson(runView(get("session"), get("run"), "schedule"));
+  const { caption } = await fetchJson(runView(get("session"), get("run"), "schedule"), { signal });
   const columns = FRAME_COLUMNS.map(([key, label, unit]) => ({
     key,
     label,
@@ -85,13 +85,14 @@ async function overFrames() {
 }
 
 /** All layers of one parameter's clouds, beside the first and last of them all. */
-async function cloudsOf(session, run, frame, view, trial, among) {
-  const whole = await fetchJson(frameView(session, run, frame, view.name, queryOf(view, trial)));
+async function cloudsOf(session, run, frame, view, trial, { among, signal }) {
+  const path = frameView(session, run, frame, view.name, queryOf(view, trial));
+  const whole = await fetchJson(path, { signal });
   const named = (answer, name) => answer.tables.filter((table) => table.name === name);
   const parameter = among ?? get("parameter") ?? mostLearnt(records(named(whole, "summary")[0]));
   const rest = new URLSearchParams(queryOf(view, trial));
   const query = new URLSearchParams([["parameter", parameter], ...rest]);
-  const own = await fetchJson(frameView(session, run, frame, view.name, String(query)));
+  const own = await fetchJson(frameView(session, run, frame, view.name, String(query)), { signal });
   return {
     ...whole,
     tables: [
@@ -106,14 +107,14 @@ async function cloudsOf(session, run, frame, view, trial, among) {
  * A view's numbers.
  * @param {any} view
  * @param {string | null} trial whose
- * @param {string | null} among the parameter whose clouds are drawn where none is chosen
+ * @param {{ signal?: AbortSignal, among?: string | null }} [how] `among`: the parameter whose clouds are drawn where none is chosen
  * @returns {Promise<any>}
  */
-export async function numbersOf(view, trial, among = null) {
-  if (view.name === OVER_FRAMES.name) return overFrames();
+export async function numbersOf(view, trial, { signal, among = null } = {}) {
+  if (view.name === OVER_FRAMES.name) return overFrames(signal);
   const [session, run, frame] = [get("session"), get("run"), get("frame")];
   const query = queryOf(view, trial);
-  if (isOfRun(view)) return fetchJson(runView(session, run, view.name, query));
-  if (view.name === "clouds") return cloudsOf(session, run, frame, view, trial, among);
-  return fetchJson(frameView(session, run, frame, view.name, query));
+  if (isOfRun(view)) return fetchJson(runView(session, run, view.name, query), { signal });
+  if (view.name === "clouds") return cloudsOf(session, run, frame, view, trial, { among, signal });
+  return fetchJson(frameView(session, run, frame, view.name, query), { signal });
 }

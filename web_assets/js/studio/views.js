@@ -6,11 +6,11 @@ import { fetchJson, post } from "../api.js";
 import { countedIn, onOneAxis } from "../layer_axis.js";
 import { onEvent } from "../live.js";
 import { complain } from "../messages.js";
-import { paced } from "../pacing.js";
+import { askingAbout, paced } from "../pacing.js";
 import { followsSearch, isStored, layersShown, select } from "../selection.js";
 import { get, set, watch } from "../state.js";
 import { records } from "../view_sheet.js";
-import { follow, html, signal, useRef } from "./component.js";
+import { follow, html, signal, useEffect, useRef } from "./component.js";
 import { FigurePlace } from "./figure_place.js";
 import { liveView, triedView } from "./live_views.js";
 import { SeedTools, startSeeds } from "./seeds.js";
@@ -20,6 +20,7 @@ import { DRAWINGS, isOfRun, numbersOf, OVER_FRAMES, queryOf } from "./view_numbe
 
 const LOAD_MILLISECONDS = 120;
 const LATE_MILLISECONDS = 800;
+const FADE_PIXELS = 40;
 const TOWARDS = [
   ["truth", "from estimate to truth"],
   ["mode", "from estimate to the best particle"],
@@ -57,23 +58,17 @@ const draw = (/** @type {Shown | null} */ shown, words = "") => {
   drawn.value = { shown, words };
 };
 
-async function load() {
-  if (get("panel") !== "views" || !views.value.length) return;
-  const view = current();
-  const isFound = get("summary")?.frames.length || get("detail");
-  if (get("run") && !get("summary") && !isFound) {
-    held = null;
-    return draw(null, "The run is being read.");
-  }
-  if (!get("run") || get("frame") === null || !isFound) {
-    held = null;
-    return draw(null, "No frames yet: track a run to look into its search.");
-  }
-  if (!isOfRun(view) && (followsSearch() || !isStored())) {
-    held = null;
-    const live = liveFigure(view.name);
-    if (live) return draw(live);
-    if (followsSearch() || !get("detail")) return draw(null, "The first layer is being searched.");
+function load() {
+  const view = get("panel") === "views" && views.value.length ? current() : null;
+  const early = view && withoutAsking(view);
+  if (!view || early) {
+    asking.stop();
+    isLoading.value = false;
+    if (early) {
+      held = null;
+      draw(early.shown, early.words);
+    }
+    return;
   }
   const against = get("against");
   const key = [
@@ -85,7 +80,28 @@ async function load() {
     age,
     isOfRun(view) ? get("summary")?.frames.length : get("frame"),
   ].join(" ");
-  if (held?.key === key) return showBoth(view, held);
+  const subject = [get("session"), get("run"), view.name, get("over")].join(" ");
+  asking.ask(subject, (signal) => loadView(view, key, signal));
+}
+
+/** What a view shows while there is nothing to ask for; null where there is. */
+function withoutAsking(view) {
+  const isFound = get("summary")?.frames.length || get("detail");
+  const say = (/** @type {string} */ words) => ({ shown: null, words });
+  if (get("run") && !get("summary") && !isFound) return say("The run is being read.");
+  if (!get("run") || get("frame") === null || !isFound) {
+    return say("No frames yet: track a run to look into its search.");
+  }
+  if (isOfRun(view) || (!followsSearch() && isStored())) return null;
+  const live = liveFigure(view.name);
+  if (live) return { shown: live, words: "" };
+  return followsSearch() || !get("detail") ? say("The first layer is being searched.") : null;
+}
+
+/** Ask for a view's numbers and show them. */
+async function loadView(view, /** @type {string} */ key, /** @type {AbortSignal} */ signal) {
+  if (held?.key === key) return showBoth(view, held, signal);
+  const against = get("against");
   isLoading.value = true;
   // Another view's figure does not stand under this one's name for long.
   const late = setTimeout(() => {
@@ -93,18 +109,18 @@ async function load() {
     if (isOther && current() === view) draw(null, `${view.title} is being computed.`);
   }, LATE_MILLISECONDS);
   try {
-    const answer = await numbersOf(view, against);
-    if (current() !== view) return;
+    const answer = await numbersOf(view, against, { signal });
+    if (signal.aborted || current() !== view) return;
     held = { key, answer };
-    await showBoth(view, held);
+    await showBoth(view, held, signal);
   } catch (error) {
-    const { name, message, hint = "" } = /** @type {any} */ (error);
-    if (current() !== view || name === "AbortError") return;
+    const { message, hint = "" } = /** @type {any} */ (error);
+    if (signal.aborted || current() !== view) return;
     held = null;
     draw(null, `${message} ${hint}`);
   } finally {
     clearTimeout(late);
-    isLoading.value = false;
+    if (!signal.aborted) isLoading.value = false;
   }
 }
 
@@ -112,7 +128,7 @@ async function load() {
  * What was tried, in a view's tables: from the events where they tell all of it, else from the
  * studio; null: nothing.
  */
-async function triedIn(view, stored) {
+async function triedIn(view, stored, /** @type {AbortSignal} */ signal) {
   if (!get("whatIf")) return null;
   const live = !isOfRun(view) && triedView(view.name);
   if (live) return live;
@@ -122,15 +138,19 @@ async function triedIn(view, stored) {
   if (heldTried?.key !== key) {
     const ridges = stored.answer.tables.find((table) => table.name === "ridges");
     const among = ridges ? records(ridges)[0]?.parameter : null;
-    heldTried = { key, answer: await numbersOf(view, trial, among) };
+    heldTried = { key, answer: await numbersOf(view, trial, { signal, among }) };
   }
   return heldTried.answer;
 }
 
 /** Show what is held, and beside it what was tried, once both are there. */
-async function showBoth(view, stored) {
-  const tried = await triedIn(view, stored);
-  if (held?.key === stored.key && current() === view) show(view, stored.answer, tried);
+async function showBoth(view, stored, /** @type {AbortSignal} */ signal) {
+  const tried = await triedIn(view, stored, signal).catch((error) => {
+    if (!signal.aborted) throw error;
+    return null;
+  });
+  if (!signal.aborted && held?.key === stored.key && current() === view)
+    show(view, stored.answer, tried);
 }
 
 /**
@@ -325,6 +345,15 @@ function Tools() {
 function ViewList() {
   const list = useRef(/** @type {HTMLElement | null} */ (null));
   const shown = followCurrent();
+  useEffect(() => {
+    // Where the list stands in one line, the chosen view is seen in it.
+    const [line, entry] = [list.current, list.current?.querySelector('[aria-current="true"]')];
+    if (!line || !entry) return;
+    const [outer, inner] = [line.getBoundingClientRect(), entry.getBoundingClientRect()];
+    const right = inner.right + FADE_PIXELS - outer.right;
+    if (inner.left < outer.left) line.scrollLeft += inner.left - outer.left;
+    else if (right > 0) line.scrollLeft += right;
+  }, [shown]);
   const takeArrow = (event) => {
     const by = { ArrowDown: 1, ArrowUp: -1 }[event.key];
     if (!by) return;
@@ -398,9 +427,11 @@ const USED = [
   ...["trials", "parameters", "detail", "follow", "work"],
 ];
 
+const loadLater = paced(load, LOAD_MILLISECONDS);
+const asking = askingAbout(loadLater);
+
 /** Load which views there are, and what the shown one draws. */
 export function startViews() {
-  const loadLater = paced(load, LOAD_MILLISECONDS);
   fetchJson("/api/views")
     .then((answer) => {
       views.value = [...answer.views.filter((view) => DRAWINGS[view.name]), OVER_FRAMES];

@@ -7,7 +7,7 @@ import { figure as figureWords } from "../chart_looks.js";
 import { countedIn, onOneAxis } from "../layer_axis.js";
 import { onEvent } from "../live.js";
 import { complain, say } from "../messages.js";
-import { paced } from "../pacing.js";
+import { askingAbout, paced } from "../pacing.js";
 import { followsSearch, isStored, layersShown, select } from "../selection.js";
 import { setupPath } from "../sessions.js";
 import { get, set, watch } from "../state.js";
@@ -67,44 +67,55 @@ function queryOf(trial) {
 }
 
 /** The answers for a trial, or for what is stored. */
-async function answersFor(session, run, frame, /** @type {string | null} */ trial) {
+async function answersFor(
+  session,
+  run,
+  frame,
+  /** @type {string | null} */ trial,
+  /** @type {AbortSignal} */ signal,
+) {
   const [ofFrame, ofRun] = await Promise.all([
-    fetchJson(frameView(session, run, frame, "why", queryOf(trial))),
-    fetchJson(runView(session, run, "why", queryOf(trial))),
+    fetchJson(frameView(session, run, frame, "why", queryOf(trial)), { signal }),
+    fetchJson(runView(session, run, "why", queryOf(trial)), { signal }),
   ]);
   return { frame: ofFrame, run: ofRun };
 }
 
-async function load() {
-  if (get("panel") !== "why") return;
-  if (subject.value !== "stored") {
-    held.value = null;
+function load() {
+  const isShown = get("panel") === "why";
+  if (isShown && subject.value === "stored") {
+    const [session, run, frame] = [get("session"), get("run"), get("frame")];
+    const [trial, against] = [get("trial"), get("against")];
+    const of = `${session}/${run} ${frame} ${queryOf(against)} ${trial ?? ""}`;
+    const key = `${of} ${age} ${get("summary").frames.length}`;
+    if (held.value?.key === key) return;
+    asking.ask(key, async (signal) => {
+      isLoading.value = true;
+      wrong.value = "";
+      try {
+        const [stored, tried] = await Promise.all([
+          answersFor(session, run, frame, against, signal),
+          trial ? answersFor(session, run, frame, trial, signal) : null,
+        ]);
+        if (!signal.aborted) held.value = { key, ...stored, tried };
+      } catch (error) {
+        const { message, hint = "" } = /** @type {any} */ (error);
+        if (signal.aborted) return;
+        held.value = null;
+        wrong.value = `${message} ${hint}`;
+      } finally {
+        if (!signal.aborted) isLoading.value = false;
+      }
+    });
     return;
   }
-  const [session, run, frame] = [get("session"), get("run"), get("frame")];
-  const [trial, against] = [get("trial"), get("against")];
-  const of = `${session}/${run} ${frame} ${queryOf(against)} ${trial ?? ""}`;
-  const key = `${of} ${age} ${get("summary").frames.length}`;
-  if (held.value?.key === key) return;
-  const isShown = () => frame === get("frame") && run === get("run") && session === get("session");
-  isLoading.value = true;
-  wrong.value = "";
-  try {
-    const [stored, tried] = await Promise.all([
-      answersFor(session, run, frame, against),
-      trial ? answersFor(session, run, frame, trial) : null,
-    ]);
-    if (isShown()) held.value = { key, ...stored, tried };
-  } catch (error) {
-    const { message, hint = "" } = /** @type {any} */ (error);
-    if (isShown()) {
-      held.value = null;
-      wrong.value = `${message} ${hint}`;
-    }
-  } finally {
-    isLoading.value = false;
-  }
+  asking.stop();
+  isLoading.value = false;
+  if (isShown) held.value = null;
 }
+
+const later = paced(load, LOAD_MILLISECONDS);
+const asking = askingAbout(later);
 
 /** Go to what a finding speaks of. @param {Finding} finding */
 function goTo({ frame, limb, layer, camera }) {
@@ -291,7 +302,6 @@ export const Why = () => html`
 
 /** Load what the panel says. */
 export function startWhy() {
-  const later = paced(load, LOAD_MILLISECONDS);
   const names = ["session", "run", "frame", "track", "trial", "against", "summary", "panel"];
   watch([...names, "follow", "work", "detail"], later);
   onEvent("frame", (event, here) => {
