@@ -589,6 +589,49 @@ def test_moved_knobs_are_kept_per_run_until_they_are_put_back(
     assert studio.get(f"{RUN}/settings")["moved"] == {}
 
 
+PLACES = """async () => {
+  const echarts = await import('/assets/vendor/echarts.esm.min.js');
+  const place = document.querySelector('#panel-views .figure-chart');
+  const { grid, title } = echarts.getInstanceByDom(place).getOption();
+  const pen = document.createElement('canvas').getContext('2d');
+  pen.font = '12px Inter, system-ui, sans-serif';
+  const words = (text) => text.replaceAll(/[{][ab][|]|[}]/g, '');
+  return {
+    width: place.clientWidth,
+    plots: grid.map((one) => [one.left, one.top, one.left + one.width, one.top + one.height]),
+    headings: title.map((one) => [one.left, one.top, one.left + pen.measureText(words(one.text)).width, one.top + 12, words(one.text)]),
+  };
+}"""
+
+
+def lie_apart(boxes: list[list[float]]) -> bool:
+    """Whether no two boxes (left, top, right, bottom) share anything."""
+    return all(
+        one[2] <= other[0] or other[2] <= one[0] or one[3] <= other[1] or other[3] <= one[1]
+        for at, one in enumerate(boxes)
+        for other in boxes[:at]
+    )
+
+
+def test_where_it_is_narrow_no_plot_or_heading_lies_on_another(
+    window: StudioPage, studio: StudioServer
+) -> None:
+    page = window.page
+    size = page.viewport_size
+    assert size is not None
+    page.set_viewport_size({"width": 480, "height": 800})
+    try:
+        for name in [one["name"] for one in studio.get("/api/views")["views"] if one["name"] != "why"]:
+            show(window, name)
+            until(page, window.charts_drawn)
+            found = page.evaluate(PLACES)
+            assert lie_apart(found["plots"]), name
+            assert lie_apart(found["headings"]), (name, found["headings"])
+            assert max(box[2] for box in found["plots"]) <= found["width"], name
+    finally:
+        page.set_viewport_size(size)
+
+
 @pytest.mark.slow
 def test_the_views_look_designed(window: StudioPage, artefacts: Path) -> None:
     page = window.page

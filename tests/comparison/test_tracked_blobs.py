@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from studio.comparison.footage_cache import NO_PICTURE, FootageCache
 from studio.comparison.tracked import TrackingTrial, track
@@ -12,6 +13,7 @@ SAMPLES = Path(__file__).parents[2] / "sample_sessions"
 CHANGES = {"layers": 5, "particles": 60, "hull_depth": 6}
 
 
+@pytest.mark.slow
 def test_the_walk_is_followed_by_blobs() -> None:
     cache = FootageCache(SAMPLES)
     fields = {"seed": 3, "last": 12, "body": "human25"}

@@ -22,7 +22,12 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Stage:
     return Stage(tmp_path_factory.mktemp("stage"))
 
 
-@pytest.mark.parametrize("kind", SHORT)
+LONG = ("killed again and again", "killed", "stopped process")
+
+
+@pytest.mark.parametrize(
+    "kind", [pytest.param(kind, marks=pytest.mark.slow) if kind in LONG else kind for kind in SHORT]
+)
 def test_nothing_is_lost_and_nothing_false_is_said(stage: Stage, kind: str) -> None:
     for seed in SEEDS.get(kind, (0, 1)):
         trial = plant(stage, kind, seed)

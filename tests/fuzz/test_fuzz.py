@@ -42,6 +42,7 @@ def test_some_mutations_are_read_or_refused_in_words() -> None:
     assert sum(tally.read for tally in found.values()) > 50, "mutations that destroy everything test nothing"
 
 
+@pytest.mark.slow
 def test_harm_is_noticed() -> None:
     tally = campaign(["numbers"], 6, module="fuzz.harmful", patience=15.0)["numbers"]
     assert (tally.tries, tally.read, tally.tracebacks, tally.aborts, tally.hangs) == (6, 2, 2, 1, 1)

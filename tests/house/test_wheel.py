@@ -57,6 +57,7 @@ def test_the_network_travels_with_its_licence(installed: Path) -> None:
         assert f"{network.stem}-LICENSE" in readme
 
 
+@pytest.mark.slow
 def test_the_demo_serves_pages_and_sample(installed: Path, tmp_path: Path) -> None:
     code = "import studio.cli.main as m; m.main(['demo'])"
     with subprocess.Popen(

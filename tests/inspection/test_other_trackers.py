@@ -47,6 +47,7 @@ def test_every_view_answers(session: Session, tracker: str, weighting: str, knob
         assert look(run, 2, "schedule", Selection()).table("layers").column("beta")[0] is None
 
 
+@pytest.mark.slow
 def test_what_the_refinement_put_right_is_said(tmp_path: Path) -> None:
     poses = person_poses("walk", 20, 18, 2)
     session, made = planted(

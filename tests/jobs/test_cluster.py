@@ -127,6 +127,7 @@ def test_results_errors_reports_and_what_cannot_travel(address: str, tmp_path: P
         executor.submit(identifier)
 
 
+@pytest.mark.slow
 def test_24_trials_with_a_worker_killed_are_those_of_a_serial_run(doomed: str, tmp_path: Path) -> None:
     wanted = measured(jobs_of(tmp_path / "serial", 12), tmp_path, serially)
     with ClusterExecutor(doomed, tmp_path) as executor:

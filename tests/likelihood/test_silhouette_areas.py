@@ -58,6 +58,7 @@ def compare_with_oracle(body, cameras, masks, poses, resolution):
     return equal / (len(poses) * len(masks))
 
 
+@pytest.mark.slow
 @pytest.mark.real_data
 @pytest.mark.parametrize("resolution", [pytest.param(FULL, marks=pytest.mark.slow), HALF])
 def test_a_thousand_poses_in_the_real_cameras(real_data, resolution):

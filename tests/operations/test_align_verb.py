@@ -8,6 +8,7 @@ from studio.sessions.session import CAMERAS_PATH
 from studio.sessions.workspace import Workspace
 
 
+@pytest.mark.slow
 def test_cameras_are_turned_reported_and_turned_back() -> None:
     session = make_nudged_session(Workspace().place_for("nudged"))
     before = (session.path / CAMERAS_PATH).read_bytes()

@@ -13,6 +13,7 @@ from studio.sessions.session import Session, described_anew
 FRAMES = 4
 
 
+@pytest.mark.slow
 @pytest.mark.real_data
 def test_the_balancing_man_is_cut_out_without_a_plate(real_data: Path, tmp_path: Path) -> None:
     """Not the bystander whom two cameras see. The cameras are as they were published: one of them was touched."""

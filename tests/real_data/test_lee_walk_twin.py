@@ -57,6 +57,7 @@ def cameras(data: Path) -> tuple[Camera, ...]:
     return tuple(read_calibration(data / "CALIB").cameras)
 
 
+@pytest.mark.slow
 def test_the_lengths_are_the_real_subjects_and_every_marker_can_be_met(data: Path) -> None:
     shape = subject_from_shape(BODY, numbers(data / "BodyShapeParameters.txt"))
     _, _, motion = twin("lee-walk-twin")

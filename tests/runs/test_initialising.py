@@ -79,6 +79,7 @@ def test_people_in_random_moments_and_headings_are_found(people: Session) -> Non
     assert max(errors_in(people, range(3), seed=2)) <= 80.0
 
 
+@pytest.mark.slow
 def test_a_run_without_start_pose_finds_one(people: Session) -> None:
     steps: list[tuple[str, int, int]] = []
     run = prepare_run(people, first=1, last=2, progress=lambda *reported: steps.append(reported))

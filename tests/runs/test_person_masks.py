@@ -222,6 +222,7 @@ def test_nobody_at_all_is_an_error(walk: Rendered) -> None:
         Shown(walk.cameras[1:3], shown, 1, FPS).masks()
 
 
+@pytest.mark.slow
 def test_whom_most_cameras_see_is_followed(walk: Rendered) -> None:
     """Two of three cameras see another one as well, who is nearer to them: one of them alone would take him."""
     other = rendered_walk(1, at=(-1000.0, 900.0), seed=5)

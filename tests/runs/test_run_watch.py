@@ -132,6 +132,7 @@ def test_recovery_can_be_switched_off(black: Session) -> None:
     assert not np.array_equal(results[4].estimate.pose, results[3].estimate.pose)
 
 
+@pytest.mark.slow
 def test_a_run_that_starts_beside_the_body_is_lost_and_finds_it(walk: Session, tmp_path: Path) -> None:
     frames = [STEP * number for number in range(9)]
     session = interrupted(walk, tmp_path / "walk", frames, range(0), BLACK, FPS)

@@ -83,6 +83,7 @@ def test_a_run_that_is_sound_has_no_such_track(
     assert "sides" not in track_names(again)
 
 
+@pytest.mark.slow
 def test_a_finished_runs_sides_are_checked(session: Session, truth: np.ndarray) -> None:
     batch, job = planted(session, truth), planted(session, truth)
     steps: list[str] = []

@@ -123,7 +123,7 @@ def test_masks_of_two_are_not_called_usable(made: TwoPeople) -> None:
     assert "2 subjects" in found.in_words()
 
 
-@pytest.mark.parametrize("who", [0, 1])
+@pytest.mark.parametrize("who", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_the_others_are_cut_from_the_masks(people: TwoPeople, who: int) -> None:
     set_up_background(people.session, "masks", subject_at=people.places()[who])
     session = Session(people.session.path)

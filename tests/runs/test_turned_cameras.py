@@ -78,6 +78,7 @@ def test_turning_back_restores_every_byte_and_makes_runs_good_again(
         turn_back(change.session)
 
 
+@pytest.mark.slow
 def test_cameras_turned_twice_go_back_one_by_one(session: Session, aligned: SessionAlignment) -> None:
     first = (session.path / CAMERAS_PATH).read_bytes()
     once = turn_cameras(session, aligned).session

@@ -49,6 +49,7 @@ def test_the_form_is_reported_every_knob_once(studio: Studio) -> None:
     assert response["progress"] is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("archive", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_uploaded_motion_becomes_a_model(studio: Studio, tmp_path, archive: bool) -> None:
     content, name = swaying(tmp_path).read_bytes(), "motion/sway.trc"

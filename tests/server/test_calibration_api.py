@@ -314,6 +314,7 @@ def test_a_board_to_print(studio: Studio) -> None:
     assert "does not fit" in large.json()["message"]
 
 
+@pytest.mark.slow
 @pytest.mark.real_data
 def test_lenses_of_the_balancing_mans_cameras(studio: Studio, real_data: Path) -> None:
     """Few and hard pictures: the focal length is within 3 % of the given one, or what is shown says why not."""

@@ -35,6 +35,7 @@ def test_offsets_keep_the_smallest_at_zero(session: Session) -> None:
     assert Session(session.path).manifest == back.manifest
 
 
+@pytest.mark.slow
 def test_the_notes_name_stale_parts(session: Session) -> None:
     assert session.thumbnail() is not None
     old = prepare_run(session, name="old")

@@ -152,6 +152,7 @@ def test_originals_of_several_files_are_kept_byte_for_byte(tmp_path: Path) -> No
     ).read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.real_data
 def test_the_balancing_man_is_a_folder_whose_toml_goes_before_the_qualisys_file(
     real_data: Path, tmp_path: Path

@@ -55,6 +55,7 @@ def rig(folder: Path) -> tuple[Camera, ...]:
     return recipe_cameras(recipe, np.random.default_rng(recipe.seed))
 
 
+@pytest.mark.slow
 def test_a_stored_calibration_is_off_by_the_given_pixels(tmp_path: Path) -> None:
     for folder, pixels in (("none", 0.0), ("two", 2.0)):
         (tmp_path / folder).mkdir()

@@ -46,6 +46,7 @@ def silhouette(hull: Hull, camera: Camera) -> np.ndarray:
     return drawn > 0
 
 
+@pytest.mark.slow
 def test_a_man_stands_on_the_floor_and_covers_his_silhouettes(real_data: Path) -> None:
     folder = real_data / "lee-walk"
     cameras = read_calibration(folder / "CALIB").cameras
