@@ -81,8 +81,8 @@ from studio.sessions.workspace import Workspace
 from studio.settings import all_knobs
 
 REDRAW_SECONDS = 1.0 / 30.0
-TRAVEL_SECONDS = 1.0 / 30.0
-"""Between two places of particles that travel from one layer to the next."""
+TRAVEL_SECONDS = 1.0 / 18.0
+"""Between two places of particles that travel from one layer to the next: often enough to be seen as one motion."""
 PICTURE_SECONDS, LIVE_PICTURE_SECONDS = 1.0 / 10.0, 1.0 / 2.0
 """Composing pictures ten times a second costs a third of a core, which a live run needs."""
 PICTURES_WAIT, ANNEALED_PICTURES_WAIT = 0.06, 0.4
@@ -123,7 +123,7 @@ class SceneController:
         self._events = process.subscribe(self._concerns)
         self._inbox: deque[tuple[Change, tuple[Any, ...], bool]] = deque()
         self._drawings = Due(REDRAW_SECONDS), Due(PICTURE_SECONDS, PICTURES_WAIT)
-        self._travelling = Due(TRAVEL_SECONDS)
+        self._travelling = Due(REDRAW_SECONDS)
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="scene", daemon=True)
         self._theme, self._has_shadows = "", True
@@ -615,8 +615,9 @@ class SceneController:
         """Seconds to wait for events: until the next redraw is due."""
         now = time.monotonic()
         layers = self.model.layers
-        moves = self.model.playback.playing or layers.playing or layers.phase < 1.0 or self.viewers.is_moving
-        rest = REDRAW_SECONDS if moves else IDLE_SECONDS
+        travels = layers.playing or layers.phase < 1.0
+        moves = self.model.playback.playing or self.viewers.is_moving
+        rest = REDRAW_SECONDS if moves else TRAVEL_SECONDS if travels else IDLE_SECONDS
         return min((drawing.waits(now) for drawing in self._drawings if drawing.is_wanted), default=rest)
 
     def _listen(self, patience: float) -> None:

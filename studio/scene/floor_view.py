@@ -35,9 +35,14 @@ class FloorView:
             position=(*middle, 0.0),
         )
         self.sky = server.scene.add_light_hemisphere("/floor/sky", intensity=_SKY)
+        self._drawn: tuple[object, ...] = ()
 
     def show(self, tokens: ColourTokens, visible: bool = True, shadows: bool = True) -> None:
         """Draw the floor in a theme's colours, or hide it. shadows : else the sky lights all sides alike."""
+        wanted = (tokens.name, visible, shadows)
+        if wanted == self._drawn:
+            return
+        self._drawn = wanted
         self.plane.visible, self.sky.visible = visible, not shadows
         self.plane.plane_color = tokens["scene-floor"]
         self.plane.cell_color = self.plane.section_color = tokens["scene-floor-line"]

@@ -26,17 +26,21 @@ class LinesView:
             thickness_units="screen",
             visible=False,
         )
+        self._colours: Bytes | None = None
 
     def draw(self, segments: Array, colours: Bytes) -> None:
         """Draw segments (S, 2, 3) in metres in colours (3,) or (S, 2, 3); none hides them."""
         self.handle.visible = len(segments) > 0
         if not len(segments):
             return
+        is_longer = self.handle.points.shape != segments.shape
         # A colour array of another length must never meet the old points: a single colour goes in between.
-        if self.handle.points.shape != segments.shape:
+        if is_longer:
             self.handle.colors = np.zeros(3, dtype=np.uint8)
         self.handle.points = segments.astype(np.float32)
-        self.handle.colors = colours
+        # What only moves keeps its colours: they are not compared again.
+        if is_longer or colours is not self._colours:
+            self.handle.colors = self._colours = colours
 
 
 class TruthView(LinesView):

@@ -3,6 +3,7 @@
 from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -157,9 +158,15 @@ class OpenedRun:
         """
         if self.truth is None:
             return None
-        rows: Indices = np.round(self.truth.times * self.fps).astype(np.int64)
+        rows = self._truth_rows
         place = int(np.searchsorted(rows, frame))
         return self.truth.positions[place] if place < len(rows) and rows[place] == frame else None
+
+    @cached_property
+    def _truth_rows(self) -> Indices:
+        """(K,) the frame of each row of the truth."""
+        assert self.truth is not None
+        return np.round(self.truth.times * self.fps).astype(np.int64)
 
     def start_pose(self) -> Array:
         """(D,) where the search starts: the run's own start, the session's, else the body's rest pose."""

@@ -57,8 +57,10 @@ class ParticleView:
             self.handles.append(self._added(layer))
         for layer, handle in enumerate(self.handles):
             record = by_layer.get(layer)
-            handle.visible = record is not None and style.layer in (None, layer) and bool(style.limbs)
-            if record is None or not handle.visible:
+            is_shown = record is not None and style.layer in (None, layer) and bool(style.limbs)
+            if handle.visible != is_shown:
+                handle.visible = is_shown
+            if record is None or not is_shown:
                 continue
             # While a frame is searched every redraw shows all of its layers, and only the newest one is new.
             before = self._drawn.get(layer)

@@ -67,6 +67,25 @@ class Pointed:
     line: tuple[int, ...]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Drawing:
+    """What is drawn of a layer, made once while its frame is looked at.
+
+    key : what it was made from. heaviest : (K,) rows of the stick figures; colours : (K * limbs, 2, 3) theirs.
+    shells, shades : points (P, 3) and colours (P, 3) of the earlier layers.
+    """
+
+    key: tuple[object, ...]
+    record: LayerRecord
+    journey: Journey
+    look: SearchLook
+    tokens: ColourTokens
+    heaviest: Indices
+    colours: Bytes
+    shells: NDArray[np.float32]
+    shades: Bytes
+
+
 class SearchView:
     """Beside the cloud of one layer, all else about it. cloud : draws the layer's own points."""
 
@@ -77,8 +96,8 @@ class SearchView:
         self.skeletons = LinesView(server, "/search/heaviest", _SKELETON)
         self.ways = LinesView(server, "/search/ways", _WAYS)
         self.lineage = LinesView(server, "/search/lineage", _LINEAGE)
-        self._shown: tuple[LayerRecord, Journey, SearchLook, ColourTokens, Indices] | None = None
-        self._drawn: tuple[object, ...] = ()
+        self._shown: _Drawing | None = None
+        self._made: dict[int, _Drawing] = {}
         self._fade: tuple[object, ...] = ()
         self._upto: Sequence[LayerRecord] = ()
         self._phase = 1.0
@@ -99,20 +118,34 @@ class SearchView:
             self.hide()
             return
         record = upto[-1]
-        before = upto[-2] if len(upto) > 1 else None
         key = (record, len(upto), upto[0], look, tokens.name)
-        if key != self._drawn:
-            self._drawn, self._upto = key, upto
-            heaviest = np.argsort(-glow(record), kind="stable")[:HEAVIEST]
-            self._shown = record, self._journeys.to(record, before), look, tokens, heaviest
-            self._draw_shells(upto[:-1] if look.shells else [], look, tokens)
+        made = self._made.get(record.layer)
+        if made is None or made.key != key:
+            made = self._made[record.layer] = self._drawing(key, upto, look, tokens)
+        if made is not self._shown:
+            self._shown, self._upto = made, upto
+            self._draw_shells(made)
             self._draw_ways(upto, look, tokens)
             self._fade = ()
         self.travel(phase)
 
+    def _drawing(
+        self, key: tuple[object, ...], upto: Sequence[LayerRecord], look: SearchLook, tokens: ColourTokens
+    ) -> _Drawing:
+        record = upto[-1]
+        journey = self._journeys.to(record, upto[-2] if len(upto) > 1 else None)
+        heaviest = np.argsort(-glow(record), kind="stable")[:HEAVIEST]
+        ghostly = np.array(
+            mixed(tokens.layer(record.layer, look.count), tokens["scene-background"], GHOSTLY), dtype=np.uint8
+        )
+        colours = np.tile(ghostly, (len(heaviest) * journey.end.shape[1], 2, 1))
+        shells = self._shells(upto[:-1] if look.shells and look.limbs else [], look, tokens)
+        return _Drawing(key, record, journey, look, tokens, heaviest, colours, *shells)
+
     def hide(self) -> None:
         """Draw nothing."""
-        self._shown, self._drawn = None, ()
+        self._shown = None
+        self._made.clear()
         for view in (self.skeletons, self.ways, self.lineage):
             view.handle.visible = False
         self.shells.visible = self.dead.visible = False
@@ -121,16 +154,13 @@ class SearchView:
         """Move the particles to where they are after a share of the layer's time."""
         if self._shown is None:
             return
-        record, journey, look, tokens, heaviest = self._shown
+        shown, look = self._shown, self._shown.look
         self._phase = phase
-        places = journey.at(travelled(phase))
-        self._cloud.move(record, places[:, list(look.limbs), FAR_END].reshape(-1, 3))
-        self._draw_dead(record.layer, journey, look, tokens, phase)
+        places = shown.journey.at(travelled(phase))
+        self._cloud.move(shown.record, places[:, list(look.limbs), FAR_END].reshape(-1, 3))
+        self._draw_dead(shown.record.layer, shown.journey, look, shown.tokens, phase)
         if look.skeletons:
-            lines = places[heaviest].reshape(-1, 2, 3)
-            own, back = tokens.layer(record.layer, look.count), tokens["scene-background"]
-            colour = np.array(mixed(own, back, GHOSTLY), dtype=np.uint8)
-            self.skeletons.draw(lines, np.broadcast_to(colour, lines.shape).copy())
+            self.skeletons.draw(places[shown.heaviest].reshape(-1, 2, 3), shown.colours)
         else:
             self.skeletons.handle.visible = False
 
@@ -140,10 +170,10 @@ class SearchView:
         """The particle whose drawn point is nearest to `at` (shares of the view) within `reach` (of its height), None
         where there is none. lens : field of view and width over height.
         """
-        if self._shown is None or not self._shown[2].limbs:
+        if self._shown is None or not self._shown.look.limbs:
             return None
-        record, journey, look, _, _ = self._shown
-        places = journey.at(travelled(self._phase))[:, list(look.limbs), FAR_END]
+        record, look = self._shown.record, self._shown.look
+        places = self._shown.journey.at(travelled(self._phase))[:, list(look.limbs), FAR_END]
         seen = on_screen(places.reshape(-1, 3), eye, *lens)
         away = np.hypot((seen[:, 0] - at[0]) * lens[1], seen[:, 1] - at[1])
         away[seen[:, 2] <= 0.0] = np.inf
@@ -178,20 +208,24 @@ class SearchView:
         self.dead.colors = np.array(colour, dtype=np.uint8)
         self._fade = journey, step
 
-    def _draw_shells(self, earlier: Sequence[LayerRecord], look: SearchLook, tokens: ColourTokens) -> None:
-        """The clouds of earlier layers, thinned and small, each in its layer's colour."""
-        self.shells.visible = bool(earlier) and bool(look.limbs)
-        if not self.shells.visible:
-            return
-        points, colours = list[NDArray[np.float32]](), list[Bytes]()
+    def _shells(
+        self, earlier: Sequence[LayerRecord], look: SearchLook, tokens: ColourTokens
+    ) -> tuple[NDArray[np.float32], Bytes]:
+        """The clouds of earlier layers, thinned, each in its layer's colour."""
+        points, shades = [np.zeros((0, 3), np.float32)], [np.zeros((0, 3), np.uint8)]
         for record in earlier:
             stride = -(-len(record.poses) // MOST_SHELL)
             ends = _far_ends(self._journeys.places(record)[::stride], look.limbs)
             colour = mixed(tokens.layer(record.layer, look.count), tokens["scene-background"], 0.75)
             points.append(ends)
-            colours.append(np.tile(np.array(colour, dtype=np.uint8), (len(ends), 1)))
-        _put(self.shells, np.concatenate(points), np.concatenate(colours), tokens)
-        self.shells.point_size = look.size * SHELL_SIZE
+            shades.append(np.tile(np.array(colour, dtype=np.uint8), (len(ends), 1)))
+        return np.concatenate(points), np.concatenate(shades)
+
+    def _draw_shells(self, made: _Drawing) -> None:
+        self.shells.visible = len(made.shells) > 0
+        if self.shells.visible:
+            _put(self.shells, made.shells, made.shades, made.tokens)
+            self.shells.point_size = made.look.size * SHELL_SIZE
 
     def _draw_ways(self, upto: Sequence[LayerRecord], look: SearchLook, tokens: ColourTokens) -> None:
         """The ways of one limb's particles, and the line of one particle at all limbs that carry particles."""

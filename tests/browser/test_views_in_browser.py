@@ -599,7 +599,10 @@ PLACES = """async () => {
   return {
     width: place.clientWidth,
     plots: grid.map((one) => [one.left, one.top, one.left + one.width, one.top + one.height]),
-    headings: title.map((one) => [one.left, one.top, one.left + pen.measureText(words(one.text)).width, one.top + 12, words(one.text)]),
+    headings: title.map((one) => {
+      const wide = pen.measureText(words(one.text)).width;
+      return [one.left, one.top, one.left + wide, one.top + 12, words(one.text)];
+    }),
   };
 }"""
 

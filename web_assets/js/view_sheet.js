@@ -82,7 +82,7 @@ export class Sheet {
     const lines = (names ? LEGEND : 0) + above;
     const top = start + (title ? HEADING : 8) + lines;
     const height = Math.max(40, box.height - lines);
-    if (title) this.heading(title, unit, left, start, width + 12);
+    if (title) this.heading(title, unit, left, start, box.isBelow ? this.width - left : width + 12);
     if (names) this.legend(names, left, start + HEADING - 7, width);
     this.option.grid.push({
       left, top, width, height, ...(over ? { tooltip: { trigger: "axis", formatter: (points) => over(Array.isArray(points) ? points : [points]) } } : {}),

@@ -115,8 +115,8 @@ function blame(sheet, { matrix, left_out: leftOut, areas, scale: [{ level, most 
   const sources = distinct(matrix.map((row) => `${row.camera} · ${row.term}`));
   const bound = signedDecades(most, level);
   const height = Math.max(limbs.length * LIMB_ROW, at.room - 110);
-  const shownMost = Math.max(6, Math.floor(height / LIMB_ROW));
-  const [one, two] = sheet.columns(2, { height, least: limbs.length * LIMB_ROW, gutters: [124, 190], shares: [1.3, 1], right: 70 });
+  const count = Math.min(leftOut.length, Math.max(6, Math.floor(height / LIMB_ROW)));
+  const [one, two] = sheet.columns(2, { height, least: [limbs.length, count].map((rows) => rows * LIMB_ROW), gutters: [124, 190], shares: [1.3, 1], right: 70 });
   const plot = sheet.plot(one, {
     title: "Pose less reference pose", unit: `nats, log scale; orange speaks for the pose, blue against it${tried ? "; ◤ stored, ◢ tried" : ""}`, below: 64,
     x: categories(sources, "", { axisLabel: { interval: 0, rotate: sources.length > 5 ? 28 : 0, fontSize: 10, width: 96, overflow: "truncate" } }), y: categories(limbs, "", { inverse: true, axisLabel: { interval: 0 } }),
@@ -131,7 +131,7 @@ function blame(sheet, { matrix, left_out: leftOut, areas, scale: [{ level, most 
   });
   for (const limb of limbs) if (at.limb && isChosenLimb(limb, at.limb)) sheet.chosen(plot, { row: limbs.indexOf(limb) });
   const nameOf = (row) => `${[row.camera, row.term].filter(Boolean).join(" · ") || "all"}, ${row.factor === 0 ? "left out" : `counts ${figure(row.factor)}`}`;
-  const shown = [...leftOut].sort((a, b) => Math.abs(b.change ?? 0) - Math.abs(a.change ?? 0)).slice(0, shownMost);
+  const shown = [...leftOut].sort((a, b) => Math.abs(b.change ?? 0) - Math.abs(a.change ?? 0)).slice(0, count);
   const bars = sheet.plot({ ...two, height: Math.min(two.height, Math.max(90, shown.length * 22)) }, { title: "When one counts less", unit: "change of preference for the pose, nats", x: numbers("", { scale: false }), y: categories(shown.map(nameOf), "", { inverse: true, axisLabel: { interval: 0, width: 180, overflow: "truncate" } }) });
   const inTried = new Map((tried?.left_out ?? []).map((row) => [nameOf(row), row]));
   const lists = /** @type {[string, any[]][]} */ (tried ? [["stored", shown], ["tried", shown.map((row) => inTried.get(nameOf(row)) ?? { ...row, change: null })]] : [["", shown]]);

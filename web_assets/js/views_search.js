@@ -588,7 +588,7 @@ function survivors(sheet, { particles, difference }, at) {
   const height = Math.max(150, at.room - 92);
   const [one, two] = sheet.columns(2, { height: Math.max(height, MOST_AXES * 14), least: [200, MOST_AXES * 14], gutters: [24, 150], shares: [2.3, 1], right: 20 });
   const names = ranked.slice(0, Math.min(MOST_AXES, Math.floor(one.width / AXIS_ROOM))).map((row) => row.parameter);
-  sheet.heading("Particles of the layer", `${tried ? "survivors, stored and tried" : "coloured: survive, grey: die"}; the parameters that differ most first`, one.left, 0);
+  sheet.heading("Particles of the layer", `${tried ? "survivors, stored and tried" : "coloured: survive, grey: die"}; the parameters that differ most first`, one.left, 0, one.width + 12);
   const heaviest = (list) => [...list].sort((a, b) => a.rank - b.rank).slice(0, MOST_LINES);
   const kept = heaviest(particles);
   sheet.option.parallel = { left: one.left + 10, top: 74, width: one.width - 30, height: (one.isBelow ? one.height : height) - 46, parallelAxisDefault: { type: "value", scale: true, nameTextStyle: { color: token("text-quiet"), fontSize: 10, width: 74, overflow: "truncate" }, axisLine: { lineStyle: { color: token("line-strong") } }, axisTick: { show: false }, axisLabel: { show: false }, splitLine: { show: false } } };
