@@ -81,7 +81,7 @@ from studio.sessions.workspace import Workspace
 from studio.settings import all_knobs
 
 REDRAW_SECONDS = 1.0 / 30.0
-TRAVEL_SECONDS = 1.0 / 18.0
+TRAVEL_SECONDS = 1.0 / 19.0
 """Between two places of particles that travel from one layer to the next: often enough to be seen as one motion."""
 PICTURE_SECONDS, LIVE_PICTURE_SECONDS = 1.0 / 10.0, 1.0 / 2.0
 """Composing pictures ten times a second costs a third of a core, which a live run needs."""

@@ -47,6 +47,7 @@ class ParticleView:
         self.handles: list[viser.PointCloudHandle] = []
         self._drawn: dict[int, tuple[LayerRecord, tuple[object, ...]]] = {}
         self._away = set[int]()
+        keep_programs(server)
 
     def show(self, records: Sequence[LayerRecord], style: CloudStyle, tokens: ColourTokens) -> None:
         """Draw the layers' clouds; layers that are not in `records` vanish."""
@@ -116,6 +117,25 @@ class ParticleView:
             handle.colors = np.array(tokens["ghost"], dtype=np.uint8)
         handle.points, handle.colors = points.astype(np.float32), colours
         handle.point_size = style.point_size
+
+
+def keep_programs(server: viser.ViserServer) -> None:
+    """Two points under the floor that never change, in one colour and in one each.
+
+    viser makes a cloud's material anew whenever its points change. What draws it is compiled again then, unless another
+    cloud is drawn by the same: for a browser without a card that takes longer than the picture.
+    """
+    hidden = np.array([[0.0, 0.0, -0.01]] * 2, dtype=np.float32)
+    for name, colours in (("one", (0, 0, 0)), ("each", np.zeros((2, 3), dtype=np.uint8))):
+        server.scene.add_point_cloud(
+            f"/particles/kept {name}",
+            hidden,
+            colours,
+            point_size=1e-6,
+            precision="float32",
+            point_shape="circle",
+            point_shading="flat",
+        )
 
 
 def cloud_points(body: BodyModel, poses: Array, limbs: Sequence[int]) -> Array:
