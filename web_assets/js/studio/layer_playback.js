@@ -26,9 +26,14 @@ function take(now) {
   }
 }
 
+let stops = 0;
+/** How often the layers were stopped by hand: who begins to play them leaves off then. */
+export const timesStopped = () => stops;
+
 /** Begin, end, or change how the layers are played; what is left out stays. @param {Partial<LayerPlayback>} changes */
 export async function playLayers(changes) {
   const before = layerPlayback.value;
+  if (changes.playing === false) stops += 1;
   take({ ...before, ...changes });
   try {
     await post("/api/scene/play-layers", changes);

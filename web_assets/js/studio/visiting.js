@@ -2,6 +2,7 @@
 
 import { fetchJson, post } from "../api.js";
 import { get } from "../state.js";
+import { timesStopped } from "./layer_playback.js";
 
 const TRIES = 30;
 const TRY_MILLISECONDS = 500;
@@ -25,6 +26,7 @@ const isShown = () => get("frame") !== null && get("detail")?.frame === get("fra
 
 /** Play the layers once the frame is there: what the page says of it to the scene meanwhile would stop them. */
 export async function playWhenShown() {
+  const stopped = timesStopped();
   for (let waited = 0; waited < PATIENCE && !isShown(); waited++) await wait(TRY_MILLISECONDS);
   const wanted = [get("session"), get("run"), get("frame")].join();
   let seen = 0;
@@ -32,6 +34,7 @@ export async function playWhenShown() {
     // Who has gone on meanwhile is not followed.
     if ([get("session"), get("run"), get("frame")].join() !== wanted) return;
     const now = await fetchJson("/api/scene/play-layers");
+    if (timesStopped() !== stopped) return;
     seen = now.playing ? seen + 1 : 0;
     if (!now.playing) await post("/api/scene/play-layers", { playing: true, rate: RATE });
     await wait(TRY_MILLISECONDS);
