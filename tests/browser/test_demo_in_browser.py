@@ -12,7 +12,7 @@ from urllib.parse import unquote
 import cv2
 import numpy as np
 import pytest
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, expect
 from scene_wire import until
 from stored_clouds import differing, drawn, run_path, stored_clouds
 from studio_page import StudioPage
@@ -127,6 +127,47 @@ def test_the_first_two_minutes(
     window.until("get('summary')?.frames.length === 14")
     until(page, lambda: demo.get("/api/preferences").get("first-steps") == "closed")
     assert not page.locator(".first-steps").count()
+    window.close()
+
+
+def test_a_step_stays_and_says_which_run_it_is_about(browser: Browser, demo: StudioServer) -> None:
+    """Also after a reload and while another run is looked at; a comparison goes on with the run that is chosen."""
+    demo.post("/api/preferences", {"first-steps": None}, method="PATCH")
+    window = StudioPage(browser, demo, with_scene=False)
+    page = window.page
+    strip = page.locator(".first-steps")
+    strip.get_by_role("button", name="Make it fail").click()
+    window.until("get('step') === 3 && get('run') === 'one-layer' && get('compared') === 'walk/ten-layers'")
+    until(page, lambda: "step=3" in page.url)
+    page.reload()
+    window.until("get('step') === 3 && get('run') === 'one-layer' && get('summary')?.frames.length")
+    expect(strip.locator("[aria-current=step]")).to_contain_text("Make it fail")
+    page.locator('.run[data-key="walk/ten-layers"]').click()
+    window.until("get('run') === 'ten-layers' && get('compared') === 'walk/one-layer'")
+    # A run's colour is its own, whichever of them is open.
+    swatches = page.locator("#panel-compare .compared .swatch")
+    until(page, lambda: swatches.count() == 2)
+
+    def colours() -> dict[str, str]:
+        rows = page.locator("#panel-compare .compared tbody tr")
+        return {
+            row.locator("td").first.inner_text(): str(row.locator(".swatch").get_attribute("style"))
+            for row in rows.all()
+        }
+
+    before = colours()
+    page.locator('.run[data-key="walk/one-layer"]').click()
+    window.until("get('run') === 'one-layer' && get('compared') === 'walk/ten-layers'")
+    until(page, lambda: list(colours()) != list(before) and len(colours()) == 2)
+    assert colours() == before
+    # The second step is about the other run.
+    strip.get_by_role("button", name="Change survival").click()
+    window.until("get('run') === 'ten-layers' && get('step') === 2")
+    page.locator('.run[data-key="walk/one-layer"]').click()
+    strip.get_by_text("this step is about").wait_for()
+    strip.get_by_role("button", name="Back to this step", exact=True).click()
+    window.until("get('run') === 'ten-layers' && get('step') === 2 && get('view') === 'schedule'")
+    page.locator(".first-knob input:enabled").wait_for()
     window.close()
 
 
