@@ -161,12 +161,14 @@ class Selection:
 class Remedy:
     """Something that may help. title : for a button. words : why. settings : knobs to change, by name. action : what
     else to do, as a machine reads it ("start pose", "calibrate", "masks", "correct sides"), "" where the knobs are all.
+    frame : the one from which on it was tried, where that is another than the frame that is asked about.
     """
 
     title: str
     words: str
     settings: Mapping[str, bool | int | float | str] = field(default_factory=dict[str, Any])
     action: str = ""
+    frame: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,8 +14,9 @@ Then it is asked, in this order; the first that holds is the cause:
    layer's choice is luck: with a usual survival rate they would not be as few (survival), or would (particles)?
 5. Does the likelihood prefer the wrong pose, both settled nearby? Then which camera and term (`blame`)?
 6. Else the stretch is tracked again: a search of few layers with as many evaluations in the usual number of layers (its
-   one step from broad to narrow is too long, Deutscher & Reid 2005, section 3), any with more particles and with more
-   noise. What helps names the cause; where nothing does and the likelihood prefers the reference, the search missed it.
+   one step from broad to narrow is too long, Deutscher & Reid 2005, section 3), any with other seeds alone (luck), with
+   more particles and with more noise. What helps names the cause; where nothing does and the likelihood prefers the
+   reference, the search missed it.
 
 Stretches are always tracked again with the remedy, and what became of the limb is said. What these rules cannot tell
 apart: a survival rate that is too low and too few particles where both are so; a camera that is moved and one whose
@@ -26,7 +27,7 @@ than three cameras, any fault of one. Distances in mm are at a person's size (`s
 import threading
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -507,6 +508,9 @@ def _explained(case: Case) -> Found:
         _add_search(case, limb, findings, remedies, cause_known=fault is not None)
     elif case.drifting and case.verdict.fits:
         findings += [_layer_finding(case, case.drifting[0]), _preference_finding(case)]
+    if case.wrong and case.stretch[1] < case.frame.number:
+        # With knobs the whole stretch is tracked again: in its last frame alone they mend little.
+        remedies = [replace(one, frame=case.stretch[1]) if one.settings else one for one in remedies]
     if not case.verdict.fits and not remedies:
         remedies.append(BY_HAND)
     table: list[Row] = [(one.kind, one.words, one.limb, one.layer, one.camera, one.term) for one in findings]
@@ -639,7 +643,7 @@ def _add_search(
     began = case.stretch[0] if known else case.frame.number
     if began < case.frame.number:
         first, mm = case.beginning
-        words = f"It began in frame {began}, where the {first} was {_mm(mm)} off: look at that frame first."
+        words = f"It began in frame {began}, where the {first} was {_mm(mm)} off."
         findings.append(Finding("began", words, first, numbers={"frame": began, "off": mm}, frame=began))
     cause = None if cause_known else _cause(case, limb, remedies)
     if cause is not None:
@@ -651,7 +655,7 @@ def _add_search(
         return
     remedy = remedies[-1]
     before = case.error(case.pose, case.wrong)
-    trials = case.trials([("the same settings and other seeds", {}), (remedy.title, remedy.settings)])
+    trials = case.trials([SAME, (remedy.title, remedy.settings)])
     for trial in trials:
         words = (
             f"Tracked again from frame {case.stretch[1]} with {_lowered(trial.what)}: the error of what is off goes"
@@ -660,8 +664,9 @@ def _add_search(
         findings.append(Finding("trial", words, limb, numbers={"before": before, "after": trial.left}))
 
 
-TRIED = ("noise", "survival", "particles", "layers")
+TRIED = ("noise", "survival", "particles", "layers", "luck")
 """Causes with a remedy of knobs, which is tried."""
+SAME = ("the same settings and other seeds", dict[str, Value]())
 
 
 def _cause(case: Case, limb: str, remedies: list[Remedy]) -> Finding | None:
@@ -759,6 +764,14 @@ def _by_trial(case: Case, limb: str, remedies: list[Remedy]) -> Finding:
         if trial.left <= HELPS * before:
             remedies.append(spread)
             return Finding("layers", _few_layers_words(case, before, trial), limb, is_cause=True)
+    [again] = case.trials([SAME])
+    if again.left <= HELPS * before:
+        words = (
+            f"The search had no luck: with {again.what} the error of what is off goes from {_mm(before)} to"
+            f" {_mm(again.left)}. More particles depend less on it."
+        )
+        remedies.append(more)
+        return Finding("luck", words, limb, numbers={"before": before, "after": again.left}, is_cause=True)
     wanted = [(more.title, more.settings)]
     if noise:
         wanted.append((f"{TIMES_NOISE:g} times the noise", noise))
@@ -816,7 +829,10 @@ def _layer_finding(case: Case, limb: str) -> Finding:
     place = f"where {_of(case.reference.kind)} has the {limb}"
     near = _mm(NEAR_MM * case.size)
     if len(case.frame.layers) == 1 and layer is None:
-        words = f"There was a particle near {place}: the nearest {_mm(nearest)} away. No second layer went on from it."
+        words = (
+            f"There was a particle near {place}: the nearest {_mm(nearest)} away. There was no second layer to go on"
+            " from it."
+        )
         return Finding("near to the end", words, limb, numbers=numbers)
     if layer is None:
         words = f"Down to the last layer particles were near {place}: the nearest {_mm(nearest)} away."

@@ -151,6 +151,9 @@ def test_one_layer_is_blamed_and_ten_are_tried(demo: Session) -> None:
     [cause] = [finding for finding in found.findings if finding.is_cause]
     assert cause.kind == "layers"
     assert dict(found.remedies[0].settings) == {"layers": 10, "particles": 50}
+    # In the shown frame alone the knobs mend little: the failure began before it.
+    assert found.remedies[0].frame is not None
+    assert found.remedies[0].frame < 13
     [*_, tried] = [finding for finding in found.findings if finding.kind == "trial"]
     assert tried.numbers["after"] < 0.5 * tried.numbers["before"]
     # The frame where it began is lost nowhere, and is not called right.

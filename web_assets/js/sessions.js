@@ -2,7 +2,7 @@
 
 import { fetchJson } from "./api.js";
 import { complain } from "./messages.js";
-import { comparedRuns, MOST_COMPARED, nothingChosen } from "./selection.js";
+import { comparedRuns, nothingChosen } from "./selection.js";
 import { get, set } from "./state.js";
 
 /** Ask the server for the list again. */
@@ -26,17 +26,17 @@ export function openSession(session, run = undefined, shown = {}) {
   const frame = shown.frame ?? null;
   const isHere = session === get("session");
   set({
-    missing: null, session, run: chosen, track: "raw", summary: null, detail: null, parameters: null, layerCount: null, settings: null, moved: null, whatIf: null, trial: null, against: null, trials: null, compared: isHere ? comparedWith(chosen) : null, through: null, eye: null,
+    missing: null, session, run: chosen, track: "raw", summary: null, detail: null, parameters: null, layerCount: null, settings: null, moved: null, whatIf: null, trial: null, against: null, trials: null, compared: isHere && chosen ? comparedWith(chosen) : null, through: null, eye: null,
     ...nothingChosen(), ...shown, frame, follow: frame === null, step: shown.step ?? (isHere ? get("step") : null),
   });
   document.body.classList.remove("rail-open");
 }
 
-/** The comparison that is shown, as it goes on with another run of the session: the run that was open takes its place. */
+/** The comparison as it goes on with another run of the session: where that was one of the others, the run that was open is now. */
 function comparedWith(run) {
-  const [others, open, next] = [comparedRuns(), `${get("session")}/${get("run")}`, `${get("session")}/${run}`];
-  if (!others.length || get("panel") !== "compare" || !run) return null;
-  return [open, ...others.filter((one) => one !== next)].slice(0, MOST_COMPARED - 1).join(",");
+  const [open, next] = [get("run"), run].map((name) => `${get("session")}/${name}`);
+  const others = comparedRuns().map((one) => (one === next ? open : one));
+  return others.length ? others.join(",") : null;
 }
 
 /** What a session is called in a list. */

@@ -470,7 +470,7 @@ function clouds(sheet, { summary, own: steps, ridges, marks }, at) {
   }));
   const all = sheet.plot(one, { title: "5 % to 95 % of the particles", unit: "in half widths of the first cloud", names: ["first cloud", "last cloud", ...(tried ? ["tried"] : []), "estimate", "truth"], below: 12, x: numbers("", { scale: false, min: -2, max: 2, interval: 1, position: "top" }), y: parameterAxis(names, at) });
   const bar = (name, which, colour, thickness, lower = 0) => sheet.series(all, {
-    name, type: "custom", encode: { x: [0, 1], y: 2 }, clip: true, itemStyle: { color: token(colour) },
+    name, type: "custom", z: name === "first cloud" ? 2 : 3, encode: { x: [0, 1], y: 2 }, clip: true, itemStyle: { color: token(colour) },
     data: names.flatMap((parameter, row) => { const own = which(byParameter.get(parameter), parameter); const place = places.get(parameter); const ends = [place(own.q05), place(own.q95)]; return ends[0] === null ? [] : [{ value: [...ends, row], own }]; }),
     renderItem: (_params, api) => {
       const [from, to] = [api.coord([Math.max(-2, api.value(0)), api.value(2)]), api.coord([Math.min(2, api.value(1)), api.value(2)])];
@@ -484,7 +484,7 @@ function clouds(sheet, { summary, own: steps, ridges, marks }, at) {
   const triedOf = tried && grouped(tried.summary, "parameter");
   if (tried) bar("tried", (own, parameter) => triedOf.get(parameter)?.at(-1) ?? own.at(-1), "tried", 3, 2);
   const point = (name, key, colour, symbol) => sheet.series(all, {
-    name, type: "scatter", symbol, symbolSize: 8, itemStyle: { color: token(colour), borderColor: token("surface"), borderWidth: 1 },
+    name, type: "scatter", z: 4, symbol, symbolSize: 8, itemStyle: { color: token(colour), borderColor: token("surface"), borderWidth: 1 },
     data: names.flatMap((parameter, row) => { const place = places.get(parameter)(marked.get(parameter)?.[key]); return place === null ? [] : [{ value: [Math.max(-2, Math.min(2, place)), row], parameter }]; }),
     click: ({ data }) => ({ parameter: data.parameter }), tip: ({ data }) => tipOf(at.label(data.parameter), [[name, withUnit(marked.get(data.parameter)[key], marked.get(data.parameter).unit)]]),
   });

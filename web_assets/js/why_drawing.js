@@ -7,20 +7,24 @@ import { byLayer, categories, distinct, grouped, KEY, layersOfAll, numbers, tipO
 
 const ROW = 17;
 
+/** Why a limb counts as lost. */
+const lostWords = ({ lost_by: by, error }, limit) =>
+  error !== null && by.includes("truth") ? `lost by the ${by}: a marker is more than ${limit} off` : `lost by the ${by}`;
+
 /** Limbs over the frames, and how near the particles of each layer came to the reference pose. */
 export function drawLimbs(sheet, /** @type {any} */ { limbs: rows, scale, nearest }, at, room) {
   const frames = distinct(rows.map((row) => row.frame));
   const names = distinct(rows.map((row) => row.limb));
   const measured = rows.some((row) => row.error !== null);
   const key = measured ? "error" : "disagreement";
-  const unitWords = measured ? "error" : "share of its area that silhouettes and body do not agree about";
+  const unitWords = measured ? "mean error" : "share of its area that silhouettes and body do not agree about";
   // The same colours in every frame, stored and tried, from the first frame of a run on.
   const { low, lost, high } = scale.find((row) => row.quantity === key);
   const inUnit = (value) => (measured ? `${figureWords(value)} mm` : `${figureWords(100 * value)} %`);
   const height = Math.max(names.length * ROW, room - 60);
   const [one, two] = sheet.columns(2, { height, least: [names.length * ROW, 0], gutters: [112, 84], shares: [1.7, 1], right: 18 });
   if (rows.length) {
-    const plot = sheet.plot({ ...one, width: one.width - (one.isBelow ? 60 : 0) }, { title: "Limbs over the frames", unit: `${unitWords}; lost from ${inUnit(lost)}${at.tried ? "; ◤ stored, ◢ tried" : ""}`, x: categories(frames.map(String), "frame"), y: categories(names, "", { inverse: true, axisLabel: { interval: 0, width: 104, overflow: "truncate" } }) });
+    const plot = sheet.plot({ ...one, width: one.width - (one.isBelow ? 60 : 0) }, { title: "Limbs over the frames", unit: `${unitWords}; lost ${measured ? `where a marker is ${inUnit(lost)} off` : `from ${inUnit(lost)}`}${at.tried ? "; ◤ stored, ◢ tried" : ""}`, x: categories(frames.map(String), "frame"), y: categories(names, "", { inverse: true, axisLabel: { interval: 0, width: 104, overflow: "truncate" } }) });
     const rowOf = new Map(rows.map((row) => [`${row.frame}/${row.limb}`, row]));
     const cellsOf = (list) => list.map((row) => [frames.indexOf(row.frame), names.indexOf(row.limb), row[key] ?? "-"]);
     sheet.splitHeat(plot, {
@@ -50,5 +54,5 @@ export function drawLimbs(sheet, /** @type {any} */ { limbs: rows, scale, neares
   } else sheet.words("There is no reference pose to measure the particles against.", two);
   const limb = at.limb ?? rows.filter((row) => row.frame === at.frame).reduce((worst, row) => ((row[key] ?? -1) > (worst?.[key] ?? -1) ? row : worst), null)?.limb;
   const now = rows.find((row) => row.frame === at.frame && row.limb === limb);
-  return now ? `${now.limb}, frame ${now.frame}: ${now.error === null ? "" : `error ${figureWords(now.error)} mm, `}${now.disagreement === null ? "" : `disagreement with the silhouettes ${figureWords(100 * now.disagreement)} %, `}${now.lost ? `lost by the ${now.lost_by}` : "not lost"}.` : "";
+  return now ? `${now.limb}, frame ${now.frame}: ${now.error === null ? "" : `mean error ${figureWords(now.error)} mm, `}${now.disagreement === null ? "" : `disagreement with the silhouettes ${figureWords(100 * now.disagreement)} %, `}${now.lost ? lostWords(now, inUnit(lost)) : "not lost"}.` : "";
 }

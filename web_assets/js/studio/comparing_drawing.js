@@ -16,12 +16,29 @@ const tipOfLayer = (points) =>
     points.map((point) => [point.seriesName, point.data]),
   );
 
+/** The colours' numbers of all runs that were compared on this page. @type {Map<string, number>} */
+const given = new Map();
+
 /**
- * The colour's number of each run: it stays with the run, whichever of them is open.
+ * The colour's number of each run: it stays with the run, whichever of them is open and whatever joins.
  * @param {string[]} runs
  * @returns {Map<string, number>}
  */
-export const coloursOf = (runs) => new Map([...runs].sort().map((run, at) => [run, at]));
+export function coloursOf(runs) {
+  const taken = new Set();
+  for (const run of runs) {
+    const own = given.get(run);
+    if (own === undefined || taken.has(own)) given.delete(run);
+    else taken.add(own);
+  }
+  for (const run of [...runs].sort()) {
+    if (given.has(run)) continue;
+    const free = runs.findIndex((_, at) => !taken.has(at));
+    given.set(run, free);
+    taken.add(free);
+  }
+  return new Map(runs.map((run) => [run, given.get(run) ?? 0]));
+}
 
 /**
  * How many layers are drawn: a swarm's have no effective number, as many as it has do not squeeze

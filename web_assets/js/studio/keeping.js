@@ -1,8 +1,9 @@
 // Keeping what was tried of a frame: as a run of its own, or in place of the stored frame.
 
-import { post, runPath } from "../api.js";
+import { post, remove, runPath } from "../api.js";
 import { openForm } from "./dialogs.js";
 import { complain, say } from "../messages.js";
+import { comparedRuns, MOST_COMPARED } from "../selection.js";
 import { openSession, refreshSessions } from "../sessions.js";
 import { get, set } from "../state.js";
 
@@ -17,8 +18,12 @@ export async function keepAsNewRun(frame, settings = {}) {
   const [session, run] = [get("session"), get("run")];
   try {
     const made = await post(`${runPath(session, run)}/branch`, { frame, settings });
+    // What was moved is the new run's now.
+    await remove(`${runPath(session, run)}/settings/moved`);
     await refreshSessions();
-    openSession(session, made.name);
+    const others = comparedRuns().filter((one) => one !== `${session}/${run}`);
+    const compared = [`${session}/${run}`, ...others].slice(0, MOST_COMPARED - 1).join(",");
+    openSession(session, made.name, { panel: get("panel"), compared });
     say(`${made.name} is ${run} with these knobs from frame ${frame} on; ${run} is unchanged.`);
     set({ follow: true });
     await post(`${runPath(session, made.name)}/start`);

@@ -19,7 +19,7 @@ import { DRAWINGS, isOfRun, numbersOf, OVER_FRAMES, queryOf } from "./view_numbe
 /** @import { Figure, Shown } from "../figure.js" */
 
 const LOAD_MILLISECONDS = 120;
-const LATE_MILLISECONDS = 800;
+const LATE_MILLISECONDS = 300;
 const FADE_PIXELS = 40;
 const TOWARDS = [
   ["truth", "from estimate to truth"],

@@ -16,6 +16,7 @@ import { drawLimbs } from "../why_drawing.js";
 import { computed, follow, html, signal } from "./component.js";
 import { correctFrame } from "./correcting.js";
 import { FigurePlace } from "./figure_place.js";
+import { keepAsNewRun } from "./keeping.js";
 import { hasTrack } from "./tracks.js";
 import { liveFigure } from "./views.js";
 
@@ -150,6 +151,11 @@ const knobWords = (settings) =>
     .map(([name, value]) => `${name.replaceAll("_", " ")} ${valueWords(value)}`)
     .join(", ");
 
+/** Track again with a remedy from the frame on where the failure began, as a run of its own. @param {Remedy} remedy */
+async function trackAgain({ frame, settings }) {
+  if (frame !== null && frame !== undefined) await keepAsNewRun(frame, settings ?? {});
+}
+
 /** What a remedy's button says; "" where there is none. @param {Remedy} remedy */
 function buttonOf({ action, settings }) {
   if (STEPS[action] || action === "look") return "Go there";
@@ -162,6 +168,7 @@ function buttonOf({ action, settings }) {
 function RemedyCard({ remedy }) {
   const knobs = knobWords(remedy.settings);
   const label = buttonOf(remedy);
+  const isLonger = label === "Try it" && Number.isInteger(remedy.frame);
   return html`<div class="remedy-card">
     <b>${remedy.title}</b>
     <p>${remedy.words}${knobs && ` (${knobs})`}</p>
@@ -173,7 +180,18 @@ function RemedyCard({ remedy }) {
         aria-label=${`Try: ${remedy.title}`}
         onClick=${() => attempt(remedy)}
       >
-        ${label}
+        ${isLonger ? "Try this frame" : label}
+      </button>`
+    }
+    ${
+      isLonger &&
+      html`<button
+        type="button"
+        class="small primary again"
+        title="The frames before it, then this one and all after it with these knobs, as a run of its own"
+        onClick=${() => trackAgain(remedy)}
+      >
+        Track again from frame ${remedy.frame}
       </button>`
     }
   </div>`;
