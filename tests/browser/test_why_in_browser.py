@@ -83,6 +83,9 @@ def test_the_cause_is_read_and_its_remedy_tried(
     window.until(f"get('frame') === {other} && get('limb') === '{limb}'")
     page.evaluate("async (frame) => (await import('/assets/js/selection.js')).goTo(frame)", frame)
     window.until(f"get('frame') === {frame}")
+    # The other frame's answer, which comes late, does not take this one's place.
+    page.wait_for_timeout(3000)
+    words.get_by_role("heading", name=f"Why is frame {frame} as it is?").wait_for()
 
     # What is tried is told over the scene: the error falls; nothing of it is stored.
     stored = studio.get(f"{RUN}/frames/{frame}")
@@ -118,10 +121,12 @@ def test_a_finding_leads_to_what_it_speaks_of(
 
     # Where it began is a frame: the finding leads there, and back leads to where it was read.
     began = page.locator(".why-words li button", has_text="It began in frame")
-    before = int(re.findall(r"\d+", began.inner_text())[0])
+    words = began.inner_text()
+    before = int(re.findall(r"\d+", words)[0])
     assert before < frame
     began.click()
-    window.until(f"get('frame') === {before} && get('limb') === '{limb}'")
+    window.until(f"get('frame') === {before}")
+    assert str(window.get("limb")) in words
     page.locator(".why-words").get_by_role("heading", name=f"Why is frame {before} as it is?").wait_for(
         timeout=2 * PATIENCE
     )

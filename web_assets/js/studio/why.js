@@ -82,37 +82,44 @@ async function answersFor(
   return { frame: ofFrame, run: ofRun };
 }
 
+/** What the answers of the shown frame are known by; null where there are none to ask for. */
+function keyNow() {
+  if (get("panel") !== "why" || subject.value !== "stored") return null;
+  const of = `${get("session")}/${get("run")} ${get("frame")} ${queryOf(get("against"))}`;
+  return `${of} ${get("trial") ?? ""} ${age} ${get("summary").frames.length}`;
+}
+
 function load() {
-  const isShown = get("panel") === "why";
-  if (isShown && subject.value === "stored") {
-    const [session, run, frame] = [get("session"), get("run"), get("frame")];
-    const [trial, against] = [get("trial"), get("against")];
-    const of = `${session}/${run} ${frame} ${queryOf(against)} ${trial ?? ""}`;
-    const key = `${of} ${age} ${get("summary").frames.length}`;
-    if (held.value?.key === key) return;
-    asking.ask(key, async (signal) => {
-      isLoading.value = true;
-      wrong.value = "";
-      try {
-        const [stored, tried] = await Promise.all([
-          answersFor(session, run, frame, against, signal),
-          trial ? answersFor(session, run, frame, trial, signal) : null,
-        ]);
-        if (!signal.aborted) held.value = { key, ...stored, tried };
-      } catch (error) {
-        const { message, hint = "" } = /** @type {any} */ (error);
-        if (signal.aborted) return;
-        held.value = null;
-        wrong.value = `${message} ${hint}`;
-      } finally {
-        if (!signal.aborted) isLoading.value = false;
-      }
-    });
+  const key = keyNow();
+  if (key !== null && held.value?.key !== key) {
+    asking.ask(key, (signal) => loadAnswers(key, signal));
     return;
   }
+  // What is still asked for is of another frame.
   asking.stop();
   isLoading.value = false;
-  if (isShown) held.value = null;
+  if (key === null && get("panel") === "why") held.value = null;
+}
+
+async function loadAnswers(/** @type {string} */ key, /** @type {AbortSignal} */ signal) {
+  const [session, run, frame] = [get("session"), get("run"), get("frame")];
+  const [trial, against] = [get("trial"), get("against")];
+  isLoading.value = true;
+  wrong.value = "";
+  try {
+    const [stored, tried] = await Promise.all([
+      answersFor(session, run, frame, against, signal),
+      trial ? answersFor(session, run, frame, trial, signal) : null,
+    ]);
+    if (!signal.aborted) held.value = { key, ...stored, tried };
+  } catch (error) {
+    const { message, hint = "" } = /** @type {any} */ (error);
+    if (signal.aborted) return;
+    held.value = null;
+    wrong.value = `${message} ${hint}`;
+  } finally {
+    if (!signal.aborted) isLoading.value = false;
+  }
 }
 
 const later = paced(load, LOAD_MILLISECONDS);
