@@ -41,6 +41,8 @@ def window(browser: Browser, demo: StudioServer) -> Iterator[StudioPage]:
     """One window for all tests of this file but the first, on a run that is begun in the demo, slowed and held up here,
     and tracked on in the window.
     """
+    # The steps stay beside any run of this session; without them the scene has room for its knobs.
+    demo.post("/api/preferences", {"first-steps": "closed"}, method="PATCH")
     demo.post("/api/sessions/walk/runs", {"name": "run-1"})
     demo.post(f"{RUN}/start")
     demo.pace(PACE)
