@@ -19,7 +19,7 @@ export async function keepAsNewRun(frame, settings = {}) {
   try {
     const made = await post(`${runPath(session, run)}/branch`, { frame, settings });
     // What was moved is the new run's now.
-    await remove(`${runPath(session, run)}/settings/moved`);
+    await remove(`${runPath(session, run)}/settings/moved`).catch(complain);
     await refreshSessions();
     const others = comparedRuns().filter((one) => one !== `${session}/${run}`);
     const compared = [`${session}/${run}`, ...others].slice(0, MOST_COMPARED - 1).join(",");
