@@ -8,6 +8,7 @@ import { complain } from "../messages.js";
 import { select } from "../selection.js";
 import { get, set } from "../state.js";
 import { signal } from "./component.js";
+import { leaveOffPlaying } from "./visiting.js";
 
 /** Layers a second that are offered. */
 export const RATES = [1, 3, 10];
@@ -26,14 +27,10 @@ function take(now) {
   }
 }
 
-let stops = 0;
-/** How often the layers were stopped by hand: who begins to play them leaves off then. */
-export const timesStopped = () => stops;
-
 /** Begin, end, or change how the layers are played; what is left out stays. @param {Partial<LayerPlayback>} changes */
 export async function playLayers(changes) {
   const before = layerPlayback.value;
-  if (changes.playing === false) stops += 1;
+  if (changes.playing === false) leaveOffPlaying();
   take({ ...before, ...changes });
   try {
     await post("/api/scene/play-layers", changes);

@@ -2,7 +2,6 @@
 
 import { fetchJson, post } from "../api.js";
 import { get } from "../state.js";
-import { timesStopped } from "./layer_playback.js";
 
 const TRIES = 30;
 const TRY_MILLISECONDS = 500;
@@ -24,9 +23,15 @@ export function visit(state) {
 
 const isShown = () => get("frame") !== null && get("detail")?.frame === get("frame");
 
+let stops = 0;
+/** The layers were stopped by hand: what is about to play them leaves off. */
+export function leaveOffPlaying() {
+  stops += 1;
+}
+
 /** Play the layers once the frame is there: what the page says of it to the scene meanwhile would stop them. */
 export async function playWhenShown() {
-  const stopped = timesStopped();
+  const stopped = stops;
   for (let waited = 0; waited < PATIENCE && !isShown(); waited++) await wait(TRY_MILLISECONDS);
   const wanted = [get("session"), get("run"), get("frame")].join();
   let seen = 0;
@@ -34,7 +39,7 @@ export async function playWhenShown() {
     // Who has gone on meanwhile is not followed.
     if ([get("session"), get("run"), get("frame")].join() !== wanted) return;
     const now = await fetchJson("/api/scene/play-layers");
-    if (timesStopped() !== stopped) return;
+    if (stops !== stopped) return;
     seen = now.playing ? seen + 1 : 0;
     if (!now.playing) await post("/api/scene/play-layers", { playing: true, rate: RATE });
     await wait(TRY_MILLISECONDS);
