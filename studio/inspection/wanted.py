@@ -1,21 +1,19 @@
-"""Whether whoever asked for a view still waits for it: one that takes long ends between two of its steps when nobody
-does, so that it does not hold up those that somebody looks at.
+"""Whether a view is still waited for: one that takes long ends between two of its steps when its request was broken
+off, so that it does not hold up the one that is looked at.
 """
 
 from collections.abc import Callable
 from contextvars import ContextVar
 
-from studio.errors import StudioError
-
 IS_WANTED: ContextVar[Callable[[], bool]] = ContextVar("is_wanted", default=lambda: True)
 """Says of the answer that is computed in this context whether it is still waited for."""
 
 
-class LeftError(StudioError, status=499, code="left"):
-    """Whoever asked has gone; the answer reaches nobody."""
+class LeftError(Exception):
+    """The request was broken off: there is no one to answer, and no cause or remedy to tell."""
 
 
 def stop_if_left() -> None:
     """Raises LeftError where the answer is not waited for any more."""
     if not IS_WANTED.get()():
-        raise LeftError("Nobody waits for this any more.")
+        raise LeftError

@@ -34,7 +34,7 @@ import numpy as np
 
 from studio.arrays import Array
 from studio.body.scale import scale_of
-from studio.errors import StudioError
+from studio.errors import SettingsError, StudioError
 from studio.evaluation.errors import lost_mm
 from studio.inspection.blame import ReferencePose, judged_pose, reference_pose
 from studio.inspection.camera_checks import CameraFault, fault_of, view_fits
@@ -47,13 +47,12 @@ from studio.inspection.retracking import Change, Retracking, more_evaluations
 from studio.inspection.schedule import effective_number
 from studio.inspection.tables import Finding, Found, Remedy, Row, Selection, View, table
 from studio.inspection.verdict import STATE_WORDS, Verdict, verdict, verdict_on
-from studio.inspection.wanted import LeftError
 from studio.knobs import Value, knobs_of
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.runs.run_footage import filmed_cameras
 from studio.runs.tracks import RAW, best_track, track_stamp
 from studio.settings import RunSettings
-from studio.trackers.catalogue import TRACKERS
+from studio.trackers.catalogue import TRACKERS, knobs_for_evaluations
 from studio.trackers.tracker import TRACKED
 from studio.words import enumerated
 
@@ -341,8 +340,6 @@ class Case:
                 pose = self.run.frame(number).estimate(
                     "" if self.reference.kind == "refined" else self.reference.kind
                 )
-        except LeftError:
-            raise
         except StudioError:
             return None
         return body_points(self.run.body, pose[None])[0]
@@ -453,11 +450,13 @@ def usual_layers(settings: RunSettings) -> dict[str, Value]:
     """
     tracker = TRACKERS[settings.tracker_name]
     has_layers = "layers" in {entry.name for entry in knobs_of(settings.tracker)}
-    evaluations = tracker.evaluations(settings.tracker)
-    few = tracker.layer_count(settings.tracker) < FEW_LAYERS
-    if not has_layers or not few or evaluations < tracker.least_evaluations(USUAL_LAYERS):
+    if not has_layers or tracker.layer_count(settings.tracker) >= FEW_LAYERS:
         return {}
-    return dict(tracker.evaluation_knobs(evaluations, USUAL_LAYERS))
+    try:
+        evaluations = tracker.evaluations(settings.tracker)
+        return dict(knobs_for_evaluations(settings.tracker_name, evaluations, USUAL_LAYERS))
+    except SettingsError:  # Too few for so many layers.
+        return {}
 
 
 def usual_survival(settings: RunSettings) -> dict[str, Value]:

@@ -84,15 +84,7 @@ class ParticleView:
             self._away.add(record.layer)
 
     def _added(self, layer: int) -> viser.PointCloudHandle:
-        return self._server.scene.add_point_cloud(
-            f"/particles/layer {layer}",
-            np.zeros((1, 3), dtype=np.float32),
-            (255, 255, 255),
-            precision="float32",
-            point_shape="circle",
-            point_shading="flat",
-            visible=False,
-        )
+        return add_cloud(self._server, f"/particles/layer {layer}")
 
     def _draw(
         self,
@@ -119,6 +111,19 @@ class ParticleView:
         handle.point_size = style.point_size
 
 
+def add_cloud(server: viser.ViserServer, name: str) -> viser.PointCloudHandle:
+    """A cloud that is not seen at first: all clouds are made alike, so that one program draws them."""
+    return server.scene.add_point_cloud(
+        name,
+        np.zeros((1, 3), dtype=np.float32),
+        (255, 255, 255),
+        precision="float32",
+        point_shape="circle",
+        point_shading="flat",
+        visible=False,
+    )
+
+
 def keep_programs(server: viser.ViserServer) -> None:
     """Two points under the floor that never change, in one colour and in one each.
 
@@ -126,16 +131,10 @@ def keep_programs(server: viser.ViserServer) -> None:
     cloud is drawn by the same: for a browser without a card that takes longer than the picture.
     """
     hidden = np.array([[0.0, 0.0, -0.01]] * 2, dtype=np.float32)
-    for name, colours in (("one", (0, 0, 0)), ("each", np.zeros((2, 3), dtype=np.uint8))):
-        server.scene.add_point_cloud(
-            f"/particles/kept {name}",
-            hidden,
-            colours,
-            point_size=1e-6,
-            precision="float32",
-            point_shape="circle",
-            point_shading="flat",
-        )
+    for name, shape in (("one", (3,)), ("each", (2, 3))):
+        handle = add_cloud(server, f"/particles/kept {name}")
+        handle.points, handle.colors, handle.point_size = hidden, np.zeros(shape, dtype=np.uint8), 1e-6
+        handle.visible = True
 
 
 def cloud_points(body: BodyModel, poses: Array, limbs: Sequence[int]) -> Array:

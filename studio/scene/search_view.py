@@ -16,7 +16,7 @@ from studio.body.model import BodyModel
 from studio.runs.colour_tokens import ColourTokens
 from studio.scene.layer_journey import FAR_END, Journey, Journeys, glow, lines_back, travelled
 from studio.scene.line_views import LinesView
-from studio.scene.particle_view import ParticleView
+from studio.scene.particle_view import ParticleView, add_cloud
 from studio.scene.viewpoint import Eye, on_screen
 from studio.trackers.tracker import NO_PARENT, LayerRecord
 
@@ -91,8 +91,8 @@ class SearchView:
 
     def __init__(self, server: viser.ViserServer, body: BodyModel, cloud: ParticleView) -> None:
         self._cloud, self._journeys = cloud, Journeys(body)
-        self.shells = _points(server, "/search/shells")
-        self.dead = _points(server, "/search/dead")
+        self.shells = add_cloud(server, "/search/shells")
+        self.dead = add_cloud(server, "/search/dead")
         self.skeletons = LinesView(server, "/search/heaviest", _SKELETON)
         self.ways = LinesView(server, "/search/ways", _WAYS)
         self.lineage = LinesView(server, "/search/lineage", _LINEAGE)
@@ -297,15 +297,3 @@ def _put(
     if handle.points.shape != points.shape:
         handle.colors = np.array(tokens["ghost"], dtype=np.uint8)
     handle.points, handle.colors = points, colours
-
-
-def _points(server: viser.ViserServer, name: str) -> viser.PointCloudHandle:
-    return server.scene.add_point_cloud(
-        name,
-        np.zeros((1, 3), dtype=np.float32),
-        (255, 255, 255),
-        precision="float32",
-        point_shape="circle",
-        point_shading="flat",
-        visible=False,
-    )

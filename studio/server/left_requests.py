@@ -1,25 +1,23 @@
-"""Views that a browser asked for and does not wait for any more: what computes them is told, and stops."""
+"""Answers that are computed and that a browser does not wait for any more: what computes them stops."""
 
 import asyncio
 import contextlib
-import re
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from studio.inspection.wanted import IS_WANTED
-
-VIEW = re.compile(r"/views/[a-z-]+$")
+from studio.inspection.wanted import IS_WANTED, LeftError
+from studio.server.viewers_budget import COMPUTED
 
 
 class LeftRequests:
-    """ASGI middleware: while a view is computed it listens whether the connection is still there."""
+    """ASGI middleware: while an answer is computed it listens whether the connection is still there."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass on."""
-        if scope["type"] != "http" or scope["method"] != "GET" or not VIEW.search(scope["path"]):
+        if scope["type"] != "http" or scope["method"] != "GET" or not COMPUTED.search(scope["path"]):
             await self.app(scope, receive, send)
             return
         has_left = asyncio.Event()
@@ -35,7 +33,8 @@ class LeftRequests:
         kept = IS_WANTED.set(lambda: not has_left.is_set())
         listening = asyncio.create_task(listen())
         try:
-            await self.app(scope, asked.get, send)
+            with contextlib.suppress(LeftError):
+                await self.app(scope, asked.get, send)
         finally:
             IS_WANTED.reset(kept)
             listening.cancel()

@@ -26,17 +26,20 @@ export function openSession(session, run = undefined, shown = {}) {
   const frame = shown.frame ?? null;
   const isHere = session === get("session");
   set({
-    missing: null, session, run: chosen, track: "raw", summary: null, detail: null, parameters: null, layerCount: null, settings: null, moved: null, whatIf: null, trial: null, against: null, trials: null, compared: isHere && chosen ? comparedWith(chosen) : null, through: null, eye: null,
+    missing: null, session, run: chosen, track: "raw", summary: null, detail: null, parameters: null, layerCount: null, settings: null, moved: null, whatIf: null, trial: null, against: null, trials: null, compared: comparedWith(session, chosen), through: null, eye: null,
     ...nothingChosen(), ...shown, frame, follow: frame === null, step: shown.step ?? (isHere ? get("step") : null),
   });
   document.body.classList.remove("rail-open");
 }
 
-/** The comparison as it goes on with another run of the session: where that was one of the others, the run that was open is now. */
-function comparedWith(run) {
-  const [open, next] = [get("run"), run].map((name) => `${get("session")}/${name}`);
-  const others = comparedRuns().map((one) => (one === next ? open : one));
-  return others.length ? others.join(",") : null;
+/**
+ * The comparison as it goes on with another of its runs, or of the session's: where that was one of the others, the run that
+ * was open is now.
+ */
+function comparedWith(session, run) {
+  const [open, next, others] = [`${get("session")}/${get("run")}`, `${session}/${run}`, comparedRuns()];
+  const goesOn = run && (session === get("session") || others.includes(next));
+  return (goesOn && others.map((one) => (one === next ? open : one)).join(",")) || null;
 }
 
 /** What a session is called in a list. */

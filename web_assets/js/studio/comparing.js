@@ -135,15 +135,16 @@ async function loadFrames(names) {
   drawBeside(
     frames.value.runs
       .slice(1)
-      .flatMap(({ run, pose }) => (pose ? [{ colour: `series-${colours.get(run)}`, pose }] : [])),
+      .flatMap(({ run, pose }) =>
+        pose ? [{ colour: seriesToken(colours.get(run) ?? 0), pose }] : [],
+      ),
   );
 }
 
 /** Open another of the runs at the shown frame, with this one beside it. */
 function open(name) {
   const [session, run] = partsOf(name);
-  const beside = [own(), ...others().filter((one) => one !== name)].join(",");
-  openSession(session, run, { frame: get("frame"), compared: beside, panel: "compare" });
+  openSession(session, run, { frame: get("frame"), panel: "compare" });
 }
 
 /** The worst frame of each run. @param {{ rows: any[], colours: Map<string, number> }} properties */

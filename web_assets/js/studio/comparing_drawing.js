@@ -28,7 +28,8 @@ export function coloursOf(runs) {
   const taken = new Set();
   for (const run of runs) {
     const own = given.get(run);
-    if (own === undefined || taken.has(own)) given.delete(run);
+    // As many colours as runs: a scene gives its own run the one that the others leave.
+    if (own === undefined || own >= runs.length || taken.has(own)) given.delete(run);
     else taken.add(own);
   }
   for (const run of [...runs].sort()) {
