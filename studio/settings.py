@@ -24,7 +24,9 @@ DEFAULT_TRACKER, DEFAULT_WEIGHTING = "annealed", "edge-region-silhouette"
 # Knobs of older records: the new name, and the new value where an old one is gone.
 RENAMED: dict[str, tuple[str, dict[object, Value]]] = {"limits": ("constraints", {"reflect": "clamp"})}
 # Knobs that older records do not have, as those runs were tracked.
-BEFORE: dict[str, Value] = {"refine_frames": False}
+BEFORE: dict[str, Value] = {"refine_frames": False, "mask_shadow_window": 1}
+# Knobs that are gone; what they did cannot be done again.
+GONE = ("mask_shadow_learnt",)
 JSON_TYPES = {bool: "boolean", int: "integer", float: "number", str: "string"}
 
 
@@ -150,6 +152,8 @@ def in_todays_names(recorded: Mapping[str, Any]) -> dict[str, Any]:
     """Recorded knobs by the names that they have today."""
     found: dict[str, Any] = {}
     for name, value in recorded.items():
+        if name in GONE:
+            continue
         today, changes = RENAMED.get(name, (name, {}))
         found[today] = changes.get(value, value)
     return found

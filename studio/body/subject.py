@@ -42,7 +42,7 @@ from studio.errors import BodyError
 from studio.foreign_files import foreign_file, read_foreign_text
 from studio.typed_decoding import decode_toml
 
-DEFAULT_BODY = "human31"
+DEFAULT_BODY = "human35"
 
 # Weight of a distance measured standing, relative to one that no pose changes.
 STANDING_WEIGHT = 0.03

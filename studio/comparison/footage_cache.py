@@ -112,7 +112,7 @@ class FootageCache:
             if self._footage is not None:
                 self._footage[1].close()
             footage = session.footage()
-            self._footage = (session.path, footage, Backgrounds(footage, session.cameras()))
+            self._footage = (session.path, footage, Backgrounds(footage))
         return self._footage[1:]
 
     def _kept(self, key: Hashable, evidence: FrameEvidence) -> FrameEvidence:

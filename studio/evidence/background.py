@@ -2,12 +2,12 @@
 
 `GaussianBackground` keeps a mean and a standard deviation for each pixel and colour (section 4.2.2 uses
 thresholded background subtraction). Its shadow test follows Horprasert et al. 1999: a pixel whose
-colour is the background's, only darker, is background. OpenCV's MOG2 and KNN models are trained on a
+colour is the background's, only darker, is background; unlike there the colour is that of a few changed pixels
+together, not of one, whose noise would hide the difference between a shadow and skin. OpenCV's MOG2 and KNN models are trained on a
 fixed set of frames and then only applied (learning rate 0), so that a frame's mask does not depend on the
 frames processed before.
 """
 
-import dataclasses
 import threading
 from collections.abc import Sequence
 from typing import Literal, Protocol
@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from studio.arrays import Bytes, Floats
 from studio.evidence.settings import EvidenceSettings
-from studio.evidence.shadow_colours import DARKNESS_BINS, TINT_BINS, TINT_REACH, Changed, ShadowTable
 from studio.numba_in_threads import EXACT, KERNEL, njit
 
 GAIN_STRIDE = 8
@@ -40,12 +39,8 @@ frames twice more, so that updates already due and the order of a mixture's Gaus
 class BackgroundModel(Protocol):
     """One camera's background, fitted."""
 
-    def foreground(
-        self, picture: Bytes, settings: EvidenceSettings, shadows: ShadowTable | None = None
-    ) -> Bytes:
-        """(H, W) uint8, 255 where the picture differs from the background, before any clean-up. shadows : of
-        `learn_shadow_colours`.
-        """
+    def foreground(self, picture: Bytes, settings: EvidenceSettings) -> Bytes:
+        """(H, W) uint8, 255 where the picture differs from the background, before any clean-up."""
         ...
 
 
@@ -72,36 +67,31 @@ class GaussianBackground:
         self._samples = self.mean[::GAIN_STRIDE, ::GAIN_STRIDE].astype(np.float32)
         self.is_grey = float(np.ptp(self._samples, axis=2).mean()) < GREY_SPREAD
 
-    def foreground(
-        self, picture: Bytes, settings: EvidenceSettings, shadows: ShadowTable | None = None
-    ) -> Bytes:
+    def foreground(self, picture: Bytes, settings: EvidenceSettings) -> Bytes:
         """(H, W) uint8, 255 where the picture differs and is no shadow."""
         gain = self.gain(picture) if settings.mask_gain_fit else np.ones(3, np.float32)
-        darkest = settings.mask_shadow_darkest if self.tests_shadows(settings) else NO_SHADOW
-        return differing_pixels(
-            np.ascontiguousarray(picture),
+        picture, noise = np.ascontiguousarray(picture), np.float32(settings.mask_noise**2)
+        threshold = np.float32(settings.mask_threshold**2)
+        changed = differing_pixels(
+            picture, self.mean, self._rough, self.variance, gain, threshold, noise
+        )
+        if not self.tests_shadows(settings):
+            return changed
+        darkest, colour = settings.mask_shadow_darkest, settings.mask_shadow_colour
+        return drop_shadows(
+            changed,
+            picture,
             self.mean,
-            self._rough,
-            self.variance,
             gain,
-            np.float32(settings.mask_threshold**2),
-            np.float32(settings.mask_noise**2),
+            noise,
             np.float32(darkest),
-            np.float32(settings.mask_shadow_colour),
-            ALL_SHADOW if shadows is None else shadows,
+            np.float32(colour),
+            settings.mask_shadow_window // 2,
         )
 
     def tests_shadows(self, settings: EvidenceSettings) -> bool:
         """Whether darker pixels may count as background: a grey picture has no colour to compare."""
         return settings.mask_shadow_test and not self.is_grey
-
-    def changed(self, picture: Bytes, settings: EvidenceSettings) -> Changed:
-        """What differs, with and without the shadow test, for learning the colours of shadows."""
-        differs = self.foreground(picture, dataclasses.replace(settings, mask_shadow_test=False)) > 0
-        gain = self.gain(picture) if settings.mask_gain_fit else np.ones(3, np.float32)
-        return Changed(
-            differs, differs & (self.foreground(picture, settings) == 0), picture, self.mean * gain
-        )
 
     def gain(self, picture: Bytes) -> Floats:
         """(3,) factor on each colour of the background, from the median pixel (people cover less than
@@ -143,9 +133,7 @@ class SubtractorBackground:
             self._model.apply(picture, learningRate=self._rate)
         self._lock = threading.Lock()
 
-    def foreground(
-        self, picture: Bytes, settings: EvidenceSettings, shadows: ShadowTable | None = None
-    ) -> Bytes:
+    def foreground(self, picture: Bytes, settings: EvidenceSettings) -> Bytes:
         """(H, W) uint8, 255 for foreground; OpenCV's shadow pixels are background, by its own test alone."""
         with self._lock:
             if isinstance(self._model, cv2.BackgroundSubtractorMOG2):
@@ -221,16 +209,14 @@ def gain_ratios(
     return ratios, counts
 
 
-NO_SHADOW = 2.0
-"""Darkest shadow at which nothing is shadow."""
-ALL_SHADOW: ShadowTable = np.ones((DARKNESS_BINS, TINT_BINS, TINT_BINS), np.uint8)
-"""The table that leaves the decision to the two tolerances."""
-ALL_SHADOW.setflags(write=False)
-REACH, PER_TINT = np.float32(TINT_REACH), np.float32(0.5 * TINT_BINS / TINT_REACH)
 PART, WORDS = 16, 6
 """Pixels of a row that are decided together, and 64-bit words of their flags, a byte a colour."""
 ROUGH = np.float32(0.501)
 """Grey levels by which a rounded mean is off at most."""
+UNSURE = np.float32(3.0)
+"""Deviations of the noise by which a shadow's colour may seem another one."""
+FINE = np.float32(16.0)
+"""Steps of a grey level in which the background is summed: whole numbers add up alike in any order."""
 
 
 @njit(**EXACT, fastmath=True)
@@ -242,16 +228,11 @@ def differing_pixels(
     gain: NDArray[np.float32],
     threshold: np.float32,
     noise: np.float32,
-    darkest: np.float32,
-    colour: np.float32,
-    shadows: NDArray[np.uint8],
 ) -> Bytes:
-    """255 where a colour differs by more than sqrt(threshold) deviations and the pixel is no shadow.
+    """255 where a colour differs by more than sqrt(threshold) deviations.
 
     picture : (H, W, 3) uint8. mean : (H, W, 3) uint8 or float32. rough : (H, W, 3) uint8, the mean rounded. variance :
-    (H or 1, W, 3) float32. noise : least variance. A shadow has
-    darkest <= brightness / background < 1 and a colour within `colour` of the background's, as a share of its
-    brightness; of these it is one where the table `shadows` (`shadow_colours.cells_of`) has 1.
+    (H or 1, W, 3) float32. noise : least variance.
     The first loop of a row vectorises over all its colours: nearer to the rounded mean than the least noise allows
     nothing differs. Most of a picture is decided so, at a quarter of the bytes; only the rest is compared exactly.
     """
@@ -286,27 +267,80 @@ def differing_pixels(
                     away = np.float32(seen[k + c]) - gains[k + c] * np.float32(expected[k + c])
                     differs |= away * away > threshold * max(spread[k + c], noise)
                 if differs:
-                    dot, norm, square = np.float32(0.0), np.float32(0.0), np.float32(0.0)
+                    row[x] = np.uint8(255)
+    return out
+
+
+@njit(**EXACT)
+def drop_shadows(
+    changed: Bytes,
+    picture: Bytes,
+    mean: NDArray[np.uint8 | np.float32],
+    gain: NDArray[np.float32],
+    noise: np.float32,
+    darkest: np.float32,
+    colour: np.float32,
+    reach: int,
+) -> Bytes:
+    """Changed pixels (H, W) without the shadows among them.
+
+    A pixel may be shadow if darkest <= brightness / background < 1 and its colour, allowing for UNSURE deviations of
+    noise, lies within `colour` of the background's, as a share of its brightness. It is one if the mean colour of all
+    that may be shadow at most `reach` pixels away along each axis lies so near, allowing for a deviation of that mean.
+    One pixel's colour is mostly noise: a tolerance that lets a noisy shadow through lets skin on a floor of wood
+    through, too. picture, mean, gain, noise : as in `differing_pixels`.
+    """
+    height, width = changed.shape
+    possible, top, bottom = np.zeros((height, width), np.bool_), height, -1
+    for y in range(height):
+        for x in range(width):
+            if not changed[y, x]:
+                continue
+            dot, norm, square = np.float32(0.0), np.float32(0.0), np.float32(0.0)
+            for c in range(3):
+                value, background = np.float32(picture[y, x, c]), gain[c] * np.float32(mean[y, x, c])
+                dot += value * background
+                norm += background * background
+                square += value * value
+            norm = max(norm, np.float32(1.0))
+            share = dot / norm
+            near = square - share * dot < colour * colour * norm + UNSURE * UNSURE * noise
+            if darkest <= share and share < np.float32(1.0) and near:
+                possible[y, x] = True
+                top, bottom = min(top, y), y
+    out = changed.copy()
+    # Of each column over 2 reach + 1 rows: the picture's three colours, the background's, and the number of pixels.
+    columns, around = np.zeros((width, 7), np.int64), np.empty(7, np.int64)
+    for y in range(top, bottom + reach + 1):
+        for row, sign in ((y, 1), (y - 2 * reach - 1, -1)):
+            if row < top or row > bottom:
+                continue
+            for x in range(width):
+                if possible[row, x]:
                     for c in range(3):
-                        value, background = np.float32(seen[k + c]), gain[c] * np.float32(expected[k + c])
-                        dot += value * background
-                        norm += background * background
-                        square += value * value
-                    share = dot / max(norm, np.float32(1.0))
-                    off_colour = square - share * dot
-                    same_colour = off_colour < colour * colour * norm + noise
-                    shadow = darkest <= share and share < np.float32(1.0) and same_colour
-                    if shadow:
-                        root = np.sqrt(max(norm, np.float32(1.0)))
-                        blue = (np.float32(seen[k]) - share * gain[0] * np.float32(expected[k])) / root
-                        red = (np.float32(seen[k + 2]) - share * gain[2] * np.float32(expected[k + 2])) / root
-                        shadow = (
-                            shadows[
-                                min(int(share * (DARKNESS_BINS - 1)), DARKNESS_BINS - 1),
-                                min(max(int(np.floor((blue + REACH) * PER_TINT)), 0), TINT_BINS - 1),
-                                min(max(int(np.floor((red + REACH) * PER_TINT)), 0), TINT_BINS - 1),
-                            ]
-                            > 0
-                        )
-                    row[x] = np.uint8(0) if shadow else np.uint8(255)
+                        columns[x, c] += sign * picture[row, x, c]
+                        background = FINE * gain[c] * np.float32(mean[row, x, c])
+                        columns[x, 3 + c] += sign * np.int64(np.rint(background))
+                    columns[x, 6] += sign
+        middle = y - reach
+        if middle < top:
+            continue
+        around[:] = 0
+        for x in range(-reach, width):
+            if x + reach < width:
+                around += columns[x + reach]
+            if x - reach - 1 >= 0:
+                around -= columns[x - reach - 1]
+            if x < 0 or not possible[middle, x]:
+                continue
+            count = np.float32(around[6])
+            dot, norm, square = np.float32(0.0), np.float32(0.0), np.float32(0.0)
+            for c in range(3):
+                value, background = np.float32(around[c]) / count, np.float32(around[3 + c]) / (FINE * count)
+                dot += value * background
+                norm += background * background
+                square += value * value
+            norm = max(norm, np.float32(1.0))
+            if square - dot / norm * dot < colour * colour * norm + noise / count:
+                out[middle, x] = np.uint8(0)
     return out

@@ -4,7 +4,6 @@ A model is fitted to a camera's plate picture or empty clip, else to frames spre
 (a moving subject is then absent from the median; one that stays leaves a ghost).
 """
 
-import contextlib
 import threading
 from pathlib import Path
 from typing import Literal
@@ -26,11 +25,7 @@ from studio.evidence.background import (
     gaussian_from_median,
 )
 from studio.evidence.combined_background import combine
-from studio.evidence.masks import uncleaned
-from studio.evidence.settings import EvidenceSettings
-from studio.evidence.shadow_colours import LEAST_CAMERAS, Changed, ShadowTable, learn_shadow_colours
 from studio.evidence.yuv_background import YuvBackground, independent_background, learn_background
-from studio.geometry.camera import Camera
 
 FittedKind = Literal["gaussian", "median", "combined", "mog2", "knn"]
 
@@ -38,8 +33,6 @@ CLIP_FRAMES = 60
 MEDIAN_FRAMES, FEWEST_FRAMES = 31, 3
 MEDIAN_BYTES = 200_000_000
 TRAINING_FRAMES = 40
-SHADOW_FRAMES = 8
-"""Frames, evenly spread, from which the colours of shadows are learnt."""
 LARGEST_DIFFERENCE = 0.02
 GRADIENT_LIMIT = 100.0
 
@@ -47,11 +40,8 @@ GRADIENT_LIMIT = 100.0
 class Backgrounds:
     """Fitted models by camera and kind, for any number of evidence makers and threads."""
 
-    def __init__(self, footage: Footage, cameras: tuple[Camera, ...] = ()) -> None:
-        """cameras : of the footage; without them no colours of shadows are learnt."""
-        self._footage, self._cameras = footage, cameras
-        self._learning = threading.Lock()
-        self._shadows: dict[tuple[FittedKind, EvidenceSettings], ShadowTable | None] = {}
+    def __init__(self, footage: Footage) -> None:
+        self._footage = footage
         self._fitted: dict[tuple[str, FittedKind], BackgroundModel] = {}
         self._yuv: dict[tuple[str, float], YuvBackground] = {}
         self._exclusions: dict[str, Bytes | None] = {}
@@ -80,37 +70,6 @@ class Backgrounds:
                 if key[0] == camera:
                     del self._yuv[key]
             self._exclusions.pop(camera, None)
-
-    def shadows(self, kind: FittedKind, settings: EvidenceSettings) -> ShadowTable | None:
-        """The colours of the room's shadows, learnt from a few frames of all cameras; None where that cannot be.
-
-        Raises FootageError if there is too little to fit a background to.
-        """
-        key = kind, uncleaned(settings)
-        with self._learning:
-            if key not in self._shadows:
-                self._shadows[key] = self._learn_shadows(kind, settings)
-            return self._shadows[key]
-
-    def _learn_shadows(self, kind: FittedKind, settings: EvidenceSettings) -> ShadowTable | None:
-        cameras = [one for one in self._cameras if not self._footage.has_masks(one.name)]
-        if len(cameras) < LEAST_CAMERAS:
-            return None
-        frames: list[dict[str, Changed]] = []
-        for frame in evenly_spread(self._footage.frame_count, SHADOW_FRAMES):
-            absent, views = self._footage.absent(int(frame)), dict[str, Changed]()
-            for camera in cameras:
-                model = self.model(camera.name, kind)
-                if camera.name in absent or not isinstance(model, GaussianBackground):
-                    continue
-                # A frame that is damaged in one camera says nothing; tracking names it when it comes to it.
-                with contextlib.suppress(FootageError):
-                    views[camera.name] = model.changed(
-                        self._footage.picture(camera.name, int(frame)), settings
-                    )
-            if len(views) >= LEAST_CAMERAS:
-                frames.append(views)
-        return learn_shadow_colours(cameras, frames)
 
     def exclusion(self, camera: str) -> Bytes | None:
         """(H, W) uint8, 255 in excluded areas; None without any. Raises FootageError."""

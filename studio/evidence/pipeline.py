@@ -21,7 +21,6 @@ from studio.evidence.edges import bodytrack_edges, proximity_edges
 from studio.evidence.frame_evidence import EDGE_KINDS, FrameEvidence, ViewEvidence
 from studio.evidence.masks import cleaned
 from studio.evidence.settings import EvidenceSettings
-from studio.evidence.shadow_colours import ShadowTable
 from studio.evidence.threshold import between_thresholds
 from studio.geometry.camera import Camera
 from studio.tracing import span
@@ -120,16 +119,7 @@ class EvidenceMaker:
             return RawMask(between_thresholds(picture, self.settings), True)
         kind: FittedKind = KINDS.get(choice, "gaussian")
         model = self._backgrounds.model(camera, kind)
-        return RawMask(model.foreground(picture, self.settings, self._shadows(kind)), True)
-
-    def _shadows(self, kind: FittedKind) -> ShadowTable | None:
-        """The colours of the room's shadows, where they are to be learnt."""
-        if not (self.settings.mask_shadow_test and self.settings.mask_shadow_learnt) or kind in (
-            "mog2",
-            "knn",
-        ):
-            return None
-        return self._backgrounds.shadows(kind, self.settings)
+        return RawMask(model.foreground(picture, self.settings), True)
 
     def finished_mask(self, camera: str, raw: RawMask) -> Bytes:
         """(H, W) 0 or 255: a raw mask, cleaned if `to_clean`, without excluded areas."""

@@ -468,7 +468,7 @@ class _Trying:
     ) -> None:
         self.frames = spread_frames(footage.frame_count, TRIED_FRAMES)
         self._session, self._footage, self._cameras, self._report = session, footage, cameras, report
-        self._backgrounds = Backgrounds(footage, cameras)
+        self._backgrounds = Backgrounds(footage)
         self._raw: dict[EvidenceSettings, dict[tuple[int, str], tuple[PackedMask, bool]]] = {}
         self._tried, self._total = 0, total
 

@@ -177,7 +177,7 @@ def check_run(
     denied, agreement = list[DeniedLimb](), Agreement(body, cameras)
     with contextlib.closing(footage_of(session, run)) as footage, run.results() as results:
         known = set(results.frames())
-        maker = EvidenceMaker(cameras, footage, Backgrounds(footage, cameras), settings.evidence, "none")
+        maker = EvidenceMaker(cameras, footage, Backgrounds(footage), settings.evidence, "none")
         for done, row in enumerate(rows):
             progress("comparing with the masks", done, len(rows))
             evidence = maker.evidence(int(chosen.frames[row]))

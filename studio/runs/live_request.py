@@ -15,16 +15,8 @@ from studio.trackers.recovery_settings import SPREAD
 
 
 def live_changes(changes: Mapping[str, object]) -> dict[str, object]:
-    """The knobs of a live run that differ from the defaults: the requested ones, a quick recovery, and the shadow test
-    by its tolerances alone: the footage from which the colours of shadows are learnt is not there yet.
-    """
-    return {"recovery": SPREAD, "mask_shadow_learnt": False, **changes}
-
-
-TOLERANCES_ALONE = (
-    "Live, the colours of shadows are not learnt, for the footage is not there yet: the two tolerances of the shadow"
-    " test decide alone."
-)
+    """The knobs of a live run that differ from the defaults: the requested ones, and a quick recovery."""
+    return {"recovery": SPREAD, **changes}
 
 
 def check_live(settings: RunSettings, *, live: bool, ping_pong: bool) -> None:
@@ -33,11 +25,6 @@ def check_live(settings: RunSettings, *, live: bool, ping_pong: bool) -> None:
         raise RunError(
             "Only a live run can play its footage forwards and backwards.",
             "Make it a live run, or leave this option out.",
-        )
-    if live and settings.evidence.mask_shadow_learnt:
-        raise RunError(
-            "A live run cannot learn the colours of shadows: its footage is not there yet.",
-            "Set mask_shadow_learnt to false, or track the footage without the clock.",
         )
     if live and getattr(settings.tracker, "online_learning", False):
         raise RunError(

@@ -38,7 +38,7 @@ from studio.likelihood.catalogue import WEIGHTINGS
 from studio.progress import Progress, unheard
 from studio.runs.behaviour_models import chosen_model
 from studio.runs.initialising import InitialPose, initialise
-from studio.runs.live_request import TOLERANCES_ALONE, check_live, live_changes
+from studio.runs.live_request import check_live, live_changes
 from studio.runs.mask_quality import look_before_the_first_run
 from studio.runs.search_space import parameter_names, session_sigma
 from studio.runs.session_settings import session_settings
@@ -171,8 +171,6 @@ def prepare_run(
     first, last = checked_frames(session, _first(session, first, last, of), last, endless=ping_pong)
     if not 0 <= seed < 2**63:
         raise RunError(f"The seed {seed} cannot be used.", "Give a whole number of 0 or more.")
-    if live and session_settings(session, tracker, weighting, knobs).evidence.mask_shadow_learnt:
-        notes = (*notes, TOLERANCES_ALONE)
     notes = (*([note] if note else []), *notes, *(f"{DESPITE}{doubt}" for doubt in doubts))
     model = chosen_model(session, tree, settings, behaviour)
     if model is not None and model.note:

@@ -70,7 +70,7 @@ class ViewComposer:
         self.body: BodyModel = run.body() if run else session.body()
         self.cameras: dict[str, Camera] = {camera.name: camera for camera in session.cameras()}
         self._footage: Footage = footage_of(session, run)
-        self._backgrounds = Backgrounds(self._footage, tuple(self.cameras.values()))
+        self._backgrounds = Backgrounds(self._footage)
         self._settings = settings or _settings_of(session, run)
         self._truth = _truth_of(session)
         self._lock = threading.RLock()

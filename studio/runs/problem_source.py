@@ -62,7 +62,7 @@ class ProblemSource:
         self.cameras = filmed_cameras(session, cameras) if cameras else session.cameras()
         self.footage = footage or session.footage()
         self._last = self.footage.frame_count if last is None else last
-        self._backgrounds = Backgrounds(self.footage, self.cameras)
+        self._backgrounds = Backgrounds(self.footage)
         self._executor = executor
         self._views = views
         self._keeping, self._making = threading.Lock(), threading.Lock()

@@ -42,4 +42,4 @@ def masks_of(session: Session, settings: EvidenceSettings | None = None) -> Gene
     knobs = settings or session_settings(session).evidence
     with closing(session.footage()) as footage:
         cameras = session.cameras()
-        yield EvidenceMaker(cameras, footage, Backgrounds(footage, cameras), knobs, "none")
+        yield EvidenceMaker(cameras, footage, Backgrounds(footage), knobs, "none")

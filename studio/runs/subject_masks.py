@@ -81,7 +81,7 @@ class WholeMasks:
         cameras = session.cameras()
         settings = session_settings(session).evidence
         self.maker = EvidenceMaker(
-            cameras, self.footage, Backgrounds(self.footage, cameras), settings, edge_kind
+            cameras, self.footage, Backgrounds(self.footage), settings, edge_kind
         )
 
     def of(self, camera: str, frame: int) -> Bytes:

@@ -154,22 +154,9 @@ def test_a_live_run_recovers_quickly_by_default(session_on_disk: Session) -> Non
     assert prepare_run(session_on_disk, name="c").record.settings["recovery"] == INITIALISE
 
 
-def test_a_live_run_learns_no_shadows_and_says_so(session_on_disk: Session) -> None:
-    """Its footage is not there yet; what is tracked without the clock learns them where its session does."""
-    write_evidence(session_on_disk, SessionEvidence(knobs={"mask_shadow_learnt": True}))
-    record = live_run(session_on_disk, "a").record
-    assert record.settings["mask_shadow_learnt"] is False
-    assert any("colours of shadows are not learnt" in note for note in record.notes)
-    later = prepare_run(session_on_disk, name="b").record
-    assert later.settings["mask_shadow_learnt"] is True
-    assert not any("colours of shadows" in note for note in later.notes)
-
-
 def test_what_cannot_be_done_live_is_refused(session_on_disk: Session) -> None:
     with pytest.raises(RunError, match="cannot train"):
         prepare_run(session_on_disk, **live_request(knobs={"online_learning": True}))
-    with pytest.raises(RunError, match="colours of shadows"):
-        prepare_run(session_on_disk, **live_request(knobs={"mask_shadow_learnt": True}))
     with pytest.raises(RunError, match="Only a live run"):
         prepare_run(session_on_disk, ping_pong=True)
     with pytest.raises(RunError, match="do not lie"):

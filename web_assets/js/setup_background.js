@@ -39,7 +39,7 @@ const MISSING = {
 /** Sources that have no knobs to tune. */
 const AS_THEY_ARE = ["person", "strokes", "masks", "subject"];
 const THRESHOLDS = ["mask_darkest", "mask_brightest", "mask_hue", "mask_hue_reach", "mask_saturation"];
-const FIRST = ["mask_threshold", "mask_gain_fit", "mask_shadow_test", "mask_shadow_darkest", "mask_shadow_colour", "mask_shadow_learnt", "mask_opening", "mask_closing", "mask_keep_components"];
+const FIRST = ["mask_threshold", "mask_gain_fit", "mask_shadow_test", "mask_shadow_darkest", "mask_shadow_colour", "mask_shadow_window", "mask_opening", "mask_closing", "mask_keep_components"];
 
 /** @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
 export function mount(place, setup) {
