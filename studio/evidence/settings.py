@@ -64,9 +64,9 @@ class EvidenceSettings:
         label="darkest shadow",
         help="A shadow leaves at least this share of the background's brightness.",
     )
-    # Masks of 13 drawn clips and two of others (`make masks`), window 5: body called background 1.26 % (each pixel alone,
-    # 0.04) -> 0.25, the worst clip 10.5 -> 1.4; what is not body called body 0.04 -> 0.09. At 0.015 tinted shadows count
-    # as body (up to 9 %), at 0.025 more of the forearms goes.
+    # Masks of 13 drawn clips and two of others (`studio reproduce shadow-test`), body called background: 1.5 % (worst clip
+    # 12.3) with each pixel alone and 0.04, 0.4 (2.1) with five and 0.02; beside it called body 0.07 and 0.12. At 0.015
+    # tinted shadows count as body (9 % of it), at 0.025 more of the forearms goes.
     mask_shadow_colour: float = next_frame_knob(
         0.02,
         0.005,

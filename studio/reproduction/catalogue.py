@@ -32,6 +32,7 @@ from studio.reproduction.open_questions import (
     other_people,
     posterior,
     robustness,
+    shadow_masks,
     start_poses,
 )
 
@@ -54,6 +55,7 @@ MODULES = (
     robustness,
     generalisation,
     other_people,
+    shadow_masks,
     evaluations,
     effort,
     posterior,

@@ -160,7 +160,8 @@ def prepare_run(
     weighting = weighting or session.manifest.weighting or DEFAULT_WEIGHTING
     settings = session_settings(session, tracker, weighting, live_changes(knobs or {}) if live else knobs)
     check_live(settings, live=live, ping_pong=ping_pong)
-    measures = subject if isinstance(subject, Subject) or subject is None else read_subject(Path(subject))
+    own = session.manifest.body
+    measures = subject if isinstance(subject, Subject | None) else read_subject(Path(subject), own)
     given: Array | None = None
     if start_pose is not None:
         tree, fps = session.body(body or None, measures), session.manifest.fps

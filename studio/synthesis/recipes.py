@@ -25,7 +25,7 @@ from studio.sessions.named_rows import write_pose, write_sigma
 from studio.sessions.session import BESIDE
 from studio.synthesis.arm_footage import render_arm
 from studio.synthesis.body_footage import TRUE_POSES, render_body
-from studio.synthesis.damage import misplaced
+from studio.synthesis.damage import cameras_left, misplaced
 from studio.synthesis.motions import make_motion
 from studio.synthesis.person import (
     marker_lengths,
@@ -35,7 +35,7 @@ from studio.synthesis.person import (
     subject_of_file,
     with_hands_and_feet,
 )
-from studio.synthesis.person_footage import render_person
+from studio.synthesis.person_footage import recipe_renderer, render_person
 from studio.synthesis.real_data import located
 from studio.synthesis.recipe_file import (
     JOINED,
@@ -48,7 +48,7 @@ from studio.synthesis.recipe_file import (
     recipe_cameras,
 )
 from studio.synthesis.recorded_clips import joined_person, recorded_person
-from studio.synthesis.renderer import RenderedPerson
+from studio.synthesis.renderer import RenderedPerson, Renderer
 from studio.synthesis.wardrobes import dressed
 
 ARM = "arm"
@@ -107,6 +107,17 @@ def person_of_recipe(
         parsed, options={**parsed.options, **(options or {})}, frames=frames or parsed.frames
     )
     return recipe_motion(changed, path.parent, skeleton)
+
+
+def person_renderer(recipe: Path | str) -> tuple[Renderer, tuple[Camera, ...], int]:
+    """What draws the person of a recipe into its pictures, the cameras, and the number of frames. Raises StudioError."""
+    path = find_recipe(recipe)
+    parsed = read_recipe(path)
+    rng = np.random.default_rng(parsed.seed)
+    skeleton, _ = recipe_person(parsed, path.parent, rng)
+    cameras = cameras_left(_cameras(parsed, path.parent, rng), parsed.damage.missing)
+    motion = recipe_motion(parsed, path.parent, skeleton)
+    return recipe_renderer(parsed, motion, cameras), cameras, motion.frame_count
 
 
 def render_source(

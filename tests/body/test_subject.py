@@ -8,7 +8,14 @@ from studio.body.catalogue import load_body
 from studio.body.dimensions import with_dimensions
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
-from studio.body.subject import Subject, fit_subject, read_subject, subject_from_shape, write_subject
+from studio.body.subject import (
+    DEFAULT_BODY,
+    Subject,
+    fit_subject,
+    read_subject,
+    subject_from_shape,
+    write_subject,
+)
 from studio.errors import BodyError
 
 HEIGHT = 1780.0
@@ -178,7 +185,7 @@ def test_a_subject_file_comes_back_as_written(tmp_path: Path) -> None:
 def test_an_empty_subject_file_is_of_the_usual_body_or_its_sessions(tmp_path: Path) -> None:
     path = tmp_path / "subject.toml"
     path.write_text("")
-    assert read_subject(path) == Subject(body="human31")
+    assert read_subject(path) == Subject(body=DEFAULT_BODY)
     assert read_subject(path, "human25") == Subject(body="human25")
     path.write_text('body = "human29"\n')
     assert read_subject(path, "human25").body == "human29"

@@ -58,20 +58,20 @@ def test_person_is_found_and_the_shadow_is_not() -> None:
 
 
 def test_skin_on_a_floor_of_nearly_its_colour_is_no_shadow() -> None:
-    """Its colour lies 3 % from that of a darker floor, and so does that of single pixels of a noisy shadow."""
+    """Its colour lies 3 % to 4 % from that of a darker floor, and so does that of single pixels of a noisy shadow."""
     floor = np.broadcast_to((90.0, 120.0, 160.0), ROOM.shape)
-    skin, shadow = (slice(30, 70), slice(50, 60)), (slice(70, 85), slice(50, 90))
+    skin, shadow = (slice(20, 70), slice(50, 75)), (slice(70, 85), slice(50, 90))
     light = floor.copy()
-    light[skin] = 0.7 * floor[skin] + (-4.5, 0.0, 4.0)
+    light[skin] = 0.7 * floor[skin] + (-6.0, 0.0, 5.0)
     light[shadow] = 0.7 * floor[shadow]
     background = gaussian_from_frames([seen(floor, seed) for seed in range(100, 130)])
     found = background.foreground(seen(light, 5), SETTINGS) > 0
     assert found[skin].mean() > 0.95
-    assert found[shadow].mean() < 0.05
+    assert found[shadow].mean() < 0.03
     for tolerance in (0.01, 0.02, 0.03, 0.04):
         alone = dataclasses.replace(SETTINGS, mask_shadow_window=1, mask_shadow_colour=tolerance)
         found = background.foreground(seen(light, 5), alone) > 0
-        assert found[skin].mean() < 0.95 or found[shadow].mean() > 0.05
+        assert found[skin].mean() < 0.8 or found[shadow].mean() > 0.2
 
 
 @pytest.mark.parametrize("window", [1, 3, 5, 15])
@@ -82,8 +82,14 @@ def test_shadows_are_those_of_a_plain_sum_over_the_changed_pixels_around(window:
     changed = background.foreground(frame, dataclasses.replace(settings, mask_shadow_test=False)) > 0
     expected = background.mean.astype(np.float64) * background.gain(frame)
     seen_colours, reach = frame.astype(np.float64), window // 2
-    off_colour = lambda value, wanted: value - (value * wanted).sum(-1, keepdims=True) / (wanted**2).sum(-1, keepdims=True) * wanted  # noqa: E731, E501
-    limit = lambda wanted: settings.mask_shadow_colour**2 * (wanted**2).sum(-1)  # noqa: E731
+
+    def off_colour(value: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+        share = (value * wanted).sum(-1, keepdims=True) / (wanted**2).sum(-1, keepdims=True)
+        return value - share * wanted
+
+    def limit(wanted: np.ndarray) -> np.ndarray:
+        return settings.mask_shadow_colour**2 * (wanted**2).sum(-1)
+
     share = (seen_colours * expected).sum(-1) / (expected**2).sum(-1)
     near = (off_colour(seen_colours, expected) ** 2).sum(-1) < limit(expected) + 9.0 * settings.mask_noise**2
     possible = changed & (share >= settings.mask_shadow_darkest) & (share < 1.0) & near

@@ -232,8 +232,8 @@ def test_other_people_are_kept_apart_from_both_halves_and_lost_limbs_are_counted
     assert numbers["mean error, human34, choosing half"] == pytest.approx(50.0, abs=0.2)
     assert numbers["named of frames with a limb lost, human34, clips of others"] == pytest.approx(200.0 / 3)
     # What cannot become the default says nothing on the half that only reports.
-    assert "mean error, human31, reporting half" in numbers
-    assert "mean error, human31, shadows learnt, reporting half" not in numbers
+    assert "mean error, human35, reporting half" in numbers
+    assert "mean error, human34, reporting half" not in numbers
     others = next(table for table in findings.tables if table.title.startswith("clips of others"))
     row = next(row for row in others.rows if row[0] == "human34")
     # Three seeds of three frames each; the tracker notices a frame late.

@@ -15,6 +15,7 @@ from toy_footage import number_of, numbered_frame, rig, write_pictures, write_vi
 
 import studio
 from studio.body.catalogue import load_body
+from studio.body.subject import DEFAULT_BODY
 from studio.capture.calibration_files import read_calibration
 from studio.capture.video import measure_video
 from studio.errors import BodyError, CalibrationError, FootageError
@@ -262,7 +263,7 @@ def test_a_start_pose_in_degrees_is_noticed(tmp_path: Path) -> None:
 
 def test_a_source_that_names_no_body_has_the_usual_one_or_that_of_its_start_pose(tmp_path: Path) -> None:
     source = video_source(tmp_path / "source")
-    assert imported(source).session.manifest.body == "human31"
+    assert imported(source).session.manifest.body == DEFAULT_BODY
     other = load_body("human34")
     write_pose(source / "start_pose.csv", tuple(one.name for one in other.parameters), other.neutral)
     (source / "subject.toml").write_text("[dimensions_mm]\npelvis_length = 190\n")
