@@ -36,7 +36,7 @@ _VERBS = {
         "workflow",
     ),
     "studio.operations.own_bodies": ("edit_body",),
-    "studio.operations.person": ("fit_subject", "initialise", "subject"),
+    "studio.operations.person": ("fit_subject", "initialise", "landmarks", "subject"),
     "studio.operations.remote": ("batch", "download", "upload"),
     "studio.operations.results": (
         "check",

@@ -37,6 +37,7 @@ from studio.operations.opening import workflow as workflow
 from studio.operations.own_bodies import edit_body as edit_body
 from studio.operations.person import fit_subject as fit_subject
 from studio.operations.person import initialise as initialise
+from studio.operations.person import landmarks as landmarks
 from studio.operations.person import subject as subject
 from studio.operations.remote import batch as batch
 from studio.operations.remote import download as download

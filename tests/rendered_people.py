@@ -6,6 +6,7 @@ import numpy as np
 from sized_people import drawn_and_seen, renderer_of
 
 from studio.arrays import Array, Bytes
+from studio.body.person import PersonMotion
 from studio.geometry.camera import Camera
 from studio.synthesis.cameras import RIGS
 from studio.synthesis.motions import make_motion
@@ -16,12 +17,13 @@ FPS = 60.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rendered:
-    """pictures, masks : (H, W, 3) and (H, W) by camera and frame. empty : (H, W, 3) by camera."""
+    """pictures, masks : (H, W, 3) and (H, W) by camera and frame. empty : (H, W, 3) by camera. motion : of the person."""
 
     cameras: tuple[Camera, ...]
     pictures: dict[tuple[str, int], Bytes]
     masks: dict[tuple[str, int], Bytes]
     empty: dict[str, Bytes]
+    motion: PersonMotion | None = None
 
 
 def rendered_walk(frames: int, at: tuple[float, float] = (0.0, 0.0), seed: int = 3) -> Rendered:
@@ -30,8 +32,9 @@ def rendered_walk(frames: int, at: tuple[float, float] = (0.0, 0.0), seed: int =
     cameras = RIGS["corners"](SIZE, np.random.default_rng(1))
     motion = make_motion("walk", skeleton, frames, FPS, {})
     place: Array = np.array([*at, 0.0])
-    renderer = renderer_of(cameras, replace(motion, root=motion.root + place), seed, noise=1.5)
-    found = Rendered(cameras, {}, {}, {c.name: renderer.empty(i, 0) for i, c in enumerate(cameras)})
+    motion = replace(motion, root=motion.root + place)
+    renderer = renderer_of(cameras, motion, seed, noise=1.5)
+    found = Rendered(cameras, {}, {}, {c.name: renderer.empty(i, 0) for i, c in enumerate(cameras)}, motion)
     for frame in range(frames):
         shadow = renderer.shadow(frame)
         for index, camera in enumerate(cameras):

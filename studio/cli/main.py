@@ -30,6 +30,7 @@ COMMANDS = {
     "subject": ("person_commands", "operations.person.subject"),
     "fit-subject": ("person_commands", "operations.person.fit_subject"),
     "initialise": ("person_commands", "operations.person.initialise"),
+    "landmarks": ("person_commands", "operations.person.landmarks"),
     "track": ("tracking_commands", "operations.tracking.track"),
     "batch": ("remote_commands", "operations.remote.batch"),
     "live": ("tracking_commands", "operations.tracking.live"),

@@ -14,7 +14,7 @@ from studio.operations.masks import background, exclude_region, mask_quality
 from studio.runs.background_setup import SOURCES
 from studio.runs.mask_quality import MaskQuality
 from studio.runs.session_settings import session_settings
-from studio.sessions.background_files import set_backgrounds
+from studio.sessions.background_files import read_evidence, set_backgrounds
 from studio.sessions.session import Session
 
 UNUSED = "unused"
@@ -79,6 +79,11 @@ def _answer(session: Session, found: MaskQuality | None) -> dict[str, object]:
         f"  {view.in_words()}".rstrip()
         for view in found.views
     ]
+    if not all(view.usable for view in found.views) and not _has_own_masks(session):
+        lines.append(
+            f"Masks that agree so little are of no use. 'studio background {session.name} --source best' tries every"
+            " source and takes the one under which the views agree."
+        )
     if found.subjects > 1:
         lines.append(
             f"{found.subjects} subjects are in view: say which one with --subject-at X,Y"
@@ -99,6 +104,13 @@ def _answer(session: Session, found: MaskQuality | None) -> dict[str, object]:
         "settings": knobs,
         "text": "\n".join(lines),
     }
+
+
+def _has_own_masks(session: Session) -> bool:
+    """Whether masks were made or given, which trying other sources would replace."""
+    model = read_evidence(session).knobs.get("background_model", "auto")
+    given = any(source.masks for source in session.manifest.footage.cameras)
+    return model == "mask" or (model == "auto" and given)
 
 
 def _files(session: Session, words: Sequence[str]) -> Mapping[str, Path]:

@@ -1,10 +1,10 @@
-"""The person: `subject`, `fit-subject`, `initialise`."""
+"""The person: `subject`, `fit-subject`, `initialise`, `landmarks`."""
 
 from dataclasses import asdict
 
 from studio.body.model import BodyModel
 from studio.cli.deriving import Call, command_of
-from studio.operations.person import fit_subject, initialise, subject
+from studio.operations.person import Landmarks, fit_subject, initialise, landmarks, subject
 from studio.operations.subjects import subjects, together
 from studio.runs.initialising import InitialPose
 from studio.runs.subject_fitting import FittedSubject
@@ -69,6 +69,20 @@ def initialise_command(call: Call) -> dict[str, object]:
         "session": call.given["session"].name,
         "file": str(found.file or ""),
         "text": f"Pose of {found.body} in frame {found.frame} {kept} ({sure}).",
+    }
+
+
+@command_of(landmarks)
+def landmarks_command(call: Call) -> dict[str, object]:
+    found: Landmarks = call()
+    session = call.given["session"].name
+    return {
+        "session": session,
+        "file": str(found.file),
+        "frames": len(found.motion.times),
+        "seen": found.seen,
+        "text": f"{found.file}: in {100.0 * found.seen:.0f} % of the frames all twelve joints. Measure a run by them with"
+        f" 'studio evaluate {session} RUN --truth {found.file}'.",
     }
 
 

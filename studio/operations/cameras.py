@@ -1,5 +1,6 @@
 """Cameras: solved from footage of a printed board, and turned until the silhouettes agree."""
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,14 +14,17 @@ from studio.calibration.findings import Finding
 from studio.calibration.floor import read_clicks
 from studio.calibration.verbs import Calibrated
 from studio.declaring import Target, Terminal, Web, operation
-from studio.errors import SettingsError
+from studio.errors import SettingsError, StudioError
 from studio.geometry.camera import Camera
 from studio.operations.opening import SessionName, keeping_in_place, open_session
 from studio.operations.progress import Reporting, reporting, say
 from studio.runs.aligning import SessionAlignment, align_cameras
 from studio.runs.levelling import level_by_clicks, level_by_run, level_by_silhouettes, use_level_world
+from studio.runs.mask_quality import measure_masks
+from studio.runs.silhouette_doubts import MEASURED
 from studio.runs.turned_cameras import alignment_words, remember_alignment, turn_back, turn_cameras
 from studio.sessions.board_calibration import keep_boards, place_of_boards, solve_boards
+from studio.sessions.provenance import origin_of
 from studio.sessions.session import Session
 
 SPELLING = (
@@ -226,6 +230,7 @@ def align(
         change = turn_cameras(opened, found)
         opened, notes = change.session, change.notes
         say(progress, notes)
+        _measure_masks_again(opened, progress)
     each = found.found
     before, after, turns = (
         dict(zip(found.names, map(float, values), strict=True))
@@ -244,6 +249,7 @@ def unalign(session: SessionName, *, progress: Reporting = None) -> Session:
     """
     change = turn_back(open_session(session))
     say(progress, change.notes)
+    _measure_masks_again(change.session, progress)
     return change.session
 
 
@@ -301,7 +307,17 @@ def level(
         return Levelled(opened, found.tilted, found.lowered, found.how, changed=False)
     change = use_level_world(opened, found)
     say(progress, change.notes)
+    _measure_masks_again(change.session, progress)
     return Levelled(change.session, found.tilted, found.lowered, found.how, changed=True, notes=change.notes)
+
+
+def _measure_masks_again(session: Session, progress: Reporting) -> None:
+    """Measure how far the masks agree under the cameras of now, where that was known of those before."""
+    if origin_of(session, MEASURED) is None:
+        return
+    # Cameras that were turned stay so, whatever the masks say.
+    with contextlib.suppress(StudioError), reporting(progress, f"{session.name}: masks") as report:
+        measure_masks(session, progress=report)
 
 
 def _path(given: str | Path | None) -> Path | None:

@@ -2,15 +2,19 @@
 
 import dataclasses
 from collections.abc import Mapping
+from contextlib import closing
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import Field
 
 from studio.body.model import BodyModel
 from studio.body.subject import Subject
 from studio.declaring import Body, Model, OneOf, Seed, Terminal, Web, operation, taking
 from studio.likelihood.catalogue import WEIGHTINGS
+from studio.motion_files.trc import MarkerMotion, write_trc
 from studio.operations.opening import SessionName, keeping_in_place, open_session
 from studio.operations.progress import Reporting, reporting, say
 from studio.runs.initialising import WEIGHTING, InitialPose, keep_pose
@@ -25,6 +29,7 @@ from studio.runs.subject_fitting import (
     fit_session_subject,
     keep_subject,
 )
+from studio.runs.person_landmarks import person_landmarks
 from studio.sessions.atomic_files import check_writable
 
 
@@ -142,3 +147,39 @@ def initialise(
         found = dataclasses.replace(found, file=keep_pose(opened, found, replace))
     say(progress, [found.note] if found.note else [])
     return found
+
+
+@dataclass(frozen=True, slots=True)
+class Landmarks:
+    """What the network sees of a person. file : the TRC file. seen : share of the frames with all of its joints."""
+
+    file: Path
+    motion: MarkerMotion
+    seen: float
+
+
+@operation
+@keeping_in_place
+def landmarks(
+    session: SessionName,
+    to: Annotated[
+        str | Path, Field(description="The TRC file that is written."), Terminal(metavar="FILE", kind=Path)
+    ],
+    *,
+    progress: Reporting = None,
+) -> Landmarks:
+    """Write where a network sees a person's joints, triangulated over the cameras: a witness to measure a run by.
+
+    It knows nothing of the studio's bodies and searches, and needs no markers: shoulders, elbows, wrists, hips, knees and
+    ankles of a person (of people only), coarse by some centimetres and constantly beside a body's own joints by as much:
+    `studio evaluate --truth FILE` prints the error with and without that.
+
+    Raises FootageError where no two cameras see the same person.
+    """
+    opened, path = open_session(session), Path(to).absolute()
+    check_writable(path.parent)
+    with closing(opened.footage()) as footage, reporting(progress, f"{opened.name}: joints") as report:
+        motion = person_landmarks(opened.cameras(), footage, report)
+    write_trc(path, motion)
+    seen = np.isfinite(motion.positions).all(axis=(1, 2))
+    return Landmarks(path, motion, float(seen.mean()))

@@ -71,13 +71,9 @@ def person_masks(cameras: Sequence[Camera], footage: Footage, progress: Progress
     Where he is lost, the frames ahead are searched every `SEARCHED_EVERY` seconds, and from the one that shows him he
     is followed backwards too. Raises FootageError if no camera sees anybody in any frame.
     """
-    cv2.setNumThreads(1)
-    threads_count = min(len(cameras), os.cpu_count() or 1)
-    with ThreadPoolExecutor(threads_count, "person network") as threads:
-        step = max(1, round(SEARCHED_EVERY * footage.fps))
-        follower = _Follower(tuple(cameras), threads, step)
+    with _network_threads(cameras) as threads:
         anybody = False
-        for done, (frame, pictures, seen) in enumerate(_all_frames(follower, footage, step, progress), 1):
+        for done, (frame, pictures, seen) in enumerate(_followed(cameras, footage, threads, progress), 1):
             anybody = anybody or bool(seen)
             masks = _each(threads, seen, partial(_mask, seen, pictures))
             absent = footage.absent(frame)
@@ -97,12 +93,32 @@ def person_masks(cameras: Sequence[Camera], footage: Footage, progress: Progress
             )
 
 
+def followed_person(
+    cameras: Sequence[Camera], footage: Footage, progress: Progress
+) -> Iterator[tuple[int, Sightings]]:
+    """Of every frame who is seen in each camera, frames in the order in which that is known."""
+    with _network_threads(cameras) as threads:
+        for done, (frame, _, seen) in enumerate(_followed(cameras, footage, threads, progress), 1):
+            yield frame, seen
+            progress(FOLLOWING, done, footage.frame_count)
+
+
+def _network_threads(cameras: Sequence[Camera]) -> ThreadPoolExecutor:
+    """A thread a camera at most; OpenCV starts none of its own."""
+    cv2.setNumThreads(1)
+    return ThreadPoolExecutor(min(len(cameras), os.cpu_count() or 1), "person network")
+
+
 Followed = tuple[int, Mapping[str, Bytes], Sightings]
 """A frame, its pictures by camera, and who is seen in them."""
 
 
-def _all_frames(follower: "_Follower", footage: Footage, step: int, progress: Progress) -> Iterator[Followed]:
+def _followed(
+    cameras: Sequence[Camera], footage: Footage, threads: ThreadPoolExecutor, progress: Progress
+) -> Iterator[Followed]:
     """Each frame once."""
+    step = max(1, round(SEARCHED_EVERY * footage.fps))
+    follower = _Follower(tuple(cameras), threads, step)
     count, frame = footage.frame_count, 0
     while frame < count:
         pictures = follower.pictures(footage, frame)

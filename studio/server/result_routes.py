@@ -237,13 +237,13 @@ def frames(
         )
         for at, frame in enumerate(timeline.frames.tolist())
     ]
-    times = timeline.milliseconds
+    times, history = timeline.milliseconds, history_of(run)
     return FramesSummary.of(
         record,
-        describe=describe(record),
+        describe=describe(record, history),
         score=TRACKERS.get(record.tracker, Tracker).score,
         frames=lines,
-        settings_changes=changes_of(history_of(run)),
+        settings_changes=changes_of(history),
         damaged=damaged,
         checked=checked,
         partial=partial.frame if partial else None,

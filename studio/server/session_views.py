@@ -15,12 +15,16 @@ from studio.geometry.camera import Camera
 from studio.runs.silhouette_doubts import standing_doubts
 from studio.server.run_errors import mean_error
 from studio.server.schemas import Answer, Number, Numbers
+from studio.server.setting_views import history_of
 from studio.sessions.run_record import RunRecord
 from studio.sessions.session import Session
 from studio.sessions.stored_run import RunSummary
 from studio.sessions.workspace import SessionSummary, next_step
-from studio.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING
+from studio.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, SettingsHistory
 from studio.trackers.catalogue import size_in_words
+
+
+NOTHING_CHANGED = SettingsHistory()
 
 
 @dataclass(frozen=True)
@@ -165,14 +169,22 @@ def run_line(summary: RunSummary, session: Session | None) -> RunLine:
     try:
         run = session.run(line.name)
         line = dataclasses.replace(line, describe=describe(run.record))
+        line = dataclasses.replace(line, describe=describe(run.record, history_of(run)))
         return dataclasses.replace(line, mean_mm=mean_error(session, run, line.done))
     except StudioError:
         return line
 
 
-def describe(record: RunRecord) -> str:
-    """A run in a few words: tracker, layers × particles, weighting where it is not the tracker's usual one."""
+def describe(record: RunRecord, history: SettingsHistory = NOTHING_CHANGED) -> str:
+    """A run in a few words: tracker, layers × particles and from which frame on others, weighting where it is not the
+    tracker's usual one.
+    """
     size = size_in_words(record.tracker, record.settings)
+    now = size
+    for entry in history.entries:
+        later = size_in_words(record.tracker, entry.values)
+        if later != now:
+            size, now = f"{size}, {later} from frame {entry.frame}", later
     unusual = "" if record.weighting == DEFAULT_WEIGHTING else f" · {record.weighting}"
     return f"{record.tracker} {size}".strip() + unusual
 

@@ -6,7 +6,7 @@ from studio.knobs import Knob
 from studio.runs.moved_knobs import moved_between, settings_with_moved, stored_settings
 from studio.server.schemas import Answer, Value
 from studio.sessions.stored_run import StoredRun
-from studio.settings import RunSettings, SettingsEntry, SettingsHistory, all_knobs, default_settings
+from studio.settings import RunSettings, SettingsHistory, all_knobs, default_settings
 
 
 class KnobView(Answer):
@@ -65,10 +65,7 @@ def knob_view(entry: Knob) -> KnobView:
 def history_of(run: StoredRun) -> SettingsHistory:
     """Every version of the settings that a run has used."""
     with run.results() as results:
-        stored = results.settings_history()
-    return SettingsHistory(
-        tuple(SettingsEntry(entry.version, entry.frame, entry.layer, entry.values) for entry in stored)
-    )
+        return SettingsHistory(tuple(results.settings_history()))
 
 
 def changes_of(history: SettingsHistory) -> list[SettingsChange]:

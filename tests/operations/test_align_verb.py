@@ -4,7 +4,8 @@ import pytest
 from nudged_camera import NUDGED, make_nudged_session
 
 import studio
-from studio.sessions.session import CAMERAS_PATH
+from studio.runs.workflow import background_step
+from studio.sessions.session import CAMERAS_PATH, Session
 from studio.sessions.workspace import Workspace
 
 
@@ -20,11 +21,15 @@ def test_cameras_are_turned_reported_and_turned_back() -> None:
     assert (session.path / CAMERAS_PATH).read_bytes() == before
     assert max(looked.before, key=lambda name: looked.before[name]) == NUDGED
     assert set(steps) == {"reading silhouettes"}
+    studio.mask_quality("nudged")
     turned = studio.align("nudged")
     assert turned.changed
+    # What the masks are worth is known of the cameras that the session uses now.
+    assert background_step(Session(session.path)).state != "stale"
     assert turned.after[NUDGED] < 0.4 * turned.before[NUDGED]
     assert studio.align("nudged", keep=False).needed is False
     studio.unalign("nudged")
+    assert background_step(Session(session.path)).state != "stale"
     assert (session.path / CAMERAS_PATH).read_bytes() == before
     with pytest.raises(studio.StudioError, match="were not turned"):
         studio.unalign("nudged")

@@ -1,0 +1,33 @@
+"""`studio background` says what comes next where masks are of no use."""
+
+import pytest
+from click.testing import CliRunner
+
+from studio.cli.main import main
+from studio.cli.mask_commands import _answer
+from studio.runs.mask_quality import MaskQuality, ViewQuality
+from studio.sessions.background_files import SessionEvidence, write_evidence
+from studio.sessions.session import Session
+
+
+def said(session: Session, agreement: float) -> str:
+    views = tuple(ViewQuality(name, agreement, agreement, 0.0, ()) for name in ("a", "b"))
+    return str(_answer(session, MaskQuality((0,), views, (60.0,)))["text"])
+
+
+def test_poor_masks_name_the_command_that_tries_every_source(session_on_disk: Session) -> None:
+    write_evidence(session_on_disk, SessionEvidence(knobs={"background_model": "gaussian"}))
+    assert "studio background toy --source best" in said(session_on_disk, 0.5)
+    assert "--source best" not in said(session_on_disk, 0.95)
+
+
+def test_made_masks_are_not_thrown_away_for_it(session_on_disk: Session) -> None:
+    write_evidence(session_on_disk, SessionEvidence(knobs={"background_model": "mask"}))
+    assert "--source best" not in said(session_on_disk, 0.5)
+
+
+def test_the_command_that_is_named_is_one(session_on_disk: Session) -> None:
+    help_text = CliRunner().invoke(main, ["background", "--help"]).stdout
+    assert "best" in help_text
+    with pytest.raises(SystemExit):
+        main(["background", "no-such-session", "--source", "best"])

@@ -1,0 +1,101 @@
+"""A network's joints in space: sides that it exchanges, a camera that is wrong, and a rendered person's true joints."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from rendered_people import FPS, Rendered, rendered_walk
+
+from studio.arrays import Array, Bytes
+from studio.body.person import marker_motion
+from studio.errors import FootageError
+from studio.evidence.person_network import INPUT, Crop, Sighting
+from studio.geometry.camera import Camera
+from studio.geometry.projection import project
+from studio.progress import unheard
+from studio.runs.person_landmarks import LEFT_AND_RIGHT, NAMES, RIGHT_AND_LEFT, _joints, person_landmarks
+from studio.synthesis.cameras import RIGS
+
+FRAMES = 3
+CAMERAS = RIGS["corners"]((480, 360), np.random.default_rng(1))
+JOINTS = np.random.default_rng(2).uniform((-300.0, -300.0, 100.0), (300.0, 300.0, 1500.0), (12, 3))
+
+
+def sighting(camera: Camera, exchanged: bool = False, wrong: int | None = None) -> Sighting:
+    """What a camera sees of JOINTS. wrong : a joint that it sees elsewhere."""
+    pixels = project(camera, JOINTS)[0]
+    if wrong is not None:
+        pixels[wrong] += 90.0
+    points = np.zeros((39, 2))
+    points[RIGHT_AND_LEFT if exchanged else LEFT_AND_RIGHT] = pixels
+    points[33], points[34] = (240.0, 180.0), (240.0, 60.0)
+    return Sighting(1.0, np.ones((INPUT, INPUT), np.float32), points, Crop(240.0, 180.0, 300.0))
+
+
+def found(seen: dict[str, Sighting], before: Array | None = None) -> Array:
+    points = _joints({camera.name: camera for camera in CAMERAS}, seen, before)
+    assert points is not None
+    return points
+
+
+def test_joints_lie_where_the_rays_meet() -> None:
+    seen = {camera.name: sighting(camera) for camera in CAMERAS}
+    np.testing.assert_allclose(found(seen), JOINTS, atol=0.1)
+
+
+def test_a_camera_that_exchanges_sides_is_put_right() -> None:
+    seen = {camera.name: sighting(camera, number == 2) for number, camera in enumerate(CAMERAS)}
+    np.testing.assert_allclose(found(seen), JOINTS, atol=0.1)
+
+
+def test_sides_go_on_from_the_frame_before_where_every_camera_exchanges_them() -> None:
+    seen = {camera.name: sighting(camera, exchanged=True) for camera in CAMERAS}
+    np.testing.assert_allclose(found(seen, before=JOINTS + 5.0), JOINTS, atol=0.1)
+
+
+def test_a_joint_that_one_camera_sees_elsewhere_is_that_of_the_others() -> None:
+    seen = {camera.name: sighting(camera, wrong=4 if number == 1 else None) for number, camera in enumerate(CAMERAS)}
+    np.testing.assert_allclose(found(seen), JOINTS, atol=0.1)
+
+
+def test_two_cameras_that_contradict_each_other_say_nothing_of_a_joint() -> None:
+    one, other = CAMERAS[:2]
+    points = found({one.name: sighting(one), other.name: sighting(other, wrong=4)})
+    assert np.isnan(points[4]).all()
+    np.testing.assert_allclose(np.delete(points, 4, axis=0), np.delete(JOINTS, 4, axis=0), atol=0.5)
+
+
+@dataclass
+class RenderedFootage:
+    """As much of footage as the network reads."""
+
+    of: Rendered
+    frame_count: int = FRAMES
+    fps: float = FPS
+
+    def picture(self, camera: str, frame: int) -> Bytes:
+        return self.of.pictures[camera, frame]
+
+    def absent(self, frame: int) -> tuple[str, ...]:
+        return ()
+
+    def size(self, camera: str) -> tuple[int, int]:
+        return 480, 360
+
+
+def test_a_rendered_persons_joints_are_near_the_true_ones() -> None:
+    walk = rendered_walk(FRAMES)
+    motion = person_landmarks(walk.cameras, RenderedFootage(walk), unheard)  # pyright: ignore[reportArgumentType]
+    assert walk.motion is not None
+    truth = marker_motion(walk.motion)
+    true = truth.positions[:, [truth.names.index(name) for name in NAMES]]
+    apart = np.linalg.norm(motion.positions - true, axis=2)
+    # Coarse, as the module says, and the right sides: the hips alone lie 180 mm apart.
+    assert np.nanmedian(apart) < 70.0
+    assert np.isfinite(apart).mean() > 0.9
+
+
+def test_one_camera_shows_no_place() -> None:
+    walk = rendered_walk(1)
+    with pytest.raises(FootageError, match="One camera"):
+        person_landmarks(walk.cameras[:1], RenderedFootage(walk), unheard)  # pyright: ignore[reportArgumentType]
