@@ -17,7 +17,7 @@ FPS = 60.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rendered:
-    """pictures, masks : (H, W, 3) and (H, W) by camera and frame. empty : (H, W, 3) by camera. motion : of the person."""
+    """pictures, masks : (H, W, 3) and (H, W) by camera and frame. empty : (H, W, 3) by camera. motion : whose."""
 
     cameras: tuple[Camera, ...]
     pictures: dict[tuple[str, int], Bytes]

@@ -81,8 +81,8 @@ def landmarks_command(call: Call) -> dict[str, object]:
         "file": str(found.file),
         "frames": len(found.motion.times),
         "seen": found.seen,
-        "text": f"{found.file}: in {100.0 * found.seen:.0f} % of the frames all twelve joints. Measure a run by them with"
-        f" 'studio evaluate {session} RUN --truth {found.file}'.",
+        "text": f"{found.file}: in {100.0 * found.seen:.0f} % of the frames all twelve joints. Measure a run by them"
+        f" with 'studio evaluate {session} RUN --truth {found.file}'.",
     }
 
 

@@ -3,8 +3,8 @@
 `GaussianBackground` keeps a mean and a standard deviation for each pixel and colour (section 4.2.2 uses
 thresholded background subtraction). Its shadow test follows Horprasert et al. 1999: a pixel whose
 colour is the background's, only darker, is background; unlike there the colour is that of a few changed pixels
-together, not of one, whose noise would hide the difference between a shadow and skin. OpenCV's MOG2 and KNN models are trained on a
-fixed set of frames and then only applied (learning rate 0), so that a frame's mask does not depend on the
+together, not of one, whose noise would hide the difference between a shadow and skin. OpenCV's MOG2 and KNN models are
+trained on a fixed set of frames and then only applied (learning rate 0), so that a frame's mask does not depend on the
 frames processed before.
 """
 
@@ -72,9 +72,7 @@ class GaussianBackground:
         gain = self.gain(picture) if settings.mask_gain_fit else np.ones(3, np.float32)
         picture, noise = np.ascontiguousarray(picture), np.float32(settings.mask_noise**2)
         threshold = np.float32(settings.mask_threshold**2)
-        changed = differing_pixels(
-            picture, self.mean, self._rough, self.variance, gain, threshold, noise
-        )
+        changed = differing_pixels(picture, self.mean, self._rough, self.variance, gain, threshold, noise)
         if not self.tests_shadows(settings):
             return changed
         darkest, colour = settings.mask_shadow_darkest, settings.mask_shadow_colour
@@ -271,7 +269,6 @@ def differing_pixels(
     return out
 
 
-@njit(**EXACT)
 def drop_shadows(
     changed: Bytes,
     picture: Bytes,
@@ -288,10 +285,28 @@ def drop_shadows(
     noise, lies within `colour` of the background's, as a share of its brightness. It is one if the mean colour of all
     that may be shadow at most `reach` pixels away along each axis lies so near, allowing for a deviation of that mean.
     One pixel's colour is mostly noise: a tolerance that lets a noisy shadow through lets skin on a floor of wood
-    through, too. picture, mean, gain, noise : as in `differing_pixels`.
+    through, too. Of no reach each pixel's colour decides alone, within a deviation. picture, mean, gain, noise : as in
+    `differing_pixels`.
     """
+    unsure = UNSURE * UNSURE if reach else np.float32(1.0)
+    possible = possible_shadows(changed, picture, mean, gain, unsure * noise, darkest, colour)
+    shadow = shadows_together(possible, picture, mean, gain, noise, colour, reach) if reach else possible
+    return changed - shadow
+
+
+@njit(**EXACT, fastmath=True)
+def possible_shadows(
+    changed: Bytes,
+    picture: Bytes,
+    mean: NDArray[np.uint8 | np.float32],
+    gain: NDArray[np.float32],
+    noise: np.float32,
+    darkest: np.float32,
+    colour: np.float32,
+) -> Bytes:
+    """(H, W) 255 where a changed pixel is darker than the background, in its colour but for the noise."""
     height, width = changed.shape
-    possible, top, bottom = np.zeros((height, width), np.bool_), height, -1
+    possible = np.zeros((height, width), np.uint8)
     for y in range(height):
         for x in range(width):
             if not changed[y, x]:
@@ -302,45 +317,82 @@ def drop_shadows(
                 dot += value * background
                 norm += background * background
                 square += value * value
-            norm = max(norm, np.float32(1.0))
-            share = dot / norm
-            near = square - share * dot < colour * colour * norm + UNSURE * UNSURE * noise
-            if darkest <= share and share < np.float32(1.0) and near:
-                possible[y, x] = True
-                top, bottom = min(top, y), y
-    out = changed.copy()
+            share = dot / max(norm, np.float32(1.0))
+            off_colour = square - share * dot
+            same_colour = off_colour < colour * colour * norm + noise
+            if darkest <= share and share < np.float32(1.0) and same_colour:
+                possible[y, x] = np.uint8(255)
+    return possible
+
+
+@njit(**EXACT)
+def shadows_together(
+    possible: Bytes,
+    picture: Bytes,
+    mean: NDArray[np.uint8 | np.float32],
+    gain: NDArray[np.float32],
+    noise: np.float32,
+    colour: np.float32,
+    reach: int,
+) -> Bytes:
+    """(H, W) 255 where the mean colour of what may be shadow around is the background's. Sums over a column's rows and
+    over a row's columns move with the pixel.
+    """
+    height, width = possible.shape
+    shadow = np.zeros((height, width), np.uint8)
+    top, bottom, left, right = height, -1, width, -1
+    for y in range(height):
+        for x in range(width):
+            if possible[y, x]:
+                top, bottom, left, right = min(top, y), y, min(left, x), max(right, x)
     # Of each column over 2 reach + 1 rows: the picture's three colours, the background's, and the number of pixels.
-    columns, around = np.zeros((width, 7), np.int64), np.empty(7, np.int64)
+    columns = np.zeros((width + 2 * reach + 1, 7), np.int32)
     for y in range(top, bottom + reach + 1):
         for row, sign in ((y, 1), (y - 2 * reach - 1, -1)):
             if row < top or row > bottom:
                 continue
-            for x in range(width):
+            for x in range(left, right + 1):
                 if possible[row, x]:
+                    at = columns[x + reach]
                     for c in range(3):
-                        columns[x, c] += sign * picture[row, x, c]
-                        background = FINE * gain[c] * np.float32(mean[row, x, c])
-                        columns[x, 3 + c] += sign * np.int64(np.rint(background))
-                    columns[x, 6] += sign
+                        at[c] += np.int32(sign * picture[row, x, c])
+                        at[3 + c] += np.int32(sign * np.rint(FINE * gain[c] * np.float32(mean[row, x, c])))
+                    at[6] += np.int32(sign)
         middle = y - reach
         if middle < top:
             continue
-        around[:] = 0
-        for x in range(-reach, width):
-            if x + reach < width:
-                around += columns[x + reach]
-            if x - reach - 1 >= 0:
-                around -= columns[x - reach - 1]
-            if x < 0 or not possible[middle, x]:
+        blue, green, red, wanted_blue, wanted_green, wanted_red, pixels = 0, 0, 0, 0, 0, 0, 0
+        for x in range(left - reach, right + 1):
+            # `columns` begins `reach` before the picture: this is the column `reach` after x.
+            come = columns[x + 2 * reach]
+            blue, green, red = blue + come[0], green + come[1], red + come[2]
+            wanted_blue, wanted_green, wanted_red = (
+                wanted_blue + come[3],
+                wanted_green + come[4],
+                wanted_red + come[5],
+            )
+            pixels += come[6]
+            if x < left:
                 continue
-            count = np.float32(around[6])
-            dot, norm, square = np.float32(0.0), np.float32(0.0), np.float32(0.0)
-            for c in range(3):
-                value, background = np.float32(around[c]) / count, np.float32(around[3 + c]) / (FINE * count)
-                dot += value * background
-                norm += background * background
-                square += value * value
-            norm = max(norm, np.float32(1.0))
-            if square - dot / norm * dot < colour * colour * norm + noise / count:
-                out[middle, x] = np.uint8(0)
-    return out
+            if possible[middle, x]:
+                each = np.float32(1.0) / np.float32(pixels)
+                wanted = each / FINE
+                b, g, r = np.float32(blue) * each, np.float32(green) * each, np.float32(red) * each
+                p, q, s = (
+                    np.float32(wanted_blue) * wanted,
+                    np.float32(wanted_green) * wanted,
+                    np.float32(wanted_red) * wanted,
+                )
+                dot, norm = b * p + g * q + r * s, p * p + q * q + s * s
+                off_colour = b * b + g * g + r * r - dot * dot / max(norm, np.float32(1.0))
+                if off_colour < colour * colour * norm + noise * each:
+                    shadow[middle, x] = np.uint8(255)
+            gone = columns[x]
+            blue, green, red = blue - gone[0], green - gone[1], red - gone[2]
+            wanted_blue, wanted_green, wanted_red = (
+                wanted_blue - gone[3],
+                wanted_green - gone[4],
+                wanted_red - gone[5],
+            )
+            pixels -= gone[6]
+    return shadow

@@ -64,11 +64,12 @@ class EvidenceSettings:
         label="darkest shadow",
         help="A shadow leaves at least this share of the background's brightness.",
     )
-    # Masks of 13 drawn clips and two of others (`studio reproduce shadow-test`), body called background: 1.5 % (worst clip
-    # 12.3) with each pixel alone and 0.04, 0.4 (2.1) with five and 0.02; beside it called body 0.07 and 0.12. At 0.015
-    # tinted shadows count as body (9 % of it), at 0.025 more of the forearms goes.
+    # Masks of 13 drawn clips and two of others (`studio reproduce shadow-test`), body called background: 1.5 % (worst
+    # clip 12.3) with each pixel alone and 0.04, 0.5 (2.2) with five and 0.025; beside it called body 0.07 and 0.1. At
+    # 0.015 tinted shadows count as body (9 % of it), at 0.02 the deepest beside a foot, which pull it; at 0.03 forearms
+    # go.
     mask_shadow_colour: float = next_frame_knob(
-        0.02,
+        0.025,
         0.005,
         0.5,
         0.005,
@@ -82,8 +83,8 @@ class EvidenceSettings:
         2,
         label="shadow colour over",
         unit="px",
-        help="A shadow's colour is that of the changed pixels in a square of this side: one pixel's is mostly noise. 1 ="
-        " each pixel alone.",
+        help="A shadow's colour is that of the changed pixels in a square of this side: one pixel's is mostly noise."
+        " 1 = each pixel alone.",
     )
     mask_darkest: int = next_frame_knob(
         128,

@@ -20,6 +20,7 @@ from studio.operations.progress import Reporting, reporting, say
 from studio.runs.initialising import WEIGHTING, InitialPose, keep_pose
 from studio.runs.initialising import initialise as initialise_session
 from studio.runs.new_run import checked_frames
+from studio.runs.person_landmarks import person_landmarks
 from studio.runs.subject_choice import body_of_choice, choose_body, choose_subject, keep_fitted
 from studio.runs.subject_fitting import (
     FitRequest,
@@ -29,7 +30,6 @@ from studio.runs.subject_fitting import (
     fit_session_subject,
     keep_subject,
 )
-from studio.runs.person_landmarks import person_landmarks
 from studio.sessions.atomic_files import check_writable
 
 
@@ -170,9 +170,9 @@ def landmarks(
 ) -> Landmarks:
     """Write where a network sees a person's joints, triangulated over the cameras: a witness to measure a run by.
 
-    It knows nothing of the studio's bodies and searches, and needs no markers: shoulders, elbows, wrists, hips, knees and
-    ankles of a person (of people only), coarse by some centimetres and constantly beside a body's own joints by as much:
-    `studio evaluate --truth FILE` prints the error with and without that.
+    It knows nothing of the studio's bodies and searches, and needs no markers: shoulders, elbows, wrists, hips, knees
+    and ankles of a person (of people only), coarse by some centimetres and constantly beside a body's own joints by as
+    much: `studio evaluate --truth FILE` prints the error with and without that.
 
     Raises FootageError where no two cameras see the same person.
     """

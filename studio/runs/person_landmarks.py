@@ -137,7 +137,9 @@ def _of_those_that_agree(
     """(1, 3) where the rays (1, 2 pixels each) of the largest set of cameras meet that agree on the point."""
 
     def contradiction(among: Mapping[str, Array], at: Array) -> float:
-        return max(float(_missed(cameras[name], at, among[name])[0]) / seen[name].next_crop.side for name in among)
+        return max(
+            float(_missed(cameras[name], at, among[name])[0]) / seen[name].next_crop.side for name in among
+        )
 
     left = dict(rays)
     while contradiction(left, point) > APART:

@@ -80,9 +80,7 @@ class WholeMasks:
         self._cut = any(cut)
         cameras = session.cameras()
         settings = session_settings(session).evidence
-        self.maker = EvidenceMaker(
-            cameras, self.footage, Backgrounds(self.footage), settings, edge_kind
-        )
+        self.maker = EvidenceMaker(cameras, self.footage, Backgrounds(self.footage), settings, edge_kind)
 
     def of(self, camera: str, frame: int) -> Bytes:
         """(H, W) 0 or 255. Raises FootageError."""

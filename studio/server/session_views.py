@@ -23,7 +23,6 @@ from studio.sessions.workspace import SessionSummary, next_step
 from studio.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, SettingsHistory
 from studio.trackers.catalogue import size_in_words
 
-
 NOTHING_CHANGED = SettingsHistory()
 
 

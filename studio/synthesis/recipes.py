@@ -110,7 +110,7 @@ def person_of_recipe(
 
 
 def person_renderer(recipe: Path | str) -> tuple[Renderer, tuple[Camera, ...], int]:
-    """What draws the person of a recipe into its pictures, the cameras, and the number of frames. Raises StudioError."""
+    """What draws the person of a recipe into its pictures, the cameras, the number of frames. Raises StudioError."""
     path = find_recipe(recipe)
     parsed = read_recipe(path)
     rng = np.random.default_rng(parsed.seed)

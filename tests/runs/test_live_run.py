@@ -11,7 +11,6 @@ from studio.runs.live_summary import summary_of
 from studio.runs.new_run import prepare_run
 from studio.runs.problem_source import ProblemSource
 from studio.runs.run_footage import footage_of
-from studio.sessions.background_files import SessionEvidence, write_evidence
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.settings import changed_settings

@@ -54,7 +54,10 @@ def test_sides_go_on_from_the_frame_before_where_every_camera_exchanges_them() -
 
 
 def test_a_joint_that_one_camera_sees_elsewhere_is_that_of_the_others() -> None:
-    seen = {camera.name: sighting(camera, wrong=4 if number == 1 else None) for number, camera in enumerate(CAMERAS)}
+    seen = {
+        camera.name: sighting(camera, wrong=4 if number == 1 else None)
+        for number, camera in enumerate(CAMERAS)
+    }
     np.testing.assert_allclose(found(seen), JOINTS, atol=0.1)
 
 

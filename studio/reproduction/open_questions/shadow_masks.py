@@ -6,6 +6,7 @@ of others bring theirs.
 
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import cv2
@@ -19,7 +20,6 @@ from studio.comparison.findings import Table
 from studio.comparison.footage_cache import FootageCache
 from studio.comparison.statistics import number
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
-from studio.errors import StudioError
 from studio.evidence.background import GaussianBackground, gaussian_from_frames
 from studio.evidence.masks import cleaned, disc
 from studio.evidence.settings import EvidenceSettings
@@ -35,8 +35,9 @@ CHOICES: Mapping[str, Mapping[str, Any]] = {
     "each pixel alone, 0.015": {"mask_shadow_window": 1, "mask_shadow_colour": 0.015},
     "5 pixels, 0.015": {"mask_shadow_colour": 0.015},
     "5 pixels, 0.02": {"mask_shadow_colour": 0.02},
-    "5 pixels, 0.025": {"mask_shadow_colour": 0.025},
-    "7 pixels, 0.02": {"mask_shadow_window": 7},
+    "5 pixels, 0.025": {},
+    "5 pixels, 0.03": {"mask_shadow_colour": 0.03},
+    "7 pixels, 0.025": {"mask_shadow_window": 7},
     "no shadow test": {"mask_shadow_test": False},
 }
 FRAMES, EMPTY_FRAMES = 5, 10
@@ -98,7 +99,7 @@ def _views_of_others(clip: str) -> Iterator[View]:
             yield picture, np.ascontiguousarray(truth[:, :, 0]), background
 
 
-def _frames(video: Any, most: int) -> list[tuple[int, Bytes]]:
+def _frames(video: Path, most: int) -> list[tuple[int, Bytes]]:
     count = measure_video(video).frame_count
     reader = VideoReader(video, count)
     try:
@@ -116,22 +117,34 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
         counts = np.array([outcome.measured[choice] for outcome in outcomes], dtype=np.float64)
         missed[choice] = [float(value) for value in 100.0 * counts[:, 0] / counts[:, 2]]
         added[choice] = [float(value) for value in 100.0 * counts[:, 1] / counts[:, 2]]
-        yield number(f"body called background, {choice}", [float(np.mean(missed[choice]))], "%", better="lower")
+        yield number(
+            f"body called background, {choice}", [float(np.mean(missed[choice]))], "%", better="lower"
+        )
         yield number(
             f"body called background, worst clip, {choice}", [max(missed[choice])], "%", better="lower"
         )
         yield number(f"beside it called body, {choice}", [float(np.mean(added[choice]))], "%", better="lower")
-        yield number(f"beside it called body, worst clip, {choice}", [max(added[choice])], "%", better="lower")
+        yield number(
+            f"beside it called body, worst clip, {choice}", [max(added[choice])], "%", better="lower"
+        )
     names = tuple(outcome.trial.label for outcome in outcomes)
     yield Table(
         "body called background / beside it called body, both as a share of the body (%)",
         ("choice", *names),
         tuple(
-            (choice, *(f"{one:.1f} / {other:.1f}" for one, other in zip(missed[choice], added[choice], strict=True)))
+            (
+                choice,
+                *(
+                    f"{one:.1f} / {other:.1f}"
+                    for one, other in zip(missed[choice], added[choice], strict=True)
+                ),
+            )
             for choice in CHOICES
         ),
     )
-    cells = {choice: [a + b for a, b in zip(missed[choice], added[choice], strict=True)] for choice in CHOICES}
+    cells = {
+        choice: [a + b for a, b in zip(missed[choice], added[choice], strict=True)] for choice in CHOICES
+    }
     yield heat_chart("wrong pixels, as a share of the body (%)", "clip", "choice", names, cells)
     yield {"frames a clip": FRAMES, "masks": "cleaned, the other knobs at their defaults"}
 

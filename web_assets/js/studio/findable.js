@@ -231,6 +231,10 @@ const views = () =>
     kind: "View",
     words: view.title,
     more: view.question,
+    // By what it shows, too: a knob's word finds the view of what the knob does.
+    also: view.tables
+      .flatMap(({ title, columns }) => [title, ...columns.map((one) => one.label)])
+      .join(" "),
     act: () => {
       showPanel("views");
       showView(view.name);

@@ -8,7 +8,7 @@ import { countedIn, onOneAxis } from "../layer_axis.js";
 import { onEvent } from "../live.js";
 import { complain, say } from "../messages.js";
 import { askingAbout, paced } from "../pacing.js";
-import { followsSearch, isStored, layersShown, select } from "../selection.js";
+import { followsSearch, isStored, layersShown, select, shownTrial } from "../selection.js";
 import { setupPath } from "../sessions.js";
 import { get, set, watch } from "../state.js";
 import { records } from "../view_sheet.js";
@@ -171,16 +171,30 @@ function buttonOf({ action, settings }) {
   return Object.keys(settings ?? {}).length && !readOnly ? "Try it" : "";
 }
 
+/** Whether the trial that is shown is this remedy's. @param {Remedy} remedy */
+function isShown({ settings }) {
+  const tried = shownTrial();
+  const wanted = Object.entries(settings ?? {});
+  return (
+    Boolean(tried && wanted.length) &&
+    wanted.every(([name, value]) =>
+      tried?.moved.some((knob) => knob.name === name && knob.tried === value),
+    )
+  );
+}
+
 /** @param {{ remedy: Remedy }} properties */
 function RemedyCard({ remedy }) {
   const knobs = knobWords(remedy.settings);
   const label = buttonOf(remedy);
+  const isTried = isShown(remedy);
   const isLonger = label === "Try it" && Number.isInteger(remedy.frame);
   return html`<div class="remedy-card">
     <b>${remedy.title}</b>
-    <p>${remedy.words}${knobs && ` (${knobs})`}</p>
+    <p>${isTried ? "This is the trial that is shown" : remedy.words}${knobs && ` (${knobs})`}</p>
     ${
       label &&
+      !isTried &&
       html`<button
         type="button"
         class="small"
@@ -216,6 +230,8 @@ const Findings = ({ findings = [] }) => html`<ul class="why-findings">
 
 /** Why a frame is as it is. @param {{ frame: Answer, tried: Answers | null }} properties */
 function Reasons({ frame, tried }) {
+  follow("trial");
+  follow("trials");
   const { notes, findings, remedies = [] } = frame;
   // What is compared with what comes first: without it no figure below can be read.
   return html`<h2>Why is frame ${frame.frame} as it is?</h2>
