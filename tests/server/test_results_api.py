@@ -89,7 +89,7 @@ def test_any_stored_frame_with_all_its_layers(studio: Studio, tracked: StoredRun
         layers, result = results.layers(1), results.result(1)
     assert response["finished"] is True
     assert np.allclose(response["pose"], result.estimate.pose)
-    assert len(response["parameters"]) == 31
+    assert len(response["parameters"]) == 35
     assert len(response["layers"]) == 3
     for shown, stored in zip(response["layers"], layers, strict=True):
         for name in ("variance_weighed", "variance_resampled", "variance_diffused", "best", "mean"):

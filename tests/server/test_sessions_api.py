@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 from web_doubles import Studio, state_of
 
+from studio.body.subject import DEFAULT_BODY
 from studio.jobs.commands import Close
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -19,7 +20,7 @@ def test_the_list_says_what_the_rail_shows(studio: Studio, tracked: StoredRun) -
     entry = sessions(studio)["take1"]
     assert (entry["cameras"], entry["frame_count"], entry["fps"]) == (2, 4, 25.0)
     assert entry["camera_names"] == ["cam1", "cam2"]
-    assert (entry["tracker"], entry["weighting"], entry["body"]) == ("annealed", DEFAULT_WEIGHTING, "human31")
+    assert (entry["tracker"], entry["weighting"], entry["body"]) == ("annealed", DEFAULT_WEIGHTING, DEFAULT_BODY)
     [run] = entry["runs"]
     assert (run["name"], run["done"], run["first"], run["last"]) == ("first", 2, 0, 4)
     assert run["status"] == "interrupted"
@@ -50,7 +51,7 @@ def test_the_detail_shows_cameras_matching_body_and_subject(studio: Studio, sess
     assert response["cameras"][0]["quarter_turns"] == first.quarter_turns
     assert response["cameras"][0]["picture_width"] == 96
     assert {match["camera"] for match in response["matching"]} == {"cam1", "cam2"}
-    assert len(response["body"]["parameters"]) == 31
+    assert len(response["body"]["parameters"]) == 35
     assert {entry["unit"] for entry in response["body"]["parameters"]} == {"mm", "rad"}
     assert response["has_start_pose"] is True
     assert response["has_truth"] is False
