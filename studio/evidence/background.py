@@ -215,6 +215,9 @@ UNSURE = np.float32(3.0)
 """Deviations of the noise by which a shadow's colour may seem another one."""
 FINE = np.float32(16.0)
 """Steps of a grey level in which the background is summed: whole numbers add up alike in any order."""
+BITS_SEEN, BITS_WANTED = np.uint64(16), np.uint64(21)
+"""Of a sum over the largest window, 15 x 15 pixels, of grey levels, and of their sixteenths (twice as bright at most)."""
+MOST_SEEN, MOST_WANTED = np.uint64(2**16 - 1), np.uint64(2**21 - 1)
 
 
 @njit(**EXACT, fastmath=True)
@@ -289,14 +292,19 @@ def drop_shadows(
     `differing_pixels`.
     """
     unsure = UNSURE * UNSURE if reach else np.float32(1.0)
-    possible = possible_shadows(changed, picture, mean, gain, unsure * noise, darkest, colour)
-    shadow = shadows_together(possible, picture, mean, gain, noise, colour, reach) if reach else possible
-    return changed - shadow
+    possible = possible_shadows(
+        changed, cv2.boundingRect(changed), picture, mean, gain, unsure * noise, darkest, colour
+    )
+    if not reach:
+        return changed - possible
+    place = cv2.boundingRect(possible)
+    return changed - shadows_together(possible, place, picture, mean, gain, noise, colour, reach)
 
 
 @njit(**EXACT, fastmath=True)
 def possible_shadows(
     changed: Bytes,
+    place: Sequence[int],
     picture: Bytes,
     mean: NDArray[np.uint8 | np.float32],
     gain: NDArray[np.float32],
@@ -304,11 +312,13 @@ def possible_shadows(
     darkest: np.float32,
     colour: np.float32,
 ) -> Bytes:
-    """(H, W) 255 where a changed pixel is darker than the background, in its colour but for the noise."""
-    height, width = changed.shape
-    possible = np.zeros((height, width), np.uint8)
-    for y in range(height):
-        for x in range(width):
+    """(H, W) 255 where a changed pixel is darker than the background, in its colour but for the noise. place : left,
+    top, width and height of what is changed.
+    """
+    left, top, wide, high = place
+    possible = np.zeros_like(changed)
+    for y in range(top, top + high):
+        for x in range(left, left + wide):
             if not changed[y, x]:
                 continue
             dot, norm, square = np.float32(0.0), np.float32(0.0), np.float32(0.0)
@@ -328,6 +338,7 @@ def possible_shadows(
 @njit(**EXACT)
 def shadows_together(
     possible: Bytes,
+    place: Sequence[int],
     picture: Bytes,
     mean: NDArray[np.uint8 | np.float32],
     gain: NDArray[np.float32],
@@ -335,64 +346,53 @@ def shadows_together(
     colour: np.float32,
     reach: int,
 ) -> Bytes:
-    """(H, W) 255 where the mean colour of what may be shadow around is the background's. Sums over a column's rows and
-    over a row's columns move with the pixel.
+    """(H, W) 255 where the mean colour of what may be shadow around is the background's. place : of what may.
+
+    Sums over a column's rows and then over a row's columns move with the pixel; those of the picture's three colours
+    and of the pixels share one number, 16 bits each, those of the background's three another, 21 bits each.
     """
-    height, width = possible.shape
-    shadow = np.zeros((height, width), np.uint8)
-    top, bottom, left, right = height, -1, width, -1
-    for y in range(height):
-        for x in range(width):
-            if possible[y, x]:
-                top, bottom, left, right = min(top, y), y, min(left, x), max(right, x)
-    # Of each column over 2 reach + 1 rows: the picture's three colours, the background's, and the number of pixels.
-    columns = np.zeros((width + 2 * reach + 1, 7), np.int32)
+    left, top, wide, high = place
+    right, bottom = left + wide - 1, top + high - 1
+    shadow, rows = np.zeros_like(possible), 2 * reach + 1
+    recent = np.zeros((rows, 2, right + 1), np.uint64)
+    columns = np.zeros((2, right + 1 + rows), np.uint64)
     for y in range(top, bottom + reach + 1):
-        for row, sign in ((y, 1), (y - 2 * reach - 1, -1)):
-            if row < top or row > bottom:
-                continue
-            for x in range(left, right + 1):
-                if possible[row, x]:
-                    at = columns[x + reach]
-                    for c in range(3):
-                        at[c] += np.int32(sign * picture[row, x, c])
-                        at[3 + c] += np.int32(sign * np.rint(FINE * gain[c] * np.float32(mean[row, x, c])))
-                    at[6] += np.int32(sign)
+        before = recent[y % rows]
+        for x in range(left, right + 1):
+            seen, wanted = np.uint64(0), np.uint64(0)
+            if y <= bottom and possible[y, x]:
+                seen = np.uint64(1)
+                for c in range(3):
+                    seen = seen << BITS_SEEN | np.uint64(picture[y, x, c])
+                    wanted = wanted << BITS_WANTED | np.uint64(
+                        np.rint(FINE * gain[c] * np.float32(mean[y, x, c]))
+                    )
+            columns[0, x + reach] += seen - before[0, x]
+            columns[1, x + reach] += wanted - before[1, x]
+            before[0, x], before[1, x] = seen, wanted
         middle = y - reach
         if middle < top:
             continue
-        blue, green, red, wanted_blue, wanted_green, wanted_red, pixels = 0, 0, 0, 0, 0, 0, 0
+        seen, wanted = np.uint64(0), np.uint64(0)
         for x in range(left - reach, right + 1):
             # `columns` begins `reach` before the picture: this is the column `reach` after x.
-            come = columns[x + 2 * reach]
-            blue, green, red = blue + come[0], green + come[1], red + come[2]
-            wanted_blue, wanted_green, wanted_red = (
-                wanted_blue + come[3],
-                wanted_green + come[4],
-                wanted_red + come[5],
-            )
-            pixels += come[6]
+            seen += columns[0, x + 2 * reach]
+            wanted += columns[1, x + 2 * reach]
             if x < left:
                 continue
             if possible[middle, x]:
-                each = np.float32(1.0) / np.float32(pixels)
-                wanted = each / FINE
-                b, g, r = np.float32(blue) * each, np.float32(green) * each, np.float32(red) * each
-                p, q, s = (
-                    np.float32(wanted_blue) * wanted,
-                    np.float32(wanted_green) * wanted,
-                    np.float32(wanted_red) * wanted,
-                )
-                dot, norm = b * p + g * q + r * s, p * p + q * q + s * s
-                off_colour = b * b + g * g + r * r - dot * dot / max(norm, np.float32(1.0))
+                dot, norm, square = np.float32(0.0), np.float32(0.0), np.float32(0.0)
+                each = np.float32(1.0) / np.float32(seen >> np.uint64(3) * BITS_SEEN)
+                for c in range(3):
+                    shift = np.uint64(2 - c)
+                    value = each * np.float32(seen >> shift * BITS_SEEN & MOST_SEEN)
+                    background = each / FINE * np.float32(wanted >> shift * BITS_WANTED & MOST_WANTED)
+                    dot += value * background
+                    norm += background * background
+                    square += value * value
+                off_colour = square - dot * dot / max(norm, np.float32(1.0))
                 if off_colour < colour * colour * norm + noise * each:
                     shadow[middle, x] = np.uint8(255)
-            gone = columns[x]
-            blue, green, red = blue - gone[0], green - gone[1], red - gone[2]
-            wanted_blue, wanted_green, wanted_red = (
-                wanted_blue - gone[3],
-                wanted_green - gone[4],
-                wanted_red - gone[5],
-            )
-            pixels -= gone[6]
+            seen -= columns[0, x]
+            wanted -= columns[1, x]
     return shadow

@@ -20,7 +20,11 @@ def test_the_list_says_what_the_rail_shows(studio: Studio, tracked: StoredRun) -
     entry = sessions(studio)["take1"]
     assert (entry["cameras"], entry["frame_count"], entry["fps"]) == (2, 4, 25.0)
     assert entry["camera_names"] == ["cam1", "cam2"]
-    assert (entry["tracker"], entry["weighting"], entry["body"]) == ("annealed", DEFAULT_WEIGHTING, DEFAULT_BODY)
+    assert (entry["tracker"], entry["weighting"], entry["body"]) == (
+        "annealed",
+        DEFAULT_WEIGHTING,
+        DEFAULT_BODY,
+    )
     [run] = entry["runs"]
     assert (run["name"], run["done"], run["first"], run["last"]) == ("first", 2, 0, 4)
     assert run["status"] == "interrupted"
