@@ -216,7 +216,7 @@ UNSURE = np.float32(3.0)
 FINE = np.float32(16.0)
 """Steps of a grey level in which the background is summed: whole numbers add up alike in any order."""
 BITS_SEEN, BITS_WANTED = np.uint64(16), np.uint64(21)
-"""Of a sum over the largest window, 15 x 15 pixels, of grey levels, and of their sixteenths (twice as bright at most)."""
+"""Of a sum over the largest window, 15 x 15 pixels, of grey levels, and of their sixteenths, twice as bright."""
 MOST_SEEN, MOST_WANTED = np.uint64(2**16 - 1), np.uint64(2**21 - 1)
 
 

@@ -78,14 +78,17 @@ class StudioPage:
     def see_scene(self) -> None:
         """Wait until the scene is drawn and has its panel; the warning of software rendering is closed."""
         self.scene.locator("canvas").first.wait_for()
-        self.scene.get_by_text("survival rate").first.wait_for()
+        self.scene.get_by_text("survival rate").first.wait_for(state="attached")
         toast = self.scene.locator("#webgl-software-rendering button")
         if toast.count():
             toast.dispatch_event("click")
             toast.wait_for(state="detached")
 
     def slider(self, label: str) -> Locator:
-        """A slider of viser's panel by its label."""
+        """A slider of viser's panel by its label; a narrow scene shows the panel where it is asked to."""
+        knobs = self.page.get_by_role("button", name="Knobs", exact=True)
+        if knobs.count() and knobs.get_attribute("aria-pressed") == "false":
+            knobs.click()
         row = self.scene.locator("label", has_text=label).locator(
             "xpath=ancestor::*[.//*[@role='slider']][1]"
         )

@@ -308,6 +308,24 @@ def test_the_search_is_watched_layer_by_layer(paused: StudioPage, artefacts: Pat
     until(page, lambda: speed.locator("option:checked").inner_text() == "10 layers/s")
 
 
+def test_a_narrow_scene_has_its_knobs_when_they_are_asked_for(paused: StudioPage) -> None:
+    """As beside the first steps on a laptop: the panel would cover the body."""
+    page, knob = paused.page, paused.scene.get_by_text("survival rate").first
+    button = page.get_by_role("button", name="Knobs", exact=True)
+    knob.wait_for()
+    assert button.count() == 0
+    page.set_viewport_size({"width": 600, "height": 800})
+    button.wait_for()
+    knob.wait_for(state="hidden")
+    button.click()
+    knob.wait_for()
+    button.click()
+    knob.wait_for(state="hidden")
+    page.set_viewport_size({"width": 1280, "height": 800})
+    button.wait_for(state="detached")
+    knob.wait_for()
+
+
 def test_the_survival_rate_is_moved_and_new_layers_are_drawn(paused: StudioPage) -> None:
     frame = paused.get("frame")
     assert isinstance(frame, int)

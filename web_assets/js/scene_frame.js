@@ -8,8 +8,11 @@ import { onTheme, theme, token } from "./theme.js";
 /** @type {HTMLIFrameElement} */
 const frame = byId("scene");
 const FONT = "/assets/vendor/inter.woff2";
+/** Pixels up to which a scene is too narrow for its panel beside the body: it is there when it is asked for. */
+export const NARROW = 620;
 const CONTROLS = "[role=slider], [role=tab], input, textarea, select";
 const style = document.createElement("style");
+let hasKnobs = false;
 
 function look() {
   const dark = theme() === "dark" ? `
@@ -20,7 +23,8 @@ function look() {
   return `
     body, body * { font-family: "Inter", system-ui, sans-serif !important; letter-spacing: 0 !important; font-variant-numeric: tabular-nums; }
     label, label * { font-size: 11.5px !important; letter-spacing: -.03em !important; }
-    @media (max-width: 620px) { .mantine-Paper-root:has(.mantine-ScrollArea-root) { display: none !important; } }
+    @media (max-width: ${NARROW}px) { :root:not([data-knobs]) .mantine-Paper-root:has(.mantine-ScrollArea-root) { display: none !important; } }
+    .mantine-Notifications-root[data-position^="top"] { top: 92px !important; }
     [role="tab"] { padding-inline: 8px !important; font-size: 12.5px !important; }
     * { scrollbar-width: thin; scrollbar-color: ${token("line-strong")} transparent; }
     :root, :root[data-mantine-color-scheme] {
@@ -37,6 +41,7 @@ async function dress() {
   const page = frame.contentDocument;
   style.textContent = look();
   page.head.append(style);
+  showKnobs(hasKnobs);
   if (![...page.fonts].some((face) => face.family === "Inter")) {
     const face = new page.defaultView.FontFace("Inter", await (await fetch(FONT)).arrayBuffer(), { weight: "100 900" });
     page.fonts.add(await face.load());
@@ -54,6 +59,12 @@ const first = (takeKey) => (event) => {
   takeKey(event);
   if (event.defaultPrevented) event.stopImmediatePropagation();
 };
+
+/** Show the panel with the knobs in a scene that is too narrow for it, or no longer. @param {boolean} isShown */
+export function showKnobs(isShown) {
+  hasKnobs = isShown;
+  frame.contentDocument?.documentElement.toggleAttribute("data-knobs", hasKnobs);
+}
 
 /** Put the keyboard into the scene's panel: the frame is no stop of the page's own, for its many controls' sake. */
 export function enterScene() {

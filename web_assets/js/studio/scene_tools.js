@@ -3,8 +3,9 @@
 import { post } from "../api.js";
 import { byId } from "../elements.js";
 import { complain } from "../messages.js";
+import { NARROW, showKnobs } from "../scene_frame.js";
 import { get, set } from "../state.js";
-import { follow, html, mount, signal, useSignalEffect } from "./component.js";
+import { follow, html, mount, signal, useEffect, useSignalEffect } from "./component.js";
 
 /** @import { Answer } from "../api_types" */
 
@@ -12,6 +13,9 @@ const HOVER_MILLISECONDS = 80;
 
 /** Whether the view goes along with the body from frame to frame. */
 const follows = signal(false);
+/** Whether the scene is too narrow for its panel, and whether the panel is shown all the same. */
+const isNarrow = signal(false);
+const hasKnobs = signal(false);
 /** @typedef {NonNullable<Answer<"/api/scene/point", "post">>} Pointed */
 /** @type {import("@preact/signals").Signal<{ found: Pointed, left: number, top: number } | null>} */
 const pointed = signal(null);
@@ -111,6 +115,33 @@ function toggleFullScreen() {
   else byId("stage").requestFullscreen();
 }
 
+const KNOBS =
+  "M2 4h6v1.5H2zM11 4h3v1.5h-3zM8 3h2v3.5H8zM2 10.5h2V12H2zM7 10.5h7V12H7zM4 9.5h2V13H4z";
+
+/** The panel with the knobs, where the scene is too narrow to have it beside the body. */
+function Knobs() {
+  useEffect(() => {
+    const watch = new ResizeObserver(([{ contentRect }]) => {
+      isNarrow.value = contentRect.width <= NARROW;
+    });
+    watch.observe(byId("scene"));
+    return () => watch.disconnect();
+  }, []);
+  if (!isNarrow.value) return null;
+  const toggle = () => {
+    hasKnobs.value = !hasKnobs.value;
+    showKnobs(hasKnobs.value);
+  };
+  return html`<${Tool}
+    label="Knobs"
+    title="Survival rate, layers, particles and the other knobs, over the scene"
+    pressed=${hasKnobs.value}
+    act=${toggle}
+  >
+    ${drawing(KNOBS)}
+  <//>`;
+}
+
 function SceneTools() {
   const through = follow("through");
   useSignalEffect(() => {
@@ -141,6 +172,7 @@ function SceneTools() {
       <${Tool} label="Full screen" title="The scene on the whole screen, and back" act=${toggleFullScreen}>
         ${drawing(FULL)}
       <//>
+      <${Knobs} />
       ${
         through &&
         html`<button class="small scene-through" title="Leave the camera (0)" onClick=${resetView}>
