@@ -141,7 +141,7 @@ def _of_those_that_agree(
             float(_missed(cameras[name], at, among[name])[0]) / seen[name].next_crop.side for name in among
         )
 
-    left = dict(rays)
+    left: dict[str, Array] = dict(rays)
     while contradiction(left, point) > APART:
         if len(left) == 2:
             return np.full_like(point, np.nan)
