@@ -39,6 +39,7 @@ OTHERS = {
     "align": "minutes",
     "fit-subject": "minutes",
     "initialise": "minutes",
+    "landmarks": "minutes",
     "track": "minutes",
     "batch": "minutes",
     "level": "a session of several cameras",
