@@ -213,6 +213,10 @@ ROUGH = np.float32(0.501)
 """Grey levels by which a rounded mean is off at most."""
 UNSURE = np.float32(3.0)
 """Deviations of the noise by which a shadow's colour may seem another one."""
+MIXED = np.float32(1.6)
+"""Times the tolerance within which a pixel of the border passes for shadow. By exact masks of six clips the border lies
+0.02 to 0.2 pixels further in than without; a walk with dark trousers is tracked 0.9 mm nearer so."""
+CROSS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
 FINE = np.float32(16.0)
 """Steps of a grey level in which the background is summed: whole numbers add up alike in any order."""
 BITS_SEEN, BITS_WANTED = np.uint64(16), np.uint64(21)
@@ -288,7 +292,8 @@ def drop_shadows(
     noise, lies within `colour` of the background's, as a share of its brightness. It is one if the mean colour of all
     that may be shadow at most `reach` pixels away along each axis lies so near, allowing for a deviation of that mean.
     One pixel's colour is mostly noise: a tolerance that lets a noisy shadow through lets skin on a floor of wood
-    through, too. Of no reach each pixel's colour decides alone, within a deviation. picture, mean, gain, noise : as in
+    through, too. Pixels of the border of what is left are mixtures, of a colour of their own: each decides alone,
+    within MIXED times the tolerance and a deviation. Of no reach all decide alone. picture, mean, gain, noise : as in
     `differing_pixels`.
     """
     unsure = UNSURE * UNSURE if reach else np.float32(1.0)
@@ -298,7 +303,11 @@ def drop_shadows(
     if not reach:
         return changed - possible
     place = cv2.boundingRect(possible)
-    return changed - shadows_together(possible, place, picture, mean, gain, noise, colour, reach)
+    left = changed - shadows_together(possible, place, picture, mean, gain, noise, colour, reach)
+    rim = left - cv2.erode(left, CROSS)
+    return left - possible_shadows(
+        rim, cv2.boundingRect(rim), picture, mean, gain, noise, darkest, MIXED * colour
+    )
 
 
 @njit(**EXACT, fastmath=True)
