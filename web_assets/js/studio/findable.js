@@ -232,7 +232,7 @@ const views = () =>
     words: view.title,
     more: view.question,
     // By what it shows, too: a knob's word finds the view of what the knob does.
-    also: view.tables
+    also: (view.tables ?? [])
       .flatMap(({ title, columns }) => [title, ...columns.map((one) => one.label)])
       .join(" "),
     act: () => {
