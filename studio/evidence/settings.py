@@ -65,7 +65,7 @@ class EvidenceSettings:
         help="A shadow leaves at least this share of the background's brightness.",
     )
     # Masks of 13 drawn clips and two of others (`studio reproduce shadow-test`), body called background: 1.5 % (worst
-    # clip 12.3) with each pixel alone and 0.04, 0.5 (2.2) with five and 0.025; beside it called body 0.07 and 0.1. At
+    # clip 12.3) with each pixel alone and 0.04, 0.6 (2.7) with five and 0.025; beside it called body 0.07 and 0.08. At
     # 0.015 tinted shadows count as body (9 % of it), at 0.02 the deepest beside a foot, which pull it; at 0.03 forearms
     # go.
     mask_shadow_colour: float = next_frame_knob(
