@@ -304,7 +304,7 @@ def drop_shadows(
         return changed - possible
     place = cv2.boundingRect(possible)
     left = changed - shadows_together(possible, place, picture, mean, gain, noise, colour, reach)
-    rim = left - cv2.erode(left, CROSS)
+    rim = left - np.asarray(cv2.erode(left, CROSS), np.uint8)
     return left - possible_shadows(
         rim, cv2.boundingRect(rim), picture, mean, gain, noise, darkest, MIXED * colour
     )

@@ -61,7 +61,10 @@ def begin_film(request: FilmRequest, app: App, scene: Scene) -> ExportState:
     if request.of == "frames":
         with run.results() as results:
             stored = results.timeline().frames.tolist()
-        first, last = request.first or 0, request.last if request.last is not None else stored[-1] + 1
+        first, last = (
+            request.first or 0,
+            request.last if request.last is not None else max(stored, default=-1) + 1,
+        )
         frames = tuple(frame for frame in stored if first <= frame < last)[:MOST_FRAMES]
         if not frames:
             raise NotFoundError(f"There are no frames from {first} to {last}.", "Choose others.")

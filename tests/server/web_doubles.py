@@ -13,6 +13,7 @@ import numpy as np
 import uvicorn
 from fastapi import FastAPI
 
+from studio.arrays import Bytes
 from studio.body.model import BodyModel
 from studio.errors import RunError
 from studio.export.task import ExportTask, Written
@@ -20,6 +21,7 @@ from studio.jobs.commands import ChangeSettings, Command
 from studio.jobs.events import Event, StateChanged
 from studio.jobs.watchers import Subscription, Watchers
 from studio.scene.model import LayerPlayback, LiveSearch, Selection
+from studio.scene.scene_pictures import Film, Report, UnseenSceneError
 from studio.sessions.workspace import Workspace
 
 NAN = float("nan")
@@ -72,6 +74,16 @@ class RecordingControl:
         if isinstance(event, StateChanged):
             self.state = event
         self.watchers.publish(event)
+
+
+class UnseenPictures:
+    """Pictures of a scene that no browser shows."""
+
+    def take(self, scale: float = 2.0, *, transparent: bool = False) -> Bytes:
+        raise UnseenSceneError("No browser shows this scene.", "Open the studio, then try again.")
+
+    def film(self, film: Film, place: Path, report: Report) -> int:
+        raise UnseenSceneError("No browser shows this scene.", "Open the studio, then try again.")
 
 
 @dataclass
@@ -136,6 +148,13 @@ class RecordingStage:
 
     def set_options(self, **changes: object) -> None:
         self.calls.append(("options", changes))
+
+    def point(self, at: tuple[float, float] | None, choose: bool = False) -> None:
+        self.calls.append(("point", at, choose))
+
+    @property
+    def pictures(self) -> "UnseenPictures":
+        return UnseenPictures()
 
     def play(
         self, playing: bool | None = None, *, speed: float | None = None, loop: bool | None = None
