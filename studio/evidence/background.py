@@ -75,15 +75,14 @@ class GaussianBackground:
         changed = differing_pixels(picture, self.mean, self._rough, self.variance, gain, threshold, noise)
         if not self.tests_shadows(settings):
             return changed
-        darkest, colour = settings.mask_shadow_darkest, settings.mask_shadow_colour
         return drop_shadows(
             changed,
             picture,
             self.mean,
             gain,
             noise,
-            np.float32(darkest),
-            np.float32(colour),
+            np.float32(settings.mask_shadow_darkest),
+            np.float32(settings.mask_shadow_colour),
             settings.mask_shadow_window // 2,
         )
 

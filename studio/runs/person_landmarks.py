@@ -88,7 +88,7 @@ def _joints(cameras: Mapping[str, Camera], seen: Sightings, before: Array | None
         return None
     found, other = best[1], _exchanged(best[1])
     if before is None:
-        # Most cameras say which side is which.
+        # The first camera says which side is which.
         return found
     return found if _moved(found, before) <= _moved(other, before) else other
 

@@ -117,16 +117,12 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
         counts = np.array([outcome.measured[choice] for outcome in outcomes], dtype=np.float64)
         missed[choice] = [float(value) for value in 100.0 * counts[:, 0] / counts[:, 2]]
         added[choice] = [float(value) for value in 100.0 * counts[:, 1] / counts[:, 2]]
-        yield number(
-            f"body called background, {choice}", [float(np.mean(missed[choice]))], "%", better="lower"
-        )
-        yield number(
-            f"body called background, worst clip, {choice}", [max(missed[choice])], "%", better="lower"
-        )
-        yield number(f"beside it called body, {choice}", [float(np.mean(added[choice]))], "%", better="lower")
-        yield number(
-            f"beside it called body, worst clip, {choice}", [max(added[choice])], "%", better="lower"
-        )
+        for what, shares in (
+            ("body called background", missed[choice]),
+            ("beside it called body", added[choice]),
+        ):
+            yield number(f"{what}, {choice}", [float(np.mean(shares))], "%", better="lower")
+            yield number(f"{what}, worst clip, {choice}", [max(shares)], "%", better="lower")
     names = tuple(outcome.trial.label for outcome in outcomes)
     yield Table(
         "body called background / beside it called body, both as a share of the body (%)",
