@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 
@@ -56,4 +57,10 @@ def with_dimensions(body: BodyModel, changes: Mapping[str, float]) -> BodyModel:
             raise BodyError(
                 f"Dimension '{name}' cannot be {value}.", "Give a finite number that is not negative."
             )
-    return assemble(body.definition, body.name, {**body.dimensions, **changes})
+    return _resized(body, tuple(sorted(changes.items())))
+
+
+@lru_cache(maxsize=64)
+def _resized(body: BodyModel, changes: tuple[tuple[str, float], ...]) -> BodyModel:
+    assert body.definition is not None
+    return assemble(body.definition, body.name, {**body.dimensions, **dict(changes)})

@@ -4,6 +4,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import NoReturn
 
@@ -328,8 +329,9 @@ def read_body(path: Path) -> BodyModel:
         return parse_body(read_foreign_text(path), path.stem, path.name)
 
 
+@lru_cache(maxsize=64)
 def parse_body(text: str, name: str, file: str) -> BodyModel:
-    """The body of a TOML text; `file` is what errors call it."""
+    """The body of a TOML text, the same object for the same text; `file` is what errors call it."""
     try:
         definition = decode_toml(text, BodyDefinition)
     except msgspec.ValidationError as problem:

@@ -5,6 +5,7 @@ that a pose costs one pair of column turns for each of its angles and little els
 `KinematicTables` can hold can be compiled.
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -40,8 +41,9 @@ class KinematicProgram(NamedTuple):
     dimension: int
 
 
+@lru_cache(maxsize=64)
 def compile_program(tables: KinematicTables) -> KinematicProgram:
-    """The program of a body's tables."""
+    """The program of a body's tables, made once a table: read only."""
     needed = _needed_joints(tables)
     number = {int(joint): index for index, joint in enumerate(needed)}
     operations: list[tuple[int, int, float, Array]] = []

@@ -45,6 +45,17 @@ class ViewOverlay:
     region_samples: Array
 
 
+def limb_contours(body: BodyModel, cameras: tuple[Camera, ...], pose: Array) -> tuple[tuple[Array, ...], ...]:
+    """For each camera the `ViewOverlay.contours` of a pose (D,), nothing else. Raises BodyError for one that does not
+    fit.
+    """
+    pose = np.asarray(pose, dtype=np.float64)
+    corners = OutlineProjector.of_body(body, cameras).corners(pose[None])[0][0]
+    return tuple(
+        _contours(body, camera, pose, outlines) for camera, outlines in zip(cameras, corners, strict=True)
+    )
+
+
 def overlay_points(
     body: BodyModel,
     cameras: tuple[Camera, ...],
@@ -148,32 +159,45 @@ def _inside(camera: Camera, points: Array) -> Array:
 
 def _contours(body: BodyModel, camera: Camera, pose: Array, outlines: Array) -> tuple[Array, ...]:
     """Closed polylines around each limb: side A, far end, side B, near end."""
-    frames = limb_frames(body, pose[None])[0]
     shapes = kinematic_tables(body).limb_shape
-    found: list[Array] = []
-    for frame, shape, outline in zip(frames, shapes, outlines, strict=True):
-        if not np.isfinite(outline).all():
-            found.append(np.zeros((0, 2)))
-            continue
-        far = _cap(camera, frame, shape, at_end=True, start=outline[1], away=outline[1] - outline[0])
-        near = _cap(camera, frame, shape, at_end=False, start=outline[3], away=outline[0] - outline[1])
-        found.append(np.concatenate([outline[:1], far, near, outline[:1]]))
-    return tuple(found)
+    seen = np.flatnonzero(np.isfinite(outlines).all(axis=(1, 2)))
+    frames, shapes, corners = limb_frames(body, pose[None])[0][seen], shapes[seen], outlines[seen]
+    along = corners[:, 1] - corners[:, 0]
+    zeros = np.zeros(len(seen))
+    far = _caps(camera, frames, shapes, (shapes[:, 0], shapes[:, 2]), corners[:, 1], along)
+    near = _caps(camera, frames, shapes, (zeros, shapes[:, 1]), corners[:, 3], -along)
+    lines = np.concatenate([corners[:, :1], far, near, corners[:, :1]], axis=1)
+    contours = [np.zeros((0, 2))] * len(outlines)
+    for limb, line in zip(seen, lines, strict=True):
+        contours[limb] = line
+    return tuple(contours)
 
 
-def _cap(camera: Camera, frame: Array, shape: Array, *, at_end: bool, start: Array, away: Array) -> Array:
-    """(CAP_POINTS, 2) the half of an end's ellipse that bulges away from the limb, from one side to the
-    other.
+def _caps(
+    camera: Camera,
+    frames: Array,
+    shapes: Array,
+    end: tuple[Array, Array],
+    starts: Array,
+    away: Array,
+) -> Array:
+    """(L, CAP_POINTS, 2) the half of an end's ellipse that bulges away from each limb, from one side to the other.
+
+    frames (L, 3, 4) and shapes (L, 5) of the limbs; end : (L,) its places along the bone and its radii, mm;
+    starts (L, 2) : where the halves begin, away (L, 2) : the direction in which they bulge, pixels.
     """
-    length, radius = (shape[0], shape[2]) if at_end else (0.0, shape[1])
+    places, radii = end
     turns = np.linspace(0.0, 2.0 * np.pi, 2 * CAP_POINTS - 1)
-    centre = frame[:, :2].T @ (camera.centre - frame[:, 3]) / shape[3:5]
-    first = np.arctan2(-centre[0], centre[1])
-    circle = radius * np.stack([np.cos(first + turns), np.sin(first + turns)], axis=1) * shape[3:5]
-    ring = np.column_stack([circle, np.full(len(turns), length)])
-    pixels, _ = project(camera, ring @ frame[:, :3].T + frame[:, 3])
-    one, other = pixels[:CAP_POINTS], pixels[CAP_POINTS - 1 :][::-1]
+    scales, origins = shapes[:, 3:5], frames[:, :, 3]
+    centres = np.einsum("lji,lj->li", frames[:, :, :2], camera.centre - origins) / scales
+    angles = np.arctan2(-centres[:, 0], centres[:, 1])[:, None] + turns
+    circles = radii[:, None, None] * np.stack([np.cos(angles), np.sin(angles)], axis=2) * scales[:, None]
+    rings = np.concatenate([circles, np.broadcast_to(places[:, None, None], (*angles.shape, 1))], axis=2)
+    points = rings @ frames[:, :, :3].transpose(0, 2, 1) + origins[:, None]
+    pixels = project(camera, points)[0]
+    ones, others = pixels[:, :CAP_POINTS], pixels[:, CAP_POINTS - 1 :][:, ::-1]
     middle = CAP_POINTS // 2
-    half = one if one[middle] @ away >= other[middle] @ away else other
-    begins_at_start = np.sum((half[0] - start) ** 2) <= np.sum((half[-1] - start) ** 2)
-    return half if begins_at_start else half[::-1]
+    is_one = np.sum((ones[:, middle] - others[:, middle]) * away, axis=1) >= 0.0
+    halves = np.where(is_one[:, None, None], ones, others)
+    first, last = (np.sum((halves[:, at] - starts) ** 2, axis=1) for at in (0, -1))
+    return np.where((first <= last)[:, None, None], halves, halves[:, ::-1])

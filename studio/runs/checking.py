@@ -21,7 +21,7 @@ from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.pipeline import EvidenceMaker
 from studio.geometry.camera import Camera
-from studio.likelihood.overlay import overlay_points
+from studio.likelihood.overlay import limb_contours
 from studio.progress import Progress, unheard
 from studio.runs.jumps import Jump, jumps_of
 from studio.runs.overlay_drawing import projected_silhouette
@@ -182,7 +182,7 @@ def check_run(
             progress("comparing with the masks", done, len(rows))
             evidence = maker.evidence(int(chosen.frames[row]))
             frame, pose = evidence.frame, chosen.poses[row]
-            shares.append(frame_shares(body, cameras, pose, evidence, settings))
+            shares.append(frame_shares(body, cameras, pose, evidence))
             hidden: Mapping[str, Array] = results.result(frame).carried.memory if frame in known else {}
             denied += _denied(agreement, pose, evidence, hidden)
     check = RunCheck(
@@ -219,20 +219,20 @@ def kept_check(run: StoredRun, track: str) -> RunCheck | None:
 
 
 def frame_shares(
-    body: BodyModel, cameras: tuple[Camera, ...], pose: Array, evidence: FrameEvidence, settings: RunSettings
+    body: BodyModel, cameras: tuple[Camera, ...], pose: Array, evidence: FrameEvidence
 ) -> tuple[tuple[float | None, ...], tuple[float | None, ...]]:
     """For each camera: the share of the model's pixels in the mask, and of the mask's pixels under the model."""
     views = {view.camera: view for view in evidence.views}
     inside: list[float | None] = []
     covered: list[float | None] = []
-    for overlay in overlay_points(body, cameras, pose, settings.weighting):
-        view = views.get(overlay.camera)
+    for camera, contours in zip(cameras, limb_contours(body, cameras, pose), strict=True):
+        view = views.get(camera.name)
         if view is None:
             inside.append(None)
             covered.append(None)
             continue
         mask = view.mask > 0
-        model = projected_silhouette(overlay.contours, *mask.shape) > 0
+        model = projected_silhouette(contours, *mask.shape) > 0
         both = int(np.count_nonzero(mask & model))
         inside.append(_share(both, int(np.count_nonzero(model))))
         covered.append(_share(both, int(np.count_nonzero(mask))))

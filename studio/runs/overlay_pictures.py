@@ -27,7 +27,7 @@ from studio.evidence.pipeline import EvidenceMaker
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project
 from studio.likelihood.catalogue import WEIGHTINGS
-from studio.likelihood.overlay import overlay_points
+from studio.likelihood.overlay import limb_contours, overlay_points
 from studio.motion_files.trc import MarkerMotion, read_trc
 from studio.runs.colour_tokens import colour_tokens
 from studio.runs.marker_lines import marker_links
@@ -45,7 +45,8 @@ Found = TypeVar("Found")
 REST_SECONDS = 20.0
 _NEED_EVIDENCE = {"mask", "edges", "cost"}
 _NEED_EDGES = {"edges", "cost"}
-_NEED_BODY = {"outline", "filled", "mask", "samples", "cost"}
+_NEED_SAMPLES = {"samples", "cost"}
+_NEED_BODY = {"outline", "filled", "mask", *_NEED_SAMPLES}
 _KEPT_COMPOSERS, _KEPT_PIXELS = 3, 18_000_000
 """Composers kept at most, and pixels of all their cameras. A pixel takes about 100 bytes (decoder, background,
 pictures), so two sessions of four full-HD cameras take 1.7 GB.
@@ -116,16 +117,12 @@ class ViewComposer:
             view = self._view(frame, camera, layers)
             marks = self._marks(camera, frame, layers, pose, clouds, limbs, body or self.body)
             if {"outline", "filled"} & set(layers):
-                lenses, settings = (self.cameras[camera],), self._settings.weighting
-                others = [
-                    (
-                        overlay_points(other.body or body or self.body, lenses, other.pose, settings)[0],
-                        other.colour,
-                    )
+                lenses = (self.cameras[camera],)
+                drawn = [
+                    (limb_contours(other.body or body or self.body, lenses, other.pose)[0], other.colour)
                     for other in beside
                 ]
-                drawn = tuple((seen.contours, colour) for seen, colour in others)
-                marks = replace(marks, own=own, beside=drawn)
+                marks = replace(marks, own=own, beside=tuple(drawn))
         scale = 1.0 if height is None else height / view.picture.shape[0]
         return draw_view(view, marks, tuple(layers), colour_tokens(dark=True), scale=scale)
 
@@ -177,10 +174,14 @@ class ViewComposer:
         dots = self._dots(lens, clouds, limbs) if "particles" in layers else ()
         if pose is None or not _NEED_BODY & set(layers):
             return replace(NO_MARKS, clouds=dots, truth=truth)
+        sides = tuple(limb.side for limb in body.drawn)
+        if not _NEED_SAMPLES & set(layers):
+            outlined = replace(NO_MARKS, contours=limb_contours(body, (lens,), pose)[0], sides=sides)
+            return replace(outlined, clouds=dots, truth=truth)
         seen = overlay_points(body, (lens,), pose, self._settings.weighting)[0]
         return ViewMarks(
             seen.contours,
-            tuple(limb.side for limb in body.drawn),
+            sides,
             seen.edge_samples,
             seen.region_samples,
             dots,

@@ -7,11 +7,10 @@ import numpy as np
 
 from studio.arrays import Bytes
 from studio.errors import RunError
-from studio.likelihood.overlay import overlay_points
+from studio.likelihood.overlay import limb_contours
 from studio.runs.overlay_drawing import projected_silhouette
 from studio.runs.tracks import BEST, read_track, track_digest
 from studio.sessions.session import Session
-from studio.settings import settings_from_values
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,14 +36,13 @@ def projected_masks(session: Session, run_name: str) -> ProjectedMasks:
         raise RunError(f"Run '{run.name}' has no frame yet.", "Track it first.")
     cameras = {camera.name: camera for camera in session.cameras()}
     body = run.body()
-    weighting = settings_from_values(record.tracker, record.weighting, record.settings).weighting
 
     def of(name: str, frame: int) -> Bytes | None:
         row = int(np.searchsorted(track.frames, frame))
         if row == len(track.frames) or track.frames[row] != frame:
             return None
         camera = cameras[name]
-        seen = overlay_points(body, (camera,), track.poses[row], weighting)[0]
-        return projected_silhouette(seen.contours, camera.height, camera.width)
+        (contours,) = limb_contours(body, (camera,), track.poses[row])
+        return projected_silhouette(contours, camera.height, camera.width)
 
     return ProjectedMasks(f"{run.name} {track.name} {track_digest(track)}", of)

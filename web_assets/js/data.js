@@ -264,8 +264,14 @@ export function startData() {
   });
   onEvent("layer", (event, here) => { if (here) takeLayer(event); });
   onEvent("settings", (event, here) => { if (here) { set({ settings: event, layerCount: layersOf(event.values) }); movedLater(); } });
+  let state = "";
   onEvent("state", (event, here) => {
-    if (here && !searching()) { takeRest(event); summaryLater(); sceneLater(); }
+    // A frame that is annealed again changes nothing that is stored.
+    const isTrial = event.state === "reannealing" || (state === "reannealing" && ["paused", "finished"].includes(event.state));
+    if (here) state = event.state;
+    if (here && !searching()) { takeRest(event); sceneLater(); }
+    if (isTrial) return;
+    if (here && !searching()) summaryLater();
     if (event.state !== "tracking") sessionsLater();
   });
   onEvent("sessions", sessionsLater);
