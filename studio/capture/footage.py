@@ -214,7 +214,7 @@ def camera_reader(source: CameraSource, session_folder: Path) -> Reader:
     """The frames of one camera's file or folder as they lie there: not turned, counted from the file's first one."""
     path = session_folder / source.path
     if source.kind == "video":
-        return VideoReader(path, source.frame_count)
+        return VideoReader(path, source.frame_count, source.fields)
     if source.kind == "numbered":
         return NumberedReader(path)
     return PictureReader(path, source.frame_count)

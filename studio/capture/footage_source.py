@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from studio.capture.frame_pairing import file_frame
+from studio.capture.interlacing import Fields
 
 Turn = Literal[0, 90, 180, 270]
 TURNS: tuple[Turn, ...] = (0, 90, 180, 270)
@@ -26,6 +27,8 @@ class CameraSource:
     claims. offset : the file's frame that was taken at the session's frame 0. turned : degrees clockwise by which the
     pictures (masks and background too) are turned, in addition to the file's own rotation: 0, 90, 180 or 270. steps :
     where frames are paired by time, (frame of the session, so many frames further in the file) from that frame on.
+    fields : of an interlaced video that is split, which field of a picture comes first; then every field counts as a
+    frame of the file.
     """
 
     name: str
@@ -39,6 +42,7 @@ class CameraSource:
     offset: int = 0
     turned: Turn = 0
     steps: tuple[tuple[int, int], ...] = ()
+    fields: Fields = ""
 
     def file_frame(self, frame: int) -> int:
         """The file's frame that belongs to a frame of the session."""

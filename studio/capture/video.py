@@ -23,16 +23,19 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from fractions import Fraction
 from pathlib import Path
 
 import av
 import av.container
 import av.error
+import av.filter
 import av.video
 import numpy as np
 from av.video.reformatter import VideoReformatter
 
 from studio.arrays import Array, Bytes
+from studio.capture.interlacing import FieldMotion, Fields, whole_picture
 from studio.errors import FootageError
 from studio.foreign_files import check_regular, foreign_file
 from studio.isolated import isolated, silent
@@ -195,6 +198,11 @@ STEADY = 0.6
 variable."""
 MOST_GAPS, ROUNDED = 0.1, 5e-4
 """At most this share of the frames' steps are gaps; measured rates are this near the usual one that they are."""
+FIELD_PAIRS, FEWEST_APART, USUALLY_APART = 48, 4, 16
+"""About so many pairs of neighbouring pictures are looked at for fields, at least so many frames apart, and so many
+where a file does not say how long it is."""
+LOWER_FIRST = frozenset(("dvvideo",))
+"""Codecs whose interlaced pictures begin with the lower field where nothing says otherwise."""
 FORWARD = 24
 """A jump forward of up to this many frames is decoded through instead of sought."""
 
@@ -204,8 +212,9 @@ class VideoMeasure:
     """A video measured by decoding all of it. width, height : pixels as shown (the file's rotation applied).
 
     uneven_frame : the first frame that is not where a constant frame rate puts it, or -1. turned : degrees clockwise by
-    which the file itself says to turn its pictures. interlaced : whether most frames are of two fields. times : (F,)
-    seconds as the file has them, empty where it has none.
+    which the file itself says to turn its pictures. interlaced : whether its pictures hold two moments. first_field :
+    the earlier one where what moves says it, else "". times : (F,) seconds as the file has them, empty where it has
+    none.
     """
 
     width: int
@@ -215,6 +224,7 @@ class VideoMeasure:
     uneven_frame: int
     turned: int = 0
     interlaced: bool = False
+    first_field: Fields = ""
     times: Array = field(default_factory=lambda: np.zeros(0), compare=False)
 
 
@@ -230,13 +240,21 @@ def measure_video(path: Path, on_frame: Callable[[int, int], None] | None = None
 
 def _measured(path: Path, on_frame: Callable[[int, int], None]) -> VideoMeasure:
     times: list[float] = []
-    width = height = turned = fields = 0
+    width = height = turned = marked = 0
+    motion = FieldMotion()
+    before: Bytes | None = None
     with open_video(path) as container:
         stream = container.streams.video[0]
         announced = announced_frames(container, stream)
+        apart = max(FEWEST_APART, announced // FIELD_PAIRS) if announced else USUALLY_APART
         for frame in _decoded(path, container, stream):
             turned = round(-frame.rotation / 90.0) % 4 * 90
-            fields += frame.interlaced_frame
+            marked += frame.interlaced_frame
+            if len(times) % apart < 2:
+                grey = frame.reformat(format="gray").to_ndarray().astype(np.uint8, copy=False)
+                if before is not None and len(times) % apart == 1:
+                    motion.compare(before, grey)
+                before = grey
             size = (frame.height, frame.width) if turned in (90, 270) else (frame.width, frame.height)
             if times and size != (width, height):
                 raise FootageError(
@@ -247,7 +265,7 @@ def _measured(path: Path, on_frame: Callable[[int, int], None]) -> VideoMeasure:
             if len(times) > MAX_FRAMES:
                 raise FootageError(f"'{path.name}' has more than {MAX_FRAMES} frames.", "Cut it into pieces.")
             on_frame(len(times), announced)
-        nominal = float(stream.average_rate or stream.guessed_rate or 0)
+        nominal, codec = float(stream.average_rate or stream.guessed_rate or 0), stream.codec_context.name
     if not times:
         raise FootageError(f"'{path.name}' holds no frames.", "Record or export the video again.")
     if len(times) < announced - max(1, announced // 100) - _hidden_frames(path, announced - len(times)):
@@ -258,16 +276,24 @@ def _measured(path: Path, on_frame: Callable[[int, int], None]) -> VideoMeasure:
     fps, uneven = _rate(np.array(times), nominal)
     known = np.array(times)
     shown_at = known if np.isfinite(known).all() and np.all(np.diff(known) > 0.0) else np.zeros(0)
-    return VideoMeasure(width, height, len(times), fps, uneven, turned, 2 * fields > len(times), shown_at)
+    interlaced, first = motion.judged(2 * marked > len(times))
+    if interlaced and not first and codec in LOWER_FIRST:
+        first = "bottom"
+    return VideoMeasure(width, height, len(times), fps, uneven, turned, interlaced, first, shown_at)
 
 
 class VideoReader:
     """Random access to the frames of one measured video; reading onwards keeps the decoder open.
     Thread-safe."""
 
-    def __init__(self, path: Path, frame_count: int) -> None:
-        """frame_count : as measured, 0 where it is not known."""
-        self._path, self._count = path, frame_count
+    def __init__(self, path: Path, frame_count: int, fields: Fields = "") -> None:
+        """frame_count : as measured, 0 where it is not known. fields : which field of each picture is its first frame
+        where the two are to be frames of their own, of which there are twice as many.
+        """
+        self._path, self._count = path, frame_count // 2 if fields else frame_count
+        self._fields = fields
+        self._halves: dict[bool, av.filter.Graph] = {}
+        self._last: tuple[int, av.VideoFrame] | None = None
         self._lock = threading.Lock()
         self._container: av.container.InputContainer | None = None
         self._frames: Iterator[av.VideoFrame] = iter(())
@@ -280,15 +306,37 @@ class VideoReader:
     def read(self, index: int) -> Bytes:
         """(H, W, 3) uint8 BGR picture of frame `index`. Raises FootageError for damage."""
         with self._lock:
-            if self._container is None or not self._next <= index <= self._next + FORWARD:
-                self._go_to(index)
-            while True:
-                frame = next(self._frames, None)
-                if frame is None:
-                    raise _cut(self._path, self._next, self._count)
-                self._next += 1
-                if self._next > index:
-                    return upright_array(frame, self._reformatter)
+            if not self._fields:
+                return upright_array(self._decoded(index), self._reformatter)
+            number, later = divmod(index, 2)
+            if self._last is None or self._last[0] != number:
+                self._last = number, self._decoded(number)
+            return self._field(self._last[1], below=(self._fields == "bottom") != bool(later))
+
+    def _decoded(self, index: int) -> av.VideoFrame:
+        """The file's picture `index`."""
+        if self._container is None or not self._next <= index <= self._next + FORWARD:
+            self._go_to(index)
+        while True:
+            frame = next(self._frames, None)
+            if frame is None:
+                raise _cut(self._path, self._next, self._count)
+            self._next += 1
+            if self._next > index:
+                return frame
+
+    def _field(self, frame: av.VideoFrame, below: bool) -> Bytes:
+        """One field of a picture at full height. It is parted before its colours are read: these are stored a line for
+        two of the same field.
+        """
+        graph = self._halves.get(below)
+        if graph is None:
+            graph = self._halves[below] = _field_graph(frame, below)
+        graph.push(frame)
+        half = graph.pull()
+        assert isinstance(half, av.VideoFrame)
+        lines = self._reformatter.reformat(half, format="bgr24").to_ndarray().astype(np.uint8, copy=False)
+        return _turned_up(whole_picture(lines, below, frame.height), frame.rotation)
 
     def close(self) -> None:
         """Close the file."""
@@ -298,6 +346,8 @@ class VideoReader:
             self._container = None
             # What yields frames holds the decoder with all its buffers.
             self._frames = iter(())
+            self._last = None
+            self._halves = {}
 
     def _go_to(self, index: int) -> None:
         """Place the decoder so that frame `index` is at most a keyframe's distance ahead."""
@@ -335,8 +385,26 @@ class VideoReader:
 def upright_array(frame: av.VideoFrame, reformatter: VideoReformatter) -> Bytes:
     """(H, W, 3) uint8 BGR, turned as the file's rotation says."""
     picture = reformatter.reformat(frame, format="bgr24").to_ndarray().astype(np.uint8, copy=False)
-    turns = round(frame.rotation / 90.0) % 4
+    return _turned_up(picture, frame.rotation)
+
+
+def _turned_up(picture: Bytes, rotation: float) -> Bytes:
+    turns = round(rotation / 90.0) % 4
     return np.ascontiguousarray(np.rot90(picture, turns) if turns else picture)
+
+
+def _field_graph(frame: av.VideoFrame, below: bool) -> av.filter.Graph:
+    """What takes every second line of pictures like this one, in all its planes."""
+    graph = av.filter.Graph()
+    source = graph.add_buffer(
+        width=frame.width, height=frame.height, format=frame.format, time_base=Fraction(1, 1)
+    )
+    part = graph.add("field", "type=bottom" if below else "type=top")
+    sink = graph.add("buffersink")
+    source.link_to(part)
+    part.link_to(sink)
+    graph.configure()
+    return graph
 
 
 def _decoded(

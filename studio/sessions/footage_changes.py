@@ -17,6 +17,7 @@ from studio.arrays import Array
 from studio.capture.footage import camera_reader
 from studio.capture.footage_source import CameraSource, FootageSource
 from studio.capture.frame_pairing import paired_by_time
+from studio.capture.interlacing import times_of_fields
 from studio.capture.naming import listed, match_names
 from studio.capture.pictures import list_pictures
 from studio.capture.synchrony import MOST_SECONDS, Synchrony, estimate_synchrony
@@ -92,6 +93,8 @@ def pair_by_time(
                 progress(f"times of {name}", done, total)
 
             own = measure_video(place, report).times
+        if own is not None and camera.fields:
+            own = times_of_fields(own, camera.frame_count)
         if own is None or len(own) < 2:
             own = np.arange(camera.frame_count) / before.fps
         times[camera.name] = own[camera.offset : camera.frame_count]
@@ -159,7 +162,9 @@ def _recorded_times(session: Session, path: Path) -> dict[str, Array]:
             f"'{path.name}' has times of {len(matches)} of the {len(names)} cameras.",
             "Give the offsets by hand.",
         )
-    return {match.camera: times[match.footage] for match in matches}
+    recorded = {match.camera: times[match.footage] for match in matches}
+    split = {camera.name: camera.frame_count for camera in session.manifest.footage.cameras if camera.fields}
+    return recorded | {name: times_of_fields(recorded[name], count) for name, count in split.items()}
 
 
 def _changed(

@@ -109,6 +109,7 @@ def _footage_digest(session: Session) -> str:
     facts = [
         [camera.name, camera.path, camera.width, camera.height, camera.offset, camera.turned]
         + ([camera.steps] if camera.steps else [])
+        + ([camera.fields] if camera.fields else [])
         for camera in source.cameras
     ]
     return _digest(msgspec.json.encode([source.fps, facts]))

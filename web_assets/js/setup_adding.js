@@ -1,10 +1,12 @@
 // Footage taken into the session: uploaded from this browser, or from a folder of the studio's computer.
 
 import { fault, fetchJson, post, remove, sessionPath } from "./api.js";
-import { actions, button, check, drawProgress, element, failure, field, files, fill, hint, number, optional, text } from "./elements.js";
+import { actions, button, check, drawProgress, element, failure, field, files, fill, hint, number, optional, select, text } from "./elements.js";
 import { CANCELLED, jobDone, shareOf, standing } from "./jobs.js";
 import { complain } from "./messages.js";
 import { uploadFiles } from "./uploading.js";
+
+/** @import { Schemas } from "./api_types" */
 
 const MOST_FOLDERS = 60;
 
@@ -20,6 +22,9 @@ export function adder(place, setup, done) {
   const refer = check("refer to it where it lies instead of copying it", { name: "refer" });
   const fps = number("", { name: "fps", min: 1, placeholder: "as the files say" });
   const trial = text({ name: "trial", placeholder: "the only one" });
+  const fields = select([["", "no"], ["auto", "into fields"], ["top", "top field first"], ["bottom", "bottom field first"]], "", { name: "fields" });
+  const byTime = check("pair frames by their times", { name: "by_time" }, "Not by their numbers: for cameras of other rates, drift and lost frames.");
+  const inverted = check("black is the person in the masks", { name: "inverted" });
   const replace = check("replace all cameras", { name: "replace" }, "Cameras that are not in the new footage are removed.");
   const submit = button("Add footage", begin);
   const summary = element("summary", {});
@@ -29,8 +34,9 @@ export function adder(place, setup, done) {
     field("Videos, one per camera (or a zip or tar of all)", videos),
     field("or a folder: videos/, pictures, masks/, background/, calibration/; Pose2Sim, FreeMoCap, Caliscope, anipose and EasyMocap layouts too", folder),
     field("or a folder of the computer that the studio runs on", source), folders, refer,
-    element("div", { className: "step-row" }, field("Frames per second", fps), field("Trial", trial, { title: "For a folder with several trials." })),
-    replace, actions(submit), going, wrong, elsewhere));
+    element("div", { className: "step-row" }, field("Frames per second", fps), field("Trial", trial, { title: "For a folder with several trials." }),
+      field("Split interlaced videos", fields, { title: "A frame of each field, twice as many." })),
+    byTime, inverted, replace, actions(submit), going, wrong, elsewhere));
   source.onfocus = () => browse(source.value).catch(() => fill(folders));
 
   /** Folders below the one that is typed, to be chosen by a click. */
@@ -55,7 +61,8 @@ export function adder(place, setup, done) {
     abort = new AbortController();
     const checked = (box) => box.querySelector("input").checked;
     try {
-      const request = { copy: !checked(refer), replace: checked(replace), fps: fps.value ? Number(fps.value) : null, trial: trial.value.trim() || null };
+      /** @type {Omit<Schemas["FootageAddition"], "source" | "upload">} */
+      const request = { copy: !checked(refer), replace: checked(replace), fps: fps.value ? Number(fps.value) : null, fields: /** @type {Schemas["FootageAddition"]["fields"]} */ (fields.value), by_time: checked(byTime), masks: checked(inverted) ? "inverted" : "", trial: trial.value.trim() || null };
       const { identifier } = await post(`${sessionPath(setup.session)}/footage`, { ...request, ...await chosenSource() });
       const cancel = () => remove(`/api/imports/${identifier}`).catch(complain);
       const job = await jobDone(`/api/imports/${identifier}`, (state) => drawProgress(going, { words: standing(state, "beginning"), share: shareOf(state), cancel }), () => stopped);

@@ -350,6 +350,7 @@ def plan_folder(
         names=layout.names,
         offsets={camera.name: camera.offset for camera in kept if camera.offset},
         rotations={camera.name: camera.turned for camera in kept if camera.turned},
+        fields={camera.name: camera.fields for camera in kept if camera.fields},
     )
 
 

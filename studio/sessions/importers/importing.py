@@ -136,6 +136,13 @@ class ImportOptions:
             description="What is the person in the footage's masks; default: white, labels, or opaque alpha."
         ),
     ] = ""
+    fields: Annotated[
+        Literal["", "auto", "top", "bottom"],
+        Field(
+            description="Interlaced videos: make a frame of each field, twice as many; auto sees which field is the"
+            " earlier, top or bottom says it."
+        ),
+    ] = ""
     unit: Unit = ""
     up: Up = "z"
     replace: Annotated[bool, Field(description="Forget all cameras that the source does not name.")] = False
@@ -309,6 +316,7 @@ def _plan(source: Path, options: ImportOptions, *, bare: bool = False) -> Source
         offsets={**plan.offsets, **(options.offsets or {})},
         rotations={**plan.rotations, **(options.rotations or {})},
         masks_inverted=options.masks == "inverted",
+        split=options.fields,
     )
 
 

@@ -4,6 +4,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal, TypeVar
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from studio.capture.footage import background_turn, turned_picture
 from studio.capture.footage_fit import NO_BARS, Margins, black_margins, fit_camera
 from studio.capture.footage_source import TURNS, Turn
 from studio.capture.frame_pairing import Steps, drifts, file_frame, paired_by_time
+from studio.capture.interlacing import Fields, times_of_fields
 from studio.capture.naming import CameraMatch, listed, match_names
 from studio.capture.pictures import (
     PictureReader,
@@ -23,7 +25,7 @@ from studio.capture.pictures import (
     measure_pictures,
 )
 from studio.capture.timestamps import offsets_from_times, read_timestamps
-from studio.capture.video import VideoMeasure, VideoReader, measure_video, probe_video
+from studio.capture.video import MAX_FRAMES, VideoMeasure, VideoReader, measure_video, probe_video
 from studio.errors import CalibrationError, FootageError
 from studio.evidence.backgrounds import check_plate_size
 from studio.geometry.camera import Camera
@@ -43,7 +45,8 @@ class MeasuredCamera:
     camera : as fitted to the footage. footage, masks, background : source paths. found : measured by decoding
     the footage, before turning. crop : assumed to make it fit, if any. turned : degrees
     clockwise. offset : the file's frame that is frame 0 of all cameras. steps : as of `CameraSource`.
-    mask_form, mask_count : how the masks are meant, and how many there are.
+    fields : as of `CameraSource`; found counts them then. mask_form, mask_count : how the masks are meant, and how many
+    there are.
     """
 
     camera: Camera
@@ -55,6 +58,7 @@ class MeasuredCamera:
     turned: Turn = 0
     offset: int = 0
     steps: Steps = ()
+    fields: Fields = ""
     mask_form: MaskForm | None = None
     mask_count: int = 0
 
@@ -212,6 +216,7 @@ def different_rates(rates: Mapping[str, float]) -> FootageError:
     )
 
 
+Value = TypeVar("Value")
 CENTRAL = (0.35, 0.65)
 """Where a principal point lies, as a share of the picture, if a calibration without a size fits it."""
 
@@ -252,7 +257,11 @@ def measure_source(
     masks = _matched(plan.masks, used, "masks")
     backgrounds = _matched(plan.backgrounds, used, "backgrounds")
     turns = requested_turns(plan, by_camera)
-    check_before_decoding([by_camera[camera.name] for camera in used], fps or plan.fps, by_time)
+    split = _by_camera(plan.fields, by_camera)
+    # Of fields, videos announce the rate of their pictures.
+    check_before_decoding(
+        [by_camera[camera.name] for camera in used], fps or plan.fps, by_time or bool(plan.split or split)
+    )
     measured = tuple(
         _measure_camera(
             calibration,
@@ -265,6 +274,7 @@ def measure_source(
         )
         for camera in used
     )
+    measured = in_fields(measured, plan.split, split)
     aligning: list[str] = []
     measured, notes, aligned = with_offsets(plan, measured, names, aligning)
     warnings = [
@@ -282,8 +292,10 @@ def measure_source(
         count = common_frame_count(measured, warnings, aligned)
         rate = common_rate(measured, fps, plan.fps, warnings)
         check_in_step(measured, rate, warnings, trusted=fps is not None or plan.timestamps is not None)
-    notes = (*_turned_by_files(measured), *notes)
-    warnings += _interlaced(measured)
+    notes = (*_turned_by_files(measured), *_split_in_fields(measured), *notes)
+    warnings += _interlaced(measured, guess=plan.split == "auto")
+    if plan.split and not any(entry.fields for entry in measured):
+        notes = (*notes, "No video is interlaced: none was split into fields.")
     measured = tuple(
         _with_masks(entry, entry.masks, count, plan.masks_inverted, progress)
         if entry.masks is not None
@@ -341,7 +353,8 @@ def with_times(
         for match in matches:
             entry = next((one for one in measured if one.camera.name == match.camera), None)
             if entry is not None:
-                own[match.camera] = recorded[match.footage][entry.offset : entry.found.frame_count]
+                times = _recorded_of(entry, recorded[match.footage])
+                own[match.camera] = times[entry.offset : entry.found.frame_count]
     steps, count = paired_by_time(own, rate)
     placed = tuple(dataclasses.replace(entry, steps=steps[entry.camera.name]) for entry in measured)
     changed = {name: len(one) for name, one in steps.items() if one}
@@ -361,19 +374,95 @@ def _turned_by_files(measured: tuple[MeasuredCamera, ...]) -> tuple[str, ...]:
     return (f"Turned clockwise as the files themselves say: {words}.",) if turned else ()
 
 
-def _interlaced(measured: tuple[MeasuredCamera, ...]) -> list[str]:
-    """A warning where frames are of two fields, taken at two moments."""
-    names = [
-        entry.footage.name
+def _interlaced(measured: tuple[MeasuredCamera, ...], *, guess: bool) -> list[str]:
+    """Warnings of videos whose pictures hold two moments, and of those split in an order that nothing shows (guess) or
+    that is wrong.
+    """
+    videos = {
+        entry.footage.name: (entry.found, entry.fields)
         for entry in measured
         if isinstance(entry.found, VideoMeasure) and entry.found.interlaced
+    }
+    whole = [name for name, (_, fields) in videos.items() if not fields]
+    guessed = [name for name, (found, fields) in videos.items() if guess and fields and not found.first_field]
+    wrong = [
+        name for name, (found, fields) in videos.items() if fields and found.first_field not in ("", fields)
     ]
-    if not names:
-        return []
-    return [
-        f"{listed(names)} is interlaced: each picture holds two moments in its odd and even lines, which fray what"
-        " moves. Split it into fields before the import: ffmpeg -i IN -vf bwdif=mode=send_field OUT."
-    ]
+    warnings: list[str] = []
+    if whole:
+        warnings.append(
+            f"{listed(whole)} is interlaced: each picture holds two moments in its odd and even lines, which fray what"
+            " moves. Import it with --fields auto, which makes a frame of each."
+        )
+    if guessed:
+        warnings.append(
+            f"{listed(guessed)} is interlaced, and too little moves in it to see which field of a picture is the"
+            " earlier. Where the movement jumps to and fro, import it with --fields top or bottom."
+        )
+    if wrong:
+        other = videos[wrong[0]][0].first_field
+        warnings.append(
+            f"By what moves in {listed(wrong)}, the {other} field is the earlier one: import it with --fields {other}."
+        )
+    return warnings
+
+
+def in_fields(
+    measured: tuple[MeasuredCamera, ...],
+    split: Literal["", "auto", "top", "bottom"],
+    before: Mapping[str, Fields],
+) -> tuple[MeasuredCamera, ...]:
+    """The cameras, of interlaced videos with a frame of each field. split : as of `ImportOptions.fields`; where an
+    order is given and no video seems interlaced all are. before : the earlier field by camera, where none is requested.
+    """
+    if not split:
+        return tuple(_of_fields(entry, before.get(entry.camera.name, "")) for entry in measured)
+    seen: dict[str, Fields] = {
+        entry.camera.name: entry.found.first_field or "top"
+        for entry in measured
+        if isinstance(entry.found, VideoMeasure) and entry.found.interlaced
+    }
+    if split == "auto":
+        return tuple(_of_fields(entry, seen.get(entry.camera.name, "")) for entry in measured)
+    names = seen or {entry.camera.name for entry in measured}
+    return tuple(_of_fields(entry, split if entry.camera.name in names else "") for entry in measured)
+
+
+def _of_fields(entry: MeasuredCamera, first: Fields) -> MeasuredCamera:
+    """The camera with a frame of each field of its video. first : the earlier one, "" to leave pictures whole."""
+    found = entry.found
+    if not first or not isinstance(found, VideoMeasure):
+        return entry
+    count = 2 * found.frame_count
+    if count > MAX_FRAMES:
+        raise FootageError(
+            f"'{entry.footage.name}' has more than {MAX_FRAMES} fields.", "Cut it into pieces."
+        )
+    fields = dataclasses.replace(
+        found,
+        frame_count=count,
+        fps=2.0 * found.fps,
+        uneven_frame=2 * found.uneven_frame if found.uneven_frame >= 0 else -1,
+        times=times_of_fields(found.times, count),
+    )
+    return dataclasses.replace(entry, found=fields, fields=first)
+
+
+def _split_in_fields(measured: tuple[MeasuredCamera, ...]) -> tuple[str, ...]:
+    """A note on videos that were split into their fields."""
+    split = {entry.footage.name: entry for entry in measured if entry.fields}
+    words = ", ".join(
+        f"{name} ({entry.fields} field first, {entry.found.frame_count} frames)"
+        for name, entry in split.items()
+    )
+    return (
+        (f"Split into fields, each a frame with the lines between interpolated: {words}.",) if split else ()
+    )
+
+
+def _recorded_of(entry: MeasuredCamera, times: Array) -> Array:
+    """A recorder's times of a camera's frames: of each field, where it is split and the times are of its pictures."""
+    return times_of_fields(times, entry.found.frame_count) if entry.fields else times
 
 
 def part_name(path: Path) -> str:
@@ -465,7 +554,7 @@ def _with_masks(
     if found.frame_count <= last:
         raise FootageError(
             f"The masks '{masks.name}' have {found.frame_count} frames, the footage {last + 1}.",
-            "Give one mask for every frame.",
+            "Give one mask for every field." if entry.fields else "Give one mask for every frame.",
         )
     form = form_of_masks(masks, found.frame_count, inverted)
     return dataclasses.replace(entry, mask_form=form, mask_count=found.frame_count)
@@ -544,7 +633,12 @@ def _recorded(
     """Offsets of a recorder's times. Raises FootageError if a camera has none."""
     times = read_timestamps(path)
     names = match_names(list(times), known, f"cameras of {path.name}", FootageError)
-    by_camera = {match.camera: times[match.footage] for match in names}
+    entries = {entry.camera.name: entry for entry in measured}
+    by_camera = {
+        match.camera: _recorded_of(entries[match.camera], times[match.footage])
+        for match in names
+        if match.camera in entries
+    }
     missing = [entry.camera.name for entry in measured if entry.camera.name not in by_camera]
     if missing:
         raise FootageError(
@@ -563,9 +657,9 @@ def _recorded(
     return found.offsets
 
 
-def _by_camera(requested: Mapping[str, int], footage: Mapping[str, Path]) -> dict[str, int]:
+def _by_camera(requested: Mapping[str, Value], footage: Mapping[str, Path]) -> dict[str, Value]:
     """Requested values by camera, from names of cameras or of their footage. Raises FootageError for other names."""
-    found: dict[str, int] = {}
+    found: dict[str, Value] = {}
     for name, value in requested.items():
         fitting = [camera for camera, path in footage.items() if name in (camera, path.name, path.stem)]
         if len(fitting) != 1:

@@ -3,9 +3,11 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Literal
 
 from studio.arrays import Array
 from studio.body.subject import Subject
+from studio.capture.interlacing import Fields
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +21,8 @@ class SourcePlan:
     sigma_fps : the rate at which sigma was measured. tracker, weighting : defaults for runs of the session, "" for
     the studio's. layout : name of the recognised folder layout. timestamps : a recorder's times of the frames.
     offsets, rotations : given by hand, by the name of a camera or its footage. masks_inverted : black is the person.
-    names : cameras of footage that its folder is named after.
+    fields : the earlier field of footage that was split into its fields before, by camera. split : as of
+    `ImportOptions.fields`. names : cameras of footage that its folder is named after.
     """
 
     source: Path
@@ -45,6 +48,8 @@ class SourcePlan:
     offsets: Mapping[str, int] = field(default_factory=dict[str, int])
     rotations: Mapping[str, int] = field(default_factory=dict[str, int])
     masks_inverted: bool = False
+    fields: Mapping[str, Fields] = field(default_factory=dict[str, Fields])
+    split: Literal["", "auto", "top", "bottom"] = ""
     names: Mapping[Path, str] = field(default_factory=dict[Path, str])
 
     def part_name(self, path: Path) -> str:

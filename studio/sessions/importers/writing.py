@@ -231,6 +231,7 @@ def write_footage(folder: Path, measured: MeasuredSource, copy: bool, progress: 
                 entry.offset,
                 entry.turned,
                 entry.steps,
+                entry.fields,
             )
         )
     return FootageSource(measured.fps, measured.frame_count, tuple(sources))
