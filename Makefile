@@ -46,7 +46,8 @@ test-fast: env
 	$(BIN)/pytest $(WORKERS) -m "not slow and not browser" $(LONG_ROOMS:%=--ignore=tests/%)
 
 test-slow: env browser
-	$(BIN)/pytest -m slow --timeout 3600
+	$(BIN)/pytest $(WORKERS) -m "slow and not browser" --timeout 3600
+	$(BIN)/pytest $(WORKERS) -m "slow and browser" --timeout 3600 $(IN_BROWSER)
 
 # A thousand faults of disk, processes and wires, at places by seed; `FAULTS="--seed 7 --only killed"` does one again.
 faults: env

@@ -258,6 +258,7 @@ def digests() -> dict[str, str]:
     return found
 
 
+@pytest.mark.slow
 def test_every_kernel_of_the_product_has_the_same_key_in_another_process() -> None:
     program = "from test_kernel_cache import digests; print(digests())"
     environment = os.environ | {"PYTHONPATH": str(ROOT / "tests"), "PYTHONHASHSEED": "5"}

@@ -82,6 +82,7 @@ def test_the_printed_address_opens_the_studio_and_ctrl_c_closes_everything(
     assert alive == []
 
 
+@pytest.mark.slow
 def test_it_ends_whatever_a_thread_waits_for(tmp_path: Path) -> None:
     script = tmp_path / "serving.py"
     waiting = "import threading\nfrom studio.sessions.workspace import Workspace\n"
@@ -108,6 +109,7 @@ def test_it_ends_whatever_a_thread_waits_for(tmp_path: Path) -> None:
         process.communicate()
 
 
+@pytest.mark.slow
 def test_the_token_is_printed_once_and_logged_nowhere(
     served: tuple[subprocess.Popen[str], str], tmp_path: Path
 ) -> None:

@@ -36,6 +36,7 @@ def test_exponents_are_those_of_known_curves() -> None:
     assert not leaking.holds
 
 
+@pytest.mark.slow
 def test_what_is_measured_has_the_wanted_size(tmp_path: Path) -> None:
     body = chain(7, tmp_path)
     ends = limb_ends(body, body.neutral[None])

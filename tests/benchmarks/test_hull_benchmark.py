@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pytest
 
 from studio.benchmarks.hulls import (
     DEPTHS,
@@ -16,6 +17,7 @@ from studio.volume.reconstruction import reconstruct
 from studio.volume.tracking_space import box_of
 
 
+@pytest.mark.slow
 def test_the_report() -> None:
     steps = []
     result = json.loads(json.dumps(run_hull_benchmark(repeats=1, progress=lambda *step: steps.append(step))))
@@ -29,6 +31,7 @@ def test_the_report() -> None:
     assert result["pictures"] == "320x240"
 
 
+@pytest.mark.slow
 def test_the_scene_is_a_person() -> None:
     body, cameras = load_body("human25"), ring_of_small_cameras(5)
     evidence = hull_evidence(body, cameras, np.random.default_rng(0))

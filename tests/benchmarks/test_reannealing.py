@@ -9,6 +9,7 @@ from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
 
 
+@pytest.mark.slow
 def test_every_answer_is_waited_for(session_on_disk: Session) -> None:
     run = prepare_run(session_on_disk, last=2, knobs={"layers": 3, "particles": 40})
     control = StudioControl(Workspace(session_on_disk.path.parent))

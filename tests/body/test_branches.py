@@ -60,6 +60,7 @@ CHAINS = [
 ]
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(
     spellings=st.lists(st.tuples(st.booleans(), st.booleans()), min_size=4, max_size=4),

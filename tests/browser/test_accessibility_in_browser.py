@@ -185,6 +185,7 @@ def test_every_view(window: StudioPage, studio: StudioServer) -> None:
         check(window, "view", name, rules=IN_DARK)
 
 
+@pytest.mark.slow
 def test_every_panel_and_dialog_of_the_studio(window: StudioPage, studio: StudioServer) -> None:
     page = window.page
     page.goto(f"{studio.origin}/?session=walk&run=seen&frame=2")
@@ -232,6 +233,7 @@ def test_every_panel_and_dialog_of_the_studio(window: StudioPage, studio: Studio
     expect(row.locator(".more")).to_be_focused()
 
 
+@pytest.mark.slow
 def test_every_step_of_the_guided_set_up(window: StudioPage, studio: StudioServer) -> None:
     for step in STEPS:
         window.page.goto(f"{studio.origin}/way?session=walk&step={step}")

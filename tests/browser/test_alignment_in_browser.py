@@ -23,6 +23,7 @@ def workspace(workspace: Path) -> Path:
     return workspace
 
 
+@pytest.mark.slow
 def test_a_nudged_camera_is_turned_and_turned_back(page: Page, studio: StudioServer, artefacts: Path) -> None:
     place = studio.workspace / "nudged" / CAMERAS_PATH
     before = place.read_bytes()

@@ -29,6 +29,7 @@ def shoot(window: StudioPage, artefacts: Path, name: str) -> None:
     page.click("#theme")
 
 
+@pytest.mark.slow
 def test_a_model_is_learnt_from_a_file_and_opens(window: StudioPage, artefacts: Path, tmp_path: Path) -> None:
     page = window.page
     page.goto(f"{window.studio.origin}/behaviours")
@@ -54,6 +55,7 @@ def test_a_model_is_learnt_from_a_file_and_opens(window: StudioPage, artefacts: 
         page.get_by_role("button", name=label, exact=True).click()
 
 
+@pytest.mark.slow
 def test_it_gets_another_name_goes_and_comes_back(window: StudioPage) -> None:
     page = window.page
     page.get_by_role("button", name="Rename…").click()
@@ -70,6 +72,7 @@ def test_it_gets_another_name_goes_and_comes_back(window: StudioPage) -> None:
     assert names(window) == ["swing"]
 
 
+@pytest.mark.slow
 def test_what_cannot_be_learnt_is_reported_in_the_form(window: StudioPage) -> None:
     page = window.page
     window.watch.allow(422, "/api/learning")

@@ -128,6 +128,7 @@ def test_the_gallery_opens_a_bundled_session_at_a_click(window: StudioPage, stud
     page.locator("[data-card=planar_arm][data-state=there]").wait_for()
 
 
+@pytest.mark.slow
 def test_rendering_from_a_card_shows_its_progress_and_can_be_cancelled(
     window: StudioPage, studio: StudioServer
 ) -> None:

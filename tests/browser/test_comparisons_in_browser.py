@@ -95,6 +95,7 @@ def test_what_cannot_be_compared_is_reported_in_the_form(window: StudioPage) -> 
     form.locator(".wrong", has_text="'survival' cannot be '7'").wait_for()
 
 
+@pytest.mark.slow
 def test_it_is_watched_cancelled_and_goes_on(window: StudioPage, artefacts: Path) -> None:
     page = window.page
     form = fill(window, evaluations="200", seeds="60", last="9", name="long")
@@ -116,6 +117,7 @@ def test_it_is_watched_cancelled_and_goes_on(window: StudioPage, artefacts: Path
     assert window.studio.get("/api/comparisons/walk/long")["comparison"]["done"] >= response["done"]
 
 
+@pytest.mark.slow
 def test_a_small_one_is_shown_when_it_is_done(idle: StudioPage) -> None:
     window, page = idle, idle.page
     page.get_by_role("button", name="+ New", exact=True).click()
@@ -131,6 +133,7 @@ def test_a_small_one_is_shown_when_it_is_done(idle: StudioPage) -> None:
     assert response["settings"]["annealed:mine"]["survival"] == 0.4
 
 
+@pytest.mark.slow
 def test_the_result_is_read_and_downloaded(window: StudioPage, artefacts: Path) -> None:
     page, result = window.page, window.studio.get(FIRST)["result"]
     rows = page.locator(".figures:not(.trials) tbody tr")
@@ -159,6 +162,7 @@ def test_the_result_is_read_and_downloaded(window: StudioPage, artefacts: Path) 
     assert len(Path(coming.value.path()).read_text().splitlines()) == 1 + 3 * 2 * 10
 
 
+@pytest.mark.slow
 def test_a_trial_is_opened_as_a_run_at_its_worst_frame(window: StudioPage) -> None:
     page, response = window.page, window.studio.get(FIRST)
     lines = page.locator(".trials tbody tr")
@@ -188,6 +192,7 @@ def test_a_trial_is_opened_as_a_run_at_its_worst_frame(window: StudioPage) -> No
     link.wait_for()
 
 
+@pytest.mark.slow
 def test_points_of_the_charts_lead_to_their_trials(window: StudioPage) -> None:
     page, response = window.page, window.studio.get(FIRST)
     other, stored = response["trials"][2:4]
@@ -229,6 +234,7 @@ def click_value(chart: Locator, x: float, y: float, done: Callable[[], bool]) ->
     raise AssertionError(f"clicks at {x}, {y} lead nowhere")
 
 
+@pytest.mark.slow
 def test_again_asks_for_the_same(window: StudioPage) -> None:
     page = window.page
     page.get_by_role("button", name="Again…", exact=True).click()
@@ -243,6 +249,7 @@ def test_again_asks_for_the_same(window: StudioPage) -> None:
     form.get_by_text("Eq. 13 as Deutscher & Reid print it").wait_for()
 
 
+@pytest.mark.slow
 def test_it_is_listed_with_its_session_thrown_away_and_restored(window: StudioPage) -> None:
     page = window.page
     page.get_by_role("link", name="Studio", exact=True).click()

@@ -92,6 +92,7 @@ def test_a_corrected_frame_is_tracked_on_and_backwards(
     window.close()
 
 
+@pytest.mark.slow
 def test_a_correction_goes_on_after_a_reload_and_leaving_it_changes_nothing(
     browser: Browser, studio: StudioServer
 ) -> None:
@@ -112,6 +113,7 @@ def test_a_correction_goes_on_after_a_reload_and_leaving_it_changes_nothing(
     window.close()
 
 
+@pytest.mark.slow
 def test_tracks_are_made_and_chosen(browser: Browser, studio: StudioServer, artefacts: Path) -> None:
     window = opened(browser, studio)
     assert window.page.locator("#track-choice").is_hidden()

@@ -132,6 +132,7 @@ def test_the_first_two_minutes(
     window.close()
 
 
+@pytest.mark.slow
 def test_a_step_stays_and_says_which_run_it_is_about(browser: Browser, demo: StudioServer) -> None:
     """Also after a reload and while another run is looked at; a comparison goes on with the run that is chosen."""
     demo.post("/api/preferences", {"first-steps": None}, method="PATCH")
@@ -263,6 +264,7 @@ def paused(window: StudioPage) -> StudioPage:
     return window
 
 
+@pytest.mark.slow
 def test_the_scene_is_seen_while_the_tracking_goes_on(window: StudioPage) -> None:
     window.until("get('work')?.state === 'paused' && get('summary')?.frames.length > 0")
     count = len(window.get("summary")["frames"])  # pyright: ignore[reportIndexIssue]
@@ -440,6 +442,7 @@ def test_the_keyboard_moves_frames_and_layers(paused: StudioPage) -> None:
     paused.until(f"get('frame') === {last}")
 
 
+@pytest.mark.slow
 def test_the_keyboard_plays_loops_looks_and_explains(paused: StudioPage, artefacts: Path) -> None:
     page = paused.page
     paused.key("l")
@@ -473,6 +476,7 @@ def test_the_keyboard_plays_loops_looks_and_explains(paused: StudioPage, artefac
     paused.until("get('whatIf')?.length === get('layerCount') && get('work').state === 'paused'")
 
 
+@pytest.mark.slow
 def test_camera_views_with_every_overlay(paused: StudioPage, artefacts: Path) -> None:
     page = paused.page
     page.click("[data-panel=cameras]")
@@ -547,6 +551,7 @@ def test_the_guide_lists_every_knob(paused: StudioPage, artefacts: Path) -> None
     guide.close()
 
 
+@pytest.mark.slow
 def test_a_new_answer_can_be_kept(paused: StudioPage) -> None:
     last = paused.get("frame")
     assert isinstance(last, int)
@@ -566,6 +571,7 @@ def test_a_new_answer_can_be_kept(paused: StudioPage) -> None:
     until(paused.page, lambda: drawn(paused, clouds))
 
 
+@pytest.mark.slow
 def test_tracking_on_uses_the_new_setting(paused: StudioPage) -> None:
     last = paused.get("frame")
     assert isinstance(last, int)

@@ -37,6 +37,7 @@ def workspace(workspace: Path) -> Path:
     return workspace
 
 
+@pytest.mark.slow
 def test_a_live_run_is_ticked_and_says_how_it_keeps_up(browser: Browser, studio: StudioServer) -> None:
     window = StudioPage(browser, studio, open_at=f"{studio.address}&session=toy", with_scene=False)
     page = window.page

@@ -22,6 +22,7 @@ def studio(tmp_path: Path) -> Iterator[StudioServer]:
         yield made
 
 
+@pytest.mark.slow
 def test_a_run_with_both_is_begun_from_the_form(browser: Browser, studio: StudioServer) -> None:
     window = StudioPage(browser, studio, with_scene=False)
     window.until("get('session') === 'toy'")

@@ -52,6 +52,7 @@ def page(browser: Browser, studio: StudioServer) -> Iterator[Page]:
     context.close()
 
 
+@pytest.mark.slow
 def test_cameras_are_looked_at_and_what_they_see_is_tracked(
     page: Page, streams: Streams, walk: Session, studio: StudioServer, artefacts: Path
 ) -> None:
@@ -93,6 +94,7 @@ def test_cameras_are_looked_at_and_what_they_see_is_tracked(
     assert all(SECRET not in path.read_text() for path in (walk.path.parent / ".studio").rglob("*.log"))
 
 
+@pytest.mark.slow
 def test_the_page_says_what_is_no_camera(page: Page, studio: StudioServer) -> None:
     page.reload()
     for place, said in (

@@ -115,6 +115,7 @@ def test_a_folder_is_imported_and_tracked(imported: StudioPage, artefacts: Path)
     until(page, lambda: len(imported.wire.layers()) == imported.get("layerCount"))
 
 
+@pytest.mark.slow
 def test_names_copies_and_the_trash(imported: StudioPage, artefacts: Path) -> None:
     page = imported.page
     session_menu(imported, "arm", "Rename…")
@@ -166,6 +167,7 @@ def test_a_run_is_renamed_and_deleted(imported: StudioPage) -> None:
     imported.until("get('run') !== 'other'")
 
 
+@pytest.mark.slow
 def test_a_studio_that_is_gone_is_said_and_the_last_state_stays(
     browser: Browser, tmp_path: Path, footage: Path, artefacts: Path
 ) -> None:

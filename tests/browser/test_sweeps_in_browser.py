@@ -22,6 +22,7 @@ def workspace(workspace: Path) -> Path:
     return workspace
 
 
+@pytest.mark.slow
 def test_a_sweep_is_begun_and_watched(window: StudioPage) -> None:
     page = window.page
     window.watch.allow(422, "/api/comparisons/sweeps/expected")
@@ -46,6 +47,7 @@ def test_a_sweep_is_begun_and_watched(window: StudioPage) -> None:
     assert window.studio.get(SWEEP)["comparison"]["status"] == "done"
 
 
+@pytest.mark.slow
 def test_what_is_drawn_is_the_result_and_opens_the_runs(window: StudioPage, artefacts: Path) -> None:
     page = window.page
     result = window.studio.get(SWEEP)["result"]
@@ -91,6 +93,7 @@ def test_what_is_drawn_is_the_result_and_opens_the_runs(window: StudioPage, arte
     assert page.locator(".runs .run:not(.swept)").count() == 8
 
 
+@pytest.mark.slow
 def test_a_run_is_given_away_as_a_page(
     browser: Browser, window: StudioPage, tmp_path: Path, artefacts: Path
 ) -> None:

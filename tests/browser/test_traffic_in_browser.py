@@ -46,6 +46,7 @@ def heap(window: StudioPage) -> float:
     return float(used)
 
 
+@pytest.mark.slow
 def test_a_watched_run_asks_little_and_keeps_little(browser: Browser, studio: StudioServer) -> None:
     window = StudioPage(browser, studio)
     window.until("get('run') === 'long' && get('connected') === true && get('summary') !== null")
@@ -69,6 +70,7 @@ def test_a_watched_run_asks_little_and_keeps_little(browser: Browser, studio: St
     window.close()
 
 
+@pytest.mark.slow
 def test_what_of_a_run_is_damaged_is_said_once_all_of_it_was_read(browser: Browser, tmp_path: Path) -> None:
     session = make_session(tmp_path / "workspace" / "arm")
     run = prepare_run(session, name="torn", last=3, start_pose=true_poses(1)[0])

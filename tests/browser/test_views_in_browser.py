@@ -264,6 +264,7 @@ def test_every_view_is_used_by_the_keyboard(window: StudioPage, studio: StudioSe
     window.until(f"get('frame') === {FRAME + 1}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("panel", ["why", "views", "compare", "cameras", "export"])
 def test_the_arrows_move_the_timeline_from_every_stop_of_the_keyboard(window: StudioPage, panel: str) -> None:
     """Fields that are typed in, sliders and the list of tabs keep them. Of a table its first rows stand for all; what
@@ -367,6 +368,7 @@ STATES = (
 )
 
 
+@pytest.mark.slow
 def test_a_copied_address_restores_every_state(
     browser: Browser, window: StudioPage, studio: StudioServer
 ) -> None:
@@ -540,6 +542,7 @@ def moved_knobs(window: StudioPage) -> dict[str, tuple[object, object]]:
     return {one["label"]: (one["before"], one["after"]) for one in moved}
 
 
+@pytest.mark.slow
 def test_moved_knobs_are_kept_per_run_until_they_are_put_back(
     browser: Browser, window: StudioPage, studio: StudioServer
 ) -> None:
@@ -629,6 +632,7 @@ def lie_apart(boxes: list[list[float]]) -> bool:
     )
 
 
+@pytest.mark.slow
 def test_where_it_is_narrow_no_plot_or_heading_lies_on_another(
     window: StudioPage, studio: StudioServer
 ) -> None:
@@ -695,6 +699,7 @@ def test_nothing_that_is_drawn_is_made_up(window: StudioPage, studio: StudioServ
     assert sorted(cell[2] for cell in heat["data"]) == pytest.approx(sorted(row["error"] for row in rows))
 
 
+@pytest.mark.slow
 def test_stored_runs_are_compared_side_by_side(window: StudioPage, studio: StudioServer) -> None:
     page = window.page
     page.bring_to_front()

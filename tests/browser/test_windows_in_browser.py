@@ -159,6 +159,7 @@ def test_what_the_scene_said_before_it_knew_of_a_move_changes_nothing(
     window.close()
 
 
+@pytest.mark.slow
 def test_a_window_keeps_its_name_when_it_is_loaded_again_and_a_copy_gets_another(
     browser: Browser, studio: StudioServer, windows: dict[str, StudioPage]
 ) -> None:
@@ -183,6 +184,7 @@ def test_a_window_keeps_its_name_when_it_is_loaded_again_and_a_copy_gets_another
     window.close()
 
 
+@pytest.mark.slow
 def test_the_arrows_are_the_timeline_s_wherever_the_focus_is(windows: dict[str, StudioPage]) -> None:
     window = windows["left"]
     window.page.bring_to_front()
@@ -215,6 +217,7 @@ def test_the_arrows_are_the_timeline_s_wherever_the_focus_is(windows: dict[str, 
     assert window.wire.viewer == pytest.approx(view, abs=1e-6), "the view was not turned as well"
 
 
+@pytest.mark.slow
 def test_the_keyboard_passes_the_scene_by_and_enters_it_by_a_key(windows: dict[str, StudioPage]) -> None:
     window = windows["left"]
     window.page.bring_to_front()

@@ -97,6 +97,7 @@ def test_the_command_writes_calibration_report_and_pictures(footage: Path, tmp_p
     assert (tmp_path / "b.report.json").exists()
 
 
+@pytest.mark.slow
 def test_the_intrinsics_alone_give_lenses(footage: Path, tmp_path: Path) -> None:
     result = CliRunner().invoke(
         main,
@@ -121,6 +122,7 @@ def test_the_intrinsics_alone_give_lenses(footage: Path, tmp_path: Path) -> None
         calibrate(BOARD, intrinsics=tmp_path / "rig.lenses.toml")
 
 
+@pytest.mark.slow
 def test_a_mirrored_video_blocks(footage: Path, tmp_path: Path) -> None:
     for camera in ("cam1", "cam2"):
         source = footage / "extrinsics" / f"ext_{camera}_img"
@@ -175,6 +177,7 @@ def test_the_rigs_own_frame_is_kept_by_names(footage: Path) -> None:
     assert np.isfinite(transform(fit, boards)).all()
 
 
+@pytest.mark.slow
 def test_a_board_that_was_meant_otherwise_is_found_and_named(footage: Path) -> None:
     given = dataclasses.replace(BOARD, columns=BOARD.rows, rows=BOARD.columns)
     found = calibrate(given, intrinsics=footage / "intrinsics", names=("cam1", "cam2"))

@@ -23,6 +23,7 @@ def takes(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return render_takes(tmp_path_factory.mktemp("takes"))
 
 
+@pytest.mark.slow
 def test_the_sessions_calibration_is_replaced_and_reported(takes: Path) -> None:
     session = session_of_takes(Workspace().place_for("fresh"), takes)
     words = ["calibrate", "fresh", "--board", BOARD.text, "--extrinsics", str(takes / "extrinsics")]

@@ -52,6 +52,7 @@ def test_positions_within_ten_millimetres_at_four_metres(count: int) -> None:
     assert pair_findings(rig) == ()
 
 
+@pytest.mark.slow
 def test_a_board_that_looks_alike_after_half_a_turn() -> None:
     board = Board("chessboard", 7, 5, 90.0)
     assert board.turn_symmetric
@@ -69,6 +70,7 @@ def test_a_board_that_looks_alike_after_half_a_turn() -> None:
     assert np.linalg.norm(transform(best_fit(solved, true), solved) - true, axis=1).max() < 10.0
 
 
+@pytest.mark.slow
 def test_wrong_views_are_left_out() -> None:
     cameras = ring(4)
     poses, sightings = waved(CHARUCO, cameras)
@@ -81,6 +83,7 @@ def test_wrong_views_are_left_out() -> None:
     assert position_errors(rig, cameras, CHARUCO, poses).max() < 10.0
 
 
+@pytest.mark.slow
 def test_refining_lenses_leads_towards_the_truth_and_never_far_from_a_good_start() -> None:
     """Boards at four metres say little of a focal length: the prior keeps the result of the close ones."""
     cameras = ring(4)
@@ -117,6 +120,7 @@ def test_cameras_that_share_no_view_are_named() -> None:
         solve_rig(CHARUCO, apart, {camera.name: true_lens(camera) for camera in cameras})
 
 
+@pytest.mark.slow
 def test_unsynchronised_footage_is_reported() -> None:
     cameras = ring(4)
     _, sightings = waved(CHARUCO, cameras, each=14)

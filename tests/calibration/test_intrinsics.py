@@ -52,6 +52,7 @@ def test_focal_length_within_half_a_percent(seed: int) -> None:
     assert "aspect" in lens.model
 
 
+@pytest.mark.slow
 def test_a_rendered_board_gives_the_lens_within_half_a_percent() -> None:
     camera = placed_camera(
         "cam1",
@@ -119,6 +120,7 @@ def test_coverage_names_the_parts_that_were_not_seen() -> None:
     assert picture[:, :200].mean() > picture[:, 280:].mean() + 30
 
 
+@pytest.mark.slow
 @pytest.mark.real_data
 @pytest.mark.parametrize(
     ("camera", "focal"), [("cam01", 1681.2), ("cam02", 1673.8), ("cam03", 1681.6), ("cam04", 1675.2)]

@@ -118,6 +118,7 @@ def test_mirrored_video_by_silhouettes(masks: Masks, name: str) -> None:
     assert findings[0].cameras == (name,)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [2, 3, 4])
 def test_cameras_that_were_knocked_have_no_other_fault(count: int) -> None:
     """Turned by 0.3 to 1.8 degrees each, which silhouettes show, but which no fault explains."""

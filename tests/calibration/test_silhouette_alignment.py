@@ -46,6 +46,7 @@ def outlines(rig: tuple[Camera, ...], frames: int = 14) -> dict[int, dict[str, A
     return found
 
 
+@pytest.mark.slow
 def test_turned_cameras_are_turned_back(rig: tuple[Camera, ...]) -> None:
     turns = np.radians([[0.4, -0.3, 0.0], [0.0, 0.0, 0.0], [-0.5, 0.5, 0.1], [0.1, 0.2, 0.0]])
     wrong, views = turned(rig, turns), outlines(rig)
@@ -59,6 +60,7 @@ def test_turned_cameras_are_turned_back(rig: tuple[Camera, ...]) -> None:
         assert np.allclose(other.rotation @ other.rotation.T, np.eye(3), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_points_meet_again(rig: tuple[Camera, ...]) -> None:
     """Points that took no part in it are met by all cameras together, to a pixel."""
     wrong = turned(rig, np.radians([[0.4, -0.3, 0.0], [0.0, 0.0, 0.0], [-0.5, 0.5, 0.1], [0.1, 0.2, 0.0]]))

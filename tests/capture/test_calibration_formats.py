@@ -124,6 +124,7 @@ def test_the_qualisys_file_equals_the_toml_made_from_it(real_data: Path) -> None
         np.testing.assert_allclose(a.distortion / 64.0, b.distortion, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.real_data
 def test_chessboards_distinguish_the_qualisys_lenses_from_those_divided_by_64(real_data: Path) -> None:
     folder = real_data / "pose2sim-balance" / "calibration"

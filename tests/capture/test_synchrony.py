@@ -145,6 +145,7 @@ def test_energy_is_the_mean_difference_of_grey_levels() -> None:
     np.testing.assert_allclose(energy, [0.0, 15.0, 5.0])
 
 
+@pytest.mark.slow
 @pytest.mark.real_data
 def test_the_balancing_man_moves_too_slowly_to_determine_the_offset(real_data: Path) -> None:
     energies = {}

@@ -43,6 +43,7 @@ def motions(tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_learn_tells_numbers_and_models_lists(motions: Path, tmp_path: Path) -> None:
     result = run("learn", str(motions), "--into", "mine", *QUICK, *BY_NAME, "--memory", "3", "--json")
     assert result.exit_code == 0, result.stderr
@@ -104,6 +105,7 @@ def test_a_cancelled_learning_leaves_nothing(motions: Path, monkeypatch: pytest.
     assert not (workspace_root() / "models").exists()
 
 
+@pytest.mark.slow
 def test_frames_that_the_body_cannot_follow_are_named(tmp_path: Path) -> None:
     poses = swinging(BODY, 60, 30.0)
     names = [entry.name for entry in BODY.parameters]
@@ -115,6 +117,7 @@ def test_frames_that_the_body_cannot_follow_are_named(tmp_path: Path) -> None:
     assert "fit badly" in result.stderr
 
 
+@pytest.mark.slow
 def test_learn_takes_the_body_that_the_sessions_have(motions: Path) -> None:
     """Where most of the workspace's sessions have another body than a new one would, that is the model's."""
     for name, body in (("a", "human25"), ("b", "human31"), ("c", "human25")):

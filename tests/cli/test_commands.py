@@ -195,6 +195,7 @@ def test_import_refuses_a_folder_that_is_no_session_and_leaves_nothing(tmp_path:
     assert "no session 'made'" in refused("track", "made")
 
 
+@pytest.mark.slow
 def test_evaluate_prints_numbers_with_their_alignment(tmp_path: Path) -> None:
     session = str(copy_of_walk(tmp_path / "walk").path)
     tracked = printed("track", session, "--frames", "0:3", "--particles", "100", "--layers", "5")

@@ -34,6 +34,7 @@ def printed(*arguments: str) -> dict:
     return json.loads(result.stdout)
 
 
+@pytest.mark.slow
 def test_the_document_is_as_agreed(walk: Session, tmp_path: Path) -> None:
     out = tmp_path / "found"
     changes = ("--set", "annealed:b.crossover=0", "--set", "diffusion_scale=0.8")
@@ -65,6 +66,7 @@ def test_the_document_is_as_agreed(walk: Session, tmp_path: Path) -> None:
     assert "other candidates" in other.stderr
 
 
+@pytest.mark.slow
 def test_after_ctrl_c_the_same_command_goes_on(walk: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     arguments = ("walk", "--trackers", "annealed,condensation", "--seeds", "1", *SMALL)
     really = comparing.run_comparison
@@ -118,6 +120,7 @@ def swept(*arguments: str) -> Result:
     return CliRunner().invoke(main, ["sweep", "walk", *arguments], catch_exceptions=False)
 
 
+@pytest.mark.slow
 def test_a_sweep_is_reported_of_before_and_printed_after(walk: Session) -> None:
     small = ("--seeds", "1", "--frames", "0:2", "--layers", "2", "--particles", "10", "--keep-shape")
     done = swept("--vary", "survival=0.2,0.5", *small, "--processes", "1", "--json")

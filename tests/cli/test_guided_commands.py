@@ -63,6 +63,7 @@ def test_track_without_a_model_says_how_to_get_one(started: Session) -> None:
     assert "no behaviour model 'nobody'" in result.stderr
 
 
+@pytest.mark.slow
 def test_compare_with_a_model(started: Session) -> None:
     path = keep_arm_model(started.path.parent)
     common = (

@@ -10,6 +10,7 @@ from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
 
 
+@pytest.mark.slow
 def test_a_start_pose_is_written_and_then_kept(session_on_disk: Session) -> None:
     runner = CliRunner()
     first = runner.invoke(main, ["initialise", "toy", "--json"])

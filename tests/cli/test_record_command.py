@@ -46,6 +46,7 @@ def test_cameras_are_recorded_at_once(
         assert "something at" in again.stderr
 
 
+@pytest.mark.slow
 def test_live_cameras_are_tracked(walk: Session, pictures: dict[str, list[bytes]], tmp_path: Path) -> None:
     quick = ("--tracker", "annealed", "--weighting", "edge-region", "--particles", "30", "--layers", "2")
     with served(pictures, STREAM_FPS) as streams:

@@ -31,6 +31,7 @@ def run(*arguments: str) -> Result:
     return CliRunner().invoke(main, ["reproduce", *arguments], catch_exceptions=False)
 
 
+@pytest.mark.slow
 def test_a_stranger_sees_what_there_is_and_what_was_found(tmp_path: Path) -> None:
     assert "toy-good  (not run yet)" in run("list").stdout
     found = run("toy-good", "--seeds", "2", "--processes", "1")
@@ -49,6 +50,7 @@ def test_a_stranger_sees_what_there_is_and_what_was_found(tmp_path: Path) -> Non
     ]
 
 
+@pytest.mark.slow
 def test_json_is_one_object_and_failures_have_an_exit_code(tmp_path: Path) -> None:
     found = run(
         "all", "--quick", "--seeds", "1", "--processes", "1", "--out", str(tmp_path / "here"), "--json"
@@ -83,6 +85,7 @@ def test_after_ctrl_c_it_is_said_how_to_go_on(monkeypatch: pytest.MonkeyPatch) -
     assert (workspace_root() / "reproduction" / "report.html").is_file()
 
 
+@pytest.mark.slow
 def test_findings_go_into_the_guide_with_commits_that_exist(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -37,6 +37,7 @@ def test_who_is_in_view_is_listed_and_each_gets_a_session(people: TwoPeople) -> 
     assert json.loads(done.stdout)["bodies"] == 2
 
 
+@pytest.mark.slow
 def test_masks_of_several_are_said_to_be_so_and_cut(people: TwoPeople) -> None:
     said = run("background", "two")
     assert "2 subjects are in view" in said.stdout

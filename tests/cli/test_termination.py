@@ -29,6 +29,7 @@ def prepared(session: Session, name: str) -> StoredRun:
     return prepare_run(session, name=name, seed=3, start_pose=true_poses()[0], knobs=SLOW)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "code", "words"),
     [(signal.SIGTERM, 143, "Ended from outside"), (signal.SIGINT, 130, "Cancelled")],

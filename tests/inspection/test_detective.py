@@ -62,6 +62,7 @@ def fast() -> Array:
     return person_poses("walk", 20, 18, 8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cause", CAUSES)
 def test_the_planted_cause_is_named(tmp_path: Path, calm: Array, fast: Array, cause: str) -> None:
     inspected = InspectedRun(*planted(tmp_path / cause, cause, calm, fast, seed=7))

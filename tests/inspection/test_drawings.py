@@ -216,6 +216,7 @@ def test_a_trial_is_drawn_beside_the_stored(
     assert both["words"] != alone["words"] or view in ("blame", "seeds", "coverage", "why")
 
 
+@pytest.mark.slow
 def test_colours_of_maps_mean_the_same_in_every_frame(
     drawings: Drawings, run: InspectedRun, tried: InspectedRun
 ) -> None:

@@ -108,6 +108,7 @@ def serially(jobs: list[TrialJob], folder: Path, on_result: Callable[..., None])
         on_result(job, run_trial(job, str(folder), 1))
 
 
+@pytest.mark.slow
 def test_results_errors_reports_and_what_cannot_travel(address: str, tmp_path: Path) -> None:
     heard: list[tuple[object, ...]] = []
     with ClusterExecutor(address, tmp_path, lambda *words: heard.append(words)) as executor:

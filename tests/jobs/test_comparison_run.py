@@ -34,6 +34,7 @@ class Broken(Exception):
     """What ends a comparison in these tests."""
 
 
+@pytest.mark.slow
 def test_it_is_broken_off_and_goes_on_with_what_is_missing(walk: Session, kept: KeptComparison) -> None:
     steps: list[tuple[str, int, int]] = []
 
@@ -66,6 +67,7 @@ def test_it_is_broken_off_and_goes_on_with_what_is_missing(walk: Session, kept: 
     assert timeless[0] == timeless[1]
 
 
+@pytest.mark.slow
 def test_a_trial_that_fails_ends_it_with_the_reason(walk: Session) -> None:
     plan = small(walk)
     wrong = replace(plan.candidates[0], changes={**plan.candidates[0].changes, "survivor": 1})

@@ -75,6 +75,7 @@ def track(control: StudioControl, run: StoredRun) -> np.ndarray:
     return poses_of(run)
 
 
+@pytest.mark.slow
 def test_killed_in_mid_run_it_is_lost_and_resumes_bit_for_bit(control: StudioControl) -> None:
     session = make_session(control.workspace.place_for("longer"), frames=LONG)
     whole, killed = (new_run(session, name, LONG, particles=1000) for name in ("whole", "killed"))
@@ -134,6 +135,7 @@ def test_commands_are_answered_while_a_frame_is_annealed(
     assert wait_for(watching, in_state("cancelled"))
 
 
+@pytest.mark.slow
 def test_the_time_from_a_slider_to_its_last_layer_is_in_the_events(
     control: StudioControl, session_on_disk: Session
 ) -> None:
@@ -162,6 +164,7 @@ def test_a_command_that_the_process_dies_of_is_answered(
     assert wait_for(watching, in_state("lost"))
 
 
+@pytest.mark.slow
 def test_a_process_that_is_slow_to_start_is_not_lost(
     control: StudioControl, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -172,6 +175,7 @@ def test_a_process_that_is_slow_to_start_is_not_lost(
     assert isinstance(watching.get(timeout=PATIENCE), Acknowledged)
 
 
+@pytest.mark.slow
 def test_what_a_restarted_process_left_unanswered_is_refused(control: StudioControl) -> None:
     control.start()
     psutil.Process(control.process_identifier).suspend()
@@ -184,6 +188,7 @@ def test_what_a_restarted_process_left_unanswered_is_refused(control: StudioCont
         control.request(commands.Pause())
 
 
+@pytest.mark.slow
 def test_a_silent_process_is_said_to_be_lost_until_it_speaks_again(
     session_on_disk: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -204,6 +209,7 @@ def test_a_silent_process_is_said_to_be_lost_until_it_speaks_again(
     assert not process.is_running()
 
 
+@pytest.mark.slow
 def test_what_waits_is_brought_back(control: StudioControl, session_on_disk: Session) -> None:
     for name in ("a", "b"):
         new_run(session_on_disk, name, particles=2000, layers=20)
@@ -219,6 +225,7 @@ def test_what_waits_is_brought_back(control: StudioControl, session_on_disk: Ses
     assert [run.summary().status for run in session_on_disk.runs()] == ["finished", "finished"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lost", [False, True])
 def test_windows_that_start_different_runs_at_once_each_get_theirs(
     control: StudioControl, session_on_disk: Session, lost: bool
@@ -270,6 +277,7 @@ def test_windows_that_start_different_runs_at_once_each_get_theirs(
     assert len(tracking) == 1
 
 
+@pytest.mark.slow
 def test_a_process_that_dies_after_its_last_frame_is_brought_back_with_what_waits(
     control: StudioControl, session_on_disk: Session
 ) -> None:
@@ -306,6 +314,7 @@ def test_closing_saves_the_frame_at_hand_and_stops_the_process(
     assert len(partial.state["set_poses"]) == 4000
 
 
+@pytest.mark.slow
 def test_the_process_ends_when_the_server_is_killed(session_on_disk: Session) -> None:
     script = textwrap.dedent(
         """
@@ -332,6 +341,7 @@ def test_the_process_ends_when_the_server_is_killed(session_on_disk: Session) ->
     process.wait(PATIENCE)
 
 
+@pytest.mark.slow
 def test_the_pace_comes_back_with_the_process(control: StudioControl) -> None:
     watching = control.subscribe()
     control.request(commands.SetPace(seconds_a_layer=0.2))

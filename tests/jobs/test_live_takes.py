@@ -83,6 +83,7 @@ class Watcher:
             raise KeyboardInterrupt
 
 
+@pytest.mark.slow
 def test_two_mjpeg_streams_are_tracked_and_recorded_and_one_that_stops_is_left_out(
     walk: Session, pictures: dict[str, list[bytes]], tmp_path: Path
 ) -> None:
@@ -119,6 +120,7 @@ def _evidence_has_only_the_others(take: Session, frame: int) -> None:
     problems.close()
 
 
+@pytest.mark.slow
 def test_four_replayed_videos_are_tracked_live(walk: Session, tmp_path: Path) -> None:
     heard: list[str] = []
     found = track_cameras(

@@ -179,6 +179,7 @@ def test_a_batch_compares_and_tracks_at_addresses(
         studio.batch([store], cluster=scheduler, **options)
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_goes_on_from_its_store(store: str, tmp_path: Path) -> None:
     walk = copy_of_walk(tmp_path / "walk")
     address = studio.upload(walk, f"{store}/walk")
@@ -200,6 +201,7 @@ def test_an_interrupted_run_goes_on_from_its_store(store: str, tmp_path: Path) -
     same_search(back.run("broken"), studio.track(walk, **options).run)
 
 
+@pytest.mark.slow
 def test_a_reproduction_is_kept_at_an_address(
     store: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -28,6 +28,7 @@ def walk(tmp_path_factory: pytest.TempPathFactory) -> Session:
     return copy_of_walk(tmp_path_factory.mktemp("workspace") / "walk")
 
 
+@pytest.mark.slow
 def test_runs_are_kept_and_a_broken_sweep_goes_on(walk: Session) -> None:
     plan = plan_sweep(walk, GRID, range(2), knobs={"layers": 2, "particles": 20}, last=3, fit_shape=False)
     kept = new_comparison(place_of(walk, sweep=True), plan)
@@ -94,6 +95,7 @@ def test_a_run_of_another_request_is_neither_taken_nor_overwritten(walk: Session
     assert {**first, "milliseconds": 0} == {**again, "milliseconds": 0}
 
 
+@pytest.mark.slow
 def test_a_run_of_another_sweep_of_the_same_name_is_left_to_it(walk: Session) -> None:
     plan = plan_sweep(walk, GRID, range(1), knobs={"layers": 1, "particles": 10}, last=2, fit_shape=False)
     trial = {**sweep_trials(plan)[0].arguments, "run": "twice-p1-s0"}

@@ -49,6 +49,7 @@ def errors_of(walk: Session, run: StoredRun) -> dict[int, float]:
     return dict(zip(found.frames, found.per_frame_mm, strict=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("tracker", "seed"), [("annealed:mine", 4), ("swarm", 3)])
 def test_the_run_of_a_trial_has_its_errors(
     walk: Session, kept: KeptComparison, tracker: str, seed: int

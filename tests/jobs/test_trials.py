@@ -78,6 +78,7 @@ def test_results_errors_and_what_cannot_travel(one: ProcessExecutor) -> None:
         one.submit(lambda: None)
 
 
+@pytest.mark.slow
 def test_a_lost_process_fails_its_own_task_and_is_said(one: ProcessExecutor, tmp_path: Path) -> None:
     before = one.submit(identifier)
     lost, after = one.submit(die_unless, tmp_path / "died"), one.submit(identifier)
@@ -87,6 +88,7 @@ def test_a_lost_process_fails_its_own_task_and_is_said(one: ProcessExecutor, tmp
     assert after.result(PATIENCE) != before.result(PATIENCE)
 
 
+@pytest.mark.slow
 def test_a_task_tells_what_it_does_and_has_the_environment() -> None:
     heard: list[tuple[object, ...]] = []
     with ProcessExecutor(1, environment={"TOY": "1"}, on_report=lambda *words: heard.append(words)) as one:
@@ -96,6 +98,7 @@ def test_a_task_tells_what_it_does_and_has_the_environment() -> None:
     assert speak(3) == "", "elsewhere nobody hears"
 
 
+@pytest.mark.slow
 def test_a_shutdown_that_cancels_ends_what_runs_and_what_waits(tmp_path: Path) -> None:
     one = ProcessExecutor(1)
     running, waiting = one.submit(sleep_in, tmp_path / "pid"), one.submit(identifier)
@@ -110,6 +113,7 @@ def test_a_shutdown_that_cancels_ends_what_runs_and_what_waits(tmp_path: Path) -
         one.submit(identifier)
 
 
+@pytest.mark.slow
 def test_a_waiting_task_can_be_cancelled_alone(one: ProcessExecutor) -> None:
     first, second, third = (one.submit(identifier) for _ in range(3))
     if second.cancel():

@@ -96,6 +96,7 @@ def _truth(body: BodyModel, motion: PersonMotion, step: int) -> tuple[np.ndarray
     return np.array(poses), float(np.mean(errors))
 
 
+@pytest.mark.slow
 def test_the_walk_samples_truth_is_never_refused() -> None:
     session = Session(WALK)
     body, truth = session.body(), read_trc(WALK / "truth" / "walk.trc")
@@ -118,6 +119,7 @@ def test_written_motions_are_never_refused(body_name: str, name: str) -> None:
     assert HardPriors(body).hold(poses, limbs_apart=True).all()
 
 
+@pytest.mark.slow
 @pytest.mark.real_data
 @pytest.mark.parametrize(
     ("file", "step"),

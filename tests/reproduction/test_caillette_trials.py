@@ -124,6 +124,7 @@ def test_pointing_moves_one_arm_and_comes_back() -> None:
     assert np.abs(np.diff(poses, axis=0)).max() < 0.15
 
 
+@pytest.mark.slow
 def test_a_recipe_is_fitted_once_and_from_its_beginning(cache) -> None:
     body = load_body("human31")
     found = recorded(cache, "walk", body, 45)
@@ -185,6 +186,7 @@ def test_errors_are_wrapped_and_over_the_joints_alone(cache) -> None:
     np.testing.assert_allclose(joint_errors(body, columns, one, truth).angle_deg, expected)
 
 
+@pytest.mark.slow
 def test_frames_are_given_the_truth_once(cache) -> None:
     session = cache.session("walk")
     truth = true_motion(cache, session, LAST).poses

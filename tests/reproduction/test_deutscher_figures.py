@@ -208,6 +208,7 @@ def test_200_particles_are_judged_with_eq_13() -> None:
     assert too_few.verdict == "not reproduced"
 
 
+@pytest.mark.slow
 def test_the_fewest_particles_of_a_body_are_searched_on_footage(cache) -> None:
     trial = particles_needed.body_trials({"Eq. 13": {"survival": 0.5, "layers": 2}}, Scale((1,), quick=True))[
         0
@@ -219,6 +220,7 @@ def test_the_fewest_particles_of_a_body_are_searched_on_footage(cache) -> None:
     assert {row[0] for row in found["tried"]} <= {1, 60}
 
 
+@pytest.mark.slow
 def test_true_poses_lie_on_the_true_markers(cache) -> None:
     session = cache.session("walk")
     body = session.body()
@@ -247,6 +249,7 @@ def test_fig_3_measures_clouds_that_draw_together(cache) -> None:
     assert "by construction" in found.words
 
 
+@pytest.mark.slow
 def test_the_pelvis_is_where_its_marker_is(cache) -> None:
     session = cache.session("walk")
     frames = [0, 9, 60]

@@ -55,6 +55,7 @@ def test_a_factor_makes_spreads_right_in_95_of_100_cases() -> None:
     assert np.mean(errors**2 > times**2 * posterior.NORMAL_95) == pytest.approx(0.05, abs=0.002)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tracker", [0, 2, 3])
 def test_a_tracker_is_measured_layer_by_layer(tracker: int) -> None:
     cache = FootageCache(SAMPLES)

@@ -69,6 +69,7 @@ def test_everything_is_written_and_nothing_is_run_twice(tmp_path: Path) -> None:
     assert {**again.documents[0], "date": ""} == {**document, "date": ""}
 
 
+@pytest.mark.slow
 def test_more_seeds_run_only_the_new_trials(tmp_path: Path) -> None:
     log, out = tmp_path / "log", tmp_path / "out"
     run([toy("toy", log)], out)
@@ -77,6 +78,7 @@ def test_more_seeds_run_only_the_new_trials(tmp_path: Path) -> None:
     assert found.documents[0]["seeds"] == 3
 
 
+@pytest.mark.slow
 def test_experiments_share_the_trials_that_are_the_same(tmp_path: Path) -> None:
     log, out = tmp_path / "log", tmp_path / "out"
     found = run([toy("one", log), toy("two", log)], out)
@@ -85,6 +87,7 @@ def test_experiments_share_the_trials_that_are_the_same(tmp_path: Path) -> None:
     assert found.documents[0]["numbers"] == found.documents[1]["numbers"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("deed", "reason", "failed"),
     [
@@ -106,6 +109,7 @@ def test_a_failing_trial_fails_its_experiment_only(
     assert reason in bad["words"]
 
 
+@pytest.mark.slow
 def test_failed_trials_run_again_and_outcomes_are_kept(tmp_path: Path) -> None:
     log, out = tmp_path / "log", tmp_path / "out"
     run([toy("bad", log, seed1="once refused")], out)
@@ -114,6 +118,7 @@ def test_failed_trials_run_again_and_outcomes_are_kept(tmp_path: Path) -> None:
     assert found.documents[0]["verdict"] == "reproduced"
 
 
+@pytest.mark.slow
 def test_a_process_that_dies_once_is_replaced(tmp_path: Path) -> None:
     log = tmp_path / "log"
     found = run([toy("toy", log, seed1="die once")], tmp_path / "out")
@@ -121,6 +126,7 @@ def test_a_process_that_dies_once_is_replaced(tmp_path: Path) -> None:
     assert len(lines(log)) == 5
 
 
+@pytest.mark.slow
 def test_a_failing_conclusion_is_reported(tmp_path: Path) -> None:
     log = tmp_path / "log"
     wrong = toy("toy", log)
@@ -130,6 +136,7 @@ def test_a_failing_conclusion_is_reported(tmp_path: Path) -> None:
     assert "The conclusion: KeyError: 'nothing'" in found.documents[0]["words"]
 
 
+@pytest.mark.slow
 def test_trials_have_one_core_unless_they_measure_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -148,6 +155,7 @@ def test_trials_have_one_core_unless_they_measure_time(
     assert "NUMBA_NUM_THREADS" not in os.environ
 
 
+@pytest.mark.slow
 def test_footage_is_rendered_once_and_again_when_its_recipe_changed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -180,6 +188,7 @@ def test_an_unknown_recipe_fails_its_experiment_only(tmp_path: Path) -> None:
     assert "There is no recipe 'nowhere'." in found.documents[0]["words"]
 
 
+@pytest.mark.slow
 def test_outcomes_of_another_version_are_used_and_noted(tmp_path: Path) -> None:
     out = tmp_path / "out"
     run([toy("toy", tmp_path / "log")], out)
@@ -190,6 +199,7 @@ def test_outcomes_of_another_version_are_used_and_noted(tmp_path: Path) -> None:
     assert "Some outcomes were measured by another version (0.0.1+old)." in found.documents[0]["notes"]
 
 
+@pytest.mark.slow
 def test_a_damaged_outcome_is_measured_again(tmp_path: Path) -> None:
     out = tmp_path / "out"
     run([toy("toy", tmp_path / "log")], out)
@@ -212,6 +222,7 @@ def test_folders_that_cannot_be_used_are_refused(tmp_path: Path) -> None:
     lock.free()
 
 
+@pytest.mark.slow
 def test_the_workspace_does_not_take_the_folder_for_a_session(tmp_path: Path) -> None:
     workspace = Workspace()
     run([toy("toy", tmp_path / "log")], workspace.root / "reproduction", Scale((0,)))

@@ -67,6 +67,7 @@ def concluded(name: str, error_of, scale: Scale = SCALE) -> Findings:
     return experiment.conclude([made(trial, error_of(trial.label)) for trial in experiment.trials(scale)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TRACKED)
 def test_findings_are_plain_and_name_their_settings(name: str) -> None:
     findings = concluded(name, lambda label: 40.0)
@@ -172,6 +173,7 @@ def test_groups_keep_the_order_of_seeds_and_curves_their_mean() -> None:
     )
 
 
+@pytest.mark.slow
 def test_generalisation_keeps_the_halves_apart_and_counts_near_clips() -> None:
     def error(label: str) -> float:
         if "reporting" in label:
@@ -196,6 +198,7 @@ def test_generalisation_keeps_the_halves_apart_and_counts_near_clips() -> None:
     assert len(long.rows) == sum(cell != "–" for row in short.rows for cell in row[1:])
 
 
+@pytest.mark.slow
 def test_generalisation_counts_frames_with_a_limb_lost() -> None:
     experiment = EXPERIMENTS["generalisation"]
     outcomes = [
@@ -215,6 +218,7 @@ def test_generalisation_counts_frames_with_a_limb_lost() -> None:
     assert numbers["named of other frames, swarm, choosing"] == 0.0
 
 
+@pytest.mark.slow
 def test_other_people_are_kept_apart_from_both_halves_and_lost_limbs_are_counted() -> None:
     experiment = EXPERIMENTS["other-people"]
     is_wood = "human34 on data:drawn-elsewhere/wood"

@@ -17,6 +17,7 @@ from studio.evidence.masks import PackedMask
 COUNT = 40
 
 
+@pytest.mark.slow
 def test_frames_that_were_read_are_let_go_of(tmp_path: Path) -> None:
     """All stayed until Python collected cycles, 3 MB of full HD each."""
     rng = np.random.default_rng(0)

@@ -114,6 +114,7 @@ def test_what_is_excluded_is_in_no_mask(session: Session, tmp_path: Path) -> Non
     assert set_exclusion(changed, "cam0", b"") == 0
 
 
+@pytest.mark.slow
 def test_who_stood_in_a_plate_is_cleaned_away(session: Session, tmp_path: Path) -> None:
     changed = set_backgrounds(session, plates(tmp_path, change=True))
     setup = set_up_background(changed, "combined", tune=False)
@@ -128,6 +129,7 @@ def test_who_stood_in_a_plate_is_cleaned_away(session: Session, tmp_path: Path) 
     assert back.manifest.footage.cameras[0].background == "background/cam0.png"
 
 
+@pytest.mark.slow
 def test_a_run_begins_with_the_sessions_knobs(session: Session) -> None:
     set_up_background(session, "median", knobs={"mask_threshold": 9.0}, tune=False)
     assert read_evidence(session).knobs["background_model"] == "median"

@@ -181,6 +181,7 @@ def long_session(models: Path, monkeypatch: pytest.MonkeyPatch) -> Session:
     return make_session(models.parent.parent / "long", 24)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tracker", sorted(GUIDED))
 def test_lessons_are_the_same_wherever_a_run_is_taken_up(long_session: Session, tracker: str) -> None:
     whole = made(long_session, tracker, "whole", **LEARNING)
@@ -221,6 +222,7 @@ def test_an_attempt_without_a_model_is_the_trial_that_it_was(session_on_disk: Se
     assert TrackingTrial.of_plain(given.plain()) == given
 
 
+@pytest.mark.slow
 def test_experiments_track_with_a_model(long_session: Session) -> None:
     """The same frames as a run with the same seed, lessons included."""
     body = long_session.body()

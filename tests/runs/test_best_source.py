@@ -102,6 +102,7 @@ def test_all_sources_of_a_session_are_tried_and_the_best_is_used(tmp_path: Path)
     footage.close()
 
 
+@pytest.mark.slow
 def test_masks_of_several_sources_become_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made_ball = patched_ball(tmp_path / "ball")
     choose = choose_sources

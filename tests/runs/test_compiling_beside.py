@@ -44,6 +44,7 @@ def run(tmp_path: Path) -> StoredRun:
     return prepare_run(copy_of_walk(tmp_path / "walk"), last=2)
 
 
+@pytest.mark.slow
 def test_all_that_follows_the_first_search_is_compiled(run: StoredRun) -> None:
     given = [str(run.folder.parents[1]), run.name]
     answer = subprocess.run(

@@ -74,6 +74,7 @@ def whole_run(session: Session) -> tuple[list[bytes], int]:
     return content(run), statements
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS)
 def test_a_run_whose_disk_fills_at_any_statement_is_taken_up_again(
     session_on_disk: Session, way: str
@@ -97,6 +98,7 @@ def test_a_run_whose_disk_fills_at_any_statement_is_taken_up_again(
         assert content(run) == wanted, f"statement {number}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS)
 def test_a_run_that_stays_open_goes_on_when_there_is_room(session_on_disk: Session, way: str) -> None:
     wanted, statements = whole_run(session_on_disk)
@@ -303,6 +305,7 @@ def test_what_follows_from_what_failed_is_not_done(one_thread: ThreadPoolExecuto
     assert done == [0, 4]
 
 
+@pytest.mark.slow
 def test_a_live_run_drops_what_the_disk_refuses_and_replays(
     session_on_disk: Session, one_thread: ThreadPoolExecutor
 ) -> None:

@@ -160,6 +160,7 @@ def test_an_arm_that_is_fixed_to_the_world_is_found_with_one_camera(session_on_d
     assert found.overlap > 0.6
 
 
+@pytest.mark.slow
 def test_a_drawn_body_without_feet_is_sought_with_feet() -> None:
     """On masks of a body with feet, the one without faces the right way, for no feet could point the other way."""
     cameras, with_feet = ring_of_cameras(4), load_body("human25")

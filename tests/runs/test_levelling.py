@@ -40,6 +40,7 @@ def tilt(session: Session) -> float:
     return float(np.degrees(np.arccos(np.clip((ups * true).sum(axis=1), -1.0, 1.0))).max())
 
 
+@pytest.mark.slow
 def test_the_world_is_levelled_by_cameras_and_silhouettes(askew: Session) -> None:
     step = calibration_step(askew)
     assert step.state == "stale"

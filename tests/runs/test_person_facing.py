@@ -32,6 +32,7 @@ def walking_pose(turned: float) -> Array:
     return pose
 
 
+@pytest.mark.slow
 def test_the_network_knows_which_way_somebody_walks() -> None:
     walk, body = rendered_walk(1, seed=SEED), load_body("human31")
     pictures = {camera.name: walk.pictures[camera.name, 0] for camera in walk.cameras}

@@ -67,6 +67,7 @@ def files_of(session: Session) -> dict[str, bytes]:
     return {str(path): path.read_bytes() for path in sorted(session.path.rglob("*")) if path.is_file()}
 
 
+@pytest.mark.slow
 def test_the_masks_are_the_sessions_own_until_others_are_chosen(session: Session, walk: Rendered) -> None:
     made = set_up_background(session, "person")
     assert made.knobs == {"background_model": "auto"}
@@ -216,6 +217,7 @@ def test_somebody_comes_and_goes(walk: Rendered) -> None:
     assert reports[-1] == (5, 5)
 
 
+@pytest.mark.slow
 def test_nobody_at_all_is_an_error(walk: Rendered) -> None:
     shown = {(camera.name, 0): walk.empty[camera.name] for camera in walk.cameras[1:3]}
     with pytest.raises(FootageError, match="No camera sees a person"):

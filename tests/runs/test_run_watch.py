@@ -89,6 +89,7 @@ def test_black_frames_are_held_and_the_body_is_found_after_them(
     assert (line.overlaps[[*range(4), *range(9, 13)]] > 0.7).all()
 
 
+@pytest.mark.slow
 def test_a_run_taken_up_again_in_the_frame_of_the_search_gives_the_same_bits(
     black: Session, through: tuple[StoredRun, list[FrameResult]]
 ) -> None:
@@ -111,6 +112,7 @@ def test_a_run_taken_up_again_in_the_frame_of_the_search_gives_the_same_bits(
         assert (one.layers, one.evaluations, one.doubts) == (other.layers, other.evaluations, other.doubts)
 
 
+@pytest.mark.slow
 def test_the_frame_of_the_search_annealed_again_is_the_same(
     black: Session, through: tuple[StoredRun, list[FrameResult]]
 ) -> None:

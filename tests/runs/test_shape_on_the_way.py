@@ -63,6 +63,7 @@ def test_thicker_limbs_are_found_and_bones_are_kept() -> None:
     assert found.overlap[1] > found.overlap[0]
 
 
+@pytest.mark.slow
 def test_a_run_begins_with_the_shape_says_so_and_fits_it_once(
     walk: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -80,6 +81,7 @@ def test_a_run_begins_with_the_shape_says_so_and_fits_it_once(
     assert run_changes(walk, walk.run(first.name)) == []
 
 
+@pytest.mark.slow
 def test_the_shape_that_comes_with_the_walk_is_the_one_that_is_fitted(
     walk: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -92,6 +94,7 @@ def test_the_shape_that_comes_with_the_walk_is_the_one_that_is_fitted(
     assert bundled.start_pose == pytest.approx(fitted.start_pose, abs=5.0)
 
 
+@pytest.mark.slow
 def test_a_fit_is_found_again_whatever_the_last_bits_are(
     walk: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -126,6 +129,7 @@ def test_few_frames_or_one_camera_give_no_shape(walk: Session, session_on_disk: 
     assert not (session_on_disk.path / FOLDER).exists()
 
 
+@pytest.mark.slow
 def test_masks_that_show_something_else_change_nothing(
     walk: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -44,6 +44,7 @@ def problems(session: Session, run: StoredRun) -> Iterator[ProblemSource]:
         yield source
 
 
+@pytest.mark.slow
 def test_legs_are_corrected_once_and_the_raw_track_stays(
     run: StoredRun, truth: np.ndarray, problems: ProblemSource
 ) -> None:

@@ -165,6 +165,7 @@ def test_a_cut_that_is_cancelled_leaves_the_masks_as_they_were(people: TwoPeople
     assert not (people.session.path / "subject_masks").exists()
 
 
+@pytest.mark.slow
 def test_each_gets_a_session_with_what_is_known_of_him(people: TwoPeople) -> None:
     places = people.places()
     made = subjects(people.session, at=[places[1], places[0]]).sessions
@@ -216,6 +217,7 @@ def test_what_does_not_belong_together_is_refused(people: TwoPeople, tmp_path: P
         subjects(people.session, at=people.places(), into=["mine"])
 
 
+@pytest.mark.slow
 def test_the_verb_takes_a_place(people: TwoPeople) -> None:
     made = background(people.session, "subject", subject_at=people.places()[0])
     assert made.source == "subject"

@@ -57,6 +57,7 @@ def test_the_way_recommends_turning_and_is_content_afterwards(
     assert "aligned by silhouettes" in calibration_step(change.session).words
 
 
+@pytest.mark.slow
 def test_turning_back_restores_every_byte_and_makes_runs_good_again(
     session: Session, aligned: SessionAlignment
 ) -> None:
@@ -91,6 +92,7 @@ def test_cameras_turned_twice_go_back_one_by_one(session: Session, aligned: Sess
     assert (session.path / CAMERAS_PATH).read_bytes() == first
 
 
+@pytest.mark.slow
 def test_good_cameras_are_left_alone(tmp_path: Path) -> None:
     session = make_nudged_session(tmp_path / "good", degrees=0.0)
     found = align_cameras(session)

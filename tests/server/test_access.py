@@ -191,6 +191,7 @@ def test_socket_with_everything_is_let_in(studio: Studio) -> None:
         assert json.loads(socket.recv(timeout=60))["type"] == "state"
 
 
+@pytest.mark.slow
 def test_get_changes_nothing(studio: Studio) -> None:
     """Every address that a GET could reach leaves the workspace's sessions and the process as they were."""
     spec = studio.client.get("/api/openapi.json").json()["paths"]

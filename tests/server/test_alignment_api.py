@@ -46,6 +46,7 @@ def calibration_why(studio: Studio) -> str:
     return next(step["why"] for step in steps if step["step"] == "calibration")
 
 
+@pytest.mark.slow
 def test_cameras_are_measured_turned_and_turned_back(studio: Studio, session: Session) -> None:
     before = (session.path / CAMERAS_PATH).read_bytes()
     run = prepare_run(session, start_pose=session.body().neutral, last=2, name="old")

@@ -83,6 +83,7 @@ def test_a_stream_that_stops_is_reported(studio: Studio, streams: Streams) -> No
     until(studio, "/api/cameras", lambda response: response["cameras"][1]["state"] == "running")
 
 
+@pytest.mark.slow
 def test_cameras_are_recorded_into_a_session(studio: Studio, streams: Streams) -> None:
     shown(studio, streams)
     assert studio.client.post("/api/recordings/stop").status_code == 404

@@ -103,6 +103,7 @@ def test_one_runs_at_a_time_is_cancelled_and_goes_on(compared: Studio) -> None:
     assert client.get("/api/comparisons/other/comparison-1").json()["comparison"]["total"] == 80
 
 
+@pytest.mark.slow
 def test_an_interrupted_one_is_offered_to_go_on(compared: Studio) -> None:
     session = compared.workspace.session("walk")
     plan = plan_comparison(session, Lineup(("annealed",), "", 60, 3), (0,), last=2)
@@ -113,6 +114,7 @@ def test_an_interrupted_one_is_offered_to_go_on(compared: Studio) -> None:
     assert until(compared, "comparison-1", "done")["comparison"]["best"] == "annealed"
 
 
+@pytest.mark.slow
 def test_a_server_that_ends_leaves_it_to_go_on(compared: Studio) -> None:
     compared.client.post("/api/comparisons", json={**WISH, "seeds": 40})
     deadline = time.monotonic() + waiting.PATIENCE
@@ -124,6 +126,7 @@ def test_a_server_that_ends_leaves_it_to_go_on(compared: Studio) -> None:
     assert 1 <= line["done"] < 80
 
 
+@pytest.mark.slow
 def test_what_fails_is_said(compared: Studio) -> None:
     session = compared.workspace.session("walk")
     plan = plan_comparison(session, Lineup(("annealed",), "", 60, 3), (0,), last=2)
@@ -208,6 +211,7 @@ SWEEP = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_sweep_says_what_it_takes_runs_behind_and_leaves_runs(compared: Studio) -> None:
     client = compared.client
     wait = client.post("/api/comparisons/sweeps/expected", json=SWEEP).json()

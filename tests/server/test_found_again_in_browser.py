@@ -87,6 +87,7 @@ def opened(context: BrowserContext, studio: Studio, address: str) -> Page:
     return page
 
 
+@pytest.mark.slow
 def test_a_fit_is_found_again_wherever_it_is_looked_for(
     context: BrowserContext, studio: Studio, held: HeldFit
 ) -> None:
@@ -149,6 +150,7 @@ def refining(tracked: StoredRun, monkeypatch: pytest.MonkeyPatch) -> Iterator[th
     go.set()
 
 
+@pytest.mark.slow
 def test_a_run_s_refinement_is_found_again_and_shown_where_it_was_begun(
     context: BrowserContext, studio: Studio, refining: threading.Event
 ) -> None:
@@ -184,6 +186,7 @@ def test_a_run_s_refinement_is_found_again_and_shown_where_it_was_begun(
     expect(page.locator("#toasts")).to_be_empty()
 
 
+@pytest.mark.slow
 def test_refining_is_cancelled_from_another_window(
     context: BrowserContext, studio: Studio, refining: threading.Event
 ) -> None:
@@ -227,6 +230,7 @@ def test_a_link_says_what_is_not_there(context: BrowserContext, studio: Studio, 
     expect(page.locator("#step")).to_contain_text("Session “gone” is not here")
 
 
+@pytest.mark.slow
 def test_the_header_tells_how_the_open_run_stands(
     context: BrowserContext, studio: Studio, tracked: StoredRun
 ) -> None:
@@ -294,6 +298,7 @@ def test_old_masks_are_not_shown_while_new_ones_are_cut(
     expect(first).to_have_attribute("src", re.compile("show=mask"))
 
 
+@pytest.mark.slow
 def test_moved_knobs_and_the_chosen_layer_are_found_again(
     context: BrowserContext, studio: Studio, tracked: StoredRun
 ) -> None:
@@ -338,6 +343,7 @@ def test_find_knows_frames_knobs_limbs_formats_pages_and_help(
     expect(page.locator("html")).to_have_attribute("data-theme", "light")
 
 
+@pytest.mark.slow
 def test_a_note_is_written_on_a_frame_and_seen_in_every_window(
     context: BrowserContext, studio: Studio, tracked: StoredRun
 ) -> None:

@@ -85,6 +85,7 @@ def test_the_pages_speak_of_every_run_and_their_pictures_are_there() -> None:
         assert f'"{file}"' in taken
 
 
+@pytest.mark.slow
 def test_runs_are_made_once(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(room, "RUNS", SMALL)
     monkeypatch.setattr(room, "FRAMES", 2)

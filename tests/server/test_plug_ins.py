@@ -127,6 +127,7 @@ def page(installed: Path, toy_root: Path, tmp_path: Path) -> Iterator[Page]:
             yield Page(client, socket, control)
 
 
+@pytest.mark.slow
 def test_the_page_is_offered_them_and_tracks_with_them(page: Page) -> None:
     get = page.client.get
     choices = get("/api/choices").json()

@@ -93,6 +93,7 @@ def test_from_a_new_run_to_its_end_and_into_the_trash(page: Page) -> None:
     assert client.delete("/api/sessions/take1").status_code == 200
 
 
+@pytest.mark.slow
 def test_when_the_process_is_killed_the_page_is_reported_and_start_resumes(page: Page) -> None:
     page.post("/api/sessions/take1/runs", {"name": "small", "settings": SMALL | {"layers": 40}})
     # Four seconds a frame: it is killed in mid-run however long a busy machine keeps this thread waiting.
@@ -113,6 +114,7 @@ def test_when_the_process_is_killed_the_page_is_reported_and_start_resumes(page:
     assert len(page.client.get(f"{RUN}/frames").json()["frames"]) == 4
 
 
+@pytest.mark.slow
 def test_a_refusal_of_the_process_reaches_the_page_in_words(page: Page) -> None:
     page.post("/api/sessions/take1/runs", {"name": "small", "settings": SMALL})
     wrong = page.client.patch(f"{RUN}/settings", json={"start_repeats": 3})

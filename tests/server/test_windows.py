@@ -182,6 +182,7 @@ def test_a_run_that_is_deleted_leaves_every_window_that_shows_it(windows: Window
     until(lambda: [scenes[window].shown.run for window in "abc"] == ["", "run-1", ""])
 
 
+@pytest.mark.slow
 def test_a_window_that_is_gone_frees_its_scene_and_one_that_is_loaded_again_finds_it(
     windows: Windows, runs: list[str]
 ) -> None:

@@ -8,6 +8,8 @@ import sys
 import tomllib
 from pathlib import Path
 
+import pytest
+
 from studio.self_check import OLDEST_PYTHON
 from supply_chain import bill as bills
 from supply_chain.bill import bill, components, doubts, licence_of, table
@@ -47,6 +49,7 @@ def test_what_is_not_known_or_binds_is_named() -> None:
     assert "libx264" in table(components())
 
 
+@pytest.mark.slow
 def test_the_bill_is_cyclonedx_and_its_references_lead_somewhere() -> None:
     made = bill(components())
     assert made == bill(components())
@@ -61,6 +64,7 @@ def test_the_bill_is_cyclonedx_and_its_references_lead_somewhere() -> None:
     assert all(entry["licenses"] and entry["scope"] in ("required", "excluded") for entry in entries)
 
 
+@pytest.mark.slow
 def test_one_command_writes_it(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "supply_chain", "--out", str(tmp_path / "build" / "sbom.cdx.json")]
     done = subprocess.run(command, cwd=ROOT / "tests", capture_output=True, text=True, check=True)

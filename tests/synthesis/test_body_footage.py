@@ -69,6 +69,7 @@ def degrees_off(session: Session, poses: np.ndarray) -> np.ndarray:
     return np.degrees(np.abs((off + np.pi) % (2.0 * np.pi) - np.pi))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["robot-arm", "hand-grasp"])
 def test_masks_and_markers_are_where_the_true_poses_put_the_body(tmp_path: Path, name: str) -> None:
     recipe = smaller(tmp_path, name, 0.3, frames=2, include__masks=True, damage__clutter=0)
@@ -114,6 +115,7 @@ def test_the_session_of_a_robot_has_its_body_and_needs_no_other_reader(tmp_path:
     np.testing.assert_allclose(limb_ends(session.body(), own.neutral), limb_ends(own, own.neutral), atol=1e-6)
 
 
+@pytest.mark.slow
 def test_flat_ends_are_those_of_the_tree(tmp_path: Path) -> None:
     """Rendered with edges, the mask is the outline that the tracker projects, to the pixels of its border."""
     recipe = smaller(tmp_path, "robot-arm", 0.5, frames=1, include__masks=True, damage__clutter=0)

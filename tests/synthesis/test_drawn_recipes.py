@@ -31,6 +31,7 @@ def test_all_drawn_recipes_are_bundled() -> None:
     assert {name for side in HALVES for name in clip_names(side)} <= set(recipe_names())
 
 
+@pytest.mark.slow
 @pytest.mark.real_data
 @pytest.mark.parametrize("side", HALVES)
 def test_drawing_again_gives_the_bundled_files(
@@ -111,6 +112,7 @@ def test_people_stand_on_the_floor_inside_every_view(
         assert np.all((pixels > 0.0) & (pixels < [recipe.picture.width, recipe.picture.height]))
 
 
+@pytest.mark.slow
 @pytest.mark.real_data
 def test_the_20_hz_walk_has_every_third_frame_of_the_60_hz_one(
     real_data: Path, monkeypatch: pytest.MonkeyPatch

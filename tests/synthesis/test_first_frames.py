@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from studio.motion_files.trc import read_trc
 from studio.sessions.session import Session
@@ -23,6 +24,7 @@ empty_frames = 2
 """
 
 
+@pytest.mark.slow
 def test_the_beginning_is_that_of_the_whole(tmp_path: Path) -> None:
     recipe = tmp_path / "short.toml"
     recipe.write_text(RECIPE)

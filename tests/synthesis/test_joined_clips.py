@@ -100,6 +100,7 @@ def test_impossible_joins_are_refused() -> None:
         assert refusal.value.hint
 
 
+@pytest.mark.slow
 @pytest.mark.real_data
 @pytest.mark.parametrize(
     "name", ["dance-exercise-1", "dance-exercise-2", "dance-test-1", "dance-test-2", "dance-unseen"]

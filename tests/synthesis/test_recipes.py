@@ -17,6 +17,7 @@ from studio.synthesis.recipe_file import read_recipe, recipe_cameras
 from studio.synthesis.recipes import synthesize
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["walk", "run", "box", "handstand"])
 def test_a_rendered_motion_becomes_a_session_whose_start_pose_meets_the_truth(
     tmp_path: Path, name: str

@@ -78,6 +78,7 @@ def test_the_recipe_still_gives_the_committed_truth() -> None:
     np.testing.assert_allclose(truth.positions, markers.positions, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_background_subtraction_finds_the_person_nearly_whole() -> None:
     """Against the exact masks, from the committed footage and empty clips."""
     session, recipe = Session(SAMPLES / "walk"), read_recipe(find_recipe("walk"))

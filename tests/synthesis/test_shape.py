@@ -56,6 +56,7 @@ def test_the_bones_have_the_shapes_lengths(shape_file: Path) -> None:
     assert lengths == pytest.approx(wanted, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_the_body_of_that_shape_meets_every_marker(shape_file: Path) -> None:
     motion = circuit(skeleton_of_subject(subject_of_file(shape_file, "human31")), np.arange(40) / 20.0, {})
     markers, body = marker_motion(motion), sized(shape_file)
@@ -105,6 +106,7 @@ def test_a_wrong_shape_file_is_refused(tmp_path: Path, shape_file: Path) -> None
         skeleton_of_subject(subject_of_file(short, "human31"))
 
 
+@pytest.mark.slow
 def test_a_recipe_may_name_shape_and_sigma(tmp_path: Path, shape_file: Path) -> None:
     names = [entry.name for entry in BODY.parameters]
     sigma = np.linspace(0.01, 0.31, len(names))

@@ -70,6 +70,7 @@ def test_a_stored_calibration_is_off_by_the_given_pixels(tmp_path: Path) -> None
             np.testing.assert_allclose(stored.centre, rendered.centre, atol=0.01)
 
 
+@pytest.mark.slow
 def test_a_missing_camera_has_no_footage(tmp_path: Path) -> None:
     session = made(tmp_path, damage={"missing": ["cam3"]})
     assert [camera.name for camera in session.cameras()] == ["cam1", "cam2", "cam4"]
@@ -94,6 +95,7 @@ def test_an_exposed_picture_is_less_sharp_where_the_person_moves(tmp_path: Path)
     assert 0.7 < both.sum() / either.sum() < 1.0
 
 
+@pytest.mark.slow
 def test_clutter_hides_parts_of_the_person_and_stays_clear_of_them(tmp_path: Path) -> None:
     motion, cameras = running(), rig(tmp_path)
     things = clutter_in_front(6, cameras, motion, seed=2)
@@ -176,6 +178,7 @@ def test_drawn_rooms_differ_and_are_the_same_every_time() -> None:
     assert one.half != other.half
 
 
+@pytest.mark.slow
 def test_a_damaged_take_can_be_tracked_from_the_height_alone(tmp_path: Path) -> None:
     session = made(
         tmp_path,

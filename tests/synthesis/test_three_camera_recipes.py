@@ -141,6 +141,7 @@ def test_the_run_is_a_run_round_a_bend() -> None:
     assert abs(heading[-1] - heading[0]) > np.pi
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_data")
 @pytest.mark.parametrize("name", [param for param in ALL if param.values[0] != "walk-with-turns"])
 def test_a_few_small_frames_become_a_session(tmp_path: Path, name: str) -> None:

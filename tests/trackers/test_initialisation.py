@@ -88,6 +88,7 @@ def test_an_attitude_far_from_rest_is_found_and_faces_the_right_way() -> None:
     assert 0.0 < found.agreement < 1.0
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_pose_and_progress_counts_up_to_its_end() -> None:
     problem, reports = NearMarkers(pose_with(heading=-60, pelvis_z=920)), []
     first = candidates((0.0, 0.0, 900.0))
@@ -109,6 +110,7 @@ def test_the_same_seed_gives_the_same_pose_and_progress_counts_up_to_its_end() -
     assert reports[-1][0] <= reports[-1][1]
 
 
+@pytest.mark.slow
 def test_a_known_pose_is_a_line_from_the_start() -> None:
     truth = pose_with(heading=75, pelvis_x=900, pelvis_z=915, left_knee=40, right_elbow=90)
     problem = NearMarkers(truth)

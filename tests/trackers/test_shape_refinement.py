@@ -105,6 +105,7 @@ def refined_nowhere(found: RefinedShape) -> RefinedShape:
     return RefinedShape(0.0 * found.shape, found.deviation, found.poses, found.loss, found.residual)
 
 
+@pytest.mark.slow
 def test_fewer_frames_are_less_sure(space: ShapeSpace, truth: tuple[Array, Array]) -> None:
     one, three = refined(space, truth, REPORTED_MM, frames=1), refined(space, truth, REPORTED_MM)
     prior = ShapePrior(space, ShapeSpreads(), REPORTED_MM)
@@ -113,6 +114,7 @@ def test_fewer_frames_are_less_sure(space: ShapeSpace, truth: tuple[Array, Array
     assert (one.deviation[rows] < np.hypot(prior.sigma, ShapeSpreads().size)[rows]).all()
 
 
+@pytest.mark.slow
 def test_silhouettes_overrule_a_wrong_height(space: ShapeSpace, truth: tuple[Array, Array]) -> None:
     prior = ShapePrior(space, ShapeSpreads(), REPORTED_MM)
     true = prior.height(truth[0])

@@ -124,6 +124,7 @@ def test_lengths_of_people_with_drawn_limbs() -> None:
     assert 0.5 <= np.mean(sure) <= 0.95
 
 
+@pytest.mark.slow
 def test_hands_show_where_forearms_end(person: DrawnPerson) -> None:
     """While lengths are fitted, rigid hands pull: else the upper arms come out too short."""
     space = shape_space(person.body)

@@ -59,6 +59,7 @@ def test_a_sound_clip_is_unchanged(walk: np.ndarray, shown) -> None:
     assert np.array_equal(found, walk)
 
 
+@pytest.mark.slow
 def test_legs_exchanged_where_they_cross_are_corrected(walk: np.ndarray, shown) -> None:
     planted = walk.copy()
     for row in range(*CROSSING.indices(len(walk))):
@@ -72,6 +73,7 @@ def test_legs_exchanged_where_they_cross_are_corrected(walk: np.ndarray, shown) 
     assert np.array_equal(found[: CROSSING.start - 1], planted[: CROSSING.start - 1])
 
 
+@pytest.mark.slow
 def test_a_body_that_faces_backwards_is_turned(walk: np.ndarray, shown) -> None:
     planted = np.array([kind("front").offered(pose) for pose in walk])
     found, changes = put_right(planted, shown)

@@ -27,7 +27,7 @@ export function adder(place, setup, done) {
   const inverted = check("black is the person in the masks", { name: "inverted" });
   const replace = check("replace all cameras", { name: "replace" }, "Cameras that are not in the new footage are removed.");
   const submit = button("Add footage", begin);
-  const summary = element("summary", {});
+  const summary = element("summary", {}, "Add or replace footage");
   const elsewhere = hint("Connected cameras (USB, RTSP, MJPEG) can be viewed and recorded under ", element("a", { href: "/recording" }, "Live cameras"), ".");
   const folders = element("div", { className: "folder-list" });
   fill(place, summary, element("div", { className: "footage-form" },

@@ -444,11 +444,11 @@ function weights(sheet, tables, at) {
   const most = ({ max }) => Math.max(1, Math.ceil(10 * max) / 10);
   const limit = [{ y: 0.7, word: "0.7", colour: "warn", dashed: true }];
   const y = numbers("", { scale: false, max: most });
-  draw(three, "Pareto k̂", "above 0.7 a few particles hold all", "k_hat", y, limit);
+  draw(three, "Tail of the weights", "Pareto k̂; above 0.7 a few hold all", "k_hat", y, limit);
   const words = sides.map(({ name, tables: own }) => {
     const now = own.sorted[0]?.layer ?? layer;
     const row = own.layers.find((entry) => entry.layer === now) ?? own.layers.at(-1);
-    const what = `${layerInSearch(row.layer, at)}: the heaviest of ${row.particles} particles holds ${figure(100 * row.largest)} %, ${row.for_90} hold 90 %, effective number ${figure(row.effective)}, k̂ ${figure(row.k_hat)}`;
+    const what = `${layerInSearch(row.layer, at)}: the heaviest of ${row.particles} particles holds ${figure(100 * row.largest)} %, ${row.for_90} hold 90 %, effective number ${figure(row.effective)}, tail k̂ ${figure(row.k_hat)}`;
     return name ? `${name}: ${what}` : `L${what.slice(1)}`;
   });
   return `${words.join("; ")}.`;
