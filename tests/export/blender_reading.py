@@ -1,7 +1,8 @@
-"""Run inside Blender (`blender --background --python`): what it sees of a BVH or GLB, as JSON.
+"""Run inside Blender (`blender --background --python`) or with its module `bpy`: what it sees of a file, as JSON.
 
-Arguments after "--": the file, the JSON to write, the frames a second. Blender turns files that are Y up into its own
-world, z up; what is written here is Blender's world, in metres.
+Arguments after "--": the file (BVH, GLB or USD), the JSON to write, the frames a second, and, where the scene is to be
+exported as FBX and opened again first, that file. Blender turns files that are Y up into its own world, z up; what is
+written here is Blender's world, in metres.
 """
 
 import builtins
@@ -14,14 +15,30 @@ import bpy
 _open = builtins.open
 builtins.open = lambda path, mode="r", *rest, **named: _open(path, mode.replace("U", ""), *rest, **named)
 
-source, target, fps = sys.argv[sys.argv.index("--") + 1 :]
-bpy.ops.wm.read_factory_settings(use_empty=True)
-bpy.context.scene.render.fps = round(float(fps))
+source, target, fps, *through = sys.argv[sys.argv.index("--") + 1 :]
+
+
+def begin() -> None:
+    """An empty scene with as many frames a second."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.context.scene.render.fps = round(float(fps))
+
+
+begin()
 if source.endswith(".bvh"):
     bpy.ops.import_anim.bvh(filepath=source, use_fps_scale=False, update_scene_duration=True)
+elif source.endswith(".usd"):
+    bpy.ops.wm.usd_import(filepath=source)
 else:
     # Its default shading fails there on any mesh (numpy dropped "np.bool"); this is another of the importer's choices.
     bpy.ops.import_scene.gltf(filepath=source, import_shading="SMOOTH")
+if through:
+    animated = next(entry for entry in bpy.data.objects if entry.type == "ARMATURE").animation_data.action
+    # The exporter bakes the scene's frames, whatever lies in the action.
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = map(round, animated.frame_range)
+    bpy.ops.export_scene.fbx(filepath=through[0], add_leaf_bones=False, bake_anim_simplify_factor=0.0)
+    begin()
+    bpy.ops.import_scene.fbx(filepath=through[0])
 armature = next(entry for entry in bpy.data.objects if entry.type == "ARMATURE")
 action = armature.animation_data.action
 first, last = (round(value) for value in action.frame_range)

@@ -1,6 +1,10 @@
-"""Blender as the package manager brings it opens BVH and GLB with the same joints in every frame."""
+"""A real Blender opens BVH, GLB and USD with the same joints in every frame, and makes an FBX of the GLB that has them.
+
+`blender` of the package manager, or a Python with Blender's module: STUDIO_BPY=/path/to/python (pip install bpy there).
+"""
 
 import json
+import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -24,22 +28,27 @@ BLENDER_FROM_WORLD = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0
 
 
 @pytest.fixture(scope="module")
-def blender() -> str:
-    """The command, or a skip that says why."""
-    found = shutil.which("blender")
+def blender() -> list[str]:
+    """The command that runs the script, or a skip that says why."""
+    module, found = os.environ.get("STUDIO_BPY"), shutil.which("blender")
+    if module:
+        return [module, str(SCRIPT)]
     if found is None:
         pytest.skip(
-            "no Blender is installed: install the package 'blender' (and 'python3-numpy' for its GLB importer)"
+            "no Blender is installed: install the package 'blender' (and 'python3-numpy' for its GLB importer), or let"
+            " STUDIO_BPY name a Python that has its module 'bpy'"
         )
-    return found
+    return [
+        *(found, "--background", "--factory-startup", "--python-exit-code", "3", "--python"),
+        str(SCRIPT),
+    ]
 
 
-def opened(blender: str, path: Path) -> dict:
-    """What Blender sees of a file."""
+def opened(blender: list[str], path: Path, *through: Path) -> dict:
+    """What Blender sees of a file. through : the FBX that it makes of it and opens in its place."""
     answer = path.with_suffix(".json")
-    arguments = ["--background", "--factory-startup", "--python-exit-code", "3", "--python", str(SCRIPT)]
     done = subprocess.run(
-        [blender, *arguments, "--", str(path), str(answer), "60"],
+        [*blender, "--", str(path), str(answer), "60", *map(str, through)],
         capture_output=True,
         text=True,
         timeout=600,
@@ -53,14 +62,15 @@ def opened(blender: str, path: Path) -> dict:
     return json.loads(answer.read_text())
 
 
-@pytest.mark.parametrize("ending", ["bvh", "glb"])
+@pytest.mark.parametrize("ending", ["bvh", "glb", "usd", "fbx"])
 @pytest.mark.parametrize("name", ["human31", "human29"])
 def test_the_same_joints_in_every_frame(
-    make_run, tmp_path: Path, blender: str, ending: str, name: str
+    make_run, tmp_path: Path, blender: list[str], ending: str, name: str
 ) -> None:
     session, run = make_run(name, lambda body: track_of(moving_poses(body)))
-    report = export_run(session, run, FORMATS[ending], {"track": MADE}, tmp_path / f"walk.{ending}")
-    seen = opened(blender, report.files[0])
+    given = "glb" if ending == "fbx" else ending
+    report = export_run(session, run, FORMATS[given], {"track": MADE}, tmp_path / f"walk.{given}")
+    seen = opened(blender, report.files[0], *([tmp_path / "walk.fbx"] if ending == "fbx" else []))
     body = load_body(name)
     skeleton = skeleton_of(body)
     places, turns = followed(skeleton.tree.parents, *skeleton.animated(moving_poses(body)))
@@ -74,5 +84,5 @@ def test_the_same_joints_in_every_frame(
     print(f"Blender {seen['version']}, {ending} of {name}: {apart:.5f} mm, {angle:.6f} degrees")
     assert apart < LEAST_MM
     assert angle < LEAST_DEGREES
-    assert seen["skinned"] == (ending == "glb")
-    assert (seen["vertices"] > 0) == (ending == "glb")
+    assert seen["skinned"] == (ending != "bvh")
+    assert (seen["vertices"] > 0) == (ending != "bvh")
