@@ -5,6 +5,7 @@ threads that parse at the same moment may both end in "AST constructor recursion
 where four views of a frame are requested at once). Hence one lock.
 """
 
+import io
 import math
 import threading
 import zipfile
@@ -63,25 +64,33 @@ def read_archive(source: Path | IO[bytes], most: int = LARGEST_ARCHIVE) -> dict[
         return {member.filename.removesuffix(".npy"): _array(archive, member) for member in members}
 
 
+def read_array(content: bytes) -> NDArray[Any]:
+    """The array of a npy file's bytes; nothing in it can run. Raises ValueError, EOFError for what is no such array."""
+    return _read_array(io.BytesIO(content), "it", len(content))
+
+
 def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
     with archive.open(member) as stream:
-        with _one_at_a_time:
-            version = np.lib.format.read_magic(stream)
-            if version not in ((1, 0), (2, 0)):
-                raise ValueError(f"'{member.filename}' has the unknown version {version}")
-            head = (
-                np.lib.format.read_array_header_1_0
-                if version == (1, 0)
-                else np.lib.format.read_array_header_2_0
-            )
-            shape, by_column, kind = head(stream)
-        count = math.prod(shape)
-        if kind.hasobject or min(shape, default=0) < 0 or count * max(1, kind.itemsize) > member.file_size:
-            raise ValueError(f"'{member.filename}' is not an array of its size")
-        content = bytearray()
-        # Its checksum is compared at its end.
-        while chunk := stream.read(CHUNK):
-            content += chunk
-        if len(content) != count * kind.itemsize:
-            raise ValueError(f"'{member.filename}' has {len(content)} bytes, which is not an array's size")
-        return np.ndarray(shape, kind, content, order="F" if by_column else "C")
+        return _read_array(stream, f"'{member.filename}'", member.file_size)
+
+
+def _read_array(stream: IO[bytes], what: str, size: int) -> NDArray[Any]:
+    """size : bytes that the file has in all."""
+    with _one_at_a_time:
+        version = np.lib.format.read_magic(stream)
+        if version not in ((1, 0), (2, 0)):
+            raise ValueError(f"{what} has the unknown version {version}")
+        head = (
+            np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        )
+        shape, by_column, kind = head(stream)
+    count = math.prod(shape)
+    if kind.hasobject or min(shape, default=0) < 0 or count * max(1, kind.itemsize) > size:
+        raise ValueError(f"{what} is not an array of its size")
+    content = bytearray()
+    # Its checksum is compared at its end.
+    while chunk := stream.read(CHUNK):
+        content += chunk
+    if len(content) != count * kind.itemsize:
+        raise ValueError(f"{what} has {len(content)} bytes, which is not an array's size")
+    return np.ndarray(shape, kind, content, order="F" if by_column else "C")

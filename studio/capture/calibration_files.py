@@ -20,6 +20,8 @@ from studio.capture.calibration_easymocap import (
     is_easymocap,
     read_easymocap,
 )
+from studio.capture.calibration_opencap import FILE_NAME as OPENCAP_NAME
+from studio.capture.calibration_opencap import opencap_files, read_opencap
 from studio.capture.calibration_opencv import opencv_files, read_opencv
 from studio.capture.calibration_parts import AssumedCrop, FoundCameras, Intrinsics
 from studio.capture.calibration_qualisys import is_qualisys, read_qualisys
@@ -74,7 +76,7 @@ class Calibration:
     label : the file's (or folder's) name. unit_note : the unit found and how, a sentence. sources : the
     files, to be kept byte for byte. sizes_known : False where the format has no picture size and
     a stand-in takes its place.
-    crops : assumptions that an earlier import stored. notes : what was left out.
+    crops : assumptions that an earlier import stored. notes : what was left out. mm : millimetres in the file's unit.
     """
 
     label: str
@@ -84,6 +86,7 @@ class Calibration:
     sizes_known: bool = True
     crops: dict[str, AssumedCrop] = field(default_factory=dict[str, AssumedCrop])
     notes: tuple[str, ...] = ()
+    mm: float = 1.0
 
 
 def find_calibrations(folder: Path) -> tuple[Path, ...]:
@@ -180,7 +183,7 @@ def _of_other_tools(folder: Path) -> list[Path]:
     found = [path for path in files if is_qualisys(path) or added_reader(path)]
     if is_easymocap(folder):
         return [*found, folder / INTRINSICS]
-    if dannce_files(folder):
+    if dannce_files(folder) or opencap_files(folder):
         return [*found, folder]
     found += [path for path in files if is_label3d(path)]
     opened = opencv_files(folder)
@@ -206,10 +209,12 @@ def _read(path: Path) -> FoundCameras:
         return added(path)
     if suffix in STORAGE_SUFFIXES:
         return read_opencv(path)
+    if path.name == OPENCAP_NAME:
+        return read_opencap(path)
     if suffix in PICKLES:
         raise CalibrationError(
             f"'{path.name}' is a Python pickle, which can run any program when it is opened; it is not read.",
-            "Convert it where you trust it (Pose2Sim converts OpenCap's), and give the TOML.",
+            f"Convert it where you trust it, and give a TOML. OpenCap's are read: Videos/Cam0/{OPENCAP_NAME}, ….",
         )
     if suffix != ".toml":
         raise CalibrationError(
@@ -227,6 +232,8 @@ def _read_folder(folder: Path) -> FoundCameras:
         return read_easymocap(folder)
     if dannce_files(folder):
         return read_dannce(folder)
+    if opencap_files(folder):
+        return read_opencap(folder)
     if opencv_files(folder):
         return read_opencv(folder)
     raise CalibrationError(
@@ -249,7 +256,7 @@ def _finished(read: Calibration, unit: str, requested: str, turned: bool = False
     scaled = [dataclasses.replace(camera, translation=camera.translation * scale) for camera in cameras]
     if not turned:
         scaled = [dataclasses.replace(camera, quarter_turns=quarter_turns(camera)) for camera in scaled]
-    return dataclasses.replace(read, cameras=tuple(scaled), unit_note=note)
+    return dataclasses.replace(read, cameras=tuple(scaled), unit_note=note, mm=scale)
 
 
 def mm_of(unit: str) -> float:

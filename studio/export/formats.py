@@ -145,8 +145,9 @@ _OWN = (
     ExportFormat(
         "h5",
         "SLEAP analysis file",
-        "Opens in movement and keypoint-moseq, as SLEAP's analysis.h5 with three coordinates. Needs the extra labs.",
-        POINTS,
+        "Opens in movement and keypoint-moseq, as SLEAP's analysis.h5 with three coordinates; or in pandas, as"
+        " DeepLabCut's points in space (layout). Needs the extra labs.",
+        (*POINTS, "layout"),
         write_sleap,
         unit="mm",
         up="z",

@@ -72,7 +72,8 @@ class ExportOptions:
         OWN,
         label="table layout",
         choices=(OWN, "deeplabcut", "anipose"),
-        help="Of the CSV: the studio's own, with angles; or points alone, as DeepLabCut's or anipose's tools read it.",
+        help="Of a CSV: the studio's own, with angles; or points alone, as DeepLabCut's or anipose's tools read it. Of"
+        " an H5: SLEAP's (own), or DeepLabCut's.",
     )
     split: bool = knob(False, help="More frames than the format counts go into several files.")
     camera: str = knob("", help="Only this camera's video; none: one video a camera.")

@@ -9,7 +9,10 @@ import json
 
 import numpy as np
 
+from studio.errors import ExportError
+from studio.export.deeplabcut_writing import write_deeplabcut
 from studio.export.marker_files import marked_points, unit_and_point_notes
+from studio.export.options import OWN
 from studio.export.task import ExportTask, Written, agreed, apart
 from studio.extras import load_extra
 
@@ -17,12 +20,19 @@ EXTRA = "labs"
 
 
 def write_sleap(task: ExportTask) -> Written:
-    """Write one track of M points over K frames and read it back.
+    """Write one track of M points (as DeepLabCut does, where that layout is requested) over K frames and read it back.
 
     tracks (1, 3, M, K) in the requested unit, NaN in gaps; point_scores (1, M, K) and instance_scores (1, K), the
     frame's confidence; track_occupancy (K, 1). Raises StudioError without the extra, ExportError where the file does
     not read back.
     """
+    if task.options.layout == "deeplabcut":
+        return write_deeplabcut(task)
+    if task.options.layout != OWN:
+        raise ExportError(
+            f"'{task.options.layout}' has no HDF5 file of points.",
+            "Choose the layout own (SLEAP's analysis file) or deeplabcut, or export to .csv.",
+        )
     h5 = load_extra("h5py", EXTRA)
     points, places = marked_points(task)
     count, confidence = len(places), task.motion.confidence

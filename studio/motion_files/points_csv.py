@@ -6,15 +6,16 @@ Either a row a point, or a row a frame (as anipose writes them):
     0,Nose,95.3,7.9,546.0                 0,95.3,7.9,546.0,143.2,47.7,503.6
 
 Separated by commas, semicolons or tabs. Other columns are ignored. Instead of frames there may be a column of seconds
-(`time`). The unit stands behind x, y and z (`x_mm`, `x_cm`, `x_m`, in rows of frames `Nose_x_mm`); without one it is
-mm. A point that is missing has no row, blank cells or exact zeros. Where columns are separated by semicolons or tabs, a
-comma in a number is a decimal one. Tables of other programs: `points_tables`.
+(`time`); without either the rows are counted from 0. The unit stands behind x, y and z (`x_mm`, `x_cm`, `x_m`, in
+rows of frames `Nose_x_mm`); without one it is mm. A point that is missing has no row, blank cells or exact zeros. Where
+columns are separated by semicolons or tabs, a comma in a number is a decimal one. Tables of other programs:
+`points_tables`.
 """
 
 import csv
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +32,7 @@ from studio.motion_files.trc import (
     without_zeros,
 )
 
-FRAME = ("frame", "frames", "frame_number", "fnum", "frame_index")
+FRAME = ("frame", "frames", "frame_number", "fnum", "frame_index", "sync_index")
 TIME = ("time", "time_s", "seconds")
 POINT = ("point", "name", "marker", "label", "bodypart", "keypoint", "node")
 SEPARATORS = (",", ";", "\t")
@@ -43,8 +44,9 @@ SHAPE = "Give a header such as frame,point,x_mm,y_mm,z_mm, or frame,Nose_x,Nose_
 
 @dataclass(frozen=True, slots=True)
 class _Columns:
-    """Where things stand. place : of frame or time. timed : whether that is a time. point : of the name, -1 in a file
-    with a row a frame. axes : name ("" with a row a point) → columns of x, y, z. unit : "" where none is named.
+    """Where things stand. place : of frame or time, -1 where rows are counted. timed : whether that is a time. point :
+    of the name, -1 in a file with a row a frame. axes : name ("" with a row a point) → columns of x, y, z. unit : ""
+    where none is named.
     """
 
     place: int
@@ -73,7 +75,7 @@ def _motion(path: Path, rows: Iterable[Sequence[str]], fps: float) -> MarkerMoti
     columns: _Columns | None = None
     found: dict[tuple[int, str], tuple[float, float, float]] = {}
     names: dict[str, None] = {}
-    width = 0
+    width = counted = 0
     for number, row in enumerate(rows, 1):
         cells = list(row)
         while columns is not None and len(cells) > width and not cells[-1]:
@@ -88,7 +90,10 @@ def _motion(path: Path, rows: Iterable[Sequence[str]], fps: float) -> MarkerMoti
                 f"'{path.name}' line {number} has {len(cells)} columns, the header {width}.",
                 "One cell a number, missing ones blank; numbers with a decimal comma need semicolons between cells.",
             )
-        frame = _frame(path, number, cells[columns.place], columns.timed, fps)
+        if columns.place < 0:
+            frame, counted = counted, counted + 1
+        else:
+            frame = _frame(path, number, cells[columns.place], columns.timed, fps)
         for name, axes in columns.axes.items():
             point = name if columns.point < 0 else cells[columns.point]
             if not point:
@@ -102,7 +107,11 @@ def _motion(path: Path, rows: Iterable[Sequence[str]], fps: float) -> MarkerMoti
             found[frame, point] = _place(path, number, point, [cells[at] for at in axes])
     if columns is None or not found:
         raise TruthError(f"'{path.name}' has no rows of points.", SHAPE)
-    return _filled(path, found, tuple(names), columns.unit, fps)
+    motion = _filled(path, found, tuple(names), columns.unit, fps)
+    if columns.place >= 0:
+        return motion
+    note = f"'{path.name}' has no column of frames: its rows were counted from 0."
+    return replace(motion, notes=(*motion.notes, note))
 
 
 def _filled(
@@ -135,9 +144,9 @@ def _columns(path: Path, header: Sequence[str]) -> _Columns:
     if twice:
         raise TruthError(f"'{path.name}' has two columns '{twice[0]}'.", "Give each column its own name.")
     place = next((names.index(name) for name in (*FRAME, *TIME) if name in names), -1)
-    if place < 0:
-        raise TruthError(f"'{path.name}' has no column of frames or times.", SHAPE)
     point = next((names.index(name) for name in POINT if name in names), -1)
+    if place < 0 and point >= 0:
+        raise TruthError(f"'{path.name}' has no column of frames or times.", SHAPE)
     found: dict[str, dict[str, tuple[int, str]]] = {}
     for column, name in enumerate(header):
         parts = name.split("_")
@@ -159,7 +168,7 @@ def _columns(path: Path, header: Sequence[str]) -> _Columns:
             "Give all coordinates in one unit.",
         )
     places = {owner: (axes["x"][0], axes["y"][0], axes["z"][0]) for owner, axes in found.items()}
-    return _Columns(place, names[place] in TIME, point, places, units.pop())
+    return _Columns(place, place >= 0 and names[place] in TIME, point, places, units.pop())
 
 
 def _frame(path: Path, number: int, text: str, timed: bool, fps: float) -> int:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from studio.errors import TruthError
+from studio.motion_files.points_arrays import read_points_h5, read_points_mat, read_points_npy
 from studio.motion_files.points_csv import read_points
 from studio.motion_files.trc import MarkerMotion, read_trc
 
@@ -14,10 +15,14 @@ READERS: Mapping[str, Callable[[Path, float, str], MarkerMotion]] = {
     ".trc": lambda path, fps, up: read_trc(path, up),
     ".csv": lambda path, fps, up: read_points(path, fps),
     ".tsv": lambda path, fps, up: read_points(path, fps),
+    ".h5": lambda path, fps, up: read_points_h5(path, fps),
+    ".nwb": lambda path, fps, up: read_points_h5(path, fps),
+    ".npy": lambda path, fps, up: read_points_npy(path, fps),
+    ".mat": lambda path, fps, up: read_points_mat(path, fps),
 }
 """Ending → reader of a file, the footage's frames per second and the file's axis that points up ("" as it shows). A TRC
-is in the session's world, a table in its own."""
-ANY_WORLD = (".csv", ".tsv")
+is in the session's world, any other in its own."""
+ANY_WORLD = (".csv", ".tsv", ".h5", ".nwb", ".npy", ".mat")
 """Endings of files whose world is their own."""
 
 
@@ -27,9 +32,7 @@ def read_truth(path: Path, fps: float, frame_count: int = 0, up: str = "") -> Ma
     """
     reader = READERS.get(path.suffix.lower())
     if reader is None:
-        raise TruthError(
-            f"'{path.name}' is no truth that can be read.", f"Give a {' or '.join(READERS)} file."
-        )
+        raise TruthError(f"'{path.name}' is no truth that can be read.", f"Give a {', '.join(READERS)} file.")
     return _counted_from_0(path, reader(path, fps, up), fps, frame_count)
 
 

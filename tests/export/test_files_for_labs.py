@@ -14,10 +14,11 @@ from export_runs import FRAMES, MADE, moving_poses, track_of
 
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
-from studio.errors import StudioError
+from studio.errors import ExportError, StudioError
 from studio.export.exporting import export_run
 from studio.export.formats import FORMATS
 from studio.export.naming import points_of
+from studio.motion_files.truth_files import read_truth
 
 LEAST_MM = 0.1
 CAMERAS = 1
@@ -96,6 +97,31 @@ def test_pandas_reads_the_layout_of_deeplabcut(exported) -> None:
     by_point = table["capture studio"]
     got = np.stack([by_point[name][["x", "y", "z"]].to_numpy() for name in names], axis=1)
     np.testing.assert_allclose(got, places, atol=LEAST_MM, equal_nan=True)
+
+
+def test_pandas_reads_the_h5_of_deeplabcut(exported) -> None:
+    names, places = wanted()
+    path = exported("h5", layout="deeplabcut", unit="cm")
+    table = pandas.read_hdf(path)
+    assert table.columns.names == ["scorer", "bodyparts", "coords"]
+    assert list(table.index) == list(range(FRAMES))
+    got = np.stack([table["capture studio"][name].to_numpy() for name in names], axis=1)
+    np.testing.assert_allclose(got * 10.0, places, atol=LEAST_MM, equal_nan=True)
+    with pytest.raises(ExportError, match="anipose"):
+        exported("h5", layout="anipose")
+
+
+@pytest.mark.parametrize(
+    ("name", "requested"),
+    [("h5", {}), ("h5", {"layout": "deeplabcut"}), ("nwb", {}), ("csv", {"layout": "deeplabcut"})],
+)
+def test_what_is_written_for_labs_is_read_as_truth(exported, name: str, requested: dict[str, str]) -> None:
+    names, places = wanted()
+    motion = read_truth(exported(name, **requested), 60.0)
+    assert set(motion.names) == set(names)
+    got = motion.positions[:, [motion.names.index(one) for one in names]]
+    np.testing.assert_allclose(got, places[: len(got)], atol=LEAST_MM, equal_nan=True)
+    assert len(got) == FRAMES
 
 
 def test_the_layout_of_anipose_has_its_columns(exported) -> None:

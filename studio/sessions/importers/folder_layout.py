@@ -17,6 +17,8 @@ Layouts of other tools, and the places of footage, calibration, masks and times 
                 a tracker's folder, which holds its own copy
     anipose     videos-raw/, several takes distinguished by their names, and calibration/
     EasyMocap   intri.yml with extri.yml, videos/ or images/
+    OpenCap     Videos/<camera>/InputMedia/<trial>/, and the camera's pickle in Videos/<camera>/
+    DANNCE      videos/<camera>/0.mp4, calibration/*.mat or the label3d file that io.yaml names
     Pose2Sim    Config.toml in a trial or above trials; <trial>/videos/, calibration*/ in the trial or above it
 
 Anything else is read as the studio's own layout (`folder_layout`). A folder above several trials names them.
@@ -38,6 +40,7 @@ from studio.capture.video import VIDEO_SUFFIXES
 from studio.errors import CalibrationError, FootageError
 from studio.motion_files.truth_files import READERS
 from studio.sessions.importers.plan import SourcePlan
+from studio.sessions.importers.points_of_tools import DANNCE_PROJECT, label3d_of, points_of_tool
 from studio.sessions.manifest import FILE_NAME, read_manifest
 
 FOOTAGE_FOLDERS = ("videos", "videos/synchronized", "synchronized_videos", "videos-raw", "pictures", "images")
@@ -80,7 +83,8 @@ class Layout:
 
     title : of the layout. folder : of everything but the calibration. calibrations : folders
     to look for it, the first one that has any. footage : videos and picture folders, natural order. timestamps : a
-    recorder's times, None without. names : cameras of footage that its folder, not its file, is named after.
+    recorder's times, None without. names : cameras of footage that its folder, not its file, is named after. take : the
+    name of what was chosen of several in the folder.
     """
 
     title: str
@@ -89,6 +93,7 @@ class Layout:
     calibrations: tuple[Path, ...]
     timestamps: Path | None = None
     names: Mapping[Path, str] = field(default_factory=dict[Path, str])
+    take: str = ""
 
 
 def recognise(source: Path) -> Layout:
@@ -117,6 +122,8 @@ def recognise(source: Path) -> Layout:
         return _timed(
             "Caliscope recording", source, loose_footage(source) or footage, (source, *snapshots[-1:])
         )
+    if (source / DANNCE_PROJECT).is_file():
+        return _timed("DANNCE project", source, footage or loose_footage(source), own)
     if (source / "Config.toml").is_file():
         return _timed("Pose2Sim trial", source, footage or loose_footage(source), own)
     return _timed("folder in the studio's layout", source, footage or loose_footage(source), own)
@@ -126,6 +133,8 @@ def trials_of(source: Path) -> dict[str, Layout]:
     """The trials below a folder that holds none itself, by name; empty if there are none."""
     if is_caliscope(source):
         return {take.folder.name: take for take in _caliscope_takes(source)}
+    if is_opencap(source):
+        return _opencap_trials(source)
     found: dict[str, Layout] = {}
     for folder in _folders_below(source, DEEPEST_TRIAL):
         if any(folder.is_relative_to(layout.folder) for layout in found.values()):
@@ -150,6 +159,44 @@ def is_caliscope(source: Path) -> bool:
         source / CALISCOPE_ARRAY,
     )
     return (source / "recordings").is_dir() and any(mark.exists() for mark in marks)
+
+
+def is_opencap(source: Path) -> bool:
+    """Whether a folder is a session that OpenCap offers for download."""
+    return bool(_opencap_cameras(source))
+
+
+def _opencap_cameras(source: Path) -> list[Path]:
+    folders = (source / "Videos").iterdir() if (source / "Videos").is_dir() else ()
+    found = [path for path in folders if (path / "InputMedia").is_dir() and not path.is_symlink()]
+    return sorted(found, key=lambda path: natural_key(path.name))
+
+
+def _opencap_trials(source: Path) -> dict[str, Layout]:
+    """The trials that every camera has a video of, without that of the board. Of a trial's videos the synchronised one
+    is taken.
+    """
+    cameras = _opencap_cameras(source)
+    videos: dict[str, dict[str, Path]] = {}
+    for camera in cameras:
+        for folder in sorted((camera / "InputMedia").iterdir(), key=lambda path: natural_key(path.name)):
+            found = [path for path in entries(folder) if path.is_file()]
+            synchronised = [path for path in found if path.stem.endswith("_sync")] or found
+            if len(synchronised) == 1 and folder.name.lower() != "calibration":
+                videos.setdefault(folder.name, {})[camera.name] = synchronised[0]
+    places = (*calibration_folders(source), source / "Videos", source)
+    return {
+        trial: Layout(
+            "OpenCap session",
+            source,
+            tuple(found.values()),
+            places,
+            names={video: camera for camera, video in found.items()},
+            take=trial,
+        )
+        for trial, found in videos.items()
+        if len(found) == len(cameras)
+    }
 
 
 def takes_by_name(footage: tuple[Path, ...]) -> dict[str, tuple[Path, ...]]:
@@ -323,20 +370,23 @@ def plan_folder(
     session = read_manifest(folder) if (folder / FILE_NAME).is_file() else None
     kept = session.footage.cameras if session else ()
     try:
-        wanted, chosen = _calibration(folder, layout.calibrations, calibration), True
+        wanted, chosen = _calibration(folder, layout.calibrations, calibration or label3d_of(folder)), True
     except CalibrationError:
         if not bare or calibration is not None:
             raise
         wanted, chosen = folder, False
     calibration_note = f"calibration '{wanted.name}'" if chosen else "without a calibration"
     above = "" if folder == source else f" in '{source.name}'"
+    truth = _truths(folder / "truth")
+    points, several = (None, "") if truth or session else points_of_tool(folder, layout.take)
     return SourcePlan(
         source=folder,
         calibration=wanted if chosen else None,
         footage=footage,
         masks=next((found for name in MASK_FOLDERS if (found := entries(folder / name))), ()),
         backgrounds=_backgrounds(folder / "background") or _backgrounds(folder / "backgrounds"),
-        truth=_truths(folder / "truth"),
+        truth=truth,
+        points=points,
         bodies=body_files(folder / "bodies"),
         fps=session.fps if session else None,
         subject_file=_file(folder / "subject.toml"),
@@ -344,7 +394,10 @@ def plan_folder(
         sigma_file=_file(folder / "sigma.csv"),
         tracker=session.tracker if session else "",
         weighting=session.weighting if session else "",
-        notes=(f"Taken for a {layout.title}: '{folder.name}'{above}, {calibration_note}.",),
+        notes=(
+            f"Taken for a {layout.title}: '{folder.name}'{above}, {calibration_note}.",
+            *([several] if several else []),
+        ),
         layout=layout.title,
         timestamps=layout.timestamps,
         names=layout.names,
@@ -370,7 +423,7 @@ def choose_calibration(source: Path, choice: Path | str | None) -> Path:
 
 def _chosen(source: Path, trial: str | None) -> tuple[Layout, tuple[Path, ...]]:
     """The trial to take and its footage. Raises FootageError."""
-    layout = None if is_caliscope(source) else recognise(source)
+    layout = None if is_caliscope(source) or is_opencap(source) else recognise(source)
     if layout is not None and not layout.footage and not trials_of(source):
         cameras = folders_of_cameras(source)
         names = {video: name for name, video in cameras.items()}
@@ -389,7 +442,8 @@ def _chosen(source: Path, trial: str | None) -> tuple[Layout, tuple[Path, ...]]:
         trial = None
     takes = takes_by_name(layout.footage) if not layout.names else {}
     if takes:
-        return layout, takes[_one_of(layout.folder, tuple(takes), trial)]
+        take = _one_of(layout.folder, tuple(takes), trial)
+        return replace(layout, take=take), takes[take]
     if trial is not None:
         raise FootageError(
             f"'{source.name}' is one trial and holds none named '{trial}'.",

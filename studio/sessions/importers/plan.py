@@ -8,6 +8,7 @@ from typing import Literal
 from studio.arrays import Array
 from studio.body.subject import Subject
 from studio.capture.interlacing import Fields
+from studio.sessions.importers.points_of_tools import ToolPoints
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +24,7 @@ class SourcePlan:
     offsets, rotations : given by hand, by the name of a camera or its footage. masks_inverted : black is the person.
     fields : the earlier field of footage that was split into its fields before, by camera. split : as of
     `ImportOptions.fields`. names : cameras of footage that its folder is named after.
+    points : what the tool that made the folder left.
     """
 
     source: Path
@@ -51,6 +53,7 @@ class SourcePlan:
     fields: Mapping[str, Fields] = field(default_factory=dict[str, Fields])
     split: Literal["", "auto", "top", "bottom"] = ""
     names: Mapping[Path, str] = field(default_factory=dict[Path, str])
+    points: ToolPoints | None = None
 
     def part_name(self, path: Path) -> str:
         """The name by which a video (without suffix) or folder is matched with a camera."""
@@ -61,6 +64,7 @@ class SourcePlan:
         return replace(
             self,
             truth=(),
+            points=None,
             bodies=(),
             subject=None,
             subject_file=None,

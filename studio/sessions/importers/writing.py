@@ -1,5 +1,6 @@
 """A measured source written as a session: into a hidden folder beside its place, then renamed into it."""
 
+import math
 import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -21,7 +22,7 @@ from studio.capture.calibration_files import (
 from studio.capture.calibration_toml import is_canonical
 from studio.capture.footage_source import CameraSource, FootageSource
 from studio.capture.pictures import list_pictures
-from studio.errors import SessionError
+from studio.errors import SessionError, StudioError
 from studio.motion_files.trc import MarkerMotion, read_trc, write_trc
 from studio.motion_files.truth_files import ANY_WORLD, read_truth
 from studio.progress import Progress
@@ -29,6 +30,7 @@ from studio.sessions.atomic_files import write_text
 from studio.sessions.importers.mask_forms import write_meant_masks
 from studio.sessions.importers.measuring import MeasuredSource
 from studio.sessions.importers.plan import SourcePlan
+from studio.sessions.importers.points_of_tools import ToolPoints
 from studio.sessions.manifest import SessionManifest, now, write_manifest
 from studio.sessions.named_rows import (
     check_radians,
@@ -108,6 +110,14 @@ def carried_truth(
     """
     found: dict[str, MarkerMotion] = {}
     notes: list[str] = []
+    if plan.points is not None and plan.calibration is not None:
+        path = plan.points.path
+        try:
+            own = read_calibration(plan.calibration, unit)
+            found[path.stem], said = _of_tool(plan.points, own, calibration, fps, frame_count)
+            notes += said
+        except StudioError as problem:
+            notes.append(f"The points '{path.name}' were not taken for the truth: {problem}")
     for path in plan.truth:
         if path.suffix.lower() not in ANY_WORLD:
             motion = read_truth(path, fps, frame_count)
@@ -122,6 +132,8 @@ def carried_truth(
         place = beside[0] if beside else plan.calibration
         own = read_calibration(place) if beside else read_calibration(place, unit)
         motion = read_truth(path, fps, frame_count)
+        if not motion.unit and own.mm > 1.0 and _spread(motion) < MOST_METRES:
+            motion = _in_unit_of(own, motion, place.name)
         notes += motion.notes
         positions, missed = carried(motion.positions, own.cameras, calibration.cameras)
         found[path.stem] = replace(motion, positions=positions, unit="mm")
@@ -130,6 +142,50 @@ def carried_truth(
             f" cameras see them ({missed:.1f} px off in the median)."
         )
     return found, tuple(notes)
+
+
+MOST_METRES = 10.0
+"""A body's points are within so many m, and not within so few mm."""
+
+
+def _of_tool(
+    points: ToolPoints, own: Calibration, calibration: Calibration, fps: float, frame_count: int
+) -> tuple[MarkerMotion, list[str]]:
+    """The points that a tool left, in the session's world, and notes. own : the calibration as its file has it.
+
+    Raises TruthError, CalibrationError.
+    """
+    path = points.path
+    # Pose2Sim and OpenCap always turn the calibration's z up to a TRC's y.
+    motion = read_truth(path, fps, frame_count, "y" if path.suffix.lower() == ".trc" else "")
+    if not points.placed:
+        note = (
+            f"The points '{path.name}' were taken for the truth. Their world is not the calibration's: measure with"
+            " --align rigid."
+        )
+        return replace(motion, unit="mm"), [*motion.notes, note]
+    if not motion.unit:
+        motion = _in_unit_of(own, motion, own.label)
+    positions, missed = carried(motion.positions, own.cameras, calibration.cameras)
+    note = f"The points '{path.name}' were taken for the truth ({missed:.1f} px off in the median)."
+    return replace(motion, positions=positions, unit="mm"), [*motion.notes, note]
+
+
+def _in_unit_of(own: Calibration, motion: MarkerMotion, name: str) -> MarkerMotion:
+    """Points of a table that names no unit, read as mm, in the calibration's."""
+    if own.mm == 1.0:
+        return motion
+    note = f"The points name no unit: they were taken to be in that of '{name}' ({own.mm:g} mm)."
+    return replace(motion, positions=motion.positions * own.mm, notes=(*motion.notes, note))
+
+
+def _spread(motion: MarkerMotion) -> float:
+    """How far a frame's points lie apart along an axis, in the median."""
+    known = np.isfinite(motion.positions).sum(axis=2) == 3
+    there = motion.positions[known.sum(axis=1) > 0]
+    if not len(there):
+        return math.inf
+    return float(np.median(np.nanmax(there, axis=1) - np.nanmin(there, axis=1), axis=0).max())
 
 
 def check_room(plan: SourcePlan, into: Path) -> None:
@@ -278,8 +334,11 @@ def write_calibrations(folder: Path, calibration: Calibration, measured: Measure
         shutil.copyfile(sources[0], place / f"original{ending}")
     else:
         (place / "original").mkdir()
+        names = [path.name for path in sources]
         for path in sources:
-            shutil.copyfile(path, place / "original" / path.name)
+            # OpenCap's lie in folders that are named after their cameras, all under one name.
+            own = path.name if names.count(path.name) == 1 else f"{path.parent.name}-{path.name}"
+            shutil.copyfile(path, place / "original" / own)
     crops = {entry.camera.name: entry.crop for entry in measured.cameras if entry.crop is not None}
     write_calibration(tuple(entry.camera for entry in measured.cameras), place / "cameras.toml", crops)
 
