@@ -8,6 +8,7 @@ this relay sends.
 
 import asyncio
 import gzip
+import hashlib
 from functools import cache
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from websockets.typing import Subprotocol
 
 from studio.errors import StudioError
 from studio.foreign_files import read_file
+from studio.runs.self_contained import assets_folder
 from studio.server.access import VIEWING
 from studio.server.app_state import AppState
 from studio.server.windows import WindowInPath
@@ -38,13 +40,14 @@ class SceneMissingError(StudioError, status=500, code="scene"):
 
 
 @cache
-def client_page() -> tuple[bytes, bytes]:
-    """viser's client from the installed wheel, as it is and gzipped."""
+def client_page() -> tuple[bytes, bytes, str]:
+    """viser's client from the installed wheel, with our script put first: as it is, gzipped, and its tag."""
     path = Path(viser.__file__).parent / "client" / "build" / "index.html"
     if not path.is_file():
         raise SceneMissingError("viser's page is missing from its package.", "Install viser again.")
-    content = read_file(path)
-    return content, gzip.compress(content, 6)
+    own = b"<head><script>" + read_file(assets_folder() / "js" / "scene_context.js") + b"</script>"
+    content = read_file(path).replace(b"<head>", own, 1)
+    return content, gzip.compress(content, 6), f'"{hashlib.sha256(content).hexdigest()}"'
 
 
 @router.get("/scene")
@@ -58,9 +61,8 @@ def scene_without_slash(request: Request) -> Response:
 @router.get("/scene/{window}/")
 def scene_page(request: Request) -> Response:
     """viser's client, the same for every window."""
-    plain, packed = client_page()
+    plain, packed, tag = client_page()
     # The browser keeps the page and asks whether it changed: the client must be of the server's version.
-    tag = f'"viser-{viser.__version__}"'
     headers = {"cache-control": "no-cache", "etag": tag, "vary": "accept-encoding"}
     if request.headers.get("if-none-match") == tag:
         return Response(status_code=304, headers=headers)

@@ -19,7 +19,12 @@ const look = () => ({ dark: theme() === "dark" });
 const show = (change) => post("/api/scene/view", change).catch(() => {});
 
 /** Put a new scene into the page's theme, and take out what this browser would draw too slowly. */
-export const dressScene = () => show({ ...look(), ...(drawsInSoftware() ? { options: { shadows: false } } : {}) });
+export function dressScene() {
+  // `scene_context.js` reads it too, inside the scene's own page.
+  const looks = document.documentElement.dataset;
+  looks.drawing ??= drawsInSoftware() ? "software" : "card";
+  show({ ...look(), ...(looks.drawing === "software" ? { options: { shadows: false } } : {}) });
+}
 
 /** Load the scene into a frame; returns the frame. */
 export function loadScene(frame) {
