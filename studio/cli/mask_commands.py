@@ -42,12 +42,24 @@ OWN = (
     click.option(
         "--frames", default="", metavar="A,B,…", help="In which frames; default: five, evenly spread."
     ),
+    click.option(
+        "--pictures",
+        type=click.Path(path_type=Path),
+        metavar="FOLDER",
+        help="With --quality: a picture a camera there, in which is outlined what is like the background.",
+    ),
 )
 
 
 @command_of(background, *OWN, without=("source", "plates", "exclude", "exclude_unused"))
 def background_command(
-    call: Call, source: str | None, plates: Sequence[str], exclude: Sequence[str], quality: bool, frames: str
+    call: Call,
+    source: str | None,
+    plates: Sequence[str],
+    exclude: Sequence[str],
+    quality: bool,
+    frames: str,
+    pictures: Path | None,
 ) -> dict[str, object]:
     session: Session = call.given["session"]
     if plates:
@@ -65,8 +77,8 @@ def background_command(
         call(session=session, source=source, exclude_unused=UNUSED in exclude)
         session = Session(session.path)
     comparable = len(session.manifest.footage.cameras) > 1 and session.is_calibrated
-    if quality or (comparable if source is not None else not plates and not exclude):
-        return _answer(session, call.do(mask_quality, frames=frame_numbers(frames)))
+    if quality or pictures or (comparable if source is not None else not plates and not exclude):
+        return _answer(session, call.do(mask_quality, frames=frame_numbers(frames), pictures=pictures))
     return _answer(session, None)
 
 
@@ -84,6 +96,12 @@ def _answer(session: Session, found: MaskQuality | None) -> dict[str, object]:
             f"Masks that agree so little are of no use. 'studio background {session.name} --source best' tries every"
             " source and takes the one under which the views agree."
         )
+    contrast = found.contrast
+    if contrast is not None and contrast.low:
+        lines.append(f"{_sentence(contrast.in_words())}. {contrast.remedy()}")
+        lines.append(f"'studio background {session.name} --quality --pictures FOLDER' draws where.")
+    elif found.agreeing and not found.usable:
+        lines.append(f"The views agree, but {found.why_not_confirmed()}: look at the masks yourself.")
     if found.subjects > 1:
         lines.append(
             f"{found.subjects} subjects are in view: say which one with --subject-at X,Y"
@@ -98,12 +116,25 @@ def _answer(session: Session, found: MaskQuality | None) -> dict[str, object]:
             {name: getattr(view, name) for name in names} | {"note": view.in_words()} for view in found.views
         ],
         "usable": found.usable,
+        "contrast": None
+        if contrast is None
+        else {
+            "low": contrast.low,
+            "words": contrast.in_words(),
+            "remedy": contrast.remedy(),
+            "pose": contrast.pose,
+        }
+        | {"cameras": [msgspec.to_builtins(view) for view in contrast.views]},
         "subjects": found.subjects,
         "doubts": [msgspec.to_builtins(finding) for finding in found.doubts],
         "hull_litres": list(found.hull_litres),
         "settings": knobs,
         "text": "\n".join(lines),
     }
+
+
+def _sentence(words: str) -> str:
+    return words[0].upper() + words[1:]
 
 
 def _has_own_masks(session: Session) -> bool:

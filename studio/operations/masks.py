@@ -14,6 +14,7 @@ from studio.foreign_files import read_file
 from studio.operations.opening import SessionName, keeping_in_place, open_session
 from studio.operations.progress import Reporting, reporting, say
 from studio.runs.background_setup import BackgroundSetup, BackgroundSource, set_up_background
+from studio.runs.contrast import draw_contrast
 from studio.runs.mask_quality import MaskQuality, measure_masks
 from studio.sessions.background_files import polygon_exclusion, set_backgrounds, set_exclusion
 from studio.sessions.session import Session
@@ -85,7 +86,9 @@ def background(
     the masks made of it).
 
     Agreement is the smaller of two shares: of a camera's mask that the visual hull of all views covers, and of the
-    hull's silhouette that lies in the mask. From 0.9 on masks are called usable.
+    hull's silhouette that lies in the mask. From 0.9 on masks are called usable, unless subject and background are
+    alike in colour: then all masks may lack the same part. Where that is so, "best" is tried as well, unless `tune` is
+    off.
 
     Raises FootageError for a source that is not there, SettingsError for a knob; then nothing is changed.
     """
@@ -118,15 +121,25 @@ def mask_quality(
         Sequence[int], Field(max_length=24, description="To look at; default: five, evenly spread.")
     ] = (),
     *,
+    pictures: Annotated[
+        str | Path | None,
+        Field(description="Folder for a picture a camera, in which is outlined what is like the background."),
+        Terminal(metavar="FOLDER"),
+        Web(left_out=True),
+    ] = None,
     progress: Reporting = None,
 ) -> MaskQuality:
-    """How far the masks agree in the hull, camera by camera, and what the silhouettes say against the calibration.
+    """How far the masks agree in the hull, camera by camera, whether subject and background can be told apart, and what
+    the silhouettes say against the calibration.
 
     Without frames it is remembered; then a fault that makes results wrong keeps tracking from beginning.
     """
     opened = open_session(session)
     with reporting(progress, f"{opened.name}: masks") as report:
-        return measure_masks(opened, frames, report)
+        found = measure_masks(opened, frames, report)
+    if pictures is not None and found.contrast is not None:
+        say(progress, [f"Picture {path}" for path in draw_contrast(opened, found.contrast, Path(pictures))])
+    return found
 
 
 def exclude_region(session: Session, camera: str, region: ArrayLike | str | Path | None) -> None:

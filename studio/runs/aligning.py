@@ -10,7 +10,7 @@ from studio.calibration.silhouette_alignment import AlignedCameras, aligned_came
 from studio.calibration.silhouette_checks import outlines_of
 from studio.errors import CalibrationError
 from studio.progress import Progress, unheard
-from studio.runs.mask_quality import spread_frames
+from studio.runs.person_hull import spread_frames
 from studio.runs.session_settings import masks_of
 from studio.runs.silhouette_doubts import person_alone
 from studio.sessions.calibration_changes import CalibrationChange, NewCalibration, replace_calibration

@@ -34,24 +34,11 @@ from studio.evidence.settings import EvidenceSettings
 from studio.evidence.strokes import Stroke
 from studio.geometry.camera import Camera
 from studio.progress import Progress, unheard
-from studio.runs.best_source import (
-    SampledMasks,
-    SourceChoice,
-    border_support,
-    can_be_subject,
-    choose_sources,
-)
+from studio.runs.best_source import SampledMasks, SourceChoice, can_be_subject, choose_sources
 from studio.runs.clean_plates import clean_plates
-from studio.runs.mask_quality import (
-    JUDGED_SIDE,
-    ROUGH,
-    FrameCounts,
-    MaskQuality,
-    count_frame,
-    mask_quality,
-    spread_frames,
-    summed,
-)
+from studio.runs.contrast import border_support, measure_contrast
+from studio.runs.mask_quality import FrameCounts, MaskQuality, count_frame, mask_quality, summed
+from studio.runs.person_hull import JUDGED_SIDE, ROUGH, spread_frames
 from studio.runs.person_masks import person_masks
 from studio.runs.projected_masks import projected_masks
 from studio.runs.session_settings import masks_of, session_settings
@@ -184,6 +171,10 @@ def set_up_background(
             made = BackgroundSetup(source, {}, (), None)
         else:
             made = _set_up(session, source, wanted, progress)
+            if tune and made.quality is not None and _tells_too_little(made.quality):
+                made = _tried_besides(
+                    made, made.quality, _set_up_best(Session(session.path), wanted, progress)
+                )
         if subject_at is not None:
             made = _cut_to_subject(Session(session.path), subject_at, made, progress)
     except BaseException:
@@ -198,6 +189,19 @@ def set_up_background(
         raise
     forget_unused_masks(Session(session.path))
     return made
+
+
+def _tells_too_little(quality: MaskQuality) -> bool:
+    """Whether the views agree, but a subject of low contrast: about what all masks lack, too."""
+    return quality.agreeing and quality.contrast is not None and quality.contrast.low
+
+
+def _tried_besides(made: BackgroundSetup, quality: MaskQuality, best: BackgroundSetup) -> BackgroundSetup:
+    """What "best" made after a source of low contrast, and why it was tried. quality : of the source's masks."""
+    assert quality.contrast is not None
+    words = quality.contrast.in_words()
+    note = f"{words[0].upper()}{words[1:]}: every source was tried besides {made.source}."
+    return dataclasses.replace(best, notes=(*made.notes, note, *best.notes))
 
 
 @dataclass(frozen=True, slots=True)
@@ -455,7 +459,8 @@ def _tuned(
         best = max(best, *map(tried, cleaned), key=lambda one: one[0])
     finally:
         footage.close()
-    return best[1], best[2]
+    contrast = measure_contrast(session, _settings(session, best[1]), progress=report)
+    return best[1], dataclasses.replace(best[2], contrast=contrast)
 
 
 class _Trying:

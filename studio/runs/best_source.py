@@ -12,21 +12,19 @@ import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from studio.arrays import Bytes
 from studio.errors import FootageError
 from studio.geometry.camera import Camera
 from studio.progress import Progress
-from studio.runs.mask_quality import ROUGH, count_frame, summed
+from studio.runs.mask_quality import count_frame, summed
+from studio.runs.person_hull import ROUGH
 
 JUDGING = "comparing the sources"
 GAIN = 0.01
 """By how much another source for one camera must raise the worst score."""
 MOST_CHANGES = 4
-STRONGEST_EDGE = 40.0
-"""Grey levels between neighbouring pixels, twice: from there an edge counts whole."""
 MOST_FILLED, MOST_BORDER = 0.5, 0.35
 """Shares of a picture, and of its border, that a subject's mask may fill: what is everywhere agrees in all views."""
 
@@ -134,20 +132,6 @@ def choose_sources(
         best, choice = better, change
     progress(JUDGING, most, most)
     return SourceChoice(tuple(tried), choice, best)
-
-
-def border_support(picture: Bytes, mask: Bytes) -> float:
-    """How much a picture (H, W, 3) changes along the border of a mask (H, W), 0 to 1; 0 for an empty one."""
-    contours = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)[0]
-    if not contours:
-        return 0.0
-    smooth = cv2.GaussianBlur(picture, (0, 0), 1.0)
-    slopes = [np.asarray(cv2.Sobel(smooth, cv2.CV_32F, *along)) for along in ((1, 0), (0, 1))]
-    edges = 0.25 * np.hypot(*slopes).max(axis=2)
-    # The border may be a pixel off.
-    near = np.asarray(cv2.dilate(edges, np.ones((3, 3), np.uint8)))
-    x, y = np.concatenate([contour[:, 0] for contour in contours]).T
-    return float(np.minimum(near[y, x] / STRONGEST_EDGE, 1.0).mean())
 
 
 def can_be_subject(mask: Bytes) -> bool:

@@ -21,7 +21,7 @@ from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
 from studio.geometry.rigid import rigid
 from studio.progress import Progress, unheard
-from studio.runs.mask_quality import spread_frames
+from studio.runs.person_hull import spread_frames
 from studio.runs.session_settings import masks_of
 from studio.runs.silhouette_doubts import person_alone
 from studio.runs.tracks import best_track, read_track

@@ -4,6 +4,9 @@ Where a mask contains something else than the person (a bystander, a reflection)
 the hull's silhouette leaves that part of the mask uncovered. Where a mask has a hole, its own camera carves the
 person, and the *other* masks stay uncovered. So for each camera the hull is carved once more without it: the part of
 the other masks that is then covered is removed by this camera alone.
+
+Agreement says nothing of what all masks lack. So the contrast of subject and background has a say too
+(`runs.contrast`), and where masks are not made by contrast, the edges of the pictures along their borders.
 """
 
 import dataclasses
@@ -17,38 +20,30 @@ from studio.arrays import Bytes
 from studio.body.scale import scale_of
 from studio.calibration.findings import Finding, blocking
 from studio.errors import FootageError, RunError, StudioError
+from studio.evidence.frame_evidence import ViewEvidence
 from studio.evidence.masks import PackedMasks, reduced
 from studio.evidence.pipeline import EvidenceMaker
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
 from studio.progress import Progress, unheard
+from studio.runs.contrast import Contrast, border_support, measure_contrast
+from studio.runs.person_hull import FINE, JUDGED_SIDE, ROUGH, covered, large_hull, person_box, spread_frames
 from studio.runs.session_settings import masks_of, session_settings
 from studio.runs.silhouette_doubts import MEASURED, height_of, person_alone, silhouette_doubts
 from studio.runs.subject_masks import count_subjects
 from studio.sessions.provenance import changed_inputs, note, origin_of
 from studio.sessions.session import Session
-from studio.volume.hull import Hull
-from studio.volume.hull_pieces import chosen_voxels, piece_numbers
 from studio.volume.hull_settings import HullSettings
-from studio.volume.hull_silhouette import silhouette
 from studio.volume.reconstruction import Reconstructor, check_views
-from studio.volume.tracking_space import Box, box_of
+from studio.words import enumerated
 
 FRAMES = 5
-COARSE = HullSettings(hull_depth=6)
-FINE = HullSettings(hull_depth=8, hull_edge_share=0.5, hull_least_views=2)
-ROUGH = dataclasses.replace(FINE, hull_depth=7)
-"""Hull settings where many hulls are needed: to find which camera removes something, which knobs are better."""
-MARGIN = 120.0
-"""Margin (mm, of a person: `scale_of`) around the coarse hull in which the fine one is carved."""
-LEAST_PIECE = 0.05
-"""Of the largest piece's volume."""
-JUDGED_SIDE = 480
-"""Least shorter side (pixels) of the compared masks: a voxel of the fine hull is wider than one of their pixels."""
 USABLE = 0.9
 """Agreement from which masks are usable (issue 5)."""
 MOST_FILLED = 0.5
 """Masks that cover more of the picture agree in every view and show nothing."""
+LEAST_BORDER = 0.25
+"""`border_support` from which a mask lies where something ends."""
 BLAMED = 0.05
 """Share of the other masks that one camera may remove before it is named."""
 
@@ -60,6 +55,7 @@ class ViewQuality:
     covered : share of the mask that the hull's silhouette covers. inside : share of the silhouette that lies in the
     mask. denied : share of the other cameras' masks that only this camera's mask removes from the hull. frames :
     (covered, inside) of each frame; NaN where there is nothing. filled : share of the picture that the masks cover.
+    border : how much the pictures change along the masks' border, 0 to 1 (`border_support`); NaN: not measured.
     """
 
     camera: str
@@ -68,6 +64,7 @@ class ViewQuality:
     denied: float
     frames: tuple[tuple[float, float], ...]
     filled: float = 0.0
+    border: float = float("nan")
 
     @property
     def agreement(self) -> float:
@@ -104,6 +101,7 @@ class ViewQuality:
 class MaskQuality:
     """The quality of all cameras' masks in some frames. hull_litres : the hull's volume in each. doubts : findings of
     the silhouettes on the calibration. subjects : seen in two frames or more (in one, of one), 0: not counted.
+    contrast : of subject and background; None: not measured, or the masks are not made by it.
     """
 
     frames: tuple[int, ...]
@@ -111,11 +109,30 @@ class MaskQuality:
     hull_litres: tuple[float, ...]
     doubts: tuple[Finding, ...] = ()
     subjects: int = 0
+    contrast: Contrast | None = None
+
+    @property
+    def agreeing(self) -> bool:
+        """Whether every camera's masks agree with the others, of one subject, and show no fault of the calibration."""
+        return all(view.usable for view in self.views) and self.subjects < 2 and not blocking(self.doubts)
 
     @property
     def usable(self) -> bool:
-        """Whether every camera's masks are usable, of one subject, and show no fault of the calibration."""
-        return all(view.usable for view in self.views) and self.subjects < 2 and not blocking(self.doubts)
+        """Whether they agree, and something else confirms them: for what all of them lack they agree about, too."""
+        return self.agreeing and not self.why_not_confirmed()
+
+    def why_not_confirmed(self) -> str:
+        """Why agreement does not prove the masks, "" where it does: low contrast; without contrast, borders that lie on
+        no edges of the pictures.
+        """
+        if self.contrast is not None:
+            return self.contrast.in_words()
+        faint = [view.camera for view in self.views if not view.border >= LEAST_BORDER]
+        if not faint:
+            return ""
+        if all(np.isnan(view.border) for view in self.views):
+            return "nothing but the agreement was measured"
+        return f"the masks' borders lie on no edges of the pictures of {enumerated(faint)}"
 
     @property
     def worst(self) -> str:
@@ -142,6 +159,8 @@ class MaskQuality:
             return f"the masks of camera {fullest.camera} cover {share} of the picture: are they inverted?"
         if self.usable:
             return f"every view agrees by {least:.2f} or more"
+        if self.agreeing:
+            return f"every view agrees by {least:.2f} or more, but {self.why_not_confirmed()}"
         # Rounded down: what is below the mark never reads like it.
         least = np.floor(1000.0 * least) / 1000.0
         return f"least agreement {least:.3f}, below the mark of {USABLE:g}: check camera {self.worst}"
@@ -183,10 +202,12 @@ def mask_quality(
         masks: dict[int, list[Bytes]] = {frame: [] for frame in chosen}
         people = {frame: PackedMasks() for frame in chosen}
         total = (len(cameras) + 1) * len(masks)
-        for camera, frame, mask in _each_mask(maker, cameras, sorted(masks), total, progress):
-            masks[frame].append(reduced(mask, lenses[camera.name]))
+        borders: dict[str, list[float]] = {camera.name: [] for camera in cameras}
+        for camera, frame, view in _each_view(maker, cameras, sorted(masks), total, progress):
+            masks[frame].append(reduced(view.mask, lenses[camera.name]))
+            borders[camera.name].append(border_support(view.picture, view.mask))
             if blame:
-                people[frame].put(camera.name, person_alone(mask))
+                people[frame].put(camera.name, person_alone(view.mask))
         counted: list[FrameCounts] = []
         seen: list[int] = []
         for done, frame in enumerate(chosen):
@@ -196,17 +217,21 @@ def mask_quality(
     found = summed(chosen, tuple(camera.name for camera in cameras), counted)
     doubts = silhouette_doubts(cameras, people, height_of(session), scale) if blame else ()
     subjects = sorted(seen, reverse=True)[:2][-1] if seen else 0
-    return dataclasses.replace(found, doubts=doubts, subjects=subjects)
+    contrast = measure_contrast(session, settings, progress=progress)
+    views = tuple(
+        dataclasses.replace(view, border=float(np.mean(borders[view.camera]))) for view in found.views
+    )
+    return dataclasses.replace(found, views=views, doubts=doubts, subjects=subjects, contrast=contrast)
 
 
-def _each_mask(
+def _each_view(
     maker: EvidenceMaker, cameras: tuple[Camera, ...], frames: Sequence[int], total: int, progress: Progress
-) -> Iterator[tuple[Camera, int, Bytes]]:
-    """The mask (H, W) of every camera and frame, camera by camera: only one camera's pictures are held."""
+) -> Iterator[tuple[Camera, int, ViewEvidence]]:
+    """Picture and mask of every camera and frame, camera by camera: only one camera's pictures are held."""
     for done, camera in enumerate(cameras):
         for number, frame in enumerate(frames):
             progress("comparing masks", done * len(frames) + number, total)
-            yield camera, frame, maker.view(camera.name, frame).mask
+            yield camera, frame, maker.view(camera.name, frame)
         maker.release(camera.name)
 
 
@@ -222,21 +247,23 @@ def measure_masks(session: Session, frames: Sequence[int] = (), progress: Progre
     return found
 
 
-def look_before_the_first_run(session: Session, progress: Progress = unheard) -> None:
-    """Measure the masks of imported footage that nothing was tracked of, unless that was done: exchanged cameras, a
-    mirrored video or a wrong unit refuse the run then, instead of losing its frames. Masks that cannot be compared say
-    nothing.
+def look_before_the_first_run(session: Session, progress: Progress = unheard) -> bool:
+    """Whether nothing was tracked yet of imported footage. Its masks are measured then, unless that was done: exchanged
+    cameras, a mirrored video or a wrong unit refuse the run, instead of losing its frames. Masks that cannot be
+    compared say nothing.
     """
+    if not session.manifest.layout or len(session.manifest.footage.cameras) < 2 or session.runs():
+        return False
     measured = origin_of(session, MEASURED)
-    known = measured is not None and not changed_inputs(session, MEASURED, ("footage", "calibration"))
-    if known or not session.manifest.layout or len(session.manifest.footage.cameras) < 2 or session.runs():
-        return
+    if measured is not None and not changed_inputs(session, MEASURED, ("footage", "calibration")):
+        return True
     try:
         doubts = _doubts_by_silhouettes(session, progress)
     except StudioError:
-        return
+        return True
     if stops := blocking(doubts):
         note(session, MEASURED, _doubted(stops[0]), False, tuple(map(str, stops)))
+    return True
 
 
 def _doubts_by_silhouettes(session: Session, progress: Progress) -> tuple[Finding, ...]:
@@ -246,15 +273,9 @@ def _doubts_by_silhouettes(session: Session, progress: Progress) -> tuple[Findin
     with masks_of(session, session_settings(session).evidence) as maker:
         people = {frame: PackedMasks() for frame in spread_frames(maker.footage.frame_count, FRAMES)}
         total = len(cameras) * len(people)
-        for camera, frame, mask in _each_mask(maker, cameras, tuple(people), total, progress):
-            people[frame].put(camera.name, person_alone(mask))
+        for camera, frame, view in _each_view(maker, cameras, tuple(people), total, progress):
+            people[frame].put(camera.name, person_alone(view.mask))
     return silhouette_doubts(cameras, people, height_of(session), scale_of(session.body()))
-
-
-def spread_frames(count: int, wanted: int) -> tuple[int, ...]:
-    """Up to `wanted` frames in the middle of as many equal parts of the footage."""
-    parts = min(count, wanted)
-    return tuple(int((part + 0.5) * count / parts) for part in range(parts))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -284,9 +305,9 @@ def count_frame(
     scale : of the body (`scale_of`).
     """
     box = person_box(masks, cameras, scale)
-    whole = None if box is None else _large_hull(Reconstructor(cameras, box, fineness), masks)
+    whole = None if box is None else large_hull(Reconstructor(cameras, box, fineness), masks)
     mask = np.array([np.count_nonzero(one) for one in masks])
-    covers = [_silhouette(whole, camera) for camera in cameras]
+    covers = [covered(whole, camera) for camera in cameras]
     both = np.array([np.count_nonzero(one & cover) for one, cover in zip(masks, covers, strict=True)])
     denied = np.zeros(len(cameras), dtype=np.int64)
     if blame and len(cameras) > 2 and box is not None:
@@ -300,37 +321,15 @@ def denied_pixels(
     masks: Sequence[Bytes], cameras: tuple[Camera, ...], carver: Reconstructor
 ) -> NDArray[np.int64]:
     """(V,) pixels of the other cameras' masks that the hull covers only when a camera is left out."""
-    whole = _large_hull(carver, masks)
-    open_yet = [mask & ~_silhouette(whole, camera) for mask, camera in zip(masks, cameras, strict=True)]
+    whole = large_hull(carver, masks)
+    open_yet = [mask & ~covered(whole, camera) for mask, camera in zip(masks, cameras, strict=True)]
     denied = np.zeros(len(cameras), dtype=np.int64)
     for left_out in range(len(cameras)):
-        alone = _large_hull(carver, without(masks, left_out))
+        alone = large_hull(carver, without(masks, left_out))
         for other, camera in enumerate(cameras):
             if other != left_out:
-                denied[left_out] += np.count_nonzero(open_yet[other] & _silhouette(alone, camera))
+                denied[left_out] += np.count_nonzero(open_yet[other] & covered(alone, camera))
     return denied
-
-
-def person_box(masks: Sequence[Bytes], cameras: tuple[Camera, ...], scale: float = 1.0) -> Box | None:
-    """A box around the large pieces of a coarse hull; None for an empty hull. scale : of the body (`scale_of`)."""
-    coarse = Reconstructor(cameras, box_of(cameras, scale=scale), COARSE).shape(masks)
-    if coarse.empty:
-        return None
-    coarse = _large_pieces(coarse)
-    reach = 0.5 * coarse.edges[:, None] + MARGIN * scale
-    return Box((coarse.centres - reach).min(axis=0), (coarse.centres + reach).max(axis=0))
-
-
-def _large_hull(carver: Reconstructor, masks: Sequence[Bytes]) -> Hull | None:
-    """The large pieces of the hull, None if it is empty."""
-    found = carver.shape(masks)
-    return None if found.empty else _large_pieces(found)
-
-
-def _large_pieces(hull: Hull) -> Hull:
-    """The hull without small pieces and ghosts. (A wrong mask may cut a person in two; both parts stay.)"""
-    numbers, volumes = piece_numbers(hull)
-    return chosen_voxels(hull, volumes[numbers] >= LEAST_PIECE * volumes[0])
 
 
 def without(masks: Sequence[Bytes], left_out: int) -> list[Bytes]:
@@ -338,12 +337,6 @@ def without(masks: Sequence[Bytes], left_out: int) -> list[Bytes]:
     changed = list(masks)
     changed[left_out] = np.full_like(masks[left_out], 255)
     return changed
-
-
-def _silhouette(hull: Hull | None, camera: Camera) -> Bytes:
-    if hull is None:
-        return np.zeros((camera.height, camera.width), np.uint8)
-    return silhouette(hull, camera)
 
 
 def summed(frames: tuple[int, ...], names: tuple[str, ...], counted: Sequence[FrameCounts]) -> MaskQuality:

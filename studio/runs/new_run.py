@@ -37,6 +37,7 @@ from studio.knobs import Knob
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.progress import Progress, unheard
 from studio.runs.behaviour_models import chosen_model
+from studio.runs.contrast import KnownPoses, contrast_notes
 from studio.runs.initialising import InitialPose, initialise
 from studio.runs.live_request import check_live, live_changes
 from studio.runs.mask_quality import look_before_the_first_run
@@ -154,7 +155,7 @@ def prepare_run(
 
     Raises StudioError; then nothing was made.
     """
-    look_before_the_first_run(session, progress)
+    is_first = look_before_the_first_run(session, progress)
     doubts = accepted_doubts(session, allow_inconsistent)
     tracker = tracker or session.manifest.tracker or DEFAULT_TRACKER
     weighting = weighting or session.manifest.weighting or DEFAULT_WEIGHTING
@@ -184,6 +185,11 @@ def prepare_run(
         found = _found(session, first, tree, path, seed, progress)
         start, source = within_limits(tree, found.pose), found.source
         notes = (*notes, *([found.note] if found.note else []))
+    if is_first and start is not None:
+        notes = (
+            *notes,
+            *contrast_notes(session, settings.evidence, KnownPoses(tree, {first: start}, source)),
+        )
     before = dict(tree.dimensions)
     if fit_shape and not live and start is not None:
         tree, start, words = session_shape(session, tree, settings, start, first, progress)

@@ -21,6 +21,7 @@ from studio.knobs import knobs_of
 from studio.operations.masks import background as set_background
 from studio.runs.background_setup import HOME_OF, MODEL_OF, SOURCES, BackgroundSource
 from studio.runs.best_source import SourceChoice
+from studio.runs.contrast import ViewContrast
 from studio.runs.mask_quality import MaskQuality, mask_quality, measure_masks
 from studio.runs.overlay_pictures import forget_composers
 from studio.runs.session_settings import session_settings
@@ -67,9 +68,22 @@ class ViewQualityLine(Answer):
     note: str
 
 
+class ContrastAnswer(Answer):
+    """How well subject and background can be told apart. low: too badly; words, remedy: what is alike, and what may
+    help. pose: where the pose came from that says where limbs are, "" for the hull.
+    """
+
+    low: bool
+    words: str
+    remedy: str
+    pose: str
+    views: list[ViewContrast]
+
+
 class MaskQualityAnswer(Answer):
     """All cameras' masks in some frames. worst: the camera to look at first, "" where all are usable. doubts: what the
-    silhouettes say against the calibration. subjects: in view, 0: not counted.
+    silhouettes say against the calibration. subjects: in view, 0: not counted. contrast: null where masks are not made
+    by it. unconfirmed: why agreement alone does not prove them, "" where something else does.
     """
 
     frames: list[int]
@@ -79,6 +93,8 @@ class MaskQualityAnswer(Answer):
     worst: str = ""
     doubts: list[Finding] = Field(default_factory=list[Finding])
     subjects: int = 0
+    contrast: ContrastAnswer | None = None
+    unconfirmed: str = ""
 
 
 class BackgroundCamera(Answer):
@@ -243,7 +259,12 @@ def put_evidence(session: OpenSession, request: dict[str, Value]) -> EvidenceAns
 def quality_answer(found: MaskQuality) -> MaskQualityAnswer:
     """A quality as the API shows it."""
     lines = [ViewQualityLine.of(view, note=view.in_words()) for view in found.views]
-    return MaskQualityAnswer.of(found, cameras=lines)
+    contrast = found.contrast and ContrastAnswer.of(
+        found.contrast, words=found.contrast.in_words(), remedy=found.contrast.remedy()
+    )
+    return MaskQualityAnswer.of(
+        found, cameras=lines, contrast=contrast, unconfirmed=found.why_not_confirmed()
+    )
 
 
 @router.get("/background")

@@ -5,6 +5,7 @@ from click.testing import CliRunner
 
 from studio.cli.main import main
 from studio.cli.mask_commands import _answer
+from studio.runs.contrast import Contrast, ViewContrast
 from studio.runs.mask_quality import MaskQuality, ViewQuality
 from studio.sessions.background_files import SessionEvidence, write_evidence
 from studio.sessions.session import Session
@@ -31,3 +32,16 @@ def test_the_command_that_is_named_is_one(session_on_disk: Session) -> None:
     assert "best" in help_text
     with pytest.raises(SystemExit):
         main(["background", "no-such-session", "--source", "best"])
+
+
+def test_low_contrast_is_said_with_what_may_help(session_on_disk: Session) -> None:
+    views = tuple(ViewQuality(name, 0.95, 0.95, 0.0, (), border=0.9) for name in ("a", "b"))
+    alike = tuple(
+        ViewContrast(name, 0.2, {"left forearm": 0.6}, 0, (((1, 2), (9, 2), (9, 8)),)) for name in ("a", "b")
+    )
+    answer = _answer(
+        session_on_disk, MaskQuality((0,), views, (60.0,), contrast=Contrast(alike, "told", 0.025))
+    )
+    assert "Left forearm and background are alike in a and b. Narrow the shadow colour" in str(answer["text"])
+    assert "--quality --pictures FOLDER" in str(answer["text"])
+    assert answer["usable"] is False

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.pipeline import EvidenceMaker
 from studio.geometry.camera import Camera
-from studio.runs.mask_quality import spread_frames
+from studio.runs.person_hull import spread_frames
 from studio.runs.session_settings import session_settings
 from studio.runs.silhouette_doubts import person_alone, silhouette_doubts
 from studio.sessions.importers.importing import import_source

@@ -13,7 +13,8 @@ from studio.errors import FootageError
 from studio.geometry.projection import project
 from studio.progress import unheard
 from studio.runs.background_setup import candidates, set_up_background
-from studio.runs.best_source import SampledMasks, border_support, can_be_subject, choose_sources
+from studio.runs.best_source import SampledMasks, can_be_subject, choose_sources
+from studio.runs.contrast import border_support
 from studio.sessions.background_files import read_evidence
 from studio.sessions.session import Session
 from studio.synthesis.cameras import placed_camera

@@ -12,6 +12,7 @@ from studio.geometry.camera import Camera
 from studio.geometry.projection import project
 from studio.runs import mask_quality as quality
 from studio.runs.initialising import initialise
+from studio.runs.person_hull import spread_frames
 from studio.runs.problem_source import ProblemSource
 from studio.sessions.session import Session
 from studio.synthesis.cameras import placed_camera
@@ -48,7 +49,8 @@ def judged(masks: list[np.ndarray], cameras: tuple[Camera, ...]) -> quality.Mask
 def test_good_masks_agree_in_every_view() -> None:
     cameras = ring()
     found = judged([ball_mask(camera) for camera in cameras], cameras)
-    assert found.usable
+    assert found.agreeing
+    assert not found.usable, "nothing but agreement was measured"
     for view in found.views:
         assert view.covered > 0.97
         assert view.inside > 0.93
@@ -108,8 +110,8 @@ def test_empty_masks_are_reported() -> None:
 
 
 def test_frames_are_spread_over_the_footage() -> None:
-    assert quality.spread_frames(100, 5) == (10, 30, 50, 70, 90)
-    assert quality.spread_frames(3, 5) == (0, 1, 2)
+    assert spread_frames(100, 5) == (10, 30, 50, 70, 90)
+    assert spread_frames(3, 5) == (0, 1, 2)
 
 
 def test_without_one_camera_leaves_the_others_as_they_are() -> None:

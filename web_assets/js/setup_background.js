@@ -261,7 +261,7 @@ export function mount(place, setup) {
 
   function drawQuality() {
     const measure = button("Measure", measureQuality, "small", { hidden: background.cameras.length < 2 });
-    fill(agreement, element("div", { className: "head-line" }, element("h2", {}, "Agreement of the views"), measure), qualityList(quality, paint, background.measured, background.source));
+    fill(agreement, element("div", { className: "head-line" }, element("h2", {}, "Agreement of the views"), measure), qualityList(setup, quality, paint, background.measured, background.source));
     pictures.rate(quality);
   }
 

@@ -1,7 +1,8 @@
 // How far the views' masks agree in the hull: a bar a camera with words, and the camera to look at first.
 
+import { sessionPath } from "./api.js";
 import { findingList } from "./calibration_drawing.js";
-import { button, element, hint, notice, percent } from "./elements.js";
+import { button, element, hint, notice, percent, shape } from "./elements.js";
 
 /** @import { Schemas } from "./api_types" */
 
@@ -19,8 +20,8 @@ function agreementBar(line) {
 }
 
 /** What is said of a quality (`GET S/masks/quality`), null where it was not measured since the studio was opened (then what
- * is known in words, `measured`, is said); `paint(camera)` opens the brush; `source` : of the masks. */
-export function qualityList(quality, paint, measured = "", source = "") {
+ * is known in words, `measured`, is said); `paint(camera)` opens the brush; `source` : of the masks. @param {import("./setup.js").Setup} setup */
+export function qualityList(setup, quality, paint, measured = "", source = "") {
   if (!quality && measured) return [hint(`When it was last measured, ${measured}. Measure again to see every camera.`)];
   if (!quality) return [hint("Not measured yet. No ground truth is needed: the masks of all views must agree in the visual hull.")];
   const rows = quality.cameras.map((line) => element("li", {}, element("span", {}, line.camera), agreementBar(line), element("span", { className: "figure" }, agreementOf(line)), line.note && hint(line.note)));
@@ -28,8 +29,27 @@ export function qualityList(quality, paint, measured = "", source = "") {
   const doubts = quality.doubts.length > 0 && element("div", {}, notice("The silhouettes contradict the calibration:"), findingList({ findings: quality.doubts }));
   const verdict = worst
     ? element("div", { className: "notice" }, element("p", {}, remedy(worst, source)), button(`Exclude regions of ${worst.camera}…`, () => paint(worst.camera), "small"))
-    : !doubts && hint(`Every view agrees with the others; ${quality.frames.length} frames were compared.`);
-  return [element("ul", { className: "agree" }, rows), verdict, doubts];
+    : !doubts && !quality.unconfirmed && hint(`Every view agrees with the others; ${quality.frames.length} frames were compared.`);
+  return [element("ul", { className: "agree" }, rows), verdict, doubts, unconfirmed(setup, quality)];
+}
+
+const sentence = (words) => `${words[0].toUpperCase()}${words.slice(1)}.`;
+
+/** Why agreement does not prove the masks, what may help, and where, camera by camera; nothing where something else does. */
+function unconfirmed(setup, { contrast, unconfirmed: why }) {
+  if (!contrast?.low) return why && notice(`The views agree, but ${why}: look at the masks yourself.`);
+  const seen = contrast.views.filter((view) => view.outlines.length);
+  return element("section", { className: "alike" }, notice(sentence(contrast.words), " ", contrast.remedy),
+    element("div", { className: "alike-pictures" }, seen.map((view) => alikePicture(setup, view))));
+}
+
+/** A camera's picture with what might as well be background outlined. @param {Schemas["ViewContrast"]} view */
+function alikePicture(setup, view) {
+  const lens = setup.detail.cameras.find((one) => one.name === view.camera);
+  const lines = view.outlines.map((outline) => shape("polygon", { points: outline.map((point) => point.join(",")).join(" ") }));
+  const words = `${view.camera}, frame ${view.frame}: ${percent(view.share)} like the background`;
+  return element("figure", {}, element("div", {}, element("img", { src: `${sessionPath(setup.session)}/footage/${encodeURIComponent(view.camera)}/${view.frame}.jpg?height=420`, alt: words }),
+    shape("svg", { viewBox: `0 0 ${lens.width} ${lens.height}`, "aria-hidden": "true" }, ...lines)), element("figcaption", {}, words));
 }
 
 /** How the sources compare (job `choice`): agreement and edges by camera, the used ones marked. @param {Schemas["SourceChoiceAnswer"]} choice */

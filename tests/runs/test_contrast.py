@@ -1,0 +1,125 @@
+"""Subject and background alike in colour: said before anything is tracked, with limbs, cameras and where."""
+
+import dataclasses
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from alike_person import SIZE, make_alike_session, standing_pose
+
+from studio.runs.background_setup import set_up_background
+from studio.runs.contrast import Contrast, KnownPoses, ViewContrast, draw_contrast, measure_contrast
+from studio.runs.mask_quality import mask_quality, measure_masks
+from studio.runs.new_run import prepare_run
+from studio.runs.session_settings import session_settings
+from studio.sessions.background_files import SessionEvidence, write_evidence
+from studio.sessions.session import Session
+
+CAMERAS = ("cam1", "cam2", "cam3", "cam4")
+
+
+@pytest.fixture(scope="module")
+def alike(tmp_path_factory: pytest.TempPathFactory) -> Session:
+    """Forearms are a darker floor."""
+    return make_alike_session(tmp_path_factory.mktemp("alike") / "alike", forearms_alike=True)
+
+
+@pytest.fixture(scope="module")
+def apart(tmp_path_factory: pytest.TempPathFactory) -> Session:
+    """Forearms are of cloth."""
+    return make_alike_session(tmp_path_factory.mktemp("apart") / "apart", forearms_alike=False)
+
+
+def contrast_of(session: Session, *, posed: bool) -> Contrast:
+    known = KnownPoses(session.body(), {0: standing_pose()}, "told") if posed else None
+    found = measure_contrast(session, session_settings(session).evidence, known)
+    assert found is not None
+    return found
+
+
+def test_limbs_of_a_known_pose_are_named_with_their_cameras(alike: Session) -> None:
+    found = contrast_of(alike, posed=True)
+    assert set(found.alike) == {"left forearm", "right forearm"}
+    assert found.in_words() == "forearms and background are alike in cam1 to cam4"
+    assert "source person" in found.remedy()
+    assert "source best" in found.remedy()
+
+
+def test_a_subject_of_another_colour_is_not_named_whatever_its_shadow(apart: Session) -> None:
+    for posed in (True, False):
+        found = contrast_of(apart, posed=posed)
+        assert not found.low, found
+        assert (found.in_words(), found.remedy()) == ("", "")
+
+
+def test_without_a_pose_the_hull_says_where_the_subject_is(alike: Session) -> None:
+    found = contrast_of(alike, posed=False)
+    assert found.alike == {"subject": CAMERAS}
+
+
+def test_the_outlines_lie_on_what_is_alike(alike: Session, tmp_path: Path) -> None:
+    found = contrast_of(alike, posed=True)
+    for view in found.views:
+        picture = cv2.imread(str(alike.path / "pictures" / view.camera / "0000.png"))
+        assert picture is not None
+        inside = np.zeros((SIZE[1], SIZE[0]), np.uint8)
+        cv2.fillPoly(inside, [np.array(outline, np.int32) for outline in view.outlines], (255,))
+        # Redder than blue: wood, not cloth.
+        assert (picture[inside > 0].astype(int) @ [-1, 0, 1] > 0).mean() > 0.95
+    drawn = draw_contrast(alike, found, tmp_path / "where")
+    assert [path.name for path in drawn] == [f"{name}-frame-0.png" for name in CAMERAS]
+
+
+def test_agreement_alone_is_not_usable(alike: Session, apart: Session) -> None:
+    settings = session_settings(alike).evidence
+    poor, good = (mask_quality(session, settings) for session in (alike, apart))
+    assert poor.agreeing
+    assert not poor.usable
+    assert "but subject and background are alike in cam1 to cam4" in poor.in_words()
+    assert good.usable
+    unmeasured = dataclasses.replace(good, contrast=None)
+    assert unmeasured.usable, "borders of the pictures confirm it"
+    views = tuple(dataclasses.replace(view, border=0.1) for view in good.views)
+    assert not dataclasses.replace(unmeasured, views=views).usable
+
+
+def test_masks_that_came_with_the_footage_have_no_contrast(alike: Session) -> None:
+    settings = dataclasses.replace(session_settings(alike).evidence, background_model="threshold")
+    assert measure_contrast(alike, settings) is None
+
+
+def test_every_source_is_tried_where_the_views_agree_about_too_little(tmp_path: Path) -> None:
+    session = make_alike_session(tmp_path / "tried", forearms_alike=True)
+    shadows = {"mask_shadow_test": True, "mask_shadow_darkest": 0.4, "mask_shadow_colour": 0.025}
+    made = set_up_background(session, "plate", knobs=shadows)
+    assert made.choice is not None
+    assert any("every source was tried besides plate" in note for note in made.notes)
+    kept = set_up_background(Session(session.path), "plate", tune=False)
+    assert kept.choice is None
+
+
+def test_the_first_run_notes_it(tmp_path: Path) -> None:
+    session = make_alike_session(tmp_path / "noted", forearms_alike=True)
+    run = prepare_run(session, start_pose=standing_pose(), fit_shape=False)
+    assert [note for note in run.record.notes if note.startswith("Forearms and background are alike")]
+    second = prepare_run(session, start_pose=standing_pose(), fit_shape=False)
+    assert not [note for note in second.record.notes if "alike" in note]
+
+
+def test_it_is_remembered_for_the_guided_set_up(alike: Session) -> None:
+    write_evidence(alike, SessionEvidence())
+    assert not measure_masks(alike).usable
+
+
+def test_one_camera_of_four_is_made_up_for() -> None:
+    views = tuple(
+        ViewContrast(name, 0.2, {"shin": share}, 0, ())
+        for name, share in zip(CAMERAS, (0.6, 0.1, 0.1, 0.0), strict=True)
+    )
+    assert not Contrast(views, "told", 0.025).low
+    more = (dataclasses.replace(views[1], limbs={"shin": 0.3}), *views[2:])
+    assert (
+        Contrast((views[0], *more), "told", 0.025).in_words()
+        == "shin and background are alike in cam1 and cam2"
+    )
