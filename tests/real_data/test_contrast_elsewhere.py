@@ -1,4 +1,4 @@
-"""Two people of others: before a frame is tracked, the one on wood is said to be like the floor, the one on tiles not."""
+"""Two people of others: before a frame is tracked the one on wood is called like the floor, the one on tiles is not."""
 
 from pathlib import Path
 
