@@ -173,15 +173,18 @@ class StudioControl:
         place = self._places.get((said.session, said.run))
         if place is not None:
             about: commands.About = {"session": place[0], "run": place[1]}
-            if resume and said.state in ("tracking", "compiling"):
-                # Refused if the process died just after its last frame: then nothing is left to go on with.
-                with contextlib.suppress(RunError):
-                    self.request(commands.Start(**about))
-            else:
-                self.request(commands.Open(**about))
+            # What was renamed or deleted meanwhile stays closed.
+            with contextlib.suppress(NotFoundError):
+                if resume and said.state in ("tracking", "compiling"):
+                    # Refused if the process died just after its last frame: then nothing is left to go on with.
+                    with contextlib.suppress(RunError):
+                        self.request(commands.Start(**about))
+                else:
+                    self.request(commands.Open(**about))
         for names in said.waiting:
             session, run = self._places[names]
-            self.request(commands.Start(session=session, run=run))
+            with contextlib.suppress(NotFoundError):
+                self.request(commands.Start(session=session, run=run))
 
     def close(self) -> None:
         """End the process, its search saved where it stands, and all subscriptions."""

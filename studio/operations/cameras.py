@@ -242,6 +242,7 @@ def align(
 
 
 @operation
+@keeping_in_place
 def unalign(session: SessionName, *, progress: Reporting = None) -> Session:
     """Use the calibration again that a session's cameras were turned from.
 

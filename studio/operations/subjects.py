@@ -1,6 +1,7 @@
 """Several subjects in view: who there is, a session for each, all of them tracked at once."""
 
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -16,6 +17,7 @@ from studio.runs.subject_sessions import make_subject_sessions
 from studio.runs.together import BodiesTogether, track_together
 from studio.sessions.names import free_name
 from studio.sessions.session import Session
+from studio.sessions.work_under_way import working_on
 from studio.sessions.workspace import Workspace
 
 
@@ -95,7 +97,10 @@ def together(
     Raises RunError for sessions that do not belong together; then nothing is changed.
     """
     opened = [open_session(session), *(open_session(name) for name in beside)]
-    with reporting(progress, f"{opened[0].name} and {len(opened) - 1} more") as report:
+    with ExitStack() as kept:
+        for other in opened[1:]:
+            kept.enter_context(working_on(other.path, "together"))
+        report = kept.enter_context(reporting(progress, f"{opened[0].name} and {len(opened) - 1} more"))
         return track_together(opened, report)
 
 

@@ -17,6 +17,7 @@ from studio.sessions.atomic_files import write_bytes
 from studio.sessions.calibration_changes import CalibrationChange, earlier_calibration, restore_calibration
 from studio.sessions.provenance import changed_inputs, note, origin_of
 from studio.sessions.session import CAMERAS_PATH, Session
+from studio.sessions.work_under_way import one_at_a_time
 from studio.typed_decoding import decode_json
 
 RECORD_PATH = CAMERAS_PATH.with_name("cameras.alignment.json")
@@ -70,15 +71,17 @@ def turn_cameras(session: Session, aligned: SessionAlignment) -> CalibrationChan
     """Make the turned cameras the session's. Raises SessionError while a run is being tracked, CalibrationError if the
     calibration has changed since the alignment.
     """
-    if not is_of(session, aligned):
-        raise CalibrationError(
-            "The calibration has changed since it was measured.", "Measure the cameras again."
-        )
-    source = session.manifest.calibration_source
-    change = keep_alignment(session, aligned)
-    if change.kept is not None:
-        turned = Turned(change.kept.name, source, _content(change.session))
-        write_bytes(change.session.path / RECORD_PATH, msgspec.json.encode(turned))
+    with one_at_a_time(session.path):
+        if not is_of(session, aligned):
+            raise CalibrationError(
+                f"The calibration of session '{session.name}' has changed since it was measured.",
+                "Measure the cameras again.",
+            )
+        source = session.manifest.calibration_source
+        change = keep_alignment(session, aligned)
+        if change.kept is not None:
+            turned = Turned(change.kept.name, source, _content(change.session))
+            write_bytes(change.session.path / RECORD_PATH, msgspec.json.encode(turned))
     found = aligned.found
     worst, most = int(np.nanargmax(found.after)), float(np.nanmax(found.after))
     words = f"The silhouettes miss by up to {most:.1f} px ({aligned.names[worst]})"
@@ -96,13 +99,14 @@ def turn_back(session: Session) -> CalibrationChange:
     """Restore the calibration from before the cameras were turned. Raises NotFoundError if they were not, SessionError
     while a run is being tracked.
     """
-    found = _turned(session)
-    if found is None:
-        raise NotFoundError(
-            f"The cameras of session '{session.name}' were not turned by their silhouettes.",
-            "Choose one of the earlier calibrations in step Calibration.",
-        )
-    return restore_calibration(session, found.before, found.source)
+    with one_at_a_time(session.path):
+        found = _turned(session)
+        if found is None:
+            raise NotFoundError(
+                f"The cameras of session '{session.name}' were not turned by their silhouettes.",
+                "Choose one of the earlier calibrations in step Calibration.",
+            )
+        return restore_calibration(session, found.before, found.source)
 
 
 def is_of(session: Session, aligned: SessionAlignment) -> bool:

@@ -119,7 +119,11 @@ def restore_calibration(session: Session, name: str, source: str) -> Calibration
     name : one of `earlier_calibrations`. source : its origin, as text. Raises NotFoundError, SessionError
     while a run is being tracked, CalibrationError where it lacks a camera of the footage.
     """
-    folder = earlier_calibration(session, name)
+    with one_at_a_time(session.path):
+        return _restored(session, earlier_calibration(session, name), source)
+
+
+def _restored(session: Session, folder: Path, source: str) -> CalibrationChange:
     place = session.path / CAMERAS_PATH
     before = read_calibration(place).cameras if _readable(place) else ()
     read = read_calibration(folder / CAMERAS_PATH.name)

@@ -19,7 +19,7 @@ from studio.errors import NotFoundError, SessionError, StudioError
 from studio.progress import Progress, unheard
 from studio.sessions import atomic_files
 from studio.sessions.atomic_files import made_whole, write_text
-from studio.sessions.file_checksums import note_again
+from studio.sessions.file_checksums import forget_files, note_again
 from studio.sessions.manifest import FILE_NAME, SessionManifest, now, write_manifest
 from studio.sessions.names import checked_name, free_name, inside, is_name
 from studio.sessions.object_stores import folder_of, is_address
@@ -209,6 +209,8 @@ class Workspace:
             if new_name.lower() in taken:
                 raise SessionError(f"There is a run '{new_name}' already.", "Choose another name.")
             record = msgspec.structs.replace(run.record, name=new_name)
+            # Killed before it is noted again, the record would be taken for damaged.
+            forget_files(run.folder, [RECORD_NAME])
             os.rename(run.folder, place)
             write_run_record(place, record)
             note_again(place, RECORD_NAME)
@@ -255,6 +257,7 @@ class Workspace:
                 session = self.session(owner)
                 (session.path / RUNS_NAME).mkdir(exist_ok=True)
                 name = free_name(record.name, {entry.name for entry in (session.path / RUNS_NAME).iterdir()})
+                forget_files(path, [RECORD_NAME])
                 write_run_record(path, msgspec.structs.replace(record, name=name))
                 note_again(path, RECORD_NAME)
                 os.rename(path, inside(session.path / RUNS_NAME, name, "run"))

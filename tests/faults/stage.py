@@ -11,12 +11,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 from flipped_bytes import flip_stored
-from toy_session import make_session, true_poses
+from toy_session import facing_camera, make_session, true_poses
 
 from faults.seams import watched
 from studio.errors import NotFoundError, SessionError
 from studio.export.exporting import export_run
 from studio.export.formats import FORMATS
+from studio.geometry.camera import Camera
 from studio.jobs.batch import track_to_end
 from studio.runs.new_run import prepare_run
 from studio.runs.verifying import repair, verify
@@ -193,9 +194,15 @@ class Stage:
         return Place(self.folder / name)
 
 
-def build_session(at: Place, tracked: Sequence[str], fresh: str) -> Session:
+def build_session(
+    at: Place,
+    tracked: Sequence[str],
+    fresh: str,
+    frames: int = FRAMES,
+    cameras: tuple[Camera, ...] = (facing_camera(),),
+) -> Session:
     """The small session. tracked, fresh : the names of its runs, tracked to their end and not begun."""
-    session = make_session(at.workspace.place_for(TOY), FRAMES)
+    session = make_session(at.workspace.place_for(TOY), frames, cameras=cameras)
     for name in tracked:
         track(session, new_run(session, name))
     new_run(session, fresh)
@@ -206,10 +213,12 @@ def build_source(at: Place) -> None:
     """A folder of footage and calibration that can be imported."""
     source = at.folder / "source"
     shutil.copytree(at.session.path / "calibration", source / "calibration")
-    (source / "front").mkdir()
     with contextlib.closing(at.session.footage()) as footage:
-        for frame in range(FRAMES):
-            cv2.imwrite(str(source / "front" / f"{frame:04d}.png"), footage.picture("front", frame))
+        for camera in at.session.cameras():
+            (source / camera.name).mkdir()
+            for frame in range(at.session.manifest.frame_count):
+                picture = footage.picture(camera.name, frame)
+                cv2.imwrite(str(source / camera.name / f"{frame:04d}.png"), picture)
 
 
 def files_of(at: Place) -> dict[str, bytes]:

@@ -226,6 +226,23 @@ def test_what_waits_is_brought_back(control: StudioControl, session_on_disk: Ses
 
 
 @pytest.mark.slow
+def test_what_was_renamed_meanwhile_stays_closed_when_the_process_is_started_again(
+    control: StudioControl, session_on_disk: Session
+) -> None:
+    runs = [new_run(session_on_disk, name, particles=2000, layers=20) for name in ("a", "b")]
+    watching = control.subscribe()
+    for run in runs:
+        control.track("toy", run.name)
+    wait_for(watching, lambda event: isinstance(event, StateChanged) and event.waiting != ())
+    psutil.Process(control.process_identifier).kill()
+    wait_for(watching, in_state("lost"))
+    for run in runs:
+        run.folder.rename(run.folder.with_name(f"{run.name}-renamed"))
+    control.restart()
+    assert control.state.state == "idle"
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("lost", [False, True])
 def test_windows_that_start_different_runs_at_once_each_get_theirs(
     control: StudioControl, session_on_disk: Session, lost: bool

@@ -14,6 +14,12 @@ parser.add_argument(
 )
 parser.add_argument("--groups", type=int, default=50, help="how many")
 parser.add_argument("--only", choices=[*VERBS], action="append", metavar="VERB", help=", ".join(VERBS))
+parser.add_argument(
+    "--kept",
+    type=Path,
+    metavar="FILE",
+    help="keep the numbers there; with them there, go on after their seeds",
+)
 parser.add_argument("--seconds", type=float, default=float("inf"), help="begin none after so long")
 
 if __name__ == "__main__":
@@ -25,6 +31,7 @@ if __name__ == "__main__":
             asked.only or [*VERBS],
             asked.seconds,
             each=lambda line: print(line, flush=True),
+            kept=asked.kept,
         )
     print(table(found))
     sys.exit(bool(found.wrong))

@@ -4,6 +4,7 @@ import contextlib
 import os
 import re
 import signal
+import subprocess
 import threading
 import time
 from collections import Counter
@@ -13,13 +14,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import httpx
+import msgspec
 import numpy as np
 import psutil
 from faults.process_kinds import PATIENCE, until
-from faults.stage import DONE, FRAMES, NEW, frames_of
+from faults.stage import DONE, NEW, frames_of
 
 from races.stage import GONE, MARK, Outcome, Stage
-from races.verbs import LEFT, OVERWRITES, PYTHON, SERVED, Given, There, plain
+from races.verbs import ALONE, LEFT, OVERWRITES, PYTHON, SERVED, SLOW, TRACKING, Given, There, plain
 from studio.errors import StudioError
 from studio.foreign_files import MANIFEST_NAME
 from studio.runs.notes import notes_of
@@ -31,7 +33,7 @@ from studio.sessions.session import RUNS_NAME, Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import TRASH_NAME
 
-SLOW = 0.3
+RARE = 0.3
 """Verbs that take seconds come so often, where the others come once."""
 KILLED = 0.3
 """In so many of the groups something is killed."""
@@ -39,6 +41,7 @@ SERVER_KILLED = 0.05
 """In so many of these it is the server, which takes seconds to start; in three times as many its tracking process."""
 WITHIN = 0.08
 """Seconds in which all verbs of a group are fired."""
+HERE = Path(__file__).parent
 LET_GO_SECONDS = 60.0
 CAUSELESS = re.compile(
     r"No such file|Errno|Traceback|fault of the studio|disk space|disk I/O|unable to open", re.I
@@ -49,7 +52,9 @@ SEARCHING = ("tracking", "compiling", "starting", "preparing")
 
 @dataclass
 class Tally:
-    """Of all groups. refusals : their words, by how often. wrong : the group's seed, its verbs, and what was wrong."""
+    """Of all groups. refusals : their words, by how often. wrong : the group's seed, its verbs, and what was wrong.
+    commits : that they were fired at.
+    """
 
     groups: int = 0
     done: int = 0
@@ -59,6 +64,7 @@ class Tally:
     pairs: set[frozenset[str]] = field(default_factory=set[frozenset[str]])
     refusals: Counter[str] = field(default_factory=Counter[str])
     wrong: list[str] = field(default_factory=list)
+    commits: list[str] = field(default_factory=list)
 
 
 def campaign(
@@ -67,9 +73,15 @@ def campaign(
     verbs: Sequence[str],
     seconds: float = float("inf"),
     each: Callable[[str], None] = lambda line: None,
+    kept: Path | None = None,
 ) -> Tally:
-    """A group for each seed. seconds : begin none after that. each : called with what is wrong, as it comes."""
-    tally = Tally()
+    """A group for each seed. seconds : begin none after that. each : called with what is wrong, as it comes. kept : a
+    file of what earlier calls did, with which this one goes on: after the seeds of these, its numbers added to theirs.
+    """
+    tally = msgspec.json.decode(kept.read_bytes(), type=Tally) if kept and kept.is_file() else Tally()
+    seeds = seeds[tally.groups :]
+    if kept and (commit := _commit()) not in tally.commits:
+        tally.commits.append(commit)
     with Stage(folder) as stage:
         began = time.monotonic()
         for seed in seeds:
@@ -89,7 +101,14 @@ def campaign(
             for words in dict.fromkeys(wrong):
                 tally.wrong.append(f"--seed {seed} --groups 1 ({', '.join(fired)}): {words}")
                 each(tally.wrong[-1])
+            if kept:
+                kept.write_bytes(msgspec.json.encode(tally))
     return tally
+
+
+def _commit() -> str:
+    words = ["git", "describe", "--always", "--dirty"]
+    return subprocess.run(words, capture_output=True, text=True, check=False, cwd=HERE).stdout.strip()
 
 
 def table(tally: Tally) -> str:
@@ -98,6 +117,7 @@ def table(tally: Tally) -> str:
     lines = [
         f"{tally.groups} groups ({each:.2f} s each), {len(tally.pairs)} pairs of verbs: {tally.done} verbs done,"
         f" {tally.refused} refused, {tally.killed} killed; {len(tally.wrong)} wrong states"
+        + "".join(f"; {commit}" for commit in tally.commits)
     ]
     return "\n".join([*lines, *(f"{count:6} {words}" for words, count in tally.refusals.most_common(60))])
 
@@ -105,7 +125,7 @@ def table(tally: Tally) -> str:
 def group(stage: Stage, verbs: Sequence[str], seed: int) -> tuple[list[str], list[Outcome], list[str]]:
     """Fire a group: the verbs, what became of each, and what is wrong afterwards."""
     rng = np.random.default_rng(seed)
-    share = np.array([SLOW if plain(verb) in ("fit the subject", "initialise") else 1.0 for verb in verbs])
+    share = np.array([RARE if plain(verb) in SLOW else 1.0 for verb in verbs])
     fired = [str(verb) for verb in rng.choice(verbs, size=int(rng.integers(2, 4)), p=share / share.sum())]
     moments = rng.uniform(0.0, WITHIN, len(fired))
     strike = _strike(stage, rng, fired)
@@ -136,16 +156,16 @@ def group(stage: Stage, verbs: Sequence[str], seed: int) -> tuple[list[str], lis
 
 
 def _strike(stage: Stage, rng: np.random.Generator, fired: Sequence[str]) -> Callable[[], None] | None:
-    """What is killed in this group, if anything is."""
+    """What is killed in this group, if anything is: of processes that have something to do in it."""
     if rng.random() > KILLED:
         return None
-    share = rng.random()
-    if share < SERVER_KILLED:
-        return lambda: _kill_server(stage)
-    if share < 4 * SERVER_KILLED or not any(verb in PYTHON for verb in fired):
-        return lambda: _kill_tracker(stage)
+    share, tracks = rng.random(), any(verb in TRACKING for verb in fired)
     chosen = [place for place, verb in enumerate(fired) if verb in PYTHON]
-    return stage.others[int(rng.choice(chosen))].kill
+    if len(chosen) < len(fired) and share < SERVER_KILLED:
+        return lambda: _kill_server(stage)
+    if tracks and (share < 4 * SERVER_KILLED or not chosen):
+        return lambda: _kill_tracker(stage)
+    return stage.others[int(rng.choice(chosen))].kill if chosen else None
 
 
 def _kill_server(stage: Stage) -> None:
@@ -193,6 +213,8 @@ def _served(stage: Stage, given: Given, verb: str) -> Outcome:
         words = f"{said.get('message')} {said.get('hint')}"
         return Outcome("wrong" if answer.status_code >= 500 else "refused", words)
     key = said.get("identifier") or given.name
+    if path.startswith("/api/comparisons"):
+        key = f"{given.name}/{said.get('name')}"
     while True:
         jobs = client.get("/api/jobs", params={"session": given.name}).json()["jobs"]
         mine = [job for job in jobs if job["key"] == key] if answer.status_code == 202 else []
@@ -224,7 +246,7 @@ def _await_quiet(stage: Stage) -> None:
 def _misleading(given: Given, fired: Sequence[str], outcomes: Sequence[Outcome]) -> Iterator[str]:
     """Refusals that do not say of what, or why."""
     for verb, outcome in zip(fired, outcomes, strict=True):
-        if outcome.state != "refused":
+        if outcome.state != "refused" or outcome.words.startswith(ALONE):
             continue
         if given.name not in outcome.words and not re.search(
             rf"'({DONE}|{NEW}|{GONE}|[\w-]+-\d+-\d)'", outcome.words
@@ -254,7 +276,7 @@ def _judged(
     runs = [StoredRun(path) for path in thrown if (path / RECORD_NAME).is_file()]
     for session in sessions:
         yield from (f"verify: {fault.place} {fault.what}" for fault in verify(session).faults)
-        for path in (session.path / RUNS_NAME).iterdir():
+        for path in (session.path / RUNS_NAME).glob("*"):
             if not path.name.startswith(".") and not (path / RECORD_NAME).is_file():
                 yield f"the folder '{path.name}' is no run"
         runs += session.runs()
@@ -294,7 +316,9 @@ def _runs_wrong(
         if summary.damaged:
             yield f"run '{run.name}' has damaged frames"
         # The server may still have it open.
-        if summary.status != "tracking" and (summary.status == "finished") != (summary.done == FRAMES):
+        if summary.status != "tracking" and (summary.status == "finished") != (
+            summary.done == run.record.last - run.record.first
+        ):
             yield f"run '{run.name}' is {summary.status} with {summary.done} frames"
         # A kill between the two steps of renaming leaves the old name, which is read nowhere but in the trash.
         if not killed and run.folder.parent.name == RUNS_NAME and run.record.name != run.name:

@@ -11,12 +11,15 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from types import TracebackType
 
+import cv2
 import msgspec
 from faults.process_kinds import Served, server, until
-from faults.stage import DONE, FRAMES, NEW, TOY, Place, build_session, build_source, frames_of
+from faults.stage import DONE, TOY, Place, build_source, frames_of
 
-from races.verbs import PYTHON, Given
+from races.verbs import FRAMES, PYTHON, Given, build
 from studio.errors import StudioError, UnforeseenError
+from studio.export.exporting import export_run
+from studio.export.formats import FORMATS
 from studio.runs.notes import write_note
 from studio.runs.verifying import verify
 from studio.sessions.manifest import write_manifest
@@ -49,9 +52,10 @@ class OtherProcess:
 
     def _start(self) -> None:
         context = multiprocessing.get_context("forkserver")
-        context.set_forkserver_preload(["races.verbs"])
+        context.set_forkserver_preload(["races.warm"])
         self._here, there = context.Pipe()
-        self._process = context.Process(target=_live, args=(there, self._root), daemon=True)
+        # No daemon: comparisons have processes of their own.
+        self._process = context.Process(target=_live, args=(there, self._root))
         self._process.start()
         there.close()
 
@@ -82,6 +86,7 @@ class OtherProcess:
 
 def _live(there: Connection, root: Path) -> None:
     """In the process."""
+    cv2.setNumThreads(-1)
     os.environ[VARIABLE] = str(root)
     while True:
         try:
@@ -117,8 +122,10 @@ class Stage:
 
     def __post_init__(self) -> None:
         first = Place(self.folder / "first")
-        build_session(first, (DONE, GONE), NEW)
+        session = build(first, DONE, GONE)
         build_source(first)
+        (session.path / "truth").mkdir()
+        export_run(session, first.run(DONE), FORMATS["trc"], {}, session.path / "truth" / "arm.trc")
         verify(first.session)
         write_note(first.run(DONE), FRAMES - 1, MARK)
         self.frames = frames_of(first.run(DONE))

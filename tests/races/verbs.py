@@ -1,23 +1,35 @@
 """The verbs that are fired: of Python in another process, and requests to a server; and what each leaves once done."""
 
 import dataclasses
+import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from faults.stage import DONE, FRAMES, NEW, QUICK
-from toy_session import true_poses
+import numpy as np
+from faults.stage import DONE, NEW, QUICK, Place, build_session
+from toy_session import facing_camera, side_camera, true_poses
 
 import studio
+from studio.body.forward_kinematics import limb_ends
+from studio.calibration.silhouette_alignment import AlignedCameras
 from studio.capture.calibration_files import read_calibration
+from studio.geometry.projection import project
+from studio.geometry.rotations import rotation_from_vector
+from studio.runs.aligning import SessionAlignment
 from studio.runs.notes import notes_of
 from studio.runs.tracks import track_names
+from studio.runs.turned_cameras import turn_cameras
 from studio.sessions.calibration_changes import EARLIER, NewCalibration, replace_calibration
 from studio.sessions.session import CAMERAS_PATH, Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
 
+FRAMES = 7
+"""So many show enough to align two cameras by."""
 POSE = [float(value) for value in true_poses()[0] + 0.02]
+ONE_TRIAL = {"seeds": 1, "last": 1}
+"""Of a comparison, that it takes no longer than the start of its process."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +90,30 @@ class There:
         return any(fits(session) for session in self.sessions)
 
 
+def build(at: Place, *tracked: str) -> Session:
+    """The session that verbs are fired at: two cameras, one of them turned a little. tracked : its finished runs."""
+    session = build_session(at, tracked, NEW, FRAMES, (facing_camera(), side_camera()))
+    turn_the_cameras(session, 0.5)
+    return session
+
+
+def turn_the_cameras(session: Session, degrees: float) -> None:
+    """What aligning ends with where it turns a camera."""
+    cameras = session.cameras()
+    turn = rotation_from_vector(np.array([0.0, 0.0, np.radians(degrees)]))
+    side = dataclasses.replace(
+        cameras[1], rotation=turn @ cameras[1].rotation, translation=turn @ cameras[1].translation
+    )
+    turns = np.array([0.0, degrees])
+    turn_cameras(
+        session,
+        SessionAlignment(
+            tuple(camera.name for camera in cameras),
+            AlignedCameras((cameras[0], side), turns, np.full(2, 9.0), np.ones(2), (0,)),
+        ),
+    )
+
+
 # Python's verbs are imported on first use: here for all processes, before they are forked.
 for _verb in dir(studio):
     getattr(studio, _verb)
@@ -97,6 +133,38 @@ def _calibrate(given: Given) -> None:
     replace_calibration(session, NewCalibration(tuple(cameras), given.called("calibration")))
 
 
+def _level(given: Given) -> object:
+    """By three points of a floor a metre and a half down."""
+    cameras = studio.open_session(given.name).cameras()
+    floor = np.array([[-400.0, 0.0, -900.0], [400.0, 0.0, -900.0], [0.0, 500.0, -900.0]])
+    seen = {camera.name: project(camera, floor)[0] for camera in cameras}
+    points = [{"pixels": {name: seen[name][at].tolist() for name in seen}} for at in range(len(floor))]
+    file = given.out / f"{given.called('clicks')}.json"
+    file.write_text(json.dumps({"points": points}))
+    return studio.level(given.name, clicks=file)
+
+
+def _strokes(given: Given) -> list[dict[str, object]]:
+    """Along the arm, and off it, in the first frame of each camera."""
+    session = studio.open_session(given.name)
+    near, far = limb_ends(session.body(), true_poses(1))[0].transpose(1, 0, 2)
+    away = np.array([0.0, 0.0, 300.0])
+    return [
+        {"camera": camera.name, "frame": 0, "kind": kind, "width": 3.0, "points": line.tolist()}
+        for camera in session.cameras()
+        for kind, line in (
+            ("inside", project(camera, (near + far) / 2)[0]),
+            ("outside", project(camera, (near + far) / 2 + away)[0]),
+        )
+    ]
+
+
+def _paint(given: Given) -> object:
+    file = given.out / f"{given.called('strokes')}.json"
+    file.write_text(json.dumps({"strokes": _strokes(given)}))
+    return studio.background(given.name, "strokes", strokes=file, tune=False)
+
+
 PYTHON: Mapping[str, Callable[[Given], object]] = {
     "refine": lambda at: studio.refine(at.run, into=at.called("refined")),
     "smooth": lambda at: studio.smooth(at.run, into=at.called("smoothed")),
@@ -114,7 +182,34 @@ PYTHON: Mapping[str, Callable[[Given], object]] = {
     "initialise": lambda at: studio.initialise(at.name, replace=True),
     "background": lambda at: studio.background(at.name, "masks", tune=False),
     "add footage": lambda at: studio.add_footage(at.name, at.source, replace=True, fps=60.0),
+    "import": lambda at: studio.import_footage(at.source, at.called("imported"), fps=60.0),
     "calibrate": _calibrate,
+    "align": lambda at: studio.align(at.name),
+    "turn the cameras": lambda at: turn_the_cameras(studio.open_session(at.name), 0.1),
+    "unalign": lambda at: studio.unalign(at.name),
+    "level": _level,
+    "strokes": _paint,
+    "mask quality": lambda at: studio.mask_quality(at.name, [0, 1]),
+    "subjects": lambda at: studio.subjects(at.name),
+    "evaluate": lambda at: studio.evaluate(at.run),
+    "seeds": lambda at: studio.seeds(at.run, 1, count=2),
+    "view": lambda at: studio.view(at.run, "variance"),
+    "why": lambda at: studio.why(at.run, 1),
+    "workflow": lambda at: studio.workflow(at.name),
+    "inspect": lambda at: studio.inspect(at.session),
+    "upload": lambda at: studio.upload(at.name, f"memory://races/{at.called('put')}"),
+    "compare": lambda at: studio.compare(
+        at.name, trackers=["annealed"], evaluations=40, **ONE_TRIAL, name=at.called("compared"), processes=1
+    ),
+    "sweep": lambda at: studio.sweep(
+        at.name,
+        vary={"survival": [0.4]},
+        knobs=QUICK,
+        fit_shape=False,
+        **ONE_TRIAL,
+        name=at.called("swept"),
+        processes=1,
+    ),
     "synchronise": lambda at: studio.synchronise(at.name, rotations={"front": 180}),
     "verify": lambda at: studio.verify(at.name, mend=True),
     "rename": lambda at: _workspace(at).rename(at.name, at.called("renamed")),
@@ -171,10 +266,91 @@ SERVED: Mapping[str, Callable[[Given], Request]] = {
     "served rename the run": lambda at: ("PATCH", RUN, {"name": at.called("renamed")}),
     "served delete the run": lambda at: ("DELETE", RUN, None),
     "served restore": lambda at: ("POST", "/api/trash/restore", {"entry": at.trashed}),
+    "served import": lambda at: (
+        "POST",
+        "/api/imports",
+        {"source": str(at.source), "name": at.called("imported"), "fps": 60.0},
+    ),
+    "served align": lambda at: ("POST", "/alignment", {}),
+    "served keep alignment": lambda at: ("POST", "/alignment/keep", None),
+    "served unalign": lambda at: ("POST", "/alignment/undo", None),
+    "served level": lambda at: ("POST", "/calibration/level", {}),
+    "served strokes": lambda at: (
+        "PUT",
+        "/strokes/front",
+        {
+            "strokes": [
+                {
+                    "frame": 0,
+                    "kind": "inside",
+                    "width": 3.0,
+                    "points": [[80.0, 60.0], [90.0 + at.place, 60.0]],
+                }
+            ]
+        },
+    ),
+    "served mask quality": lambda at: ("POST", "/masks/quality", None),
+    "served background off": lambda at: ("DELETE", "/background", None),
+    "served synchrony": lambda at: ("POST", "/synchrony", {}),
+    "served seeds": lambda at: ("POST", f"{RUN}/frames/1/seeds", {"count": 2}),
+    "served open": lambda at: ("POST", f"{RUN}/open", None),
+    "served seek": lambda at: ("POST", f"{RUN}/seek", {"frame": at.place}),
+    "served reanneal": lambda at: ("POST", f"{RUN}/reanneal", {"frame": 2}),
+    "served layer": lambda at: ("POST", f"/runs/{NEW}/step-layer", None),
+    "served frame": lambda at: ("POST", f"/runs/{NEW}/step-frame", None),
+    "served pause": lambda at: ("POST", f"/runs/{NEW}/pause", None),
+    "served cancel": lambda at: ("POST", f"/runs/{NEW}/cancel", None),
+    "served settings back": lambda at: ("DELETE", f"/runs/{NEW}/settings/moved", None),
+    "served note off": lambda at: ("DELETE", f"{RUN}/frames/{at.place}/note", None),
+    "served compare": lambda at: (
+        "POST",
+        "/api/comparisons",
+        {
+            "session": at.name,
+            "trackers": [{"name": "annealed"}],
+            "evaluations": 40,
+            "name": at.called("compared"),
+            **ONE_TRIAL,
+        },
+    ),
+    "served sweep": lambda at: (
+        "POST",
+        "/api/comparisons/sweeps",
+        {
+            "session": at.name,
+            "vary": {"survival": [0.4]},
+            "settings": QUICK,
+            "fit_shape": False,
+            "name": at.called("swept"),
+            **ONE_TRIAL,
+        },
+    ),
     "served look": lambda at: ("GET", RUN, None),
     "served list": lambda at: ("GET", "/api/sessions", None),
 }
 VERBS: tuple[str, ...] = (*PYTHON, *SERVED)
+TRACKING = {
+    f"served {verb}"
+    for verb in (
+        *("track", "branch", "correct", "settings", "settings back", "better pose", "open", "seek"),
+        *(
+            "reanneal",
+            "layer",
+            "frame",
+            "pause",
+            "cancel",
+            "rename",
+            "delete",
+            "rename the run",
+            "delete the run",
+        ),
+    )
+}
+"""Verbs that the server's tracking process has a part in."""
+ALONE = ("Too few silhouettes", "The cameras' pictures are not level", "Camera front has")
+"""Begin what a verb is refused with where nothing else goes on."""
+SLOW = {"fit the subject", "initialise", "compare", "sweep"}
+"""Verbs that take seconds."""
 
 
 def plain(verb: str) -> str:
@@ -202,10 +378,10 @@ LEFT: Mapping[str, Callable[[There, Given], object]] = {
     "retitle": lambda there, at: there.any_session(lambda one: one.manifest.title == at.called("title")),
     "duplicate": lambda there, at: there.any_session(lambda one: one.manifest.name == at.called("copy")),
     "rename the run": lambda there, at: there.any_run(at.called("renamed")),
-    "turn": lambda there, at: there.any_session(
-        lambda one: [camera.turned for camera in one.manifest.footage.cameras] == [180]
-    ),
+    "turn": lambda there, at: there.any_session(lambda one: one.manifest.footage.cameras[0].turned == 180),
     "synchronise": lambda there, at: LEFT["turn"](there, at),
+    "import": lambda there, at: there.any_session(lambda one: one.name == at.called("imported")),
+    "level": lambda there, at: LEFT["calibrate"](there, at),
     "calibrate": lambda there, at: there.any_session(
         lambda one: list((one.path / "calibration" / EARLIER).glob("*"))
     ),
