@@ -188,10 +188,15 @@ class Footage:
 
 
 def open_footage(source: FootageSource, session_folder: Path) -> Footage:
-    """The footage that a manifest describes. Raises FootageError if a file is gone."""
+    """The footage that a manifest describes. Raises FootageError if a file is gone, NotFoundError if the session is."""
     for camera in source.cameras:
         for entry in filter(None, camera.places):
             if not (session_folder / entry).exists():
+                if not session_folder.is_dir():
+                    raise NotFoundError(
+                        f"'{session_folder}' is no longer there.",
+                        "Where it was renamed meanwhile, do this again under its new name.",
+                    )
                 raise FootageError(
                     f"Footage '{entry}' of camera {camera.name} is not there.",
                     "Put the file back, or import the session again.",

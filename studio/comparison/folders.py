@@ -24,13 +24,25 @@ from studio.sessions.manifest import now
 from studio.sessions.names import checked_name, free_name, inside, is_name
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
+from studio.sessions.work_under_way import check_there, one_at_a_time
 from studio.sessions.workspace import TRASH_NAME, Workspace
 
 FOLDER_NAME = "comparisons"
 
 
-def new_comparison(folder: Path, plan: Plan) -> KeptComparison:
-    """Make a comparison's folder, atomically. Raises SessionError if it exists."""
+def new_comparison(folder: Path, plan: Plan, of: Session | None = None) -> KeptComparison:
+    """Make a comparison's folder, atomically. of : the session that it lies in, if any.
+
+    Raises SessionError if it exists, NotFoundError if the session was moved meanwhile.
+    """
+    if of is None:
+        return _begun(folder, plan)
+    with one_at_a_time(of.path):
+        check_there(of.path)
+        return _begun(folder, plan)
+
+
+def _begun(folder: Path, plan: Plan) -> KeptComparison:
     record = ComparisonRecord(name=folder.name, created=now(), software=software_version(), plan=plan)
     made = atomic_files.new_folder_beside(folder)
     try:

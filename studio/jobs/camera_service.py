@@ -42,7 +42,12 @@ class RecordingState(SessionJob):
 
 
 RECORDINGS = JobKind(
-    "recording", "recording", RecordingState, changes_session=True, busy="The cameras are being recorded."
+    "recording",
+    "recording",
+    RecordingState,
+    changes_session=True,
+    makes_session=True,
+    busy="The cameras are being recorded.",
 )
 
 

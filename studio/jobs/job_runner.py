@@ -14,7 +14,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Generic, TypeVar, cast
+from typing import Any, Generic, TypeVar, cast
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -86,8 +86,6 @@ State = TypeVar("State", bound=SessionJob)
 SomeState = TypeVar("SomeState", bound=SessionJob, covariant=True)
 Work = Callable[["Job"], Mapping[str, object]]
 """work(job) does it, in a thread; what it returns goes into the state, which is "done" unless that says otherwise."""
-During = Callable[[str, SessionJob], AbstractContextManager[None]]
-"""during(noun, state) is entered while a job goes on."""
 Publish = Callable[[dict[str, object]], None]
 
 
@@ -97,8 +95,8 @@ class JobKind(Generic[SomeState]):
 
     states : the class of its states. changes_session : once it is done, all pages hear that the session has changed.
     busy : why no other of the kind can begin, with fields of the state in braces; "" where several may be under way.
-    keeps_session : meanwhile its session stays where it is, under its name. at : the address of its state, page : the
-    page that shows what came of it, both with fields of the state in braces.
+    keeps_session : meanwhile its session stays where it is, under its name. makes_session : it may not be there before.
+    at : the address of its state, page : the page that shows what came of it, both with fields of the state in braces.
     """
 
     event: str
@@ -107,6 +105,7 @@ class JobKind(Generic[SomeState]):
     changes_session: bool = False
     busy: str = ""
     keeps_session: bool = False
+    makes_session: bool = False
     at: str = ""
     page: str = ""
 
@@ -116,6 +115,10 @@ class JobKind(Generic[SomeState]):
         """
         names = self.states.model_fields.keys() - SessionJob.model_fields.keys() - own.keys()
         return {name: getattr(found, name) for name in names if hasattr(found, name)} | own
+
+
+During = Callable[[JobKind[Any], SessionJob], AbstractContextManager[None]]
+"""during(kind, state) is entered while a job goes on."""
 
 
 class Job:
@@ -207,7 +210,7 @@ class JobRunner:
         self,
         publish: Publish,
         log_path: Path | None = None,
-        during: During = lambda noun, state: nullcontext(),
+        during: During = lambda kind, state: nullcontext(),
     ) -> None:
         self._publish, self._log_path, self._during = publish, log_path, during
         self._lock = threading.RLock()
@@ -236,7 +239,7 @@ class JobRunner:
 
     def _known_to_others(self, work: Work) -> Work:
         def known(job: Job) -> Mapping[str, object]:
-            with self._during(job.kind.noun, job.state):
+            with self._during(job.kind, job.state):
                 return work(job)
 
         return known

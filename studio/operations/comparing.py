@@ -257,7 +257,7 @@ def kept_sweep(session: Session, plan: Plan, name: str = "") -> KeptComparison:
     checked_name(run_name(folder.name, plan, len(plan.candidates) * len(plan.seeds) - 1), "run of a sweep")
     if (folder / RECORD_NAME).is_file():
         return _same(folder, plan)
-    return new_comparison(folder, plan)
+    return new_comparison(folder, plan, session)
 
 
 def planned(
@@ -290,13 +290,13 @@ def _kept(session: Session, plan: Plan, name: str, out: Path | None) -> KeptComp
     """
     try:
         if out is None and not name:
-            return unfinished_like(session, plan) or new_comparison(place_of(session), plan)
+            return unfinished_like(session, plan) or new_comparison(place_of(session), plan, session)
         folder = (out or place_of(session, name)).absolute()
         if (folder / RECORD_NAME).is_file():
             return _same(folder, plan)
         if folder.is_dir() and not any(folder.iterdir()):
             folder.rmdir()
-        return new_comparison(folder, plan)
+        return new_comparison(folder, plan, None if out else session)
     except PermissionError as error:
         raise SessionError(
             f"A comparison cannot be kept in '{error.filename}'.", "Choose another folder with --out."

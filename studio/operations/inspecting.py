@@ -29,6 +29,7 @@ def inspected(run: RunName) -> InspectedRun:
 
 
 @operation
+@keeping_in_place
 def view(
     run: RunName,
     name: ViewName,
@@ -58,6 +59,7 @@ def view(
 
 
 @operation
+@keeping_in_place
 def why(
     run: RunName,
     frame: Annotated[int | None, Field(ge=0, description="The frame; default: the run's worst one.")] = None,

@@ -97,6 +97,7 @@ def keeping_in_place(function: Callable[P, R]) -> Callable[P, R]:
         with working_on(session, function.__name__, run):
             return function(*args, **kwargs)
 
+    call.__dict__["keeps_in_place"] = True
     return call
 
 
@@ -135,6 +136,7 @@ def bodies() -> tuple[BodyModel, ...]:
 
 
 @operation
+@keeping_in_place
 def workflow(session: SessionName) -> Workflow:
     """Say how far a session is, step by step from footage to an exported motion, and what is next."""
     opened = open_session(session)

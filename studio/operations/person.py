@@ -34,6 +34,7 @@ from studio.sessions.atomic_files import check_writable
 
 
 @operation
+@keeping_in_place
 def subject(
     session: SessionName,
     height_mm: Annotated[

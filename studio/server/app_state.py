@@ -4,7 +4,7 @@ from collections.abc import Generator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import Depends, Request
 
@@ -14,7 +14,7 @@ from studio.inspection.likelihoods import forget_evaluations
 from studio.jobs.camera_service import CameraService
 from studio.jobs.commands import Close
 from studio.jobs.control import StudioControl
-from studio.jobs.job_runner import JobRunner, SessionJob
+from studio.jobs.job_runner import JobKind, JobRunner, SessionJob
 from studio.runs.overlay_pictures import forget_composers
 from studio.scene.scene_server import SceneServer
 from studio.scene.window_scenes import WindowScenes
@@ -52,12 +52,12 @@ class AppState:
         self.jobs = JobRunner(self.events.publish, self.log_path, self._working)
         self.cameras = CameraService(self.jobs)
 
-    def _working(self, noun: str, state: SessionJob) -> AbstractContextManager[None]:
-        """What keeps other processes from moving a job's session, where it is there and not only being made."""
+    def _working(self, kind: JobKind[Any], state: SessionJob) -> AbstractContextManager[None]:
+        """What keeps other processes from moving a job's session, unless that is only being made."""
         session = self.workspace.root / state.session
-        if not state.session or not (session / MANIFEST_NAME).is_file():
+        if not state.session or (kind.makes_session and not (session / MANIFEST_NAME).is_file()):
             return nullcontext()
-        verb = str(getattr(state, "verb", "") or noun)
+        verb = str(getattr(state, "verb", "") or kind.noun)
         return working_on(session.resolve(), verb, str(getattr(state, "run", "") or ""))
 
     @property

@@ -222,7 +222,7 @@ def begin(
     session = app.workspace.session(arguments.more["session"])
     plan = _plan(session, arguments)
     app.jobs.check_free(COMPARISON)
-    kept = new_comparison(place_of(session, arguments.get("name", "")), plan)
+    kept = new_comparison(place_of(session, arguments.get("name", "")), plan, session)
     return _start(app, session, kept)
 
 

@@ -21,6 +21,7 @@ COURSE = JobKind(
     "making of the course's runs",
     CourseState,
     changes_session=True,
+    makes_session=True,
     busy="The course's runs are being made.",
     page="/guide/course",
 )

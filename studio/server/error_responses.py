@@ -6,6 +6,7 @@ and the answer names that file.
 
 import html
 import logging
+import sqlite3
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,10 @@ from starlette.exceptions import HTTPException
 from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from studio.errors import StudioError, UnforeseenError
+from studio.errors import NotFoundError, StudioError, UnforeseenError
+from studio.foreign_files import MANIFEST_NAME
+from studio.sessions.names import is_name
+from studio.sessions.work_under_way import gone
 
 log = logging.getLogger("studio.server")
 
@@ -66,8 +70,16 @@ def validation_words(errors: Sequence[dict[str, Any]]) -> str:
 def add_error_handlers(app: FastAPI) -> None:
     """Translate the errors that routes raise."""
 
-    async def studio_error(_request: Request, error: Exception) -> Response:
-        return error_response(error if isinstance(error, StudioError) else UnforeseenError(str(error)))
+    async def studio_error(request: Request, error: Exception) -> Response:
+        known = error if isinstance(error, StudioError) else UnforeseenError(str(error))
+        moved = None if isinstance(known, NotFoundError) else _moved_meanwhile(request)
+        return error_response(moved or known)
+
+    async def system_error(request: Request, error: Exception) -> Response:
+        moved = _moved_meanwhile(request)
+        if moved is None:
+            raise error
+        return error_response(moved)
 
     async def invalid(_request: Request, error: Exception) -> Response:
         details: Sequence[dict[str, Any]] = (
@@ -102,6 +114,16 @@ def add_error_handlers(app: FastAPI) -> None:
     app.add_exception_handler(RequestValidationError, invalid)
     app.add_exception_handler(HTTPException, http_error)
     app.add_exception_handler(OverflowError, too_large)
+    app.add_exception_handler(OSError, system_error)
+    app.add_exception_handler(sqlite3.Error, system_error)
+
+
+def _moved_meanwhile(request: Request) -> StudioError | None:
+    """Why a request failed whose session was renamed or deleted meanwhile, whatever it then stumbled over."""
+    name = str(request.path_params.get("session", ""))
+    if not is_name(name) or (request.app.state.studio.workspace.root / name / MANIFEST_NAME).is_file():
+        return None
+    return gone(f"Session '{name}'")
 
 
 class ErrorsInWords:

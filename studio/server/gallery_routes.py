@@ -34,6 +34,7 @@ GALLERY = JobKind(
     "making of a session",
     GalleryState,
     changes_session=True,
+    makes_session=True,
     at="/api/gallery/{session}",
     page="/?session={session}",
 )

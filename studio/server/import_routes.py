@@ -50,6 +50,7 @@ IMPORT = JobKind(
     "import",
     ImportState,
     changes_session=True,
+    makes_session=True,
     at="/api/imports/{identifier}",
     page="/?session={session}",
 )

@@ -180,7 +180,10 @@ class Workspace:
                     "Say 'studio inspect' of it, and remove what is no file.",
                 ) from None
             for store in session.path.glob(f"{RUNS_NAME}/*/{RESULTS_NAME}"):
-                atomic_files.copy_database(store, folder / store.relative_to(session.path))
+                copy = folder / store.relative_to(session.path)
+                # A run that was made meanwhile is not in the copy.
+                if copy.parent.is_dir():
+                    atomic_files.copy_database(store, copy)
             title = f"{session.manifest.title} (copy)"
             write_manifest(folder, msgspec.structs.replace(session.manifest, name=wanted, title=title))
         return Session(place)

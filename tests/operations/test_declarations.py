@@ -44,6 +44,25 @@ VERBS = {
 }
 
 
+LEFT_WHERE_IT_IS = {
+    "notes": "reads a record",
+    "note": "writes a record, in its turn",
+    **dict.fromkeys(("track", "branch", "correct"), "of verbs that keep theirs in place"),
+    "live": "whose run is being tracked",
+}
+"""Verbs on a session or a run during which that may be renamed or deleted, and why."""
+
+
+def test_a_session_stays_where_it_is_while_a_verb_works_on_it() -> None:
+    about = {
+        name
+        for name in VERBS
+        if next(iter(inspect.signature(getattr(studio, name)).parameters), "") in ("session", "run")
+    }
+    keeping = {name for name in about if getattr(getattr(studio, name), "keeps_in_place", False)}
+    assert about - keeping == set(LEFT_WHERE_IT_IS)
+
+
 def command_of(verb: str) -> click.Command:
     return load(NAMED.get(verb, verb.replace("_", "-")))
 

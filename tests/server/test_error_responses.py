@@ -3,13 +3,14 @@
 import base64
 import hashlib
 import logging
+import sqlite3
 from collections.abc import Iterator
 
 import pytest
 from web_doubles import Studio
 
-from studio.errors import StudioError, UnforeseenError
-from studio.server import session_routes
+from studio.errors import FootageError, StudioError, UnforeseenError
+from studio.server import session_routes, subject_routes
 from studio.server.content_policy import PAGE_POLICY
 from studio.server.error_responses import error_response, validation_words
 from studio.sessions.stored_run import StoredRun
@@ -91,6 +92,28 @@ def test_an_unforeseen_fault_is_reported_in_words_and_logged_whole(
     assert "Traceback" not in answer.text
     assert "Traceback" in records.text
     assert studio.client.get("/api/worker").status_code == 200
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        FileNotFoundError(2, "No such file or directory", "subject.toml"),
+        sqlite3.OperationalError("unable to open database file"),
+        FootageError("Footage 'videos/cam1.mp4' is not there.", "Put the file back."),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+def test_whatever_a_request_stumbles_over_a_session_that_was_renamed_meanwhile_is_the_cause(
+    studio: Studio, monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    def moved(*_: object, **__: object) -> None:
+        (studio.workspace.root / "take1").rename(studio.workspace.root / "new")
+        raise error
+
+    monkeypatch.setattr(subject_routes, "write_subject", moved)
+    answer = studio.client.put("/api/sessions/take1/subject", json={"height_mm": 1800})
+    assert answer.status_code == 404
+    assert answer.json()["message"] == "Session 'take1' was renamed or deleted meanwhile."
 
 
 def test_errors_of_the_studio_keep_their_words() -> None:

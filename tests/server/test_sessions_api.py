@@ -2,10 +2,14 @@
 
 import cv2
 import numpy as np
+import pytest
 from web_doubles import Studio, state_of
 
 from studio.body.subject import DEFAULT_BODY
+from studio.errors import NotFoundError
 from studio.jobs.commands import Close
+from studio.server.alignment_routes import ALIGNMENT, AlignmentJob
+from studio.server.import_routes import IMPORT, ImportState
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.settings import DEFAULT_WEIGHTING
@@ -134,3 +138,16 @@ def test_a_run_is_renamed_and_deleted(studio: Studio, tracked: StoredRun) -> Non
     frames = client.get("/api/sessions/take1/runs/best-2/frames").json()["frames"]
     assert [entry["frame"] for entry in frames] == [0, 1]
     assert client.get("/api/trash").json()["entries"] == []
+
+
+def test_a_job_of_a_session_that_was_moved_before_it_began_says_so(studio: Studio) -> None:
+    known = studio.app.state.studio
+    with (
+        pytest.raises(NotFoundError, match="'gone' was renamed or deleted meanwhile"),
+        known._working(ALIGNMENT, AlignmentJob(session="gone")),
+    ):
+        pass
+    # One that makes its session finds none.
+    with known._working(IMPORT, ImportState(session="gone", name="gone")):
+        pass
+    assert not (studio.workspace.root / "gone").exists()

@@ -10,15 +10,23 @@ import pytest
 from toy_session import make_session, true_poses
 
 import studio
+from studio.comparison.folders import new_comparison, place_of
+from studio.comparison.sweep import plan_sweep
 from studio.errors import NotFoundError, RunError, SessionError
 from studio.runs.initialising import InitialPose, keep_pose
 from studio.runs.new_run import prepare_run
 from studio.runs.notes import notes_of, write_note
 from studio.runs.verifying import verify
-from studio.sessions import atomic_files, work_under_way
+from studio.sessions import atomic_files, calibration_changes, work_under_way
+from studio.sessions import workspace as workspace_module
 from studio.sessions.atomic_files import NameTakenError
 from studio.sessions.background_files import use_masks
-from studio.sessions.calibration_changes import EARLIER, NewCalibration, replace_calibration
+from studio.sessions.calibration_changes import (
+    EARLIER,
+    NewCalibration,
+    replace_calibration,
+    restore_calibration,
+)
 from studio.sessions.footage_changes import change_footage
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session, described_anew
@@ -265,3 +273,70 @@ def test_a_file_is_kept_beside_before_it_changes(tmp_path: Path) -> None:
         "own.csv",
     ]
     assert (tmp_path / "own-before-3.csv").read_text() == "c"
+
+
+@pytest.mark.parametrize("moment", ["write_run_record", "note_again"])
+def test_a_rename_or_a_return_that_is_killed_leaves_no_damage(
+    workspace: Workspace, run: StoredRun, monkeypatch: pytest.MonkeyPatch, moment: str
+) -> None:
+    session = workspace.session("toy")
+    assert not verify(session).faults
+
+    def die(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as killed:
+        killed.setattr(workspace_module, moment, die)
+        with pytest.raises(KeyboardInterrupt):
+            workspace.rename_run("toy", "one", "new")
+    assert not verify(session).faults
+    trashed = workspace.trash_run("toy", "new")
+    session.path.joinpath("runs", "new").mkdir()
+    with monkeypatch.context() as killed:
+        killed.setattr(workspace_module, moment, die)
+        with pytest.raises(KeyboardInterrupt):
+            workspace.restore_run(trashed.name)
+    session.path.joinpath("runs", "new").rmdir()
+    workspace.restore_run(trashed.name)
+    assert not verify(session).faults
+
+
+def test_nobody_comes_between_the_parts_of_a_calibration_that_is_put_back(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cameras = tuple(session.cameras())
+    change = replace_calibration(session, NewCalibration(cameras, "again"))
+    assert change.kept is not None
+    monkeypatch.setattr(work_under_way, "PATIENCE", 0.05)
+    words: list[str] = []
+    parts = calibration_changes.stale_runs
+
+    def between(opened: Session) -> tuple[str, ...]:
+        with ThreadPoolExecutor(1) as threads:
+            try:
+                threads.submit(replace_calibration, opened, NewCalibration(cameras, "third")).result()
+            except RunError as error:
+                words.append(str(error))
+        return parts(opened)
+
+    monkeypatch.setattr(calibration_changes, "stale_runs", between)
+    restore_calibration(change.session, change.kept.name, "first")
+    # Once for the cameras, and once more after the other parts.
+    assert len(words) == 2
+    assert Session(session.path).manifest.calibration_source == "first"
+
+
+def test_what_a_moved_session_no_longer_has_is_not_said_to_be_missing(
+    workspace: Workspace, session: Session
+) -> None:
+    workspace.rename("toy", "new")
+    with pytest.raises(NotFoundError, match="renamed meanwhile"):
+        session.footage()
+
+
+def test_no_comparison_begins_where_a_session_was(workspace: Workspace, session: Session) -> None:
+    plan = plan_sweep(session, {"survival": [0.4]}, range(1), last=1, fit_shape=False)
+    workspace.rename("toy", "new")
+    with pytest.raises(NotFoundError, match="Session 'toy' was renamed or deleted meanwhile"):
+        new_comparison(place_of(session, "one"), plan, session)
+    assert not session.path.exists()

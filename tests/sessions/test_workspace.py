@@ -9,6 +9,7 @@ from store_records import layer_of, record_of, result_of
 from toy_session import make_session
 
 from studio.errors import NotFoundError, SessionError
+from studio.sessions import workspace as workspace_module
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session, free_run_name, jpeg
 from studio.sessions.workspace import Workspace, workspace_root
@@ -203,3 +204,19 @@ def test_links_out_of_the_workspace_are_not_listed(
     make_session(outside, frames=3)
     (two_sessions.root / "leak").symlink_to(outside)
     assert [entry.name for entry in two_sessions.sessions()] == ["other", "toy"]
+
+
+def test_a_run_that_is_made_while_its_session_is_copied_is_in_the_copy_or_not(
+    session_on_disk: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left_out = workspace_module._transient
+    session_on_disk.new_run(record_of(session_on_disk, "first"))
+
+    def listed(folder: str, names: list[str]) -> set[str]:
+        if Path(folder).name == "runs":
+            session_on_disk.new_run(record_of(session_on_disk, "late"))
+        return left_out(folder, names)
+
+    monkeypatch.setattr(workspace_module, "_transient", listed)
+    copy = Workspace().duplicate("toy")
+    assert [run.name for run in copy.runs()] == ["first"]
