@@ -5,7 +5,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from studio.declaring import Terminal, Web, operation
+from studio.declaring import LARGEST, Terminal, Web, operation
 from studio.errors import RunError
 from studio.inspection.comparing import RunsCompared, compare_stored
 from studio.inspection.limbs import disagreements_of, errors_of
@@ -19,7 +19,9 @@ from studio.operations.progress import Reporting, reporting
 ViewName = Annotated[
     str, Field(description=f"Which: {', '.join(VIEWS)}."), Terminal("--view", metavar="NAME")
 ]
-Frame = Annotated[int, Field(ge=0, description="The frame that is looked at."), Terminal("--frame")]
+Frame = Annotated[
+    int, Field(ge=0, le=LARGEST, description="The frame that is looked at."), Terminal("--frame")
+]
 
 
 def inspected(run: RunName) -> InspectedRun:
@@ -34,13 +36,15 @@ def view(
     run: RunName,
     name: ViewName,
     frame: Annotated[
-        int | None, Field(ge=0, description="The frame; default: the tables of the whole run.")
+        int | None, Field(ge=0, le=LARGEST, description="The frame; default: the tables of the whole run.")
     ] = None,
     *,
-    layer: Annotated[int | None, Field(ge=0, description="Its index, from 0; default: the last one.")] = None,
+    layer: Annotated[
+        int | None, Field(ge=0, le=LARGEST, description="Its index, from 0; default: the last one.")
+    ] = None,
     parameter: Annotated[str, Field(description="A parameter of the body.")] = "",
     limb: Annotated[str, Field(description="A limb of the body.")] = "",
-    particle: Annotated[int | None, Field(ge=0, description="A particle of the layer.")] = None,
+    particle: Annotated[int | None, Field(ge=0, le=LARGEST, description="A particle of the layer.")] = None,
     camera: Annotated[str, Field(description="A camera.")] = "",
     track: Annotated[str, Field(description="Whose pose; default: what the search found.")] = "",
     second: Annotated[str, Field(description="Another parameter, for a plane of the landscape.")] = "",
@@ -62,7 +66,9 @@ def view(
 @keeping_in_place
 def why(
     run: RunName,
-    frame: Annotated[int | None, Field(ge=0, description="The frame; default: the run's worst one.")] = None,
+    frame: Annotated[
+        int | None, Field(ge=0, le=LARGEST, description="The frame; default: the run's worst one.")
+    ] = None,
     *,
     track: Annotated[str, Field(description="Whose pose; default: what the search found.")] = "",
 ) -> Viewed:

@@ -27,6 +27,7 @@ from studio.capture.calibration_files import (
     find_calibrations,
     read_calibration,
 )
+from studio.declaring import LARGEST
 from studio.errors import CalibrationError, NotFoundError
 from studio.foreign_files import read_file as content_of
 from studio.geometry.camera import Camera
@@ -106,7 +107,7 @@ async def view(
     camera: str,
     app: App,
     height: Annotated[int, Query(ge=64, le=2160)] = 720,
-    frame: Annotated[int, Query(ge=0)] = 0,
+    frame: Annotated[int, Query(ge=0, le=LARGEST)] = 0,
     board: bool = True,
     axes: bool = True,
 ) -> Response:

@@ -2,9 +2,10 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Path, Response
 from pydantic import Field
 
+from studio.declaring import LARGEST
 from studio.operations.notes import note as write
 from studio.operations.notes import notes as read
 from studio.runs.notes import Note
@@ -59,7 +60,7 @@ def put_note(
 
 
 @router.delete(RUN + "/frames/{frame}/note")
-def delete_note(run: OpenRun, frame: int, app: App) -> NoteList:
+def delete_note(run: OpenRun, frame: Annotated[int, Path(le=LARGEST)], app: App) -> NoteList:
     """Take a frame's note away."""
     return _told(app, run, write(run, frame, remove=True))
 

@@ -12,6 +12,7 @@ from studio.arrays import Array
 from studio.body.dragging import Dragger
 from studio.body.mirroring import Mirror, has_sides
 from studio.body.model import BodyModel, checked_pose
+from studio.declaring import LARGEST
 from studio.errors import SettingsError, StudioError
 from studio.jobs.job_runner import Job, JobKind, NumberedJob
 from studio.likelihood.catalogue import WEIGHTINGS
@@ -64,7 +65,7 @@ class StartPoseRequest(Request):
     """
 
     pose: list[float]
-    frame: int | None = Field(None, ge=0)
+    frame: int | None = Field(None, ge=0, le=LARGEST)
 
 
 class PoseRequest(Request):
@@ -92,8 +93,8 @@ class BetterPoseRequest(PoseRequest):
     start pose, whoever still waits for it.
     """
 
-    frame: int = Field(0, ge=0)
-    seed: int = Field(0, ge=0, le=2**63 - 1)
+    frame: int = Field(0, ge=0, le=LARGEST)
+    seed: int = Field(0, ge=0, le=LARGEST)
     keep: bool = False
 
 
@@ -104,7 +105,7 @@ class EditRequest(Request):
 
     session: RunName
     run: RunName | None = None
-    frame: int | None = Field(None, ge=0)
+    frame: int | None = Field(None, ge=0, le=LARGEST)
     pose: list[float] | None = None
 
 

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Query
 from pydantic import Field
 
+from studio.declaring import LARGEST
 from studio.errors import RunError
 from studio.jobs import commands
 from studio.jobs.search_pace import MOST_SECONDS, SpeedChoice, offered
@@ -30,13 +31,13 @@ router = APIRouter(prefix="/api", tags=["runs"])
 class Frame(Request):
     """A frame by its number."""
 
-    frame: int = Field(ge=0)
+    frame: int = Field(ge=0, le=LARGEST)
 
 
 class ReannealRequest(Request):
     """Which frame (-1: the selected one), and whether the answer replaces the stored one."""
 
-    frame: int = Field(-1, ge=-1)
+    frame: int = Field(-1, ge=-1, le=LARGEST)
     keep: bool = False
 
 

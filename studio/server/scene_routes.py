@@ -7,6 +7,7 @@ from fastapi import APIRouter
 from pydantic import Field
 
 from studio.body.reader import parse_body
+from studio.declaring import LARGEST
 from studio.errors import SettingsError
 from studio.geometry.reach import within_reach
 from studio.operations.own_bodies import MOST_TEXT
@@ -52,12 +53,12 @@ class SceneRequest(Request):
 
     session: RunName | None = None
     run: RunName | None = None
-    frame: int | None = Field(None, ge=0)
-    layer: int | None = Field(None, ge=0)
+    frame: int | None = Field(None, ge=0, le=LARGEST)
+    layer: int | None = Field(None, ge=0, le=LARGEST)
     follow: bool | None = None
     limb: ChosenName = None
     parameter: ChosenName = None
-    particle: int | None = Field(None, ge=0)
+    particle: int | None = Field(None, ge=0, le=LARGEST)
     camera: ChosenName = None
     look_through: ChosenName = None
     eye: list[float] | None = Field(None, min_length=6, max_length=6)

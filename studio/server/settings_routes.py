@@ -15,6 +15,7 @@ from pydantic import Field
 from studio.body.catalogue import body_files, list_bodies, load_body
 from studio.body.dimensions import follows_height
 from studio.body.subject import DEFAULT_BODY
+from studio.declaring import LARGEST
 from studio.errors import SettingsError, StudioError
 from studio.jobs import commands
 from studio.likelihood.catalogue import WEIGHTINGS
@@ -209,7 +210,7 @@ def change_settings(
     run: OpenRun,
     changes: dict[str, Value],
     app: App,
-    frame: Annotated[int | None, Query(ge=0, description="The frame that is shown.")] = None,
+    frame: Annotated[int | None, Query(ge=0, le=LARGEST, description="The frame that is shown.")] = None,
 ) -> SettingsInUse:
     """Change knobs by name, all or none; a `settings` event says from which layer on they are used.
 

@@ -6,6 +6,7 @@ from fastapi import APIRouter, Response
 from pydantic import Field
 
 from studio.capture.footage_source import CameraSource
+from studio.declaring import LARGEST
 from studio.errors import NotFoundError
 from studio.evidence.strokes import Stroke, StrokeKind
 from studio.runs.overlay_drawing import upright
@@ -35,7 +36,7 @@ class StrokeEntry(Request):
     upright).
     """
 
-    frame: int = Field(ge=0)
+    frame: int = Field(ge=0, le=LARGEST)
     kind: StrokeKind
     width: float = Field(ge=1.0, le=WIDEST)
     points: list[tuple[float, float]] = Field(min_length=1, max_length=MOST_POINTS)
@@ -65,7 +66,7 @@ class StrokesRequest(Request):
 class StrokesPreviewRequest(StrokesRequest):
     """Strokes of one camera that are tried, and the frame whose mask they are to give."""
 
-    frame: int = Field(ge=0)
+    frame: int = Field(ge=0, le=LARGEST)
 
 
 @router.get("")

@@ -5,6 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query, Response
 from pydantic import BeforeValidator, Field
 
+from studio.declaring import LARGEST
 from studio.errors import RunError
 from studio.inspection.comparing import compare_stored
 from studio.inspection.reading import InspectedRun
@@ -108,10 +109,10 @@ Name = Annotated[str, Query(max_length=64)]
 
 
 def selection_of(
-    layer: Annotated[int | None, Query(ge=0, description="Default: the last one.")] = None,
+    layer: Annotated[int | None, Query(ge=0, le=LARGEST, description="Default: the last one.")] = None,
     parameter: Name = "",
     limb: Name = "",
-    particle: Annotated[int | None, Query(ge=0)] = None,
+    particle: Annotated[int | None, Query(ge=0, le=LARGEST)] = None,
     camera: Name = "",
     track: Annotated[str, Query(max_length=64, description="Whose pose; default: raw.")] = "",
     second: Annotated[str, Query(max_length=64, description="Another parameter, for a plane.")] = "",
@@ -164,7 +165,7 @@ def run_view(inspected: Inspected, view: str, selection: Selected) -> ViewAnswer
 def shared(
     session: OpenSession,
     run: OpenRun,
-    frame: Annotated[int | None, Query(ge=0, description="Default: the run's worst one.")] = None,
+    frame: Annotated[int | None, Query(ge=0, le=LARGEST, description="Default: the run's worst one.")] = None,
     track: Name = "",
     clouds: Annotated[
         tuple[int, ...], Query(max_length=11, description="Frames whose particles are in the page, too.")

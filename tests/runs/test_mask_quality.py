@@ -3,9 +3,10 @@
 import dataclasses
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
-from toy_session import make_session
+from toy_session import facing_camera, make_session, side_camera
 
 from studio.errors import FootageError
 from studio.geometry.camera import Camera
@@ -14,6 +15,7 @@ from studio.runs import mask_quality as quality
 from studio.runs.initialising import initialise
 from studio.runs.person_hull import spread_frames
 from studio.runs.problem_source import ProblemSource
+from studio.sessions.manifest import write_manifest
 from studio.sessions.session import Session
 from studio.synthesis.cameras import placed_camera
 
@@ -107,6 +109,16 @@ def test_empty_masks_are_reported() -> None:
     found = judged([np.zeros((240, 320), np.uint8) for _ in cameras], cameras)
     assert not found.usable
     assert "empty" in found.views[0].in_words()
+
+
+def test_footage_without_frames_has_no_quality(tmp_path: Path) -> None:
+    session = make_session(tmp_path / "toy", 3, cameras=(facing_camera(), side_camera()))
+    empty = msgspec.structs.replace(
+        session.manifest, footage=dataclasses.replace(session.manifest.footage, frame_count=0)
+    )
+    write_manifest(session.path, empty)
+    with pytest.raises(FootageError, match="'toy' has no frame whose masks could be measured"):
+        quality.measure_masks(Session(session.path))
 
 
 def test_frames_are_spread_over_the_footage() -> None:
