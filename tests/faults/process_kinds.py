@@ -192,10 +192,11 @@ RUN = f"/api/sessions/{TOY}/runs/{NEW}"
 
 @dataclass
 class Served:
-    """A server in a process of its own, and a browser that was let in."""
+    """A server in a process of its own, and a browser that was let in. viewers_token : of those who only look."""
 
     process: subprocess.Popen[str]
     client: httpx.Client
+    viewers_token: str
 
     def state(self) -> str:
         return self.client.get("/api/worker").json()["state"]
@@ -250,13 +251,13 @@ def server(place: Place) -> Iterator[Served]:
     )
     assert process.stdout is not None
     try:
-        printed = process.stdout.readline()
-        found = re.search(r"(http://\S+)/\?token=(\S+)", printed)
-        assert found, f"the server did not start: {printed}"
-        base, token = found.groups()
+        printed = process.stdout.readline() + process.stdout.readline()
+        found = re.findall(r"(http://\S+)/\?token=(\S+)", printed)
+        assert len(found) == 2, f"the server did not start: {printed}"
+        (base, token), (_, viewers_token) = found
         with httpx.Client(base_url=base, headers={"origin": base}, timeout=PATIENCE) as client:
             assert client.get("/", params={"token": token}).status_code == 303
-            yield Served(process, client)
+            yield Served(process, client, viewers_token)
     finally:
         children = psutil.Process(process.pid).children(recursive=True) if process.poll() is None else []
         process.kill()

@@ -6,6 +6,7 @@ import tempfile
 from pathlib import Path
 
 from soak.load import LONG, Load, soak, table
+from soak.viewers import LEAST, speeds
 
 parser = argparse.ArgumentParser(prog="soak", description=__doc__)
 parser.add_argument(
@@ -24,6 +25,10 @@ if __name__ == "__main__":
         pings=LONG.pings,
     )
     with tempfile.TemporaryDirectory() as folder:
-        found = soak(Path(folder), load)
+        found = soak(Path(folder) / "load", load)
+        beside = speeds(Path(folder) / "viewers", frames=60, rounds=2)
+    found.lines.append(("tracking", beside.in_words()))
+    if beside.share < LEAST:
+        found.wrong.append(f"viewers leave a run {beside.share:.2f} of its speed, less than {LEAST}")
     print(table(found))
     sys.exit(bool(found.wrong))
