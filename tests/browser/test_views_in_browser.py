@@ -686,7 +686,7 @@ def test_a_large_picture_follows_the_timeline(window: StudioPage) -> None:
 
 def test_nothing_that_is_drawn_is_made_up(window: StudioPage, studio: StudioServer) -> None:
     """What why says stands in the panel, word by word."""
-    window.page.evaluate(SET, {"panel": "why", "frame": FRAME})
+    window.page.evaluate(SET, {"panel": "why", "frame": FRAME, "trial": None, "whatIf": None})
     answer = studio.get(f"{RUN}/frames/{FRAME}/views/why")
     words = window.page.locator(".why-words")
     for finding in answer["findings"]:
