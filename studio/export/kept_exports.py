@@ -80,11 +80,11 @@ def export_into_run(
     return kept
 
 
-def keep_film(
+def keep_file(
     run: StoredRun, stem: str, kind: str, fps: float, write: Callable[[Path], int], words: str
 ) -> KeptExport:
-    """Keep a film of the scene among the run's exports. write : makes the file, and says how many pictures it has. The
-    same film replaces its file.
+    """Keep what was made for a run, such as a film of its scene, among its exports. write : makes the file, and says
+    how many frames it has. Another of the same name is replaced.
     """
     folder = run.folder / FOLDER
     folder.mkdir(exist_ok=True)
@@ -92,7 +92,7 @@ def keep_film(
     part = new_folder_beside(place)
     try:
         count = write(part / place.name)
-        with writing("The film", place):
+        with writing("The file", place):
             os.replace(part / place.name, place)
     finally:
         discard(part)

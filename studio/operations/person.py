@@ -164,7 +164,10 @@ class Landmarks:
 def landmarks(
     session: SessionName,
     to: Annotated[
-        str | Path, Field(description="The TRC file that is written."), Terminal(metavar="FILE", kind=Path)
+        str | Path,
+        Field(description="The TRC file that is written."),
+        Terminal(metavar="FILE", kind=Path),
+        Web(left_out=True),
     ],
     *,
     progress: Reporting = None,

@@ -2,9 +2,10 @@
 
 Each camera's points (`evidence.person_network`) are triangulated over the cameras. Left and right, which the network
 exchanges at times, are given to each camera so that the rays meet; of the two ways to do that for all cameras together
-the one that goes on from the frame before. A camera whose point lies far from where the others' rays meet does not
-count for that point. The network's joints are no marker on a bone: each may lie constantly beside a body's own, by
-centimetres (`Evaluation.without_offsets_mm` is the error without that).
+the one that goes on from the frame before. Which of both sides is the left one most cameras say, in all frames.
+A camera whose point lies far from where the others' rays meet does not count for that point. The network's joints are
+no marker on a bone: each may lie constantly beside a body's own, by centimetres (`Evaluation.without_offsets_mm` is
+the error without that).
 """
 
 import itertools
@@ -54,11 +55,15 @@ def person_landmarks(cameras: Sequence[Camera], footage: Footage, progress: Prog
     positions = np.full((footage.frame_count, len(NAMES), 3), np.nan)
     seen = dict(followed_person(cameras, footage, progress))
     before: Array | None = None
+    votes = 0
     for frame in sorted(seen):
         found = _joints(known, seen[frame], before)
         if found is not None:
-            positions[frame] = found
-            before = found
+            positions[frame], vote = found
+            before = positions[frame]
+            votes += vote
+    if votes < 0:
+        positions = positions.reshape(-1, len(PAIRS), 2, 3)[:, :, ::-1].reshape(positions.shape)
     if before is None:
         raise FootageError(
             "No two cameras see the same person in any frame.",
@@ -68,13 +73,15 @@ def person_landmarks(cameras: Sequence[Camera], footage: Footage, progress: Prog
     return MarkerMotion(NAMES, times, positions, "mm", footage.fps)
 
 
-def _joints(cameras: Mapping[str, Camera], seen: Sightings, before: Array | None) -> Array | None:
-    """(12, 3) mm; None where fewer than two cameras see the person. before : those of the last frame."""
+def _joints(cameras: Mapping[str, Camera], seen: Sightings, before: Array | None) -> tuple[Array, int] | None:
+    """(12, 3) mm, and how many more cameras see the left side as the left one than as the right one; None where fewer
+    than two cameras see the person. before : those of the last frame; without it both sides may be exchanged.
+    """
     names = [name for name in seen if name in cameras]
     if len(names) < 2:
         return None
     ways = itertools.product((False, True), repeat=len(names) - 1) if len(names) <= MOST_EXCHANGED else [()]
-    best: tuple[float, Array] | None = None
+    best: tuple[float, Array, int] | None = None
     for way in ways:
         exchanged = dict(zip(names, (False, *way, *[False] * len(names)), strict=False))
         pixels = {name: _pixels(seen[name], exchanged[name]) for name in names}
@@ -83,14 +90,15 @@ def _joints(cameras: Mapping[str, Camera], seen: Sightings, before: Array | None
             continue
         missed = float(np.mean([np.median(_missed(cameras[name], points, pixels[name])) for name in names]))
         if best is None or missed < best[0]:
-            best = missed, _without_outliers(cameras, pixels, seen, points)
+            kept = len(names) - 2 * sum(exchanged.values())
+            best = missed, _without_outliers(cameras, pixels, seen, points), kept
     if best is None:
         return None
-    found, other = best[1], _exchanged(best[1])
-    if before is None:
-        # The first camera says which side is which.
-        return found
-    return found if _moved(found, before) <= _moved(other, before) else other
+    found, vote = best[1:]
+    other = _exchanged(found)
+    if before is None or _moved(found, before) <= _moved(other, before):
+        return found, vote
+    return other, -vote
 
 
 def _pixels(seen: Sighting, exchanged: bool) -> Array:

@@ -8,7 +8,7 @@ from fastapi.responses import Response
 from pydantic import Field
 
 from studio.errors import NotFoundError
-from studio.export.kept_exports import keep_film
+from studio.export.kept_exports import keep_file
 from studio.jobs.job_runner import Job
 from studio.scene.scene_pictures import Film, png_of
 from studio.server.app_state import App, Scene
@@ -77,7 +77,7 @@ def begin_film(request: FilmRequest, app: App, scene: Scene) -> ExportState:
                 film, place, lambda done, total: job.report_or_stop("drawing", done, total)
             )
 
-        return {"result": keep_film(run, stem, request.kind, rate, write, "A film of the scene")}
+        return {"result": keep_file(run, stem, request.kind, rate, write, "A film of the scene")}
 
     state = ExportState(session=shown.session, run=run.name, format=request.kind)
     return app.jobs.begin(EXPORT, state, work)

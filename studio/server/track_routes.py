@@ -1,16 +1,20 @@
 """Tracks of a run: listed, made in the background with progress as `track` events, downloaded; runs corrected."""
 
 import asyncio
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Response
 from pydantic import Field
 
+from studio.export.kept_exports import keep_file, kept_file
 from studio.jobs.job_runner import Job, JobKind, NumberedJob, Work
 from studio.knobs import changed, knobs_of
+from studio.operations.person import landmarks
 from studio.operations.results import check as check_run
-from studio.operations.results import refine, smooth
+from studio.operations.results import evaluate, refine, smooth
 from studio.operations.tracking import correct, corrected_run
+from studio.progress import unheard
 from studio.runs.checking import RunCheck, kept_check
 from studio.runs.correcting import track_backwards
 from studio.runs.refining import REFINED, SMOOTHED, MadeTrack, check_making, jitter
@@ -31,7 +35,9 @@ from studio.trackers.refinement import RefinementSettings
 from studio.trackers.smoothing import SmoothingSettings
 
 router = APIRouter(prefix="/api", tags=["tracks"])
-Verb = Literal["refine", "smooth", "correct", "pose", "check"]
+LANDMARKS = "landmarks"
+"""Stem of the file with a network's joints among a run's exports."""
+Verb = Literal["refine", "smooth", "correct", "pose", "check", "landmarks"]
 
 
 class TrackLine(Answer):
@@ -60,11 +66,22 @@ class TrackList(Answer):
     smooth_settings: list[KnobView]
 
 
+class LandmarksLine(Answer):
+    """A track against a network's joints. file: of the run's exports, with the joints; seen: share of the frames with
+    all of them; mean_mm: from them; without_offsets_mm: the same without each joint's constant offset.
+    """
+
+    file: str
+    seen: Number
+    mean_mm: Number
+    without_offsets_mm: Number
+
+
 class TrackJobState(NumberedJob):
     """How refining, smoothing or correcting stands.
 
     made_run: the corrected run. track: the track that is made. pose, gain, overlap_before, overlap: of a search around
-    a pose (verb pose; run is "" where it is the session's).
+    a pose (verb pose; run is "" where it is the session's). landmarks: of verb landmarks.
     """
 
     verb: Verb
@@ -80,6 +97,7 @@ class TrackJobState(NumberedJob):
     gain: Number = None
     overlap_before: Number = None
     overlap: Number = None
+    landmarks: LandmarksLine | None = None
 
 
 TRACK = JobKind(
@@ -277,6 +295,37 @@ async def begin_check(
         return {"track": name}
 
     return begin_job(app, "check", session, run, work)
+
+
+@router.post(RUN + "/landmarks", status_code=202)
+async def begin_landmarks(
+    session: OpenSession,
+    run: OpenRun,
+    arguments: Annotated[
+        Arguments,
+        body_of(evaluate, "LandmarksRequest", without=("truth", "truth_cameras", "truth_up", "align")),
+    ],
+    app: App,
+) -> TrackJobState:
+    """Measure a track against the joints that a network sees of a person, which are kept among the run's exports."""
+    name = await asyncio.to_thread(track_named, run, arguments.get("track", BEST))
+    await asyncio.to_thread(read_track, run, name)
+
+    def work(job: Job) -> dict[str, object]:
+        seen = 0.0
+
+        def write(place: Path) -> int:
+            nonlocal seen
+            made = landmarks(session, place, progress=job.report_or_stop)
+            seen = made.seen
+            return len(made.motion.times)
+
+        kept = keep_file(run, LANDMARKS, "trc", session.manifest.fps, write, "A network's joints")
+        found = evaluate(run, truth=kept_file(run, kept.file), track=name, progress=unheard)
+        line = LandmarksLine.of(found, file=kept.file, seen=seen)
+        return {"track": name, "landmarks": line}
+
+    return begin_job(app, "landmarks", session, run, work)
 
 
 def _check_line(found: RunCheck) -> CheckLine:

@@ -33,9 +33,9 @@ def sighting(camera: Camera, exchanged: bool = False, wrong: int | None = None) 
 
 
 def found(seen: dict[str, Sighting], before: Array | None = None) -> Array:
-    points = _joints({camera.name: camera for camera in CAMERAS}, seen, before)
-    assert points is not None
-    return points
+    joints = _joints({camera.name: camera for camera in CAMERAS}, seen, before)
+    assert joints is not None
+    return joints[0]
 
 
 def test_joints_lie_where_the_rays_meet() -> None:
@@ -46,6 +46,26 @@ def test_joints_lie_where_the_rays_meet() -> None:
 def test_a_camera_that_exchanges_sides_is_put_right() -> None:
     seen = {camera.name: sighting(camera, number == 2) for number, camera in enumerate(CAMERAS)}
     np.testing.assert_allclose(found(seen), JOINTS, atol=0.1)
+
+
+@pytest.mark.parametrize("wrong", range(len(CAMERAS)))
+@pytest.mark.parametrize("always", [True, False])
+def test_the_left_side_is_what_most_cameras_call_left_in_all_frames(
+    monkeypatch: pytest.MonkeyPatch, wrong: int, always: bool
+) -> None:
+    """One camera exchanges the sides, the first one too: in every frame, or all of them in the first frame alone."""
+
+    def seen(frame: int) -> dict[str, Sighting]:
+        return {
+            camera.name: sighting(camera, number == wrong if always else frame == 0)
+            for number, camera in enumerate(CAMERAS)
+        }
+
+    frames = [(frame, seen(frame)) for frame in range(FRAMES)]
+    monkeypatch.setattr("studio.runs.person_landmarks.followed_person", lambda *_: iter(frames))
+    footage = RenderedFootage(None)  # pyright: ignore[reportArgumentType]
+    motion = person_landmarks(CAMERAS, footage, unheard)  # pyright: ignore[reportArgumentType]
+    np.testing.assert_allclose(motion.positions, np.broadcast_to(JOINTS, (FRAMES, 12, 3)), atol=0.1)
 
 
 def test_sides_go_on_from_the_frame_before_where_every_camera_exchanges_them() -> None:

@@ -9,6 +9,8 @@ from tracked_runs import finish
 from waiting import PATIENCE
 from web_doubles import Studio
 
+from studio.body.forward_kinematics import marker_points
+from studio.motion_files.trc import MarkerMotion
 from studio.runs.new_run import prepare_run
 from studio.runs.tracks import Track, read_track, write_track
 from studio.sessions.stored_run import StoredRun
@@ -115,3 +117,27 @@ def test_corrected_on_and_back(studio: Studio, run: StoredRun) -> None:
     back = begun(studio, "correct", {"frame": 4, "track": "raw", "back_to": 1, "name": "back"})
     assert (back["state"], back["made_run"], back["moved"]) == ("done", "back", 4), back
     assert studio.client.get("/api/track-jobs/none").status_code == 404
+
+
+def test_a_track_is_measured_against_the_joints_of_a_network(
+    studio: Studio, run: StoredRun, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    body, track = run.body(), read_track(run)
+    markers = marker_points(body, track.poses) + np.array([30.0, 0.0, 0.0])
+    names = tuple(marker.name for marker in body.markers)
+    seen = MarkerMotion(names, track.frames / run.record.fps, markers, "mm", run.record.fps)
+    monkeypatch.setattr("studio.operations.person.person_landmarks", lambda *_: seen)
+    response = begun(studio, "landmarks", {"track": "raw"})
+    assert response["state"] == "done", response
+    line = response["landmarks"]
+    assert line["mean_mm"] == pytest.approx(30.0, abs=0.1)
+    assert line["without_offsets_mm"] == pytest.approx(0.0, abs=0.1)
+    assert (line["file"], line["seen"]) == ("landmarks.trc", 1.0)
+    assert studio.client.get(f"{RUN}/exports/landmarks.trc").status_code == 200
+    assert studio.client.get(f"{RUN}/exports").json()["exports"][0]["file"] == "landmarks.trc"
+
+
+def test_one_camera_has_no_joints_in_space(studio: Studio, run: StoredRun) -> None:
+    response = begun(studio, "landmarks", {})
+    assert (response["state"], response["message"]) == ("failed", "One camera shows no place in space.")
+    assert studio.client.get(f"{RUN}/exports").json()["exports"] == []

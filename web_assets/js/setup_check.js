@@ -10,7 +10,7 @@ import { viewWall } from "./setup_views.js";
 
 const MOST_CHIPS = 24;
 const GOOD = 0.85;
-const GOING = { refine: "refining", smooth: "smoothing", check: "comparing" };
+const GOING = { refine: "refining", smooth: "smoothing", check: "comparing", landmarks: "looking for joints" };
 const millimetres = (value) => (value === null ? "–" : `${value.toFixed(1)} mm`);
 
 /** @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
@@ -18,9 +18,10 @@ export function mount(place, setup) {
   const run = setup.detail.runs.find((one) => one.name === setup.step.run) ?? setup.detail.runs[0];
   const here = runPath(setup.session, run.name);
   const found = element("section", { className: "footage-step" });
+  const witness = element("section", { className: "footage-step" });
   const better = element("section", { className: "footage-step" });
   const going = optional();
-  place.append(found, going, better);
+  place.append(found, going, ...(setup.detail.body.by_height && setup.detail.cameras.length > 1 ? [witness] : []), better);
   const wall = viewWall(setup);
   /** @type {Schemas["CheckAnswer"]} */
   let answer = null;
@@ -30,6 +31,8 @@ export function mount(place, setup) {
   let track = "";
   let shown = run.first; // the frame that is looked at
   let failed = null;
+  /** @type {Schemas["LandmarksLine"] | null} */
+  let seen = null; // how far the track lies from a network's joints
   let stopped = false;
 
   const picker = element("input", { type: "range", min: 0, max: 0, value: 0, ariaLabel: "Checked frame" });
@@ -132,8 +135,18 @@ export function mount(place, setup) {
       hint("Each is stored beside the tracked one. The smoothed one is exported if there is one, else the refined one, else the one with corrected sides."), failure(failed));
   }
 
+  /** Another witness than the masks, of people: joints that a network sees, triangulated. */
+  function drawWitness() {
+    const file = seen && element("a", { href: `${here}/exports/${encodeURIComponent(seen.file)}`, download: seen.file }, seen.file);
+    fill(witness, element("h2", {}, "Another witness"),
+      seen ? element("p", {}, `Track "${track}" lies ${millimetres(seen.mean_mm)} from a network's joints, ${millimetres(seen.without_offsets_mm)} without each joint's constant offset; all of them are seen in ${percent(seen.seen)} of the frames. `, file)
+        : hint("A network that knows people, and nothing of this body or its search, sees shoulders, elbows, wrists, hips, knees and ankles in every view; coarse by some centimetres."),
+      actions(button(seen ? "Look again" : "Compare with a network's joints", () => begin("landmarks", { track }), "small", { disabled: Boolean(job) })));
+  }
+
   async function choose(name) {
     track = name;
+    seen = null;
     answer = await fetchJson(`${here}/check?track=${encodeURIComponent(name)}`);
     draw();
     showAgain();
@@ -141,11 +154,12 @@ export function mount(place, setup) {
 
   function draw() {
     drawFound();
+    drawWitness();
     drawBetter();
     drawProgress(going, job && progressOf(job, GOING[job.verb] || "working", () => remove(`/api/track-jobs/${job.identifier}`).catch(complain)));
   }
 
-  /** Begin refining, smoothing or measuring, and follow it to its end; nothing else can be begun meanwhile. @param {"refine" | "smooth" | "check"} verb */
+  /** Begin refining, smoothing or measuring, and follow it to its end; nothing else can be begun meanwhile. @param {"refine" | "smooth" | "check" | "landmarks"} verb */
   function begin(verb, request) {
     failed = null;
     job = { verb, state: "running" };
@@ -174,7 +188,9 @@ export function mount(place, setup) {
       ended = await followJob(`/api/track-jobs/${job.identifier}`, (state) => { job = state; draw(); }, () => stopped);
     } catch (error) { failed = error; }
     if (stopped) return "";
-    const made = ended?.state === "done" && ended.verb !== "check" ? ended.track : "";
+    const made = ended?.state === "done" && !["check", "landmarks"].includes(ended.verb) ? ended.track : "";
+    if (made) seen = null;
+    if (ended?.landmarks) seen = ended.landmarks;
     await load(made || track);
     await setup.refresh();
     return made;
