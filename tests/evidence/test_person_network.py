@@ -41,5 +41,6 @@ def test_a_person_is_found_and_cut_out(walk: Rendered, network: PersonNetwork, t
     assert overlap(mask, true) >= 0.9
 
 
+@pytest.mark.slow
 def test_nobody_is_found_in_an_empty_room(walk: Rendered, network: PersonNetwork) -> None:
     assert network.found(walk.empty[walk.cameras[2].name]) == []

@@ -196,6 +196,7 @@ def test_trimesh_opens_it_and_finds_closed_limbs(make_run, tmp_path: Path) -> No
     assert spans[2] < 0.5
 
 
+@pytest.mark.slow
 def test_an_hour_is_long_for_32_bit_times_and_yet_reads_back(make_run, tmp_path: Path) -> None:
     count = 100_000
     session, run = make_run("planar_arm4", lambda body: track_of(moving_poses(body, count)))

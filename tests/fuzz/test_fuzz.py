@@ -24,7 +24,13 @@ def malformed(bench: Bench, name: str) -> dict[str, tuple[str, bytes]]:
     return found
 
 
-@pytest.mark.parametrize("name", FORMATS)
+LONG = ("mjcf",)
+"""Formats whose reader takes seconds a file."""
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG)) for name in FORMATS]
+)
 def test_the_corpus_is_read_or_refused_in_words(name: str, tmp_path_factory: pytest.TempPathFactory) -> None:
     bench = Bench(name, tmp_path_factory.mktemp("bench"))
     for what, (file, content) in malformed(bench, name).items():

@@ -66,6 +66,7 @@ def test_a_process_stays_with_what_is_near_its_last_task() -> None:
     assert nearest(waiting[:1], "run", ["walk"]) == 0
 
 
+@pytest.mark.slow
 def test_results_errors_and_what_cannot_travel(one: ProcessExecutor) -> None:
     here = one.submit(identifier)
     assert here.result(PATIENCE) not in (0, os.getpid())
@@ -164,6 +165,7 @@ EXECUTORS: dict[str, Callable[[], Executor | None]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "alone"), [*((name, False) for name in EXECUTORS), ("a client's", True)])
 def test_any_executor_gives_the_same_outcomes(tmp_path: Path, name: str, alone: bool) -> None:
     jobs = jobs_of(tmp_path / "log", alone=alone, seed1="refuse")

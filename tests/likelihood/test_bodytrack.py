@@ -130,6 +130,7 @@ def close_cameras(*factors: int) -> tuple[Camera, ...]:
     )
 
 
+@pytest.mark.slow
 def test_a_camera_within_reach_of_the_body_breaks_nothing(human):
     """Limbs that fill many pictures: more samples than there is room for are left out, not written."""
     cameras = close_cameras(1, 30, 1000)

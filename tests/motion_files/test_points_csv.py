@@ -102,6 +102,7 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
         read_truth(tmp_path / "bytes.csv", 30.0)
 
 
+@pytest.mark.slow
 @given(st.integers(0, len(LONG) - 1), st.text(max_size=4))
 def test_no_change_of_a_file_raises_anything_else(
     tmp_path_factory: pytest.TempPathFactory, at: int, put: str

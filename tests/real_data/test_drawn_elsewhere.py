@@ -14,6 +14,7 @@ from studio.sessions.session import Session
 pytestmark = pytest.mark.real_data
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["wood", "tiles"])
 def test_a_clip_of_others_begins_in_its_true_pose(
     name: str, real_data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

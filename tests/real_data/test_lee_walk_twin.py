@@ -106,6 +106,7 @@ def test_the_person_is_whole_in_all_pictures_all_the_time(cameras: tuple[Camera,
         assert (pixels[..., 1] + reach).max() < camera.height
 
 
+@pytest.mark.slow
 def test_its_silhouettes_are_about_as_large_as_the_real_ones(data: Path, cameras: tuple[Camera, ...]) -> None:
     """Laid on the real start pose. The real person has more hair and a looser shirt."""
     recipe, skeleton, _ = twin("lee-walk-twin")

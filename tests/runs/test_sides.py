@@ -69,6 +69,7 @@ def test_legs_are_corrected_once_and_the_raw_track_stays(
     assert smooth_run(run).track.made_by["from"] == "sides"
 
 
+@pytest.mark.slow
 def test_a_run_that_is_sound_has_no_such_track(
     session: Session, run: StoredRun, truth: np.ndarray, problems: ProblemSource
 ) -> None:

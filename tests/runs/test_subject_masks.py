@@ -116,6 +116,7 @@ def test_a_camera_without_a_picture_says_nothing_of_who_is_in_view(
     assert all(part.any() for parts in second.parts for name, part in parts.items() if name != gone)
 
 
+@pytest.mark.slow
 def test_masks_of_two_are_not_called_usable(made: TwoPeople) -> None:
     found = mask_quality(made.session, session_settings(made.session).evidence)
     assert found.subjects == 2

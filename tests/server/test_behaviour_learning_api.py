@@ -75,6 +75,7 @@ def test_uploaded_motion_becomes_a_model(studio: Studio, tmp_path, archive: bool
     assert begin(studio, sources=["walk"]).status_code == 422, "the name is taken"
 
 
+@pytest.mark.slow
 def test_what_goes_wrong_inside_is_reported_in_words(studio: Studio, tracked: StoredRun) -> None:
     answer = begin(studio, sources=["take1/first"])
     assert answer.status_code == 202, answer.text

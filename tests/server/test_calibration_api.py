@@ -69,6 +69,7 @@ def ended_calibration(studio: Studio, begun: dict) -> dict:
     raise AssertionError("the calibration did not end")
 
 
+@pytest.mark.slow
 def test_a_tilted_world_is_levelled_as_a_proposal(studio: Studio) -> None:
     session = make_nudged_session(studio.workspace.place_for("askew"), 0.0)
     tilt = rigid(cv2.Rodrigues(np.array([np.radians(12.0), 0.0, 0.0]))[0], np.array([0.0, 0.0, 300.0]))

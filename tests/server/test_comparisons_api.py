@@ -44,6 +44,7 @@ def until(studio: Studio, name: str, *statuses: str) -> dict:
     raise AssertionError(f"it never was {statuses}")
 
 
+@pytest.mark.slow
 def test_a_comparison_is_made_kept_and_downloaded(compared: Studio) -> None:
     client = compared.client
     begun = client.post("/api/comparisons", json=WISH)

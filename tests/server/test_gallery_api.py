@@ -80,6 +80,7 @@ def standing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_recipe_is_rendered_as_a_job(
     studio: Studio, standing: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:

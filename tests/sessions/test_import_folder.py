@@ -225,6 +225,7 @@ def test_an_absurd_frame_rate(tmp_path: Path, fps: float) -> None:
         import_source(tmp_path, tmp_path / "made", ImportOptions(fps=fps))
 
 
+@pytest.mark.slow
 @pytest.mark.real_data
 def test_the_balancing_man(real_data: Path, tmp_path: Path) -> None:
     report = import_source(real_data / "pose2sim-balance", tmp_path / "made")

@@ -161,6 +161,7 @@ def test_what_an_upload_broke_off_is_no_session(
     assert remote_session(address).manifest.frame_count == toy.manifest.frame_count
 
 
+@pytest.mark.slow
 def test_a_killed_upload_of_a_run_is_no_run(
     address: str, toy: Session, server: Mapping[str, str], tmp_path: Path
 ) -> None:
@@ -256,6 +257,7 @@ def test_what_a_killed_copy_left_is_made_anew_and_many_wait_for_one(
     assert contents(found[0]) == contents(toy.path)
 
 
+@pytest.mark.slow
 def test_copies_that_nobody_uses_make_room(
     address: str, toy: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -311,6 +313,7 @@ def test_what_is_not_there(address: str, toy: Session, tmp_path: Path) -> None:
         upload(toy, f"s3://{BUCKET}/a b")
 
 
+@pytest.mark.slow
 def test_a_store_that_refuses_says_why(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")
     s3fs.S3FileSystem.clear_instance_cache()

@@ -54,6 +54,7 @@ def person() -> DrawnPerson:
     return drawn_person(2, postures=2)
 
 
+@pytest.mark.slow
 def test_silhouettes_agree_better_afterwards_and_a_seed_repeats(person: DrawnPerson) -> None:
     settings = ShapeSearchSettings(particles=12, layers=10, sought=64)
     found = search_of(person, settings).run(person.poses)
