@@ -97,7 +97,8 @@ class WindowScenes:
             if (entry := self._entries.get(window + TWIN)) is not None:
                 entry.is_led = False
             return leader.lead(None)
-        leader.lead(self.scene(window + TWIN))
+        # It takes one of the places that its window takes one of.
+        leader.lead(self.scene(window + TWIN, self._entries[window].bare))
         self._entries[window + TWIN].is_led = True
 
     def open_scenes(self) -> dict[str, SceneServer]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from click.testing import CliRunner
 
+from studio.cli.inspection_commands import tables_csv
 from studio.cli.main import main
 from studio.sessions.session import Session
 
@@ -35,3 +36,8 @@ def test_a_layer_is_named_as_the_tables_count_it(session_on_disk: Session, tmp_p
     assert refused.exit_code == 2
     assert "no layer 4" in refused.stderr
     assert "layers 1 to 3" in refused.stderr
+
+
+def test_a_line_break_in_a_run_s_record_begins_no_cell() -> None:
+    text = tables_csv([], "variance of toy / one (studio 1\r\n=cmd|' /C calc'!A0)")
+    assert text.splitlines() == ["# variance of toy / one (studio 1 =cmd|' /C calc'!A0)"]

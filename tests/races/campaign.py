@@ -62,7 +62,7 @@ class Tally:
     killed: int = 0
     seconds: float = 0.0
     pairs: set[frozenset[str]] = field(default_factory=set[frozenset[str]])
-    refusals: Counter[str] = field(default_factory=Counter[str])
+    refusals: dict[str, int] = field(default_factory=dict[str, int])
     wrong: list[str] = field(default_factory=list)
     commits: list[str] = field(default_factory=list)
 
@@ -78,10 +78,8 @@ def campaign(
     """A group for each seed. seconds : begin none after that. each : called with what is wrong, as it comes. kept : a
     file of what earlier calls did, with which this one goes on: after the seeds of these, its numbers added to theirs.
     """
-    tally = msgspec.json.decode(kept.read_bytes(), type=Tally) if kept and kept.is_file() else Tally()
+    tally = _begun(kept)
     seeds = seeds[tally.groups :]
-    if kept and (commit := _commit()) not in tally.commits:
-        tally.commits.append(commit)
     with Stage(folder) as stage:
         began = time.monotonic()
         for seed in seeds:
@@ -97,12 +95,21 @@ def campaign(
                 tally.killed += outcome.state == "killed"
                 tally.refused += outcome.state == "refused"
                 if outcome.state == "refused":
-                    tally.refusals[re.sub(r"[\w-]*\d[\w-]*", "#", outcome.words)] += 1
+                    words = re.sub(r"[\w-]*\d[\w-]*", "#", outcome.words)
+                    tally.refusals[words] = tally.refusals.get(words, 0) + 1
             for words in dict.fromkeys(wrong):
                 tally.wrong.append(f"--seed {seed} --groups 1 ({', '.join(fired)}): {words}")
                 each(tally.wrong[-1])
             if kept:
                 kept.write_bytes(msgspec.json.encode(tally))
+    return tally
+
+
+def _begun(kept: Path | None) -> Tally:
+    """What earlier calls did, with the commit of now among theirs."""
+    tally = msgspec.json.decode(kept.read_bytes(), type=Tally) if kept and kept.is_file() else Tally()
+    if kept and (commit := _commit()) not in tally.commits:
+        tally.commits.append(commit)
     return tally
 
 
@@ -119,7 +126,9 @@ def table(tally: Tally) -> str:
         f" {tally.refused} refused, {tally.killed} killed; {len(tally.wrong)} wrong states"
         + "".join(f"; {commit}" for commit in tally.commits)
     ]
-    return "\n".join([*lines, *(f"{count:6} {words}" for words, count in tally.refusals.most_common(60))])
+    return "\n".join(
+        [*lines, *(f"{count:6} {words}" for words, count in Counter(tally.refusals).most_common(60))]
+    )
 
 
 def group(stage: Stage, verbs: Sequence[str], seed: int) -> tuple[list[str], list[Outcome], list[str]]:

@@ -7,7 +7,7 @@ from toy_session import FRAMES, make_session, true_poses
 
 from studio.body.catalogue import load_body
 from studio.body.mirroring import Mirror
-from studio.errors import RunError
+from studio.errors import RunError, SessionError
 from studio.runs.checking import check_run, kept_check, sudden_turns
 from studio.runs.new_run import prepare_run
 from studio.runs.refining import SMOOTHED
@@ -73,3 +73,17 @@ def test_a_body_that_turns_round_at_once_is_named():
     assert sudden_turns(body, track_of(poses), 60.0) == ()
     turned = np.array([mirror.turned_round(pose) for pose in poses[3:]])
     assert sudden_turns(body, track_of(np.concatenate([poses[:3], turned])), 60.0) == (3,)
+
+
+def test_what_a_disk_cannot_keep_is_measured_all_the_same(session, monkeypatch):
+    run = prepare_run(session, start_pose=true_poses()[0])
+    with ResultsWriter(run.folder) as writer:
+        writer.write_frame(result_of(0, layers=1), [layer_of(0, 0)])
+    kept(run, true_poses())
+
+    def refused(*_):
+        raise SessionError("The disk cannot be written.", "")
+
+    monkeypatch.setattr("studio.sessions.record_files.write_bytes", refused)
+    assert check_run(session, run, every=3).inside_mean > 0.9
+    assert kept_check(run, SMOOTHED) is None

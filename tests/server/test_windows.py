@@ -18,6 +18,7 @@ from websockets.sync.client import ClientConnection, connect
 from studio.jobs.events import SettingsApplied
 from studio.runs.new_run import prepare_run
 from studio.scene.model import select
+from studio.scene.scene_server import SceneServer
 from studio.scene.window_scenes import TooManyScenesError, WindowScenes
 from studio.server import app as web_app
 from studio.server.app import build_app
@@ -234,6 +235,25 @@ def test_the_number_of_scenes_is_bounded(workspace: Workspace, control: Recordin
             with pytest.raises(TooManyScenesError):
                 scenes.scene("e")
     assert not scenes.open_scenes()
+
+
+def test_half_of_the_scenes_are_kept_for_the_owner(
+    workspace: Workspace, control: RecordingControl, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever viewers show, trials beside a scene included."""
+    monkeypatch.setattr(SceneServer, "is_viewed", True)
+    scenes = WindowScenes(workspace, control, most=4)
+    try:
+        scenes.scene("v1", bare=True)
+        scenes.split("v1", True)
+        with pytest.raises(TooManyScenesError, match=r"2 windows show a scene already, .* to viewers"):
+            scenes.scene("v2", bare=True)
+        scenes.scene("a")
+        scenes.split("a", True)
+        with pytest.raises(TooManyScenesError, match="4 windows"):
+            scenes.scene("b")
+    finally:
+        scenes.stop()
 
 
 def test_a_window_is_named_by_letters_and_digits(windows: Windows) -> None:
