@@ -22,18 +22,20 @@ from pathlib import Path
 import psutil
 from click.testing import CliRunner
 from fastapi.testclient import TestClient
+from fsspec.implementations.memory import MemoryFileSystem
 from fuzz.api import LONG, left_to_ask
 
 # Not under its own name here: the doubles are the server's tests'.
 from web_doubles import TOKEN, RecordingControl, RecordingScenes
 
 from hostile.commands import SESSION_COMMANDS
-from hostile.makers import MAKERS, NAME, RUN, SECRET, make_outside, make_plain
+from hostile.makers import MAKERS, NAME, RUN, SECRET, make_nothing, make_outside, make_plain
 from studio.cli.main import load, main
 from studio.server.api_document import api_document
 from studio.server.app import build_app
 from studio.sessions.workspace import Workspace
 
+AS_IT_IS = "as it is"
 LONGEST_SECONDS, MOST_BYTES = 10.0, 300 << 20
 FILLED = {
     "session": NAME,
@@ -76,6 +78,8 @@ def campaign(
         load(command)
     with tempfile.TemporaryDirectory(prefix="hostile-") as folder:
         plain = make_plain(Path(folder) / "plain")
+        found[AS_IT_IS] = tried(AS_IT_IS, plain, Path(folder))
+        told(AS_IT_IS, found[AS_IT_IS])
         for number, name in enumerate(names):
             if seconds is not None and time.monotonic() - began > seconds:
                 break
@@ -93,11 +97,11 @@ def tried(name: str, plain: Path, folder: Path, part: int | None = None) -> Tall
     shutil.copytree(plain, workspace / "other")
     out.mkdir()
     make_outside(outside)
-    MAKERS[name](workspace / NAME, outside)
+    MAKERS.get(name, make_nothing)(workspace / NAME, outside)
     before = _digest(outside), _digest(workspace / "other")
     tally, began = Tally(), time.monotonic()
-    for work in (_ask, _command):
-        _watched(lambda say, work=work: work(workspace, out, say, part), tally)
+    for work in (_command, _ask) if name == AS_IT_IS else (_ask, _command):
+        _watched(lambda say, work=work: work(workspace, out, say, part), tally, bounded=name != AS_IT_IS)
     tally.seconds = time.monotonic() - began
     if before[0] != _digest(outside):
         tally.wrong.append("something outside was changed")
@@ -112,8 +116,10 @@ def tried(name: str, plain: Path, folder: Path, part: int | None = None) -> Tall
 Say = Callable[[str], None]
 
 
-def _watched(work: Callable[[Say], None], tally: Tally) -> None:
-    """Do work in a child; what it says and how it ends goes to the tally. A line before each piece names it."""
+def _watched(work: Callable[[Say], None], tally: Tally, *, bounded: bool = True) -> None:
+    """Do work in a child; what it says and how it ends goes to the tally. A line before each piece names it. bounded :
+    it may not take long, nor may a command be refused otherwise.
+    """
     reading, writing = os.pipe()
     child = os.fork()
     if not child:
@@ -132,9 +138,9 @@ def _watched(work: Callable[[Say], None], tally: Tally) -> None:
             *lines, rest = (rest + content).split(b"\n")
             for line in map(bytes.decode, lines):
                 kind, _, words = line.partition(" ")
-                if kind == "wrong":
+                if kind == "wrong" or (kind == "refused" and not bounded):
                     tally.wrong.append(words)
-                else:
+                elif kind != "refused":
                     doing = words
                     tally.requests += kind == "request"
                     tally.commands += kind == "command"
@@ -143,7 +149,7 @@ def _watched(work: Callable[[Say], None], tally: Tally) -> None:
         waited, worked = time.monotonic() - since, _seconds_of(process) - spent
         # Its own time counts, for the machine may be busy; without any it waits for something.
         idle = waited > LONGEST_SECONDS and worked < waited / 100
-        if tally.most_bytes > 2 * MOST_BYTES or idle or worked > LONGEST_SECONDS:
+        if bounded and (tally.most_bytes > 2 * MOST_BYTES or idle or worked > LONGEST_SECONDS):
             tally.wrong.append(f"{doing}: {tally.most_bytes >> 20} MB, {time.monotonic() - since:.0f} s")
             os.kill(child, signal.SIGKILL)
             break
@@ -151,7 +157,7 @@ def _watched(work: Callable[[Say], None], tally: Tally) -> None:
     _, status = os.waitpid(child, 0)
     if status and os.WIFSIGNALED(status) and os.WTERMSIG(status) != signal.SIGKILL:
         tally.wrong.append(f"{doing}: the process died of signal {os.WTERMSIG(status)}")
-    if tally.most_bytes > MOST_BYTES:
+    if bounded and tally.most_bytes > MOST_BYTES:
         tally.wrong.append(f"{tally.most_bytes >> 20} MB more than at the start")
 
 
@@ -229,10 +235,14 @@ def _command(workspace: Path, out: Path, say: Say, part: int | None) -> None:
         text = ended.output
         if ended.exit_code not in (0, 1, 2) or not isinstance(ended.exception, SystemExit | None):
             say(f"wrong studio {' '.join(line)}: {ended.exit_code} {ended.exception!r} {text[-300:]}")
+        if ended.exit_code:
+            say(f"refused studio {' '.join(line)}: {text[-300:]}")
         if "Traceback" in text or "fault of the studio" in text:
             say(f"wrong studio {' '.join(line)}: {text[-300:]}")
         if SECRET in text:
             say(f"wrong studio {' '.join(line)} shows what lies outside")
+        if SECRET.encode() in b"".join(one.getvalue() for one in MemoryFileSystem.store.values()):
+            say(f"wrong studio {' '.join(line)} puts what lies outside into a store")
         if re.search(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]", text):
             say(f"wrong studio {' '.join(line)} writes control characters")
 

@@ -4,6 +4,10 @@ from collections.abc import Sequence
 
 from hostile.makers import NAME, RUN
 
+STORE = "memory://put"
+"""Of objects, in memory."""
+
+ABOUT_RUN = (NAME, RUN)
 SESSION_COMMANDS: dict[str, Sequence[Sequence[str]]] = {
     "runs": (("runs",), ("runs", NAME)),
     "workflow": (("workflow", NAME),),
@@ -11,22 +15,42 @@ SESSION_COMMANDS: dict[str, Sequence[Sequence[str]]] = {
     "inspect": (("inspect", NAME),),
     "subject": (("subject", NAME),),
     "background": (("background", NAME),),
-    "bodies": (("bodies", NAME),),
-    "evaluate": (("evaluate", f"{NAME}/{RUN}"),),
-    "why": (("why", f"{NAME}/{RUN}", "--frame", "1"),),
-    "view": (("view", f"{NAME}/{RUN}", "variance"),),
-    "smooth": (("smooth", f"{NAME}/{RUN}"),),
-    "export": (("export", f"{NAME}/{RUN}", "--as", "csv", "--out", "{out}/motion.csv"),),
-    "upload": (("upload", NAME, "--to", "{out}/put"),),
-    "diagnostics": (("diagnostics", NAME, "--out", "{out}/diagnostics.zip"),),
-    "share": (("share", f"{NAME}/{RUN}", "--out", "{out}/page.html"),),
-    "synchronise": (("synchronise", NAME),),
-    "check": (("check", f"{NAME}/{RUN}"),),
-    "notes": (("notes", f"{NAME}/{RUN}"),),
-    "note": (("note", f"{NAME}/{RUN}", "--frame", "1"),),
+    "bodies": (("bodies",),),
+    "evaluate": (("evaluate", *ABOUT_RUN),),
+    "why": (("why", *ABOUT_RUN, "--frame", "1"),),
+    "view": (("view", *ABOUT_RUN, "--view", "variance", "--frame", "1"),),
+    "notes": (("notes", *ABOUT_RUN),),
+    "note": (("note", *ABOUT_RUN, "--frame", "1"),),
+    "check": (("check", *ABOUT_RUN),),
+    "smooth": (("smooth", *ABOUT_RUN),),
+    "refine": (("refine", *ABOUT_RUN),),
+    "export": (
+        ("export", *ABOUT_RUN, "--to", "{out}/motion.csv"),
+        ("export", *ABOUT_RUN, "--to", "{out}/motion.bvh"),
+    ),
+    "share": (("share", *ABOUT_RUN, "--to", "{out}/page.html"),),
+    "track": (
+        (
+            "track",
+            NAME,
+            "--particles",
+            "20",
+            "--layers",
+            "2",
+            "--frames",
+            "0:1",
+            "--name",
+            "again",
+            "--keep-shape",
+        ),
+    ),
+    "upload": (("upload", NAME, "--to", STORE),),
+    "diagnostics": (("diagnostics", "--out", "{out}/diagnostics.zip"),),
+    "synchronise": (("synchronise", NAME, "--rotate", "front=180"),),
     "import": (("import", "{session}", "--into", "again"),),
-    "add-footage": (("add-footage", NAME, "{session}"),),
+    "add-footage": (("add-footage", NAME, "{session}", "--replace"),),
 }
+"""All of them end well on the session as it is."""
 
 OTHERS = {
     "demo": "serves",
@@ -40,14 +64,12 @@ OTHERS = {
     "fit-subject": "minutes",
     "initialise": "minutes",
     "landmarks": "minutes",
-    "track": "minutes",
     "batch": "minutes",
     "level": "a session of several cameras",
     "live": "a clock",
     "record": "cameras",
     "seeds": "minutes",
     "compare-runs": "reads as view does",
-    "refine": "minutes",
     "correct": "minutes",
     "branch": "tracks",
     "compare": "minutes",

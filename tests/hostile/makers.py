@@ -14,8 +14,10 @@ import cv2
 import numpy as np
 import zstandard
 from store_records import layer_of, record_of, result_of
-from toy_session import make_session
+from toy_session import facing_camera, make_session, side_camera
 
+from studio.export.exporting import export_run
+from studio.export.formats import FORMATS
 from studio.sessions.named_rows import write_pose
 from studio.sessions.results_store import ResultsWriter
 
@@ -29,7 +31,7 @@ MAKERS: dict[str, Maker] = {}
 
 def make_plain(workspace: Path) -> Path:
     """The session before it is spoilt."""
-    session = make_session(workspace / NAME, frames=3)
+    session = make_session(workspace / NAME, frames=3, cameras=(facing_camera(), side_camera()))
     body = session.body()
     names = tuple(entry.name for entry in body.parameters)
     write_pose(session.path / "start_pose.csv", names, body.neutral)
@@ -38,8 +40,14 @@ def make_plain(workspace: Path) -> Path:
         writer.write_settings(1, 0, 0, {"particles": 12, "layers": 2})
         for frame in range(3):
             writer.write_frame(result_of(frame), [layer_of(frame, layer) for layer in range(2)], 2000)
+    (session.path / "truth").mkdir()
+    export_run(session, run, FORMATS["trc"], {}, session.path / "truth" / "arm.trc")
     cv2.imwrite(str(session.path / "thumbnail.jpg"), np.zeros((8, 8, 3), np.uint8))
     return session.path
+
+
+def make_nothing(_folder: Path, _outside: Path) -> None:
+    """The session as it is."""
 
 
 def make_outside(folder: Path) -> None:
