@@ -114,8 +114,11 @@ def remove_left_behind(session: Session) -> None:
 
 
 def _newest(path: Path) -> float:
-    """When something was last changed in a folder, or the file."""
-    times = [path.lstat().st_mtime]
+    """When something was last changed in a folder, or the file; just now, where it is gone by now."""
+    try:
+        times = [path.lstat().st_mtime]
+    except FileNotFoundError:
+        return time.time()
     for parent, _, names in os.walk(path):
         for entry in (parent, *(os.path.join(parent, name) for name in names)):
             with contextlib.suppress(OSError):

@@ -104,11 +104,14 @@ def check_files(folder: Path, *, note: bool = True) -> CheckedFiles:
     again: list[str] = []
     new: list[str] = []
     for name, path in _files(folder):
-        if path.suffix.lower() in BOUNDED and path.stat().st_size > LARGEST:
-            damaged[name] = f"is larger than the {LARGEST >> 20} MB that such a file can have"
-            continue
         try:
+            if path.suffix.lower() in BOUNDED and path.stat().st_size > LARGEST:
+                damaged[name] = f"is larger than the {LARGEST >> 20} MB that such a file can have"
+                continue
             found = _noted(path)
+        except FileNotFoundError:
+            # Removed since the folder was listed, by other work in it.
+            continue
         except OSError as error:
             damaged[name] = f"cannot be read ({error.strerror})"
             continue

@@ -92,12 +92,16 @@ def _inspected(folder: Path) -> Inspection:
     files = size = 0
     for path in _entries(folder):
         name = path.relative_to(folder).as_posix()
-        status = path.lstat()
+        try:
+            status = path.lstat()
+        except FileNotFoundError:
+            # Something else works in the session: it is gone since the folder was listed.
+            continue
         files, size = files + 1, size + (status.st_size if stat.S_ISREG(status.st_mode) else 0)
         if files > MOST_FILES:
             found.append(Oddity(".", f"more than {MOST_FILES} files"))
             break
-        with contextlib.suppress(StopIteration):
+        with contextlib.suppress(StopIteration, FileNotFoundError):
             found.append(next(_oddities(folder, path, name, status, elsewhere)))
     for name, place in elsewhere.items():
         if Path(place).is_absolute():

@@ -14,9 +14,11 @@ from toy_session import make_session
 
 from studio.errors import SessionError, StudioError
 from studio.foreign_files import read_file
+from studio.runs import verifying
 from studio.runs.moved_knobs import FILE_NAME as MOVED_NAME
 from studio.runs.verifying import UNTOUCHED_SECONDS, remove_left_behind, verify
-from studio.sessions import atomic_files
+from studio.sessions import atomic_files, file_checksums, foreign_sessions
+from studio.sessions.file_checksums import check_files
 from studio.sessions.foreign_sessions import inspect_place
 from studio.sessions.process_lock import ProcessLock
 from studio.sessions.results_codec import LARGEST_BLOB, unpack
@@ -225,6 +227,19 @@ def test_oddities_are_named_and_nothing_is_changed(taken: Session) -> None:
     assert "broken off" in found[".partial-abc"]
     assert "1024 MB" in found["large.json"]
     assert sorted(path.as_posix() for path in taken.path.rglob("*")) == before
+
+
+def test_what_other_work_removes_meanwhile_is_neither_odd_nor_damaged(
+    taken: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gone = taken.path / "results.sqlite-shm"
+    before = inspect_place(taken.path)
+    entries, files = foreign_sessions._entries, file_checksums._files
+    monkeypatch.setattr(foreign_sessions, "_entries", lambda folder: [*entries(folder), gone])
+    monkeypatch.setattr(file_checksums, "_files", lambda folder: [*files(folder), ("gone.json", gone)])
+    assert inspect_place(taken.path) == before
+    assert check_files(taken.path).damaged == {}
+    assert verifying._newest(gone) > time.time() - UNTOUCHED_SECONDS
 
 
 def test_an_archive_is_looked_at_without_being_unpacked(taken: Session, tmp_path: Path) -> None:
