@@ -90,15 +90,20 @@ def _deeplabcut(task: ExportTask, points: Points, converted: Array) -> PointTabl
 
 
 def _anipose(task: ExportTask, points: Points, converted: Array) -> PointTable:
-    """For each point its place, reprojection error (none here), number of cameras and score; then the frame."""
+    """For each point its place, reprojection error (none here), number of cameras and score; then how anipose turned
+    and moved the points (not at all), without which its readers refuse a table, and the frame.
+    """
     parts = ("x", "y", "z", "error", "ncams", "score")
-    heads = [f"{name}_{part}" for name in points.names for part in parts] + ["fnum"]
+    turned = {f"M_{row}{column}": float(row == column) for row in range(3) for column in range(3)}
+    placed = {**turned, **{f"center_{axis}": 0.0 for axis in range(3)}}
+    heads = [*(f"{name}_{part}" for name in points.names for part in parts), *placed, "fnum"]
+    unmoved = [_cell(value) for value in placed.values()]
     cameras = str(len(task.run.cameras()))
     rows: list[list[str]] = []
     for at, places in enumerate(converted):
         score = _cell(task.motion.confidence[at])
         cells = [cell for place in places for cell in (*map(_cell, place), "", cameras, score)]
-        rows.append([*cells, f"{task.motion.frames[at]:.12g}"])
+        rows.append([*cells, *unmoved, f"{task.motion.frames[at]:.12g}"])
     return PointTable([heads], rows, 0, len(parts))
 
 

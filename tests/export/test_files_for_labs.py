@@ -131,6 +131,9 @@ def test_the_layout_of_anipose_has_its_columns(exported) -> None:
     got = np.stack([table[[f"{name}_{axis}" for axis in "xyz"]].to_numpy() for name in names], axis=1)
     np.testing.assert_allclose(got * 10.0, places, atol=LEAST_MM, equal_nan=True)
     assert table["fnum"].tolist() == list(range(FRAMES))
+    # movement refuses a table without them.
+    assert np.array_equal(table[[f"M_{i}{j}" for i in range(3) for j in range(3)]].iloc[0], np.eye(3).ravel())
+    assert not table[[f"center_{axis}" for axis in range(3)]].to_numpy().any()
     assert set(table["LAnkle_ncams"]) == {CAMERAS}
 
 

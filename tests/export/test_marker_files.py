@@ -1,10 +1,11 @@
-"""TRC taken apart by hand, C3D read by py-c3d."""
+"""TRC read by pandas, as Pose2Sim reads it, C3D by py-c3d."""
 
 import warnings
 from pathlib import Path
 
 import c3d
 import numpy as np
+import pandas
 import pytest
 from export_runs import FRAMES, MADE, moving_poses, track_of
 
@@ -20,14 +21,13 @@ LOST = range(100, 120)
 STATES = tuple("lost" if frame in LOST else "tracked" for frame in range(FRAMES))
 
 
-def read_trc_by_hand(path: Path) -> tuple[list[str], dict[str, str], np.ndarray, np.ndarray]:
+def read_trc_as_pose2sim(path: Path) -> tuple[list[str], dict[str, str], np.ndarray, np.ndarray]:
     """Names, header, times and points (F, M, 3) as they stand; blank cells NaN."""
-    lines = path.read_text().splitlines()
-    header = dict(zip(lines[1].split("\t"), lines[2].split("\t"), strict=True))
-    names = [word for word in lines[3].split("\t")[2:] if word]
-    cells = [line.split("\t") for line in lines[5:]]
-    table = np.array([[float(cell or "nan") for cell in row] for row in cells])
-    return names, header, table[:, 1], table[:, 2:].reshape(len(table), -1, 3)
+    head = pandas.read_csv(path, sep="\t", skiprows=1, nrows=1, dtype=str)
+    names = [name for name in path.read_text().splitlines()[3].split("\t")[2::3] if name]
+    table = pandas.read_csv(path, sep="\t", skiprows=4)
+    points = table.drop(columns=table.columns[[0, 1]]).to_numpy()
+    return names, head.iloc[0].to_dict(), table.iloc[:, 1].to_numpy(), points.reshape(len(table), -1, 3)
 
 
 def read_c3d_by_hand(path: Path) -> tuple[list[str], float, str, np.ndarray, np.ndarray]:
@@ -48,7 +48,7 @@ def test_trc_in_metres_y_up(make_run, tmp_path: Path) -> None:
     report = export_run(session, run, FORMATS["trc"], {"track": MADE}, tmp_path / "walk.trc")
     body = load_body("human29")
     wanted = marker_points(body, moving_poses(body))
-    names, header, times, points = read_trc_by_hand(report.files[0])
+    names, header, times, points = read_trc_as_pose2sim(report.files[0])
     assert names == [marker.name for marker in body.markers]
     assert (header["Units"], header["NumFrames"], header["DataRate"]) == ("m", "450", "60")
     np.testing.assert_allclose(times, np.arange(FRAMES) / 60.0, atol=1e-7)
@@ -64,7 +64,7 @@ def test_trc_z_up_in_millimetres(make_run, tmp_path: Path) -> None:
     requested = {"track": MADE, "up": "z", "unit": "mm"}
     report = export_run(session, run, FORMATS["trc"], requested, tmp_path / "dog.trc")
     body = load_body("dog")
-    _, header, _, points = read_trc_by_hand(report.files[0])
+    _, header, _, points = read_trc_as_pose2sim(report.files[0])
     assert header["Units"] == "mm"
     assert np.linalg.norm(points - marker_points(body, moving_poses(body, 50)), axis=-1).max() < LEAST_MM
 
@@ -115,7 +115,7 @@ def test_names_of_halpe_and_what_is_missing(make_run, tmp_path: Path) -> None:
     session, run = make_run("human29", lambda body: track_of(moving_poses(body, 30)))
     requested = {"track": MADE, "names": "halpe26"}
     report = export_run(session, run, FORMATS["trc"], requested, tmp_path / "walk.trc")
-    names, _, _, points = read_trc_by_hand(report.files[0])
+    names, _, _, points = read_trc_as_pose2sim(report.files[0])
     assert {"RBigToe", "LHeel", "Neck", "RWrist"} <= set(names)
     note = next(note for note in report.notes if "left out" in note)
     assert "no RSmallToe, LSmallToe, Nose" in note

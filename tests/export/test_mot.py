@@ -1,8 +1,9 @@
-"""OpenSim motion files, taken apart by hand."""
+"""OpenSim motion files, read by pandas below their heads."""
 
 from pathlib import Path
 
 import numpy as np
+import pandas
 import pytest
 from export_runs import FRAMES, MADE, moving_poses, track_of
 
@@ -30,9 +31,9 @@ def test_joint_angles_are_degrees_over_time(make_run, tmp_path: Path) -> None:
     body = load_body("human31")
     count = len(body.parameters) + 1
     assert head == {"version": "1", "nRows": str(FRAMES), "nColumns": str(count), "inDegrees": "yes"}
-    names = lines[end + 1].split("\t")
-    assert names == ["time", *(entry.name for entry in body.parameters)]
-    table = np.array([[float(cell) for cell in line.split("\t")] for line in lines[end + 2 :]])
+    read = pandas.read_csv(place, sep="\t", skiprows=end + 1)
+    assert list(read.columns) == ["time", *(entry.name for entry in body.parameters)]
+    table = read.to_numpy()
     assert table[:, 0] == pytest.approx(np.arange(FRAMES) / run.record.fps, abs=1e-8)
     poses = moving_poses(body)
     seen = np.array([state == "tracked" for state in STATES])

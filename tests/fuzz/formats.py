@@ -35,7 +35,9 @@ from studio.runs.tracks import BEST, RAW, read_track, write_track
 from studio.runs.verifying import verify
 from studio.sessions.archives import unpack
 from studio.sessions.importers.bodytrack import read_numbers
+from studio.sessions.importers.folder_layout import plan_folder
 from studio.sessions.importers.mask_forms import form_of_masks
+from studio.sessions.importers.writing import carried_truth, check_person
 from studio.sessions.live_recordings import read_sets
 from studio.sessions.named_rows import write_pose, write_sigma
 from studio.sessions.run_log import append_to_log, read_log
@@ -90,6 +92,11 @@ def _make_session(folder: Path) -> None:
     write_subject(Subject(session.manifest.body), session.path / "subject.toml")
     (session.path / "evidence.json").write_text('{"schema": 1, "knobs": {"background_model": "median"}}')
     verify(session)
+
+
+def _projects(folder: Path) -> None:
+    """Folders as other tools leave them, whose videos are empty."""
+    shutil.copytree(SEEDS / "projects", folder)
 
 
 def _read_session(folder: Path) -> None:
@@ -155,6 +162,15 @@ def _read_video(path: Path) -> None:
         reader.close()
 
 
+def _read_project(folder: Path) -> None:
+    """What an import makes of a folder before it decodes its footage."""
+    plan = plan_folder(folder, None)
+    assert plan.calibration is not None
+    read = read_calibration(plan.calibration)
+    check_person(plan)
+    carried_truth(plan, read, 60.0, 3, "")
+
+
 def _unpack(path: Path) -> None:
     with tempfile.TemporaryDirectory(dir=path.parent.parent) as into:
         unpack(path, Path(into))
@@ -182,6 +198,17 @@ FORMATS: Mapping[str, Format] = {
     "humanoid-npz": Format((_each(read_recording),)),
     "trc": Format((_each(read_trc), _each(lambda path: read_truth(path, 60.0, 2)))),
     "points": Format((_each(lambda path: read_truth(path, 60.0, 2)),)),
+    "points-h5": Format((_each(lambda path: read_truth(path, 60.0, 2)),)),
+    "points-mat": Format((_each(lambda path: read_truth(path, 60.0, 2)),)),
+    "points-npy": Format((_each(lambda path: read_truth(path, 60.0, 2)),)),
+    "dannce": Format(CALIBRATION),
+    "opencap": Format((lambda folder: read_calibration(folder / "Videos"),), "Videos/*/*"),
+    **{
+        f"project-{tool}": Format(
+            (lambda folder, tool=tool: _read_project(folder / tool),), f"{tool}/**/*.*", _projects
+        )
+        for tool in ("anipose", "freemocap", "pose2sim", "opencap", "caliscope", "dannce")
+    },
     "c3d": Format((_each(read_c3d),)),
     "png": Format((*PICTURE, lambda folder: form_of_masks(folder, len(list_pictures(folder))))),
     "jpeg": Format(PICTURE),
