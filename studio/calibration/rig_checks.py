@@ -1,5 +1,6 @@
 """Checks of the cameras' own numbers: up axis, floor, unit, place, resolution."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
@@ -24,8 +25,8 @@ TILTED_DEGREES, ASKEW_DEGREES, LYING_DEGREES = 8.0, 40.0, 45.0
 """From where on Z is said to be off the vertical of level pictures, off that of pictures that are not level, or another
 axis."""
 TILTED, NO_FLOOR, UNIT = "tilted-world", "floor-unknown", "unit"
-ROOM, FAR_ENOUGH = (0.4, 60.0), 6.0
-"""A body is filmed from these multiples of its height, usually from less than the other."""
+ROOM, FAR_ENOUGH, USUALLY_AWAY = (0.4, 60.0), 6.0, 2.3
+"""A body is filmed from these multiples of its height, usually from less than the second, most often from the third."""
 SIDE_BY_SIDE = 0.9
 """Cosine between lines of sight from which on cameras stand side by side, as of a stereo rig."""
 LEVEL_IT = (
@@ -248,10 +249,10 @@ def _unit(cameras: Sequence[Camera]) -> Iterator[Finding]:
     message = f"The cameras lie within {spread:.3g} mm of their middle"
     if 0.5 < spread <= SMALLEST_RIG_MM:
         message = f"{message}: metres were taken for millimetres, it seems."
-        remedy = "Multiply the translations by 1000, or name the unit when importing."
+        remedy = "Import it with --unit m (or cm, in, board=MM)."
     elif spread > LARGEST_RIG_MM:
         message = f"{message}: millimetres were taken for metres, it seems."
-        remedy = "Divide the translations by 1000, or name the unit when importing."
+        remedy = "Import it with --unit mm (or cm, in, board=MM)."
     else:
         message, remedy = f"{message}: they are all in one place.", "Calibrate the cameras' positions, too."
     yield Finding("scale", "blocks", message, remedy)
@@ -269,7 +270,9 @@ def room_findings(cameras: Sequence[Camera], size_mm: float) -> tuple[Finding, .
         return ()
     units = {"cm": 10.0, "in": 25.4, "m": 1000.0}
     fitting = [unit for unit, factor in units.items() if ROOM[0] <= factor * away / size_mm <= FAR_ENOUGH]
-    meant = f" --unit {fitting[0]} would make it {units[fitting[0]] * away / 1000:.2g} m." if fitting else ""
+    fitting.sort(key=lambda unit: abs(math.log(units[unit] * away / size_mm / USUALLY_AWAY)))
+    lengths = [f"--unit {unit} would make it {units[unit] * away / 1000:.2g} m" for unit in fitting]
+    meant = f" {', '.join(lengths)}." if lengths else ""
     message = (
         f"The cameras look at a place {away:.4g} mm in front of them, where a body of {size_mm / 1000:.2f} m has no"
         " room: the calibration is of another unit, it seems."
@@ -311,13 +314,19 @@ def _principal(cameras: Sequence[Camera]) -> Iterator[Finding]:
 
 TOLERANCE = 0.05
 UNITS = {
-    1e-3: ("metres were taken for millimetres", "Multiply the translations by 1000, or name the unit (m)."),
+    1e-3: (
+        "metres were taken for millimetres",
+        "Import it with --unit m, or multiply the translations by 1000.",
+    ),
     1e-2: ("decimetres were taken for millimetres", "Multiply the translations by 100."),
     1e-1: (
         "centimetres were taken for millimetres",
         "Multiply the translations by 10, or name the unit (cm).",
     ),
-    1e3: ("millimetres were taken for metres", "Divide the translations by 1000, or name the unit (mm)."),
+    1e3: (
+        "millimetres were taken for metres",
+        "Import it with --unit mm, or divide the translations by 1000.",
+    ),
     1.0 / 25.4: ("inches were taken for millimetres", "Multiply the translations by 25.4."),
 }
 UNIT_TOLERANCE = 0.25

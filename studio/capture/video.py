@@ -196,6 +196,8 @@ VIDEO_SUFFIXES = frozenset((".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".m
 STEADY = 0.6
 """Frames may lie this share of a frame's duration off an even spacing before a frame rate is called
 variable."""
+TREMBLE = 0.1
+"""Times off an even spacing by more than this share of a frame's duration tremble."""
 MOST_GAPS, ROUNDED = 0.1, 5e-4
 """At most this share of the frames' steps are gaps; measured rates are this near the usual one that they are."""
 FIELD_PAIRS, FEWEST_APART, USUALLY_APART = 48, 4, 16
@@ -452,6 +454,11 @@ def _rate(times: Array, nominal: float) -> tuple[float, int]:
     if nominal > 0.0 and abs(fps / nominal - 1.0) < 0.005:
         fps = nominal
     off = np.abs((times - times[0]) * fps - np.arange(len(times)))
+    # Stamps that tremble put a short video's ends, by which its rate is measured, off as well.
+    for rate in (round(fps), round(fps * 1.001) / 1.001) if off.max() > TREMBLE else ():
+        slots = (times - times[0]) * rate - np.arange(len(times))
+        if rate > 0.0 and np.abs(slots - np.median(slots)).max() <= STEADY:
+            return float(rate), -1
     return fps, int(np.argmax(off > STEADY)) if np.any(off > STEADY) else -1
 
 

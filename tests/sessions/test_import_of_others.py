@@ -4,6 +4,7 @@ import dataclasses
 import struct
 import tomllib
 import zipfile
+from fractions import Fraction
 from pathlib import Path
 
 import av
@@ -302,3 +303,48 @@ def test_a_zip_with_backslashes(tmp_path: Path) -> None:
                 info.filename = "take\\" + str(path.relative_to(source)).replace("/", "\\")
                 archive.writestr(info, path.read_bytes())
     assert len(import_source(packed, tmp_path / "unzipped").session.cameras()) == 2
+
+
+def test_several_takes_in_folders_of_cameras(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    write_pose2sim(source / "calibration" / "Calib.toml", rig(2, "cam_"))
+    for camera in (1, 2):
+        (source / f"cam{camera}").mkdir()
+        for take, first in (("walk", 0), ("run", 100)):
+            pictures = [numbered_frame(first + k, camera) for k in range(FRAMES)]
+            write_video(source / f"cam{camera}" / f"{take}-cam{camera}.mp4", pictures, fps=60)
+    with pytest.raises(FootageError, match="2 trials"):
+        imported(source)
+    assert numbers(imported(source, trial="run").session)["cam_2"] == [100 + k for k in range(FRAMES)]
+    for camera in (1, 2):
+        for at, path in enumerate(sorted((source / f"cam{camera}").iterdir())):
+            path.rename(path.with_name(f"IMG_{camera}{at}7.mp4"))
+    with pytest.raises(FootageError, match="none has the same name in all"):
+        imported(source)
+
+
+def test_stamps_that_tremble_in_a_short_video_are_even(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    steps = [max(0, round(1000 * k + rng.uniform(-250.0, 250.0))) for k in range(40)]
+    with av.open(str(tmp_path / "a.mp4"), "w") as container:
+        stream = container.add_stream("libx264", rate=60)
+        stream.width, stream.height, stream.pix_fmt = 128, 96, "yuv420p"
+        stream.codec_context.time_base = Fraction(1, 60_000)
+        for at, step in enumerate(steps):
+            frame = av.VideoFrame.from_ndarray(numbered_frame(at), format="bgr24")
+            frame.pts, frame.time_base = step, Fraction(1, 60_000)
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    found = measure_video(tmp_path / "a.mp4")
+    assert (found.fps, found.uneven_frame) == (60.0, -1)
+
+
+def test_a_calibration_in_inches_names_them(tmp_path: Path) -> None:
+    source = video_source(tmp_path / "source")
+    place = source / "calibration" / "Calib.toml"
+    document = tomllib.loads(place.read_text())
+    for entry in document.values():
+        entry["translation"] = [1000.0 / 25.4 * value for value in entry["translation"]]
+    place.write_text(tomli_w.dumps(document))
+    report = imported(source, allow_inconsistent=True)
+    assert any("--unit in would make it 3" in warning for warning in report.warnings), report.warnings

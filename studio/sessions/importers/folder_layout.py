@@ -135,6 +135,9 @@ def trials_of(source: Path) -> dict[str, Layout]:
         return {take.folder.name: take for take in _caliscope_takes(source)}
     if is_opencap(source):
         return _opencap_trials(source)
+    takes = _takes_of_camera_folders(source)
+    if takes:
+        return takes
     found: dict[str, Layout] = {}
     for folder in _folders_below(source, DEEPEST_TRIAL):
         if any(folder.is_relative_to(layout.folder) for layout in found.values()):
@@ -197,6 +200,37 @@ def _opencap_trials(source: Path) -> dict[str, Layout]:
         for trial, found in videos.items()
         if len(found) == len(cameras)
     }
+
+
+def _takes_of_camera_folders(source: Path) -> dict[str, Layout]:
+    """Takes of which folders named after cameras hold a video each, by the videos' names without the camera's; of those
+    that every camera has. Raises FootageError where cameras' folders hold several videos and no name is in all.
+    """
+    for place in (source / "videos", source / "videos-raw", source):
+        folders = sorted(place.iterdir(), key=lambda path: natural_key(path.name)) if place.is_dir() else []
+        cameras = [path for path in folders if CAMERA_FOLDER.match(path.name) and path.is_dir()]
+        videos = {camera: [path for path in entries(camera) if path.is_file()] for camera in cameras}
+        if len(cameras) < 2 or min(map(len, videos.values())) < 2:
+            continue
+        takes: dict[str, dict[Path, str]] = {}
+        for camera, found in videos.items():
+            for video in found:
+                name = CAMERA_IN_NAME.sub("", video.stem).strip("-_. ") or video.stem
+                takes.setdefault(name, {})[video] = camera.name
+        whole = {name: found for name, found in takes.items() if len(set(found.values())) == len(cameras)}
+        if not whole:
+            raise FootageError(
+                f"The folders {listed(path.name for path in cameras)} hold several videos each, and none has the same"
+                " name in all.",
+                "Give the videos of one take the same name in every camera's folder, or leave one video in each.",
+            )
+        own = (*calibration_folders(source), source)
+        return {
+            name: Layout("folder a camera", source, tuple(found), own, names=found, take=name)
+            for name, found in whole.items()
+            if len(found) == len(cameras)
+        }
+    return {}
 
 
 def takes_by_name(footage: tuple[Path, ...]) -> dict[str, tuple[Path, ...]]:
