@@ -7,13 +7,14 @@ Either a row a point, or a row a frame (as anipose writes them):
 
 Separated by commas, semicolons or tabs. Other columns are ignored. Instead of frames there may be a column of seconds
 (`time`); without either the rows are counted from 0. The unit stands behind x, y and z (`x_mm`, `x_cm`, `x_m`, in
-rows of frames `Nose_x_mm`); without one it is mm. A point that is missing has no row, blank cells or exact zeros. Where
-columns are separated by semicolons or tabs, a comma in a number is a decimal one. Tables of other programs:
-`points_tables`.
+rows of frames `Nose_x_mm` or `Nose x [mm]`); without one it is mm. A point that is missing has no row, blank cells or
+exact zeros. Where columns are separated by semicolons or tabs, a comma in a number is a decimal one. Lines that begin
+with # do not count. Tables of other programs: `points_tables`.
 """
 
 import csv
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -33,9 +34,11 @@ from studio.motion_files.trc import (
 )
 
 FRAME = ("frame", "frames", "frame_number", "fnum", "frame_index", "sync_index")
-TIME = ("time", "time_s", "seconds")
+TIME = ("time", "time_s", "seconds", "time [s]", "timestamp")
 POINT = ("point", "name", "marker", "label", "bodypart", "keypoint", "node")
 SEPARATORS = (",", ";", "\t")
+COORDINATE = re.compile(r"(?:(.+?)[ _.:-]+)?([xyz])(?:[ _]*[\[(]?(mm|cm|m)[\])]?)?", re.IGNORECASE)
+"""A column's point ("" in a table with a row a point), axis and unit: Nose_x, Nose_x_mm, Nose.X, "Nose x [mm]"."""
 LAST_FRAME = 500_000
 MOST_NUMBERS = 50_000_000
 """Frames × points at most: what a misread number of a frame would ask for fills the memory."""
@@ -64,7 +67,7 @@ def read_points(path: Path, fps: float) -> MarkerMotion:
     """
     with foreign_file(path, TruthError, "a CSV file of points", SHAPE):
         text = read_foreign_text(path)
-        lines = text.splitlines()
+        lines = [line for line in text.splitlines() if not line.startswith("#")]
         first = next((line for line in lines if line.strip()), "")
         separator = max(SEPARATORS, key=first.count)
         rows = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=separator, strict=True)]
@@ -149,10 +152,11 @@ def _columns(path: Path, header: Sequence[str]) -> _Columns:
         raise TruthError(f"'{path.name}' has no column of frames or times.", SHAPE)
     found: dict[str, dict[str, tuple[int, str]]] = {}
     for column, name in enumerate(header):
-        parts = name.split("_")
-        unit = parts.pop().lower() if len(parts) > 1 and parts[-1].lower() in MM_PER_UNIT else ""
-        axis, owner = parts[-1].lower(), "_".join(parts[:-1])
-        if axis in ("x", "y", "z") and (not owner if point >= 0 else owner):
+        parts = COORDINATE.fullmatch(name)
+        if parts is None:
+            continue
+        owner, axis, unit = parts[1] or "", parts[2].lower(), (parts[3] or "").lower()
+        if not owner if point >= 0 else owner:
             found.setdefault(owner, {})[axis] = column, unit
     if not found:
         raise TruthError(f"'{path.name}' has no columns of coordinates.", SHAPE)

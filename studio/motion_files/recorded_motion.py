@@ -115,11 +115,11 @@ def text_lines(path: Path) -> list[str]:
 
 
 def numbers(path: Path, line: int, words: list[str]) -> list[float]:
-    """Words as finite numbers. Raises StudioError naming file, line and word."""
+    """Words as finite numbers, with a decimal point or comma. Raises StudioError naming file, line and word."""
     values: list[float] = []
     for word in words:
         try:
-            value = float(word)
+            value = float(word.replace(",", ".") if "." not in word else word)
         except ValueError:
             value = float("nan")
         if not math.isfinite(value):

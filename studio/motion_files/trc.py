@@ -3,8 +3,8 @@
 A TRC is tab-separated text: three lines of header (rates, counts, unit), one of marker names (one for
 every three columns), one of axis labels, then rows `Frame#  Time  X1 Y1 Z1  X2 ...`. Its axes are Y up;
 the studio's world is Z up: (X, Y, Z)_world = (z, x, y)_trc. Files of others may mean another axis
-(`marker_meaning`). A missing marker is three cells that are blank, `nan` or exactly 0. Numbers may have a decimal
-comma.
+(`marker_meaning`). A missing marker is three cells that are blank, `nan` and the like, exactly 0, or one number of
+nines (9999999). Numbers may have a decimal comma.
 """
 
 import math
@@ -21,8 +21,16 @@ from studio.geometry.reach import FARTHEST_MM, REACH_HINT
 from studio.motion_files.marker_meaning import turned_up
 
 MM_PER_UNIT = {"mm": 1.0, "cm": 10.0, "m": 1000.0}
-MISSING = ("", "nan", "-nan", "na", "n/a", "none", "null", "nan(ind)", "-nan(ind)", "1.#qnan", "-1.#ind")
+MISSING = ("", "nan", "-nan", "na", "n/a", "none", "null", "nan(ind)", "-nan(ind)", "1.#qnan", "-1.#ind",
+           "-", "--", "---", "*", "missing")  # fmt: skip
 """What stands in the cells of a missing marker, lower case."""
+NINES = 10.0 ** np.arange(4, 9) - 1.0
+"""What stands for a place that is not known, in all three coordinates, with either sign."""
+UNIT_WORDS = {
+    "millimeter": "mm", "millimeters": "mm", "millimetre": "mm", "millimetres": "mm",
+    "centimeter": "cm", "centimeters": "cm", "centimetre": "cm", "centimetres": "cm",
+    "meter": "m", "meters": "m", "metre": "m", "metres": "m",
+}  # fmt: skip
 TRC_FROM_WORLD = (1, 2, 0)
 HEADER_LINES = 5
 FIRST_COLUMNS = 2
@@ -96,12 +104,18 @@ def _motion(path: Path, lines: list[str], up: str) -> MarkerMotion:
 
 def without_zeros(path: Path, positions: Array) -> tuple[Array, tuple[str, ...]]:
     """(F, M, 3) with NaN for three exact zeros, which is how Vicon, Motive and many converters write a marker that was
-    not seen; and a note of how many there were.
+    not seen, and for the same number of nines three times; and a note of how many there were.
+
+    positions : in the file's unit.
     """
-    unseen = np.asarray((positions == 0.0).all(axis=2))
+    zero = np.asarray((positions == 0.0).all(axis=2))
+    alike = (positions == positions[..., :1]).all(axis=2)
+    nines = np.asarray(alike & np.isin(np.abs(positions[..., 0]), NINES))
+    unseen = zero | nines
     if not unseen.any():
         return positions, ()
-    note = f"'{path.name}' has 0 0 0 for a marker {int(unseen.sum())} times: taken for missing."
+    value = "0 0 0" if zero.any() else f"{positions[nines][0, 0]:.10g} three times"
+    note = f"'{path.name}' has {value} for a marker {int(unseen.sum())} times: taken for missing."
     return np.where(unseen[..., None], np.nan, positions), (note,)
 
 
@@ -150,7 +164,13 @@ def _header(path: Path, lines: list[str]) -> _Header:
             "Give a TRC file whose first line begins with 'PathFileType'.",
         )
     fields = dict(zip(lines[1].strip().split("\t"), lines[2].strip().split("\t"), strict=False))
-    unit = fields.get("Units", "").strip().lower()
+    if "\t" not in lines[2]:
+        raise TruthError(
+            f"'{path.name}' has no tabs in its header: the cells of a TRC are separated by tabs.",
+            "Export it again: a text editor put blanks in their place.",
+        )
+    named = fields.get("Units", "").strip().lower()
+    unit = UNIT_WORDS.get(named, named)
     if unit not in MM_PER_UNIT:
         raise TruthError(
             f"'{path.name}' line 3 gives the unit '{fields.get('Units', '')}'.",

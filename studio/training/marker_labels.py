@@ -1,7 +1,8 @@
 """A person's joint markers among a file's labelled points.
 
-Labels differ between programs: case, spaces, hyphens and a subject's name before a colon do not count; joints have
-many names; and Vicon's Plug-in Gait puts markers on the skin, from which joints are estimated.
+Labels differ between programs: case, spaces, hyphens, a subject's name before a colon and a word that all begin with
+(`Bip01 L Thigh`, `Character1_LeftUpLeg`) do not count; joints have many names; and Vicon's Plug-in Gait puts markers on
+the skin, from which joints are estimated.
 """
 
 import re
@@ -53,7 +54,8 @@ def person_markers(labels: Sequence[str], points: Array, source: str) -> tuple[t
     The twelve of arms and legs must be there; those of trunk and head may be missing. source : for messages. Raises
     StudioError naming the markers that are missing and the labels that the file has.
     """
-    at = {_plain(label): place for place, label in reversed(list(enumerate(labels)))}
+    shared = shared_beginning(labels)
+    at = {_plain(label[shared:] or label): place for place, label in reversed(list(enumerate(labels)))}
     joints = {name: points[:, at[label]] for name in MARKERS if (label := _label_of(name, at)) is not None}
     skin = _from_skin(at, points)
     found = joints if _missing(joints) <= _missing(skin) else {**joints, **skin}
@@ -68,6 +70,21 @@ def person_markers(labels: Sequence[str], points: Array, source: str) -> tuple[t
         found["Hip"] = 0.5 * (found["RHip"] + found["LHip"])
     names = tuple(name for name in MARKERS if name in found)
     return names, np.stack([found[name] for name in names], axis=1)
+
+
+def shared_beginning(labels: Sequence[str]) -> int:
+    """Characters of a whole word that all labels begin with, 0 without one."""
+    first, last = (min(labels), max(labels)) if len(labels) > 1 else ("", "")
+    alike = (at for at, (one, other) in enumerate(zip(first, last, strict=False)) if one != other)
+    shared = next(alike, min(len(first), len(last)))
+    while shared and not all(_parts(label, shared) for label in labels):
+        shared -= 1
+    return shared
+
+
+def _parts(label: str, at: int) -> bool:
+    """Whether a word of a label ends at a character."""
+    return at == len(label) or not label[at - 1].isalnum() or not label[at].isalnum()
 
 
 def _plain(label: str) -> str:

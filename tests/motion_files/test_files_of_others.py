@@ -48,7 +48,7 @@ def test_zeros_are_a_missing_marker(tmp_path: Path) -> None:
     assert "2 times" in found.notes[0]
 
 
-@pytest.mark.parametrize("word", ["NaN", "nan", "", "NA", "-1.#IND"])
+@pytest.mark.parametrize("word", ["NaN", "nan", "", "NA", "-1.#IND", "-", "9999999", "-99999.000"])
 def test_a_word_for_missing_is_missing(tmp_path: Path, word: str) -> None:
     lines = trc(tmp_path / "a.trc").read_text().splitlines()
     cells = lines[6].split("\t")
@@ -224,3 +224,41 @@ def test_position_channels_of_zeros_are_added_to_the_offset_and_stretched_bones_
     with pytest.raises(StudioError, match="bone stretches"):
         read_bvh(path)
     assert len(read_bvh_file(path).moves) == 3
+
+
+@pytest.mark.parametrize(
+    ("word", "factor"), [("Millimeters", 1.0), ("meters", 1000.0), ("MM", 1.0), ("Centimetres", 10.0)]
+)
+def test_a_unit_may_be_a_word(tmp_path: Path, word: str, factor: float) -> None:
+    path = trc(tmp_path / "a.trc", walking() / 1000.0)
+    metres = read_trc(path).positions
+    edited(path, "\tm\t", f"\t{word}\t")
+    np.testing.assert_allclose(read_trc(path).positions * 1000.0, metres * factor, atol=1e-3)
+
+
+def test_a_trc_whose_tabs_became_blanks_says_so(tmp_path: Path) -> None:
+    path = trc(tmp_path / "a.trc")
+    path.write_text(path.read_text().replace("\t", "    "))
+    with pytest.raises(TruthError, match="no tabs"):
+        read_trc(path)
+
+
+@pytest.mark.parametrize(
+    "head",
+    ["frame,Nose_x,Nose_y,Nose_z", "Frame,Nose.X,Nose.Y,Nose.Z", "frame,Nose X (mm),Nose Y (mm),Nose Z (mm)",
+     "frame,Nose x [mm],Nose y [mm],Nose z [mm]", "# exported\nframe, Nose_x, Nose_y, Nose_z"],
+)  # fmt: skip
+def test_columns_of_a_point_are_spelt_in_many_ways(tmp_path: Path, head: str) -> None:
+    (tmp_path / "a.csv").write_text(f"{head}\n0,1.5,2.5,3.5\n1,4,5,6\n")
+    motion = read_truth(tmp_path / "a.csv", 60.0)
+    assert motion.names == ("Nose",)
+    assert motion.positions[:, 0].tolist() == [[1.5, 2.5, 3.5], [4.0, 5.0, 6.0]]
+
+
+def test_a_bvh_with_decimal_commas(tmp_path: Path) -> None:
+    (tmp_path / "a.bvh").write_text(
+        "HIERARCHY\nROOT Hips\n{\n OFFSET 0 0 0\n CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation"
+        " Xrotation\n End Site\n {\n  OFFSET 0 1,5 0\n }\n}\nMOTION\nFrames: 1\nFrame Time: 0,02\n1,5 0 0 90 0 0\n"
+    )
+    motion = read_bvh(tmp_path / "a.bvh")
+    assert motion.fps == 50.0

@@ -114,3 +114,27 @@ def test_the_error_lists_missing_and_present_labels() -> None:
     ) as refusal:
         person_markers(*of(labels), "x.c3d")
     assert "RKnee" in refusal.value.hint
+
+
+@pytest.mark.parametrize(
+    ("shared", "parts"),
+    [
+        ("Bip01 ", ("Thigh", "Calf", "Foot", "UpperArm", "Forearm", "Hand")),
+        ("Character1_", ("UpLeg", "Leg", "Foot", "Arm", "ForeArm", "Hand")),
+    ],
+)
+def test_a_word_that_all_labels_begin_with_does_not_count(shared: str, parts: tuple[str, ...]) -> None:
+    sides = ("L ", "R ") if shared == "Bip01 " else ("Left", "Right")
+    labels = [shared.strip(" _"), *(f"{shared}{side}{part}" for side in sides for part in parts)]
+    points = np.arange(3.0 * len(labels)).reshape(1, -1, 3)
+    names, found = person_markers(labels, points, "take.bvh")
+    at = {
+        name: labels[int(place[0] // 3)] for name, place in zip(names, found[0], strict=True) if name != "Hip"
+    }
+    joints = ("Hip", "Knee", "Ankle", "Shoulder", "Elbow", "Wrist")
+    wanted = {
+        f"{side[0]}{joint}": f"{shared}{side}{part}"
+        for side in sides
+        for joint, part in zip(joints, parts, strict=True)
+    }
+    assert at == wanted

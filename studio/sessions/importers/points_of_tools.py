@@ -58,8 +58,8 @@ def label3d_of(folder: Path) -> Path | None:
         return None
     with foreign_file(project, FootageError, "DANNCE's io.yaml", "Remove it, or write it again."):
         text = read_foreign_text(project, LARGEST_RECORD, FootageError)
-    named = {(folder / name.strip()).resolve() for name in LABEL3D_FILE.findall(text)}
-    found = [path for path in named if path.is_file() and path.is_relative_to(folder.resolve())]
+        named = {(folder / name.strip()).resolve() for name in LABEL3D_FILE.findall(text)}
+        found = [path for path in named if path.is_relative_to(folder.resolve()) and path.is_file()]
     return folder / found[0].relative_to(folder.resolve()) if len(found) == 1 else None
 
 
