@@ -71,15 +71,15 @@ def campaign(
     part, another one for each session. told : called after each session.
     """
     found: dict[str, Tally] = {}
-    began = time.monotonic()
     # Loaded here, and not by each child again.
     importlib.import_module("anyio._backends._asyncio")
     for command in SESSION_COMMANDS:
         load(command)
     with tempfile.TemporaryDirectory(prefix="hostile-") as folder:
         plain = make_plain(Path(folder) / "plain")
-        found[AS_IT_IS] = tried(AS_IT_IS, plain, Path(folder))
+        found[AS_IT_IS] = tried(AS_IT_IS, plain, Path(folder), 0 if few else None)
         told(AS_IT_IS, found[AS_IT_IS])
+        began = time.monotonic()
         for number, name in enumerate(names):
             if seconds is not None and time.monotonic() - began > seconds:
                 break
