@@ -121,6 +121,28 @@ def _(studio: Studio) -> str:
 
 
 @row(
+    "A viewer sees sessions, runs and pictures",
+    "`GET` of the list, a session, its runs, a picture with a viewer's cookie",
+    "200 200 200 200",
+)
+def _(studio: Studio) -> str:
+    at = "/api/sessions/take1"
+    with let_in(studio.base, VIEWERS_TOKEN) as viewer:
+        places = ("/api/sessions", at, f"{at}/runs", f"{at}/frames/0/views/cam1.jpg")
+        return " ".join(str(viewer.get(place).status_code) for place in places)
+
+
+@row(
+    "A viewer does not see uploads and trash",
+    "`GET /api/trash` and `GET /api/uploads/x` with a viewer's cookie",
+    "403 read-only, 403 read-only",
+)
+def _(studio: Studio) -> str:
+    with let_in(studio.base, VIEWERS_TOKEN) as viewer:
+        return ", ".join(said(viewer.get(place)) for place in ("/api/trash", "/api/uploads/x"))
+
+
+@row(
     "A viewer does not see the owner's folders", "`GET /api/folders` with a viewer's cookie", "403 read-only"
 )
 def _(studio: Studio) -> str:
