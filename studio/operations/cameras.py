@@ -13,7 +13,7 @@ from studio.calibration.boards import Board, board_from_text
 from studio.calibration.findings import Finding
 from studio.calibration.floor import read_clicks
 from studio.calibration.verbs import Calibrated
-from studio.declaring import LARGEST, Target, Terminal, Web, operation
+from studio.declaring import Target, Terminal, Web, operation
 from studio.errors import SettingsError, StudioError
 from studio.geometry.camera import Camera
 from studio.operations.opening import SessionName, keeping_in_place, open_session
@@ -31,7 +31,7 @@ SPELLING = (
     "charuco:5x7,40,30 (squares, square mm, marker mm[, dictionary][, legacy])"
     " or chessboard:4x7,60 (inner corners)."
 )
-Frames = Annotated[Sequence[Annotated[int, Field(le=LARGEST)]], Field(max_length=64)]
+Frames = Annotated[Sequence[int], Field(max_length=64)]
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
 from studio.body.shape_space import ShapeSpace, levelled, shape_space
 from studio.body.subject import SHORTEST_MM, TALLEST_MM, Subject, fit_subject, write_subject
-from studio.declaring import LARGEST, Body, Seed, Terminal
+from studio.declaring import Body, Seed, Terminal
 from studio.errors import RunError
 from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
@@ -58,7 +58,7 @@ class FitRequest:
     """
 
     frames: Annotated[
-        Sequence[Annotated[int, Field(le=LARGEST)]],
+        Sequence[int],
         Field(max_length=MOST_FRAMES, description="To look at; default: chosen for their variety."),
     ] = ()
     count: Annotated[int, Field(ge=1, le=MOST_FRAMES, description="How many frames to choose.")] = COUNT

@@ -6,7 +6,7 @@ from typing import Annotated, Any, NamedTuple, get_args, get_origin
 from fastapi import Depends
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model
 
-from studio.declaring import REQUIRED, Parameter, alternatives, declared
+from studio.declaring import LARGEST, REQUIRED, Parameter, alternatives, declared
 from studio.server.schemas import RunName, Value
 
 MaybeName = Annotated[RunName | None, BeforeValidator(lambda value: None if value == "" else value)]
@@ -101,7 +101,7 @@ def _kind(kind: Any) -> Any:  # noqa: ANN401 - a type
     for one in alternatives(kind):
         origin, parts = get_origin(one), get_args(one)
         if origin is Sequence:
-            return list[parts[0]]
+            return list[Annotated[int, Field(le=LARGEST)] if parts[0] is int else parts[0]]
         if origin is Mapping:
             return dict[parts[0], Value if parts[1] is object else parts[1]]
     if str in alternatives(kind):
