@@ -84,7 +84,7 @@ def import_footage(
 ) -> Session:
     """Make a session from a folder (or an archive) of footage and calibration, checking one against the other.
 
-    Folders of Pose2Sim, FreeMoCap, Caliscope, anipose, EasyMocap and PARSEC are recognised.
+    Folders of Pose2Sim, FreeMoCap, Caliscope, anipose, EasyMocap, OpenCap, DANNCE and PARSEC are recognised.
 
     Raises StudioError; then nothing was made.
     """

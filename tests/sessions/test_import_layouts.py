@@ -41,7 +41,7 @@ def test_a_layout_is_recognised_and_read(tmp_path: Path, write: Callable[[Path],
     source = write(tmp_path / "source")
     report = import_source(source, tmp_path / "made", ImportOptions(fps=60.0))
     assert report.layout == title
-    assert any(f"Taken for a {title}" in note for note in report.notes)
+    assert any(f" {title}: '" in note for note in report.notes)
     session = report.session
     assert session.manifest.layout == title
     footage = session.footage()

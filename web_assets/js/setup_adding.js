@@ -32,7 +32,7 @@ export function adder(place, setup, done) {
   const folders = element("div", { className: "folder-list" });
   fill(place, summary, element("div", { className: "footage-form" },
     field("Videos, one per camera (or a zip or tar of all)", videos),
-    field("or a folder: videos/, pictures, masks/, background/, calibration/; Pose2Sim, FreeMoCap, Caliscope, anipose and EasyMocap layouts too", folder),
+    field("or a folder: videos/, pictures, masks/, background/, calibration/; Pose2Sim, FreeMoCap, Caliscope, anipose, EasyMocap, OpenCap and DANNCE layouts too", folder),
     field("or a folder of the computer that the studio runs on", source), folders, refer,
     element("div", { className: "step-row" }, field("Frames per second", fps), field("Trial", trial, { title: "For a folder with several trials." }),
       field("Split interlaced videos", fields, { title: "A frame of each field, twice as many." })),

@@ -411,6 +411,7 @@ def plan_folder(
         wanted, chosen = folder, False
     calibration_note = f"calibration '{wanted.name}'" if chosen else "without a calibration"
     above = "" if folder == source else f" in '{source.name}'"
+    article = "an" if layout.title[0].lower() in "aeiou" else "a"
     truth = _truths(folder / "truth")
     points, several = (None, "") if truth or session else points_of_tool(folder, layout.take)
     return SourcePlan(
@@ -429,7 +430,7 @@ def plan_folder(
         tracker=session.tracker if session else "",
         weighting=session.weighting if session else "",
         notes=(
-            f"Taken for a {layout.title}: '{folder.name}'{above}, {calibration_note}.",
+            f"Taken for {article} {layout.title}: '{folder.name}'{above}, {calibration_note}.",
             *([several] if several else []),
         ),
         layout=layout.title,
