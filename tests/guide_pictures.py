@@ -21,6 +21,7 @@ from studio_server import StudioServer  # noqa: E402
 
 GUIDE = ROOT / "web_assets" / "guide"
 PANEL, SCENE = "#panels", "#scene"
+SMOOTH = "document.onreadystatechange = () => { document.documentElement.dataset.drawing = 'card'; }"
 WITHOUT_PANEL = 0.69
 """Share of the scene's width that its panel leaves free."""
 PATIENCE_SECONDS = 900.0
@@ -96,7 +97,7 @@ def take(page: Page, window: StudioPage, picture: Picture) -> None:
     for _ in range(MOST_LOOKS):
         page.wait_for_timeout(SETTLED_MILLISECONDS)
         now = page.screenshot()
-        if now == before:
+        if now == before and not page.locator("[aria-busy=true]").count():
             break
         before = now
     place = GUIDE / picture.file
@@ -126,6 +127,8 @@ def main() -> None:
             )
             window = StudioPage(browser, studio)
             window.page.evaluate("localStorage.setItem('theme', 'light')")
+            # Drawn by the processor, but as smooth as a graphics card would.
+            window.page.add_init_script(SMOOTH)
             for picture in chosen:
                 take(window.page, window, picture)
             browser.close()

@@ -32,6 +32,8 @@ RUN = "/api/sessions/walk/runs/run-1"
 FRAMES_BEFORE = 6
 # Seconds a layer while the search goes on: a frame a second, so that a page drawn in software can follow it.
 PACE = 0.1
+LATER_MILLISECONDS = 2500
+"""Longer than the page waits before it asks anew for what is stored."""
 PANELS = ("why", "views", "cameras", "log")
 SIZES = ((1280, 800), (1920, 1080))
 
@@ -203,7 +205,7 @@ def test_annealing_is_seen_on_the_first_screen(browser: Browser, demo: StudioSer
 
     until(page, lambda: 0.6 <= share_of_height() <= 0.9)
     # Stand still, at the first layer.
-    page.evaluate("async () => (await import('/assets/js/state.js')).set({ layer: 0 })")
+    page.evaluate("async () => (await import('/assets/js/studio/layer_playback.js')).scrubTo(0)")
     until(page, lambda: window.wire.layers().keys() == {0})
     until(page, lambda: not demo.get("/api/scene/play-layers", window.name)["playing"])
     scene = page.frame_locator("#scene")
@@ -344,7 +346,7 @@ def test_the_survival_rate_is_moved_and_new_layers_are_drawn(paused: StudioPage)
     slider = paused.slider("survival rate")
     value = float(slider.get_attribute("aria-valuenow") or "nan")
     slider.focus()
-    view = paused.wire.viewer
+    view, requested = paused.wire.viewer, len(paused.watch.requests)
     paused.page.keyboard.press("ArrowRight")
     wanted = round(value + 0.01, 2)
     paused.until(f"get('settings')?.values.survival === {wanted}")
@@ -382,6 +384,11 @@ def test_the_survival_rate_is_moved_and_new_layers_are_drawn(paused: StudioPage)
     assert boxes[0] == pytest.approx(boxes[1], abs=1.0), "both are seen alike"
     paused.page.locator("#trial", has_text=f"Frame {frame} tried again, not stored").wait_for()
     assert paused.studio.get(f"{run_path(paused)}/frames/{frame}") == stored
+
+    # Nothing that is stored is asked for again: a trial changes none of it.
+    paused.page.wait_for_timeout(LATER_MILLISECONDS)
+    asked = set(paused.watch.requests[requested:])
+    assert not asked & {"GET /api/sessions", f"GET {run_path(paused)}/frames"}
 
 
 @pytest.mark.slow

@@ -23,12 +23,12 @@ const FAMILY = "Inter, system-ui, sans-serif";
 
 const pen = document.createElement("canvas").getContext("2d");
 
-/** A text that takes at most `width` pixels. */
+/** A text that takes at most `width` pixels: whole words of it, none where less than half of it fits. */
 function shortened(text, width) {
   if (pen.measureText(text).width <= width) return text;
   let kept = text;
-  while (kept && pen.measureText(`${kept}…`).width > width) kept = kept.slice(0, -1);
-  return kept.length > 3 ? `${kept.trimEnd()}…` : "";
+  while (kept && pen.measureText(`${kept}…`).width > width) kept = kept.slice(0, Math.max(0, kept.lastIndexOf(" ")));
+  return 2 * kept.length > text.length ? `${kept.replace(/[,;]$/, "")}…` : "";
 }
 
 /** A sheet of `width` pixels that grows with what is put on it. */
