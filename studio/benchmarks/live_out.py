@@ -97,7 +97,7 @@ def _free_port(kind: socket.SocketKind) -> int:
 def _receive_osc(pipe: Connection, port: int) -> None:
     """Note when each bundle comes, by the time that it names."""
     bundles = load_extra("pythonosc.osc_bundle", "osc").OscBundle
-    came: dict[int, float] = {}
+    came: list[tuple[float, bytes]] = []
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.bind(("127.0.0.1", port))
         receiver.settimeout(0.2)
@@ -107,15 +107,18 @@ def _receive_osc(pipe: Connection, port: int) -> None:
                 datagram = receiver.recv(65535)
             except TimeoutError:
                 continue
-            moment = time.monotonic()
-            seconds = next(one for one in bundles(datagram) if one.address == "/VMC/Ext/T").params[0]
-            came[round(seconds * FPS)] = moment
-    pipe.send(came)
+            came.append((time.monotonic(), datagram))
+    # Taken apart afterwards: what comes meanwhile would wait.
+    named = [
+        (moment, next(one for one in bundles(datagram) if one.address == "/VMC/Ext/T").params[0])
+        for moment, datagram in came
+    ]
+    pipe.send({round(seconds * FPS): moment for moment, seconds in named})
 
 
 def _receive_socket(pipe: Connection, port: int) -> None:
     """Note when each message comes, by its frame."""
-    came: dict[int, float] = {}
+    came: list[tuple[float, str | bytes]] = []
     with connect(f"ws://127.0.0.1:{port}") as connection:
         connection.recv(PATIENCE)
         pipe.send("ready")
@@ -124,9 +127,8 @@ def _receive_socket(pipe: Connection, port: int) -> None:
                 text = connection.recv(0.2)
             except TimeoutError:
                 continue
-            moment = time.monotonic()
-            came[json.loads(text)["frame"]] = moment
-    pipe.send(came)
+            came.append((time.monotonic(), text))
+    pipe.send({json.loads(text)["frame"]: moment for moment, text in came})
 
 
 RECEIVERS: Mapping[str, Callable[[Connection, int], None]] = {"osc": _receive_osc, "ws": _receive_socket}

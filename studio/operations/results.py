@@ -22,7 +22,7 @@ from studio.export.options import ExportOptions
 from studio.export.task import Writer
 from studio.knobs import changed, knobs_of
 from studio.motion_files.trc import MarkerMotion
-from studio.motion_files.truth_files import ANY_WORLD, read_truth
+from studio.motion_files.truth_files import ANY_WORLD, READERS, read_truth
 from studio.operations.opening import (
     RunName,
     SessionName,
@@ -152,7 +152,7 @@ def evaluate(
     *,
     truth: Annotated[
         str | Path | None,
-        Field(description="TRC file, or CSV of named points; default: the session's own truth."),
+        Field(description=f"Named points: a {', '.join(READERS)} file; default: the session's own truth."),
         Terminal(kind=Path),
     ] = None,
     truth_cameras: Annotated[
@@ -173,7 +173,7 @@ def evaluate(
         Literal["", "none", "rigid", "similarity"],
         Field(
             description="How a truth of another world is laid on the run, once for all frames; default: not at all, but"
-            " a CSV without --truth-cameras rigidly (similarity where its header names no unit)."
+            " any but a TRC without --truth-cameras rigidly (similarity where it names no unit)."
         ),
     ] = "",
     track: TrackName = BEST,
@@ -188,7 +188,7 @@ def evaluate(
     path = Path(truth) if truth is not None else opened.truth_path
     if path is None:
         raise TruthError(
-            f"Session '{opened.name}' has no truth.", "Give one with --truth FILE (.trc, or .csv of points)."
+            f"Session '{opened.name}' has no truth.", f"Give one with --truth FILE ({', '.join(READERS)})."
         )
     if track == BEST:
         best = best_track(stored)
