@@ -6,6 +6,7 @@ limbs (`jumps`), limbs contradicted by the masks (`tracking.agreement`), and the
 """
 
 import contextlib
+import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -24,6 +25,7 @@ from studio.geometry.camera import Camera
 from studio.likelihood.overlay import limb_contours
 from studio.progress import Progress, unheard
 from studio.runs.jumps import Jump, jumps_of
+from studio.runs.limbs_elsewhere import LimbsElsewhere, changed_pixels
 from studio.runs.overlay_drawing import projected_silhouette
 from studio.runs.refining import jitter
 from studio.runs.run_footage import filmed_cameras, footage_of
@@ -56,11 +58,14 @@ NAMED = 4
 
 
 class DeniedLimb(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A limb contradicted by the masks of a frame. share : of its area that disagrees."""
+    """A limb contradicted by a frame. share : of its area that disagrees with the masks. elsewhere : what changed in
+    the pictures contradicts it (`runs.limbs_elsewhere`), though the masks may not.
+    """
 
     frame: int
     limb: str
     share: float
+    elsewhere: bool = False
 
 
 class RunCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -139,7 +144,10 @@ class RunCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
                 f"only {100 * self.covered_mean:.0f} % of the masks explained: is somebody else in view?"
             )
         parts += [f"{len(self.lost)} lost"] if self.lost else []
-        parts += [f"{limb} off the masks in {len(own)} of them" for limb, own in self.lost_limbs.items()]
+        parts += [
+            f"{limb} not where masks or pictures show it in {len(own)} of them"
+            for limb, own in self.lost_limbs.items()
+        ]
         parts += [f"{len(self.turned)} sudden turns"] if self.turned else []
         parts += [_leaps(self.jumps)] if self.jumps else []
         return ", ".join([*parts, f"jitter {self.jitter_mm:.1f} mm"])
@@ -177,14 +185,21 @@ def check_run(
     denied, agreement = list[DeniedLimb](), Agreement(body, cameras)
     with contextlib.closing(footage_of(session, run)) as footage, run.results() as results:
         known = set(results.frames())
-        maker = EvidenceMaker(cameras, footage, Backgrounds(footage), settings.evidence, "none")
+        backgrounds, knobs = Backgrounds(footage), settings.evidence
+        maker = EvidenceMaker(cameras, footage, backgrounds, knobs, "none")
+        plain = dataclasses.replace(knobs, mask_shadow_test=False)
+        with_shadows = EvidenceMaker(cameras, footage, backgrounds, plain, "none")
+        elsewhere = LimbsElsewhere(body, cameras)
         for done, row in enumerate(rows):
             progress("comparing with the masks", done, len(rows))
             evidence = maker.evidence(int(chosen.frames[row]))
             frame, pose = evidence.frame, chosen.poses[row]
             shares.append(frame_shares(body, cameras, pose, evidence))
             hidden: Mapping[str, Array] = results.result(frame).carried.memory if frame in known else {}
-            denied += _denied(agreement, pose, evidence, hidden)
+            off = _denied(agreement, pose, evidence, hidden)
+            if off is not None:
+                changed = changed_pixels(evidence, with_shadows.evidence(frame))
+                denied += _with_elsewhere(frame, off, elsewhere.lost(pose, changed))
     check = RunCheck(
         track=chosen.name,
         stamp=track_stamp(run, chosen.name),
@@ -241,17 +256,23 @@ def frame_shares(
 
 def _denied(
     agreement: Agreement, pose: Array, evidence: FrameEvidence, hidden: Mapping[str, Array]
-) -> list[DeniedLimb]:
-    """The limbs of a pose (D,) contradicted by a frame's masks. hidden : known occlusions by camera."""
+) -> dict[str, float] | None:
+    """By limb the share of its area that disagrees with a frame's masks, for a pose (D,); None where not all cameras
+    have one, or none shows anything. hidden : known occlusions by camera.
+    """
     if len(evidence.views) < len(agreement.cameras) or not anything_seen(evidence):
-        return []
+        return None
     mm = agreement.mm_per_pixel(pose)
     seen = without_hidden(silhouette_distances(evidence), agreement.cameras, mm, hidden)
-    shares = agreement.of(pose, seen).shares()
+    return agreement.of(pose, seen).shares()
+
+
+def _with_elsewhere(frame: int, off: Mapping[str, float], lost: Sequence[str]) -> list[DeniedLimb]:
+    """The limbs that masks or pictures contradict. off : as of `_denied`. lost : of `LimbsElsewhere`."""
     return [
-        DeniedLimb(evidence.frame, limb, round(share, 3))
-        for limb, share in shares.items()
-        if share > LIMB_LOST_SHARE
+        DeniedLimb(frame, limb, round(share, 3), limb in lost)
+        for limb, share in off.items()
+        if share > LIMB_LOST_SHARE or limb in lost
     ]
 
 

@@ -60,7 +60,7 @@ def test_the_true_poses_fit_and_others_do_not(session):
     assert wrong.poor == wrong.frames
     assert not found.lost_limbs
     assert set().union(*wrong.lost_limbs.values()) == set(wrong.frames)
-    assert "off the masks in" in wrong.in_words()
+    assert "not where masks or pictures show it in" in wrong.in_words()
     assert not wrong.good
     assert check_step(session).state == "done"
     assert "check the marked frames" in check_step(session).why

@@ -117,7 +117,7 @@ export function mount(place, setup) {
     const measure = actions(button(check ? "Measure again" : "Check the motion", () => begin("check", { track }), check ? "quiet small" : "primary", { disabled: Boolean(job) }));
     if (!check) return fill(found, hint(`Track "${track}" of ${run.name}: every tenth frame is compared with the masks, in every view.`), measure);
     fill(found, verdict(check), strip(check), chips("Too little of the model in the masks", plain(check.poor)), chips("Lost", plain(check.lost)),
-      Object.entries(check.lost_limbs).map(([limb, frames]) => chips(`The ${limb} is off the masks`, plain(frames))), chips("Doubtful", plain(check.doubtful)), chips("Sudden turns", plain(check.turned)), chips("Jumps", jumpsOf(check)), measure);
+      Object.entries(check.lost_limbs).map(([limb, frames]) => chips(`The ${limb} is not where masks or pictures show it`, plain(frames))), chips("Doubtful", plain(check.doubtful)), chips("Sudden turns", plain(check.turned)), chips("Jumps", jumpsOf(check)), measure);
     markShown();
   }
 
