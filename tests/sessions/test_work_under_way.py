@@ -13,6 +13,7 @@ import studio
 from studio.comparison.folders import new_comparison, place_of
 from studio.comparison.sweep import plan_sweep
 from studio.errors import NotFoundError, RunError, SessionError
+from studio.operations import subjects
 from studio.runs.initialising import InitialPose, keep_pose
 from studio.runs.new_run import prepare_run
 from studio.runs.notes import notes_of, write_note
@@ -340,3 +341,12 @@ def test_no_comparison_begins_where_a_session_was(workspace: Workspace, session:
     with pytest.raises(NotFoundError, match="Session 'toy' was renamed or deleted meanwhile"):
         new_comparison(place_of(session, "one"), plan, session)
     assert not session.path.exists()
+
+
+def test_sessions_that_are_tracked_together_all_stay_where_they_are(
+    workspace: Workspace, session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make_session(workspace.root / "other", 3)
+    monkeypatch.setattr(subjects, "track_together", lambda *_: workspace.rename("other", "new"))
+    with pytest.raises(RunError, match="Session 'other' stays as it is while 'together' works on it"):
+        studio.together("toy", ["other"])
