@@ -4,9 +4,6 @@ from collections.abc import Sequence
 
 from hostile.makers import NAME, RUN
 
-STORE = "memory://put"
-"""Of objects, in memory."""
-
 ABOUT_RUN = (NAME, RUN)
 SESSION_COMMANDS: dict[str, Sequence[Sequence[str]]] = {
     "runs": (("runs",), ("runs", NAME)),
@@ -44,7 +41,7 @@ SESSION_COMMANDS: dict[str, Sequence[Sequence[str]]] = {
             "--keep-shape",
         ),
     ),
-    "upload": (("upload", NAME, "--to", STORE),),
+    "upload": (("upload", NAME, "--to", "{out}/put"),),
     "diagnostics": (("diagnostics", "--out", "{out}/diagnostics.zip"),),
     "synchronise": (("synchronise", NAME, "--rotate", "front=180"),),
     "import": (("import", "{session}", "--into", "again"),),
