@@ -95,7 +95,11 @@ def put_strokes(session: OpenSession, camera: str, request: StrokesRequest) -> S
     return strokes(session)
 
 
-@router.post("/{camera}/preview", response_class=Response)
+@router.post(
+    "/{camera}/preview",
+    response_class=Response,
+    responses={204: {"description": "No stroke says anything of the frame yet"}},
+)
 def preview(session: OpenSession, camera: str, request: StrokesPreviewRequest) -> Response:
     """About the mask that strokes give in a frame: a transparent PNG to lie over the picture, upright; nothing (204)
     where no stroke says anything of the frame yet. Changes nothing.

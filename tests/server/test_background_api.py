@@ -165,6 +165,8 @@ def test_strokes_are_painted_tried_kept_and_carried(studio: Studio) -> None:
     assert (
         studio.client.post(f"{place}/cam1/preview", json={"frame": 0, "strokes": strokes}).status_code == 204
     )
+    paths = studio.client.get("/api/openapi.json").json()["paths"]
+    assert "204" in paths["/api/sessions/{session}/strokes/{camera}/preview"]["post"]["responses"]
     shown = studio.client.post(f"{place}/cam1/preview", json={"frame": 2, "strokes": strokes})
     assert shown.headers["content-type"] == "image/png"
     picture = cv2.imdecode(np.frombuffer(shown.content, np.uint8), cv2.IMREAD_UNCHANGED)
