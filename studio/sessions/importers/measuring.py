@@ -391,13 +391,13 @@ def _interlaced(measured: tuple[MeasuredCamera, ...], *, guess: bool) -> list[st
     warnings: list[str] = []
     if whole:
         warnings.append(
-            f"{listed(whole)} is interlaced: each picture holds two moments in its odd and even lines, which fray what"
-            " moves. Import it with --fields auto, which makes a frame of each."
+            f"{listed(whole)} {_are(whole)} interlaced: each picture holds two moments in its odd and even lines,"
+            " which fray what moves. Import it with --fields auto, which makes a frame of each."
         )
     if guessed:
         warnings.append(
-            f"{listed(guessed)} is interlaced, and too little moves in it to see which field of a picture is the"
-            " earlier. Where the movement jumps to and fro, import it with --fields top or bottom."
+            f"{listed(guessed)} {_are(guessed)} interlaced, and too little moves in it to see which field of a"
+            " picture is the earlier. Where the movement jumps to and fro, import it with --fields top or bottom."
         )
     if wrong:
         other = videos[wrong[0]][0].first_field
@@ -405,6 +405,10 @@ def _interlaced(measured: tuple[MeasuredCamera, ...], *, guess: bool) -> list[st
             f"By what moves in {listed(wrong)}, the {other} field is the earlier one: import it with --fields {other}."
         )
     return warnings
+
+
+def _are(names: Sequence[str]) -> str:
+    return "is" if len(names) == 1 else "are"
 
 
 def in_fields(
