@@ -73,7 +73,7 @@ def test_viewers_compute_one_after_another_and_rest_while_a_run_is_tracked() -> 
     assert (most, len(ends)) == (1, 3)
     most, ends = asyncio.run(asked(tracking=True))
     assert most == 1
-    # A rest of four times as long: no time is expected here but the order of sizes.
+    # A rest of six times as long: no time is expected here but the order of sizes.
     assert all(after - before > 0.05 * REST for before, after in pairwise(ends))
 
 
