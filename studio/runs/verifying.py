@@ -233,6 +233,11 @@ def _track_damaged(session: Session, run: StoredRun, progress: Progress) -> list
         while tracking.damaged:
             stepped = tracking.step_layer()
             if stepped.result is not None:
+                if stepped.result.frame in frames:
+                    raise SessionError(
+                        f"Frame {stepped.result.frame} of run '{run.name}' is damaged again once it is tracked.",
+                        "Start the run again.",
+                    )
                 frames.append(stepped.result.frame)
                 progress(f"tracking damaged frames of {run.name} again", len(frames), total)
     return frames

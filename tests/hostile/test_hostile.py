@@ -38,3 +38,9 @@ def test_some_sessions_do_no_harm() -> None:
 def test_no_session_does_harm() -> None:
     ended = tried()
     assert ended.returncode == 0, ended.stdout + ended.stderr
+
+
+@pytest.mark.slow
+def test_a_repair_that_mends_nothing_ends() -> None:
+    ended = tried("--only=poses of one byte")
+    assert ended.returncode == 0, ended.stdout + ended.stderr
