@@ -539,7 +539,8 @@ def _impossible(rows: Sequence[Row], known: Sequence[Row]) -> dict[int, str]:
     """
     if not rows or _are_plain(rows, known):
         return {}
-    sizes = Counter(len(row[6]) for row in (*known[:1], *rows) if isinstance(row[6], bytes))
+    # Bytes that are no numbers are no length that others could be measured by, however many rows have it.
+    sizes = Counter(len(row[6]) for row in rows if isinstance(row[6], bytes) and len(row[6]) % 8 == 0)
     size = len(known[0][6]) if known else max(sizes, key=lambda one: sizes[one], default=0)
     wrong = {
         row[0]: NUMBERS
@@ -547,7 +548,7 @@ def _impossible(rows: Sequence[Row], known: Sequence[Row]) -> dict[int, str]:
         if _is_frame(row[0]) and not (_are_numbers(row) and len(row[6]) == size)
     }
     whole = [row for row in rows if _is_frame(row[0]) and row[0] not in wrong]
-    if size % 8 or not whole:
+    if size % 8 or not size or not whole:
         return wrong | {row[0]: NUMBERS for row in whole}
     poses = np.frombuffer(b"".join(row[6] for row in whole), "<f8").reshape(len(whole), -1)
     unlike = np.flatnonzero(~np.isfinite(poses).all(axis=1))

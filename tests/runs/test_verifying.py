@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from flipped_bytes import flip_in_file, flip_stored
-from toy_session import true_poses
+from toy_session import make_session, true_poses
 from tracked_runs import finish, opened, poses_of
 
 import studio
@@ -261,3 +261,16 @@ def test_a_database_whose_names_are_damaged_is_named(session_on_disk: Session, r
     repair(session_on_disk, found)
     finish(session_on_disk, run)
     assert content(run) == whole
+
+
+def test_poses_of_one_byte_are_tracked_again(tmp_path: Path) -> None:
+    """However many frames have them: the first one that is mended is not the odd one among them."""
+    session = make_session(tmp_path / "toy", 3)
+    run = prepare_run(session, name="one", start_pose=true_poses()[0], knobs={"particles": 20, "layers": 2})
+    finish(session, run)
+    with contextlib.closing(sqlite3.connect(run.folder / "results.sqlite")) as store, store:
+        store.execute("UPDATE frames SET pose = x'01'")
+        store.execute("DELETE FROM checksums")
+    (repaired,) = repair(session, verify(session).faults)
+    assert (repaired.frames, repaired.problem) == ((0, 1, 2), "")
+    assert verify(session).faults == ()
