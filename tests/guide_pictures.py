@@ -84,7 +84,7 @@ def take(page: Page, window: StudioPage, picture: Picture) -> None:
     scene = page.frame_locator("iframe")
     scene.locator("canvas").first.wait_for()
     if is_studio:
-        scene.get_by_text("preset").first.wait_for(state="attached")
+        scene.get_by_role("tab").first.wait_for(state="attached")
     warning = scene.locator("#webgl-software-rendering button")
     for _ in range(60):
         page.wait_for_timeout(500)

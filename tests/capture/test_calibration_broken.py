@@ -43,7 +43,10 @@ BROKEN: dict[str, tuple[Callable[[Path], Path], str]] = {
     "entity": (lambda folder: qualisys(folder / "c.qca.txt", head=ENTITY), "document type or entities"),
     "cut xml": (lambda folder: spoiled(qualisys(folder / "c.qca.txt"), "</cameras>", ""), "is not XML"),
     "no cameras": (lambda folder: written(folder / "c.qca.txt", "<calibration/>"), "no calibrated camera"),
-    "pickle": (lambda folder: written(folder / "cameraIntrinsicsExtrinsics.pickle", ""), "pickle.*not read"),
+    "pickle": (
+        lambda folder: written(folder / "cameraIntrinsicsExtrinsics.pickle", ""),
+        "is not OpenCap's pickle of a camera",
+    ),
     "no matrix": (lambda folder: written(folder / "c.yml", "%YAML:1.0\n---\na: 1\n"), "holds no camera matrix"),
     "vicon": (lambda folder: written(folder / "c.xcp", "<a/>"), "no calibration format"),
     "fisheye": (
