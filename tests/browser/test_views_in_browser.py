@@ -689,6 +689,8 @@ def test_nothing_that_is_drawn_is_made_up(window: StudioPage, studio: StudioServ
     window.page.evaluate(SET, {"panel": "why", "frame": FRAME, "trial": None, "whatIf": None})
     answer = studio.get(f"{RUN}/frames/{FRAME}/views/why")
     words = window.page.locator(".why-words")
+    # What another test tried of the frame goes.
+    expect(words.locator(".tried-words")).to_have_count(0)
     for finding in answer["findings"]:
         words.get_by_text(finding["words"]).wait_for()
     rows = rows_of(studio, "why", "limbs", run=True)
