@@ -45,9 +45,10 @@ LONG_ROOMS := server runs jobs calibration reproduction sessions cli
 test-fast: env
 	$(BIN)/pytest $(WORKERS) -m "not slow and not browser" $(LONG_ROOMS:%=--ignore=tests/%)
 
+# All tests, those too that take long: in the browser these go on from what the quicker ones before them left.
 test-slow: env browser
-	$(BIN)/pytest $(WORKERS) -m "slow and not browser" --timeout 3600
-	$(BIN)/pytest $(WORKERS) -m "slow and browser" --timeout 3600 $(IN_BROWSER)
+	$(BIN)/pytest $(WORKERS) -m "not browser" --timeout 3600
+	$(BIN)/pytest $(WORKERS) -m browser --timeout 3600 $(IN_BROWSER)
 
 # A thousand faults of disk, processes and wires, at places by seed; `FAULTS="--seed 7 --only killed"` does one again.
 faults: env
