@@ -16,6 +16,11 @@ def counted(number: int, one: str, many: str = "") -> str:
     return f"{number} {one if number == 1 else many or one + 's'}"
 
 
+def sentence(words: str) -> str:
+    """Words as the beginning of a sentence, with a capital letter."""
+    return words[:1].upper() + words[1:]
+
+
 def enumerated(words: Sequence[str]) -> str:
     """A list as text: "a, b and c"."""
     return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else "".join(words)

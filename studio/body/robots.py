@@ -46,6 +46,7 @@ from studio.body.reader import assemble, check_definition
 from studio.errors import BodyError
 from studio.foreign_files import foreign_file, read_file
 from studio.isolated import isolated
+from studio.words import sentence
 
 ROBOT_SUFFIXES = (".urdf", ".xml", ".mjcf")
 THIN = 0.12
@@ -296,7 +297,7 @@ class _Robot:
         title = _words(self.model.names[: self.model.names.find(b"\0")].decode("utf-8", "replace"))
         return BodyDefinition(
             title=f"{title or self.path.stem}, {len(self.parameters)} parameters",
-            source=f"Made of {self.path.name}, metres as mm.{f' {said[0].upper()}{said[1:]}.' if said else ''}",
+            source=f"Made of {self.path.name}, metres as mm.{f' {sentence(said)}.' if said else ''}",
             parameters=tuple(self.parameters),
             joints=tuple(self.joints),
             limbs=tuple(self.limbs),

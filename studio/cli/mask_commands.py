@@ -16,6 +16,7 @@ from studio.runs.mask_quality import MaskQuality
 from studio.runs.session_settings import session_settings
 from studio.sessions.background_files import read_evidence, set_backgrounds
 from studio.sessions.session import Session
+from studio.words import sentence
 
 UNUSED = "unused"
 OWN = (
@@ -98,7 +99,7 @@ def _answer(session: Session, found: MaskQuality | None) -> dict[str, object]:
         )
     contrast = found.contrast
     if contrast is not None and contrast.low:
-        lines.append(f"{_sentence(contrast.in_words())}. {contrast.remedy()}")
+        lines.append(f"{sentence(contrast.in_words())}. {contrast.remedy()}")
         lines.append(f"'studio background {session.name} --quality --pictures FOLDER' draws where.")
     elif found.agreeing and not found.usable:
         lines.append(f"The views agree, but {found.why_not_confirmed()}: look at the masks yourself.")
@@ -131,10 +132,6 @@ def _answer(session: Session, found: MaskQuality | None) -> dict[str, object]:
         "settings": knobs,
         "text": "\n".join(lines),
     }
-
-
-def _sentence(words: str) -> str:
-    return words[0].upper() + words[1:]
 
 
 def _has_own_masks(session: Session) -> bool:

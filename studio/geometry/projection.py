@@ -3,8 +3,9 @@
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from studio.arrays import Array
+from studio.arrays import Array, Indices
 from studio.geometry.camera import Camera
 
 
@@ -21,6 +22,14 @@ def project(camera: Camera, points: Array) -> tuple[Array, Array]:
     m = camera.matrix
     pixels = np.stack([m[0, 0] * xd + m[0, 1] * yd + m[0, 2], m[1, 1] * yd + m[1, 2]], axis=-1)
     return pixels, depth
+
+
+def nearest_pixels(camera: Camera, points: Array) -> tuple[Indices, NDArray[np.bool_]]:
+    """(..., 2) the pixels nearest to world points (..., 3), mm, and (...) whether the camera's picture has them."""
+    pixels, depths = project(camera, points)
+    near = np.rint(np.nan_to_num(pixels, nan=-1.0, posinf=-1.0, neginf=-1.0).clip(-1.0, 1e6)).astype(np.int64)
+    fits = (near >= 0).all(axis=-1) & (near < (camera.width, camera.height)).all(axis=-1)
+    return near, (depths > 0.0) & fits
 
 
 def distorted(x: Any, y: Any, lens: Any) -> tuple[Any, Any, Any]:  # noqa: ANN401 - numbers or arrays

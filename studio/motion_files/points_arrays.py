@@ -28,7 +28,7 @@ from studio.foreign_files import LARGEST, check_regular, foreign_file, read_file
 from studio.foreign_pickles import read_plain_pickle
 from studio.isolated import isolated
 from studio.motion_files.points_csv import LAST_FRAME, MOST_NUMBERS
-from studio.motion_files.trc import MM_PER_UNIT, MarkerMotion, check_reach, without_zeros
+from studio.motion_files.trc import MM_PER_UNIT, UNIT_WORDS, MarkerMotion, check_reach, without_zeros
 from studio.typed_decoding import is_list, is_table
 
 EXTRA = "labs"
@@ -39,7 +39,6 @@ MEDIAPIPE = (
     "left_thumb", "right_thumb", "left_hip", "right_hip", "left_knee", "right_knee", "left_ankle", "right_ankle",
     "left_heel", "right_heel", "left_foot_index", "right_foot_index",
 )  # fmt: skip
-METRES = {"meters": "m", "metres": "m", "millimeters": "mm", "millimetres": "mm", "centimeters": "cm"}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -257,7 +256,7 @@ def _nwb(h5: Any, file: Any) -> _Found | None:  # noqa: ANN401
                 rate = float(start.attrs["rate"])
                 times = float(begun) + np.arange(len(places[0])) / rate
             stacked = np.stack(places, axis=1) * conversion
-            unit = METRES.get(unit, unit)
+            unit = UNIT_WORDS.get(unit, unit)
             known = unit if unit in MM_PER_UNIT else ""
             return _Found(tuple(series), np.asarray(times, dtype=np.float64), stacked, known, timed=True)
     return None

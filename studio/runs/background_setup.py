@@ -66,6 +66,7 @@ from studio.sessions.manifest import SessionManifest
 from studio.sessions.session import Session, described_anew
 from studio.sessions.stroke_files import read_strokes, restore_strokes, stored_strokes, write_strokes
 from studio.settings import changed_settings
+from studio.words import sentence
 
 BackgroundSource = Literal[
     "plate", "clip", "median", "combined", "person", "strokes", "threshold", "masks", "best", "subject"
@@ -199,8 +200,7 @@ def _tells_too_little(quality: MaskQuality) -> bool:
 def _tried_besides(made: BackgroundSetup, quality: MaskQuality, best: BackgroundSetup) -> BackgroundSetup:
     """What "best" made after a source of low contrast, and why it was tried. quality : of the source's masks."""
     assert quality.contrast is not None
-    words = quality.contrast.in_words()
-    note = f"{words[0].upper()}{words[1:]}: every source was tried besides {made.source}."
+    note = f"{sentence(quality.contrast.in_words())}: every source was tried besides {made.source}."
     return dataclasses.replace(best, notes=(*made.notes, note, *best.notes))
 
 

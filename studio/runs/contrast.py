@@ -36,7 +36,7 @@ from studio.evidence.masks import PackedMask, reduced
 from studio.evidence.pipeline import EvidenceMaker
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
-from studio.geometry.projection import project
+from studio.geometry.projection import nearest_pixels
 from studio.likelihood.outlines import OutlineProjector
 from studio.progress import Progress, unheard
 from studio.runs.person_hull import FINE, JUDGED_SIDE, covered, large_hull, person_box, spread_frames
@@ -46,7 +46,7 @@ from studio.sessions.session import Session
 from studio.volume.hull import Hull
 from studio.volume.hull_pieces import chosen_voxels
 from studio.volume.reconstruction import Reconstructor
-from studio.words import enumerated
+from studio.words import enumerated, sentence
 
 WIDER = 1.6
 """Times the shadow test's colour tolerance, each pixel alone."""
@@ -153,7 +153,7 @@ class Contrast:
         ways += ["paint strokes (source strokes)", "try every source (source best)"]
         if self.person:
             ways.append("film again in clothes of another colour than floor and walls")
-        return f"{', '.join(ways)[0].upper()}{', '.join(ways)[1:]}: any of these may help."
+        return f"{sentence(', '.join(ways))}: any of these may help."
 
 
 def _both_sides(alike: Mapping[str, tuple[str, ...]], order: list[str]) -> dict[str, tuple[str, ...]]:
@@ -248,8 +248,7 @@ def contrast_notes(session: Session, settings: EvidenceSettings, known: KnownPos
         return ()
     if found is None or not found.low:
         return ()
-    words = found.in_words()
-    return (f"{words[0].upper()}{words[1:]}: they may be lost. {found.remedy()}",)
+    return (f"{sentence(found.in_words())}: they may be lost. {found.remedy()}",)
 
 
 def _by_difference(settings: EvidenceSettings, footage: Footage, cameras: Sequence[Camera]) -> bool:
@@ -465,13 +464,7 @@ def _shadows(pixels: Flags, view: int, changed: Sequence[Bytes], lenses: Sequenc
     for other, camera in enumerate(lenses):
         if other == view:
             continue
-        at, depths = project(camera, points)
-        cells = np.rint(np.nan_to_num(at, nan=-1.0, posinf=-1.0, neginf=-1.0).clip(-1.0, 1e6)).astype(
-            np.int64
-        )
-        inside = (
-            (depths > 0.0) & (cells >= 0).all(axis=1) & (cells < (camera.width, camera.height)).all(axis=1)
-        )
+        cells, inside = nearest_pixels(camera, points)
         empty[inside] += changed[other][cells[inside, 1], cells[inside, 0]] == 0
     found[rows, columns] = falls & (empty < min(EMPTY_VIEWS, len(lenses) - 1))
     return found

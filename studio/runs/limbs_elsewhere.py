@@ -21,7 +21,7 @@ from studio.body.model import BodyModel
 from studio.body.scale import scale_of
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
-from studio.geometry.projection import project
+from studio.geometry.projection import nearest_pixels
 from studio.trackers.agreement import Agreement, limb_names
 
 SPACING = 35.0
@@ -81,10 +81,7 @@ class LimbsElsewhere:
             for name, limb in drawn.items():
                 alone = (times == 1) & (limb > 0)
                 own[name] += (np.count_nonzero(alone), np.count_nonzero(alone & (picture > 0)))
-            places, depths = project(camera, points)
-            cells = np.rint(np.nan_to_num(places, nan=-1.0).clip(-1.0, 1e6)).astype(np.int64)
-            size = (camera.width, camera.height)
-            inside = (depths > 0.0) & (cells >= 0).all(axis=1) & (cells < size).all(axis=1)
+            cells, inside = nearest_pixels(camera, points)
             rows, columns = cells[inside, 1], cells[inside, 0]
             seen += inside
             bare[inside] += (picture[rows, columns] > 0) & ~near[rows, columns]

@@ -40,6 +40,7 @@ from studio.sessions.session import (
     described_anew,
     start_pose_files,
 )
+from studio.words import sentence
 
 LIVE, SETS_NAME, GO_NAME, LOCK_NAME = "live", "sets.csv", "go", "lock"
 COLUMNS = ("frame", "moment", "spread_ms", "lagging", "left_out", "arrivals")
@@ -222,7 +223,7 @@ def finish_recording(session: Session, notes: tuple[str, ...] = ()) -> Session:
         for path in (session.path / source.path).glob("*.jpg"):
             if path.stem.isdigit() and int(path.stem) >= count and not leads_out(path):
                 path.unlink()
-    ending = [f"{recorded.spreads.in_words[0].upper()}{recorded.spreads.in_words[1:]}."]
+    ending = [f"{sentence(recorded.spreads.in_words)}."]
     ending += (
         [f"The recording ended: {recorded.ended}."] if recorded.ended else ["The recording was cut off."]
     )

@@ -19,6 +19,7 @@ from studio.sessions.manifest import FILE_NAME as MANIFEST_NAME
 from studio.sessions.names import is_name
 from studio.sessions.session import CAMERAS_PATH, Session, described_anew
 from studio.sessions.workspace import Workspace
+from studio.words import sentence
 
 TIMES_NAME = "timestamps.csv"
 LATE_SECONDS = 1e-6
@@ -81,7 +82,7 @@ def import_recording(
     report = import_source(folder, into, progress=progress)
     spreads = spreads_of(folder / TIMES_NAME, report.session)
     shutil.copyfile(folder / TIMES_NAME, report.session.path / TIMES_NAME)
-    spread_note = f"{spreads.in_words[0].upper()}{spreads.in_words[1:]}."
+    spread_note = f"{sentence(spreads.in_words)}."
     manifest = report.session.manifest
     described = described_anew(
         report.session,
