@@ -10,7 +10,10 @@ const SETTLE_MILLISECONDS = 200;
 
 const word = { read: (text) => text || null, write: (value) => value };
 const count = { read: (text) => (/^\d{1,9}$/.test(text) ? Number(text) : null), write: String };
-const place = { read: (text) => (/^(-?\d+(\.\d+)?,){5}-?\d+(\.\d+)?$/.test(text) ? text : null), write: (value) => value };
+const place = {
+  read: (text) => (/^(-?\d+(\.\d+)?,){5}-?\d+(\.\d+)?$/.test(text) ? text : null),
+  write: (value) => value,
+};
 
 /** A run by its name; "" says that none is open, nothing that the newest is meant. */
 const run = { read: (text) => text || null, write: (value) => value ?? "" };
@@ -47,7 +50,12 @@ const usualOf = (entry) => ("usual" in entry ? entry.usual : null);
 /** The state that an address holds. @param {string} [query] */
 export function held(query = location.search) {
   const given = new URLSearchParams(query);
-  return Object.fromEntries(HELD.map((one) => [one.name, given.has(one.name) ? one.kind.read(given.get(one.name)) : usualOf(one)]));
+  return Object.fromEntries(
+    HELD.map((one) => [
+      one.name,
+      given.has(one.name) ? one.kind.read(given.get(one.name)) : usualOf(one),
+    ]),
+  );
 }
 
 /** The address of the state as it is, with some entries changed: a link to it. @param {Record<string, any>} [changes] */
@@ -58,7 +66,8 @@ export function addressOf(changes = {}) {
   for (const one of HELD) {
     const { name } = one;
     // Layers that play are no layer to come back to.
-    const moves = (name === "frame" && searched) || (name === "layer" && get("plays") && !("layer" in changes));
+    const moves =
+      (name === "frame" && searched) || (name === "layer" && get("plays") && !("layer" in changes));
     const value = name in changes ? changes[name] : moves ? null : get(name);
     if (value !== usualOf(one)) query.set(name, one.kind.write(value));
   }
@@ -67,16 +76,20 @@ export function addressOf(changes = {}) {
 
 let isDue = false;
 let timer = 0;
-let restoring = true;    // whether what changes now follows from an address that was opened
+let restoring = true; // whether what changes now follows from an address that was opened
 
 /** Write the state into the address: as a step of its own where one of its steps changed, else over the last one. */
 function write() {
   isDue = false;
   const wanted = addressOf();
   // What is not here stays in the address: it may come back, and the link can be looked at.
-  if (!get("session") || get("missing") || wanted === location.pathname + location.search) { restoring = false; return; }
+  if (!get("session") || get("missing") || wanted === location.pathname + location.search) {
+    restoring = false;
+    return;
+  }
   const before = held();
-  if (!restoring && HELD.some(({ name, step }) => step && get(name) !== before[name])) history.pushState(null, "", wanted);
+  if (!restoring && HELD.some(({ name, step }) => step && get(name) !== before[name]))
+    history.pushState(null, "", wanted);
   else history.replaceState(null, "", wanted);
   restoring = false;
 }
@@ -88,8 +101,14 @@ function writeIn(milliseconds) {
 }
 
 /** Steps are written at once, so that "back" finds them; what moves with every frame is written when it rests. */
-const writeSoon = () => { if (!isDue) writeIn(SETTLE_MILLISECONDS); isDue = true; };
-const writeNow = () => { isDue = true; writeIn(0); };
+const writeSoon = () => {
+  if (!isDue) writeIn(SETTLE_MILLISECONDS);
+  isDue = true;
+};
+const writeNow = () => {
+  isDue = true;
+  writeIn(0);
+};
 
 /**
  * Show what the address says: the newest run of a session where it names none, the first session where it names none.
@@ -100,7 +119,10 @@ function read() {
   const sessions = get("sessions") ?? [];
   const { session, run: named, plays, ...shown } = held();
   if (!sessions.length) return;
-  const first = session === null ? sessions.find((one) => one.runs.length) ?? sessions[0] : sessions.find((one) => one.name === session);
+  const first =
+    session === null
+      ? (sessions.find((one) => one.runs.length) ?? sessions[0])
+      : sessions.find((one) => one.name === session);
   const isThere = first && (!named || first.runs.some((one) => one.name === named));
   if (!isThere) {
     openSession(first?.name ?? null, null);
@@ -122,7 +144,9 @@ function read() {
 function frameOfFootage(entry, chosen, shown) {
   const hasRun = chosen === undefined ? entry.runs.length > 0 : chosen !== null;
   if (hasRun || shown.frame === null || shown.frame < entry.frame_count) return shown;
-  say(`There is no frame ${shown.frame}: ${entry.name} has ${entry.frame_count} frames.`, { kind: "warning" });
+  say(`There is no frame ${shown.frame}: ${entry.name} has ${entry.frame_count} frames.`, {
+    kind: "warning",
+  });
   return { ...shown, frame: null };
 }
 
@@ -131,5 +155,8 @@ export function startAddress() {
   read();
   addEventListener("popstate", read);
   watch([...HELD.filter((one) => !one.step).map((one) => one.name), "follow", "work"], writeSoon);
-  watch(HELD.filter((one) => one.step).map((one) => one.name), writeNow);
+  watch(
+    HELD.filter((one) => one.step).map((one) => one.name),
+    writeNow,
+  );
 }

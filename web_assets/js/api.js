@@ -6,27 +6,45 @@ import { windowName } from "./window.js";
 /** @import { Address, Answer, Body } from "./api_types" */
 
 /** An error with a remedy. */
-export const fault = (message, hint = "", more = {}) => Object.assign(new Error(message), { hint, ...more });
+export const fault = (message, hint = "", more = {}) =>
+  Object.assign(new Error(message), { hint, ...more });
 
 /** An answer, or the error that it carries. */
 export async function accepted(answer) {
   if (answer.ok) return answer;
-  const { message = `The studio answered ${answer.status}.`, hint = "" } = await answer.json().catch(() => ({}));
+  const { message = `The studio answered ${answer.status}.`, hint = "" } = await answer
+    .json()
+    .catch(() => ({}));
   throw fault(message, hint, { status: answer.status });
 }
 
 /** Whether this browser may only look: what changes something is refused, and the page does not offer it. */
 export const readOnly = document.documentElement.dataset.access === "view";
-const LOOKING = ["show", "view", "play-layers", "camera", "point"].map((what) => `/api/scene/${what}`);
+const LOOKING = ["show", "view", "play-layers", "camera", "point"].map(
+  (what) => `/api/scene/${what}`,
+);
 
 /** @param {RequestInit} [options] */
 async function call(method, path, body, options = {}) {
-  if (readOnly && method !== "GET" && !LOOKING.includes(path)) throw fault("This address is for looking: it changes nothing.", "Ask whoever started the studio for the other address that it printed.");
+  if (readOnly && method !== "GET" && !LOOKING.includes(path))
+    throw fault(
+      "This address is for looking: it changes nothing.",
+      "Ask whoever started the studio for the other address that it printed.",
+    );
   /** @type {RequestInit} */
-  const request = { method, headers: { "x-studio-window": windowName, ...(body === undefined ? {} : { "content-type": "application/json" }) }, ...options };
+  const request = {
+    method,
+    headers: {
+      "x-studio-window": windowName,
+      ...(body === undefined ? {} : { "content-type": "application/json" }),
+    },
+    ...options,
+  };
   if (body !== undefined) request.body = JSON.stringify(body);
   const answer = await fetch(path, request).catch((cause) => {
-    throw cause.name === "AbortError" ? cause : fault("The studio does not answer.", "Check in its terminal whether it still runs.");
+    throw cause.name === "AbortError"
+      ? cause
+      : fault("The studio does not answer.", "Check in its terminal whether it still runs.");
   });
   const kind = (await accepted(answer)).headers.get("content-type") ?? "";
   const text = await answer.text();
@@ -49,8 +67,11 @@ export const putBytes = (path, bytes) => call("PUT", path, undefined, { body: by
 /** @returns {`/api/sessions/${string}`} */
 export const sessionPath = (session) => `/api/sessions/${encodeURIComponent(session)}`;
 /** @returns {`/api/sessions/${string}/runs/${string}`} */
-export const runPath = (session, run) => `/api/sessions/${encodeURIComponent(session)}/runs/${encodeURIComponent(run)}`;
+export const runPath = (session, run) =>
+  `/api/sessions/${encodeURIComponent(session)}/runs/${encodeURIComponent(run)}`;
 /** A view's numbers of a whole run. @returns {`/api/sessions/${string}/runs/${string}/views/${string}`} */
-export const runView = (session, run, view, query = "") => `${runPath(session, run)}/views/${view}${query && `?${query}`}`;
+export const runView = (session, run, view, query = "") =>
+  `${runPath(session, run)}/views/${view}${query && `?${query}`}`;
 /** A view's numbers of a frame. @returns {`/api/sessions/${string}/runs/${string}/frames/${string}/views/${string}`} */
-export const frameView = (session, run, frame, view, query = "") => `${runPath(session, run)}/frames/${frame}/views/${view}${query && `?${query}`}`;
+export const frameView = (session, run, frame, view, query = "") =>
+  `${runPath(session, run)}/frames/${frame}/views/${view}${query && `?${query}`}`;

@@ -12,9 +12,32 @@ export function walkCard(path, model) {
   const canvas = element("canvas", { role: "img", ariaLabel: "The generated movement" });
   const again = button("Generate", generate, "primary");
   const play = button("Pause", () => run(!playing), "", { disabled: true });
-  const slider = element("input", { type: "range", min: 0, max: FRAMES - 1, value: 0, disabled: true, ariaLabel: "Frame" });
-  const words = lead("A random walk through the automaton's states, and the smooth movement that fits its clusters best; global position and orientation stay fixed.");
-  const box = card("Generated movement", element("div", { className: "walk" }, canvas, element("div", { className: "walk-side" }, words, element("div", { className: "form-foot" }, again, play), slider)));
+  const slider = element("input", {
+    type: "range",
+    min: 0,
+    max: FRAMES - 1,
+    value: 0,
+    disabled: true,
+    ariaLabel: "Frame",
+  });
+  const words = lead(
+    "A random walk through the automaton's states, and the smooth movement that fits its clusters best; global position and orientation stay fixed.",
+  );
+  const box = card(
+    "Generated movement",
+    element(
+      "div",
+      { className: "walk" },
+      canvas,
+      element(
+        "div",
+        { className: "walk-side" },
+        words,
+        element("div", { className: "form-foot" }, again, play),
+        slider,
+      ),
+    ),
+  );
   /** @type {import("./api_types").Schemas["GeneratedWalk"]} */
   let walk = null;
   let drawing = null;
@@ -28,8 +51,9 @@ export function walkCard(path, model) {
     drawing.show(walk.frames[frame]);
     slider.value = String(frame);
     const history = walk.histories[frame];
-    words.textContent = `Seed ${walk.seed}, frame ${frame} of ${walk.frames.length} (${(frame / walk.fps).toFixed(1)} s): cluster ${walk.clusters[frame]}, `
-      + `predicted from ${history.length === 1 ? "the last frame" : `the last ${history.length} frames`}.`;
+    words.textContent =
+      `Seed ${walk.seed}, frame ${frame} of ${walk.frames.length} (${(frame / walk.fps).toFixed(1)} s): cluster ${walk.clusters[frame]}, ` +
+      `predicted from ${history.length === 1 ? "the last frame" : `the last ${history.length} frames`}.`;
   };
   const step = (now) => {
     if (closed || !playing || !box.isConnected) return;
@@ -58,8 +82,20 @@ export function walkCard(path, model) {
       again.textContent = "Another one";
       show();
       run(true);
-    } catch (error) { complain(error); }
+    } catch (error) {
+      complain(error);
+    }
   }
-  slider.oninput = () => { run(false); frame = Number(slider.value); show(); };
-  return { box, close: () => { closed = true; drawing?.close(); } };
+  slider.oninput = () => {
+    run(false);
+    frame = Number(slider.value);
+    show();
+  };
+  return {
+    box,
+    close: () => {
+      closed = true;
+      drawing?.close();
+    },
+  };
 }

@@ -3,8 +3,8 @@
 import { onTheme, token } from "./theme.js";
 
 const START = { azimuth: -0.9, elevation: 0.16 };
-const MARGIN = 0.08;      // of the canvas, kept free around the body
-const FURTHEST = 0.45;    // how much of their colour the furthest limbs lose
+const MARGIN = 0.08; // of the canvas, kept free around the body
+const FURTHEST = 0.45; // how much of their colour the furthest limbs lose
 const views = new Set();
 
 let azimuth = START.azimuth;
@@ -12,7 +12,9 @@ let elevation = START.elevation;
 
 onTheme(() => redrawAll());
 
-function redrawAll() { for (const view of views) if (view.canvas.isConnected) view.draw(); }
+function redrawAll() {
+  for (const view of views) if (view.canvas.isConnected) view.draw();
+}
 
 /** A canvas that shows one body; all of them are turned together by dragging, and by the arrow keys. */
 export class BodyDrawing {
@@ -26,7 +28,13 @@ export class BodyDrawing {
     this.arrows = [];
     this.points = [];
     this.clarity = 1;
-    this.seen = new IntersectionObserver((entries) => { this.isSeen = entries.at(-1).isIntersecting; this.draw(); }, { rootMargin: "200px" });
+    this.seen = new IntersectionObserver(
+      (entries) => {
+        this.isSeen = entries.at(-1).isIntersecting;
+        this.draw();
+      },
+      { rootMargin: "200px" },
+    );
     this.seen.observe(canvas);
     this.sized = new ResizeObserver(() => this.draw());
     this.sized.observe(canvas);
@@ -65,10 +73,15 @@ export class BodyDrawing {
     this.canvas.setPointerCapture(begin.pointerId);
     this.canvas.onpointermove = (event) => {
       azimuth = from.azimuth + (event.clientX - begin.clientX) / 90;
-      elevation = Math.min(1.4, Math.max(-1.4, from.elevation + (event.clientY - begin.clientY) / 150));
+      elevation = Math.min(
+        1.4,
+        Math.max(-1.4, from.elevation + (event.clientY - begin.clientY) / 150),
+      );
       redrawAll();
     };
-    this.canvas.onpointerup = this.canvas.onpointercancel = () => { this.canvas.onpointermove = null; };
+    this.canvas.onpointerup = this.canvas.onpointercancel = () => {
+      this.canvas.onpointermove = null;
+    };
   }
 
   draw() {
@@ -84,8 +97,12 @@ export class BodyDrawing {
       const [x, y, depth] = seen(point, this.reach.middle);
       return [width / 2 + scale * x, height / 2 - scale * y, depth];
     };
-    for (const [from, to, colour] of this.lines) drawLine(pen, place(from), place(to), token(colour));
-    const limbs = this.limbs.map((ends, index) => ({ ...this.shapes[index], ends: ends.map(place) }));
+    for (const [from, to, colour] of this.lines)
+      drawLine(pen, place(from), place(to), token(colour));
+    const limbs = this.limbs.map((ends, index) => ({
+      ...this.shapes[index],
+      ends: ends.map(place),
+    }));
     limbs.sort((one, two) => one.ends[0][2] + one.ends[1][2] - two.ends[0][2] - two.ends[1][2]);
     pen.globalAlpha = this.clarity;
     for (const limb of limbs) drawLimb(pen, limb, scale, this.reach.radius);
@@ -106,12 +123,13 @@ export class BodyDrawing {
 function reachOf(points) {
   const low = [Infinity, Infinity, Infinity];
   const high = [-Infinity, -Infinity, -Infinity];
-  for (const ends of points) for (const point of ends) {
-    for (let axis = 0; axis < 3; axis += 1) {
-      low[axis] = Math.min(low[axis], point[axis]);
-      high[axis] = Math.max(high[axis], point[axis]);
+  for (const ends of points)
+    for (const point of ends) {
+      for (let axis = 0; axis < 3; axis += 1) {
+        low[axis] = Math.min(low[axis], point[axis]);
+        high[axis] = Math.max(high[axis], point[axis]);
+      }
     }
-  }
   const middle = low.map((value, axis) => (value + high[axis]) / 2);
   return { middle, radius: Math.max(1, ...low.map((value, axis) => (high[axis] - value) / 2)) };
 }
@@ -121,7 +139,11 @@ function seen(point, middle) {
   const [x, y, z] = point.map((value, axis) => value - middle[axis]);
   const across = x * Math.cos(azimuth) - y * Math.sin(azimuth);
   const away = x * Math.sin(azimuth) + y * Math.cos(azimuth);
-  return [across, z * Math.cos(elevation) + away * Math.sin(elevation), z * Math.sin(elevation) - away * Math.cos(elevation)];
+  return [
+    across,
+    z * Math.cos(elevation) + away * Math.sin(elevation),
+    z * Math.sin(elevation) - away * Math.cos(elevation),
+  ];
 }
 
 function drawLimb(pen, { side, ends: [near, far], radius_start, radius_end }, scale, radius) {
@@ -163,7 +185,11 @@ function drawArrow(pen, [from, to]) {
   pen.stroke();
   pen.beginPath();
   pen.moveTo(to[0], to[1]);
-  for (const turn of [2.6, -2.6]) pen.lineTo(to[0] + head * 1.4 * Math.cos(along + turn), to[1] + head * 1.4 * Math.sin(along + turn));
+  for (const turn of [2.6, -2.6])
+    pen.lineTo(
+      to[0] + head * 1.4 * Math.cos(along + turn),
+      to[1] + head * 1.4 * Math.sin(along + turn),
+    );
   pen.closePath();
   pen.fill();
 }

@@ -2,7 +2,16 @@
 
 import { fetchJson, post, remove } from "./api.js";
 import { showForm } from "./comparison_form.js";
-import { badge, clearComparison, isGoing, isSweep, shareOf, showComparison, sizeWords, updateProgress } from "./comparison_result.js";
+import {
+  badge,
+  clearComparison,
+  isGoing,
+  isSweep,
+  shareOf,
+  showComparison,
+  sizeWords,
+  updateProgress,
+} from "./comparison_result.js";
 import { openForm } from "./studio/dialogs.js";
 import { bar, button, byId, element, fill } from "./elements.js";
 import { complain, say } from "./messages.js";
@@ -17,9 +26,9 @@ const POLL_MILLISECONDS = 1000;
 const content = byId("content");
 
 /** @type {Schemas["ComparisonLine"][]} */
-let lines = [];        // of all comparisons
+let lines = []; // of all comparisons
 let sessions = [];
-let open = null;       // {session, name} of the shown one, null while the form is shown
+let open = null; // {session, name} of the shown one, null while the form is shown
 /** @type {Schemas["ComparisonDetail"]} */
 let detail = null;
 /** @type {Schemas["ComparisonChoices"]} */
@@ -28,7 +37,8 @@ let [bodies, trackers, weightings] = [[], [], []];
 let timer = 0;
 
 /** @returns {`/api/comparisons/${string}/${string}`} */
-const pathOf = ({ session, name }) => `/api/comparisons/${encodeURIComponent(session)}/${encodeURIComponent(name)}`;
+const pathOf = ({ session, name }) =>
+  `/api/comparisons/${encodeURIComponent(session)}/${encodeURIComponent(name)}`;
 const same = (a, b) => a && b && a.session === b.session && a.name === b.name;
 const address = (query) => history.replaceState(null, "", `?${new URLSearchParams(query)}`);
 
@@ -38,16 +48,43 @@ async function refresh() {
 }
 
 function entryOf(line) {
-  const mark = line.status === "done" && line.best ? element("span", { className: "mark", title: line.best }, line.best_mm === null ? "done" : `${line.best_mm.toFixed(1)} mm`) : element("span", { className: "mark" }, badge(line.status));
-  const row = element("button", { type: "button", className: "entry", title: line.trackers.join(", "), dataset: { key: `${line.session}/${line.name}` }, onclick: () => openComparison(line).catch(complain) },
-    element("span", { className: "name" }, line.name), mark, element("span", { className: "facts" }, sizeWords(line)), isGoing(line) && bar(shareOf(line)));
+  const mark =
+    line.status === "done" && line.best
+      ? element(
+          "span",
+          { className: "mark", title: line.best },
+          line.best_mm === null ? "done" : `${line.best_mm.toFixed(1)} mm`,
+        )
+      : element("span", { className: "mark" }, badge(line.status));
+  const row = element(
+    "button",
+    {
+      type: "button",
+      className: "entry",
+      title: line.trackers.join(", "),
+      dataset: { key: `${line.session}/${line.name}` },
+      onclick: () => openComparison(line).catch(complain),
+    },
+    element("span", { className: "name" }, line.name),
+    mark,
+    element("span", { className: "facts" }, sizeWords(line)),
+    isGoing(line) && bar(shareOf(line)),
+  );
   if (same(line, open)) row.ariaCurrent = "true";
   return row;
 }
 
 function drawList() {
   const groups = Map.groupBy(lines, (line) => line.session);
-  fill(byId("entries"), lines.length ? [...groups].flatMap(([session, members]) => [element("h3", {}, session), ...members.map(entryOf)]) : element("p", { className: "empty" }, "No comparison yet."));
+  fill(
+    byId("entries"),
+    lines.length
+      ? [...groups].flatMap(([session, members]) => [
+          element("h3", {}, session),
+          ...members.map(entryOf),
+        ])
+      : element("p", { className: "empty" }, "No comparison yet."),
+  );
 }
 
 async function openComparison({ session, name }) {
@@ -62,23 +99,35 @@ async function openComparison({ session, name }) {
 
 function show() {
   showComparison(content, detail, {
-    cancel: () => act(() => post(`${pathOf(open)}/cancel`)), resume: () => act(() => post(`${pathOf(open)}/resume`)),
-    again: () => (isSweep(detail.comparison) ? openNewSweep(sweepLike(detail)) : openNew(initialLike(detail))), remove: () => removeForm(detail.comparison), session: open.session, look, show: showTrial,
+    cancel: () => act(() => post(`${pathOf(open)}/cancel`)),
+    resume: () => act(() => post(`${pathOf(open)}/resume`)),
+    again: () =>
+      isSweep(detail.comparison) ? openNewSweep(sweepLike(detail)) : openNew(initialLike(detail)),
+    remove: () => removeForm(detail.comparison),
+    session: open.session,
+    look,
+    show: showTrial,
   });
 }
 
 /** Open the run of a trial at its worst frame. @param {Schemas["TrialLine"]} trial */
 async function look(trial) {
   try {
-    const { session, run } = await post(`${pathOf(open)}/trials`, { tracker: trial.tracker, seed: trial.seed });
+    const { session, run } = await post(`${pathOf(open)}/trials`, {
+      tracker: trial.tracker,
+      seed: trial.seed,
+    });
     location.href = studioPath(session, run, { frame: trial.worst_frame, panel: "why" });
-  } catch (error) { complain(error); }
+  } catch (error) {
+    complain(error);
+  }
 }
 
 /** Go to the run of a trial; where there is none, to the button that makes it. @param {Schemas["TrialLine"]} trial */
 function showTrial(trial, frame = trial.worst_frame) {
   if (trial.run) location.href = studioPath(open.session, trial.run, { frame, panel: "why" });
-  else content.querySelector(`[data-trial="${CSS.escape(`${trial.tracker} ${trial.seed}`)}"]`).focus();
+  else
+    content.querySelector(`[data-trial="${CSS.escape(`${trial.tracker} ${trial.seed}`)}"]`).focus();
 }
 
 async function act(doing) {
@@ -86,18 +135,24 @@ async function act(doing) {
     await doing();
     await openComparison(open);
     await refresh();
-  } catch (error) { complain(error); }
+  } catch (error) {
+    complain(error);
+  }
 }
 
 function removeForm(line) {
   openForm({
-    heading: `Delete ${line.name}?`, action: "Delete", danger: true, intro: "It goes to the trash of the studio, where it can be restored.",
+    heading: `Delete ${line.name}?`,
+    action: "Delete",
+    danger: true,
+    intro: "It goes to the trash of the studio, where it can be restored.",
     rows: isSweep(line) ? [[{ name: "runs", kind: "check", label: "its runs, too" }]] : [],
     send: async (values) => {
       await remove(`${pathOf(line)}${values.runs ? "?runs=true" : ""}`);
       open = null;
       await refresh();
-      if (lines.length) await openComparison(lines.find((one) => one.session === line.session) ?? lines[0]);
+      if (lines.length)
+        await openComparison(lines.find((one) => one.session === line.session) ?? lines[0]);
       else openNew({});
     },
   });
@@ -110,20 +165,50 @@ function initialLike({ comparison: line, settings, body }) {
   const trackers = line.trackers.map((name) => {
     const { weighting, ...knobs } = settings[name];
     const known = choices.candidates.find((one) => one.name === name)?.changes ?? {};
-    const brought = choices.candidates.find((one) => one.tracker === name.split(":")[0])?.sized_by ?? [];
-    const own = Object.entries(knobs).filter(([knob, value]) => !brought.includes(knob) && known[knob] !== value);
+    const brought =
+      choices.candidates.find((one) => one.tracker === name.split(":")[0])?.sized_by ?? [];
+    const own = Object.entries(knobs).filter(
+      ([knob, value]) => !brought.includes(knob) && known[knob] !== value,
+    );
     return { name, settings: Object.fromEntries(own), weighting: common ? null : weighting };
   });
   const layers = Object.values(settings).find((one) => one.layers)?.layers;
-  return { session: line.session, trackers, evaluations: line.evaluations, seeds: line.seeds, weighting: common, body, first: line.first, last: line.last, layers };
+  return {
+    session: line.session,
+    trackers,
+    evaluations: line.evaluations,
+    seeds: line.seeds,
+    weighting: common,
+    body,
+    first: line.first,
+    last: line.last,
+    layers,
+  };
 }
 
 /** What the form has to be filled with to sweep the same again. @param {Schemas["ComparisonDetail"]} detail */
 function sweepLike({ comparison: line, settings, body, behaviour, fit_shape }) {
   const [{ weighting, ...knobs }] = Object.values(settings);
-  const fixed = Object.entries(knobs).filter(([name]) => !(name in line.vary)).map(([name, value]) => `${name}=${value}`).join(", ");
-  const vary = Object.fromEntries(Object.entries(line.vary).map(([name, values]) => [name, values.join(", ")]));
-  return { session: line.session, tracker: line.tracker, weighting, vary, fixed, seeds: line.seeds, first: line.first, last: line.last, body, behaviour, fit_shape };
+  const fixed = Object.entries(knobs)
+    .filter(([name]) => !(name in line.vary))
+    .map(([name, value]) => `${name}=${value}`)
+    .join(", ");
+  const vary = Object.fromEntries(
+    Object.entries(line.vary).map(([name, values]) => [name, values.join(", ")]),
+  );
+  return {
+    session: line.session,
+    tracker: line.tracker,
+    weighting,
+    vary,
+    fixed,
+    seeds: line.seeds,
+    first: line.first,
+    last: line.last,
+    body,
+    behaviour,
+    fit_shape,
+  };
 }
 
 /** Take away what is shown, for a form. */
@@ -135,17 +220,35 @@ function clearForForm(kind, initial, title) {
   document.title = `${title} · Capture studio`;
 }
 
-const started = (line) => { refresh().then(() => openComparison(line)).catch(complain); };
+const started = (line) => {
+  refresh()
+    .then(() => openComparison(line))
+    .catch(complain);
+};
 
 function openNew(initial) {
   clearForForm("", initial, "New comparison");
-  showForm(content, { sessions, choices, bodies, initial, started, instead: button("Sweep knobs instead…", () => openNewSweep({ session: initial.session })) });
+  showForm(content, {
+    sessions,
+    choices,
+    bodies,
+    initial,
+    started,
+    instead: button("Sweep knobs instead…", () => openNewSweep({ session: initial.session })),
+  });
   drawList();
 }
 
 function openNewSweep(initial) {
   clearForForm("sweep", initial, "New sweep");
-  showSweepForm(content, { sessions, trackers, weightings, initial, started, instead: button("Compare trackers instead…", () => openNew({ session: initial.session })) }).catch(complain);
+  showSweepForm(content, {
+    sessions,
+    trackers,
+    weightings,
+    initial,
+    started,
+    instead: button("Compare trackers instead…", () => openNew({ session: initial.session })),
+  }).catch(complain);
   drawList();
 }
 
@@ -157,9 +260,12 @@ function watchProgress() {
     try {
       await refresh();
       const line = lines.find((one) => same(one, open));
-      if (line && detail && line.status !== detail.comparison.status) return await openComparison(line);
+      if (line && detail && line.status !== detail.comparison.status)
+        return await openComparison(line);
       if (line) updateProgress(content, line);
-    } catch (error) { complain(error); }
+    } catch (error) {
+      complain(error);
+    }
     watchProgress();
   }, POLL_MILLISECONDS);
 }
@@ -169,20 +275,36 @@ async function start() {
   onTheme(() => detail?.result && show());
   byId("new").onclick = () => openNew({ session: open?.session });
   try {
-    const [listed, known, made] = await Promise.all([fetchJson("/api/sessions"), fetchJson("/api/choices"), fetchJson("/api/comparisons/choices")]);
-    [sessions, bodies, trackers, weightings, choices] = [listed.sessions, known.bodies, known.trackers, known.weightings, made];
+    const [listed, known, made] = await Promise.all([
+      fetchJson("/api/sessions"),
+      fetchJson("/api/choices"),
+      fetchJson("/api/comparisons/choices"),
+    ]);
+    [sessions, bodies, trackers, weightings, choices] = [
+      listed.sessions,
+      known.bodies,
+      known.trackers,
+      known.weightings,
+      made,
+    ];
     await refresh();
     const query = new URLSearchParams(location.search);
-    const wanted = lines.find((line) => line.session === query.get("session") && line.name === query.get("name"));
+    const wanted = lines.find(
+      (line) => line.session === query.get("session") && line.name === query.get("name"),
+    );
     const session = query.get("session");
     // Another session's comparison is no answer to a link to this one.
     const newest = session ? lines.find((line) => line.session === session) : lines[0];
-    if (session && !sessions.some((one) => one.name === session)) say(`Session “${session}” is not here.`, { kind: "warning" });
-    else if (query.get("name") && !wanted) say(`${session} has no comparison “${query.get("name")}”.`, { kind: "warning" });
+    if (session && !sessions.some((one) => one.name === session))
+      say(`Session “${session}” is not here.`, { kind: "warning" });
+    else if (query.get("name") && !wanted)
+      say(`${session} has no comparison “${query.get("name")}”.`, { kind: "warning" });
     if (query.get("new") === "sweep") openNewSweep({ session: query.get("session") ?? undefined });
     else if (query.has("new") || !newest) openNew({ session: query.get("session") ?? undefined });
     else await openComparison(wanted ?? newest);
-  } catch (error) { complain(error); }
+  } catch (error) {
+    complain(error);
+  }
 }
 
 start();

@@ -24,19 +24,19 @@ const AGAIN_MILLISECONDS = 250;
 const searching = () => ["tracking", "compiling"].includes(get("work")?.state);
 const isShown = (session, run) => session === get("session") && run === get("run");
 
-let arrived = [];      // lines of frames that finished since the summary was last loaded
-let layers = [];       // of the frame that is being searched
-let drawnAt = 0;       // when live layers were last shown
-let scene = {};        // what the scene last showed
-let moves = 0;         // of the page, which the scene is asked to follow
-let requested = 0;     // the last move that it was asked to follow
-let again = [];        // layers of the frame that is annealed again
-let showsAgain = 0;    // timer that shows them
-let asking = "";       // the frame whose layers are on their way
+let arrived = []; // lines of frames that finished since the summary was last loaded
+let layers = []; // of the frame that is being searched
+let drawnAt = 0; // when live layers were last shown
+let scene = {}; // what the scene last showed
+let moves = 0; // of the page, which the scene is asked to follow
+let requested = 0; // the last move that it was asked to follow
+let again = []; // layers of the frame that is annealed again
+let showsAgain = 0; // timer that shows them
+let asking = ""; // the frame whose layers are on their way
 let isOpening = false; // whether the run's frames are on their way: the scene is built after that
-let plays = false;     // whether the scene plays layers: it goes on with them unless one is chosen here
-let isHeld = false;    // whether a layer was chosen by hand since the scene was last asked: what plays stops at it
-let isAnew = true;     // whether the page was loaded since: a frame that was annealed again before is not shown on it
+let plays = false; // whether the scene plays layers: it goes on with them unless one is chosen here
+let isHeld = false; // whether a layer was chosen by hand since the scene was last asked: what plays stops at it
+let isAnew = true; // whether the page was loaded since: a frame that was annealed again before is not shown on it
 
 const sceneLater = paced(() => showInScene(), SCENE_MILLISECONDS);
 
@@ -57,15 +57,22 @@ async function loadFrames(check) {
   arrived = [];
   try {
     const track = get("track");
-    const summary = await fetchJson(`${runPath(session, run)}/frames?${new URLSearchParams({ track, check: String(check) })}`);
+    const summary = await fetchJson(
+      `${runPath(session, run)}/frames?${new URLSearchParams({ track, check: String(check) })}`,
+    );
     if (!isShown(session, run) || track !== get("track")) return true;
     const last = summary.frames.at(-1)?.frame ?? -1;
     summary.frames.push(...arrived.filter((line) => line.frame > last));
     // A search that was paused inside a run's first frame has layers to be looked at already.
     const newest = summary.frames.at(-1)?.frame ?? summary.partial ?? null;
-    set({ summary, frame: get("frame") === null || (get("follow") && searching()) ? newest : get("frame") });
+    set({
+      summary,
+      frame: get("frame") === null || (get("follow") && searching()) ? newest : get("frame"),
+    });
     // An address may name a frame that is not tracked; the one in which the search stands has layers.
-    const known = summary.frames.some((line) => line.frame === get("frame")) || [summary.partial, get("detail")?.frame].includes(get("frame"));
+    const known =
+      summary.frames.some((line) => line.frame === get("frame")) ||
+      [summary.partial, get("detail")?.frame].includes(get("frame"));
     if (get("frame") !== null && !known && !searching()) {
       const asked = get("frame");
       if (summary.frames.length) goTo(asked);
@@ -73,15 +80,26 @@ async function loadFrames(check) {
       if (isOpening) sayMissingFrame(asked, summary, run, get("frame"));
     }
     return summary.checked;
-  } catch (error) { complain(error); }
+  } catch (error) {
+    complain(error);
+  }
   return true;
 }
 
 /** Say which frame an address names that is not there, and what is shown instead. */
 function sayMissingFrame(asked, { first, last, frames }, run, shown) {
   const isOutside = asked < first || asked >= last;
-  const cause = isOutside ? `There is no frame ${asked}: ${run} goes from frame ${first} to ${last - 1}.` : `Frame ${asked} of ${run} is not tracked.`;
-  say(frames.length ? `${cause} Frame ${shown} is shown.` : isOutside ? cause : `${run} has no frames yet, so none is shown.`, { kind: "warning" });
+  const cause = isOutside
+    ? `There is no frame ${asked}: ${run} goes from frame ${first} to ${last - 1}.`
+    : `Frame ${asked} of ${run} is not tracked.`;
+  say(
+    frames.length
+      ? `${cause} Frame ${shown} is shown.`
+      : isOutside
+        ? cause
+        : `${run} has no frames yet, so none is shown.`,
+    { kind: "warning" },
+  );
 }
 
 /** The run: its parameters and its layers. */
@@ -90,8 +108,11 @@ async function loadRun() {
   if (!run) return;
   try {
     const { parameters, settings } = await fetchJson(`${runPath(session, run)}?check=false`);
-    if (isShown(session, run)) set({ parameters, layerCount: get("layerCount") ?? layersOf(settings) });
-  } catch (error) { complain(error); }
+    if (isShown(session, run))
+      set({ parameters, layerCount: get("layerCount") ?? layersOf(settings) });
+  } catch (error) {
+    complain(error);
+  }
 }
 
 /** The knobs that were moved in this run, wherever that was, and that no stored frame uses. */
@@ -102,8 +123,16 @@ async function loadMoved() {
     const { moved, values, knobs } = await fetchJson(`${runPath(session, run)}/settings`);
     if (!isShown(session, run)) return;
     const named = knobs.filter((knob) => knob.name in moved);
-    set({ moved: named.map(({ name, label, unit }) => ({ label: unit ? `${label} (${unit})` : label, before: values[name], after: moved[name] })) });
-  } catch (error) { complain(error); }
+    set({
+      moved: named.map(({ name, label, unit }) => ({
+        label: unit ? `${label} (${unit})` : label,
+        before: values[name],
+        after: moved[name],
+      })),
+    });
+  } catch (error) {
+    complain(error);
+  }
 }
 
 /** The shown frame's layers, unless they came with the events. */
@@ -116,13 +145,26 @@ async function loadDetail() {
   try {
     const detail = await fetchJson(key);
     if (isShown(session, run) && frame === get("frame")) set({ detail });
-  } catch (error) { if (error.status !== 404) complain(error); } finally { if (asking === key) asking = ""; }
+  } catch (error) {
+    if (error.status !== 404) complain(error);
+  } finally {
+    if (asking === key) asking = "";
+  }
 }
 
 /** What the page shows, as the scene takes it. */
 const shownNow = (frame) => ({
-  session: get("session"), run: get("run"), frame, layer: get("layer"), follow: get("follow"), limb: get("limb"), parameter: get("parameter"),
-  particle: get("particle"), camera: get("camera"), look_through: get("through"), eye: get("eye"),
+  session: get("session"),
+  run: get("run"),
+  frame,
+  layer: get("layer"),
+  follow: get("follow"),
+  limb: get("limb"),
+  parameter: get("parameter"),
+  particle: get("particle"),
+  camera: get("camera"),
+  look_through: get("through"),
+  eye: get("eye"),
 });
 
 /** The six numbers of a place in the scene, from the text that the address holds. */
@@ -159,14 +201,34 @@ async function showInScene() {
 /** The scene's own controls moved, or it plays: follow them, without sending the change back. What it said before it knew of the page's own last move is old. */
 function takeScene(event) {
   if (!isShown(event.session, event.run) || event.request_number !== moves) return;
-  const chosen = { limb: event.limb, parameter: event.parameter, camera: event.camera, through: event.look_through, eye: event.eye?.join(",") ?? null };
+  const chosen = {
+    limb: event.limb,
+    parameter: event.parameter,
+    camera: event.camera,
+    through: event.look_through,
+    eye: event.eye?.join(",") ?? null,
+  };
   Object.assign(scene, chosen, { look_through: event.look_through });
   if (event.follow && get("follow") && searching()) return set(chosen);
   const stored = get("summary")?.frames.some((line) => line.frame === event.frame);
   /** @type {Record<string, any>} */
-  const changes = { ...chosen, layer: event.layer, particle: event.particle, follow: event.follow, ...(stored ? { frame: event.frame } : {}) };
+  const changes = {
+    ...chosen,
+    layer: event.layer,
+    particle: event.particle,
+    follow: event.follow,
+    ...(stored ? { frame: event.frame } : {}),
+  };
   if (stored && event.frame !== get("frame") && get("whatIf")) changes.whatIf = null;
-  scene = { ...scene, session: event.session, run: event.run, layer: event.layer, particle: event.particle, frame: stored ? event.frame : scene.frame, follow: event.follow };
+  scene = {
+    ...scene,
+    session: event.session,
+    run: event.run,
+    layer: event.layer,
+    particle: event.particle,
+    frame: stored ? event.frame : scene.frame,
+    follow: event.follow,
+  };
   set(changes);
 }
 
@@ -180,7 +242,10 @@ function takeLayer(event) {
     showsAgain ||= setTimeout(showAgain, AGAIN_MILLISECONDS);
     return;
   }
-  layers = [...layers.filter((layer) => layer.frame === event.frame && layer.layer < event.layer), event];
+  layers = [
+    ...layers.filter((layer) => layer.frame === event.frame && layer.layer < event.layer),
+    event,
+  ];
   if (!get("follow")) return;
   const slow = performance.now() - drawnAt > PATIENCE_MILLISECONDS;
   if (!searching() || slow || isWatched()) showLive(event.frame, false);
@@ -195,10 +260,19 @@ function showAgain() {
 
 /** Show the layers that came with the events; whether they could be shown. */
 function showLive(frame, finished) {
-  if (!get("parameters") || layers[0]?.layer !== 0 || layers.some((layer, at) => layer.layer !== at)) return false;
+  if (
+    !get("parameters") ||
+    layers[0]?.layer !== 0 ||
+    layers.some((layer, at) => layer.layer !== at)
+  )
+    return false;
   drawnAt = performance.now();
   const { search_layers, searches } = layers[0];
-  set({ frame, whatIf: null, detail: { frame, finished, search_layers, searches, parameters: get("parameters"), layers } });
+  set({
+    frame,
+    whatIf: null,
+    detail: { frame, finished, search_layers, searches, parameters: get("parameters"), layers },
+  });
   return true;
 }
 
@@ -206,9 +280,22 @@ function showLive(frame, finished) {
 function takeFrame(event) {
   const summary = get("summary");
   if (!summary) return;
-  const line = { frame: event.frame, log_weight: event.log_weight, milliseconds: event.milliseconds, error_mm: null, lost: false, tracking: event.tracking, limbs_off: event.limbs_off };
+  const line = {
+    frame: event.frame,
+    log_weight: event.log_weight,
+    milliseconds: event.milliseconds,
+    error_mm: null,
+    lost: false,
+    tracking: event.tracking,
+    limbs_off: event.limbs_off,
+  };
   arrived.push(line);
-  set({ summary: { ...summary, frames: [...summary.frames.filter((one) => one.frame < event.frame), line] } });
+  set({
+    summary: {
+      ...summary,
+      frames: [...summary.frames.filter((one) => one.frame < event.frame), line],
+    },
+  });
   const whole = layers.length === event.layers && layers[0].frame === event.frame;
   if (get("follow") && whole && showLive(event.frame, true)) return;
   const changes = get("follow") ? { frame: event.frame } : {};
@@ -229,7 +316,9 @@ function takeRest(work) {
 function layersOf(values) {
   if (values.layers) return values.layers;
   if (!values.stage1_iterations) return null;
-  const evaluations = values.stage1_particles * values.stage1_iterations + values.stage2_particles * values.stage2_iterations;
+  const evaluations =
+    values.stage1_particles * values.stage1_iterations +
+    values.stage2_particles * values.stage2_iterations;
   if (values.partition === "hard-twelve") return Math.round(evaluations / values.stage1_particles);
   if (values.partition === "global") return Math.round(evaluations / values.stage2_particles);
   return values.stage1_iterations + values.stage2_iterations;
@@ -244,15 +333,38 @@ export function startData() {
   watch(["session", "run"], () => {
     layers = [];
     isOpening = Boolean(get("run"));
-    loadSummary(() => { loadRun(); movedLater(); });
+    loadSummary(() => {
+      loadRun();
+      movedLater();
+    });
   });
   let shownTrack = get("track");
-  watch(["track"], () => { if (get("track") !== shownTrack) { shownTrack = get("track"); if (get("summary")) loadSummary(); } });
-  watch(["session", "run", "frame"], detailLater);
-  watch(["session", "run", "frame", "layer", "follow", "limb", "parameter", "particle", "camera", "through", "eye"], () => {
-    if (isElsewhere(wantedNow())) moves += 1;
-    sceneLater();
+  watch(["track"], () => {
+    if (get("track") !== shownTrack) {
+      shownTrack = get("track");
+      if (get("summary")) loadSummary();
+    }
   });
+  watch(["session", "run", "frame"], detailLater);
+  watch(
+    [
+      "session",
+      "run",
+      "frame",
+      "layer",
+      "follow",
+      "limb",
+      "parameter",
+      "particle",
+      "camera",
+      "through",
+      "eye",
+    ],
+    () => {
+      if (isElsewhere(wantedNow())) moves += 1;
+      sceneLater();
+    },
+  );
   onEvent("frame", (event, here) => {
     if (!here) return;
     if (event.reannealed) return showAgain();
@@ -262,24 +374,45 @@ export function startData() {
     detailLater();
     summaryLater();
   });
-  onEvent("layer", (event, here) => { if (here) takeLayer(event); });
-  onEvent("settings", (event, here) => { if (here) { set({ settings: event, layerCount: layersOf(event.values) }); movedLater(); } });
+  onEvent("layer", (event, here) => {
+    if (here) takeLayer(event);
+  });
+  onEvent("settings", (event, here) => {
+    if (here) {
+      set({ settings: event, layerCount: layersOf(event.values) });
+      movedLater();
+    }
+  });
   let state = "";
   onEvent("state", (event, here) => {
     // A frame that is annealed again changes nothing that is stored.
-    const isTrial = event.state === "reannealing" || (state === "reannealing" && ["paused", "finished"].includes(event.state));
+    const isTrial =
+      event.state === "reannealing" ||
+      (state === "reannealing" && ["paused", "finished"].includes(event.state));
     if (here) state = event.state;
-    if (here && !searching()) { takeRest(event); sceneLater(); }
+    if (here && !searching()) {
+      takeRest(event);
+      sceneLater();
+    }
     if (isTrial) return;
     if (here && !searching()) summaryLater();
     if (event.state !== "tracking") sessionsLater();
   });
   onEvent("sessions", sessionsLater);
-  onEvent("scene", (event, here) => { if (here) plays = event.layers.playing; });
+  onEvent("scene", (event, here) => {
+    if (here) plays = event.layers.playing;
+  });
   onEvent("scene", takeScene);
   let before = false;
   watch(["connected"], () => {
-    if (get("connected") && before) { scene = {}; dressScene(); sceneLater(); sessionsLater(); summaryLater(); movedLater(); }
+    if (get("connected") && before) {
+      scene = {};
+      dressScene();
+      sceneLater();
+      sessionsLater();
+      summaryLater();
+      movedLater();
+    }
     before ||= get("connected");
   });
 }

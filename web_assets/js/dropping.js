@@ -41,10 +41,23 @@ export function acceptDrops(words, take) {
   document.body.append(cover);
   const isFiles = (event) => [...(event.dataTransfer?.types ?? [])].includes("Files");
   let depth = 0;
-  const end = () => { depth = 0; cover.hidden = true; };
-  document.addEventListener("dragenter", (event) => { if (isFiles(event)) { depth += 1; cover.hidden = false; event.preventDefault(); } });
-  document.addEventListener("dragover", (event) => { if (isFiles(event)) event.preventDefault(); });
-  document.addEventListener("dragleave", (event) => { if (isFiles(event) && --depth <= 0) end(); });
+  const end = () => {
+    depth = 0;
+    cover.hidden = true;
+  };
+  document.addEventListener("dragenter", (event) => {
+    if (isFiles(event)) {
+      depth += 1;
+      cover.hidden = false;
+      event.preventDefault();
+    }
+  });
+  document.addEventListener("dragover", (event) => {
+    if (isFiles(event)) event.preventDefault();
+  });
+  document.addEventListener("dragleave", (event) => {
+    if (isFiles(event) && --depth <= 0) end();
+  });
   document.addEventListener("drop", async (event) => {
     if (!isFiles(event)) return;
     event.preventDefault();
@@ -52,6 +65,8 @@ export function acceptDrops(words, take) {
     try {
       const files = await filesOf(event.dataTransfer);
       if (files.length) await take(files);
-    } catch (error) { complain(error); }
+    } catch (error) {
+      complain(error);
+    }
   });
 }

@@ -22,7 +22,11 @@ export function element(tag, { dataset = {}, ...properties } = {}, ...children) 
 }
 
 /** @param {(Child | Child[])[]} children @returns {(Node | string)[]} */
-const present = (children) => children.flat(2).filter((child) => child !== null && child !== undefined && child !== false && child !== "").map((child) => (child instanceof Node ? child : String(child)));
+const present = (children) =>
+  children
+    .flat(2)
+    .filter((child) => child !== null && child !== undefined && child !== false && child !== "")
+    .map((child) => (child instanceof Node ? child : String(child)));
 
 /** A part of a page by its id. @returns {any} */
 export const byId = (id) => document.getElementById(id);
@@ -46,7 +50,10 @@ export function fill(place, ...children) {
   const scrolled = place.scrollTop;
   place.replaceChildren(...present(children));
   place.scrollTop = scrolled;
-  if (focused && document.activeElement !== focused) /** @type {HTMLElement} */ (focused.isConnected ? focused : key && place.querySelector(key))?.focus();
+  if (focused && document.activeElement !== focused)
+    /** @type {HTMLElement} */ (
+      focused.isConnected ? focused : key && place.querySelector(key)
+    )?.focus();
 }
 
 /** An element of a drawing (SVG). */
@@ -66,27 +73,72 @@ export const notice = (...children) => element("p", { className: "notice" }, ...
 /** The introduction to a part of the page. */
 export const lead = (...children) => element("p", { className: "lead" }, ...children);
 /** An error with its remedy; nothing without an error. @param {{ message: string, hint?: string } | null} error */
-export const failure = (error) => error && element("p", { className: "wrong", role: "alert" }, error.message, error.hint && element("span", { className: "hint" }, ` ${error.hint}`));
+export const failure = (error) =>
+  error &&
+  element(
+    "p",
+    { className: "wrong", role: "alert" },
+    error.message,
+    error.hint && element("span", { className: "hint" }, ` ${error.hint}`),
+  );
 /** A place that takes no room while it is empty. */
 export const optional = () => element("div", { className: "optional" });
 /** The content of an empty page. */
-export const nothing = (heading, ...children) => element("div", { className: "nothing" }, element("h1", {}, heading), ...children);
+export const nothing = (heading, ...children) =>
+  element("div", { className: "nothing" }, element("h1", {}, heading), ...children);
 /** A part of a page in a frame, under its heading. */
-export const card = (heading, ...children) => element("section", { className: "card-box" }, heading && element("h2", {}, heading), ...children);
+export const card = (heading, ...children) =>
+  element("section", { className: "card-box" }, heading && element("h2", {}, heading), ...children);
 /** A page's heading, with what can be done at its right. */
-export const pageHead = (heading, words, ...actions) => element("header", { className: "head" }, element("div", {}, element("h1", {}, heading), words && lead(words)), ...actions);
+export const pageHead = (heading, words, ...actions) =>
+  element(
+    "header",
+    { className: "head" },
+    element("div", {}, element("h1", {}, heading), words && lead(words)),
+    ...actions,
+  );
 /** Buttons beside one another. */
 export const actions = (...children) => element("div", { className: "step-actions" }, ...children);
 /** Whatever pushes what follows to the other end of its line. */
 export const spring = () => element("span", { className: "spring" });
 
 /** A table of figures. @param {string[]} heads @param {Child[][]} rows */
-export const table = (heads, rows, className = "figures") => element("table", { className },
-  element("thead", {}, element("tr", {}, heads.map((head) => element("th", {}, head)))),
-  element("tbody", {}, rows.map((cells) => element("tr", {}, cells.map((cell) => (cell instanceof HTMLTableCellElement ? cell : element("td", {}, cell)))))));
+export const table = (heads, rows, className = "figures") =>
+  element(
+    "table",
+    { className },
+    element(
+      "thead",
+      {},
+      element(
+        "tr",
+        {},
+        heads.map((head) => element("th", {}, head)),
+      ),
+    ),
+    element(
+      "tbody",
+      {},
+      rows.map((cells) =>
+        element(
+          "tr",
+          {},
+          cells.map((cell) =>
+            cell instanceof HTMLTableCellElement ? cell : element("td", {}, cell),
+          ),
+        ),
+      ),
+    ),
+  );
 
 /** A camera's picture under its name. */
-export const picture = (image, name, ...words) => element("figure", { className: "picture" }, image, element("figcaption", {}, element("b", {}, name), ...words));
+export const picture = (image, name, ...words) =>
+  element(
+    "figure",
+    { className: "picture" },
+    image,
+    element("figcaption", {}, element("b", {}, name), ...words),
+  );
 
 // Buttons and fields.
 
@@ -95,28 +147,43 @@ export function button(label, act, className = "", more = {}) {
   const made = element("button", { type: "button", className, textContent: label, ...more });
   made.onclick = async () => {
     made.disabled = true;
-    try { await act(); } finally { made.disabled = false; }
+    try {
+      await act();
+    } finally {
+      made.disabled = false;
+    }
   };
   return made;
 }
 
 /** A field under its label; what it is for stands below it or, as `title`, where the pointer rests. */
-export const field = (label, made, { title = "", below = "" } = {}) => element("label", { title }, label, made, below && element("span", { className: "hint" }, below));
+export const field = (label, made, { title = "", below = "" } = {}) =>
+  element("label", { title }, label, made, below && element("span", { className: "hint" }, below));
 /** A box to be checked before its label. @param {Properties} [properties] */
-export const check = (label, properties = {}, title = "") => element("label", { className: "check", title }, element("input", { type: "checkbox", ...properties }), label);
+export const check = (label, properties = {}, title = "") =>
+  element(
+    "label",
+    { className: "check", title },
+    element("input", { type: "checkbox", ...properties }),
+    label,
+  );
 /** A line of text. @param {Properties} [properties] */
 export const text = (properties = {}) => element("input", { type: "text", ...properties });
 /** A number of 0 or more. @param {Properties} [properties] */
-export const number = (value, properties = {}) => element("input", { type: "number", value, step: "any", min: 0, ...properties });
+export const number = (value, properties = {}) =>
+  element("input", { type: "number", value, step: "any", min: 0, ...properties });
 /** A choice. @param {([string, string] | string)[]} options values with their words, or words alone @param {Properties} [properties] */
-export const select = (options, value = undefined, properties = {}) => offer(element("select", properties), options, value);
+export const select = (options, value = undefined, properties = {}) =>
+  offer(element("select", properties), options, value);
 
 /** Offer other options in a choice. @param {HTMLSelectElement} choice @param {([string, string] | string)[]} options */
 export function offer(choice, options, value = undefined) {
-  choice.replaceChildren(...options.map((one) => {
-    const [own, words] = Array.isArray(one) ? one : [one, one];
-    return new Option(words, own, false, own === value);
-  }));
+  choice.replaceChildren(
+    ...options.map((one) => {
+      const [own, words] = Array.isArray(one) ? one : [one, one];
+      return new Option(words, own, false, own === value);
+    }),
+  );
   return choice;
 }
 
@@ -133,7 +200,11 @@ export function files({ folder = false, ...properties } = {}) {
   return made;
 }
 /** What a session, a run or a track may be called. */
-export const NAME = { required: true, pattern: "[A-Za-z0-9_\\-]{1,64}", title: "Letters, digits, - and _, up to 64" };
+export const NAME = {
+  required: true,
+  pattern: "[A-Za-z0-9_\\-]{1,64}",
+  title: "Letters, digits, - and _, up to 64",
+};
 
 /** Let a form be sent: what went wrong stands over its buttons (`wrong`), the button is pressed once at a time. */
 export function sends(form, submit, wrong, send) {
@@ -142,7 +213,11 @@ export function sends(form, submit, wrong, send) {
     event.preventDefault();
     submit.disabled = true;
     fill(wrong);
-    try { await send((words) => { submit.textContent = words; }); } catch (error) {
+    try {
+      await send((words) => {
+        submit.textContent = words;
+      });
+    } catch (error) {
       fill(wrong, failure(error));
       wrong.scrollIntoView({ block: "nearest" });
     }
@@ -154,7 +229,12 @@ export function sends(form, submit, wrong, send) {
 // Progress.
 
 /** A progress bar. share: 0 to 1. */
-export const bar = (share, className = "progress") => element("div", { className }, element("i", { style: `width: ${Math.round(100 * (share ?? 0))}%` }));
+export const bar = (share, className = "progress") =>
+  element(
+    "div",
+    { className },
+    element("i", { style: `width: ${Math.round(100 * (share ?? 0))}%` }),
+  );
 
 /**
  * A bar with words and a button that cancels; null takes it away. What is there already is changed in place.
@@ -164,8 +244,16 @@ export const bar = (share, className = "progress") => element("div", { className
 export function drawProgress(place, state) {
   if (!state) return fill(place);
   if (!place.querySelector(".step-progress")) {
-    fill(place, element("div", { className: "step-progress" }, element("p", { className: "hint", role: "status" }), bar(0, "long-progress"),
-      state.cancel && actions(button("Cancel", () => cancels.get(place)(), "quiet small"))));
+    fill(
+      place,
+      element(
+        "div",
+        { className: "step-progress" },
+        element("p", { className: "hint", role: "status" }),
+        bar(0, "long-progress"),
+        state.cancel && actions(button("Cancel", () => cancels.get(place)(), "quiet small")),
+      ),
+    );
   }
   cancels.set(place, state.cancel);
   place.querySelector("p").textContent = state.words;
@@ -188,7 +276,10 @@ export function showPicture(image, address) {
     image.wanted = null;
     showPicture(image, newest);
   };
-  next.onload = () => { image.src = address; done(); };
+  next.onload = () => {
+    image.src = address;
+    done();
+  };
   next.onerror = done;
   next.src = address;
 }
@@ -204,6 +295,7 @@ export function duration(seconds) {
 }
 
 /** A share as a percentage; "–" where there is none. */
-export const percent = (share) => (share === null || share === undefined ? "–" : `${Math.round(100 * share)} %`);
+export const percent = (share) =>
+  share === null || share === undefined ? "–" : `${Math.round(100 * share)} %`;
 /** Parts of a line between dots; empty ones are left out. */
 export const dotted = (...parts) => parts.filter(Boolean).join(" · ");

@@ -10,7 +10,9 @@ const listeners = new Map();
 export function listen(type, handler) {
   if (!listeners.has(type)) listeners.set(type, new Set());
   listeners.get(type).add(handler);
-  return () => { listeners.get(type).delete(handler); };
+  return () => {
+    listeners.get(type).delete(handler);
+  };
 }
 
 /** @type {Set<(event: any) => void>} */

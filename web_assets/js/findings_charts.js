@@ -17,12 +17,21 @@ const NEAR = 10;
 export function drawChart(place, chart, echarts, choose = undefined) {
   const drawing = new Drawing(place, whole(chart), echarts, choose);
   shown.add(drawing);
-  return () => { shown.delete(drawing); drawing.dispose(); };
+  return () => {
+    shown.delete(drawing);
+    drawing.dispose();
+  };
 }
 
-new MutationObserver(() => { for (const drawing of shown) drawing.redraw(); }).observe(root, { attributeFilter: ["data-theme"] });
-addEventListener("beforeprint", () => { for (const drawing of shown) drawing.print(); });
-addEventListener("afterprint", () => { for (const drawing of shown) drawing.resize(); });
+new MutationObserver(() => {
+  for (const drawing of shown) drawing.redraw();
+}).observe(root, { attributeFilter: ["data-theme"] });
+addEventListener("beforeprint", () => {
+  for (const drawing of shown) drawing.print();
+});
+addEventListener("afterprint", () => {
+  for (const drawing of shown) drawing.resize();
+});
 
 class Drawing {
   constructor(place, chart, echarts, choose) {
@@ -31,22 +40,43 @@ class Drawing {
     this.choose = choose;
     this.drawn = null;
     this.entries = legendEntries(chart);
-    this.canvas = element("div", { className: "findings-canvas", role: "img", ariaLabel: `${chart.title}. ${chart.y} over ${chart.x}.` });
-    if (chart.heat) this.canvas.style.height = `${Math.min(520, 110 + 34 * chart.heat.rows.length)}px`;
-    this.legend = element("div", { className: "findings-legend" }, ...this.entries.map((entry) => this.legendButton(entry)));
+    this.canvas = element("div", {
+      className: "findings-canvas",
+      role: "img",
+      ariaLabel: `${chart.title}. ${chart.y} over ${chart.x}.`,
+    });
+    if (chart.heat)
+      this.canvas.style.height = `${Math.min(520, 110 + 34 * chart.heat.rows.length)}px`;
+    this.legend = element(
+      "div",
+      { className: "findings-legend" },
+      ...this.entries.map((entry) => this.legendButton(entry)),
+    );
     this.legend.hidden = this.entries.length < 2;
     place.classList.add("findings-chart");
     place.replaceChildren(element("figcaption", {}, chart.title), this.legend, this.canvas);
-    this.seen = new IntersectionObserver((entries) => { if (entries.some((entry) => entry.isIntersecting)) this.redraw(true); }, { rootMargin: "600px" });
+    this.seen = new IntersectionObserver(
+      (entries) => {
+        if (entries.some((entry) => entry.isIntersecting)) this.redraw(true);
+      },
+      { rootMargin: "600px" },
+    );
     this.seen.observe(this.canvas);
     this.sized = new ResizeObserver(() => this.resize());
     this.sized.observe(this.canvas);
   }
 
   legendButton(entry) {
-    const mark = element("i", { className: entry.dashed ? "dashed" : this.chart.kind === "lines" ? "line" : "block" });
+    const mark = element("i", {
+      className: entry.dashed ? "dashed" : this.chart.kind === "lines" ? "line" : "block",
+    });
     mark.style.setProperty("--swatch", entry.colour);
-    const button = element("button", { type: "button", ariaPressed: "true", title: "Show or hide" }, mark, entry.name);
+    const button = element(
+      "button",
+      { type: "button", ariaPressed: "true", title: "Show or hide" },
+      mark,
+      entry.name,
+    );
     button.onclick = () => {
       const on = button.ariaPressed !== "true";
       button.ariaPressed = String(on);
@@ -61,18 +91,26 @@ class Drawing {
     if (!this.canvas.clientWidth) return;
     const selected = this.drawn?.getOption().legend?.[0]?.selected ?? {};
     this.drawn ??= this.begun();
-    const option = this.chart.heat ? heatOption(this.chart) : seriesOption(this.chart, this.canvas.clientWidth, selected);
+    const option = this.chart.heat
+      ? heatOption(this.chart)
+      : seriesOption(this.chart, this.canvas.clientWidth, selected);
     this.drawn.setOption(option, { notMerge: true });
     this.canvas.dataset.drawn = root.dataset.theme ?? "";
   }
 
   begun() {
     const drawn = this.echarts.init(this.canvas, null, { renderer: "svg" });
-    if (this.choose && this.chart.kind === "bars") drawn.on("click", ({ seriesName, dataIndex }) => this.choose(seriesName, dataIndex));
+    if (this.choose && this.chart.kind === "bars")
+      drawn.on("click", ({ seriesName, dataIndex }) => this.choose(seriesName, dataIndex));
     else if (this.choose) {
       const sheet = drawn.getZr();
-      sheet.on("click", ({ offsetX, offsetY }) => { const found = this.nearest(offsetX, offsetY); if (found) this.choose(found.name, found.at); });
-      sheet.on("mousemove", ({ offsetX, offsetY }) => sheet.setCursorStyle(this.nearest(offsetX, offsetY) ? "pointer" : "default"));
+      sheet.on("click", ({ offsetX, offsetY }) => {
+        const found = this.nearest(offsetX, offsetY);
+        if (found) this.choose(found.name, found.at);
+      });
+      sheet.on("mousemove", ({ offsetX, offsetY }) =>
+        sheet.setCursorStyle(this.nearest(offsetX, offsetY) ? "pointer" : "default"),
+      );
     }
     return drawn;
   }
@@ -81,15 +119,32 @@ class Drawing {
   nearest(x, y) {
     if (!this.drawn.containPixel("grid", [x, y])) return null;
     const selected = this.drawn.getOption().legend[0].selected;
-    const grouped = new Set(this.chart.series.filter((series) => series.thin).map((series) => series.group));
+    const grouped = new Set(
+      this.chart.series.filter((series) => series.thin).map((series) => series.group),
+    );
     const [value] = this.drawn.convertFromPixel("grid", [x, y]);
     let best = { name: "", at: 0, away: NEAR };
     for (const series of this.chart.series) {
-      if (selected[legendName(this.chart, series)] === false || (!series.thin && grouped.has(series.group))) continue;
-      const at = series.x.reduce((found, one, index) => (Math.abs(one - value) < Math.abs(series.x[found] - value) ? index : found), 0);
-      const [before, here, after] = [at - 1, at, at + 1].map((index) => (Number.isFinite(series.y[index]) ? this.drawn.convertToPixel("grid", [series.x[index], series.y[index]]) : null));
+      if (
+        selected[legendName(this.chart, series)] === false ||
+        (!series.thin && grouped.has(series.group))
+      )
+        continue;
+      const at = series.x.reduce(
+        (found, one, index) =>
+          Math.abs(one - value) < Math.abs(series.x[found] - value) ? index : found,
+        0,
+      );
+      const [before, here, after] = [at - 1, at, at + 1].map((index) =>
+        Number.isFinite(series.y[index])
+          ? this.drawn.convertToPixel("grid", [series.x[index], series.y[index]])
+          : null,
+      );
       if (!here) continue;
-      const away = Math.min(segmentDistance([x, y], before ?? here, here), segmentDistance([x, y], here, after ?? here));
+      const away = Math.min(
+        segmentDistance([x, y], before ?? here, here),
+        segmentDistance([x, y], here, after ?? here),
+      );
       if (away < best.away) best = { name: series.name, at, away };
     }
     return best.name ? best : null;
@@ -116,12 +171,24 @@ class Drawing {
 /** How far a place is from a stretch between two others, px. */
 function segmentDistance([x, y], [x1, y1], [x2, y2]) {
   const [dx, dy] = [x2 - x1, y2 - y1];
-  const share = dx || dy ? Math.min(1, Math.max(0, ((x - x1) * dx + (y - y1) * dy) / (dx * dx + dy * dy))) : 0;
+  const share =
+    dx || dy ? Math.min(1, Math.max(0, ((x - x1) * dx + (y - y1) * dy) / (dx * dx + dy * dy))) : 0;
   return Math.hypot(x - x1 - share * dx, y - y1 - share * dy);
 }
 
 /** A chart with everything said that may be left out. */
 const whole = (chart) => ({
-  heat: null, categories: [], paper: null, bands: [], ...chart,
-  series: (chart.series ?? []).map((series) => ({ low: [], high: [], group: "", thin: false, dashed: false, ...series })),
+  heat: null,
+  categories: [],
+  paper: null,
+  bands: [],
+  ...chart,
+  series: (chart.series ?? []).map((series) => ({
+    low: [],
+    high: [],
+    group: "",
+    thin: false,
+    dashed: false,
+    ...series,
+  })),
 });

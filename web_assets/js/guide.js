@@ -15,7 +15,10 @@ const RUN = /^course-/;
 function links() {
   return [...document.querySelectorAll("main a")].flatMap((link) => {
     const { searchParams } = new URL(/** @type {HTMLAnchorElement} */ (link).href);
-    const runs = [searchParams.get("run"), ...(searchParams.get("compared") ?? "").split(",").map((name) => name.split("/")[1])].filter((name) => name && RUN.test(name));
+    const runs = [
+      searchParams.get("run"),
+      ...(searchParams.get("compared") ?? "").split(",").map((name) => name.split("/")[1]),
+    ].filter((name) => name && RUN.test(name));
     return runs.length ? [/** @type {[HTMLAnchorElement, string[]]} */ ([link, runs])] : [];
   });
 }
@@ -41,13 +44,24 @@ async function showCourse() {
     shown = key;
     if (isGoing(job)) fill(place, progress);
     else if (missing.length) {
-      fill(place, job?.state === "failed" && failure(job), hint(`${missing.length} of the course's ${runs.length} runs are not made yet; the links need them.`),
-        !readOnly && button("Make the course's runs", begin, "primary"), hint("Forty frames each, a minute or two in all."));
+      fill(
+        place,
+        job?.state === "failed" && failure(job),
+        hint(
+          `${missing.length} of the course's ${runs.length} runs are not made yet; the links need them.`,
+        ),
+        !readOnly && button("Make the course's runs", begin, "primary"),
+        hint("Forty frames each, a minute or two in all."),
+      );
     } else fill(place, hint("The course's runs are there: every link opens one of them."));
   }
 
   async function begin() {
-    try { await post("/api/course"); } catch (error) { fill(place, failure(error)); }
+    try {
+      await post("/api/course");
+    } catch (error) {
+      fill(place, failure(error));
+    }
     await follow();
   }
 
@@ -64,7 +78,9 @@ async function showCourse() {
 async function showFindings(place) {
   const files = place.dataset.files.split(" ").filter(Boolean);
   const [echarts, { drawFindings }, experiments] = await Promise.all([
-    import("../vendor/echarts.esm.min.js"), import("./findings.js"), Promise.all(files.map(async (file) => (await fetch(file)).json())),
+    import("../vendor/echarts.esm.min.js"),
+    import("./findings.js"),
+    Promise.all(files.map(async (file) => (await fetch(file)).json())),
   ]);
   if (experiments.length) drawFindings(place, experiments, echarts);
 }
@@ -72,5 +88,6 @@ async function showFindings(place) {
 startTheme();
 const findings = document.getElementById("findings");
 if (findings) showFindings(findings).catch(console.error);
-for (const block of document.querySelectorAll("pre")) if (block.scrollWidth > block.clientWidth) block.tabIndex = 0;
+for (const block of document.querySelectorAll("pre"))
+  if (block.scrollWidth > block.clientWidth) block.tabIndex = 0;
 if (links().length || location.pathname === "/guide/course") showCourse().catch(console.error);

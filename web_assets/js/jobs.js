@@ -55,12 +55,18 @@ export async function jobDone(path, report = (_job) => {}, gone = () => false) {
 export const shareOf = (job) => (job.total > 1 ? job.done / job.total : null);
 
 /** Where a job stands, in words. */
-export const standing = (job, otherwise) => dotted(job.step || otherwise, shareOf(job) === null ? "" : `${Math.round(100 * shareOf(job))} %`);
+export const standing = (job, otherwise) =>
+  dotted(job.step || otherwise, shareOf(job) === null ? "" : `${Math.round(100 * shareOf(job))} %`);
 
 /** How long a step still takes, in words; nothing where that is hardly any time, or not known. */
 export const timeLeft = (seconds) => (seconds > WORTH_SAYING ? `${duration(seconds)} left` : "");
 
 /** Where a job stands, with the time that its step still takes; as `drawProgress` takes it. */
 export const progressOf = (job, otherwise, cancel) => ({
-  words: dotted(standing(job, otherwise), timeLeft(job.seconds_left) && `${timeLeft(job.seconds_left)} of this step`), share: shareOf(job), cancel,
+  words: dotted(
+    standing(job, otherwise),
+    timeLeft(job.seconds_left) && `${timeLeft(job.seconds_left)} of this step`,
+  ),
+  share: shareOf(job),
+  cancel,
 });

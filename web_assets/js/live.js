@@ -24,14 +24,21 @@ export function startLive() {
   listen("state", (event) => {
     const before = get("work");
     set({ work: event });
-    const isSaid = before?.state === "failed" && before.run === event.run && before.message === event.message;
-    if (event.state === "failed" && !isSaid) say(event.message || "The run failed.", { remedy: event.hint, kind: "error" });
+    const isSaid =
+      before?.state === "failed" && before.run === event.run && before.message === event.message;
+    if (event.state === "failed" && !isSaid)
+      say(event.message || "The run failed.", { remedy: event.hint, kind: "error" });
   });
-  listen("acknowledged", (event) => { if (!event.ok) say(event.message, { remedy: event.hint, kind: "error" }); });
+  listen("acknowledged", (event) => {
+    if (!event.ok) say(event.message, { remedy: event.hint, kind: "error" });
+  });
   onEvent("log", (event, here) => here && addLine(event));
-  startEvents(() => set({ connected: true, stranger: false }), async () => {
-    set({ connected: false });
-    set({ stranger: !(await isKnown()) });
-    return get("stranger") ? STRANGER_MILLISECONDS : RETRY_MILLISECONDS;
-  });
+  startEvents(
+    () => set({ connected: true, stranger: false }),
+    async () => {
+      set({ connected: false });
+      set({ stranger: !(await isKnown()) });
+      return get("stranger") ? STRANGER_MILLISECONDS : RETRY_MILLISECONDS;
+    },
+  );
 }

@@ -8,8 +8,20 @@ const MOST_SHOWN = 4;
 /** Show a message; errors stay until closed. act: a button that follows from it. */
 export function say(text, { remedy = "", kind = "info", act = null } = {}) {
   const box = byId("toasts");
-  const close = element("button", { className: "icon quiet small", textContent: "×", ariaLabel: "Close message", onclick: () => toast.remove() });
-  const toast = element("div", { className: `toast ${kind}` }, element("p", {}, text), close, remedy && element("p", { className: "remedy" }, remedy), act);
+  const close = element("button", {
+    className: "icon quiet small",
+    textContent: "×",
+    ariaLabel: "Close message",
+    onclick: () => toast.remove(),
+  });
+  const toast = element(
+    "div",
+    { className: `toast ${kind}` },
+    element("p", {}, text),
+    close,
+    remedy && element("p", { className: "remedy" }, remedy),
+    act,
+  );
   act?.addEventListener("click", () => toast.remove());
   fill(box, [...box.children, toast].slice(-MOST_SHOWN));
   if (kind !== "error") setTimeout(() => toast.remove(), SECONDS_SHOWN * 1000);

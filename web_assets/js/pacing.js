@@ -13,7 +13,11 @@ function drawAll() {
   const drawings = [...requested];
   requested.clear();
   for (const draw of drawings) {
-    try { draw(); } catch (error) { console.error(error); }
+    try {
+      draw();
+    } catch (error) {
+      console.error(error);
+    }
   }
 }
 
@@ -48,14 +52,24 @@ export function drawSoon(draw) {
 export function askingAbout(again) {
   /** @type {{ subject: string, control: AbortController, more: boolean } | null} */
   let now = null;
-  const stop = () => { now?.control.abort(); now = null; };
+  const stop = () => {
+    now?.control.abort();
+    now = null;
+  };
   /** @param {string} subject @param {(signal: AbortSignal) => Promise<void>} work */
   const ask = async (subject, work) => {
-    if (now?.subject === subject) { now.more = true; return; }
+    if (now?.subject === subject) {
+      now.more = true;
+      return;
+    }
     stop();
     const own = { subject, control: new AbortController(), more: false };
     now = own;
-    try { await work(own.control.signal); } finally { if (now === own) now = null; }
+    try {
+      await work(own.control.signal);
+    } finally {
+      if (now === own) now = null;
+    }
     if (own.more && !own.control.signal.aborted) again();
   };
   return { ask, stop };
@@ -72,8 +86,15 @@ export function paced(work, milliseconds) {
     await pause(Math.max(0, last + milliseconds - performance.now()));
     wanted = false;
     last = performance.now();
-    try { await work(); } finally { busy = false; }
+    try {
+      await work();
+    } finally {
+      busy = false;
+    }
     again();
   };
-  return () => { wanted = true; again(); };
+  return () => {
+    wanted = true;
+    again();
+  };
 }

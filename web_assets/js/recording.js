@@ -1,7 +1,21 @@
 // Live cameras: which, what they show now, how far apart their pictures come; record them, or track what they see.
 
 import { fetchJson, post } from "./api.js";
-import { button, byId, card, check, dotted, element, failure, field, fill, number, offer, pageHead, text } from "./elements.js";
+import {
+  button,
+  byId,
+  card,
+  check,
+  dotted,
+  element,
+  failure,
+  field,
+  fill,
+  number,
+  offer,
+  pageHead,
+  text,
+} from "./elements.js";
 import { isGoing } from "./jobs.js";
 import { complain } from "./messages.js";
 import { sessionWords, studioPath } from "./sessions.js";
@@ -18,57 +32,127 @@ let view = null;
 let looking = 0;
 
 const going = () => isGoing(view?.recording);
-const plain = (value, digits = 1) => (value === null || value === undefined ? "–" : value.toFixed(digits));
-const clock = (seconds) => `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, "0")}`;
+const plain = (value, digits = 1) =>
+  value === null || value === undefined ? "–" : value.toFixed(digits);
+const clock = (seconds) =>
+  `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, "0")}`;
 
 const rows = element("div", { className: "camera-rows" });
 const open = button("Show cameras", show, "primary");
 const grid = element("div", { className: "camera-grid" });
 const spread = element("p", { className: "lead spread", role: "status" });
 const outcome = element("div", { className: "recording-outcome" });
-const session = element("select", { title: "The session whose calibration belongs to these cameras" });
+const session = element("select", {
+  title: "The session whose calibration belongs to these cameras",
+});
 const name = text({ placeholder: "recording-1", maxLength: 64 });
 const seconds = number("", { min: 1, max: 86400, placeholder: "until stopped" });
-const track = check("Track while recording", {}, "With that session's person, empty room and start pose; the recording becomes a session in which the run can be tracked again bit for bit");
+const track = check(
+  "Track while recording",
+  {},
+  "With that session's person, empty room and start pose; the recording becomes a session in which the run can be tracked again bit for bit",
+);
 const record = button("Record", begin, "primary record");
 const stop = button("Stop", () => post("/api/recordings/stop").catch(complain), "record");
-const form = element("div", { className: "recording-form" }, field("Calibration of", session, { title: session.title }), field("Becomes session", name), field("Seconds", seconds), track, record, stop);
+const form = element(
+  "div",
+  { className: "recording-form" },
+  field("Calibration of", session, { title: session.title }),
+  field("Becomes session", name),
+  field("Seconds", seconds),
+  track,
+  record,
+  stop,
+);
 
 /** A row for a camera's name and address; a new empty one follows the last that is filled. */
 function addRow() {
   const address = text({
-    ariaLabel: "Address", placeholder: EXAMPLES, className: "camera-address", spellcheck: false, autocomplete: "off",
-    oninput: () => { if (row === rows.lastElementChild && address.value) addRow(); }, onkeydown: (event) => { if (event.key === "Enter") open.click(); },
+    ariaLabel: "Address",
+    placeholder: EXAMPLES,
+    className: "camera-address",
+    spellcheck: false,
+    autocomplete: "off",
+    oninput: () => {
+      if (row === rows.lastElementChild && address.value) addRow();
+    },
+    onkeydown: (event) => {
+      if (event.key === "Enter") open.click();
+    },
   });
-  const row = element("div", { className: "camera-row" },
-    text({ ariaLabel: "Name in the calibration", placeholder: `cam${rows.children.length + 1}`, className: "camera-name", maxLength: 40 }), address,
-    button("×", () => { row.remove(); if (!rows.children.length) addRow(); }, "icon quiet", { ariaLabel: "Remove this camera" }));
+  const row = element(
+    "div",
+    { className: "camera-row" },
+    text({
+      ariaLabel: "Name in the calibration",
+      placeholder: `cam${rows.children.length + 1}`,
+      className: "camera-name",
+      maxLength: 40,
+    }),
+    address,
+    button(
+      "×",
+      () => {
+        row.remove();
+        if (!rows.children.length) addRow();
+      },
+      "icon quiet",
+      { ariaLabel: "Remove this camera" },
+    ),
+  );
   rows.append(row);
 }
 
 /** What is written in the rows; addresses may hold passwords, so they are kept nowhere. */
-const written = () => [...rows.children].map((line, index) => {
-  const [own, address] = [...line.querySelectorAll("input")].map((input) => input.value.trim());
-  return { name: own || `cam${index + 1}`, address };
-}).filter((camera) => camera.address);
+const written = () =>
+  [...rows.children]
+    .map((line, index) => {
+      const [own, address] = [...line.querySelectorAll("input")].map((input) => input.value.trim());
+      return { name: own || `cam${index + 1}`, address };
+    })
+    .filter((camera) => camera.address);
 
 async function show() {
   try {
     view = await post("/api/cameras/preview", { cameras: written() });
     drawCards();
     update();
-  } catch (error) { complain(error); }
+  } catch (error) {
+    complain(error);
+  }
 }
 
 /** A card a camera: its picture, and how it stands. */
 function drawCards() {
-  fill(grid, view.cameras.map((camera) => {
-    const image = element("img", { alt: `Live picture of ${camera.name}`, className: "camera-picture", hidden: true });
-    const made = element("figure", { className: "camera-card", dataset: { name: camera.name } }, element("div", { className: "camera-frame" }, image, element("p", { className: "camera-silence" })),
-      element("figcaption", {}, element("b", {}, camera.name), element("span", { className: "badge" }), element("span", { className: "camera-facts" })));
-    follow(made, image, camera.name);
-    return made;
-  }));
+  fill(
+    grid,
+    view.cameras.map((camera) => {
+      const image = element("img", {
+        alt: `Live picture of ${camera.name}`,
+        className: "camera-picture",
+        hidden: true,
+      });
+      const made = element(
+        "figure",
+        { className: "camera-card", dataset: { name: camera.name } },
+        element(
+          "div",
+          { className: "camera-frame" },
+          image,
+          element("p", { className: "camera-silence" }),
+        ),
+        element(
+          "figcaption",
+          {},
+          element("b", {}, camera.name),
+          element("span", { className: "badge" }),
+          element("span", { className: "camera-facts" }),
+        ),
+      );
+      follow(made, image, camera.name);
+      return made;
+    }),
+  );
 }
 
 /** Ask for one picture after the other while the card is there and seen. */
@@ -76,10 +160,14 @@ function follow(made, image, camera) {
   const next = () => {
     if (!made.isConnected) return;
     const here = view.cameras.find((one) => one.name === camera);
-    if (document.hidden || here?.state !== "running") return void setTimeout(next, LOOK_MILLISECONDS / 2);
+    if (document.hidden || here?.state !== "running")
+      return void setTimeout(next, LOOK_MILLISECONDS / 2);
     image.src = `/api/cameras/${encodeURIComponent(camera)}.jpg?height=${PREVIEW_HEIGHT}&at=${Date.now()}`;
   };
-  image.onload = () => { image.hidden = false; setTimeout(next, PICTURE_MILLISECONDS); };
+  image.onload = () => {
+    image.hidden = false;
+    setTimeout(next, PICTURE_MILLISECONDS);
+  };
   image.onerror = () => setTimeout(next, LOOK_MILLISECONDS);
   setTimeout(next, 0);
 }
@@ -89,17 +177,32 @@ function updateCard(made) {
   if (!camera) return;
   const running = camera.state === "running";
   made.classList.toggle("silent", !running);
-  Object.assign(made.querySelector(".badge"), { textContent: camera.state === "stopped" ? `stopped ${plain(camera.seconds, 0)} s` : camera.state, className: `badge ${STATES[camera.state]}` });
-  made.querySelector(".camera-silence").textContent = running ? "" : camera.message || (camera.state === "connecting" ? "Waiting for its first picture…" : "");
-  made.querySelector(".camera-facts").textContent = running ? dotted(`${plain(camera.fps)} fps`, `${plain(1000 * camera.age, 0)} ms old`, `${camera.width} × ${camera.height}`)
-    : camera.age === null ? camera.shown : `last picture ${plain(camera.age)} s old`;
+  Object.assign(made.querySelector(".badge"), {
+    textContent:
+      camera.state === "stopped" ? `stopped ${plain(camera.seconds, 0)} s` : camera.state,
+    className: `badge ${STATES[camera.state]}`,
+  });
+  made.querySelector(".camera-silence").textContent = running
+    ? ""
+    : camera.message || (camera.state === "connecting" ? "Waiting for its first picture…" : "");
+  made.querySelector(".camera-facts").textContent = running
+    ? dotted(
+        `${plain(camera.fps)} fps`,
+        `${plain(1000 * camera.age, 0)} ms old`,
+        `${camera.width} × ${camera.height}`,
+      )
+    : camera.age === null
+      ? camera.shown
+      : `last picture ${plain(camera.age)} s old`;
 }
 
 function spreadWords() {
   const { sets, median, most, worst, apart, lagging } = view.spread;
   if (view.cameras.length < 2 || !sets) return "";
   const words = `Pictures of one moment arrive ${plain(median)} ms apart (95 %: ${plain(most)}, worst ${plain(worst)}).`;
-  return apart ? `${words} ${apart} of the last ${sets} sets are more than half a frame apart${lagging ? `: ${lagging} lags` : ""}.` : words;
+  return apart
+    ? `${words} ${apart} of the last ${sets} sets are more than half a frame apart${lagging ? `: ${lagging} lags` : ""}.`
+    : words;
 }
 
 function update() {
@@ -107,7 +210,10 @@ function update() {
   spread.textContent = spreadWords();
   spread.classList.toggle("warn", view.spread.apart > 0);
   const is = going();
-  for (const input of document.querySelectorAll(/** @type {"input"} */ (".camera-rows :is(input, button), .recording-form :is(input, select)"))) input.disabled = is;
+  for (const input of document.querySelectorAll(
+    /** @type {"input"} */ (".camera-rows :is(input, button), .recording-form :is(input, select)"),
+  ))
+    input.disabled = is;
   open.disabled = record.hidden = is;
   form.classList.toggle("going", is);
   record.disabled = !view.cameras.length;
@@ -119,10 +225,15 @@ function update() {
 async function begin() {
   try {
     view.recording = await post("/api/recordings", {
-      name: name.value.trim() || name.placeholder, calibration: session.value, track: track.querySelector("input").checked, ...(seconds.value ? { seconds: Number(seconds.value) } : {}),
+      name: name.value.trim() || name.placeholder,
+      calibration: session.value,
+      track: track.querySelector("input").checked,
+      ...(seconds.value ? { seconds: Number(seconds.value) } : {}),
     });
     update();
-  } catch (error) { complain(error); }
+  } catch (error) {
+    complain(error);
+  }
 }
 
 function drawOutcome() {
@@ -130,11 +241,38 @@ function drawOutcome() {
   const { state, step, session: made, seconds: passed, limit, words, notes, run } = view.recording;
   if (state === "failed") return fill(outcome, failure(view.recording));
   const live = going() && step !== "importing";
-  const counter = element("span", { className: `counter ${live ? "live" : ""}` }, limit ? `${clock(passed)} / ${clock(limit)}` : clock(passed));
+  const counter = element(
+    "span",
+    { className: `counter ${live ? "live" : ""}` },
+    limit ? `${clock(passed)} / ${clock(limit)}` : clock(passed),
+  );
   const target = run ? `${made} / ${run}` : made;
-  fill(outcome, element("p", { className: "recording-line", role: "status" }, live && element("i", { className: "red-dot" }), counter, element("span", {}, dotted(step, words))),
-    (state === "done" || run) && element("p", {}, element("a", { href: studioPath(made, run) }, state === "done" ? `Open ${target}` : `Watch ${target} being tracked`)),
-    notes.length > 0 && element("ul", { className: "words" }, notes.map((note) => element("li", { className: "caution" }, note))));
+  fill(
+    outcome,
+    element(
+      "p",
+      { className: "recording-line", role: "status" },
+      live && element("i", { className: "red-dot" }),
+      counter,
+      element("span", {}, dotted(step, words)),
+    ),
+    (state === "done" || run) &&
+      element(
+        "p",
+        {},
+        element(
+          "a",
+          { href: studioPath(made, run) },
+          state === "done" ? `Open ${target}` : `Watch ${target} being tracked`,
+        ),
+      ),
+    notes.length > 0 &&
+      element(
+        "ul",
+        { className: "words" },
+        notes.map((note) => element("li", { className: "caution" }, note)),
+      ),
+  );
 }
 
 /** Ask how all stands, over and over; only while the page is looked at or something is recorded. */
@@ -150,7 +288,9 @@ async function look() {
         if (before !== names()) drawCards();
         update();
       }
-    } catch (error) { if (!view) complain(error); }
+    } catch (error) {
+      if (!view) complain(error);
+    }
   }
   setTimeout(look, going() ? LOOK_MILLISECONDS / 3 : LOOK_MILLISECONDS);
 }
@@ -158,16 +298,33 @@ async function look() {
 async function start() {
   startTheme();
   const { sessions } = await fetchJson("/api/sessions");
-  offer(session, sessions.filter((one) => one.cameras && !one.problem).map((one) => [one.name, sessionWords(one)]));
+  offer(
+    session,
+    sessions
+      .filter((one) => one.cameras && !one.problem)
+      .map((one) => [one.name, sessionWords(one)]),
+  );
   session.value = new URLSearchParams(location.search).get("session") ?? session.value;
   const taken = new Set(sessions.map((one) => one.name));
   let free = 1;
   while (taken.has(`recording-${free}`)) free += 1;
   name.placeholder = `recording-${free}`;
   addRow();
-  fill(byId("content"), element("div", { className: "column live-cameras" },
-    pageHead("Live cameras", "Cameras of this machine or network, recorded together with a timestamp for every picture. Give each the name that it has in the calibration."),
-    card("Cameras", rows, element("div", {}, open)), spread, grid, card("Recording", form, outcome)));
+  fill(
+    byId("content"),
+    element(
+      "div",
+      { className: "column live-cameras" },
+      pageHead(
+        "Live cameras",
+        "Cameras of this machine or network, recorded together with a timestamp for every picture. Give each the name that it has in the calibration.",
+      ),
+      card("Cameras", rows, element("div", {}, open)),
+      spread,
+      grid,
+      card("Recording", form, outcome),
+    ),
+  );
   await look();
 }
 

@@ -3,7 +3,22 @@
 
 import * as echarts from "../vendor/echarts.esm.min.js";
 import { fetchJson, post, readOnly, remove } from "./api.js";
-import { actions, button, byId, card, check, drawProgress, element, failure, field, fill, hint, lead, optional, select } from "./elements.js";
+import {
+  actions,
+  button,
+  byId,
+  card,
+  check,
+  drawProgress,
+  element,
+  failure,
+  field,
+  fill,
+  hint,
+  lead,
+  optional,
+  select,
+} from "./elements.js";
 import { listen } from "./events.js";
 import { drawFindings } from "./findings.js";
 import { isGoing, progressOf } from "./jobs.js";
@@ -26,7 +41,11 @@ let failed = null;
 
 async function begin() {
   failed = null;
-  try { known.job = await post("/api/reports/experiments", { name: chosen, quick }); } catch (error) { failed = error; }
+  try {
+    known.job = await post("/api/reports/experiments", { name: chosen, quick });
+  } catch (error) {
+    failed = error;
+  }
   drawRunner();
 }
 
@@ -38,25 +57,74 @@ function drawRunner() {
   const { experiments, job } = known;
   const going = isGoing(job);
   const one = experiments.find((entry) => entry.name === chosen);
-  const name = select([[ALL, `all ${experiments.length}`], ...experiments.map((entry) => /** @type {[string, string]} */ ([entry.name, `${entry.source}: ${entry.title}`]))], chosen, {
-    ariaLabel: "Experiment", disabled: going, onchange: ({ target }) => { chosen = target.value; drawRunner(); },
-  });
-  fill(runner, card("Run an experiment again",
-    field("Experiment", name), one && hint(one.claim),
-    check("a quick look, with fewer seeds, frames and settings", { checked: quick, disabled: going, onchange: ({ target }) => { quick = target.checked; drawRunner(); } }),
-    hint(quick ? "All of them take about a quarter of an hour." : one && !one.is_long ? "Ten seeds of every setting." : "Ten seeds of every setting take hours. What is measured is kept: it goes on where it was stopped."),
-    !going && !readOnly && actions(button("Run it", begin, "primary")), progress,
-    failure(failed ?? (job?.state === "failed" ? job : null)),
-    job && !going && job.state !== "failed" && hint(`${job.name}: ${job.state}${job.state === "done" ? `, ${job.measured} trials run, ${job.kept} kept from before${job.failed ? `, ${job.failed} failed` : ""}` : "; what was measured is kept"}.`)));
+  const name = select(
+    [
+      [ALL, `all ${experiments.length}`],
+      ...experiments.map(
+        (entry) =>
+          /** @type {[string, string]} */ ([entry.name, `${entry.source}: ${entry.title}`]),
+      ),
+    ],
+    chosen,
+    {
+      ariaLabel: "Experiment",
+      disabled: going,
+      onchange: ({ target }) => {
+        chosen = target.value;
+        drawRunner();
+      },
+    },
+  );
+  fill(
+    runner,
+    card(
+      "Run an experiment again",
+      field("Experiment", name),
+      one && hint(one.claim),
+      check("a quick look, with fewer seeds, frames and settings", {
+        checked: quick,
+        disabled: going,
+        onchange: ({ target }) => {
+          quick = target.checked;
+          drawRunner();
+        },
+      }),
+      hint(
+        quick
+          ? "All of them take about a quarter of an hour."
+          : one && !one.is_long
+            ? "Ten seeds of every setting."
+            : "Ten seeds of every setting take hours. What is measured is kept: it goes on where it was stopped.",
+      ),
+      !going && !readOnly && actions(button("Run it", begin, "primary")),
+      progress,
+      failure(failed ?? (job?.state === "failed" ? job : null)),
+      job &&
+        !going &&
+        job.state !== "failed" &&
+        hint(
+          `${job.name}: ${job.state}${job.state === "done" ? `, ${job.measured} trials run, ${job.kept} kept from before${job.failed ? `, ${job.failed} failed` : ""}` : "; what was measured is kept"}.`,
+        ),
+    ),
+  );
   drawProgress(progress, going ? progressOf(job, "beginning", stop) : null);
 }
 
 async function drawReports() {
   const { experiments } = await fetchJson("/api/reports");
-  const files = experiments.length > 0 && Object.entries(FILES).map(([words, file]) => element("a", { className: "download", href: `/api/reports/${file}`, download: file }, words));
+  const files =
+    experiments.length > 0 &&
+    Object.entries(FILES).map(([words, file]) =>
+      element("a", { className: "download", href: `/api/reports/${file}`, download: file }, words),
+    );
   fill(byId("downloads"), files);
   if (experiments.length) return drawFindings(column, experiments, echarts);
-  fill(column, lead("Nothing is reproduced yet. Results appear here, with the paper's claim beside every number."));
+  fill(
+    column,
+    lead(
+      "Nothing is reproduced yet. Results appear here, with the paper's claim beside every number.",
+    ),
+  );
 }
 
 async function start() {

@@ -5,6 +5,10 @@ if (window.parent.document.documentElement.dataset.drawing === "software") {
   const getContext = /** @type {any} */ (prototype.getContext);
   /** @param {string} kind @param {any} [options] */
   prototype.getContext = function (kind, options) {
-    return getContext.call(this, kind, kind.startsWith("webgl") ? { ...options, antialias: false } : options);
+    return getContext.call(
+      this,
+      kind,
+      kind.startsWith("webgl") ? { ...options, antialias: false } : options,
+    );
   };
 }

@@ -15,11 +15,14 @@ const style = document.createElement("style");
 let hasKnobs = false;
 
 function look() {
-  const dark = theme() === "dark" ? `
+  const dark =
+    theme() === "dark"
+      ? `
       --mantine-color-dark-4: ${token("line-strong")} !important;
       --mantine-color-dark-5: ${token("line")} !important;
       --mantine-color-dark-6: ${token("surface-raised")} !important;
-      --mantine-color-dark-7: ${token("surface")} !important;` : "";
+      --mantine-color-dark-7: ${token("surface")} !important;`
+      : "";
   return `
     body, body * { font-family: "Inter", system-ui, sans-serif !important; letter-spacing: 0 !important; font-variant-numeric: tabular-nums; }
     label, label * { font-size: 11.5px !important; letter-spacing: -.03em !important; }
@@ -43,7 +46,9 @@ async function dress() {
   page.head.append(style);
   showKnobs(hasKnobs);
   if (![...page.fonts].some((face) => face.family === "Inter")) {
-    const face = new page.defaultView.FontFace("Inter", await (await fetch(FONT)).arrayBuffer(), { weight: "100 900" });
+    const face = new page.defaultView.FontFace("Inter", await (await fetch(FONT)).arrayBuffer(), {
+      weight: "100 900",
+    });
     page.fonts.add(await face.load());
   }
 }
@@ -68,26 +73,32 @@ export function showKnobs(isShown) {
 
 /** Put the keyboard into the scene's panel: the frame is no stop of the page's own, for its many controls' sake. */
 export function enterScene() {
-  const tab = /** @type {HTMLElement} */ (frame.contentDocument?.querySelector("[role=tab][aria-selected=true]"));
+  const tab = /** @type {HTMLElement} */ (
+    frame.contentDocument?.querySelector("[role=tab][aria-selected=true]")
+  );
   (tab ?? frame).focus();
 }
 
 /** Escape gives the keyboard back to the timeline, unless it closes something first. */
 function leaveScene(event) {
-  if (event.key !== "Escape" || event.target.closest?.("[aria-expanded=true], [role=dialog]")) return;
+  if (event.key !== "Escape" || event.target.closest?.("[aria-expanded=true], [role=dialog]"))
+    return;
   event.target.blur?.();
   byId("track").focus();
 }
 
 const WHEEL_MILLISECONDS = 40;
-const WHEEL_STEP = 0.0016;   // of the distance's logarithm, a pixel of the wheel
+const WHEEL_STEP = 0.0016; // of the distance's logarithm, a pixel of the wheel
 const CLICK_PIXELS = 4;
 
 /** Where in the canvas an event is, shares of its width and height; null beside it. */
 function placeOf(event) {
   if (event.target.tagName !== "CANVAS") return null;
   const box = event.target.getBoundingClientRect();
-  const [across, down] = [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
+  const [across, down] = [
+    (event.clientX - box.left) / box.width,
+    (event.clientY - box.top) / box.height,
+  ];
   return across >= 0 && across <= 1 && down >= 0 && down <= 1 ? [across, down] : null;
 }
 
@@ -104,34 +115,58 @@ function zoomWithWheel(page) {
     }
     isSending = false;
   };
-  page.addEventListener("wheel", (event) => {
-    const place = placeOf(event);
-    if (!place || event.ctrlKey) return;
-    event.preventDefault();
-    event.stopImmediatePropagation();
-    turned += event.deltaY * (event.deltaMode === 1 ? 30 : 1);
-    at = place;
-    if (!isSending) send();
-  }, { capture: true, passive: false });
+  page.addEventListener(
+    "wheel",
+    (event) => {
+      const place = placeOf(event);
+      if (!place || event.ctrlKey) return;
+      event.preventDefault();
+      event.stopImmediatePropagation();
+      turned += event.deltaY * (event.deltaMode === 1 ? 30 : 1);
+      at = place;
+      if (!isSending) send();
+    },
+    { capture: true, passive: false },
+  );
 }
 
 /** Call `hover(place, event)` as the pointer moves over the scene (null where it leaves), `click(place)` where it is clicked. */
 function followPointer(page, { hover, click }) {
   let pressed = null;
-  page.addEventListener("pointermove", (event) => { if (!event.buttons) hover(placeOf(event), event); }, true);
+  page.addEventListener(
+    "pointermove",
+    (event) => {
+      if (!event.buttons) hover(placeOf(event), event);
+    },
+    true,
+  );
   page.document.addEventListener("pointerleave", (event) => hover(null, event));
-  page.addEventListener("pointerdown", (event) => { pressed = event.button === 0 ? [event.clientX, event.clientY] : null; hover(null, event); }, true);
-  page.addEventListener("pointerup", (event) => {
-    const place = placeOf(event);
-    const isStill = pressed && Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) < CLICK_PIXELS;
-    if (place && isStill) click(place);
-    pressed = null;
-  }, true);
+  page.addEventListener(
+    "pointerdown",
+    (event) => {
+      pressed = event.button === 0 ? [event.clientX, event.clientY] : null;
+      hover(null, event);
+    },
+    true,
+  );
+  page.addEventListener(
+    "pointerup",
+    (event) => {
+      const place = placeOf(event);
+      const isStill =
+        pressed &&
+        Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) < CLICK_PIXELS;
+      if (place && isStill) click(place);
+      pressed = null;
+    },
+    true,
+  );
 }
 
 /** Let the page's keys work in a scene that was loaded; `takeKey` handles them. */
 export function shareKeys(/** @type {HTMLIFrameElement} */ scene, takeKey) {
-  for (const kind of ["keydown", "keyup"]) scene.contentDocument.body.addEventListener(kind, keepToControls);
+  for (const kind of ["keydown", "keyup"])
+    scene.contentDocument.body.addEventListener(kind, keepToControls);
   scene.contentWindow.addEventListener("keydown", first(takeKey), true);
   scene.contentWindow.addEventListener("keydown", leaveScene, true);
 }
@@ -145,8 +180,12 @@ export function startSceneFrame(takeKey, pointer) {
     zoomWithWheel(frame.contentWindow);
     followPointer(frame.contentWindow, pointer);
     // Whoever clicks a tab goes on with the timeline's keys.
-    frame.contentWindow.addEventListener("click", (/** @type {any} */ event) => { if (event.detail) event.target.closest?.("[role=tab]")?.blur(); });
+    frame.contentWindow.addEventListener("click", (/** @type {any} */ event) => {
+      if (event.detail) event.target.closest?.("[role=tab]")?.blur();
+    });
   });
-  onTheme(() => { style.textContent = look(); });
+  onTheme(() => {
+    style.textContent = look();
+  });
   loadScene(frame);
 }

@@ -11,7 +11,9 @@ export async function refreshSessions() {
     const { sessions } = await fetchJson("/api/sessions");
     // An answer that says nothing new leaves the list alone.
     if (JSON.stringify(sessions) !== JSON.stringify(get("sessions"))) set({ sessions });
-  } catch (error) { complain(error); }
+  } catch (error) {
+    complain(error);
+  }
 }
 
 /**
@@ -26,8 +28,28 @@ export function openSession(session, run = undefined, shown = {}) {
   const frame = shown.frame ?? null;
   const isHere = session === get("session");
   set({
-    missing: null, session, run: chosen, track: "raw", summary: null, detail: null, parameters: null, layerCount: null, settings: null, moved: null, whatIf: null, trial: null, against: null, trials: null, compared: comparedWith(session, chosen), through: null, eye: null,
-    ...nothingChosen(), ...shown, frame, follow: frame === null, step: shown.step ?? (isHere ? get("step") : null),
+    missing: null,
+    session,
+    run: chosen,
+    track: "raw",
+    summary: null,
+    detail: null,
+    parameters: null,
+    layerCount: null,
+    settings: null,
+    moved: null,
+    whatIf: null,
+    trial: null,
+    against: null,
+    trials: null,
+    compared: comparedWith(session, chosen),
+    through: null,
+    eye: null,
+    ...nothingChosen(),
+    ...shown,
+    frame,
+    follow: frame === null,
+    step: shown.step ?? (isHere ? get("step") : null),
   });
   document.body.classList.remove("rail-open");
 }
@@ -37,19 +59,26 @@ export function openSession(session, run = undefined, shown = {}) {
  * was open is now.
  */
 function comparedWith(session, run) {
-  const [open, next, others] = [`${get("session")}/${get("run")}`, `${session}/${run}`, comparedRuns()];
+  const [open, next, others] = [
+    `${get("session")}/${get("run")}`,
+    `${session}/${run}`,
+    comparedRuns(),
+  ];
   const goesOn = run && (session === get("session") || others.includes(next));
   return (goesOn && others.map((one) => (one === next ? open : one)).join(",")) || null;
 }
 
 /** What a session is called in a list. */
-export const sessionWords = ({ name, title }) => (title && title !== name ? `${name} · ${title}` : name);
+export const sessionWords = ({ name, title }) =>
+  title && title !== name ? `${name} · ${title}` : name;
 /** The guided set-up of a session, at its next step. */
 export const setupPath = (entry) => `/way?session=${encodeURIComponent(entry.name)}`;
 /**
  * The studio's own window on a session, or on one of its runs; `more`: what is shown of it, such as {frame: 12}.
  * @param {string} session @param {string} [run] @param {Record<string, string | number>} [more]
  */
-export const studioPath = (session, run = "", more = {}) => `/?${new URLSearchParams(Object.entries({ session, ...(run ? { run } : {}), ...more }).map(([name, value]) => [name, String(value)]))}`;
+export const studioPath = (session, run = "", more = {}) =>
+  `/?${new URLSearchParams(Object.entries({ session, ...(run ? { run } : {}), ...more }).map(([name, value]) => [name, String(value)]))}`;
 /** What a session that cannot be tracked yet says of itself. */
-export const lacks = (entry) => ({ footage: "no footage yet", calibration: "not calibrated yet" })[entry.next_step] ?? "";
+export const lacks = (entry) =>
+  ({ footage: "no footage yet", calibration: "not calibrated yet" })[entry.next_step] ?? "";

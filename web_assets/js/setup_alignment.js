@@ -1,11 +1,25 @@
 // Do the cameras agree? How far silhouettes miss, camera by camera; turning the cameras until they do, and back.
 
 import { fetchJson, post, remove, sessionPath } from "./api.js";
-import { actions, button, dotted, drawProgress, element, failure, fill, hint, notice, optional, percent, table } from "./elements.js";
+import {
+  actions,
+  button,
+  dotted,
+  drawProgress,
+  element,
+  failure,
+  fill,
+  hint,
+  notice,
+  optional,
+  percent,
+  table,
+} from "./elements.js";
 import { isGoing, timeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
 
-const WHY = "A tripod that was touched after the calibration turns a camera by a degree, or twenty pixels. Silhouettes show it, without a board.";
+const WHY =
+  "A tripod that was touched after the calibration turns a camera by a degree, or twenty pixels. Silhouettes show it, without a board.";
 const pixels = (value) => (value === null ? "–" : `${value.toFixed(1)} px`);
 
 /** The box in `place`; `changed()` is called when the session has other cameras. Returns {load, measure, stop}. @param {import("./setup.js").Setup} setup */
@@ -25,8 +39,20 @@ export function alignmentBox(setup, place, changed) {
   }
 
   function turning(job) {
-    const turn = job?.needed && job.better && !job.kept && button("Turn the cameras", () => change("keep"), "small", { disabled: busy, title: "The previous calibration is kept; results made with it are marked as out of date." });
-    const back = alignment.turned && button("Turn them back", () => change("undo"), "small quiet", { disabled: busy, title: "Restore the calibration from before the cameras were turned." });
+    const turn =
+      job?.needed &&
+      job.better &&
+      !job.kept &&
+      button("Turn the cameras", () => change("keep"), "small", {
+        disabled: busy,
+        title: "The previous calibration is kept; results made with it are marked as out of date.",
+      });
+    const back =
+      alignment.turned &&
+      button("Turn them back", () => change("undo"), "small quiet", {
+        disabled: busy,
+        title: "Restore the calibration from before the cameras were turned.",
+      });
     return (turn || back) && actions(turn, back);
   }
 
@@ -38,16 +64,54 @@ export function alignmentBox(setup, place, changed) {
     const done = job?.state === "done" ? job : null;
     const error = failed ?? (job?.state === "failed" ? job : null);
     const bar = optional();
-    fill(place, element("div", { className: "head-line" }, element("h2", {}, "Do the cameras agree?"),
-      button(done ? "Measure again" : "Measure", () => { requested = true; return measure(); }, "small", { disabled: going || busy, ariaLabel: "Measure whether the cameras agree" })), bar,
-      done && [table(["camera", "misses by", "turned by", done.kept ? "misses now by" : "would miss by"], done.cameras.map((line) => [line.camera, pixels(line.before_px), `${line.turn_degrees.toFixed(2)}°`, pixels(line.after_px)])),
-        (done.needed && !done.kept ? notice : hint)(verdict(done))],
-      !done && !going && hint(turned ? "The cameras in use were turned by their silhouettes." : WHY), turning(done), notes.map((note) => notice(note)),
+    fill(
+      place,
+      element(
+        "div",
+        { className: "head-line" },
+        element("h2", {}, "Do the cameras agree?"),
+        button(
+          done ? "Measure again" : "Measure",
+          () => {
+            requested = true;
+            return measure();
+          },
+          "small",
+          { disabled: going || busy, ariaLabel: "Measure whether the cameras agree" },
+        ),
+      ),
+      bar,
+      done && [
+        table(
+          ["camera", "misses by", "turned by", done.kept ? "misses now by" : "would miss by"],
+          done.cameras.map((line) => [
+            line.camera,
+            pixels(line.before_px),
+            `${line.turn_degrees.toFixed(2)}°`,
+            pixels(line.after_px),
+          ]),
+        ),
+        (done.needed && !done.kept ? notice : hint)(verdict(done)),
+      ],
+      !done &&
+        !going &&
+        hint(turned ? "The cameras in use were turned by their silhouettes." : WHY),
+      turning(done),
+      notes.map((note) => notice(note)),
       // What was measured unasked raises no alarm.
-      requested || failed ? failure(error) : error && hint(`${error.message} ${error.hint ?? ""}`));
+      requested || failed ? failure(error) : error && hint(`${error.message} ${error.hint ?? ""}`),
+    );
     if (!going) return;
     const measuring = !job.total || job.done < job.total;
-    drawProgress(bar, { words: dotted(measuring ? job.step || "beginning" : "turning the cameras", measuring && job.done > 0 && percent(job.done / job.total), timeLeft(job.seconds_left)), share: job.total ? job.done / job.total : null, cancel: () => remove(here).catch(complain) });
+    drawProgress(bar, {
+      words: dotted(
+        measuring ? job.step || "beginning" : "turning the cameras",
+        measuring && job.done > 0 && percent(job.done / job.total),
+        timeLeft(job.seconds_left),
+      ),
+      share: job.total ? job.done / job.total : null,
+      cancel: () => remove(here).catch(complain),
+    });
   }
 
   async function load() {
@@ -59,7 +123,9 @@ export function alignmentBox(setup, place, changed) {
     failed = null;
     try {
       alignment = { ...alignment, job: await post(here), notes: [] };
-    } catch (error) { failed = error; }
+    } catch (error) {
+      failed = error;
+    }
     draw();
   }
 
@@ -68,7 +134,12 @@ export function alignmentBox(setup, place, changed) {
     failed = null;
     busy = true;
     draw();
-    try { alignment = await post(`${here}/${how}`); changed(); } catch (error) { failed = error; }
+    try {
+      alignment = await post(`${here}/${how}`);
+      changed();
+    } catch (error) {
+      failed = error;
+    }
     busy = false;
     draw();
   }
@@ -80,5 +151,11 @@ export function alignmentBox(setup, place, changed) {
     if (!isGoing(job)) setup.refresh().catch(complain);
   });
 
-  return { load, measure, stop: () => { stopped = true; } };
+  return {
+    load,
+    measure,
+    stop: () => {
+      stopped = true;
+    },
+  };
 }

@@ -7,7 +7,8 @@ import { complain } from "./messages.js";
 import { painting, upright } from "./setup_painting.js";
 
 const UNDONE = 30;
-const HELP = "Paint what is not the subject. Keys: arrows move, space paints, x paints or erases, [ and ] change the size, ctrl z undoes, enter keeps, escape leaves.";
+const HELP =
+  "Paint what is not the subject. Keys: arrows move, space paints, x paints or erases, [ and ] change the size, ctrl z undoes, enter keeps, escape leaves.";
 
 /** Edit what is excluded of `lens` (name, picture_width, picture_height, quarter_turns, frame, excluded: whether there is
  * something already, shown before a stroke can be made: one that came after would undo what was painted meanwhile);
@@ -22,10 +23,23 @@ export async function brush(setup, lens, done) {
   const before = [];
   const sheet = painting(setup, lens, {
     label: `Excluded regions of ${lens.name}. ${HELP}`,
-    size: Math.round(upright(lens)[0] / 16), least: 2, most: Math.round(upright(lens)[0] / 4), centre: 0, slowness: 4,
-    begin: (at) => { remember(); dab(at, at); last = at; },
-    to: (at) => { dab(last, at); last = at; },
-    end: () => { last = null; },
+    size: Math.round(upright(lens)[0] / 16),
+    least: 2,
+    most: Math.round(upright(lens)[0] / 4),
+    centre: 0,
+    slowness: 4,
+    begin: (at) => {
+      remember();
+      dab(at, at);
+      last = at;
+    },
+    to: (at) => {
+      dab(last, at);
+      last = at;
+    },
+    end: () => {
+      last = null;
+    },
     dress: (ring) => ring.classList.toggle("erasing", erasing),
     keys: { x: () => setErasing(!erasing), z: takeBack, Enter: save, Escape: () => done(false) },
   });
@@ -63,7 +77,14 @@ export async function brush(setup, lens, done) {
     sheet.drawRing();
   }
   const undo = button("Undo", takeBack, "small");
-  const clear = button("Clear all", () => { remember(); context.clearRect(0, 0, width, height); }, "quiet small");
+  const clear = button(
+    "Clear all",
+    () => {
+      remember();
+      context.clearRect(0, 0, width, height);
+    },
+    "quiet small",
+  );
   const keep = button("Keep", save, "primary");
   const leave = button("Leave", () => done(false), "quiet");
 
@@ -83,18 +104,26 @@ export async function brush(setup, lens, done) {
     drawn.globalCompositeOperation = "source-in";
     drawn.fillStyle = "#fff";
     drawn.fillRect(0, 0, stored[0], stored[1]);
-    const painted = drawn.getImageData(0, 0, stored[0], stored[1]).data.some((value, index) => index % 4 === 3 && value > 127);
+    const painted = drawn
+      .getImageData(0, 0, stored[0], stored[1])
+      .data.some((value, index) => index % 4 === 3 && value > 127);
     const content = painted ? await new Promise((resolve) => out.toBlob(resolve, "image/png")) : "";
     try {
       await putBytes(place, content);
       await done(true);
-    } catch (error) { complain(error); }
+    } catch (error) {
+      complain(error);
+    }
   }
 
   /** Show what is excluded now. */
   async function load() {
     const answer = await fetch(place);
-    if (!answer.ok) throw fault(`The excluded regions of ${lens.name} could not be read.`, "Open the brush again.");
+    if (!answer.ok)
+      throw fault(
+        `The excluded regions of ${lens.name} could not be read.`,
+        "Open the brush again.",
+      );
     const picture = await createImageBitmap(await answer.blob());
     const [out] = turned(picture, turns, [width, height]);
     const read = out.getContext("2d").getImageData(0, 0, width, height);
@@ -107,7 +136,18 @@ export async function brush(setup, lens, done) {
 
   undo.disabled = true;
   setErasing(false);
-  const tools = element("div", { className: "mask-bar" }, element("b", {}, lens.name), sheet.sized, erase, undo, clear, spring(), leave, keep);
+  const tools = element(
+    "div",
+    { className: "mask-bar" },
+    element("b", {}, lens.name),
+    sheet.sized,
+    erase,
+    undo,
+    clear,
+    spring(),
+    leave,
+    keep,
+  );
   try {
     if (lens.excluded) await load();
   } catch (error) {
@@ -115,7 +155,12 @@ export async function brush(setup, lens, done) {
     await done(false);
     return;
   }
-  fill(setup.aside, tools, element("div", { className: "brush-room" }, sheet.sheet), element("p", { className: "hint brush-help" }, HELP));
+  fill(
+    setup.aside,
+    tools,
+    element("div", { className: "brush-room" }, sheet.sheet),
+    element("p", { className: "hint brush-help" }, HELP),
+  );
   canvas.focus();
   sheet.drawRing();
 }

@@ -17,12 +17,22 @@ export function mount(place, setup) {
   const panel = element("div", { className: "panel export", id: "panel-export" });
   place.append(which, panel);
   show(panel, html`<${Exporting} />`);
-  if (!started) { startExporting(); started = true; }
+  if (!started) {
+    startExporting();
+    started = true;
+  }
   set({ session: setup.session, run: run.name, panel: "export" });
-  fetchJson(`${runPath(setup.session, run.name)}/check`).then(({ usual, note }) => {
-    which.textContent = `${run.name}: track "${usual}" is exported unless you choose another. ${note} Frames before the first and after the last tracked one are left out.`;
-    wall.show({ run: run.name, frame: Math.max(run.first, Math.floor((run.first + run.tracked_to) / 2)), track: usual === "raw" ? "" : usual, show: "outline" });
-  }).catch(complain);
+  fetchJson(`${runPath(setup.session, run.name)}/check`)
+    .then(({ usual, note }) => {
+      which.textContent = `${run.name}: track "${usual}" is exported unless you choose another. ${note} Frames before the first and after the last tracked one are left out.`;
+      wall.show({
+        run: run.name,
+        frame: Math.max(run.first, Math.floor((run.first + run.tracked_to) / 2)),
+        track: usual === "raw" ? "" : usual,
+        show: "outline",
+      });
+    })
+    .catch(complain);
   const wall = viewWall(setup);
   return () => {
     show(panel, null);

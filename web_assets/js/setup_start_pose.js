@@ -2,7 +2,20 @@
 // by hand in the scene or by a turn, made better by a short search.
 
 import { fault, fetchJson, post, put, remove, sessionPath } from "./api.js";
-import { actions, button, drawProgress, element, failure, field, fill, hint, notice, number, percent, picture } from "./elements.js";
+import {
+  actions,
+  button,
+  drawProgress,
+  element,
+  failure,
+  field,
+  fill,
+  hint,
+  notice,
+  number,
+  percent,
+  picture,
+} from "./elements.js";
 import { findJob, followJob, isGoing, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
 import { foundWords, isUnsure } from "./studio/start_pose.js";
@@ -17,11 +30,11 @@ export function mount(place, setup) {
   /** @type {import("./api_types").Schemas["PoseView"]} */
   let pose = null;
   let frame = Math.min(last, setup.detail.start_pose_frame ?? 0);
-  let found = null;      // what the automatic search found
-  let better = null;     // what the search around the pose found
+  let found = null; // what the automatic search found
+  let better = null; // what the search around the pose found
   let failed = null;
   let editing = false;
-  let begun = false;     // whether the scene lets it be edited already
+  let begun = false; // whether the scene lets it be edited already
   let going = false;
   let gone = false;
   let age = 0;
@@ -36,9 +49,15 @@ export function mount(place, setup) {
     const cancel = () => remove(`${jobs}/${identifier}`).catch(complain);
     try {
       // The job goes on when the step is left, and is found again when it is shown.
-      const ended = await followJob(`${jobs}/${identifier}`, (job) => drawProgress(progress, progressOf(job, words, cancel)), () => gone);
+      const ended = await followJob(
+        `${jobs}/${identifier}`,
+        (job) => drawProgress(progress, progressOf(job, words, cancel)),
+        () => gone,
+      );
       return ended?.state === "done" ? ended : null;
-    } finally { drawProgress(progress, null); }
+    } finally {
+      drawProgress(progress, null);
+    }
   }
 
   /** Do something that takes a while; its error is shown in place. */
@@ -46,30 +65,48 @@ export function mount(place, setup) {
     failed = null;
     going = true;
     draw();
-    try { await work(); } catch (error) { failed = error; }
+    try {
+      await work();
+    } catch (error) {
+      failed = error;
+    }
     going = false;
     if (gone) return;
     await load();
     setup.refresh().catch(complain);
   }
 
-  const SEARCHES = "/api/initialisations", REFINEMENTS = "/api/track-jobs";
+  const SEARCHES = "/api/initialisations",
+    REFINEMENTS = "/api/track-jobs";
 
-  const find = () => during(async () => {
-    better = null;
-    await waitForFind(await post(`${here}/initialise`, { frame, replace: true }));
-  });
-  const waitForFind = async (job) => { found = (await waited(SEARCHES, job, "looking at the frame")) ?? found; };
+  const find = () =>
+    during(async () => {
+      better = null;
+      await waitForFind(await post(`${here}/initialise`, { frame, replace: true }));
+    });
+  const waitForFind = async (job) => {
+    found = (await waited(SEARCHES, job, "looking at the frame")) ?? found;
+  };
 
-  const refine = () => during(async () => {
-    await waitForRefine(await post(`${here}/pose/refine`, { frame, pose: pose.pose, keep: true }));
-  });
-  const waitForRefine = async (job) => { better = (await waited(REFINEMENTS, job, "searching around the pose")) ?? better; };
+  const refine = () =>
+    during(async () => {
+      await waitForRefine(
+        await post(`${here}/pose/refine`, { frame, pose: pose.pose, keep: true }),
+      );
+    });
+  const waitForRefine = async (job) => {
+    better = (await waited(REFINEMENTS, job, "searching around the pose")) ?? better;
+  };
 
   /** What was begun before this step was shown: a search that is under way is followed, what the last one found is said. */
   async function findAgain() {
-    const [search, refinement] = await Promise.all([findJob({ session: setup.session, kind: "initialise" }),
-      findJob({ session: setup.session, kind: "track" }, (line) => line.verb === "pose" && !line.run)]);
+    const [search, refinement] = await Promise.all([
+      findJob({ session: setup.session, kind: "initialise" }),
+      findJob(
+        { session: setup.session, kind: "track" },
+        (line) => line.verb === "pose" && !line.run,
+      ),
+    ]);
     if (gone || going) return;
     if (isGoing(search)) return during(() => waitForFind(search));
     if (isGoing(refinement)) return during(() => waitForRefine(refinement));
@@ -79,14 +116,16 @@ export function mount(place, setup) {
     if (search?.state === "failed") failed = search;
     draw();
   }
-  const isSame = (one, other) => one?.length === other.length && one.every((value, at) => Math.abs(value - other[at]) < 1e-6);
+  const isSame = (one, other) =>
+    one?.length === other.length && one.every((value, at) => Math.abs(value - other[at]) < 1e-6);
 
   const keep = (values) => put(`${here}/start-pose`, { pose: values, frame });
   /** @param {"turned round" | "in place"} how */
-  const exchange = (how) => during(async () => {
-    await keep((await post(`${here}/pose/mirror`, { pose: pose.pose, how })).pose);
-    found = null;
-  });
+  const exchange = (how) =>
+    during(async () => {
+      await keep((await post(`${here}/pose/mirror`, { pose: pose.pose, how })).pose);
+      found = null;
+    });
 
   async function edit() {
     failed = null;
@@ -95,7 +134,9 @@ export function mount(place, setup) {
       await post("/api/scene/edit", { session: setup.session, frame });
       editing = true;
       begun = false;
-    } catch (error) { failed = error; }
+    } catch (error) {
+      failed = error;
+    }
     draw();
   }
 
@@ -103,13 +144,16 @@ export function mount(place, setup) {
     try {
       if (kept) {
         const edited = await fetchJson("/api/scene/edit");
-        if (!edited.editing) throw fault("The editing was ended in the scene.", "Edit by hand again.");
+        if (!edited.editing)
+          throw fault("The editing was ended in the scene.", "Edit by hand again.");
         await keep(edited.pose);
         found = null;
       }
       editing = false;
       await remove("/api/scene/edit");
-    } catch (error) { failed = error; }
+    } catch (error) {
+      failed = error;
+    }
     await load();
     setup.refresh().catch(complain);
   }
@@ -125,39 +169,109 @@ export function mount(place, setup) {
       drawPictures();
     };
     const disabled = going || editing;
-    fill(steps, field("In frame", which),
-      hint("The frame in which tracking begins: the whole subject in view, limbs away from the trunk if you can choose. Frames before it can be tracked backwards from it."),
-      editing ? editingBox() : actions(button("Find it automatically", find, pose?.stored ? "" : "primary", { disabled }), button("Edit by hand", edit, "", { disabled })), failure(failed));
+    fill(
+      steps,
+      field("In frame", which),
+      hint(
+        "The frame in which tracking begins: the whole subject in view, limbs away from the trunk if you can choose. Frames before it can be tracked backwards from it.",
+      ),
+      editing
+        ? editingBox()
+        : actions(
+            button("Find it automatically", find, pose?.stored ? "" : "primary", { disabled }),
+            button("Edit by hand", edit, "", { disabled }),
+          ),
+      failure(failed),
+    );
     drawVerdicts();
     if (!editing) drawPictures();
   }
 
-  function drawVerdicts() { fill(verdicts, pose?.stored && !editing && [verdict(), ...mending()]); }
+  function drawVerdicts() {
+    fill(verdicts, pose?.stored && !editing && [verdict(), ...mending()]);
+  }
 
-  const editingBox = () => element("div", { className: "step-place" },
-    element("p", {}, "Drag the balls on the limbs: the body follows, its joints keep their limits. The rings turn the whole body; the tab Pose has a slider for every angle, undo and a local search."),
-    actions(button("Use this pose", () => leave(true), "primary"), button("Discard", () => leave(false), "quiet")));
+  const editingBox = () =>
+    element(
+      "div",
+      { className: "step-place" },
+      element(
+        "p",
+        {},
+        "Drag the balls on the limbs: the body follows, its joints keep their limits. The rings turn the whole body; the tab Pose has a slider for every angle, undo and a local search.",
+      ),
+      actions(
+        button("Use this pose", () => leave(true), "primary"),
+        button("Discard", () => leave(false), "quiet"),
+      ),
+    );
 
   /** How sure the pose is, in words. */
   function verdict() {
-    const words = [found && `Found in frame ${found.frame}: ${foundWords(found)}.`, better && (better.gain > 0 && better.overlap !== null
-      ? `Improved: overlap with the masks ${percent(better.overlap_before)} → ${percent(better.overlap)}.` : "The search found no better pose near it.")];
+    const words = [
+      found && `Found in frame ${found.frame}: ${foundWords(found)}.`,
+      better &&
+        (better.gain > 0 && better.overlap !== null
+          ? `Improved: overlap with the masks ${percent(better.overlap_before)} → ${percent(better.overlap)}.`
+          : "The search found no better pose near it."),
+    ];
     const unsure = found && isUnsure(found);
-    return element("div", { className: "start-pose-verdict" }, element("p", { className: unsure ? "notice" : "" }, words.filter(Boolean).join(" ") || `The session has a start pose, of frame ${pose.frame}.`),
-      unsure && notice("It may face the other way: check left and right before you track."), found?.note && hint(found.note));
+    return element(
+      "div",
+      { className: "start-pose-verdict" },
+      element(
+        "p",
+        { className: unsure ? "notice" : "" },
+        words.filter(Boolean).join(" ") || `The session has a start pose, of frame ${pose.frame}.`,
+      ),
+      unsure && notice("It may face the other way: check left and right before you track."),
+      found?.note && hint(found.note),
+    );
   }
 
   function mending() {
     if (frame !== pose.frame) {
-      return [notice(`The start pose is of frame ${pose.frame}, where tracking begins. To begin in frame ${frame}, find or edit it here.`),
-        actions(button(`Show frame ${pose.frame}`, () => { frame = pose.frame; draw(); }, "small"))];
+      return [
+        notice(
+          `The start pose is of frame ${pose.frame}, where tracking begins. To begin in frame ${frame}, find or edit it here.`,
+        ),
+        actions(
+          button(
+            `Show frame ${pose.frame}`,
+            () => {
+              frame = pose.frame;
+              draw();
+            },
+            "small",
+          ),
+        ),
+      ];
     }
     const swatch = (side) => element("i", { className: `side-swatch ${side}` });
-    const act = (label, work, className = "") => button(label, work, className, { disabled: going });
+    const act = (label, work, className = "") =>
+      button(label, work, className, { disabled: going });
     return [
-      ...(pose.has_sides ? [element("h2", {}, "Left and right"), element("p", { className: "side-check" }, swatch("left"), "the subject's left, ", swatch("right"), "the subject's right. Is it so in every picture?")] : []),
-      actions(act("Yes, track from here", () => setup.go("track", { begin: true }), "primary"),
-        pose.has_sides && [act("No: facing the other way", () => exchange("turned round")), act("Mirror", () => exchange("in place"))], act("Refine from here", refine)),
+      ...(pose.has_sides
+        ? [
+            element("h2", {}, "Left and right"),
+            element(
+              "p",
+              { className: "side-check" },
+              swatch("left"),
+              "the subject's left, ",
+              swatch("right"),
+              "the subject's right. Is it so in every picture?",
+            ),
+          ]
+        : []),
+      actions(
+        act("Yes, track from here", () => setup.go("track", { begin: true }), "primary"),
+        pose.has_sides && [
+          act("No: facing the other way", () => exchange("turned round")),
+          act("Mirror", () => exchange("in place")),
+        ],
+        act("Refine from here", refine),
+      ),
     ];
   }
 
@@ -168,10 +282,23 @@ export function mount(place, setup) {
     timer = setTimeout(() => {
       if (gone || editing) return;
       const stored = Boolean(pose?.stored);
-      fill(setup.aside, element("div", { className: "pictures" }, setup.detail.cameras.map(({ name }) => picture(element("img", {
-        alt: `${name}, frame ${frame}${stored ? ", start pose" : ""}`, loading: "lazy",
-        src: `${here}/frames/${frame}/views/${encodeURIComponent(name)}.jpg?show=outline&height=${PICTURE_HEIGHT}${stored ? "&pose=start" : ""}&age=${age}`,
-      }), name))));
+      fill(
+        setup.aside,
+        element(
+          "div",
+          { className: "pictures" },
+          setup.detail.cameras.map(({ name }) =>
+            picture(
+              element("img", {
+                alt: `${name}, frame ${frame}${stored ? ", start pose" : ""}`,
+                loading: "lazy",
+                src: `${here}/frames/${frame}/views/${encodeURIComponent(name)}.jpg?show=outline&height=${PICTURE_HEIGHT}${stored ? "&pose=start" : ""}&age=${age}`,
+              }),
+              name,
+            ),
+          ),
+        ),
+      );
     }, REDRAW_MILLISECONDS);
   }
 
@@ -182,14 +309,19 @@ export function mount(place, setup) {
       pose = answer;
       age += 1;
       draw();
-    } catch (error) { if (!gone) fill(place, failure(error)); }
+    } catch (error) {
+      if (!gone) fill(place, failure(error));
+    }
   }
 
   // The editor may be left in the scene itself.
   setup.on("scene", (event) => {
     if (!editing) return;
     if (event.editing) begun = true;
-    else if (begun) { editing = begun = false; load(); }
+    else if (begun) {
+      editing = begun = false;
+      load();
+    }
   });
   load().then(() => findAgain().catch(complain));
   return () => {

@@ -3,22 +3,34 @@
 
 import { element, fill, shape } from "./elements.js";
 
-const COLOURS = { left: "var(--limb-left)", right: "var(--limb-right)", middle: "var(--limb-middle)" };
+const COLOURS = {
+  left: "var(--limb-left)",
+  right: "var(--limb-right)",
+  middle: "var(--limb-middle)",
+};
 const MARGIN = 90;
 const LABEL_ROOM = 620;
 const LINE = 88;
 const PERSON = 1700;
-const BULGE = 0.4;        // of a radius: how far a limb's end is rounded, so that cones look like limbs
+const BULGE = 0.4; // of a radius: how far a limb's end is rounded, so that cones look like limbs
 
 /** A tapered limb seen from the front, as a path. flat: mm, y to the right of the picture, z down. */
 function outline({ start, end, radii }) {
-  const [a, b] = [[start[1], -start[2]], [end[1], -end[2]]];
+  const [a, b] = [
+    [start[1], -start[2]],
+    [end[1], -end[2]],
+  ];
   const along = [b[0] - a[0], b[1] - a[1]];
   const length = Math.hypot(...along) || 1;
   const across = [-along[1] / length, along[0] / length];
-  const bulge = (point, radius, sign) => point.map((value, axis) => (value + sign * BULGE * radius * (along[axis] / length)).toFixed(1)).join(" ");
+  const bulge = (point, radius, sign) =>
+    point
+      .map((value, axis) => (value + sign * BULGE * radius * (along[axis] / length)).toFixed(1))
+      .join(" ");
   const at = (point, radius) => [point[0] + across[0] * radius, point[1] + across[1] * radius];
-  const [p, q, r, s] = [at(a, radii[0]), at(b, radii[1]), at(b, -radii[1]), at(a, -radii[0])].map((point) => point.map((value) => value.toFixed(1)).join(" "));
+  const [p, q, r, s] = [at(a, radii[0]), at(b, radii[1]), at(b, -radii[1]), at(a, -radii[0])].map(
+    (point) => point.map((value) => value.toFixed(1)).join(" "),
+  );
   return `M${p}L${q}Q${bulge(b, radii[1], 1)} ${r}L${s}Q${bulge(a, radii[0], -1)} ${p}Z`;
 }
 
@@ -27,7 +39,10 @@ function spread(wanted) {
   const order = wanted.map((y, index) => [y, index]).sort((one, other) => one[0] - other[0]);
   const placed = [];
   let last = -Infinity;
-  for (const [y, index] of order) { last = Math.max(y, last + LINE); placed[index] = last; }
+  for (const [y, index] of order) {
+    last = Math.max(y, last + LINE);
+    placed[index] = last;
+  }
   return placed;
 }
 
@@ -43,7 +58,13 @@ const longWords = (mm) => (mm < 500 ? `${Math.round(mm)} mm` : `${(mm / 1000).to
 /** Limbs turned to be seen from where they are longest, in sizes of a person: what the drawing has for a limb of `true` mm. */
 function turned(limbs, isLong, scale) {
   const turn = ([x, y, z]) => (isLong ? [-y, x, z] : [x, y, z]).map((value) => value / scale);
-  return limbs.map((limb) => ({ ...limb, start: turn(limb.start), end: turn(limb.end), radii: limb.radii.map((radius) => radius / scale), long: length(limb) }));
+  return limbs.map((limb) => ({
+    ...limb,
+    start: turn(limb.start),
+    end: turn(limb.end),
+    radii: limb.radii.map((radius) => radius / scale),
+    long: length(limb),
+  }));
 }
 
 /** Draw limbs in `place`; `before`: those drawn dashed beside them, and by how much their lengths differ. */
@@ -55,15 +76,33 @@ export function drawStature(place, given, givenBefore, words) {
   const [limbs, before] = [turned(given, isLong, scale), turned(givenBefore, isLong, scale)];
   const drawn = limbs.filter((limb) => length(limb) > 1);
   const all = [...drawn, ...before];
-  const xs = all.flatMap((limb) => [limb.start[1], limb.end[1]].flatMap((y) => [y - limb.radii[0], y + limb.radii[0]]));
+  const xs = all.flatMap((limb) =>
+    [limb.start[1], limb.end[1]].flatMap((y) => [y - limb.radii[0], y + limb.radii[0]]),
+  );
   const top = Math.max(...all.flatMap((limb) => [limb.start[2], limb.end[2]]));
   const low = Math.min(0, ...all.flatMap((limb) => [limb.start[2], limb.end[2]]));
   const [left, right] = [Math.min(...xs) - MARGIN, Math.max(...xs) + MARGIN];
-  const svg = shape("svg", { "aria-label": drawn.map((limb) => `${limb.name} ${Math.round(limb.long)} mm`).join(", "), viewBox: `${left - LABEL_ROOM * 0.35} ${-top - MARGIN} ${right - left + LABEL_ROOM * 1.35} ${top - low + 2 * MARGIN}`, role: "img" });
+  const svg = shape("svg", {
+    "aria-label": drawn.map((limb) => `${limb.name} ${Math.round(limb.long)} mm`).join(", "),
+    viewBox: `${left - LABEL_ROOM * 0.35} ${-top - MARGIN} ${right - left + LABEL_ROOM * 1.35} ${top - low + 2 * MARGIN}`,
+    role: "img",
+  });
   svg.append(shape("line", { class: "floor", x1: left - 100, x2: right + 60, y1: -low, y2: -low }));
-  const far = [...drawn].sort((one, other) => Math.min(one.start[0], one.end[0]) - Math.min(other.start[0], other.end[0]));
-  for (const limb of far) svg.append(shape("path", { class: "bone", d: outline(limb), fill: COLOURS[limb.side] ?? COLOURS.middle, stroke: "var(--scene-background)", "stroke-width": 4 }));
-  for (const limb of before) if (length(limb) > 1) svg.append(shape("path", { class: "ghost", d: outline(limb) }));
+  const far = [...drawn].sort(
+    (one, other) => Math.min(one.start[0], one.end[0]) - Math.min(other.start[0], other.end[0]),
+  );
+  for (const limb of far)
+    svg.append(
+      shape("path", {
+        class: "bone",
+        d: outline(limb),
+        fill: COLOURS[limb.side] ?? COLOURS.middle,
+        stroke: "var(--scene-background)",
+        "stroke-width": 4,
+      }),
+    );
+  for (const limb of before)
+    if (length(limb) > 1) svg.append(shape("path", { class: "ghost", d: outline(limb) }));
   const named = drawn.filter((limb) => limb.side !== "right");
   const places = spread(named.map((limb) => -(limb.start[2] + limb.end[2]) / 2));
   named.forEach((limb, index) => {
@@ -71,10 +110,35 @@ export function drawStature(place, given, givenBefore, words) {
     const y = places[index];
     const earlier = before.find((one) => one.name === limb.name);
     const change = earlier ? Math.round(limb.long - earlier.long) : 0;
-    svg.append(shape("polyline", { class: "leader", fill: "none", points: `${middle[0]},${middle[1]} ${right - 30},${y} ${right},${y}` }),
-      shape("text", { x: right + 14, y: y + 9 }, `${Math.round(limb.long)} mm${change ? `  (${change > 0 ? "+" : "−"}${Math.abs(change)})` : ""}`),
-      shape("text", { class: "name", x: right + 14, y: y + 40 }, limb.name.replace(/^left /, "")));
+    svg.append(
+      shape("polyline", {
+        class: "leader",
+        fill: "none",
+        points: `${middle[0]},${middle[1]} ${right - 30},${y} ${right},${y}`,
+      }),
+      shape(
+        "text",
+        { x: right + 14, y: y + 9 },
+        `${Math.round(limb.long)} mm${change ? `  (${change > 0 ? "+" : "−"}${Math.abs(change)})` : ""}`,
+      ),
+      shape("text", { class: "name", x: right + 14, y: y + 40 }, limb.name.replace(/^left /, "")),
+    );
   });
-  svg.append(shape("line", { class: "leader", x1: left - 40, x2: left - 40, y1: -low, y2: -top }), shape("text", { x: left - 54, y: -(top + low) / 2, "text-anchor": "end" }, longWords(scale * (top - low))));
-  fill(place, element("figure", { className: before.length ? "stature compared" : "stature" }, svg, element("figcaption", {}, words)));
+  svg.append(
+    shape("line", { class: "leader", x1: left - 40, x2: left - 40, y1: -low, y2: -top }),
+    shape(
+      "text",
+      { x: left - 54, y: -(top + low) / 2, "text-anchor": "end" },
+      longWords(scale * (top - low)),
+    ),
+  );
+  fill(
+    place,
+    element(
+      "figure",
+      { className: before.length ? "stature compared" : "stature" },
+      svg,
+      element("figcaption", {}, words),
+    ),
+  );
 }

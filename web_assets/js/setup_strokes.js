@@ -10,7 +10,8 @@ import { windowName } from "./window.js";
 /** @import { Schemas } from "./api_types" */
 
 const COLOURS = { inside: "#3ddc84", outside: "#ff5a4f" };
-const HELP = "Paint over the subject, and over what is not the subject: a few lines each are enough. Keys: arrows move, space paints, x changes between inside and outside, [ and ] change the size, , and . go a frame back and on, ctrl z undoes, enter keeps, escape leaves.";
+const HELP =
+  "Paint over the subject, and over what is not the subject: a few lines each are enough. Keys: arrows move, space paints, x changes between inside and outside, [ and ] change the size, , and . go a frame back and on, ctrl z undoes, enter keeps, escape leaves.";
 
 /**
  * Paint strokes of `lens` (name, picture_width, picture_height, quarter_turns), beginning in `frame`, of `count` frames;
@@ -19,7 +20,9 @@ const HELP = "Paint over the subject, and over what is not the subject: a few li
  */
 export async function paintStrokes(setup, lens, frame, count, done) {
   const place = `${sessionPath(setup.session)}/strokes`;
-  const own = /** @type {`${typeof place}/${string}`} */ (`${place}/${encodeURIComponent(lens.name)}`);
+  const own = /** @type {`${typeof place}/${string}`} */ (
+    `${place}/${encodeURIComponent(lens.name)}`
+  );
   const known = await fetchJson(place);
   /** @type {Schemas["StrokeEntry"][]} */
   let strokes = [...(known.cameras.find((one) => one.camera === lens.name)?.strokes ?? [])];
@@ -29,32 +32,72 @@ export async function paintStrokes(setup, lens, frame, count, done) {
   let kind = "inside";
   /** The stroke that is being painted. @type {number[][] | null} */
   let line = null;
-  let busy = false, again = false, gone = false, shown = "";
+  let busy = false,
+    again = false,
+    gone = false,
+    shown = "";
 
-  const mask = element("img", { alt: `Mask of ${lens.name} by the strokes`, className: "brush-photo strokes-mask", draggable: false, hidden: true });
-  const { sheet, canvas, width, height, turns, stored, state, drawRing, showFrame, sized } = painting(setup, lens, {
-    label: `Strokes of ${lens.name}. ${HELP}`, className: "strokes-canvas", layers: [mask],
-    size: Math.max(2, Math.round(upright(lens)[0] / 90)), least: 1, most: Math.round(upright(lens)[0] / 10), centre: 0.5, slowness: 2,
-    begin: (at) => { line = [at]; draw(); },
-    to: (at, isKey) => {
-      const [x, y] = line.at(-1);
-      if (isKey || Math.hypot(at[0] - x, at[1] - y) > 0.25 * state.size) { line.push(at); draw(); }
-    },
-    end: finish,
-    dress: (ring) => { ring.style.borderColor = COLOURS[kind]; },
-    keys: {
-      x: () => setKind(kind === "inside" ? "outside" : "inside"), ",": () => go(frame - 1), ".": () => go(frame + 1),
-      z: takeBack, Enter: save, Escape: () => close(false),
-    },
+  const mask = element("img", {
+    alt: `Mask of ${lens.name} by the strokes`,
+    className: "brush-photo strokes-mask",
+    draggable: false,
+    hidden: true,
   });
+  const { sheet, canvas, width, height, turns, stored, state, drawRing, showFrame, sized } =
+    painting(setup, lens, {
+      label: `Strokes of ${lens.name}. ${HELP}`,
+      className: "strokes-canvas",
+      layers: [mask],
+      size: Math.max(2, Math.round(upright(lens)[0] / 90)),
+      least: 1,
+      most: Math.round(upright(lens)[0] / 10),
+      centre: 0.5,
+      slowness: 2,
+      begin: (at) => {
+        line = [at];
+        draw();
+      },
+      to: (at, isKey) => {
+        const [x, y] = line.at(-1);
+        if (isKey || Math.hypot(at[0] - x, at[1] - y) > 0.25 * state.size) {
+          line.push(at);
+          draw();
+        }
+      },
+      end: finish,
+      dress: (ring) => {
+        ring.style.borderColor = COLOURS[kind];
+      },
+      keys: {
+        x: () => setKind(kind === "inside" ? "outside" : "inside"),
+        ",": () => go(frame - 1),
+        ".": () => go(frame + 1),
+        z: takeBack,
+        Enter: save,
+        Escape: () => close(false),
+      },
+    });
   const context = canvas.getContext("2d");
 
   // Strokes are kept in pixels of the stored picture; the canvas shows it upright.
   /** @param {number[]} point */
-  const turned = ([x, y]) => [[x, y], [stored[1] - 1 - y, x], [stored[0] - 1 - x, stored[1] - 1 - y], [y, stored[0] - 1 - x]][turns];
+  const turned = ([x, y]) =>
+    [
+      [x, y],
+      [stored[1] - 1 - y, x],
+      [stored[0] - 1 - x, stored[1] - 1 - y],
+      [y, stored[0] - 1 - x],
+    ][turns];
   /** @param {number[]} point */
-  const asStored = ([x, y]) => [[x, y], [y, stored[1] - 1 - x], [stored[0] - 1 - x, stored[1] - 1 - y], [stored[0] - 1 - y, x]][turns];
-  const rounded = (point) => /** @type {[number, number]} */ (point.map((value) => Math.round(10 * value) / 10));
+  const asStored = ([x, y]) =>
+    [
+      [x, y],
+      [y, stored[1] - 1 - x],
+      [stored[0] - 1 - x, stored[1] - 1 - y],
+      [stored[0] - 1 - y, x],
+    ][turns];
+  const rounded = (point) =>
+    /** @type {[number, number]} */ (point.map((value) => Math.round(10 * value) / 10));
 
   function drawLine(points, kind, size) {
     context.strokeStyle = COLOURS[kind];
@@ -68,33 +111,44 @@ export async function paintStrokes(setup, lens, frame, count, done) {
 
   function draw() {
     context.clearRect(0, 0, width, height);
-    for (const stroke of strokes) if (stroke.frame === frame) drawLine(stroke.points.map(turned), stroke.kind, stroke.width);
+    for (const stroke of strokes)
+      if (stroke.frame === frame) drawLine(stroke.points.map(turned), stroke.kind, stroke.width);
     if (line) drawLine(line, kind, state.size);
     undo.disabled = !before.length;
     clear.disabled = !strokes.some((stroke) => stroke.frame === frame);
     const painted = [...new Set(strokes.map((stroke) => stroke.frame))].sort((a, b) => a - b);
-    words.textContent = painted.length ? `strokes in frame${painted.length > 1 ? "s" : ""} ${painted.slice(0, 8).join(", ")}${painted.length > 8 ? ", …" : ""}` : "no strokes yet";
+    words.textContent = painted.length
+      ? `strokes in frame${painted.length > 1 ? "s" : ""} ${painted.slice(0, 8).join(", ")}${painted.length > 8 ? ", …" : ""}`
+      : "no strokes yet";
   }
 
   /** Show the mask of this frame by the strokes as they are; one request at a time. */
   async function preview() {
-    if (busy) { again = true; return; }
+    if (busy) {
+      again = true;
+      return;
+    }
     busy = true;
     again = false;
     const wanted = frame;
     sheet.classList.add("waiting");
     try {
-      const answer = await accepted(await fetch(`${own}/preview`, {
-        method: "POST", headers: { "content-type": "application/json", "x-studio-window": windowName }, body: JSON.stringify({ frame: wanted, strokes }),
-      }));
+      const answer = await accepted(
+        await fetch(`${own}/preview`, {
+          method: "POST",
+          headers: { "content-type": "application/json", "x-studio-window": windowName },
+          body: JSON.stringify({ frame: wanted, strokes }),
+        }),
+      );
       const picture = answer.status === 204 ? null : await answer.blob();
       if (gone) return;
       if (shown) URL.revokeObjectURL(shown);
       shown = picture && wanted === frame ? URL.createObjectURL(picture) : "";
       mask.hidden = !shown;
       if (shown) mask.src = shown;
-    } catch (error) { complain(error); }
-    finally {
+    } catch (error) {
+      complain(error);
+    } finally {
       busy = false;
       sheet.classList.toggle("waiting", again);
       if (again && !gone) preview();
@@ -133,7 +187,11 @@ export async function paintStrokes(setup, lens, frame, count, done) {
     preview();
   }
 
-  const kinds = /** @type {const} */ (["inside", "outside"]).map((one) => button(one === "inside" ? "Inside" : "Outside", () => setKind(one), "toggle small", { ariaPressed: "false" }));
+  const kinds = /** @type {const} */ (["inside", "outside"]).map((one) =>
+    button(one === "inside" ? "Inside" : "Outside", () => setKind(one), "toggle small", {
+      ariaPressed: "false",
+    }),
+  );
   function setKind(wanted) {
     kind = wanted;
     kinds[0].ariaPressed = String(kind === "inside");
@@ -141,10 +199,21 @@ export async function paintStrokes(setup, lens, frame, count, done) {
     drawRing();
   }
   const undo = button("Undo", takeBack, "small");
-  const clear = button("Clear this frame", () => change(strokes.filter((stroke) => stroke.frame !== frame)), "quiet small");
+  const clear = button(
+    "Clear this frame",
+    () => change(strokes.filter((stroke) => stroke.frame !== frame)),
+    "quiet small",
+  );
   const keep = button("Keep", save, "primary");
   const leave = button("Leave", () => close(false), "quiet");
-  const slider = element("input", { type: "range", min: 0, max: Math.max(0, count - 1), value: frame, ariaLabel: "Frame", oninput: ({ target }) => go(Number(target.value)) });
+  const slider = element("input", {
+    type: "range",
+    min: 0,
+    max: Math.max(0, count - 1),
+    value: frame,
+    ariaLabel: "Frame",
+    oninput: ({ target }) => go(Number(target.value)),
+  });
   const output = element("output", {}, `frame ${frame}`);
   const words = element("span", { className: "hint" });
 
@@ -152,7 +221,9 @@ export async function paintStrokes(setup, lens, frame, count, done) {
     try {
       await put(own, { strokes });
       close(true);
-    } catch (error) { complain(error); }
+    } catch (error) {
+      complain(error);
+    }
   }
 
   function close(saved) {
@@ -162,9 +233,26 @@ export async function paintStrokes(setup, lens, frame, count, done) {
   }
 
   setKind("inside");
-  const tools = element("div", { className: "mask-bar" }, element("b", {}, lens.name), kinds, sized, undo, clear, spring(), leave, keep);
+  const tools = element(
+    "div",
+    { className: "mask-bar" },
+    element("b", {}, lens.name),
+    kinds,
+    sized,
+    undo,
+    clear,
+    spring(),
+    leave,
+    keep,
+  );
   const frames = element("div", { className: "mask-bar strokes-frames" }, slider, output, words);
-  fill(setup.aside, tools, element("div", { className: "brush-room" }, sheet), frames, element("p", { className: "hint brush-help" }, HELP));
+  fill(
+    setup.aside,
+    tools,
+    element("div", { className: "brush-room" }, sheet),
+    frames,
+    element("p", { className: "hint brush-help" }, HELP),
+  );
   canvas.focus();
   go(frame);
   drawRing();

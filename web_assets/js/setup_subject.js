@@ -1,7 +1,23 @@
 // Step Subject: which body, how tall, what follows from it; and the fit to the footage, with lengths before and after.
 
 import { fault, fetchJson, post, put, remove, sessionPath } from "./api.js";
-import { actions, button, check, drawProgress, element, failure, field, fill, hint, number, optional, percent, select, table, text } from "./elements.js";
+import {
+  actions,
+  button,
+  check,
+  drawProgress,
+  element,
+  failure,
+  field,
+  fill,
+  hint,
+  number,
+  optional,
+  percent,
+  select,
+  table,
+  text,
+} from "./elements.js";
 import { findJob, followJob, isGoing, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
 import { drawStature } from "./setup_stature.js";
@@ -26,11 +42,11 @@ export function mount(place, setup) {
   /** @type {{ name: string, label: string, by_height?: boolean }[]} */
   let bodies = [];
   let body = "";
-  let height = null;     // mm, null while it is unknown
+  let height = null; // mm, null while it is unknown
   /** @type {Schemas["FitSubjectState"]} */
   let fit = null;
-  let failed = null;     // what went wrong with the height
-  let unfitted = null;   // what went wrong with the fit
+  let failed = null; // what went wrong with the height
+  let unfitted = null; // what went wrong with the fit
   let preview = 0;
   let gone = false;
   const options = { symmetric: true, lengths: true, radii: true, count: 5, frames: "", run: "" };
@@ -46,10 +62,31 @@ export function mount(place, setup) {
   // Who it is.
 
   function drawWho() {
-    const take = (value) => { height = value; look(); drawFit(); };
-    const typed = number(height ? height / 10 : "", { min: 30, max: 300, step: 0.5, placeholder: "unknown", ariaLabel: "Height in centimetres" });
-    const slider = element("input", { type: "range", min: LEAST_MM, max: MOST_MM, step: 5, value: height ?? USUAL_HEIGHT, ariaLabel: "Height" });
-    typed.oninput = () => { if (typed.value === "" || !typed.checkValidity()) return; take(Number(typed.value) * 10); slider.value = height; };
+    const take = (value) => {
+      height = value;
+      look();
+      drawFit();
+    };
+    const typed = number(height ? height / 10 : "", {
+      min: 30,
+      max: 300,
+      step: 0.5,
+      placeholder: "unknown",
+      ariaLabel: "Height in centimetres",
+    });
+    const slider = element("input", {
+      type: "range",
+      min: LEAST_MM,
+      max: MOST_MM,
+      step: 5,
+      value: height ?? USUAL_HEIGHT,
+      ariaLabel: "Height",
+    });
+    typed.oninput = () => {
+      if (typed.value === "" || !typed.checkValidity()) return;
+      take(Number(typed.value) * 10);
+      slider.value = height;
+    };
     // "1.80" is metres: no person is that many centimetres tall.
     typed.onchange = () => {
       const metres = Number(typed.value);
@@ -57,23 +94,61 @@ export function mount(place, setup) {
       typed.value = String(Math.round(1000 * metres) / 10);
       typed.dispatchEvent(new Event("input"));
     };
-    slider.oninput = () => { take(Number(slider.value)); typed.value = String(height / 10); };
-    saveHeight.textContent = isSized() || (!height && body !== subject.body) ? "Take this body" : "Set the height";
-    fill(who, field("Body", select(bodies.map((one) => [one.name, one.label]), body, { onchange: ({ target }) => { body = target.value; if (isSized()) height = null; drawWho(); look(); drawFit(); } })),
-      !isSized() && field("Height (cm)", element("div", { className: "height-row" }, typed, slider)),
-      hint(isSized() ? "As large as its file says: the run fits radii and ends to the first frames, a fit below finds the lengths too." : `Every length follows from the height by published proportions. ${subject.fitted ? "A new height replaces the fitted measures." : "A guess within 3 cm will do; the fit finds the rest."}`),
-      actions(saveHeight, element("a", { href: `/bodies?${new URLSearchParams({ session: setup.session, body })}` }, "Change it, or make one of your own")), failure(failed));
+    slider.oninput = () => {
+      take(Number(slider.value));
+      typed.value = String(height / 10);
+    };
+    saveHeight.textContent =
+      isSized() || (!height && body !== subject.body) ? "Take this body" : "Set the height";
+    fill(
+      who,
+      field(
+        "Body",
+        select(
+          bodies.map((one) => [one.name, one.label]),
+          body,
+          {
+            onchange: ({ target }) => {
+              body = target.value;
+              if (isSized()) height = null;
+              drawWho();
+              look();
+              drawFit();
+            },
+          },
+        ),
+      ),
+      !isSized() &&
+        field("Height (cm)", element("div", { className: "height-row" }, typed, slider)),
+      hint(
+        isSized()
+          ? "As large as its file says: the run fits radii and ends to the first frames, a fit below finds the lengths too."
+          : `Every length follows from the height by published proportions. ${subject.fitted ? "A new height replaces the fitted measures." : "A guess within 3 cm will do; the fit finds the rest."}`,
+      ),
+      actions(
+        saveHeight,
+        element(
+          "a",
+          { href: `/bodies?${new URLSearchParams({ session: setup.session, body })}` },
+          "Change it, or make one of your own",
+        ),
+      ),
+      failure(failed),
+    );
   }
 
   const saveHeight = button("Set the height", async () => {
     failed = null;
     try {
-      if (!height && !isSized() && body === subject.body) throw fault("The height is not known yet.", "Type it, or move the slider.");
+      if (!height && !isSized() && body === subject.body)
+        throw fault("The height is not known yet.", "Type it, or move the slider.");
       await put(`${here}/subject`, { ...(height ? { height_mm: height } : {}), body });
       await load();
       fit = null;
       setup.refresh().catch(complain);
-    } catch (error) { failed = error; }
+    } catch (error) {
+      failed = error;
+    }
     draw();
   });
 
@@ -84,12 +159,24 @@ export function mount(place, setup) {
       const query = new URLSearchParams({ body, ...(height ? { height_mm: String(height) } : {}) });
       try {
         const shown = changed() ? await fetchJson(`${here}/subject?${query}`) : subject;
-        if (!gone && !fit?.limbs?.length && !(isGoing(fit) && fit.frames.length)) drawStature(setup.aside, shown.limbs, [], note(shown));
-      } catch (error) { complain(error); }
+        if (!gone && !fit?.limbs?.length && !(isGoing(fit) && fit.frames.length))
+          drawStature(setup.aside, shown.limbs, [], note(shown));
+      } catch (error) {
+        complain(error);
+      }
     }, PREVIEW_MILLISECONDS);
   }
 
-  const note = (shown) => (shown !== subject ? "Preview." : shown.fitted ? "Fitted to the footage." : isSized() ? "As its file says." : shown.saved ? "By published proportions." : "Average size: no measures of the person yet.");
+  const note = (shown) =>
+    shown !== subject
+      ? "Preview."
+      : shown.fitted
+        ? "Fitted to the footage."
+        : isSized()
+          ? "As its file says."
+          : shown.saved
+            ? "By published proportions."
+            : "Average size: no measures of the person yet.";
 
   // The fit.
 
@@ -98,29 +185,108 @@ export function mount(place, setup) {
     const going = isGoing(fit);
     const found = fit?.state === "done";
     const isReady = subject.saved && !changed();
-    const box = (name, title) => check(name === "symmetric" ? "left and right alike" : name, { checked: options[name], onchange: ({ target }) => { options[name] = target.checked; } }, title);
+    const box = (name, title) =>
+      check(
+        name === "symmetric" ? "left and right alike" : name,
+        {
+          checked: options[name],
+          onchange: ({ target }) => {
+            options[name] = target.checked;
+          },
+        },
+        title,
+      );
     /** @type {[string, string][]} */
-    const runs = setup.detail.runs.filter((run) => run.done).map((run) => [run.name, `of ${run.name}`]);
-    fill(fitting, element("h2", {}, "Fit the subject to the footage"),
-      hint(isReady ? "Lengths and radii are found together with the poses of a few frames, on the silhouettes. Frames without a pose are searched first, which takes longest." : isSized() ? "Take the body first." : "Set the height first: it is the one measure that the pictures alone cannot give."),
-      element("div", { className: "step-row" },
-        field("How many frames", number(options.count, { min: 1, max: 24, step: 1, onchange: ({ target }) => { options.count = Number(target.value) || 5; } })),
-        field("or these frames", text({ value: options.frames, placeholder: "chosen for variety", pattern: "[0-9, ]*", onchange: ({ target }) => { options.frames = target.value; } }))),
-      field("First poses", select([["", "the newest run's, else searched for"], ...runs], options.run, { onchange: ({ target }) => { options.run = target.value; } })),
-      element("div", { className: "fit-boxes" }, box("symmetric", "Off: each side has its own lengths, which needs more frames."), box("lengths", "Of limbs"), box("radii", "Of limbs")),
-      !going && actions(button(found ? "Fit again" : "Fit the subject", beginFit, isReady && !(found && !fit.file) ? "primary" : "", { disabled: !isReady })),
-      progress, failure(unfitted), found && results());
+    const runs = setup.detail.runs
+      .filter((run) => run.done)
+      .map((run) => [run.name, `of ${run.name}`]);
+    fill(
+      fitting,
+      element("h2", {}, "Fit the subject to the footage"),
+      hint(
+        isReady
+          ? "Lengths and radii are found together with the poses of a few frames, on the silhouettes. Frames without a pose are searched first, which takes longest."
+          : isSized()
+            ? "Take the body first."
+            : "Set the height first: it is the one measure that the pictures alone cannot give.",
+      ),
+      element(
+        "div",
+        { className: "step-row" },
+        field(
+          "How many frames",
+          number(options.count, {
+            min: 1,
+            max: 24,
+            step: 1,
+            onchange: ({ target }) => {
+              options.count = Number(target.value) || 5;
+            },
+          }),
+        ),
+        field(
+          "or these frames",
+          text({
+            value: options.frames,
+            placeholder: "chosen for variety",
+            pattern: "[0-9, ]*",
+            onchange: ({ target }) => {
+              options.frames = target.value;
+            },
+          }),
+        ),
+      ),
+      field(
+        "First poses",
+        select([["", "the newest run's, else searched for"], ...runs], options.run, {
+          onchange: ({ target }) => {
+            options.run = target.value;
+          },
+        }),
+      ),
+      element(
+        "div",
+        { className: "fit-boxes" },
+        box("symmetric", "Off: each side has its own lengths, which needs more frames."),
+        box("lengths", "Of limbs"),
+        box("radii", "Of limbs"),
+      ),
+      !going &&
+        actions(
+          button(
+            found ? "Fit again" : "Fit the subject",
+            beginFit,
+            isReady && !(found && !fit.file) ? "primary" : "",
+            { disabled: !isReady },
+          ),
+        ),
+      progress,
+      failure(unfitted),
+      found && results(),
+    );
     if (going) drawGoing();
     else fill(progress);
   }
 
   async function beginFit() {
-    const frames = options.frames.split(/[,\s]+/).filter(Boolean).map(Number);
+    const frames = options.frames
+      .split(/[,\s]+/)
+      .filter(Boolean)
+      .map(Number);
     unfitted = null;
     try {
-      if (frames.some((frame) => !Number.isInteger(frame))) throw fault("Frames are whole numbers.", "Write them like 10, 40, 80.");
-      fit = await post(`${here}/fit-subject`, { ...options, frames, run: options.run || null, keep: false });
-    } catch (error) { fit = null; unfitted = error; }
+      if (frames.some((frame) => !Number.isInteger(frame)))
+        throw fault("Frames are whole numbers.", "Write them like 10, 40, 80.");
+      fit = await post(`${here}/fit-subject`, {
+        ...options,
+        frames,
+        run: options.run || null,
+        keep: false,
+      });
+    } catch (error) {
+      fit = null;
+      unfitted = error;
+    }
     draw();
     await followFit();
   }
@@ -129,8 +295,18 @@ export function mount(place, setup) {
   async function followFit() {
     if (!isGoing(fit)) return;
     try {
-      fit = await followJob(`/api/subject-fits/${fit.identifier}`, (job) => { fit = job; drawGoing(); }, () => gone);
-    } catch (error) { fit = null; unfitted = error; }
+      fit = await followJob(
+        `/api/subject-fits/${fit.identifier}`,
+        (job) => {
+          fit = job;
+          drawGoing();
+        },
+        () => gone,
+      );
+    } catch (error) {
+      fit = null;
+      unfitted = error;
+    }
     if (!gone) draw();
   }
 
@@ -140,26 +316,49 @@ export function mount(place, setup) {
     if (!known || gone || fit) return;
     if (known.state === "failed") unfitted = known;
     // What was saved shows as the session's subject, until that is another one.
-    else if (isGoing(known) || (known.state === "done" && (!known.file || subject.fitted))) fit = known;
+    else if (isGoing(known) || (known.state === "done" && (!known.file || subject.fitted)))
+      fit = known;
   }
 
-  let looks = -1;        // which pictures of the fit under way are drawn
+  let looks = -1; // which pictures of the fit under way are drawn
 
   function drawGoing() {
     const { identifier } = fit;
     if (fit.looks !== looks && fit.frames.length) {
       looks = fit.looks;
-      fill(setup.aside, element("div", { className: "pictures-bar" }, hint("So far: the body as it is fitted, over the frames that are looked at.")), fitPictures());
+      fill(
+        setup.aside,
+        element(
+          "div",
+          { className: "pictures-bar" },
+          hint("So far: the body as it is fitted, over the frames that are looked at."),
+        ),
+        fitPictures(),
+      );
     }
-    drawProgress(progress, progressOf(fit, "beginning", () => remove(`/api/subject-fits/${identifier}`).catch(complain)));
+    drawProgress(
+      progress,
+      progressOf(fit, "beginning", () => remove(`/api/subject-fits/${identifier}`).catch(complain)),
+    );
   }
 
   const sizeWords = (name) => name.replaceAll("_", " ").replace(/ (length|radius)$/, "");
 
   function sizeTable(kind) {
     const sizes = fit.sizes.filter((size) => size.kind === kind);
-    return sizes.length > 0 && table([kind === "length" ? "Length (mm)" : "Radius (mm)", "before", "after", "±"],
-      sizes.map((size) => [sizeWords(size.name), Math.round(size.before), element("td", { className: "after" }, Math.round(size.after)), Math.max(1, Math.round(size.deviation))]), "sizes");
+    return (
+      sizes.length > 0 &&
+      table(
+        [kind === "length" ? "Length (mm)" : "Radius (mm)", "before", "after", "±"],
+        sizes.map((size) => [
+          sizeWords(size.name),
+          Math.round(size.before),
+          element("td", { className: "after" }, Math.round(size.after)),
+          Math.max(1, Math.round(size.deviation)),
+        ]),
+        "sizes",
+      )
+    );
   }
 
   async function keep() {
@@ -167,27 +366,65 @@ export function mount(place, setup) {
       fit = await post(`/api/subject-fits/${fit.identifier}/keep`);
       await load();
       setup.refresh().catch(complain);
-    } catch (error) { complain(error); }
+    } catch (error) {
+      complain(error);
+    }
     draw();
   }
 
   /** Each size before and after, and how far silhouettes overlap. */
   function results() {
-    const frames = fit.frames.length > 1 ? `frames ${fit.frames.slice(0, -1).join(", ")} and ${fit.frames.at(-1)}` : `frame ${fit.frames[0]}`;
-    return element("div", { className: "background-quality" },
-      element("p", {}, `Body and silhouettes overlap by ${percent(mean(fit.overlap))} (${percent(mean(fit.overlap_before))} before), in ${frames}; first poses ${fit.poses_from.startsWith("run") ? `of ${fit.poses_from}` : fit.poses_from}.`),
-      fit.file ? hint("Saved. The old subject is kept beside it as subject-before.") : actions(button("Save as the subject", keep, "primary")),
-      sizeTable("length"), sizeTable("radius"), hint("± is one standard deviation: two limbs in three, about, lie within it. Wrists and shoulders are the least certain."));
+    const frames =
+      fit.frames.length > 1
+        ? `frames ${fit.frames.slice(0, -1).join(", ")} and ${fit.frames.at(-1)}`
+        : `frame ${fit.frames[0]}`;
+    return element(
+      "div",
+      { className: "background-quality" },
+      element(
+        "p",
+        {},
+        `Body and silhouettes overlap by ${percent(mean(fit.overlap))} (${percent(mean(fit.overlap_before))} before), in ${frames}; first poses ${fit.poses_from.startsWith("run") ? `of ${fit.poses_from}` : fit.poses_from}.`,
+      ),
+      fit.file
+        ? hint("Saved. The old subject is kept beside it as subject-before.")
+        : actions(button("Save as the subject", keep, "primary")),
+      sizeTable("length"),
+      sizeTable("radius"),
+      hint(
+        "± is one standard deviation: two limbs in three, about, lie within it. Wrists and shoulders are the least certain.",
+      ),
+    );
   }
 
   /** The pictures of the fit: the new body over each frame, a camera each in turn. */
   function fitPictures() {
     const names = setup.detail.cameras.map((camera) => camera.name);
-    return element("div", { className: "pictures fitted" }, fit.frames.map((frame, at) => {
-      const camera = names[at % names.length];
-      return element("figure", { className: "picture" }, element("img", { alt: `Frame ${frame}, ${camera}`, src: `/api/subject-fits/${fit.identifier}/frames/${frame}/views/${encodeURIComponent(camera)}.jpg?height=${PICTURE_HEIGHT}&look=${fit.looks}` }),
-        element("figcaption", {}, element("span", {}, element("b", {}, `frame ${frame}`), ` ${camera}${fit.overlap ? `, overlap ${percent(fit.overlap[at])}` : ""}`)));
-    }));
+    return element(
+      "div",
+      { className: "pictures fitted" },
+      fit.frames.map((frame, at) => {
+        const camera = names[at % names.length];
+        return element(
+          "figure",
+          { className: "picture" },
+          element("img", {
+            alt: `Frame ${frame}, ${camera}`,
+            src: `/api/subject-fits/${fit.identifier}/frames/${frame}/views/${encodeURIComponent(camera)}.jpg?height=${PICTURE_HEIGHT}&look=${fit.looks}`,
+          }),
+          element(
+            "figcaption",
+            {},
+            element(
+              "span",
+              {},
+              element("b", {}, `frame ${frame}`),
+              ` ${camera}${fit.overlap ? `, overlap ${percent(fit.overlap[at])}` : ""}`,
+            ),
+          ),
+        );
+      }),
+    );
   }
 
   function draw() {
@@ -195,7 +432,14 @@ export function mount(place, setup) {
     drawFit();
     if (isGoing(fit) && fit.frames.length) return undefined;
     if (fit?.state !== "done") return look();
-    drawStature(setup.aside, fit.limbs, subject.limbs, fit.file ? "Fitted and saved. Dashed: by height alone." : "As fitted. Dashed: before the fit.");
+    drawStature(
+      setup.aside,
+      fit.limbs,
+      subject.limbs,
+      fit.file
+        ? "Fitted and saved. Dashed: by height alone."
+        : "As fitted. Dashed: before the fit.",
+    );
     setup.aside.append(fitPictures());
   }
 
@@ -204,15 +448,20 @@ export function mount(place, setup) {
     [body, height] = [subject.body, subject.height_mm];
   }
 
-  Promise.all([fetchJson(`/api/choices?session=${encodeURIComponent(setup.session)}`), load()]).then(async ([choices]) => {
-    if (gone) return;
-    bodies = choices.bodies;
-    if (!bodies.some((one) => one.name === body)) bodies.push({ name: body, label: body });
-    await findFit().catch(complain);
-    if (gone) return;
-    draw();
-    await followFit();
-  }).catch((error) => place.append(failure(error)));
+  Promise.all([fetchJson(`/api/choices?session=${encodeURIComponent(setup.session)}`), load()])
+    .then(async ([choices]) => {
+      if (gone) return;
+      bodies = choices.bodies;
+      if (!bodies.some((one) => one.name === body)) bodies.push({ name: body, label: body });
+      await findFit().catch(complain);
+      if (gone) return;
+      draw();
+      await followFit();
+    })
+    .catch((error) => place.append(failure(error)));
 
-  return () => { gone = true; clearTimeout(preview); };
+  return () => {
+    gone = true;
+    clearTimeout(preview);
+  };
 }

@@ -10,8 +10,8 @@ import { ANSWER_VIEWS } from "./views_answer.js";
 import { SEARCH_VIEWS } from "./views_search.js";
 import { drawLimbs } from "./why_drawing.js";
 
-const NEAR = 1150;          // mm around the body that are seen
-const FLOOR = 500;          // mm between lines of the floor
+const NEAR = 1150; // mm around the body that are seen
+const FLOOR = 500; // mm between lines of the floor
 const MOST_FLOOR = 40;
 const ZOOM = { step: 1.15, least: 0.3, most: 12 };
 const SPEEDS = [0.25, 0.5, 1, 2];
@@ -23,7 +23,11 @@ const at = { frame: 0, layer: null, limb: null, parameter: null, particle: null,
 function unpacked({ ends, limbs, frames, offset, step }) {
   const values = new DataView(bytesOf(ends).buffer);
   let place = 0;
-  const next = (axis) => { const value = values.getInt16(place, true); place += 2; return value * step + offset[axis]; };
+  const next = (axis) => {
+    const value = values.getInt16(place, true);
+    place += 2;
+    return value * step + offset[axis];
+  };
   const point = () => [next(0), next(1), next(2)];
   return frames.map(() => limbs.map(() => [point(), point()]));
 }
@@ -39,8 +43,16 @@ function unpackedCloud({ offset, step, tips, layers }) {
     const values = new DataView(bytesOf(points).buffer);
     const heavy = bytesOf(weights);
     let place = 0;
-    const next = (axis) => { const value = values.getInt16(place, true); place += 2; return value * step + offset[axis]; };
-    const particles = parents.map((parent, at) => ({ parent, weight: heavy[at] / 255, tips: Array.from({ length: tips }, () => [next(0), next(1), next(2)]) }));
+    const next = (axis) => {
+      const value = values.getInt16(place, true);
+      place += 2;
+      return value * step + offset[axis];
+    };
+    const particles = parents.map((parent, at) => ({
+      parent,
+      weight: heavy[at] / 255,
+      tips: Array.from({ length: tips }, () => [next(0), next(1), next(2)]),
+    }));
     return { beta, of, particles };
   });
 }
@@ -52,7 +64,10 @@ function pointsOf(layers, index, phase) {
   return layers[index].particles.flatMap(({ tips, parent, weight }) => {
     const from = before?.[parent]?.tips ?? tips;
     return tips.map((tip, end) => ({
-      at: tip.map((value, axis) => from[end][axis] + phase * (value - from[end][axis])), colour, radius: POINT.least + POINT.more * weight, alpha: POINT.faint + (1 - POINT.faint) * weight,
+      at: tip.map((value, axis) => from[end][axis] + phase * (value - from[end][axis])),
+      colour,
+      radius: POINT.least + POINT.more * weight,
+      alpha: POINT.faint + (1 - POINT.faint) * weight,
     }));
   });
 }
@@ -60,22 +75,41 @@ function pointsOf(layers, index, phase) {
 /** Middle of all ends of a frame, mm. */
 function middleOf(limbs) {
   const points = limbs.flat();
-  return [0, 1, 2].map((axis) => points.reduce((sum, point) => sum + point[axis], 0) / points.length);
+  return [0, 1, 2].map(
+    (axis) => points.reduce((sum, point) => sum + point[axis], 0) / points.length,
+  );
 }
 
 /** The floor about the places where the body goes, and the cameras. */
 function surroundings(bodies, cameras) {
   const points = bodies.flat(2);
-  const [low, high] = [0, 1].map((end) => [0, 1].map((axis) => {
-    const value = points.reduce((far, point) => (end ? Math.max(far, point[axis]) : Math.min(far, point[axis])), end ? -Infinity : Infinity);
-    return FLOOR * (end ? Math.ceil(value / FLOOR) + 1 : Math.floor(value / FLOOR) - 1);
-  }));
-  const size = FLOOR * Math.max(1, Math.ceil((high[0] - low[0]) / FLOOR / MOST_FLOOR), Math.ceil((high[1] - low[1]) / FLOOR / MOST_FLOOR));
+  const [low, high] = [0, 1].map((end) =>
+    [0, 1].map((axis) => {
+      const value = points.reduce(
+        (far, point) => (end ? Math.max(far, point[axis]) : Math.min(far, point[axis])),
+        end ? -Infinity : Infinity,
+      );
+      return FLOOR * (end ? Math.ceil(value / FLOOR) + 1 : Math.floor(value / FLOOR) - 1);
+    }),
+  );
+  const size =
+    FLOOR *
+    Math.max(
+      1,
+      Math.ceil((high[0] - low[0]) / FLOOR / MOST_FLOOR),
+      Math.ceil((high[1] - low[1]) / FLOOR / MOST_FLOOR),
+    );
   const lines = [];
-  for (let x = low[0]; x <= high[0]; x += size) lines.push([[x, low[1], 0], [x, high[1], 0], "line"]);
-  for (let y = low[1]; y <= high[1]; y += size) lines.push([[low[0], y, 0], [high[0], y, 0], "line"]);
+  for (let x = low[0]; x <= high[0]; x += size)
+    lines.push([[x, low[1], 0], [x, high[1], 0], "line"]);
+  for (let y = low[1]; y <= high[1]; y += size)
+    lines.push([[low[0], y, 0], [high[0], y, 0], "line"]);
   for (const { centre, corners } of cameras) {
-    for (const [index, corner] of corners.entries()) lines.push([centre, corner, "camera-frame"], [corner, corners[(index + 1) % 4], "camera-frame"]);
+    for (const [index, corner] of corners.entries())
+      lines.push(
+        [centre, corner, "camera-frame"],
+        [corner, corners[(index + 1) % 4], "camera-frame"],
+      );
   }
   return lines;
 }
@@ -84,28 +118,102 @@ function surroundings(bodies, cameras) {
 function sceneBox(data, choose) {
   const { scene, fps } = data;
   const bodies = unpacked(scene);
-  const canvas = element("canvas", { className: "shared-scene", ariaLabel: "The body in three dimensions: drag or arrow keys turn it, the wheel brings it nearer" });
+  const canvas = element("canvas", {
+    className: "shared-scene",
+    ariaLabel:
+      "The body in three dimensions: drag or arrow keys turn it, the wheel brings it nearer",
+  });
   canvas.setAttribute("role", "img");
-  const drawing = new BodyDrawing(canvas, scene.limbs, bodies.flat(), surroundings(bodies, scene.cameras));
+  const drawing = new BodyDrawing(
+    canvas,
+    scene.limbs,
+    bodies.flat(),
+    surroundings(bodies, scene.cameras),
+  );
   const whole = { ...drawing.reach };
   let zoom = 1;
   let timer = 0;
   const follow = element("input", { type: "checkbox", checked: true, onchange: () => draw() });
-  const slider = element("input", { type: "range", min: 0, max: scene.frames.length - 1, step: 1, value: 0, ariaLabel: "Frame", oninput: () => choose({ frame: scene.frames[Number(slider.value)] }) });
+  const slider = element("input", {
+    type: "range",
+    min: 0,
+    max: scene.frames.length - 1,
+    step: 1,
+    value: 0,
+    ariaLabel: "Frame",
+    oninput: () => choose({ frame: scene.frames[Number(slider.value)] }),
+  });
   const output = element("output", {});
-  const speed = element("select", { ariaLabel: "Speed" }, SPEEDS.map((one) => new Option(`${one}×`, String(one), one === 1, one === 1)));
-  const play = button("Play", () => { if (timer) stop(); else start(); }, "small");
+  const speed = element(
+    "select",
+    { ariaLabel: "Speed" },
+    SPEEDS.map((one) => new Option(`${one}×`, String(one), one === 1, one === 1)),
+  );
+  const play = button(
+    "Play",
+    () => {
+      if (timer) stop();
+      else start();
+    },
+    "small",
+  );
 
   // The layers of the frames whose particles are in the page.
   const clouds = new Map(data.clouds.map((one) => [one.frame, unpackedCloud(one)]));
   const layersNow = () => clouds.get(scene.frames[Number(slider.value)]) ?? null;
   let [layer, phase, layerTimer] = [0, 1, 0];
-  const layerPlay = button("Pause layers", () => { if (layerTimer) stopLayers(); else startLayers(); }, "small");
-  const layerSlider = element("input", { type: "range", min: 0, step: 1, value: 0, ariaLabel: "Layer", oninput: () => { stopLayers(); layer = Number(layerSlider.value); draw(); } });
-  const layerRate = element("select", { ariaLabel: "Layers a second" }, LAYER_RATES.map((one) => new Option(`${one} layer${one === 1 ? "" : "s"}/s`, String(one), one === 3, one === 3)));
+  const layerPlay = button(
+    "Pause layers",
+    () => {
+      if (layerTimer) stopLayers();
+      else startLayers();
+    },
+    "small",
+  );
+  const layerSlider = element("input", {
+    type: "range",
+    min: 0,
+    step: 1,
+    value: 0,
+    ariaLabel: "Layer",
+    oninput: () => {
+      stopLayers();
+      layer = Number(layerSlider.value);
+      draw();
+    },
+  });
+  const layerRate = element(
+    "select",
+    { ariaLabel: "Layers a second" },
+    LAYER_RATES.map(
+      (one) =>
+        new Option(`${one} layer${one === 1 ? "" : "s"}/s`, String(one), one === 3, one === 3),
+    ),
+  );
   const layerWords = element("output", {});
-  const jumps = element("span", { className: "group" }, [...clouds.keys()].map((frame) => button(`frame ${frame}`, () => { choose({ frame }); startLayers(); }, "small")));
-  const layerLine = element("div", { className: "shared-transport shared-layers" }, layerPlay, layerRate, layerSlider, layerWords, jumps);
+  const jumps = element(
+    "span",
+    { className: "group" },
+    [...clouds.keys()].map((frame) =>
+      button(
+        `frame ${frame}`,
+        () => {
+          choose({ frame });
+          startLayers();
+        },
+        "small",
+      ),
+    ),
+  );
+  const layerLine = element(
+    "div",
+    { className: "shared-transport shared-layers" },
+    layerPlay,
+    layerRate,
+    layerSlider,
+    layerWords,
+    jumps,
+  );
 
   function startLayers() {
     if (!layersNow()) return;
@@ -116,7 +224,10 @@ function sceneBox(data, choose) {
     const step = (now) => {
       phase += ((now - last) / 1000) * Number(layerRate.value);
       last = now;
-      if (phase >= 1) { phase %= 1; layer = (layer + 1) % (layersNow()?.length ?? 1); }
+      if (phase >= 1) {
+        phase %= 1;
+        layer = (layer + 1) % (layersNow()?.length ?? 1);
+      }
       draw();
       layerTimer = requestAnimationFrame(step);
     };
@@ -135,9 +246,17 @@ function sceneBox(data, choose) {
     let [last, place] = [performance.now(), Number(slider.value)];
     const step = (now) => {
       // Frames that the page left out take their time, too.
-      place += ((now - last) / 1000) * fps * Number(speed.value) * Math.min(1, scene.frames.length / (scene.frames.at(-1) - scene.frames[0] + 1));
+      place +=
+        ((now - last) / 1000) *
+        fps *
+        Number(speed.value) *
+        Math.min(1, scene.frames.length / (scene.frames.at(-1) - scene.frames[0] + 1));
       last = now;
-      if (place >= scene.frames.length - 1) { show(scene.frames.length - 1); stop(); return; }
+      if (place >= scene.frames.length - 1) {
+        show(scene.frames.length - 1);
+        stop();
+        return;
+      }
       if (Math.floor(place) !== Number(slider.value)) show(Math.floor(place));
       timer = requestAnimationFrame(step);
     };
@@ -149,10 +268,15 @@ function sceneBox(data, choose) {
     play.textContent = "Play";
     choose({ frame: scene.frames[Number(slider.value)] });
   }
-  function show(index) { slider.value = String(index); draw(); }
+  function show(index) {
+    slider.value = String(index);
+    draw();
+  }
   function draw() {
     const limbs = bodies[Number(slider.value)];
-    drawing.reach = follow.checked ? { middle: middleOf(limbs), radius: NEAR / zoom } : { middle: whole.middle, radius: whole.radius / zoom };
+    drawing.reach = follow.checked
+      ? { middle: middleOf(limbs), radius: NEAR / zoom }
+      : { middle: whole.middle, radius: whole.radius / zoom };
     output.textContent = `frame ${scene.frames[Number(slider.value)]}`;
     const layers = layersNow();
     if (!layers) stopLayers();
@@ -171,17 +295,42 @@ function sceneBox(data, choose) {
     drawing.show(limbs);
   }
 
-  canvas.addEventListener("wheel", (event) => {
-    event.preventDefault();
-    zoom = Math.min(ZOOM.most, Math.max(ZOOM.least, zoom * ZOOM.step ** -Math.sign(event.deltaY)));
-    draw();
-  }, { passive: false });
+  canvas.addEventListener(
+    "wheel",
+    (event) => {
+      event.preventDefault();
+      zoom = Math.min(
+        ZOOM.most,
+        Math.max(ZOOM.least, zoom * ZOOM.step ** -Math.sign(event.deltaY)),
+      );
+      draw();
+    },
+    { passive: false },
+  );
   return {
-    box: element("section", { className: "card-box shared-box" }, canvas, element("div", { className: "shared-transport" }, play, speed, slider, output, element("label", { className: "check" }, follow, "follow the body")), layerLine),
+    box: element(
+      "section",
+      { className: "card-box shared-box" },
+      canvas,
+      element(
+        "div",
+        { className: "shared-transport" },
+        play,
+        speed,
+        slider,
+        output,
+        element("label", { className: "check" }, follow, "follow the body"),
+      ),
+      layerLine,
+    ),
     startLayers,
     /** Show a frame, or the nearest that the page has. */
     go(frame) {
-      const nearest = scene.frames.reduce((best, one, index) => (Math.abs(one - frame) < Math.abs(scene.frames[best] - frame) ? index : best), 0);
+      const nearest = scene.frames.reduce(
+        (best, one, index) =>
+          Math.abs(one - frame) < Math.abs(scene.frames[best] - frame) ? index : best,
+        0,
+      );
       show(nearest);
     },
   };
@@ -195,37 +344,116 @@ function figureOf(data, entry, choose, place) {
   const counted = countedIn(entry, 1);
   // Of the run's layers over the frames the page has one parameter.
   const own = entry.view === "variance" && entry.of === "run" ? { parameter: data.parameter } : {};
-  const known = (room) => ({ ...at, ...own, ...counted, over: entry.of === "run", layers: counted.searchLayers * counted.searches, label: (name) => labels.get(name) ?? name, room, tried: null, score: data.score });
-  const whyTables = Object.fromEntries([...data.why.tables, ...entry.tables].map((table) => [table.name, records(table)]));
-  const draw = entry.view === "why" ? (sheet, room) => drawLimbs(sheet, { limbs: [], nearest: [], ...whyTables }, { ...at, ...countedIn(data.why, 1) }, room) : (sheet, room) => drawings[entry.view][entry.of](sheet, tables, known(room));
+  const known = (room) => ({
+    ...at,
+    ...own,
+    ...counted,
+    over: entry.of === "run",
+    layers: counted.searchLayers * counted.searches,
+    label: (name) => labels.get(name) ?? name,
+    room,
+    tried: null,
+    score: data.score,
+  });
+  const whyTables = Object.fromEntries(
+    [...data.why.tables, ...entry.tables].map((table) => [table.name, records(table)]),
+  );
+  const draw =
+    entry.view === "why"
+      ? (sheet, room) =>
+          drawLimbs(
+            sheet,
+            { limbs: [], nearest: [], ...whyTables },
+            { ...at, ...countedIn(data.why, 1) },
+            room,
+          )
+      : (sheet, room) => drawings[entry.view][entry.of](sheet, tables, known(room));
   const made = new Figure(place);
   const empty = !entry.tables.some((table) => table.rows.length);
-  made.show(empty ? null : {
-    name: `${data.session}-${data.run}-${entry.view}${entry.of === "run" ? "" : `-frame${data.frame}`}`, title: entry.title, question: entry.question, caption: entry.caption, notes: entry.notes, tables: entry.tables, choose, link: null, draw,
-  }, entry.notes.join(" ") || "There are no numbers for this view.");
+  made.show(
+    empty
+      ? null
+      : {
+          name: `${data.session}-${data.run}-${entry.view}${entry.of === "run" ? "" : `-frame${data.frame}`}`,
+          title: entry.title,
+          question: entry.question,
+          caption: entry.caption,
+          notes: entry.notes,
+          tables: entry.tables,
+          choose,
+          link: null,
+          draw,
+        },
+    entry.notes.join(" ") || "There are no numbers for this view.",
+  );
   return made;
 }
 
 function whyBox({ why }) {
-  return card(`Why is frame ${why.frame} as it is?`, why.notes.map((note) => hint(note)),
-    why.findings.length ? element("ul", { className: "words" }, why.findings.map((one) => element("li", { className: one.is_cause ? "chief" : "" }, one.words))) : hint("Nothing stands out in this frame."),
-    why.remedies.length > 0 && [element("h3", {}, "What may help"), element("ul", { className: "words" }, why.remedies.map((one) => element("li", {}, element("b", {}, one.title), ` ${one.words}`)))]);
+  return card(
+    `Why is frame ${why.frame} as it is?`,
+    why.notes.map((note) => hint(note)),
+    why.findings.length
+      ? element(
+          "ul",
+          { className: "words" },
+          why.findings.map((one) =>
+            element("li", { className: one.is_cause ? "chief" : "" }, one.words),
+          ),
+        )
+      : hint("Nothing stands out in this frame."),
+    why.remedies.length > 0 && [
+      element("h3", {}, "What may help"),
+      element(
+        "ul",
+        { className: "words" },
+        why.remedies.map((one) => element("li", {}, element("b", {}, one.title), ` ${one.words}`)),
+      ),
+    ],
+  );
 }
 
 function settingsBox({ settings }) {
   const value = ({ value: own, unit }) => `${own}${unit ? ` ${unit}` : ""}`;
   const groups = Map.groupBy(settings, (one) => one.group);
-  const rows = (own) => own.map((one) => element("tr", { className: one.moved ? "moved" : "", title: one.help }, element("th", { scope: "row" }, one.label, " ", element("code", {}, one.name)), element("td", {}, value(one))));
+  const rows = (own) =>
+    own.map((one) =>
+      element(
+        "tr",
+        { className: one.moved ? "moved" : "", title: one.help },
+        element("th", { scope: "row" }, one.label, " ", element("code", {}, one.name)),
+        element("td", {}, value(one)),
+      ),
+    );
   const moved = settings.filter((one) => one.moved);
-  return element("details", { className: "card-box", open: false }, element("summary", {}, `Settings (${moved.length ? `not at their defaults: ${moved.map((one) => `${one.label} ${value(one)}`).join(", ")}` : "all at their defaults"})`),
-    element("div", { className: "shared-settings" }, [...groups].map(([group, own]) => element("table", {}, element("caption", {}, group), element("tbody", {}, rows(own))))));
+  return element(
+    "details",
+    { className: "card-box", open: false },
+    element(
+      "summary",
+      {},
+      `Settings (${moved.length ? `not at their defaults: ${moved.map((one) => `${one.label} ${value(one)}`).join(", ")}` : "all at their defaults"})`,
+    ),
+    element(
+      "div",
+      { className: "shared-settings" },
+      [...groups].map(([group, own]) =>
+        element("table", {}, element("caption", {}, group), element("tbody", {}, rows(own))),
+      ),
+    ),
+  );
 }
 
 /** Draw the page. */
 export function showSharedRun(data) {
   startTheme();
   at.frame = data.frame;
-  const places = data.figures.map((entry) => element("section", { className: "figure sweep-figure shared-figure", dataset: { key: `${entry.view}-${entry.of}` } }));
+  const places = data.figures.map((entry) =>
+    element("section", {
+      className: "figure sweep-figure shared-figure",
+      dataset: { key: `${entry.view}-${entry.of}` },
+    }),
+  );
   /** @type {Figure[]} */
   let figures = [];
   const choose = (/** @type {Record<string, any>} */ changes) => {
@@ -234,10 +462,39 @@ export function showSharedRun(data) {
     for (const one of figures) one.refresh();
   };
   const scene = sceneBox(data, choose);
-  fill(byId("heading"), element("h1", {}, `${data.session} / ${data.run}`), element("p", { className: "lead" }, data.caption), element("p", { className: "hint" }, data.made));
-  fill(byId("shared"),
-    element("div", { className: "shared-top" }, scene.box, element("div", { className: "shared-side" }, card("", element("dl", { className: "settings-list" }, data.facts.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]))), whyBox(data))),
-    data.notes.map((note) => hint(note)), ...places, settingsBox(data));
+  fill(
+    byId("heading"),
+    element("h1", {}, `${data.session} / ${data.run}`),
+    element("p", { className: "lead" }, data.caption),
+    element("p", { className: "hint" }, data.made),
+  );
+  fill(
+    byId("shared"),
+    element(
+      "div",
+      { className: "shared-top" },
+      scene.box,
+      element(
+        "div",
+        { className: "shared-side" },
+        card(
+          "",
+          element(
+            "dl",
+            { className: "settings-list" },
+            data.facts.flatMap(([name, value]) => [
+              element("dt", {}, name),
+              element("dd", {}, value),
+            ]),
+          ),
+        ),
+        whyBox(data),
+      ),
+    ),
+    data.notes.map((note) => hint(note)),
+    ...places,
+    settingsBox(data),
+  );
   figures = data.figures.map((entry, index) => figureOf(data, entry, choose, places[index]));
   scene.go(data.frame);
   if (!matchMedia("(prefers-reduced-motion: reduce)").matches) scene.startLayers();

@@ -18,7 +18,9 @@ export function layerColour(index, count) {
   const low = Math.floor(at);
   const rest = at - low;
   const mix = (a, b) => `color-mix(in srgb, ${a} ${Math.round((1 - rest) * 100)}%, ${b})`;
-  return rest < 0.01 || low === 9 ? token(`layer-${low}`) : resolved(mix(token(`layer-${low}`), token(`layer-${low + 1}`)));
+  return rest < 0.01 || low === 9
+    ? token(`layer-${low}`)
+    : resolved(mix(token(`layer-${low}`), token(`layer-${low + 1}`)));
 }
 
 /** Colour of what is compared, by its place in the list. */
@@ -33,7 +35,12 @@ function resolved(expression) {
   probe.style.color = expression;
   const text = getComputedStyle(probe).color;
   const parts = text.match(/color\(srgb ([\d.]+) ([\d.]+) ([\d.]+)/);
-  return parts ? `rgb(${parts.slice(1, 4).map((part) => Math.round(255 * Number(part))).join(",")})` : text;
+  return parts
+    ? `rgb(${parts
+        .slice(1, 4)
+        .map((part) => Math.round(255 * Number(part)))
+        .join(",")})`
+    : text;
 }
 
 /** Call `listener` whenever the theme changes. */

@@ -24,11 +24,18 @@ async function sendFile(identifier, file, path, arrived, signal) {
   for (;;) {
     let answer;
     try {
-      answer = await fetch(`/api/uploads/${identifier}/files?path=${encodeURIComponent(path)}&offset=${offset}`, { method: "PUT", body: file.slice(offset, offset + PIECE), signal });
+      answer = await fetch(
+        `/api/uploads/${identifier}/files?path=${encodeURIComponent(path)}&offset=${offset}`,
+        { method: "PUT", body: file.slice(offset, offset + PIECE), signal },
+      );
     } catch (cause) {
       failures += 1;
       if (cause.name === "AbortError") throw cause;
-      if (failures === TRIES) throw fault(`The upload of ${path} broke off.`, "Check whether the studio still runs, and try again.");
+      if (failures === TRIES)
+        throw fault(
+          `The upload of ${path} broke off.`,
+          "Check whether the studio still runs, and try again.",
+        );
       await pause(PAUSE_MILLISECONDS * failures);
       offset = await arrivedOf(identifier, path).catch(() => 0);
       continue;
@@ -48,12 +55,25 @@ export async function uploadFiles(files, report, signal = undefined) {
   let sent = 0;
   const reach = (at, bytes) => {
     const left = bytes ? ((performance.now() - begun) * (total - bytes)) / bytes / 1000 : 0;
-    report(dotted(`Uploading ${Math.round((100 * bytes) / total)} % of ${megabytes(total)} MB`, files.length > 1 && `file ${at + 1} of ${files.length}`, timeLeft(left)), bytes / total);
+    report(
+      dotted(
+        `Uploading ${Math.round((100 * bytes) / total)} % of ${megabytes(total)} MB`,
+        files.length > 1 && `file ${at + 1} of ${files.length}`,
+        timeLeft(left),
+      ),
+      bytes / total,
+    );
   };
   try {
     for (const [at, file] of [...files].entries()) {
       reach(at, sent);
-      await sendFile(identifier, file, file.webkitRelativePath || file.name, (bytes) => reach(at, sent + bytes), signal);
+      await sendFile(
+        identifier,
+        file,
+        file.webkitRelativePath || file.name,
+        (bytes) => reach(at, sent + bytes),
+        signal,
+      );
       sent += file.size;
     }
   } catch (error) {

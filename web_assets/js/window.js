@@ -4,7 +4,11 @@
 const KEY = "window";
 
 /** Random letters and digits. */
-export const windowName = sessionStorage.getItem(KEY) ?? [...crypto.getRandomValues(new Uint8Array(12))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+export const windowName =
+  sessionStorage.getItem(KEY) ??
+  [...crypto.getRandomValues(new Uint8Array(12))]
+    .map((byte) => byte.toString(16).padStart(2, "0"))
+    .join("");
 
 const take = () => sessionStorage.removeItem(KEY);
 
@@ -19,4 +23,7 @@ export const scenePath = `/scene/${windowName}/`;
 export const triedScenePath = `/scene/${windowName}-tried/`;
 
 /** A socket to the studio's events, those of this window's scene among them. */
-export const eventSocket = () => new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/api/events?window=${windowName}`);
+export const eventSocket = () =>
+  new WebSocket(
+    `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/api/events?window=${windowName}`,
+  );
