@@ -4,7 +4,7 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 SAMPLES = ("walk", "planar_arm", "branched_arms")
 TRAVELS = {
-    "web_assets": "studio/server/assets",
+    "web_assets": "studio/app/assets",
     **{f"sample_sessions/{name}": f"studio/sessions/samples/{name}" for name in (*SAMPLES, "prepared")},
 }
 

@@ -28,6 +28,7 @@ from pydantic import Field
 from studio.declaring import Terminal
 from studio.errors import StudioError
 from studio.foreign_files import open_file, read_text
+from studio.foundations.package import package_folder
 from studio.launch import LOG_NAME, served_at
 from studio.self_check import PACKAGE, doctor
 from studio.sessions.atomic_files import taken, write_bytes
@@ -144,8 +145,7 @@ def _all_known(text: str) -> bool:
 @cache
 def vocabulary() -> frozenset[str]:
     """Every word, lower case, of the studio's source, the system's messages and Python's own names."""
-    here = Path(__file__).parent
-    texts: Iterable[str] = (read_text(path) for path in sorted(here.rglob("*.py")))
+    texts: Iterable[str] = (read_text(path) for path in sorted(package_folder().rglob("*.py")))
     found = {word for text in texts for word in WORD.findall(text.lower())}
     for other in (*map(os.strerror, errno.errorcode), *dir(builtins), README, PACKAGE):
         found.update(WORD.findall(other.lower()))

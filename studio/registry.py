@@ -12,7 +12,7 @@ cannot be loaded, or is not what its group is for, is left out; `problems` says 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
 from importlib import metadata
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 from studio.errors import SettingsError, StudioError
 
@@ -120,6 +120,22 @@ class Registry(Mapping[str, Member], Generic[Member]):
             else:
                 added[point.name] = member
         return added, problems
+
+
+PARTS = "studio.parts"
+
+
+def plugged_in(name: str) -> Any:  # noqa: ANN401
+    """What a room above, or another package, gives under this name in the entry-point group PARTS; loaded at first use.
+
+    Raises PlugInError where nothing gives it, or what gives it cannot be loaded.
+    """
+    for point in metadata.entry_points(group=PARTS, name=name):
+        try:
+            return point.load()
+        except ImportError as error:
+            raise PlugInError(f"'{name}' cannot be loaded: {error}.", "Install the studio again.") from None
+    raise PlugInError(f"No installed package gives '{name}'.", "Install the studio again.")
 
 
 def _package(point: metadata.EntryPoint) -> str:

@@ -23,6 +23,7 @@ import numpy as np
 
 from studio.declaring import Terminal
 from studio.errors import StudioError
+from studio.foundations.package import assets_folder
 from studio.jobs.batch import track_to_end
 from studio.launch import PORT, served_at
 from studio.likelihood.edge_region import CPU, DEVICE_MODULE, GPU
@@ -30,7 +31,6 @@ from studio.numba_in_threads import numba
 from studio.runs.new_run import prepare_run
 from studio.runs.problem_source import ProblemSource
 from studio.runs.samples import install_sample
-from studio.runs.self_contained import assets_folder
 from studio.sessions.workspace import Workspace
 from studio.settings import changed_settings, default_settings
 

@@ -17,11 +17,11 @@ from studio.body.catalogue import load_body
 from studio.capture.footage import folded
 from studio.capture.footage_source import CameraSource
 from studio.progress import Progress, unheard
+from studio.results.motion_sources import recipe_recording
 from studio.sessions.manifest import write_manifest
 from studio.sessions.session import Session
 from studio.synthesis.clips import ClipWriter
 from studio.synthesis.recipes import synthesize
-from studio.training.sources import recipe_recording
 
 RECIPE = "walk-five-cameras"
 QUALITY = 19.0

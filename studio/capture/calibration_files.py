@@ -44,7 +44,7 @@ from studio.capture.sanity import quarter_turns
 from studio.errors import CalibrationError
 from studio.foreign_files import foreign_file
 from studio.geometry.camera import Camera
-from studio.motion_files.marker_meaning import WORLDS
+from studio.geometry.worlds import WORLDS
 
 __all__ = [
     "CALIBRATION_FORMATS",

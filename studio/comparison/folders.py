@@ -18,7 +18,7 @@ from studio.comparison.kept_comparison import (
 from studio.comparison.kept_trials import plain
 from studio.comparison.plan import Plan
 from studio.errors import NotFoundError, SessionError, StudioError
-from studio.runs.new_run import software_version
+from studio.foundations.package import software_version
 from studio.sessions import atomic_files
 from studio.sessions.manifest import now
 from studio.sessions.names import checked_name, free_name, inside, is_name

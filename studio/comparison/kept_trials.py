@@ -13,12 +13,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import studio
 from studio.comparison.trials import Plain, is_mapping
 from studio.errors import SessionError
 from studio.foreign_files import LARGEST_RECORD, read_file, read_text
+from studio.foundations.package import package_folder, software_version
 from studio.likelihood.catalogue import WEIGHTINGS
-from studio.runs.new_run import software_version
 from studio.sessions.atomic_files import write_text
 from studio.trackers.catalogue import TRACKERS
 
@@ -78,7 +77,7 @@ def measured_by() -> str:
 @cache
 def code_digest(rooms: tuple[str, ...]) -> str:
     """A digest of the code of some rooms, read once in a process."""
-    package = Path(studio.__file__).parent
+    package = package_folder()
     digest = hashlib.sha256()
     for room in rooms:
         for path in sorted((package / room).rglob("*")):

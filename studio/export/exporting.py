@@ -14,6 +14,7 @@ from studio.export.options import AUTO, ExportOptions
 from studio.export.task import ExportTask, Writer, Written
 from studio.knobs import changed
 from studio.progress import Progress, unheard
+from studio.registry import plugged_in
 from studio.runs.tracks import BEST, best_track
 from studio.sessions.atomic_files import discard, new_folder_beside, sync_folder
 from studio.sessions.session import Session
@@ -81,20 +82,15 @@ def export_run(
     place: Path,
     *,
     progress: Progress = unheard,
-    record_scene: Writer | None = None,
     pack: bool = False,
 ) -> ExportReport:
     """Export a run to `place`, which is replaced only after the new file has been read back and checked.
 
-    requested : options by name. record_scene : the writer of scene recordings. pack : several files become one zip.
+    requested : options by name. pack : several files become one zip.
     Raises ExportError, and the errors of reading the run.
     """
     options = settled(form, requested)
-    writer = form.write or record_scene
-    if writer is None:
-        raise ExportError(
-            f"{form.title} cannot be written here.", "Export it from the page or the command line."
-        )
+    writer: Writer = form.write or plugged_in("scene-recorder")
     notes: tuple[str, ...] = ()
     if "track" in form.takes:
         options, notes = with_track(run, options)

@@ -11,7 +11,6 @@ from studio.errors import NotFoundError, SessionError
 from studio.export.exporting import ExportReport, export_run
 from studio.export.formats import ExportFormat
 from studio.export.options import ExportOptions
-from studio.export.task import Writer
 from studio.progress import Progress, unheard
 from studio.runs.tracks import BEST, RAW, best_track, read_track, track_digest, track_names
 from studio.runs.workflow import ExportedFile
@@ -56,7 +55,6 @@ def export_into_run(
     requested: Mapping[str, str | int | float | bool],
     *,
     progress: Progress = unheard,
-    record_scene: Writer | None = None,
 ) -> KeptExport:
     """Export a run into its own folder; several files become one zip. The same request replaces its file.
 
@@ -71,7 +69,6 @@ def export_into_run(
         requested,
         folder / f"{_stem(session, run, form, requested)}.{form.name}",
         progress=progress,
-        record_scene=record_scene,
         pack=True,
     )
     content = _content(run, report.track) if report.track else ""

@@ -9,10 +9,10 @@ import numpy as np
 from studio.arrays import Array, Indices
 from studio.body.model import BodyModel
 from studio.errors import DamagedError, NotFoundError, SettingsError, StudioError
+from studio.foundations.package import software_version
 from studio.inspection.tables import Row, Selection
 from studio.inspection.wanted import stop_if_left
 from studio.likelihood.hard_priors import HardPriors
-from studio.runs.new_run import software_version
 from studio.runs.tracks import pose_in_track
 from studio.sessions.results_reader import ResultsReader
 from studio.sessions.session import Session

@@ -17,13 +17,13 @@ from studio.body.forward_kinematics import limb_ends
 from studio.body.model import extremities
 from studio.errors import NotFoundError, RunError, StudioError
 from studio.evaluation.errors import Evaluation, evaluate
+from studio.foundations.package import software_version
 from studio.geometry.camera import Camera
 from studio.inspection.reading import InspectedRun, no_value
 from studio.inspection.tables import Selection, Table, Viewed
 from studio.inspection.views import look, look_over, view_named
 from studio.motion_files.trc import read_trc
 from studio.progress import Progress, unheard
-from studio.runs.new_run import software_version
 from studio.runs.notes import notes_by_frame
 from studio.runs.self_contained import self_contained_page
 from studio.runs.tracks import RAW, read_track

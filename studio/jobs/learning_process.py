@@ -13,13 +13,14 @@ from studio.errors import BehaviourError
 from studio.jobs.process_executor import ProcessExecutor, ProcessLostError
 from studio.knobs import Value, changed, knobs_of
 from studio.progress import Progress, report
+from studio.results.motion_sources import read_sources
 from studio.runs.behaviour_models import models_folder
 from studio.sessions.session import BODIES_NAME
 from studio.sessions.workspace import Workspace
-from studio.training.learning import learn, read_sources
+from studio.training.learning import learn
 from studio.training.model_repository import keep_model, place_for_model
 from studio.training.oversampling import OversamplingSettings
-from studio.training.sources import FPS
+from studio.training.recordings import FPS
 
 READING = "reading motion"
 PARTS = 1000

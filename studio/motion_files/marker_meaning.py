@@ -12,19 +12,11 @@ import numpy as np
 
 from studio.arrays import Array
 from studio.errors import TruthError
+from studio.geometry.worlds import WORLDS
 
 if TYPE_CHECKING:
     from studio.motion_files.trc import MarkerMotion
 
-WORLDS = {
-    "x": ((0, 1, 0), (0, 0, 1), (1, 0, 0)),
-    "y": ((0, 0, 1), (1, 0, 0), (0, 1, 0)),
-    "z": ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
-    "-x": ((0, 0, 1), (0, 1, 0), (-1, 0, 0)),
-    "-y": ((1, 0, 0), (0, 0, 1), (0, -1, 0)),
-    "-z": ((1, 0, 0), (0, -1, 0), (0, 0, -1)),
-}
-"""By the axis that points up: the axes of the world with z up in the file's, rows."""
 HIGH = ("head", "nose", "neck", "c7", "ear", "eye", "lfhd", "rfhd", "lbhd", "rbhd", "hdtop")
 LOW = ("ankle", "heel", "toe", "foot", "ank", "lhee", "rhee", "ltoe", "rtoe", "calc", "mt5", "mt1")
 ON_THE_FLOOR = 0.35

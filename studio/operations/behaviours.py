@@ -14,14 +14,15 @@ from studio.declaring import Body, Knobs, Seed, Terminal, Values, Web, operation
 from studio.errors import SettingsError
 from studio.knobs import changed, knobs_of
 from studio.operations.progress import Reporting, reporting, say
+from studio.results.motion_sources import read_sources
 from studio.runs.live_summary import in_words as ranges
 from studio.sessions.session import BODIES_NAME
 from studio.sessions.workspace import Workspace
-from studio.training.learning import Learnt, read_sources
+from studio.training.learning import Learnt
 from studio.training.learning import learn as learn_from
 from studio.training.model_repository import ModelSummary, keep_model, list_models, place_for_model
 from studio.training.oversampling import OversamplingSettings
-from studio.training.sources import FPS, Recording
+from studio.training.recordings import FPS, Recording
 
 SHOWN_BAD_FRAMES = 12
 Sources = Annotated[

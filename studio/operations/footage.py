@@ -13,7 +13,6 @@ from studio.capture.synchrony import MOST_SECONDS, Synchrony
 from studio.capture.timestamps import TimedOffsets
 from studio.declaring import Body, Target, Terminal, Web, operation, taking
 from studio.errors import FootageError, SessionError
-from studio.footage_recipes import synthesize as synthesize_recipe
 from studio.jobs.camera_readers import CameraReaders
 from studio.jobs.stream_recording import RecordingStanding, StreamRecording, recording_folder
 from studio.operations.opening import SessionName, keeping_in_place, open_session
@@ -37,6 +36,7 @@ from studio.sessions.importers.importing import add_footage as add_to_session
 from studio.sessions.recordings import SpreadFigures, calibration_given, check_cameras, import_recording
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace, begin_session
+from studio.synthesis.recipes import synthesize as synthesize_recipe
 
 LOOK_SECONDS = 0.2
 

@@ -8,16 +8,18 @@ from pydantic import Field
 
 from studio.declaring import Terminal, Web, operation
 from studio.errors import NotFoundError, SessionError
-from studio.footage_recipes import missing_data, real_footage, synthesize
+from studio.foundations.package import assets_folder
 from studio.operations.progress import Reporting, reporting
 from studio.progress import Progress
 from studio.runs.samples import install_sample
-from studio.runs.self_contained import assets_folder
 from studio.sessions.atomic_files import discard
 from studio.sessions.importers.importing import add_footage
 from studio.sessions.manifest import FILE_NAME
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace, begin_session
+from studio.synthesis.real_data import missing_data, real_footage
+from studio.synthesis.recipe_file import find_recipe
+from studio.synthesis.recipes import synthesize
 
 CardKind = Literal["sample", "recipe", "elsewhere"]
 
@@ -193,7 +195,7 @@ def standing_of(card: Card, workspace: Workspace) -> CardStanding:
     """A card as it stands in a workspace."""
     there = (workspace.root / card.name / FILE_NAME).is_file()
     if card.kind == "recipe":
-        return CardStanding(card, there, missing_data(card.recipe or card.name))
+        return CardStanding(card, there, missing_data(find_recipe(card.recipe or card.name)))
     if card.kind == "elsewhere" and real_footage(card.footage) is None:
         return CardStanding(
             card, there, f"There is no '{card.footage}' in the folder that STUDIO_REAL_DATA names."

@@ -1,6 +1,5 @@
 """What a run holds, what is made of it afterwards, how good it is, and files for other programs."""
 
-import importlib
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -19,7 +18,6 @@ from studio.export.exporting import ExportReport
 from studio.export.exporting import export_run as write_run
 from studio.export.formats import FORMATS, format_of_file
 from studio.export.options import ExportOptions
-from studio.export.task import Writer
 from studio.knobs import changed, knobs_of
 from studio.motion_files.trc import MarkerMotion
 from studio.motion_files.truth_files import ANY_WORLD, READERS, read_truth
@@ -238,16 +236,9 @@ def export_run(
     place = Path(to)
     stored, form = open_run(run), format_of_file(place)
     with reporting(progress, f"{stored.session_name} / {stored.name}: {form.title}") as report:
-        done = write_run(
-            session_of(stored), stored, form, options, place, progress=report, record_scene=scene_writer()
-        )
+        done = write_run(session_of(stored), stored, form, options, place, progress=report)
     say(progress, done.notes)
     return done
-
-
-def scene_writer() -> Writer:
-    """What writes a run's scene as a recording; found by name, since the scene is a storey above."""
-    return importlib.import_module("studio.scene.recording").record_scene
 
 
 @dataclass(frozen=True, slots=True)

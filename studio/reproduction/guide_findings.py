@@ -17,9 +17,9 @@ import numpy as np
 from studio.comparison.findings_document import Document
 from studio.comparison.trials import is_mapping
 from studio.errors import StudioError
+from studio.foundations.package import assets_folder
 from studio.reproduction.findings_files import number_in_words
 from studio.reproduction.provenance import CHANGED
-from studio.runs.self_contained import assets_folder
 from studio.sessions.atomic_files import write_text
 from studio.typed_decoding import is_list
 

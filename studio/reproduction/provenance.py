@@ -4,7 +4,7 @@ import subprocess
 from functools import cache
 from pathlib import Path
 
-import studio
+from studio.foundations.package import package_folder
 
 DIGITS = 12
 CHANGED = " with changes"
@@ -16,7 +16,7 @@ def commit() -> str:
 
     CHANGED follows where a file of the package differs from it.
     """
-    package = Path(studio.__file__).parent
+    package = package_folder()
     found = _git(package, "rev-parse", f"--short={DIGITS}", "HEAD")
     if not found or _git(package, "ls-files", "--error-unmatch", "__init__.py") is None:
         return ""

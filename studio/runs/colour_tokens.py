@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.errors import StudioError
-from studio.runs.self_contained import assets_folder
+from studio.foundations.package import assets_folder
 
 Colour = tuple[int, int, int]
 LAYER_STOPS = 10

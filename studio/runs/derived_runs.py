@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 
 from studio.errors import RunError
-from studio.runs.new_run import software_version
+from studio.foundations.package import software_version
 from studio.sessions import atomic_files
 from studio.sessions.atomic_files import taken
 from studio.sessions.file_checksums import note_files

@@ -4,7 +4,6 @@ Defaults come from the session (body, subject, start pose, σ0, tracker, likelih
 run's record has everything that its poses depend on.
 """
 
-from importlib import metadata
 from pathlib import Path
 from typing import Annotated
 
@@ -32,6 +31,7 @@ from studio.declaring import (
     Web,
 )
 from studio.errors import BodyError, RunError, StudioError
+from studio.foundations.package import software_version
 from studio.geometry.reach import within_reach
 from studio.knobs import Knob
 from studio.likelihood.catalogue import WEIGHTINGS
@@ -53,7 +53,6 @@ from studio.sessions.stored_run import StoredRun
 from studio.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, knob_table, values
 from studio.trackers.catalogue import TRACKERS
 
-DISTRIBUTION = "capture-studio"
 DESPITE = "Tracked despite: "
 """Prefix of a run's note on an accepted fault of the calibration."""
 
@@ -305,11 +304,3 @@ def _found(
 
 def _limited(body: BodyModel) -> bool:
     return all(np.isfinite(entry.lower) and np.isfinite(entry.upper) for entry in body.parameters)
-
-
-def software_version() -> str:
-    """The studio's version."""
-    try:
-        return metadata.version(DISTRIBUTION)
-    except metadata.PackageNotFoundError:
-        return "not installed"

@@ -5,8 +5,8 @@ import tarfile
 from contextlib import suppress
 from pathlib import Path
 
-import studio
 from studio.errors import NotFoundError, SessionError
+from studio.foundations.package import package_folder
 from studio.sessions import atomic_files
 from studio.sessions.manifest import FILE_NAME
 from studio.sessions.session import RUNS_NAME, Session
@@ -23,7 +23,7 @@ def sample_folder(name: str = "walk") -> Path:
 
 def _found(path: str, words: str) -> Path:
     """A file of the samples: in an installed package beside the sessions room, in a checkout in `sample_sessions`."""
-    package = Path(studio.__file__).resolve().parent
+    package = package_folder()
     for place in (package / "sessions" / "samples" / path, package.parent / "sample_sessions" / path):
         if place.is_file():
             return place

@@ -4,14 +4,12 @@ import base64
 import html
 import json
 import re
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 
-import studio
 from studio.errors import StudioError
+from studio.foundations.package import assets_folder
 
 TYPE = "vendor/inter.woff2"
-INSTALLED = PurePosixPath("server/assets")
-"""Where an installed package has the pages, below its own folder (`hatch_build.py` puts them there)."""
 
 _IMPORT = re.compile(r'(from |import )"(\.{1,2}/[\w./-]+\.js)"')
 # The page brings the type along itself.
@@ -41,13 +39,6 @@ document.documentElement.dataset.theme = matchMedia("(prefers-color-scheme: dark
 </body>
 </html>
 """
-
-
-def assets_folder() -> Path:
-    """Where the pages' files lie: inside an installed package, in `web_assets` in a checkout."""
-    package = Path(studio.__file__).resolve().parent
-    installed = package / INSTALLED
-    return installed if installed.is_dir() else package.parent / "web_assets"
 
 
 def self_contained_page(

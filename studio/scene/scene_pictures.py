@@ -20,9 +20,10 @@ from PIL import Image, ImageDraw, ImageFont
 from studio.arrays import Bytes
 from studio.errors import StudioError
 from studio.export.overlay_video import even_sized
+from studio.foundations.package import assets_folder
 from studio.inspection.reading import InspectedRun
 from studio.runs.colour_tokens import ColourTokens, colour_tokens
-from studio.runs.self_contained import TYPE, assets_folder
+from studio.runs.self_contained import TYPE
 from studio.scene.controller import SceneController
 from studio.scene.model import Model, select, show_frame
 

@@ -10,7 +10,6 @@ from studio.capture.video import give_back_freed_memory
 from studio.errors import StudioError
 from studio.jobs.control import StudioControl
 from studio.scene.model import LayerPlayback, Selection
-from studio.scene.recording import record_scene
 from studio.scene.scene_server import SceneServer
 from studio.sessions.workspace import Workspace
 
@@ -57,7 +56,6 @@ class WindowScenes:
         self._lock = threading.Lock()
         self._stopped = False
         self._moved: Callable[[str, Selection, LayerPlayback], None] = lambda window, shown, layers: None
-        self.record_scene = record_scene
 
     def watch(self, moved: Callable[[str, Selection, LayerPlayback], None]) -> None:
         """Call `moved` with the window, what it shows and how it plays layers when a scene's own controls, playback or

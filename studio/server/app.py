@@ -14,10 +14,10 @@ from typing import Any
 from fastapi import FastAPI
 from starlette.staticfiles import StaticFiles
 
+from studio.foundations.package import assets_folder
 from studio.inspection.likelihoods import forget_evaluations, let_evaluations_rest
 from studio.jobs.control import StudioControl
 from studio.runs.overlay_pictures import forget_composers, let_composers_rest
-from studio.runs.self_contained import assets_folder
 from studio.scene.window_scenes import WindowScenes
 from studio.server import (
     alignment_routes,

@@ -11,7 +11,6 @@ from pydantic import Field
 from studio.behaviour.settings import LearningSettings
 from studio.body.catalogue import list_bodies, load_body
 from studio.errors import BehaviourError, NotFoundError
-from studio.footage_recipes import recipe_names
 from studio.jobs.job_runner import Job, JobKind, SessionJob
 from studio.jobs.learning_process import LearningOrder, learn_in_process
 from studio.knobs import knobs_of
@@ -25,8 +24,9 @@ from studio.server.upload_routes import forget, upload_folder
 from studio.sessions.archives import ENDINGS, unpacked
 from studio.sessions.names import checked_name
 from studio.sessions.session import BODIES_NAME
+from studio.synthesis.recipe_file import recipe_names
 from studio.training.oversampling import OversamplingSettings
-from studio.training.sources import FPS, MOTION_FILES
+from studio.training.recordings import FPS, MOTION_FILES
 
 router = APIRouter(prefix="/api/learning", tags=["behaviours"])
 

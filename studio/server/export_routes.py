@@ -137,15 +137,7 @@ async def begin_export(session: OpenSession, run: OpenRun, request: ExportReques
     settled(form, request.options)
 
     def work(job: Job) -> dict[str, object]:
-        kept = export_into_run(
-            session,
-            run,
-            form,
-            request.options,
-            progress=job.report_or_stop,
-            record_scene=app.scenes.record_scene,
-        )
-        return {"result": kept}
+        return {"result": export_into_run(session, run, form, request.options, progress=job.report_or_stop)}
 
     state = ExportState(session=session.name, run=run.name, format=form.name)
     return app.jobs.begin(EXPORT, state, work)

@@ -16,9 +16,9 @@ from studio.behaviour.settings import LearningSettings
 from studio.declaring import REQUIRED, Knobs, Operation, Parameter, declared
 from studio.errors import NotFoundError
 from studio.evidence.settings import EvidenceSettings
+from studio.foundations.package import assets_folder
 from studio.knobs import Knob, Value, allowed, knobs_of
 from studio.likelihood.catalogue import WEIGHTINGS
-from studio.runs.self_contained import assets_folder
 from studio.server.pages import NAME, html_page
 from studio.server.schemas import Answer
 from studio.settings import RecordingSettings, all_knobs, default_settings

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 from starlette.responses import HTMLResponse
 
-from studio.runs.self_contained import assets_folder
+from studio.foundations.package import assets_folder
 from studio.server.access import MAKING_PAGES, VIEWING
 
 PLACE = re.compile(r"\{\{(\w+)\}\}")

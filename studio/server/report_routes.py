@@ -12,8 +12,8 @@ from studio.comparison.findings_document import REPORT, REPRODUCTIONS, RESULTS, 
 from studio.errors import NotFoundError, SessionError
 from studio.foreign_files import read_file
 from studio.jobs.job_runner import Job, JobKind, SessionJob
-from studio.reproductions import ALL, reproduce
-from studio.reproductions import experiments as known_experiments
+from studio.results.experiments import ALL
+from studio.results.experiments import experiments as known_experiments
 from studio.server.app_state import App, AppState
 from studio.server.schemas import Answer, Request
 from studio.typed_decoding import decode_json
@@ -86,7 +86,7 @@ REPRODUCTION = JobKind(
 @router.get("/api/reports/experiments")
 def experiments(app: App) -> ExperimentList:
     """The papers' experiments that can be run again, and how the one stands that was begun last."""
-    listed = [ExperimentView.of(one) for one in known_experiments()]
+    listed = [ExperimentView.of(one) for one in known_experiments().lines()]
     return ExperimentList(experiments=listed, job=app.jobs.known(REPRODUCTION, KEY))
 
 
@@ -95,15 +95,15 @@ def begin_experiment(request: ReproductionRequest, app: App) -> ReproductionStat
     """Begin to run an experiment again, in the background (`reproduction` events). What is measured is kept as it
     comes: begun again it goes on where it was stopped.
     """
-    if request.name != ALL and request.name not in [one.name for one in known_experiments()]:
+    if request.name != ALL and request.name not in [one.name for one in known_experiments().lines()]:
         raise NotFoundError(f"There is no experiment '{request.name}'.", "Choose one of the list.")
     folder = _folder(app)
 
     def work(job: Job) -> dict[str, object]:
-        found = reproduce(
+        counts = known_experiments().reproduce(
             request.name, folder, quick=request.quick, seeds=request.seeds, progress=job.report_or_stop
         )
-        return REPRODUCTION.entries(found)
+        return REPRODUCTION.entries(counts)
 
     return app.jobs.begin(REPRODUCTION, ReproductionState(name=request.name, quick=request.quick), work)
 

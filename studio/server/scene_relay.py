@@ -22,7 +22,7 @@ from websockets.typing import Subprotocol
 
 from studio.errors import StudioError
 from studio.foreign_files import read_file
-from studio.runs.self_contained import assets_folder
+from studio.foundations.package import assets_folder
 from studio.server.access import VIEWING
 from studio.server.app_state import AppState
 from studio.server.windows import WindowInPath

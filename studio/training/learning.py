@@ -3,7 +3,6 @@
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -14,9 +13,8 @@ from studio.behaviour.settings import LearningSettings
 from studio.body.model import BodyModel
 from studio.errors import StudioError
 from studio.progress import Progress, unheard
-from studio.sessions.workspace import Workspace
 from studio.training.oversampling import OversamplingSettings, oversampled
-from studio.training.sources import FPS, Recording, expand, read_source
+from studio.training.recordings import Recording
 
 TEST_SHARE = 0.2
 FEWEST_FOR_A_TEST = 20
@@ -36,32 +34,6 @@ class Learnt:
     states: int
     entropy_train: float
     entropy_test: float
-
-
-def read_sources(
-    sources: Sequence[str | Path],
-    body: BodyModel,
-    skeleton: Path | None = None,
-    *,
-    fps: float = FPS,
-    workspace: Workspace | None = None,
-    progress: Progress = unheard,
-) -> tuple[Recording, ...]:
-    """The recordings of all sources in order, folders expanded. progress : called with the source's name. Raises
-    StudioError.
-    """
-    names = [name for source in sources for name in expand(source)]
-    if not names:
-        raise StudioError("There is no recording to learn from.", "Name motion files or runs.")
-    found: list[Recording] = []
-    for number, name in enumerate(names, start=1):
-        words = f"{Path(name).name} ({number} of {len(names)})"
-
-        def report(_step: str, done: int, total: int, words: str = words) -> None:
-            progress(words, done, total)
-
-        found.append(read_source(name, body, skeleton, fps=fps, workspace=workspace, progress=report))
-    return tuple(found)
 
 
 def parted(recordings: Sequence[Recording]) -> tuple[tuple[Recording, ...], tuple[Recording, ...]]:

@@ -2,7 +2,8 @@
 
 import re
 
-from studio.runs.self_contained import assets_folder, modules_of
+from studio.foundations.package import assets_folder
+from studio.runs.self_contained import modules_of
 
 IMPORTED = re.compile(r'(?:from|import)\s*"([^"]+)"')
 

@@ -7,10 +7,10 @@ from urllib.parse import urlsplit
 
 from playwright.sync_api import Browser, Route
 
+from studio.foundations.package import assets_folder
 from studio.inspection.reading import InspectedRun
 from studio.inspection.tables import Selection, Viewed
 from studio.inspection.views import look
-from studio.runs.self_contained import assets_folder
 
 ADDRESS = "http://drawings.test/"
 BLANK = (

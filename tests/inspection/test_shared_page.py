@@ -13,11 +13,11 @@ import studio
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import extremities
 from studio.errors import NotFoundError, RunError, SessionError
+from studio.foundations.package import INSTALLED_ASSETS
 from studio.inspection import shared_page as room
 from studio.inspection.limbs import errors_of
 from studio.inspection.reading import InspectedRun
 from studio.inspection.shared_page import shared_page
-from studio.runs.self_contained import INSTALLED
 from studio.runs.tracks import RAW, read_track
 
 
@@ -133,7 +133,7 @@ def test_the_verb_writes_the_page_and_names_what_is_wrong(run: InspectedRun, tmp
 
 def test_installed_pages_are_looked_for_where_the_wheel_has_them() -> None:
     build = (Path(__file__).resolve().parents[2] / "hatch_build.py").read_text()
-    assert f'"web_assets": "studio/{INSTALLED}"' in build
+    assert f'"web_assets": "studio/{INSTALLED_ASSETS}"' in build
 
 
 def test_the_particles_of_chosen_frames_are_those_of_the_store(run: InspectedRun) -> None:

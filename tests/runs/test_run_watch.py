@@ -13,13 +13,13 @@ from studio.behaviour.model_learning import learn_model
 from studio.behaviour.settings import LearningSettings
 from studio.body.forward_kinematics import marker_points
 from studio.motion_files.trc import read_trc
+from studio.results.motion_sources import read_source
 from studio.runs.new_run import prepare_run
 from studio.runs.reannealing import Reannealing
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.synthesis.recipes import synthesize
 from studio.trackers.tracker import LIMB_LOST, LOST, NO_EVIDENCE, RECOVERED, TRACKED, FrameResult
-from studio.training.sources import read_source
 
 STEP, FPS = 3, 20.0
 SMALL = {"particles": 100, "layers": 6}

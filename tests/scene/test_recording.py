@@ -12,7 +12,7 @@ from studio.errors import ExportError
 from studio.export.exporting import export_run
 from studio.export.formats import FORMATS
 from studio.runs.tracks import Track, write_track
-from studio.scene.recording import read_recording, record_scene
+from studio.scene.recording import read_recording
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 
@@ -35,9 +35,7 @@ def run(tmp_path: Path) -> tuple[Session, StoredRun]:
 def test_limbs_move_as_tracked_and_hide_when_lost(run, tmp_path: Path, ending: str) -> None:
     session, stored = run
     place = tmp_path / f"scene.{ending}"
-    report = export_run(
-        session, stored, FORMATS[ending], {"track": "moved"}, place, record_scene=record_scene
-    )
+    report = export_run(session, stored, FORMATS[ending], {"track": "moved"}, place)
     assert report.notes[-1] == "The body is hidden in 1 frames."
     recording = read_recording(place)
     assert recording.seconds == pytest.approx(FRAMES / 60.0)

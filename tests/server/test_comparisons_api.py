@@ -17,7 +17,8 @@ from web_doubles import Studio
 from studio.comparison.candidates import Lineup
 from studio.comparison.folders import new_comparison, place_of
 from studio.comparison.plan import plan_comparison
-from studio.reproductions import TrialCounts
+from studio.reproduction.papers import PapersExperiments
+from studio.results.experiments import TrialCounts
 from studio.server import report_routes
 
 WISH = {
@@ -256,15 +257,22 @@ def test_a_sweep_says_what_it_takes_runs_behind_and_leaves_runs(compared: Studio
 def test_an_experiment_is_run_from_the_page(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
     go, asked = threading.Event(), list[tuple[object, ...]]()
 
-    def runs(
-        name: str, out: Path, *, quick: bool, seeds: int | None, progress: Callable[[str, int, int], None]
-    ) -> TrialCounts:
-        asked.append((name, out, quick, seeds))
-        while not go.wait(0.02):
-            progress("trials", 2, 7)
-        return TrialCounts(5, 2, 0)
+    class Waiting(PapersExperiments):
+        def reproduce(
+            self,
+            name: str,
+            out: Path,
+            *,
+            quick: bool,
+            seeds: int | None,
+            progress: Callable[[str, int, int], None],
+        ) -> TrialCounts:
+            asked.append((name, out, quick, seeds))
+            while not go.wait(0.02):
+                progress("trials", 2, 7)
+            return TrialCounts(5, 2, 0)
 
-    monkeypatch.setattr(report_routes, "reproduce", runs)
+    monkeypatch.setattr(report_routes, "known_experiments", Waiting)
     place = "/api/reports/experiments"
     listed = studio.client.get(place).json()
     assert listed["job"] is None

@@ -68,10 +68,9 @@ def test_videos_of_all_cameras_come_as_one_zip(studio: Studio, tracked: StoredRu
     assert exported(studio, "mp4", camera="cam2")["result"]["file"] == "take1-first-cam2.mp4"
 
 
-def test_the_scene_is_recorded_by_the_stage(studio: Studio, tracked: StoredRun) -> None:
+def test_the_scene_is_exported_as_a_page(studio: Studio, tracked: StoredRun) -> None:
     response = exported(studio, "html")
     assert response["state"] == "done", response
-    assert ("record", "first") in studio.stage.calls
     answer = studio.client.get(f"{RUN}/exports/{response['result']['file']}")
     assert answer.headers["content-type"] == "application/octet-stream"
     assert answer.headers["content-disposition"].startswith("attachment")
@@ -140,7 +139,7 @@ def test_an_export_can_be_cancelled(
             task.step("recording", 1, 4)
             time.sleep(0.01)
 
-    monkeypatch.setattr(studio.scenes, "record_scene", endless)
+    monkeypatch.setattr("studio.export.exporting.plugged_in", lambda name: endless)
     begun = studio.client.post(f"{RUN}/exports", json={"format": "viser"}).json()
     listed = studio.client.get(f"{RUN}/exports").json()
     assert [entry["identifier"] for entry in listed["running"]] == [begun["identifier"]]

@@ -9,10 +9,10 @@ from web_doubles import TOKEN, Studio
 
 from studio.comparison.findings import VERDICTS
 from studio.evidence.settings import EvidenceSettings
+from studio.foundations.package import assets_folder
 from studio.knobs import knobs_of
 from studio.likelihood.catalogue import WEIGHTINGS
 from studio.reproduction.catalogue import EXPERIMENTS
-from studio.runs.self_contained import assets_folder
 from studio.scene.model import Selection
 from studio.server.guide_routes import COURSE, anchor_of
 from studio.server.pages import PLACES

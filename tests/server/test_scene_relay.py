@@ -25,7 +25,7 @@ from web_doubles import (
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from studio.runs.self_contained import assets_folder
+from studio.foundations.package import assets_folder
 from studio.scene.guarded_server import GuardedServer
 from studio.server.app import build_app
 from studio.sessions.workspace import Workspace

@@ -16,7 +16,6 @@ from fastapi import FastAPI
 from studio.arrays import Bytes
 from studio.body.model import BodyModel
 from studio.errors import RunError
-from studio.export.task import ExportTask, Written
 from studio.jobs.commands import ChangeSettings, Command
 from studio.jobs.events import Event, StateChanged
 from studio.jobs.watchers import Subscription, Watchers
@@ -176,9 +175,6 @@ class RecordingScenes:
     moved: Callable[[str, Selection, LayerPlayback], None] | None = None
     unused: list[set[str]] = field(default_factory=list)
 
-    def __post_init__(self) -> None:
-        self.record_scene = self._record
-
     def scene(self, window: str, bare: bool = False) -> RecordingStage:
         return self.by_window.setdefault(window, RecordingStage() if window else self.plain)
 
@@ -203,11 +199,6 @@ class RecordingScenes:
 
     def stop(self) -> None:
         self.by_window.clear()
-
-    def _record(self, task: ExportTask) -> Written:
-        self.plain.calls.append(("record", task.run.name))
-        task.place.write_bytes(b"scene")
-        return Written((task.place,), "read back")
 
 
 @dataclass

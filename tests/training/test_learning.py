@@ -16,7 +16,7 @@ from studio.sessions.workspace import Workspace
 from studio.training.learning import learn, parted
 from studio.training.model_repository import keep_model, list_models, place_for_model
 from studio.training.oversampling import OversamplingSettings
-from studio.training.sources import Recording
+from studio.training.recordings import Recording
 
 BODY = load_body("planar_arm4")
 PLAIN = changed(OversamplingSettings(), {"smoothings": 2})

@@ -15,10 +15,10 @@ from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
 from studio.errors import BodyError, StudioError
 from studio.motion_files.trc import MarkerMotion, write_trc
+from studio.results.motion_sources import expand, read_source, recipe_recording
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
-from studio.training.sources import expand, read_source, recipe_recording
 
 BODY = load_body("human25")
 FPS = 30.0

@@ -34,8 +34,8 @@ from studio.synthesis.recipe_file import JOINED, find_recipe, read_recipe
 from studio.synthesis.recipes import recipe_motion
 from studio.training.learning import learn
 from studio.training.oversampling import OversamplingSettings, performed
+from studio.training.recordings import FPS, Recording, fitted_person
 from studio.training.resampling import frame_times
-from studio.training.sources import FPS, Recording, fitted_person
 from studio.training.targets import skeleton_of_body
 
 # What trials learn or fit once and share: folders of files beside the footage, each made by one process.

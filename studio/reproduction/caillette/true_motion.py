@@ -22,7 +22,7 @@ from studio.reproduction.caillette.training_set import made_once
 from studio.sessions.session import Session
 from studio.synthesis.recipe_file import read_recipe
 from studio.synthesis.recipes import RECIPE_COPY, recipe_motion, recipe_person
-from studio.training.sources import fitted_person
+from studio.training.recordings import fitted_person
 
 FILE = "truth.npz"
 SAME_MM = 0.1

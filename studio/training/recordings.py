@@ -1,11 +1,9 @@
-"""Recorded motion of any kind as poses of a body.
+"""Recorded motion as poses of a body: motion files (.amc with its .asf, .bvh, .npz, .c3d, .trc) and earlier runs.
 
-Motion files (.amc with its .asf, .bvh, .npz, .c3d, .trc), earlier runs (SESSION/RUN), and recipes of footage, whose
-motion is made without rendering it. A skeleton is retargeted to the synthetic one with the body's proportions; points
-are fitted by the body in the size given by their distances; a run of the same body is used unchanged.
+A skeleton is retargeted to the synthetic one with the body's proportions; points are fitted by the body in the size
+given by their distances; a run of the same body is used unchanged.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,16 +17,12 @@ from studio.body.person import PersonMotion, sampled
 from studio.body.retargeting import family_of, on_skeleton
 from studio.body.subject import Subject, fit_subject
 from studio.errors import StudioError
-from studio.footage_recipes import person_of_recipe, recipe_names
 from studio.motion_files.c3d import read_c3d
 from studio.motion_files.reading import read_recording
 from studio.motion_files.recorded_motion import RecordedMotion
 from studio.motion_files.trc import MarkerMotion, read_trc
 from studio.progress import Progress, unheard
-from studio.sessions.manifest import FILE_NAME as SESSION_FILE
-from studio.sessions.run_record import FILE_NAME as RUN_FILE
 from studio.sessions.stored_run import StoredRun
-from studio.sessions.workspace import Workspace
 from studio.training.marker_labels import person_markers
 from studio.training.pose_fitting import bad_frames, fit_poses
 from studio.training.resampling import frame_times, points_at, poses_at
@@ -36,7 +30,7 @@ from studio.training.targets import Targets, marker_names, of_person, of_poses, 
 
 FPS = 30.0
 FEWEST_FRAMES = 10
-SKELETON_FILES, POINT_FILES, RECIPE = (".amc", ".bvh", ".npz"), (".c3d", ".trc"), ".toml"
+SKELETON_FILES, POINT_FILES = (".amc", ".bvh", ".npz"), (".c3d", ".trc")
 MOTION_FILES = (*SKELETON_FILES, *POINT_FILES)
 # Pairs of markers whose distances give the person's size.
 MEASURED = (
@@ -74,78 +68,11 @@ class Recording:
         return len(self.poses)
 
 
-def read_source(
-    source: str | Path,
-    body: BodyModel,
-    skeleton: Path | None = None,
-    *,
-    fps: float = FPS,
-    workspace: Workspace | None = None,
-    progress: Progress = unheard,
-) -> Recording:
-    """The motion of a source on `body`, at `fps`.
-
-    source : a motion file, a recipe's file or name, a run's folder, or SESSION/RUN of the workspace. skeleton : the
-    ASF of an .amc; by default NN.asf beside NN_MM.amc. Raises StudioError for what cannot be read, bodies without a
-    person's markers, and motion of fewer than FEWEST_FRAMES frames.
-    """
-    path = Path(source).expanduser()
-    if path.is_file():
-        recording = _read_file(path, body, skeleton, fps, progress)
-    elif str(source) in recipe_names():
-        recording = recipe_recording(str(source), body, fps=fps, progress=progress)
-    else:
-        recording = _read_run(_find_run(str(source), workspace or Workspace()), body, fps, progress)
-    if recording.frame_count < FEWEST_FRAMES:
-        raise StudioError(
-            f"'{recording.name}' has {recording.frame_count} frames at {fps:g} frames a second.",
-            f"Give motion of at least {FEWEST_FRAMES} frames.",
-        )
-    return recording
-
-
-def expand(source: str | Path) -> tuple[str, ...]:
-    """The sources of a name: a folder's motion files in order, else the name itself.
-
-    Raises StudioError for a folder without motion, and a session's folder, naming its runs.
-    """
-    path = Path(source).expanduser()
-    if not path.is_dir() or (path / RUN_FILE).is_file():
-        return (str(source),)
-    if (path / SESSION_FILE).is_file():
-        raise _runs_of(path)
-    found = tuple(str(entry) for entry in sorted(path.iterdir()) if entry.suffix.lower() in MOTION_FILES)
-    if not found:
-        raise StudioError(
-            f"Folder '{path.name}' holds no motion.", f"Motion files end in {', '.join(MOTION_FILES)}."
-        )
-    return found
-
-
 def fitted_person(
     motion: PersonMotion, body: BodyModel, name: str, progress: Progress = unheard
 ) -> Recording:
     """The body moving as a synthetic person does, at the motion's rate."""
     return _fitted(of_person(motion), body, name, motion.fps, progress)
-
-
-def recipe_recording(
-    recipe: str | Path,
-    body: BodyModel,
-    *,
-    fps: float = FPS,
-    options: Mapping[str, float] | None = None,
-    frames: int | None = None,
-    progress: Progress = unheard,
-) -> Recording:
-    """The motion of a footage's recipe (a file or a bundled name) on the body's own proportions; nothing is rendered.
-
-    options : of the motion, in place of the recipe's ({"performance": 2} is the second performance of joined clips).
-    frames : instead of the recipe's, at its rate. Raises StudioError, for a recipe without a person too.
-    """
-    motion = person_of_recipe(recipe, skeleton_of_body(body), options=options, frames=frames)
-    times = frame_times((motion.frame_count - 1) / motion.fps, fps)
-    return fitted_person(sampled(motion, times, fps), body, Path(recipe).stem, progress)
 
 
 def _fitted(targets: Targets, body: BodyModel, name: str, fps: float, progress: Progress) -> Recording:
@@ -154,12 +81,11 @@ def _fitted(targets: Targets, body: BodyModel, name: str, fps: float, progress: 
     return Recording(name, fps, found.poses, rms, tuple(bad_frames(found.rms_mm).tolist()))
 
 
-def _read_file(
+def read_file(
     path: Path, body: BodyModel, skeleton: Path | None, fps: float, progress: Progress
 ) -> Recording:
+    """The motion of a file on `body`, at `fps`. skeleton : the ASF of an .amc. Raises StudioError."""
     ending = path.suffix.lower()
-    if ending == RECIPE:
-        return recipe_recording(path, body, fps=fps, progress=progress)
     if ending in SKELETON_FILES:
         marker_names(body)
         recorded = read_recording(path, skeleton if ending == ".amc" else None)
@@ -237,33 +163,8 @@ def _sized(body: BodyModel, targets: Targets) -> BodyModel:
     return fit_subject(body, Subject(body=body.name, lengths_mm=lengths))[0]
 
 
-def _find_run(source: str, workspace: Workspace) -> StoredRun:
-    """A run by its folder, or as SESSION/RUN. Raises StudioError that lists the kinds of source."""
-    folder = Path(source).expanduser()
-    if (folder / RUN_FILE).is_file():
-        return StoredRun(folder.absolute())
-    session, slash, run = source.rpartition("/")
-    if slash and folder.suffix.lower() not in (*MOTION_FILES, RECIPE):
-        try:
-            return workspace.resolve(session).run(run)
-        except StudioError as problem:
-            raise StudioError(f"Source '{source}': {problem.message}", problem.hint) from None
-    raise StudioError(
-        f"There is no motion '{source}'.",
-        f"Give a file ending in {', '.join(MOTION_FILES)}, a recipe, or a run as SESSION/RUN.",
-    )
-
-
-def _runs_of(folder: Path) -> StudioError:
-    runs = sorted(entry.parent.name for entry in folder.glob(f"runs/*/{RUN_FILE}"))
-    return StudioError(
-        f"'{folder.name}' is a session, not a motion.",
-        f"Name one of its runs: {', '.join(f'{folder.name}/{run}' for run in runs) or 'there is none yet'}.",
-    )
-
-
-def _read_run(run: StoredRun, body: BodyModel, fps: float, progress: Progress) -> Recording:
-    """The stored poses; another body is fitted to the markers of the tracked one."""
+def read_run(run: StoredRun, body: BodyModel, fps: float, progress: Progress) -> Recording:
+    """A run's stored poses, at `fps`; another body is fitted to the markers of the tracked one. Raises StudioError."""
     name, own = f"{run.session_name}/{run.name}", run.body()
     with run.results() as results:
         frames, poses = results.poses()

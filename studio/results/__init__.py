@@ -1,0 +1,1 @@
+"""What is made of runs: views, measures, comparisons, files for other programs; and footage drawn with exact truth."""
