@@ -41,7 +41,7 @@ test: env browser
 	  || $(BIN)/pytest -m "browser and not slow" $$($(BIN)/python -c '$(FAILED)')
 
 # The rooms whose tests start servers and processes, or track whole runs, take most of the time.
-LONG_ROOMS := server runs jobs calibration reproduction sessions cli
+LONG_ROOMS := app runs operations garden sessions cli footage/calibration
 test-fast: env
 	$(BIN)/pytest $(WORKERS) -m "not slow and not browser" $(LONG_ROOMS:%=--ignore=tests/%)
 
@@ -61,7 +61,7 @@ fuzz: env
 
 # Sessions made to harm who opens them, through all commands and addresses; `HOSTILE="--few"` takes a part of these.
 hostile: env
-	PYTHONPATH=tests:tests/server $(BIN)/python -m hostile $(HOSTILE)
+	PYTHONPATH=tests:tests/app/server $(BIN)/python -m hostile $(HOSTILE)
 
 # Every verb beside every other on one session, by a server and other processes, some of which are killed;
 # `RACES="--seed 7 --groups 1"` fires a group again.
@@ -85,8 +85,8 @@ audit: env
 test-opencv-4: env
 	$(BIN)/python -m pip install --quiet --no-deps --upgrade --target $(VENV)/opencv-4 opencv-python-headless==4.10.0.84
 	PYTHONPATH=$(VENV)/opencv-4 $(BIN)/python -c "import cv2; assert cv2.__version__ == '4.10.0'"
-	PYTHONPATH=$(VENV)/opencv-4 $(BIN)/pytest -m "not slow and not browser" tests/calibration tests/capture \
-	  tests/evidence tests/runs tests/sessions tests/export
+	PYTHONPATH=$(VENV)/opencv-4 $(BIN)/pytest -m "not slow and not browser" tests/footage/calibration tests/footage/capture \
+	  tests/evidence tests/runs tests/sessions tests/results/export
 
 # Side by side: types in Python take as long as the rest together.
 check: env $(TOOLS)
@@ -104,7 +104,7 @@ check-style: env
 # are formatted and checked for nulls besides, the older modules that they import are not yet.
 check-pages: env $(TOOLS)
 	mkdir -p build
-	$(BIN)/python -m studio.server.api_document > build/openapi.json
+	$(BIN)/python -m studio.app.server.api_document > build/openapi.json
 	$(NODE) node_modules/openapi-typescript/bin/cli.js build/openapi.json -o build/api.d.ts --default-non-nullable=false
 	$(NODE) node_modules/@biomejs/biome/bin/biome lint --error-on-warnings
 	$(NODE) node_modules/@biomejs/biome/bin/biome format
@@ -121,7 +121,7 @@ bench: env
 # How cost grows with particles, cameras, limbs, pixels, frames, runs; makes studio/SCALE.md. About ten minutes.
 growth: env
 	mkdir -p build
-	$(BIN)/python -m studio.benchmarks.growth --json build/growth.json --document studio/SCALE.md
+	$(BIN)/python -m studio.garden.benchmarks.growth --json build/growth.json --document studio/SCALE.md
 
 # Lock with hashes and without download addresses; run after changing the dependencies in pyproject.toml.
 lock:

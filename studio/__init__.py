@@ -8,8 +8,8 @@ use, so that `import studio` costs nothing.
 import importlib
 
 _VERBS = {
-    "studio.diagnostics_archive": ("diagnostics",),
-    "studio.errors": ("StudioError",),
+    "studio.cli.diagnostics_archive": ("diagnostics",),
+    "studio.foundations.errors": ("StudioError",),
     "studio.operations.behaviours": ("learn", "models"),
     "studio.operations.cameras": ("align", "board", "calibrate", "level", "unalign"),
     "studio.operations.comparing": ("compare", "sweep"),
@@ -61,7 +61,7 @@ _VERBS = {
         "resume_live",
         "track",
     ),
-    "studio.self_check": ("doctor",),
+    "studio.cli.self_check": ("doctor",),
 }
 _MODULE_OF = {name: module for module, names in _VERBS.items() for name in names}
 

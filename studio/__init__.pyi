@@ -1,7 +1,8 @@
 # What editors and type checkers know of `studio`: the verbs, which `__init__.py` imports on first use.
 
-from studio.diagnostics_archive import diagnostics as diagnostics
-from studio.errors import StudioError as StudioError
+from studio.cli.diagnostics_archive import diagnostics as diagnostics
+from studio.cli.self_check import doctor as doctor
+from studio.foundations.errors import StudioError as StudioError
 from studio.operations.behaviours import learn as learn
 from studio.operations.behaviours import models as models
 from studio.operations.cameras import align as align
@@ -62,4 +63,3 @@ from studio.operations.tracking import new_run as new_run
 from studio.operations.tracking import replay as replay
 from studio.operations.tracking import resume_live as resume_live
 from studio.operations.tracking import track as track
-from studio.self_check import doctor as doctor

@@ -7,15 +7,15 @@ import numpy as np
 
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_ends
-from studio.capture.calibration_files import write_calibration
-from studio.capture.footage_source import CameraSource, FootageSource
-from studio.geometry.camera import Camera
-from studio.geometry.projection import project
-from studio.likelihood.outlines import OutlineProjector
-from studio.runs.overlay_drawing import projected_silhouette
+from studio.footage.capture.calibration_files import write_calibration
+from studio.footage.capture.footage_source import CameraSource, FootageSource
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.geometry.projection import project
+from studio.results.drawing_footage.cameras import placed_camera
+from studio.runs.drawing.overlay_drawing import projected_silhouette
+from studio.search.likelihood.outlines import OutlineProjector
 from studio.sessions.manifest import SessionManifest, now, write_manifest
 from studio.sessions.session import Session
-from studio.synthesis.cameras import placed_camera
 
 BODY, SIZE = "human31", (640, 480)
 WOOD, CLOTH, SHADE = np.array([80.0, 120.0, 160.0]), np.array([150.0, 60.0, 40.0]), 0.7

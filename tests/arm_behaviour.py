@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 from toy_session import BODY
 
-from studio.behaviour.model import BehaviourModel
-from studio.behaviour.model_file import write_model
-from studio.behaviour.model_learning import learn_model
-from studio.behaviour.settings import LearningSettings
 from studio.body.catalogue import load_body
 from studio.runs.behaviour_models import SUFFIX, models_folder
+from studio.search.behaviour.model import BehaviourModel
+from studio.search.behaviour.model_file import write_model
+from studio.search.behaviour.model_learning import learn_model
+from studio.search.behaviour.settings import LearningSettings
 
 FPS = 60.0
 SETTINGS = LearningSettings(most_clusters=8, reduced_dimensions=4, memory=4, least_probability=0.002)

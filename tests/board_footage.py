@@ -7,14 +7,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Array, Bytes
-from studio.calibration.board_pdf import drawn
-from studio.calibration.boards import Board
-from studio.geometry.camera import Camera
-from studio.geometry.projection import project
-from studio.geometry.rigid import rigid, transform
-from studio.geometry.rotations import axis_turn, rotation_from_vector
-from studio.synthesis.cameras import pixel_rays
+from studio.footage.calibration.board_pdf import drawn
+from studio.footage.calibration.boards import Board
+from studio.foundations.arrays import Array, Bytes
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.geometry.projection import project
+from studio.foundations.geometry.rigid import rigid, transform
+from studio.foundations.geometry.rotations import axis_turn, rotation_from_vector
+from studio.results.drawing_footage.cameras import pixel_rays
 
 LARGEST_TEXTURE = 3000.0
 LEVELS = 5

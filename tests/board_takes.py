@@ -8,12 +8,12 @@ import cv2
 import numpy as np
 from board_footage import BoardRenderer, close_boards, floor_board, waved_boards
 
-from studio.calibration.boards import Board
-from studio.capture.footage_source import CameraSource, FootageSource
-from studio.geometry.camera import Camera
+from studio.footage.calibration.boards import Board
+from studio.footage.capture.footage_source import CameraSource, FootageSource
+from studio.foundations.geometry.camera import Camera
+from studio.results.drawing_footage.cameras import placed_camera
 from studio.sessions.manifest import SessionManifest, now, write_manifest
 from studio.sessions.session import Session
-from studio.synthesis.cameras import placed_camera
 
 BOARD = Board("charuco", 6, 5, 120.0, 90.0, "DICT_4X4_50")
 PLACES = ((2600.0, -900.0, 1500.0), (2600.0, 900.0, 1900.0))

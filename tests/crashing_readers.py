@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from studio.errors import FootageError
+from studio.foundations.errors import FootageError
 
 
 def crash(path: Path) -> None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from studio.volume.blob_model import BlobMixture
+from studio.evidence.volume.blob_model import BlobMixture
 
 Array = np.ndarray
 

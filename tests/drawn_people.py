@@ -5,12 +5,12 @@ import numpy as np
 from looking_cameras import turned_to
 from numpy.typing import NDArray
 
-from studio.arrays import Array
 from studio.body.forward_kinematics import limb_frames
 from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
-from studio.geometry.camera import Camera
-from studio.geometry.projection import project
+from studio.foundations.arrays import Array
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.geometry.projection import project
 
 RING = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
 

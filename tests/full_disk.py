@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from studio.errors import SessionError
+from studio.foundations.errors import SessionError
 from studio.sessions.results_store import ResultsWriter
 
 BEFORE, ROLLED_BACK, AFTER, STUCK = "before", "rolled back", "after", "stuck"

@@ -11,27 +11,27 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT)]
 
-from studio.capture.calibration_files import read_calibration  # noqa: E402
-from studio.geometry.camera import Camera  # noqa: E402
+from studio.footage.capture.calibration_files import read_calibration  # noqa: E402
+from studio.foundations.geometry.camera import Camera  # noqa: E402
 from studio.operations.gallery import CARDS, GALLERY_PICTURES  # noqa: E402
-from studio.sessions.session import jpeg  # noqa: E402
-from studio.synthesis.body_footage import render_body  # noqa: E402
-from studio.synthesis.person_footage import recipe_renderer  # noqa: E402
-from studio.synthesis.real_data import located  # noqa: E402
-from studio.synthesis.recipe_file import (  # noqa: E402
+from studio.results.drawing_footage.body_footage import render_body  # noqa: E402
+from studio.results.drawing_footage.person_footage import recipe_renderer  # noqa: E402
+from studio.results.drawing_footage.real_data import located  # noqa: E402
+from studio.results.drawing_footage.recipe_file import (  # noqa: E402
     KEYS,
     Recipe,
     find_recipe,
     read_recipe,
     recipe_cameras,
 )
-from studio.synthesis.recipes import (  # noqa: E402
+from studio.results.drawing_footage.recipes import (  # noqa: E402
     RenderedPerson,
     dressed,
     people_beside,
     recipe_motion,
     recipe_person,
 )
+from studio.sessions.session import jpeg  # noqa: E402
 
 
 def cameras_of(recipe: Recipe, folder: Path, rng: np.random.Generator) -> tuple[Camera, ...]:

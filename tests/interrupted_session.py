@@ -8,10 +8,10 @@ import cv2
 import msgspec
 import numpy as np
 
-from studio.capture.footage_source import FootageSource
+from studio.footage.capture.footage_source import FootageSource
+from studio.results.drawing_footage.clips import ClipWriter
 from studio.sessions.manifest import write_manifest
 from studio.sessions.session import Session
-from studio.synthesis.clips import ClipWriter
 
 BLACK, GONE = "black", "gone"
 

@@ -7,9 +7,9 @@ from typing import Any
 
 from toy_session import true_poses
 
-from studio.capture.frame_clock import ReplayClock
-from studio.runs.live_problems import LiveProblems
-from studio.runs.live_run import LiveRun
+from studio.footage.capture.frame_clock import ReplayClock
+from studio.runs.live.live_problems import LiveProblems
+from studio.runs.live.live_run import LiveRun
 from studio.runs.new_run import prepare_run
 from studio.runs.problem_source import ProblemSource
 from studio.runs.run_footage import footage_of

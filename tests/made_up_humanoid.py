@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from studio.geometry.rotations import axis_turn
-from studio.motion_files.recorded_motion import RecordedMotion, moved_skeleton
+from studio.body.motion_files.recorded_motion import RecordedMotion, moved_skeleton
+from studio.foundations.geometry.rotations import axis_turn
 
 PARTS = ("upper_arm", "lower_arm", "hand", "thigh", "shin", "foot")
 NAMES = ("pelvis", "torso", "head", *(f"{side}_{part}" for side in ("right", "left") for part in PARTS))

@@ -5,9 +5,9 @@ from pathlib import Path
 import ezc3d
 import numpy as np
 
-from studio.arrays import Array
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
+from studio.foundations.arrays import Array
 
 
 def standing(body: BodyModel, **angles: float) -> Array:

@@ -9,13 +9,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.capture.calibration_files import write_calibration
-from studio.capture.footage_source import CameraSource, FootageSource
-from studio.geometry.camera import Camera
-from studio.geometry.rotations import rotation_from_vector
+from studio.footage.capture.calibration_files import write_calibration
+from studio.footage.capture.footage_source import CameraSource, FootageSource
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.geometry.rotations import rotation_from_vector
+from studio.results.drawing_footage.cameras import placed_camera
 from studio.sessions.manifest import SessionManifest, now, write_manifest
 from studio.sessions.session import Session
-from studio.synthesis.cameras import placed_camera
 
 FRAMES, SIZE, FOCAL = 8, (640, 480), 620.0
 NUDGED, DEGREES = "cam2", 1.2

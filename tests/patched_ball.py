@@ -8,15 +8,15 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from studio.arrays import Bytes
-from studio.capture.calibration_files import write_calibration
-from studio.capture.footage_source import CameraSource, FootageSource
 from studio.evidence.strokes import Stroke
-from studio.geometry.camera import Camera
-from studio.geometry.projection import project
+from studio.footage.capture.calibration_files import write_calibration
+from studio.footage.capture.footage_source import CameraSource, FootageSource
+from studio.foundations.arrays import Bytes
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.geometry.projection import project
+from studio.results.drawing_footage.cameras import placed_camera
 from studio.sessions.manifest import SessionManifest, now, write_manifest
 from studio.sessions.session import Session
-from studio.synthesis.cameras import placed_camera
 
 FRAMES, SIZE, FOCAL, RADIUS = 6, (240, 180), 165.0, 300.0
 PLACES = ((3200.0, 0.0), (-1600.0, 2800.0), (-1600.0, -2800.0))

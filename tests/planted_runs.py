@@ -11,25 +11,25 @@ from drawn_people import drawn_mask, ring_of_cameras
 from numpy.typing import NDArray
 from tracked_runs import finish
 
-from studio.arrays import Array
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
 from studio.body.inverse_kinematics import pose_from_markers
 from studio.body.model import BodyModel
+from studio.body.motion_files.trc import MarkerMotion, write_trc
 from studio.body.person import marker_motion
-from studio.capture.calibration_files import write_calibration
-from studio.capture.footage_source import CameraSource, FootageSource
-from studio.geometry.camera import Camera
-from studio.motion_files.trc import MarkerMotion, write_trc
+from studio.footage.capture.calibration_files import write_calibration
+from studio.footage.capture.footage_source import CameraSource, FootageSource
+from studio.foundations.arrays import Array
+from studio.foundations.geometry.camera import Camera
+from studio.results.drawing_footage.damage import turned_camera
+from studio.results.drawing_footage.motions import make_motion
+from studio.results.drawing_footage.person import skeleton_of_height
 from studio.runs.new_run import prepare_run
+from studio.search.trackers.side_exchange import kinds_of
 from studio.sessions.manifest import SessionManifest, now, write_manifest
 from studio.sessions.named_rows import write_pose
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.synthesis.damage import turned_camera
-from studio.synthesis.motions import make_motion
-from studio.synthesis.person import skeleton_of_height
-from studio.trackers.side_exchange import kinds_of
 
 FPS, BODY = 60.0, "human31"
 PARTICLES, LAYERS, FRAMES = 40, 4, 5

@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 from store_records import layer_of, result_of
 
 from studio.body.inverse_kinematics import pose_from_markers
-from studio.evaluation.errors import rows_of_frames
-from studio.motion_files.trc import read_trc
+from studio.body.motion_files.trc import read_trc
+from studio.results.evaluation.errors import rows_of_frames
 from studio.runs.new_run import prepare_run
+from studio.search.trackers.side_exchange import kinds_of
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.trackers.side_exchange import kinds_of
 
 LAST, EXCHANGED = 36, range(12, 28)
 

@@ -4,12 +4,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Array
 from studio.body.person import SIDES, PersonMotion, Skeleton, joint_points
-from studio.geometry.camera import Camera
-from studio.geometry.projection import project
-from studio.geometry.rotations import axis_turn
-from studio.synthesis.gait import add_arm, trunk
+from studio.foundations.arrays import Array
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.geometry.projection import project
+from studio.foundations.geometry.rotations import axis_turn
+from studio.results.drawing_footage.gait import add_arm, trunk
 
 Masks = dict[int, dict[str, NDArray[np.uint8]]]
 

@@ -6,18 +6,18 @@ from pathlib import Path
 
 import numpy as np
 
+from studio.body.motion_files.trc import write_trc
 from studio.body.person import SIDES, PersonMotion, Skeleton, joint_points, marker_motion
 from studio.body.subject import Subject, write_subject
-from studio.capture.calibration_files import write_calibration
-from studio.geometry.camera import Camera
-from studio.geometry.rotations import axis_turn
-from studio.motion_files.trc import write_trc
+from studio.footage.capture.calibration_files import write_calibration
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.geometry.rotations import axis_turn
+from studio.results.drawing_footage.gait import add_arm, trunk
+from studio.results.drawing_footage.person import yaw_pitch_roll
+from studio.results.drawing_footage.person_footage import render_person
+from studio.results.drawing_footage.recipe_file import Recipe
 from studio.sessions.importers.importing import ImportOptions, import_source
 from studio.sessions.session import Session
-from studio.synthesis.gait import add_arm, trunk
-from studio.synthesis.person import yaw_pitch_roll
-from studio.synthesis.person_footage import render_person
-from studio.synthesis.recipe_file import Recipe
 
 FPS = 60.0
 """A sole may be this many ankle heights above the floor: the lower foot stands."""

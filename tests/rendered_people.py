@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from sized_people import drawn_and_seen, renderer_of
 
-from studio.arrays import Array, Bytes
 from studio.body.person import PersonMotion
-from studio.geometry.camera import Camera
-from studio.synthesis.cameras import RIGS
-from studio.synthesis.motions import make_motion
+from studio.foundations.arrays import Array, Bytes
+from studio.foundations.geometry.camera import Camera
+from studio.results.drawing_footage.cameras import RIGS
+from studio.results.drawing_footage.motions import make_motion
 
 SIZE = (480, 360)
 FPS = 60.0

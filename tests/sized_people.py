@@ -4,20 +4,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from studio.arrays import Array
 from studio.body.catalogue import load_body
 from studio.body.inverse_kinematics import pose_from_markers
 from studio.body.model import BodyModel
 from studio.body.person import PersonMotion, Skeleton, marker_motion
 from studio.body.subject import Subject, fit_subject
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
-from studio.geometry.camera import Camera
-from studio.synthesis.cameras import RIGS
-from studio.synthesis.motions import make_motion
-from studio.synthesis.person import marker_lengths, skeleton_of_height
-from studio.synthesis.renderer import Renderer
-from studio.synthesis.rooms import ROOMS
-from studio.synthesis.wardrobes import WARDROBES
+from studio.foundations.arrays import Array
+from studio.foundations.geometry.camera import Camera
+from studio.results.drawing_footage.cameras import RIGS
+from studio.results.drawing_footage.motions import make_motion
+from studio.results.drawing_footage.person import marker_lengths, skeleton_of_height
+from studio.results.drawing_footage.renderer import Renderer
+from studio.results.drawing_footage.rooms import ROOMS
+from studio.results.drawing_footage.wardrobes import WARDROBES
 
 SIZE = (640, 480)
 POSTURES = (("run", 12), ("handstand", 24), ("box", 96), ("run", 26), ("box", 70))

@@ -8,12 +8,12 @@ import numpy as np
 from sized_people import MEASURED, SIZE, drawn_and_seen, renderer_of
 
 from studio.body.person import PersonMotion, Skeleton
-from studio.capture.calibration_files import write_calibration
-from studio.capture.footage_source import CameraSource, FootageSource
+from studio.footage.capture.calibration_files import write_calibration
+from studio.footage.capture.footage_source import CameraSource, FootageSource
+from studio.results.drawing_footage.motions import make_motion
+from studio.results.drawing_footage.person import marker_lengths
 from studio.sessions.manifest import SessionManifest, now, write_manifest
 from studio.sessions.session import Session
-from studio.synthesis.motions import make_motion
-from studio.synthesis.person import marker_lengths
 
 POSTURES = (("walk", 40), ("run", 12), ("box", 70), ("run", 26), ("box", 96))
 """Motions and frames of them at 60 Hz, one frame of the session each."""

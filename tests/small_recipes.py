@@ -5,7 +5,7 @@ from pathlib import Path
 
 import tomli_w
 
-from studio.synthesis.recipe_file import find_recipe
+from studio.results.drawing_footage.recipe_file import find_recipe
 
 
 def small(folder: Path, name: str, **changes: object) -> Path:

@@ -3,10 +3,10 @@
 import numpy as np
 
 from studio.runs.search_space import default_sigma, parameter_names
+from studio.search.trackers.tracker import Estimate, FilterState, FrameResult, LayerRecord, ParticleSet
 from studio.sessions.manifest import now
 from studio.sessions.run_record import RunRecord
 from studio.sessions.session import Session
-from studio.trackers.tracker import Estimate, FilterState, FrameResult, LayerRecord, ParticleSet
 
 
 def layer_of(frame: int, layer: int, *, count: int = 12, size: int = 4) -> LayerRecord:

@@ -6,7 +6,7 @@ import numpy as np
 
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
-from studio.motion_files.trc import MarkerMotion, write_trc
+from studio.body.motion_files.trc import MarkerMotion, write_trc
 
 
 def swaying(folder: Path, frames: int = 60) -> Path:

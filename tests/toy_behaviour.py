@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from studio.arrays import Array
-from studio.behaviour.model import BehaviourModel
-from studio.behaviour.model_learning import learn_model
-from studio.behaviour.settings import LearningSettings
 from studio.body.catalogue import load_body
-from studio.knobs import changed
+from studio.foundations.arrays import Array
+from studio.foundations.knobs import changed
+from studio.search.behaviour.model import BehaviourModel
+from studio.search.behaviour.model_learning import learn_model
+from studio.search.behaviour.settings import LearningSettings
 
 FPS = 25.0
 SETTINGS = changed(

@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from studio.comparison.findings import Chart, Heat, Series, Table
-from studio.comparison.footage_cache import FootageCache
-from studio.comparison.statistics import number
-from studio.comparison.trials import Outcome, Scale, Trial
-from studio.errors import StudioError
-from studio.reproduction.experiment import Experiment, Part
+from studio.foundations.errors import StudioError
+from studio.garden.reproduction.experiment import Experiment, Part
+from studio.results.comparison.findings import Chart, Heat, Series, Table
+from studio.results.comparison.footage_cache import FootageCache
+from studio.results.comparison.statistics import number
+from studio.results.comparison.trials import Outcome, Scale, Trial
 
 SETTINGS = ("plain", "clever")
 

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from looking_cameras import turned_to
 
-from studio.geometry.camera import Camera
+from studio.foundations.geometry.camera import Camera
 
 BITS, BLOCK = 8, 16
 WIDTH, HEIGHT = BITS * BLOCK, 96

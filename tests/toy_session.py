@@ -10,11 +10,11 @@ import numpy as np
 
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_ends
-from studio.capture.calibration_files import write_calibration
-from studio.capture.footage_source import CameraSource, FootageSource
-from studio.geometry.camera import Camera
-from studio.geometry.projection import project
-from studio.geometry.rotations import rotation_from_vector
+from studio.footage.capture.calibration_files import write_calibration
+from studio.footage.capture.footage_source import CameraSource, FootageSource
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.geometry.projection import project
+from studio.foundations.geometry.rotations import rotation_from_vector
 from studio.sessions.manifest import SessionManifest, now, write_manifest
 from studio.sessions.session import Session
 

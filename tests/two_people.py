@@ -8,20 +8,20 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from studio.arrays import Array, Bytes
 from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
 from studio.body.subject import Subject, fit_subject, write_subject
-from studio.capture.calibration_files import write_calibration
-from studio.capture.footage_source import CameraSource, FootageSource
-from studio.likelihood.overlay import overlay_points
-from studio.runs.overlay_drawing import projected_silhouette
+from studio.footage.capture.calibration_files import write_calibration
+from studio.footage.capture.footage_source import CameraSource, FootageSource
+from studio.foundations.arrays import Array, Bytes
+from studio.results.drawing_footage.cameras import RIGS
+from studio.runs.drawing.overlay_drawing import projected_silhouette
 from studio.runs.search_space import parameter_names
+from studio.search.likelihood.overlay import overlay_points
+from studio.search.settings import default_settings
 from studio.sessions.manifest import SessionManifest, now, write_manifest
 from studio.sessions.named_rows import write_pose
 from studio.sessions.session import BESIDE, Session
-from studio.settings import default_settings
-from studio.synthesis.cameras import RIGS
 
 SIZE, BODY = (240, 180), "human31"
 HEIGHTS = (1780.0, 1650.0)

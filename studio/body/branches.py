@@ -10,9 +10,9 @@ import math
 
 import numpy as np
 
-from studio.arrays import Array
 from studio.body.forward_kinematics import joint_frames, marker_points
 from studio.body.model import TURN, BodyModel, Joint, kinematic_tables
+from studio.foundations.arrays import Array
 
 # Difference (mm; and share of a limb's cross-section) allowed to a rewritten body: rounding only.
 SAME = 1e-6

@@ -7,7 +7,7 @@ from studio.body.model import BodyModel
 from studio.body.reader import parse_body, read_body
 from studio.body.robots import ROBOT_SUFFIXES, is_robot, read_robot
 from studio.body.writing import body_text
-from studio.errors import BodyError
+from studio.foundations.errors import BodyError
 
 SUFFIX = ".toml"
 

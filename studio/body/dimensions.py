@@ -9,7 +9,7 @@ import numpy as np
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
 from studio.body.reader import assemble
-from studio.errors import BodyError
+from studio.foundations.errors import BodyError
 
 FOOT = "foot"
 

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from studio.arrays import Array, Indices
 from studio.body.branches import within_limits
 from studio.body.forward_kinematics import joint_frames, limb_ends
 from studio.body.inverse_kinematics import MM_PER_RADIAN
 from studio.body.least_squares import fitted_parameters, strictly_inside
 from studio.body.model import BodyModel, extremities
-from studio.errors import BodyError
-from studio.geometry.reach import within_reach
+from studio.foundations.arrays import Array, Indices
+from studio.foundations.errors import BodyError
+from studio.foundations.geometry.reach import within_reach
 
 REACHED = 1.0
 """mm; at this distance the chain has reached the target and the rest of the body stays."""

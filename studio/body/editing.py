@@ -20,7 +20,7 @@ from studio.body.model import BodyModel
 from studio.body.reader import parse_body
 from studio.body.subject import LONGEST_MM
 from studio.body.writing import body_text, sized_definition, unit_of
-from studio.errors import BodyError
+from studio.foundations.errors import BodyError
 
 SIZES = ("length", "radius_start", "radius_end", "scale_x", "scale_y")
 LIMITS = ("lower", "upper", "neutral", "max_step")

@@ -9,10 +9,10 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from studio.arrays import Array
 from studio.body.model import MOVE, BodyModel, kinematic_tables
-from studio.errors import BodyError
-from studio.numba_in_threads import KERNEL, njit
+from studio.foundations.arrays import Array
+from studio.foundations.errors import BodyError
+from studio.foundations.numba_in_threads import KERNEL, njit
 
 
 def joint_frames(body: BodyModel, poses: ArrayLike) -> Array:

@@ -12,12 +12,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from studio.arrays import Array, Indices
 from studio.body.branches import within_limits
 from studio.body.forward_kinematics import marker_points
 from studio.body.least_squares import fitted_parameters, strictly_inside
 from studio.body.model import BodyModel
-from studio.errors import BodyError
+from studio.foundations.arrays import Array, Indices
+from studio.foundations.errors import BodyError
 
 # Headings tried for the root, evenly around; starts that are fitted whole.
 HEADINGS = 8

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import scipy.optimize
 
-from studio.arrays import Array, Indices
+from studio.foundations.arrays import Array, Indices
 
 DIFFERENCE = 1e-5
 """Step of the central differences, of scaled parameters."""

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from studio.arrays import Array, Indices
 from studio.body.dimensions import with_dimensions
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
+from studio.foundations.arrays import Array, Indices
 
 # Bend of joints in an ordinary standing posture, and the largest change by it of a distance that is measured
 # standing.

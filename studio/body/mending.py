@@ -9,10 +9,10 @@ import numpy as np
 import scipy
 from scipy.spatial.transform import Rotation
 
-from studio.arrays import Array
 from studio.body.person import SIDES, PersonMotion, joint_points
 from studio.body.retargeting import FLOOR_SHARE, above_floor, smooth_above
-from studio.geometry.rotations import axis_turn, nearest_rotation
+from studio.foundations.arrays import Array
+from studio.foundations.geometry.rotations import axis_turn, nearest_rotation
 
 SMOOTHING_S = 0.04
 TURNED_OVER = 1.0  # trace of a turn by 90 degrees

@@ -8,15 +8,15 @@ import math
 
 import numpy as np
 
-from studio.arrays import Array, Indices
 from studio.body.branches import within_limits
 from studio.body.dragging import root_joint
 from studio.body.forward_kinematics import joint_frames, limb_ends
 from studio.body.inverse_kinematics import MM_PER_RADIAN
 from studio.body.least_squares import fitted_parameters, strictly_inside
 from studio.body.model import BodyModel
-from studio.errors import BodyError
-from studio.geometry.rotations import vector_from_rotation
+from studio.foundations.arrays import Array, Indices
+from studio.foundations.errors import BodyError
+from studio.foundations.geometry.rotations import vector_from_rotation
 
 SMALL = 1e-3
 UNEVEN = 5.0

@@ -12,10 +12,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from studio.arrays import Array, Indices, Mask
 from studio.body.definition import BodyDefinition
-from studio.errors import StudioError
-from studio.geometry.reach import within_reach
+from studio.foundations.arrays import Array, Indices, Mask
+from studio.foundations.errors import StudioError
+from studio.foundations.geometry.reach import within_reach
 
 MOVE, TURN = 0, 1
 

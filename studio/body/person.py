@@ -11,8 +11,8 @@ import numpy as np
 import scipy
 from scipy.spatial.transform import Rotation, RotationSpline
 
-from studio.arrays import Array
-from studio.motion_files.trc import MarkerMotion
+from studio.body.motion_files.trc import MarkerMotion
+from studio.foundations.arrays import Array
 
 SIDES = ("left", "right")
 # Frames before and after the sampled ones that the curves go through.

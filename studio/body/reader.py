@@ -13,9 +13,9 @@ import numpy as np
 
 from studio.body.definition import WORLD, BodyDefinition, JointEntry, ParameterEntry, StepEntry, split_sign
 from studio.body.model import MOVE, TURN, BodyModel, Joint, Limb, Marker, Parameter, Step
-from studio.errors import BodyError
-from studio.foreign_files import foreign_file, read_foreign_text
-from studio.typed_decoding import decode_toml, is_list
+from studio.foundations.errors import BodyError
+from studio.foundations.foreign_files import foreign_file, read_foreign_text
+from studio.foundations.typed_decoding import decode_toml, is_list
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_ .]*")
 

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from studio.arrays import Array
+from studio.body.motion_files.recorded_motion import RecordedMotion
 from studio.body.person import SIDES, PersonMotion, Skeleton, joint_points
-from studio.errors import StudioError
-from studio.geometry.rotations import frames_along
-from studio.motion_files.recorded_motion import RecordedMotion
+from studio.foundations.arrays import Array
+from studio.foundations.errors import StudioError
+from studio.foundations.geometry.rotations import frames_along
 
 Vector = tuple[float, float, float]
 

@@ -30,7 +30,6 @@ from typing import Any, Literal
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from studio.arrays import Array
 from studio.body.definition import (
     WORLD,
     BodyDefinition,
@@ -43,10 +42,11 @@ from studio.body.definition import (
 )
 from studio.body.model import BodyModel
 from studio.body.reader import assemble, check_definition
-from studio.errors import BodyError
-from studio.foreign_files import foreign_file, read_file
-from studio.isolated import isolated
-from studio.words import sentence
+from studio.foundations.arrays import Array
+from studio.foundations.errors import BodyError
+from studio.foundations.foreign_files import foreign_file, read_file
+from studio.foundations.isolated import isolated
+from studio.foundations.words import sentence
 
 ROBOT_SUFFIXES = (".urdf", ".xml", ".mjcf")
 THIN = 0.12

@@ -14,11 +14,11 @@ from typing import Literal
 
 import numpy as np
 
-from studio.arrays import Array
 from studio.body.definition import BodyDefinition, split_sign
 from studio.body.dimensions import with_dimensions
 from studio.body.model import BodyModel
-from studio.errors import BodyError
+from studio.foundations.arrays import Array
+from studio.foundations.errors import BodyError
 
 SIDE = re.compile(r"(^|_)(left|right)(_|$)")
 SMALL = ("foot_heel", "foot_drop", "ankle_height")

@@ -38,9 +38,9 @@ from studio.body.catalogue import load_body
 from studio.body.dimensions import with_dimensions
 from studio.body.marker_distances import MarkerDistances
 from studio.body.model import BodyModel
-from studio.errors import BodyError
-from studio.foreign_files import foreign_file, read_foreign_text
-from studio.typed_decoding import decode_toml
+from studio.foundations.errors import BodyError
+from studio.foundations.foreign_files import foreign_file, read_foreign_text
+from studio.foundations.typed_decoding import decode_toml
 
 DEFAULT_BODY = "human35"
 

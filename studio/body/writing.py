@@ -8,7 +8,7 @@ import msgspec
 
 from studio.body.definition import BodyDefinition
 from studio.body.model import BodyModel
-from studio.errors import BodyError
+from studio.foundations.errors import BodyError
 
 GROUPS = ("parameters", "joints", "limbs", "markers")
 

@@ -8,22 +8,22 @@ from typing import Any
 
 import click
 
-from studio.benchmarks.devices import run_device_benchmark
-from studio.benchmarks.first_frame import measure_starts
-from studio.benchmarks.hulls import run_hull_benchmark
-from studio.benchmarks.kernels import run_benchmark
-from studio.benchmarks.live import run_live_benchmark
-from studio.benchmarks.live_stages import in_words
-from studio.benchmarks.reannealing import measure_reannealing
-from studio.benchmarks.results_table import in_lines, remember, rows_of, this_machine
-from studio.benchmarks.whole_frames import DEFAULT, WORKLOADS, measure_frames
 from studio.cli.output import command, progress
-from studio.jobs.control import StudioControl
-from studio.progress import Progress
+from studio.foundations.progress import Progress
+from studio.foundations.typed_decoding import is_table
+from studio.garden.benchmarks.devices import run_device_benchmark
+from studio.garden.benchmarks.first_frame import measure_starts
+from studio.garden.benchmarks.hulls import run_hull_benchmark
+from studio.garden.benchmarks.kernels import run_benchmark
+from studio.garden.benchmarks.live import run_live_benchmark
+from studio.garden.benchmarks.live_stages import in_words
+from studio.garden.benchmarks.reannealing import measure_reannealing
+from studio.garden.benchmarks.results_table import in_lines, remember, rows_of, this_machine
+from studio.garden.benchmarks.whole_frames import DEFAULT, WORKLOADS, measure_frames
+from studio.operations.jobs.control import StudioControl
 from studio.runs.new_run import prepare_run
-from studio.runs.samples import install_sample
+from studio.sessions.samples import install_sample
 from studio.sessions.workspace import Workspace
-from studio.typed_decoding import is_table
 
 
 def _kernels(report: Progress) -> dict[str, object]:

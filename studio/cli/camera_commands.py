@@ -2,10 +2,10 @@
 
 import click
 
-from studio.calibration.lens_verdict import verdict
-from studio.calibration.report import report_of
 from studio.cli.deriving import Call, command_of
-from studio.errors import CalibrationError
+from studio.footage.calibration.lens_verdict import verdict
+from studio.footage.calibration.report import report_of
+from studio.foundations.errors import CalibrationError
 from studio.operations.cameras import (
     Alignment,
     Calibration,

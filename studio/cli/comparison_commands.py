@@ -6,10 +6,10 @@ import click
 
 from studio.cli.deriving import Call, command_of
 from studio.cli.reading import frame_range
-from studio.comparison.candidates import LINEUPS, VARIANTS, read_assignments
-from studio.comparison.comparison_findings import document, table_text
-from studio.comparison.sweep import read_grid, sweep_document, sweep_text
 from studio.operations.comparing import USUAL, Compared, SweptGrid, compare, sweep
+from studio.results.comparison.candidates import LINEUPS, VARIANTS, read_assignments
+from studio.results.comparison.comparison_findings import document, table_text
+from studio.results.comparison.sweep import read_grid, sweep_document, sweep_text
 
 LABELS = "\n".join(f"  {name}: {variant.help}" for name, variant in VARIANTS.items())
 GROUPS = "\n".join(f"  {name}: {', '.join(members)}" for name, members in LINEUPS.items())

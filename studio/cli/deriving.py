@@ -9,8 +9,17 @@ import click
 
 from studio.cli.output import MemberChoice, command, progress, shown_progress
 from studio.cli.reading import camera_numbers, chosen_knobs, frame_numbers, measured, place, places
-from studio.declaring import PROGRESS, REQUIRED, Knobs, OneOf, Parameter, Target, alternatives, declared
-from studio.knobs import Knob, allowed
+from studio.foundations.declaring import (
+    PROGRESS,
+    REQUIRED,
+    Knobs,
+    OneOf,
+    Parameter,
+    Target,
+    alternatives,
+    declared,
+)
+from studio.foundations.knobs import Knob, allowed
 from studio.sessions.object_stores import is_address
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace

@@ -3,9 +3,9 @@
 from dataclasses import asdict
 
 from studio.cli.deriving import Call, command_of
+from studio.cli.diagnostics_archive import diagnostics
 from studio.cli.output import EXIT_CODE, FOUND_FAULTS
-from studio.diagnostics_archive import diagnostics
-from studio.self_check import doctor
+from studio.cli.self_check import doctor
 
 
 @command_of(doctor)

@@ -2,11 +2,11 @@
 
 from collections.abc import Mapping
 
-from studio.capture.live_cameras import SpreadFigures
-from studio.capture.synchrony import Synchrony, in_words
-from studio.capture.timestamps import TimedOffsets
 from studio.cli.deriving import Call, command_of
 from studio.cli.output import note
+from studio.footage.capture.live_cameras import SpreadFigures
+from studio.footage.capture.synchrony import Synchrony, in_words
+from studio.footage.capture.timestamps import TimedOffsets
 from studio.operations.footage import (
     Synchronised,
     add_footage,

@@ -9,9 +9,9 @@ from rich.console import Console
 from rich.table import Table as Drawn
 
 from studio.cli.deriving import Call, command_of
-from studio.inspection.comparing import RunsCompared
-from studio.inspection.tables import Cell, Table, Viewed
 from studio.operations.inspecting import compare_runs, inspected, seeds, view, why, worst_frame
+from studio.results.inspection.comparing import RunsCompared
+from studio.results.inspection.tables import Cell, Table, Viewed
 from studio.sessions.atomic_files import write_bytes
 from studio.sessions.named_rows import as_csv
 

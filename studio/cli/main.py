@@ -64,8 +64,8 @@ COMMANDS = {
     "download": ("remote_commands", "operations.remote.download"),
     "inspect": ("session_commands", "operations.foreign.inspect"),
     "verify": ("result_commands", "operations.results.verify"),
-    "doctor": ("doctor_commands", "self_check.doctor"),
-    "diagnostics": ("doctor_commands", "diagnostics_archive.diagnostics"),
+    "doctor": ("doctor_commands", "cli.self_check.doctor"),
+    "diagnostics": ("doctor_commands", "cli.diagnostics_archive.diagnostics"),
     "bench": ("bench_commands", "cli.bench_commands.bench_command"),
 }
 ROOT = Path(__file__).parents[1]

@@ -6,17 +6,17 @@ from pathlib import Path
 import click
 import msgspec
 
-from studio.capture.naming import match_names
 from studio.cli.deriving import Call, command_of
 from studio.cli.reading import frame_numbers
-from studio.errors import FootageError, NotFoundError
+from studio.footage.capture.naming import match_names
+from studio.foundations.errors import FootageError, NotFoundError
+from studio.foundations.words import sentence
 from studio.operations.masks import background, exclude_region, mask_quality
-from studio.runs.background_setup import SOURCES
-from studio.runs.mask_quality import MaskQuality
-from studio.runs.session_settings import session_settings
+from studio.runs.setup.background_setup import SOURCES
+from studio.runs.setup.mask_quality import MaskQuality
+from studio.runs.setup.session_settings import session_settings
 from studio.sessions.background_files import read_evidence, set_backgrounds
 from studio.sessions.session import Session
-from studio.words import sentence
 
 UNUSED = "unused"
 OWN = (

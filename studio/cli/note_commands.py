@@ -1,9 +1,9 @@
 """Notes and bookmarks on frames: `note`, `notes`."""
 
 from studio.cli.deriving import Call, command_of
+from studio.foundations.words import counted
 from studio.operations.notes import note, notes
 from studio.runs.notes import Note
-from studio.words import counted
 
 
 @command_of(notes)

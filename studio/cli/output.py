@@ -17,14 +17,14 @@ import click
 import msgspec
 from rich.console import Console
 
-from studio.errors import StudioError
-from studio.foreign_files import read_file
+from studio.foundations.errors import StudioError
+from studio.foundations.foreign_files import read_file
+from studio.foundations.progress import Progress, TimeLeft, left_in_words
+from studio.foundations.registry import Registry
+from studio.foundations.typed_decoding import decode_json
+from studio.foundations.words import printable
 from studio.operations.progress import Display, bar
-from studio.progress import Progress, TimeLeft, left_in_words
-from studio.registry import Registry
 from studio.sessions.atomic_files import write_bytes
-from studio.typed_decoding import decode_json
-from studio.words import printable
 
 P = ParamSpec("P")
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
 
-from studio.errors import FootageError, RunError, SettingsError
+from studio.foundations.errors import FootageError, RunError, SettingsError
 
 T = TypeVar("T")
 

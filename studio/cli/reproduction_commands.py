@@ -7,16 +7,16 @@ from pathlib import Path
 import click
 
 from studio.cli.output import errors_in_words, note, print_result, progress
-from studio.comparison.findings import FAILED
-from studio.comparison.findings_document import REPORT, REPRODUCTIONS, SUMMARY, Document
-from studio.comparison.trials import Scale
-from studio.jobs.cluster import CLUSTER_HELP
-from studio.reproduction.catalogue import EXPERIMENTS, find_experiments
-from studio.reproduction.experiment import Experiment
-from studio.reproduction.findings_files import FOOTAGE, number_in_words, read_findings
-from studio.reproduction.guide_findings import guide_folder, write_into_guide
-from studio.reproduction.plan import FULL_SEEDS, QUICK_SEEDS, scale_of
-from studio.reproduction.runner import Reproduction, reproduce
+from studio.garden.reproduction.catalogue import EXPERIMENTS, find_experiments
+from studio.garden.reproduction.experiment import Experiment
+from studio.garden.reproduction.findings_files import FOOTAGE, number_in_words, read_findings
+from studio.garden.reproduction.guide_findings import guide_folder, write_into_guide
+from studio.garden.reproduction.plan import FULL_SEEDS, QUICK_SEEDS, scale_of
+from studio.garden.reproduction.runner import Reproduction, reproduce
+from studio.operations.jobs.cluster import CLUSTER_HELP
+from studio.results.comparison.findings import FAILED
+from studio.results.comparison.findings_document import REPORT, REPRODUCTIONS, SUMMARY, Document
+from studio.results.comparison.trials import Scale
 from studio.sessions.object_stores import folder_of, is_address
 from studio.sessions.remote_sessions import bring_work
 from studio.sessions.workspace import workspace_root

@@ -9,16 +9,16 @@ import msgspec
 
 from studio.cli.deriving import Call, command_of
 from studio.cli.output import EXIT_CODE, FOUND_FAULTS
-from studio.evaluation.report import as_document, in_words
-from studio.export.formats import FORMATS
+from studio.foundations.words import counted
 from studio.operations.course import Course, course
 from studio.operations.results import Verified, check, evaluate, export_run, refine, smooth, verify
 from studio.operations.sharing import Shared, share
+from studio.results.evaluation.report import as_document, in_words
+from studio.results.export.formats import FORMATS
+from studio.results.verifying import Repair, Verification
 from studio.runs.refining import MadeTrack
 from studio.runs.tracks import track_named
-from studio.runs.verifying import Repair, Verification
 from studio.sessions.stored_run import StoredRun
-from studio.words import counted
 
 
 @command_of(refine)

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import click
 
+from studio.cli.launch import PORT, Announce, demo, serve
 from studio.cli.output import errors_in_words, print_result
-from studio.launch import PORT, Announce, demo, serve
 from studio.sessions.workspace import workspace_root
 
 PORT_HELP = "Port to listen on; 0 takes a free one."

@@ -6,17 +6,17 @@ import click
 
 from studio.cli.deriving import Call, command_of
 from studio.cli.output import EXIT_CODE, FOUND_FAULTS, command
+from studio.foundations.words import counted
 from studio.operations.foreign import inspect
 from studio.operations.gallery import Gallery, gallery
 from studio.operations.opening import bodies, workflow
 from studio.operations.own_bodies import EditedBody, edit_body
-from studio.runs.workflow import Workflow
+from studio.runs.setup.workflow import Workflow
 from studio.sessions.foreign_sessions import Inspection
 from studio.sessions.object_stores import is_address
 from studio.sessions.remote_sessions import sessions_at
 from studio.sessions.stored_run import damage_in_words
 from studio.sessions.workspace import Workspace
-from studio.words import counted
 
 MARKS = {"done": "✓", "ready": "·", "blocked": " ", "stale": "!", "running": "…"}
 

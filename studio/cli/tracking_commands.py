@@ -8,7 +8,7 @@ import click
 from studio.cli.deriving import Call, command_of
 from studio.cli.footage_commands import spread_figures
 from studio.cli.reading import frame_range
-from studio.errors import RunError
+from studio.foundations.errors import RunError
 from studio.operations.opening import Tracked
 from studio.operations.tracking import (
     Replayed,
@@ -24,12 +24,12 @@ from studio.operations.tracking import (
     track,
 )
 from studio.runs.sides import exchanged_sides, in_words
+from studio.search.trackers.catalogue import TRACKERS
+from studio.search.trackers.tracker import LIMB_LOST, LOST, NO_EVIDENCE, RECOVERED
 from studio.sessions.named_rows import poses_csv
 from studio.sessions.remote_sessions import bring_runs
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.trackers.catalogue import TRACKERS
-from studio.trackers.tracker import LIMB_LOST, LOST, NO_EVIDENCE, RECOVERED
 
 FRAMES = click.option(
     "--frames",

@@ -16,9 +16,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Bytes, Floats
 from studio.evidence.settings import EvidenceSettings
-from studio.numba_in_threads import EXACT, KERNEL, njit
+from studio.foundations.arrays import Bytes, Floats
+from studio.foundations.numba_in_threads import EXACT, KERNEL, njit
 
 GAIN_STRIDE = 8
 GAIN_RANGE = (0.5, 2.0)

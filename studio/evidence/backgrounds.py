@@ -12,11 +12,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Bytes, evenly_spread
-from studio.capture.footage import Footage
-from studio.capture.pictures import is_picture, read_picture
-from studio.capture.video import VideoReader, measure_video
-from studio.errors import FootageError
 from studio.evidence.background import (
     BackgroundModel,
     GaussianBackground,
@@ -26,6 +21,11 @@ from studio.evidence.background import (
 )
 from studio.evidence.combined_background import combine
 from studio.evidence.yuv_background import YuvBackground, independent_background, learn_background
+from studio.footage.capture.footage import Footage
+from studio.footage.capture.pictures import is_picture, read_picture
+from studio.footage.capture.video import VideoReader, measure_video
+from studio.foundations.arrays import Bytes, evenly_spread
+from studio.foundations.errors import FootageError
 
 FittedKind = Literal["gaussian", "median", "combined", "mog2", "knn"]
 
@@ -184,7 +184,7 @@ def fitted_plate(plate: Bytes, frame: Bytes, name: str) -> Bytes:
     """A background picture fitted to the footage's size, in the way that agrees best with one of its frames.
 
     Either cropped evenly on both sides, or scaled as a whole and centred between black bars, as in
-    `capture.footage_fit`. Raises FootageError as `check_plate_size` does.
+    `footage.capture.footage_fit`. Raises FootageError as `check_plate_size` does.
     """
     height, width = frame.shape[:2]
     tall, wide = plate.shape[:2]

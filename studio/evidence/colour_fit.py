@@ -8,7 +8,7 @@ background (least trimmed squares by repeated trimming, Rousseeuw 1984).
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Bytes, Floats
+from studio.foundations.arrays import Bytes, Floats
 
 STRIDE = 4
 DARKEST, BRIGHTEST = 4.0, 250.0

@@ -12,7 +12,7 @@ the share of background in the known surroundings, as a person there also covers
 4. Which of the two is right is decided region by region: the right one continues the known background across the
 region's border; the wrong one has an edge there. In doubt the footage is taken: what never moves is no person.
 
-One camera alone cannot distinguish a person from the same person in the plate; `runs.clean_plates` uses the other
+One camera alone cannot distinguish a person from the same person in the plate; `runs.setup.clean_plates` uses the other
 cameras. The method is this project's own, made of standard parts: the mode over time as background, and edges along the
 border of a still region to distinguish abandoned from removed objects.
 """
@@ -24,11 +24,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Array, Bytes, Floats
 from studio.evidence.background import GaussianBackground
 from studio.evidence.colour_fit import fitted_line
 from studio.evidence.masks import disc
-from studio.numba_in_threads import KERNEL, njit
+from studio.foundations.arrays import Array, Bytes, Floats
+from studio.foundations.numba_in_threads import KERNEL, njit
 
 AGREES = 16.0
 """Grey levels in any colour: within this a frame agrees with the plate."""

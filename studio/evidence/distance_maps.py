@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Array, Bytes, Floats, Indices
 from studio.evidence.frame_evidence import FrameEvidence
-from studio.numba_in_threads import EXACT, KERNEL, njit
+from studio.foundations.arrays import Array, Bytes, Floats, Indices
+from studio.foundations.numba_in_threads import EXACT, KERNEL, njit
 
 FOREGROUND = 128
 """Mask values from here on are silhouette."""

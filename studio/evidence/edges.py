@@ -13,9 +13,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Bytes
 from studio.evidence.masks import disc
-from studio.numba_in_threads import EXACT, KERNEL, njit
+from studio.foundations.arrays import Bytes
+from studio.foundations.numba_in_threads import EXACT, KERNEL, njit
 
 EDGE_WIDTH = 4.0
 """Pixels on which the gradient of a body's edge passes the threshold; thinner edges stay below 1. On the sample walk

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from studio.arrays import Bytes
 from studio.evidence.yuv_background import YuvBackground
+from studio.foundations.arrays import Bytes
 
 EDGE_KINDS = ("proximity", "bodytrack", "none", "hull")
 """Maps that a weighting reads; "hull": no map, but the evidence of a visual hull (knob hull_evidence)."""

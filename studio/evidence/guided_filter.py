@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Bytes, Floats
+from studio.foundations.arrays import Bytes, Floats
 
 GUIDED_SMOOTHNESS = 1e-4
 """ε for colours from 0 to 1."""

@@ -8,9 +8,9 @@ import cv2.typing
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Bytes
 from studio.evidence.settings import EvidenceSettings
-from studio.geometry.camera import Camera
+from studio.foundations.arrays import Bytes
+from studio.foundations.geometry.camera import Camera
 
 
 def cleaned(mask: Bytes, settings: EvidenceSettings) -> Bytes:

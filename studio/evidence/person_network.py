@@ -21,8 +21,8 @@ from importlib import resources
 import cv2
 import numpy as np
 
-from studio.arrays import Array, Bytes, Floats
 from studio.evidence.guided_filter import guided
+from studio.foundations.arrays import Array, Bytes, Floats
 
 MODEL = "pose_landmark_full.tflite"
 INPUT = 256

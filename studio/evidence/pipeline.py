@@ -13,17 +13,17 @@ from functools import partial
 import cv2
 import numpy as np
 
-from studio.arrays import Bytes
-from studio.capture.footage import Footage
-from studio.errors import FootageError
 from studio.evidence.backgrounds import Backgrounds, FittedKind
 from studio.evidence.edges import bodytrack_edges, proximity_edges
 from studio.evidence.frame_evidence import EDGE_KINDS, FrameEvidence, ViewEvidence
 from studio.evidence.masks import cleaned
 from studio.evidence.settings import EvidenceSettings
 from studio.evidence.threshold import between_thresholds
-from studio.geometry.camera import Camera
-from studio.tracing import span
+from studio.footage.capture.footage import Footage
+from studio.foundations.arrays import Bytes
+from studio.foundations.errors import FootageError
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.tracing import span
 
 KINDS: dict[str, FittedKind] = {"median": "median", "combined": "combined", "mog2": "mog2", "knn": "knn"}
 """Models by the knob's value; all others are Gaussians."""

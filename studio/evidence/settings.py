@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from studio.evidence.yuv_background import LEAST_NOISE
-from studio.knobs import next_frame_knob
+from studio.foundations.knobs import next_frame_knob
 
 BACKGROUND_MODELS = ("auto", "mask", "gaussian", "median", "combined", "mog2", "knn", "threshold")
 HULL_EVIDENCE = ("auto", "pixels", "masks")

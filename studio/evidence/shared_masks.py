@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Array, Bytes
+from studio.foundations.arrays import Array, Bytes
 
 
 def shared_mask(whole: Bytes, silhouettes: Sequence[Bytes], reach: float = np.inf) -> list[Bytes]:

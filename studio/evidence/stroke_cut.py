@@ -18,10 +18,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Bytes, Floats
-from studio.errors import FootageError
 from studio.evidence.guided_filter import guided
 from studio.evidence.strokes import Stroke, painted
+from studio.foundations.arrays import Bytes, Floats
+from studio.foundations.errors import FootageError
 
 SUBJECT_SIDE, COARSE_SIDE = 240.0, 320.0
 """Pixels: the subject's longer side in what is cut, and the picture's where it is not known yet."""

@@ -7,7 +7,7 @@ import cv2
 import msgspec
 import numpy as np
 
-from studio.arrays import Bytes
+from studio.foundations.arrays import Bytes
 
 StrokeKind = Literal["inside", "outside"]
 

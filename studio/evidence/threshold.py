@@ -5,8 +5,8 @@ infrared light, a dark fly on a lit plate, a glove of one colour.
 import cv2
 import numpy as np
 
-from studio.arrays import Bytes
 from studio.evidence.settings import EvidenceSettings
+from studio.foundations.arrays import Bytes
 
 HALF_TURN = 180.0
 

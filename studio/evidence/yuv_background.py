@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studio.arrays import Array, Bytes, Floats
+from studio.foundations.arrays import Array, Bytes, Floats
 
 SHADOW = 0.1
 """Share of the luminance that a shadow takes away."""

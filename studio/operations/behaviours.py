@@ -7,22 +7,22 @@ from typing import Annotated
 
 from pydantic import Field
 
-from studio.behaviour.model import BehaviourModel
-from studio.behaviour.settings import LearningSettings
 from studio.body.catalogue import load_body
-from studio.declaring import Body, Knobs, Seed, Terminal, Values, Web, operation
-from studio.errors import SettingsError
-from studio.knobs import changed, knobs_of
+from studio.foundations.declaring import Body, Knobs, Seed, Terminal, Values, Web, operation
+from studio.foundations.errors import SettingsError
+from studio.foundations.knobs import changed, knobs_of
 from studio.operations.progress import Reporting, reporting, say
 from studio.results.motion_sources import read_sources
-from studio.runs.live_summary import in_words as ranges
+from studio.runs.learning.learning import Learnt
+from studio.runs.learning.learning import learn as learn_from
+from studio.runs.learning.model_repository import ModelSummary, keep_model, list_models, place_for_model
+from studio.runs.learning.oversampling import OversamplingSettings
+from studio.runs.learning.recordings import FPS, Recording
+from studio.runs.live.live_summary import in_words as ranges
+from studio.search.behaviour.model import BehaviourModel
+from studio.search.behaviour.settings import LearningSettings
 from studio.sessions.session import BODIES_NAME
 from studio.sessions.workspace import Workspace
-from studio.training.learning import Learnt
-from studio.training.learning import learn as learn_from
-from studio.training.model_repository import ModelSummary, keep_model, list_models, place_for_model
-from studio.training.oversampling import OversamplingSettings
-from studio.training.recordings import FPS, Recording
 
 SHOWN_BAD_FRAMES = 12
 Sources = Annotated[

@@ -8,21 +8,21 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from studio.calibration.board_pdf import PAGES, usual_board, write_board_pdf
-from studio.calibration.boards import Board, board_from_text
-from studio.calibration.findings import Finding
-from studio.calibration.floor import read_clicks
-from studio.calibration.verbs import Calibrated
-from studio.declaring import Target, Terminal, Web, operation
-from studio.errors import SettingsError, StudioError
-from studio.geometry.camera import Camera
+from studio.footage.calibration.board_pdf import PAGES, usual_board, write_board_pdf
+from studio.footage.calibration.boards import Board, board_from_text
+from studio.footage.calibration.findings import Finding
+from studio.footage.calibration.floor import read_clicks
+from studio.footage.calibration.verbs import Calibrated
+from studio.foundations.declaring import Target, Terminal, Web, operation
+from studio.foundations.errors import SettingsError, StudioError
+from studio.foundations.geometry.camera import Camera
 from studio.operations.opening import SessionName, keeping_in_place, open_session
 from studio.operations.progress import Reporting, reporting, say
-from studio.runs.aligning import SessionAlignment, align_cameras
-from studio.runs.levelling import level_by_clicks, level_by_run, level_by_silhouettes, use_level_world
-from studio.runs.mask_quality import measure_masks
-from studio.runs.silhouette_doubts import MEASURED
-from studio.runs.turned_cameras import alignment_words, remember_alignment, turn_back, turn_cameras
+from studio.runs.setup.aligning import SessionAlignment, align_cameras
+from studio.runs.setup.levelling import level_by_clicks, level_by_run, level_by_silhouettes, use_level_world
+from studio.runs.setup.mask_quality import measure_masks
+from studio.runs.setup.silhouette_doubts import MEASURED
+from studio.runs.setup.turned_cameras import alignment_words, remember_alignment, turn_back, turn_cameras
 from studio.sessions.board_calibration import keep_boards, place_of_boards, solve_boards
 from studio.sessions.provenance import origin_of
 from studio.sessions.session import Session

@@ -8,13 +8,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from studio.comparison.candidates import DEFAULT_LAYERS, Lineup
-from studio.comparison.folders import differences, new_comparison, place_of, unfinished_like
-from studio.comparison.kept_comparison import RECORD_NAME, KeptComparison
-from studio.comparison.plan import Comparison, Plan, conclude, plan_comparison
-from studio.comparison.sweep import Sweep, conclude_sweep, expected, plan_sweep, run_name
-from studio.comparison.trials import Outcome
-from studio.declaring import (
+from studio.foundations.declaring import (
     AllowInconsistent,
     Body,
     First,
@@ -27,15 +21,23 @@ from studio.declaring import (
     Web,
     operation,
 )
-from studio.errors import RunError, SessionError
-from studio.jobs.cluster import Cluster, chosen_executor
-from studio.jobs.comparison_run import Found, done_before, run_comparison
-from studio.jobs.process_executor import cores
-from studio.likelihood.catalogue import WEIGHTINGS
+from studio.foundations.errors import RunError, SessionError
+from studio.operations.jobs.cluster import Cluster, chosen_executor
+from studio.operations.jobs.comparison_run import Found, done_before, run_comparison
+from studio.operations.jobs.process_executor import cores
 from studio.operations.opening import AnySession, keeping_in_place, open_session
 from studio.operations.progress import Reporting, reporting, say
+from studio.results.comparison.candidates import DEFAULT_LAYERS, Lineup
+from studio.results.comparison.folders import differences, new_comparison, place_of, unfinished_like
+from studio.results.comparison.kept_comparison import RECORD_NAME, KeptComparison
+from studio.results.comparison.plan import Comparison, Plan, conclude, plan_comparison
+from studio.results.comparison.sweep import Sweep, conclude_sweep, expected, plan_sweep, run_name
+from studio.results.comparison.trials import Outcome
 from studio.runs.behaviour_models import needs_model
 from studio.runs.new_run import own_knobs
+from studio.search.likelihood.catalogue import WEIGHTINGS
+from studio.search.trackers.catalogue import TRACKERS
+from studio.search.trackers.tracker import Value
 from studio.sessions.names import checked_name
 from studio.sessions.object_stores import below
 from studio.sessions.remote_sessions import (
@@ -46,8 +48,6 @@ from studio.sessions.remote_sessions import (
     place_in_words,
 )
 from studio.sessions.session import Session
-from studio.trackers.catalogue import TRACKERS
-from studio.trackers.tracker import Value
 
 MOST_TRACKERS = 12
 USUAL = tuple(name for name in sorted(TRACKERS) if not needs_model(name, None))

@@ -4,22 +4,22 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from studio.comparison.tracked import TrackingTrial
-from studio.comparison.trials import TrialJob
-from studio.declaring import operation
-from studio.errors import RunError, StudioError
-from studio.jobs.swept_runs import measure_run
-from studio.jobs.trials import TrialResult, run_jobs
+from studio.foundations.declaring import operation
+from studio.foundations.errors import RunError, StudioError
+from studio.foundations.progress import Progress
 from studio.operations.behaviours import learn
+from studio.operations.jobs.swept_runs import measure_run
+from studio.operations.jobs.trials import TrialResult, run_jobs
 from studio.operations.progress import Reporting, reporting
-from studio.progress import Progress
+from studio.results.comparison.tracked import TrackingTrial
+from studio.results.comparison.trials import TrialJob
 from studio.runs.behaviour_models import SUFFIX, models_folder
-from studio.runs.samples import install_prepared_runs, install_sample
+from studio.search.settings import DEFAULT_WEIGHTING
+from studio.search.trackers.recovery_settings import OFF
+from studio.sessions.samples import install_prepared_runs, install_sample
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
-from studio.settings import DEFAULT_WEIGHTING
-from studio.trackers.recovery_settings import OFF
 
 BEGINNING, BEGINNING_RUN = "planar_arm", "arm"
 """The session and run that the course begins with; they travel with the studio."""

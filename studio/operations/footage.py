@@ -8,16 +8,17 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from studio.capture.camera_addresses import CameraAddress, address_from_text, check_names
-from studio.capture.synchrony import MOST_SECONDS, Synchrony
-from studio.capture.timestamps import TimedOffsets
-from studio.declaring import Body, Target, Terminal, Web, operation, taking
-from studio.errors import FootageError, SessionError
-from studio.jobs.camera_readers import CameraReaders
-from studio.jobs.stream_recording import RecordingStanding, StreamRecording, recording_folder
+from studio.footage.capture.camera_addresses import CameraAddress, address_from_text, check_names
+from studio.footage.capture.synchrony import MOST_SECONDS, Synchrony
+from studio.footage.capture.timestamps import TimedOffsets
+from studio.foundations.declaring import Body, Target, Terminal, Web, operation, taking
+from studio.foundations.errors import FootageError, SessionError
+from studio.foundations.progress import Progress
+from studio.operations.jobs.camera_readers import CameraReaders
+from studio.operations.jobs.stream_recording import RecordingStanding, StreamRecording, recording_folder
 from studio.operations.opening import SessionName, keeping_in_place, open_session
 from studio.operations.progress import Reporting, reporting, say
-from studio.progress import Progress
+from studio.results.drawing_footage.recipes import synthesize as synthesize_recipe
 from studio.sessions.footage_changes import (
     FootageChange,
     change_footage,
@@ -36,7 +37,6 @@ from studio.sessions.importers.importing import add_footage as add_to_session
 from studio.sessions.recordings import SpreadFigures, calibration_given, check_cameras, import_recording
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace, begin_session
-from studio.synthesis.recipes import synthesize as synthesize_recipe
 
 LOOK_SECONDS = 0.2
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from studio.declaring import Terminal, operation
+from studio.foundations.declaring import Terminal, operation
 from studio.sessions.foreign_sessions import Inspection, inspect_place
 from studio.sessions.names import is_name
 from studio.sessions.workspace import Workspace

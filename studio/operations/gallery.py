@@ -6,20 +6,20 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from studio.declaring import Terminal, Web, operation
-from studio.errors import NotFoundError, SessionError
+from studio.foundations.declaring import Terminal, Web, operation
+from studio.foundations.errors import NotFoundError, SessionError
 from studio.foundations.package import assets_folder
+from studio.foundations.progress import Progress
 from studio.operations.progress import Reporting, reporting
-from studio.progress import Progress
-from studio.runs.samples import install_sample
+from studio.results.drawing_footage.real_data import missing_data, real_footage
+from studio.results.drawing_footage.recipe_file import find_recipe
+from studio.results.drawing_footage.recipes import synthesize
 from studio.sessions.atomic_files import discard
 from studio.sessions.importers.importing import add_footage
 from studio.sessions.manifest import FILE_NAME
+from studio.sessions.samples import install_sample
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace, begin_session
-from studio.synthesis.real_data import missing_data, real_footage
-from studio.synthesis.recipe_file import find_recipe
-from studio.synthesis.recipes import synthesize
 
 CardKind = Literal["sample", "recipe", "elsewhere"]
 

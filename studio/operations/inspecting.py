@@ -5,16 +5,16 @@ from typing import Annotated
 
 from pydantic import Field
 
-from studio.declaring import LARGEST, Terminal, Web, operation
-from studio.errors import RunError
-from studio.inspection.comparing import RunsCompared, compare_stored
-from studio.inspection.limbs import disagreements_of, errors_of
-from studio.inspection.reading import InspectedRun
-from studio.inspection.seeds import search_seeds
-from studio.inspection.tables import Selection, Viewed
-from studio.inspection.views import VIEWS, look, look_over
+from studio.foundations.declaring import LARGEST, Terminal, Web, operation
+from studio.foundations.errors import RunError
 from studio.operations.opening import RunName, keeping_in_place, open_run, session_of
 from studio.operations.progress import Reporting, reporting
+from studio.results.inspection.comparing import RunsCompared, compare_stored
+from studio.results.inspection.limbs import disagreements_of, errors_of
+from studio.results.inspection.reading import InspectedRun
+from studio.results.inspection.seeds import search_seeds
+from studio.results.inspection.tables import Selection, Viewed
+from studio.results.inspection.views import VIEWS, look, look_over
 
 ViewName = Annotated[
     str, Field(description=f"Which: {', '.join(VIEWS)}."), Terminal("--view", metavar="NAME")

@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
 
-from studio.capture.pictures import painted_picture, png_of
-from studio.declaring import Knobs, Terminal, Values, Web, operation
-from studio.foreign_files import read_file
+from studio.footage.capture.pictures import painted_picture, png_of
+from studio.foundations.declaring import Knobs, Terminal, Values, Web, operation
+from studio.foundations.foreign_files import read_file
 from studio.operations.opening import SessionName, keeping_in_place, open_session
 from studio.operations.progress import Reporting, reporting, say
-from studio.runs.background_setup import BackgroundSetup, BackgroundSource, set_up_background
-from studio.runs.contrast import draw_contrast
-from studio.runs.mask_quality import MaskQuality, measure_masks
+from studio.runs.setup.background_setup import BackgroundSetup, BackgroundSource, set_up_background
+from studio.runs.setup.contrast import draw_contrast
+from studio.runs.setup.mask_quality import MaskQuality, measure_masks
 from studio.sessions.background_files import polygon_exclusion, set_backgrounds, set_exclusion
 from studio.sessions.session import Session
 from studio.sessions.stroke_files import strokes_of_file

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from studio.declaring import Terminal, Web, operation
+from studio.foundations.declaring import Terminal, Web, operation
 from studio.operations.opening import RunName, open_run
 from studio.runs.notes import LONGEST, Note, notes_of, remove_note, write_note
 

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from studio.body.catalogue import list_bodies, load_body
 from studio.body.model import BodyModel
-from studio.declaring import Target, operation
-from studio.errors import RunError, SessionError
-from studio.export.kept_exports import exported_files
+from studio.foundations.declaring import Target, operation
+from studio.foundations.errors import RunError, SessionError
+from studio.results.export.kept_exports import exported_files
+from studio.runs.setup.workflow import Workflow, run_to_use, workflow_of
 from studio.runs.tracks import Track
-from studio.runs.workflow import Workflow, run_to_use, workflow_of
 from studio.sessions.session import BODIES_NAME, RUNS_NAME, Session
 from studio.sessions.stored_run import RunSummary, StoredRun
 from studio.sessions.work_under_way import working_on

@@ -13,7 +13,7 @@ from studio.body.editing import edited
 from studio.body.model import BodyModel
 from studio.body.reader import parse_body
 from studio.body.writing import body_text
-from studio.declaring import Target, Terminal, Web, operation
+from studio.foundations.declaring import Target, Terminal, Web, operation
 from studio.operations.opening import SessionName, open_session
 from studio.operations.progress import Reporting, say
 from studio.sessions.own_bodies import bodies_folder, save_body

@@ -11,18 +11,17 @@ import numpy as np
 from pydantic import Field
 
 from studio.body.model import BodyModel
+from studio.body.motion_files.trc import MarkerMotion, write_trc
 from studio.body.subject import Subject
-from studio.declaring import Body, Model, OneOf, Seed, Terminal, Web, operation, taking
-from studio.likelihood.catalogue import WEIGHTINGS
-from studio.motion_files.trc import MarkerMotion, write_trc
+from studio.foundations.declaring import Body, Model, OneOf, Seed, Terminal, Web, operation, taking
 from studio.operations.opening import SessionName, keeping_in_place, open_session
 from studio.operations.progress import Reporting, reporting, say
-from studio.runs.initialising import WEIGHTING, InitialPose, keep_pose
-from studio.runs.initialising import initialise as initialise_session
 from studio.runs.new_run import checked_frames
-from studio.runs.person_landmarks import person_landmarks
-from studio.runs.subject_choice import body_of_choice, choose_body, choose_subject, keep_fitted
-from studio.runs.subject_fitting import (
+from studio.runs.setup.initialising import WEIGHTING, InitialPose, keep_pose
+from studio.runs.setup.initialising import initialise as initialise_session
+from studio.runs.setup.person_landmarks import person_landmarks
+from studio.runs.setup.subject_choice import body_of_choice, choose_body, choose_subject, keep_fitted
+from studio.runs.setup.subject_fitting import (
     FitRequest,
     FittedSubject,
     Height,
@@ -30,6 +29,7 @@ from studio.runs.subject_fitting import (
     fit_session_subject,
     keep_subject,
 )
+from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.sessions.atomic_files import check_writable
 
 

@@ -9,8 +9,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 from rich.progress import Progress as Bar
 
-from studio.progress import Progress, TimeLeft, left_in_words, unheard
-from studio.words import printable
+from studio.foundations.progress import Progress, TimeLeft, left_in_words, unheard
+from studio.foundations.words import printable
 
 
 @dataclass(frozen=True, slots=True)

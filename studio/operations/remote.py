@@ -9,16 +9,16 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from studio.comparison.kept_trials import plain
-from studio.comparison.sweep import Swept
-from studio.comparison.trials import ALLOW_INCONSISTENT, TrialJob
-from studio.declaring import Terminal, Web, operation, taking
-from studio.errors import RunError
-from studio.jobs.cluster import Cluster, chosen_executor
-from studio.jobs.swept_runs import measure_run_of_batch
-from studio.jobs.trials import TrialResult, run_jobs
+from studio.foundations.declaring import Terminal, Web, operation, taking
+from studio.foundations.errors import RunError
+from studio.operations.jobs.cluster import Cluster, chosen_executor
+from studio.operations.jobs.swept_runs import measure_run_of_batch
+from studio.operations.jobs.trials import TrialResult, run_jobs
 from studio.operations.opening import SessionName, keeping_in_place, open_session
 from studio.operations.progress import Reporting, reporting, say
+from studio.results.comparison.kept_trials import plain
+from studio.results.comparison.sweep import Swept
+from studio.results.comparison.trials import ALLOW_INCONSISTENT, TrialJob
 from studio.runs.new_run import prepare_run
 from studio.sessions import remote_sessions
 from studio.sessions.names import checked_name

@@ -8,19 +8,13 @@ import numpy as np
 from pydantic import Field
 
 from studio.body.forward_kinematics import marker_points
-from studio.calibration.carried_points import carried
-from studio.capture.calibration_files import read_calibration
-from studio.declaring import Knobs, Terminal, Values, operation
-from studio.errors import TruthError
-from studio.evaluation.errors import RIGID, SIMILARITY, UNALIGNED, Evaluation, lost_mm, meant_axes
-from studio.evaluation.errors import evaluate as evaluate_poses
-from studio.export.exporting import ExportReport
-from studio.export.exporting import export_run as write_run
-from studio.export.formats import FORMATS, format_of_file
-from studio.export.options import ExportOptions
-from studio.knobs import changed, knobs_of
-from studio.motion_files.trc import MarkerMotion
-from studio.motion_files.truth_files import ANY_WORLD, READERS, read_truth
+from studio.body.motion_files.trc import MarkerMotion
+from studio.body.motion_files.truth_files import ANY_WORLD, READERS, read_truth
+from studio.footage.calibration.carried_points import carried
+from studio.footage.capture.calibration_files import read_calibration
+from studio.foundations.declaring import Knobs, Terminal, Values, operation
+from studio.foundations.errors import TruthError
+from studio.foundations.knobs import changed, knobs_of
 from studio.operations.opening import (
     RunName,
     SessionName,
@@ -30,14 +24,20 @@ from studio.operations.opening import (
     session_of,
 )
 from studio.operations.progress import Reporting, reporting, say
+from studio.results.evaluation.errors import RIGID, SIMILARITY, UNALIGNED, Evaluation, lost_mm, meant_axes
+from studio.results.evaluation.errors import evaluate as evaluate_poses
+from studio.results.export.exporting import ExportReport
+from studio.results.export.exporting import export_run as write_run
+from studio.results.export.formats import FORMATS, format_of_file
+from studio.results.export.options import ExportOptions
+from studio.results.verifying import Repair, Verification, remove_left_behind, repair
+from studio.results.verifying import verify as verify_session
 from studio.runs.checking import EVERY, RunCheck, check_run
 from studio.runs.refining import REFINED, SMOOTHED, MadeTrack, refine_run, smooth_run
 from studio.runs.tracks import BEST, Track, best_track, track_names
 from studio.runs.tracks import read_track as read_stored_track
-from studio.runs.verifying import Repair, Verification, remove_left_behind, repair
-from studio.runs.verifying import verify as verify_session
-from studio.trackers.refinement import RefinementSettings
-from studio.trackers.smoothing import SmoothingSettings
+from studio.search.trackers.refinement import RefinementSettings
+from studio.search.trackers.smoothing import SmoothingSettings
 
 TrackName = Annotated[
     str,

@@ -7,11 +7,11 @@ from typing import Annotated
 
 from pydantic import Field
 
-from studio.declaring import Terminal, operation
-from studio.inspection.shared_page import shared_page
+from studio.foundations.declaring import Terminal, operation
 from studio.operations.inspecting import inspected, worst_frame
 from studio.operations.opening import RunName, keeping_in_place
 from studio.operations.progress import Reporting, reporting
+from studio.results.inspection.shared_page import shared_page
 from studio.sessions.atomic_files import write_text, writing
 
 

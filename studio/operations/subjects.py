@@ -8,12 +8,12 @@ from typing import Annotated
 
 from pydantic import Field
 
-from studio.declaring import Terminal, Web, operation
-from studio.errors import SessionError
+from studio.foundations.declaring import Terminal, Web, operation
+from studio.foundations.errors import SessionError
 from studio.operations.opening import SessionName, keeping_in_place, open_session
 from studio.operations.progress import Reporting, reporting, say
-from studio.runs.subject_masks import SeenSubject, seen_subjects
-from studio.runs.subject_sessions import make_subject_sessions
+from studio.runs.setup.subject_masks import SeenSubject, seen_subjects
+from studio.runs.setup.subject_sessions import make_subject_sessions
 from studio.runs.together import BodiesTogether, track_together
 from studio.sessions.names import free_name
 from studio.sessions.session import Session

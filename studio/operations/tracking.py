@@ -8,7 +8,7 @@ from typing import Annotated, Concatenate, ParamSpec, TypeVar
 
 from pydantic import Field
 
-from studio.declaring import (
+from studio.foundations.declaring import (
     AllowInconsistent,
     Body,
     Knobs,
@@ -21,14 +21,14 @@ from studio.declaring import (
     operation,
     taking,
 )
-from studio.errors import RunError, SettingsError, StudioError
-from studio.jobs.batch import BatchResult, track_to_end
-from studio.jobs.camera_tracking import LiveRecordingRequest, track_cameras
-from studio.jobs.live_tracking import replay_live, track_live
-from studio.jobs.send_addresses import SendAddress, send_address
-from studio.jobs.set_recording import SetStanding
-from studio.likelihood.catalogue import WEIGHTINGS
+from studio.foundations.errors import RunError, SettingsError, StudioError
+from studio.foundations.progress import Progress
 from studio.operations.footage import Cameras, addresses_of
+from studio.operations.jobs.batch import BatchResult, track_to_end
+from studio.operations.jobs.camera_tracking import LiveRecordingRequest, track_cameras
+from studio.operations.jobs.live_tracking import replay_live, track_live
+from studio.operations.jobs.send_addresses import SendAddress, send_address
+from studio.operations.jobs.set_recording import SetStanding
 from studio.operations.opening import (
     AnySession,
     RunName,
@@ -40,20 +40,20 @@ from studio.operations.opening import (
     session_of,
 )
 from studio.operations.progress import Reporting, reporting, say
-from studio.progress import Progress
 from studio.runs.branching import prepare_branch
 from studio.runs.correcting import prepare_correction, track_backwards
-from studio.runs.live_replay import Comparison, prepare_replay
-from studio.runs.live_request import last_of
-from studio.runs.live_summary import LiveSummary, in_words, summary_of
+from studio.runs.live.live_replay import Comparison, prepare_replay
+from studio.runs.live.live_request import last_of
+from studio.runs.live.live_summary import LiveSummary, in_words, summary_of
 from studio.runs.new_run import DESPITE, Numbers, Pose, given_pose, own_knobs, prepare_run
 from studio.runs.tracks import pose_in_track, read_track
+from studio.search.likelihood.catalogue import WEIGHTINGS
+from studio.search.trackers.catalogue import TRACKERS
 from studio.sessions.names import free_name
 from studio.sessions.remote_sessions import address_of, free_run_name_at, put_run
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
-from studio.trackers.catalogue import TRACKERS
 
 P = ParamSpec("P")
 R = TypeVar("R")

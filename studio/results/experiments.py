@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from studio.progress import Progress
-from studio.registry import plugged_in
+from studio.foundations.progress import Progress
+from studio.foundations.registry import plugged_in
 
 ALL = "all"
 

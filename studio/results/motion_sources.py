@@ -5,15 +5,11 @@ from pathlib import Path
 
 from studio.body.model import BodyModel
 from studio.body.person import sampled
-from studio.errors import StudioError
-from studio.progress import Progress, unheard
-from studio.sessions.manifest import FILE_NAME as SESSION_FILE
-from studio.sessions.run_record import FILE_NAME as RUN_FILE
-from studio.sessions.stored_run import StoredRun
-from studio.sessions.workspace import Workspace
-from studio.synthesis.recipe_file import recipe_names
-from studio.synthesis.recipes import person_of_recipe
-from studio.training.recordings import (
+from studio.foundations.errors import StudioError
+from studio.foundations.progress import Progress, unheard
+from studio.results.drawing_footage.recipe_file import recipe_names
+from studio.results.drawing_footage.recipes import person_of_recipe
+from studio.runs.learning.recordings import (
     FEWEST_FRAMES,
     FPS,
     MOTION_FILES,
@@ -22,8 +18,12 @@ from studio.training.recordings import (
     read_file,
     read_run,
 )
-from studio.training.resampling import frame_times
-from studio.training.targets import skeleton_of_body
+from studio.runs.learning.resampling import frame_times
+from studio.runs.learning.targets import skeleton_of_body
+from studio.sessions.manifest import FILE_NAME as SESSION_FILE
+from studio.sessions.run_record import FILE_NAME as RUN_FILE
+from studio.sessions.stored_run import StoredRun
+from studio.sessions.workspace import Workspace
 
 RECIPE = ".toml"
 

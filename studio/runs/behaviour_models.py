@@ -11,16 +11,16 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from studio.behaviour.model import BehaviourModel
-from studio.behaviour.model_file import read_model
 from studio.body.model import BodyModel
-from studio.errors import BehaviourError, NotFoundError, SettingsError, StudioError
+from studio.foundations.errors import BehaviourError, NotFoundError, SettingsError, StudioError
+from studio.search.behaviour.model import BehaviourModel
+from studio.search.behaviour.model_file import read_model
+from studio.search.settings import RunSettings
+from studio.search.trackers.catalogue import TRACKERS
+from studio.search.trackers.shared_knobs import BEHAVIOUR
 from studio.sessions.names import is_name
 from studio.sessions.session import Session
 from studio.sessions.workspace import workspace_root
-from studio.settings import RunSettings
-from studio.trackers.catalogue import TRACKERS
-from studio.trackers.shared_knobs import BEHAVIOUR
 
 MODELS_NAME, SUFFIX = "models", ".behaviour"
 

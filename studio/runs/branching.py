@@ -7,13 +7,10 @@ with these knobs has shown.
 
 from collections.abc import Mapping
 
-from studio.errors import SettingsError
+from studio.foundations.errors import SettingsError
 from studio.runs.derived_runs import check_branching_frame, derived_record, new_folder
 from studio.runs.moved_knobs import FIRST_VERSION, keep_moved, moved_between, settings_with_moved
-from studio.sessions.names import free_name, name_from
-from studio.sessions.session import Session, numbered
-from studio.sessions.stored_run import StoredRun
-from studio.settings import (
+from studio.search.settings import (
     RunSettings,
     SettingsHistory,
     all_knobs,
@@ -21,6 +18,9 @@ from studio.settings import (
     settings_from_values,
     values,
 )
+from studio.sessions.names import free_name, name_from
+from studio.sessions.session import Session, numbered
+from studio.sessions.stored_run import StoredRun
 
 
 def prepare_branch(

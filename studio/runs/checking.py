@@ -2,7 +2,7 @@
 
 `checks/<track>.json`: for each checked frame and camera the share of the model's pixels that lie in the mask, and of
 the mask's pixels that the model covers; also lost and doubtful frames, turns faster than a person can make, jumps of
-limbs (`jumps`), limbs contradicted by the masks (`tracking.agreement`), and the jitter of the markers.
+limbs (`jumps`), limbs contradicted by the masks (`search.trackers.agreement`), and the jitter of the markers.
 """
 
 import contextlib
@@ -14,32 +14,32 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Array
 from studio.body.model import BodyModel
-from studio.errors import RunError, SessionError
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.pipeline import EvidenceMaker
-from studio.geometry.camera import Camera
-from studio.likelihood.overlay import limb_contours
-from studio.progress import Progress, unheard
+from studio.foundations.arrays import Array
+from studio.foundations.errors import RunError, SessionError
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.progress import Progress, unheard
+from studio.foundations.words import counted
+from studio.runs.drawing.overlay_drawing import projected_silhouette
 from studio.runs.jumps import Jump, jumps_of
 from studio.runs.limbs_elsewhere import LimbsElsewhere, changed_pixels
-from studio.runs.overlay_drawing import projected_silhouette
 from studio.runs.refining import jitter
 from studio.runs.run_footage import filmed_cameras, footage_of
 from studio.runs.tracks import BEST, Track, read_track, track_stamp
+from studio.search.likelihood.overlay import limb_contours
+from studio.search.settings import RunSettings, settings_from_values
+from studio.search.trackers.agreement import Agreement
+from studio.search.trackers.hidden_areas import without_hidden
+from studio.search.trackers.loss_detection import anything_seen
+from studio.search.trackers.start_candidates import facing
+from studio.search.trackers.tracker import LIMB_LOST_SHARE
 from studio.sessions.record_files import RecordFile
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.settings import RunSettings, settings_from_values
-from studio.trackers.agreement import Agreement
-from studio.trackers.hidden_areas import without_hidden
-from studio.trackers.loss_detection import anything_seen
-from studio.trackers.start_candidates import facing
-from studio.trackers.tracker import LIMB_LOST_SHARE
-from studio.words import counted
 
 FOLDER = "checks"
 SCHEMA_VERSION = 1

@@ -19,28 +19,28 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Array
 from studio.body.model import BodyModel
 from studio.evidence.distance_maps import silhouettes_by_camera
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
-from studio.geometry.camera import Camera
-from studio.kernel_cache import when_compiling
-from studio.likelihood.outline_kernels import LANES, ROWS
-from studio.likelihood.outlines import OutlineProjector
-from studio.likelihood.silhouette_areas import HALF, silhouettes_of
-from studio.numba_in_threads import numba
+from studio.foundations.arrays import Array
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.kernel_cache import when_compiling
+from studio.foundations.numba_in_threads import numba
 from studio.runs.search_space import search_space
+from studio.search.likelihood.outline_kernels import LANES, ROWS
+from studio.search.likelihood.outlines import OutlineProjector
+from studio.search.likelihood.silhouette_areas import HALF, silhouettes_of
+from studio.search.trackers.agreement import Agreement
+from studio.search.trackers.agreement_kernels import FIELDS, count_cells, view_counts
+from studio.search.trackers.catalogue import TRACKERS
+from studio.search.trackers.frame_loop import search_frame
+from studio.search.trackers.frame_refinement import FrameRefinementSettings, FrameRefiner
+from studio.search.trackers.hidden_areas import cell_size, counts_of
+from studio.search.trackers.refinement import RefinementSettings, Refiner
+from studio.search.trackers.settings import AnnealedSettings
+from studio.search.trackers.tracker import Estimate, FrameResult, start_of
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.trackers.agreement import Agreement
-from studio.trackers.agreement_kernels import FIELDS, count_cells, view_counts
-from studio.trackers.catalogue import TRACKERS
-from studio.trackers.frame_loop import search_frame
-from studio.trackers.frame_refinement import FrameRefinementSettings, FrameRefiner
-from studio.trackers.hidden_areas import cell_size, counts_of
-from studio.trackers.refinement import RefinementSettings, Refiner
-from studio.trackers.settings import AnnealedSettings
-from studio.trackers.tracker import Estimate, FrameResult, start_of
 
 COMMAND = "import sys; from studio.runs.compiling_beside import compile_for; compile_for(*sys.argv[1:])"
 

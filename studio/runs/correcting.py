@@ -13,18 +13,18 @@ frames done so far.
 from collections.abc import Callable
 from contextlib import closing
 
-from studio.arrays import Array
 from studio.body.branches import within_limits
 from studio.body.model import checked_pose
-from studio.errors import RunError
-from studio.progress import Progress, unheard
+from studio.foundations.arrays import Array
+from studio.foundations.errors import RunError
+from studio.foundations.progress import Progress, unheard
 from studio.runs.derived_runs import check_branching_frame, derived_record, new_folder
 from studio.runs.problem_source import ProblemSource
 from studio.runs.reannealing import Reannealing
 from studio.runs.tracking_run import TrackingRun
+from studio.search.settings import settings_from_values
 from studio.sessions.session import Session, numbered
 from studio.sessions.stored_run import StoredRun
-from studio.settings import settings_from_values
 
 
 def prepare_correction(

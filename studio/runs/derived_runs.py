@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 
-from studio.errors import RunError
+from studio.foundations.errors import RunError
 from studio.foundations.package import software_version
 from studio.sessions import atomic_files
 from studio.sessions.atomic_files import taken

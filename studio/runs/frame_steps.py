@@ -9,9 +9,9 @@ scaled to the number of frames ahead; a behaviour model propagates once a frame 
 import dataclasses
 from collections.abc import Sequence
 
+from studio.search.trackers.tracker import FilterState, FrameResult, SearchSpace, start_of
 from studio.sessions.results_reader import ResultsReader
 from studio.sessions.run_record import RunRecord
-from studio.trackers.tracker import FilterState, FrameResult, SearchSpace, start_of
 
 LONGEST_SECONDS = 0.25
 """Limbs swing: after a longer time than this a body is no further from where it was."""

@@ -9,9 +9,9 @@ only.
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Indices
 from studio.body.model import BodyModel, moving_joint
-from studio.trackers.tracker import Hierarchy
+from studio.foundations.arrays import Indices
+from studio.search.trackers.tracker import Hierarchy
 
 ROOT, NEAR, FAR = 0, 1, 2
 SIDES = ("left", "right")

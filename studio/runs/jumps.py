@@ -9,10 +9,10 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Array, median_and_spread, runs_of
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
 from studio.body.scale import scale_of
+from studio.foundations.arrays import Array, median_and_spread, runs_of
 from studio.runs.tracks import Track, stretches
 
 LEAST_MM = 25.0

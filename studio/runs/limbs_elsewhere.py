@@ -15,14 +15,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Array, Bytes
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
 from studio.body.scale import scale_of
 from studio.evidence.frame_evidence import FrameEvidence
-from studio.geometry.camera import Camera
-from studio.geometry.projection import nearest_pixels
-from studio.trackers.agreement import Agreement, limb_names
+from studio.foundations.arrays import Array, Bytes
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.geometry.projection import nearest_pixels
+from studio.search.trackers.agreement import Agreement, limb_names
 
 SPACING = 35.0
 """mm at a person's size, between the grid's points."""

@@ -9,13 +9,13 @@ from typing import Any
 
 import msgspec
 
-from studio.errors import SessionError, SettingsError
-from studio.foreign_files import LARGEST_RECORD, read_file
-from studio.knobs import Value
+from studio.foundations.errors import SessionError, SettingsError
+from studio.foundations.foreign_files import LARGEST_RECORD, read_file
+from studio.foundations.knobs import Value
+from studio.foundations.typed_decoding import decode_json
+from studio.search.settings import RunSettings, changed_settings, settings_from_values, values
 from studio.sessions.atomic_files import write_bytes
 from studio.sessions.stored_run import StoredRun
-from studio.settings import RunSettings, changed_settings, settings_from_values, values
-from studio.typed_decoding import decode_json
 
 FILE_NAME = "moved_knobs.json"
 FIRST_VERSION = 1

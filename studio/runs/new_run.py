@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
 
-from studio.arrays import Array
 from studio.body.branches import within_limits
 from studio.body.catalogue import body_file_text
 from studio.body.model import BodyModel
 from studio.body.subject import Subject, read_subject
-from studio.declaring import (
+from studio.foundations.arrays import Array
+from studio.foundations.declaring import (
     AllowInconsistent,
     Body,
     First,
@@ -30,28 +30,28 @@ from studio.declaring import (
     Values,
     Web,
 )
-from studio.errors import BodyError, RunError, StudioError
+from studio.foundations.errors import BodyError, RunError, StudioError
+from studio.foundations.geometry.reach import within_reach
+from studio.foundations.knobs import Knob
 from studio.foundations.package import software_version
-from studio.geometry.reach import within_reach
-from studio.knobs import Knob
-from studio.likelihood.catalogue import WEIGHTINGS
-from studio.progress import Progress, unheard
+from studio.foundations.progress import Progress, unheard
 from studio.runs.behaviour_models import chosen_model
-from studio.runs.contrast import KnownPoses, contrast_notes
-from studio.runs.initialising import InitialPose, initialise
-from studio.runs.live_request import check_live, live_changes
-from studio.runs.mask_quality import look_before_the_first_run
+from studio.runs.live.live_request import check_live, live_changes
 from studio.runs.search_space import parameter_names, session_sigma
-from studio.runs.session_settings import session_settings
-from studio.runs.shape_on_the_way import session_shape
-from studio.runs.silhouette_doubts import accepted_doubts
-from studio.runs.start_pose_file import frame_of_file, start_pose_from_file
+from studio.runs.setup.contrast import KnownPoses, contrast_notes
+from studio.runs.setup.initialising import InitialPose, initialise
+from studio.runs.setup.mask_quality import look_before_the_first_run
+from studio.runs.setup.session_settings import session_settings
+from studio.runs.setup.shape_on_the_way import session_shape
+from studio.runs.setup.silhouette_doubts import accepted_doubts
+from studio.runs.setup.start_pose_file import frame_of_file, start_pose_from_file
+from studio.search.likelihood.catalogue import WEIGHTINGS
+from studio.search.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, knob_table, values
+from studio.search.trackers.catalogue import TRACKERS
 from studio.sessions.manifest import now
 from studio.sessions.run_record import RunRecord
 from studio.sessions.session import Session, free_run_name, numbered
 from studio.sessions.stored_run import StoredRun
-from studio.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, knob_table, values
-from studio.trackers.catalogue import TRACKERS
 
 DESPITE = "Tracked despite: "
 """Prefix of a run's note on an accepted fault of the calibration."""

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import msgspec
 
-from studio.errors import NotFoundError, SettingsError
+from studio.foundations.errors import NotFoundError, SettingsError
 from studio.sessions.manifest import now
 from studio.sessions.record_files import RecordFile
 from studio.sessions.stored_run import StoredRun

@@ -5,8 +5,8 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from studio.errors import StudioError
-from studio.progress import time_left
+from studio.foundations.errors import StudioError
+from studio.foundations.progress import time_left
 from studio.sessions.results_reader import Timeline, TimeTaken
 from studio.sessions.session import Session
 

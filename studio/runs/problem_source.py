@@ -13,22 +13,22 @@ from concurrent.futures import CancelledError, Executor, Future
 from typing import Any, TypeVar
 
 from studio.body.model import BodyModel
-from studio.capture.footage import Footage
-from studio.errors import RunError
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.distance_maps import silhouettes_by_camera
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.pipeline import EvidenceMaker
-from studio.geometry.camera import Camera
-from studio.likelihood.catalogue import WEIGHTINGS
-from studio.likelihood.silhouette_areas import HALF, silhouettes_of
+from studio.footage.capture.footage import Footage
+from studio.foundations.errors import RunError
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.tracing import span
 from studio.runs.run_footage import filmed_cameras
+from studio.search.likelihood.catalogue import WEIGHTINGS
+from studio.search.likelihood.silhouette_areas import HALF, silhouettes_of
+from studio.search.settings import RunSettings
+from studio.search.trackers.loss_detection import anything_seen, shown_by
+from studio.search.trackers.recovery_settings import OFF
+from studio.search.trackers.tracker import FrameLikelihood
 from studio.sessions.session import Session
-from studio.settings import RunSettings
-from studio.tracing import span
-from studio.trackers.loss_detection import anything_seen, shown_by
-from studio.trackers.recovery_settings import OFF
-from studio.trackers.tracker import FrameLikelihood
 
 KEPT_FRAMES = 4
 """Evidence kept: the current frame, the prepared one, and two earlier ones."""

@@ -3,10 +3,10 @@
 Nothing is stored unless it is kept. One set of settings holds for the whole frame.
 """
 
-from studio.errors import RunError
+from studio.foundations.errors import RunError
 from studio.runs.tracking_run import TrackingRun
-from studio.settings import RunSettings
-from studio.trackers.tracker import FrameResult, LayerRecord
+from studio.search.settings import RunSettings
+from studio.search.trackers.tracker import FrameResult, LayerRecord
 
 
 class Reannealing:

@@ -1,10 +1,10 @@
 """A run's frames refined on their silhouettes, with the cameras, body and settings that they were tracked with.
 
-Consecutive frames are refined together (`tracking.refinement_over_time`), so that the movement is one that a body can
-make. Frames whose silhouettes agree too little even then (a platform or a shadow in the masks) are not fitted: they
-keep their pose as far as the neighbours' movement allows. Frames in which the body was lost split the movement and are
-refined alone, as are all frames where the acceleration is 0: then no frame gets a lower likelihood than before, and
-one with poor masks keeps its pose. Frames without evidence are unchanged.
+Consecutive frames are refined together (`search.trackers.refinement_over_time`), so that the movement is one that a
+body can make. Frames whose silhouettes agree too little even then (a platform or a shadow in the masks) are not
+fitted: they keep their pose as far as the neighbours' movement allows. Frames in which the body was lost split the
+movement and are refined alone, as are all frames where the acceleration is 0: then no frame gets a lower likelihood
+than before, and one with poor masks keeps its pose. Frames without evidence are unchanged.
 """
 
 from collections.abc import Callable
@@ -13,21 +13,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Array
 from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
-from studio.likelihood.catalogue import WEIGHTINGS
+from studio.foundations.arrays import Array
 from studio.runs.problem_source import ProblemSource
 from studio.runs.run_footage import filmed_cameras
 from studio.runs.tracks import Track, stretches
+from studio.search.likelihood.catalogue import WEIGHTINGS
+from studio.search.settings import RunSettings, SettingsHistory, default_settings, settings_from_values
+from studio.search.trackers.hidden_areas import without_hidden
+from studio.search.trackers.loss_detection import Onlooker, Sight
+from studio.search.trackers.refinement import Distances, FrameLoss, RefinementSettings, Refiner, mm_at
+from studio.search.trackers.refinement_over_time import HELD, MovementRefiner, Window, windows
+from studio.search.trackers.tracker import LOST, NO_EVIDENCE
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.settings import RunSettings, SettingsHistory, default_settings, settings_from_values
-from studio.trackers.hidden_areas import without_hidden
-from studio.trackers.loss_detection import Onlooker, Sight
-from studio.trackers.refinement import Distances, FrameLoss, RefinementSettings, Refiner, mm_at
-from studio.trackers.refinement_over_time import HELD, MovementRefiner, Window, windows
-from studio.trackers.tracker import LOST, NO_EVIDENCE
 
 JUDGE = "edge-region-silhouette"
 """The likelihood used where the run's own reads pictures instead of masks (blobs need a prediction)."""

@@ -8,10 +8,10 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from studio.arrays import Array
 from studio.body.forward_kinematics import marker_points
-from studio.errors import RunError
-from studio.progress import Progress, unheard
+from studio.foundations.arrays import Array
+from studio.foundations.errors import RunError
+from studio.foundations.progress import Progress, unheard
 from studio.runs.problem_source import ProblemSource
 from studio.runs.refined_frames import refined_frames
 from studio.runs.search_space import search_space
@@ -32,11 +32,11 @@ from studio.runs.tracks import (
     track_names,
     write_track,
 )
+from studio.search.trackers.refinement import RefinementSettings
+from studio.search.trackers.smoothing import Smoothed, SmoothingSettings, rms_second_difference, smooth
 from studio.sessions.names import checked_name
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.trackers.refinement import RefinementSettings
-from studio.trackers.smoothing import Smoothed, SmoothingSettings, rms_second_difference, smooth
 
 
 @dataclass(frozen=True, slots=True, eq=False)

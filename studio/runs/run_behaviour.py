@@ -4,15 +4,15 @@ import dataclasses
 
 import numpy as np
 
-from studio.arrays import Array
-from studio.behaviour.model import BehaviourModel
-from studio.behaviour.model_file import write_model
+from studio.foundations.arrays import Array
 from studio.runs.search_space import search_space
+from studio.search.behaviour.model import BehaviourModel
+from studio.search.behaviour.model_file import write_model
+from studio.search.settings import RunSettings, settings_from_values
+from studio.search.trackers.online_learning import OnlineLearner
+from studio.search.trackers.tracker import RECOVERED, TRACKED, FilterState, SearchSpace
 from studio.sessions.results_store import ResultsReader
 from studio.sessions.stored_run import StoredRun
-from studio.settings import RunSettings, settings_from_values
-from studio.trackers.online_learning import OnlineLearner
-from studio.trackers.tracker import RECOVERED, TRACKED, FilterState, SearchSpace
 
 LEARNT_NAME = "learnt.behaviour"
 """In the run's folder: the learnt model at its end, for other runs."""

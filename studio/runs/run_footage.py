@@ -1,8 +1,8 @@
 """The footage of a run, whose frame numbers may differ from the files'."""
 
-from studio.capture.footage import Footage, PingPong
-from studio.errors import RunError
-from studio.geometry.camera import Camera
+from studio.footage.capture.footage import Footage, PingPong
+from studio.foundations.errors import RunError
+from studio.foundations.geometry.camera import Camera
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 

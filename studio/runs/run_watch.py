@@ -13,17 +13,16 @@ import numpy as np
 
 from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence
-from studio.geometry.camera import Camera
-from studio.likelihood.catalogue import WEIGHTINGS, LossLimit
-from studio.runs.initialising import hull_of, seek, whole_problem
-from studio.sessions.results_reader import ResultsReader
-from studio.settings import RunSettings, default_settings
-from studio.trackers.initialisation import PER_FAMILY, QUICK
-from studio.trackers.loss_detection import Onlooker, WeightWatch, anything_seen
-from studio.trackers.particles import unweighted
-from studio.trackers.recovery_settings import INITIALISE, OFF
-from studio.trackers.start_candidates import start_candidates
-from studio.trackers.tracker import (
+from studio.foundations.geometry.camera import Camera
+from studio.runs.setup.initialising import hull_of, seek, whole_problem
+from studio.search.likelihood.catalogue import WEIGHTINGS, LossLimit
+from studio.search.settings import RunSettings, default_settings
+from studio.search.trackers.initialisation import PER_FAMILY, QUICK
+from studio.search.trackers.loss_detection import Onlooker, WeightWatch, anything_seen
+from studio.search.trackers.particles import unweighted
+from studio.search.trackers.recovery_settings import INITIALISE, OFF
+from studio.search.trackers.start_candidates import start_candidates
+from studio.search.trackers.tracker import (
     LIMB_LOST,
     LOST,
     NO_EVIDENCE,
@@ -35,6 +34,7 @@ from studio.trackers.tracker import (
     ParticleSet,
     SearchSpace,
 )
+from studio.sessions.results_reader import ResultsReader
 
 SEEKING = "edge-region-silhouette"
 """The likelihood used for recovery; recovery was measured with it."""

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from studio.arrays import Array
-from studio.behaviour.model import BehaviourModel
 from studio.body.model import BodyModel
 from studio.body.scale import scale_of
+from studio.foundations.arrays import Array
 from studio.runs.hierarchy import hierarchy_of
+from studio.search.behaviour.model import BehaviourModel
+from studio.search.trackers.tracker import SearchSpace
 from studio.sessions.session import Session
-from studio.trackers.tracker import SearchSpace
 
 SHARE_OF_MAX_STEP = 0.5
 """σ0 as a share of the largest movement expected from one frame to the next (Deutscher & Reid 2005, 3.1)."""

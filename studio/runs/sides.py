@@ -1,4 +1,4 @@
-"""Corrects exchanged sides (left and right, front and back) of a finished run (`tracking.side_exchange`).
+"""Corrects exchanged sides (left and right, front and back) of a finished run (`search.trackers.side_exchange`).
 
 The tracked poses stay. If sides were exchanged, the corrected poses are the track "sides", with the exchanges in its
 `made_by`; otherwise there is no such track.
@@ -9,11 +9,11 @@ from functools import partial
 
 import numpy as np
 
-from studio.arrays import Array
 from studio.body.model import BodyModel
 from studio.evidence.distance_maps import silhouettes_by_camera
 from studio.evidence.frame_evidence import FrameEvidence
-from studio.geometry.camera import Camera
+from studio.foundations.arrays import Array
+from studio.foundations.geometry.camera import Camera
 from studio.runs.refined_frames import MaskSettings
 from studio.runs.run_watch import Sightings
 from studio.runs.tracks import (
@@ -28,11 +28,11 @@ from studio.runs.tracks import (
     track_digest,
     write_track,
 )
+from studio.search.trackers.hidden_areas import without_hidden
+from studio.search.trackers.loss_detection import Onlooker
+from studio.search.trackers.refinement import Distances, mm_at
+from studio.search.trackers.side_exchange import with_sides_right
 from studio.sessions.stored_run import StoredRun
-from studio.trackers.hidden_areas import without_hidden
-from studio.trackers.loss_detection import Onlooker
-from studio.trackers.refinement import Distances, mm_at
-from studio.trackers.side_exchange import with_sides_right
 
 BORDER_POINTS = 150
 EXCHANGED = "exchanged"

@@ -15,21 +15,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studio.arrays import Array, Bytes
 from studio.body.branches import within_limits
 from studio.body.scale import scale_of
-from studio.errors import RunError
 from studio.evidence.frame_evidence import FrameEvidence
-from studio.geometry.camera import Camera
-from studio.likelihood.catalogue import WEIGHTINGS
-from studio.likelihood.overlay import overlay_points
-from studio.progress import Progress, unheard
-from studio.runs.following import Following
-from studio.runs.initialising import initialise
-from studio.runs.pixel_owners import LimbColours, LimbMap, Share, learn_colours, limb_map, owners
+from studio.foundations.arrays import Array, Bytes
+from studio.foundations.errors import RunError
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.progress import Progress, unheard
+from studio.runs.live.following import Following
 from studio.runs.search_space import search_space, session_sigma
-from studio.runs.session_settings import session_settings
-from studio.runs.shape_on_the_way import (
+from studio.runs.setup.initialising import initialise
+from studio.runs.setup.pixel_owners import LimbColours, LimbMap, Share, learn_colours, limb_map, owners
+from studio.runs.setup.session_settings import session_settings
+from studio.runs.setup.shape_on_the_way import (
     FEWEST_CAMERAS,
     FEWEST_FRAMES,
     FITTED_FRAMES,
@@ -37,12 +35,14 @@ from studio.runs.shape_on_the_way import (
     can_be_fitted,
     fitted_shape,
 )
-from studio.runs.subject_frames import varied_frames
-from studio.runs.subject_masks import WholeMasks, subject_masks_of
+from studio.runs.setup.subject_frames import varied_frames
+from studio.runs.setup.subject_masks import WholeMasks, subject_masks_of
+from studio.search.likelihood.catalogue import WEIGHTINGS
+from studio.search.likelihood.overlay import overlay_points
+from studio.search.settings import default_settings
+from studio.search.trackers.frame_refinement import FrameRefiner
+from studio.search.trackers.tracker import start_of
 from studio.sessions.session import Session
-from studio.settings import default_settings
-from studio.trackers.frame_refinement import FrameRefiner
-from studio.trackers.tracker import start_of
 
 TRACKER, WEIGHTING = "annealed", "edge-region-silhouette"
 STEP = "tracking the bodies at once"

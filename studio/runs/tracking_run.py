@@ -17,26 +17,26 @@ from typing import Protocol
 
 import numpy as np
 
-from studio.capture.naming import listed
-from studio.errors import NotFoundError, RunError, SessionError
 from studio.evidence.distance_maps import silhouettes_by_camera
-from studio.likelihood.problem import BaseFrameLikelihood
-from studio.numba_in_threads import numba
+from studio.footage.capture.naming import listed
+from studio.foundations.errors import NotFoundError, RunError, SessionError
+from studio.foundations.numba_in_threads import numba
+from studio.foundations.tracing import span
 from studio.runs.frame_steps import FrameHistory, space_over
 from studio.runs.pace import Pace, Progress
 from studio.runs.run_behaviour import RunBehaviour
 from studio.runs.run_watch import RunWatch, Sightings
 from studio.runs.storing_behind import StoringBehind
+from studio.search.likelihood.problem import BaseFrameLikelihood
+from studio.search.settings import RunSettings, SettingsEntry, SettingsHistory, settings_from_values, values
+from studio.search.trackers.catalogue import TRACKERS
+from studio.search.trackers.frame_loop import FrameSearch, SearchState, held_over
+from studio.search.trackers.frame_refinement import FrameRefiner, space_after
+from studio.search.trackers.layer_record import search_notes
+from studio.search.trackers.tracker import FilterState, FrameLikelihood, FrameResult, LayerRecord
 from studio.sessions.results_codec import particle_arrays, particles_from
 from studio.sessions.results_store import ResultsReader, ResultsWriter
 from studio.sessions.stored_run import StoredRun
-from studio.settings import RunSettings, SettingsEntry, SettingsHistory, settings_from_values, values
-from studio.tracing import span
-from studio.trackers.catalogue import TRACKERS
-from studio.trackers.frame_loop import FrameSearch, SearchState, held_over
-from studio.trackers.frame_refinement import FrameRefiner, space_after
-from studio.trackers.layer_record import search_notes
-from studio.trackers.tracker import FilterState, FrameLikelihood, FrameResult, LayerRecord
 
 # The newest settings and their version; called before each layer.
 SettingsSource = Callable[[], tuple[int, RunSettings]]

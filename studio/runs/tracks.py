@@ -18,14 +18,14 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Array, read_archive
-from studio.errors import NotFoundError, SessionError
-from studio.foreign_files import foreign_file
+from studio.foundations.arrays import Array, read_archive
+from studio.foundations.errors import NotFoundError, SessionError
+from studio.foundations.foreign_files import foreign_file
+from studio.foundations.typed_decoding import decode_json
+from studio.search.trackers.tracker import TRACKING_STATES
 from studio.sessions.atomic_files import write_bytes, writing
 from studio.sessions.names import checked_name, is_name
 from studio.sessions.stored_run import StoredRun
-from studio.trackers.tracker import TRACKING_STATES
-from studio.typed_decoding import decode_json
 
 Plain = Any
 """What JSON can hold."""
@@ -47,8 +47,8 @@ class Track:
 
     name : "raw", "refined", "smoothed", … frames : (K,) ascending; a missing number is a gap. poses : (K, D) radians
     and mm. confidence : (K,) 0 to 1, NaN unknown (of the search: how well the silhouettes agree, f_s). states : K words
-    of `tracking.tracker.TRACKING_STATES`, "" unknown. made_by : the track's provenance, {} for raw: "verb", "from"
-    and the settings.
+    of `search.trackers.tracker.TRACKING_STATES`, "" unknown. made_by : the track's provenance, {} for raw: "verb",
+    "from" and the settings.
     """
 
     name: str

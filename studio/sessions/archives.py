@@ -15,8 +15,8 @@ from fnmatch import fnmatch
 from pathlib import Path
 from typing import IO
 
-from studio.errors import StudioError
-from studio.foreign_files import foreign_file
+from studio.foundations.errors import StudioError
+from studio.foundations.foreign_files import foreign_file
 from studio.sessions.atomic_files import discard, new_folder_beside
 from studio.sessions.names import place_in, relative_path
 

@@ -16,8 +16,8 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
-from studio.errors import NotFoundError, SessionError
-from studio.foreign_files import NO_ROOM, check_file, check_inside, read_file
+from studio.foundations.errors import NotFoundError, SessionError
+from studio.foundations.foreign_files import NO_ROOM, check_file, check_inside, read_file
 from studio.sessions.names import free_name
 from studio.sessions.session_databases import check_tables, open_database
 

@@ -21,14 +21,14 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from studio.arrays import Array, Bytes
-from studio.capture.footage import EXCLUSIONS, background_turn, turned_picture
-from studio.capture.footage_source import CameraSource
-from studio.capture.pictures import check_picture, is_picture, painted_picture, png_of, with_polygon
-from studio.capture.video import measure_video
-from studio.errors import FootageError, NotFoundError
 from studio.evidence.backgrounds import check_plate_size
-from studio.foreign_files import read_file
+from studio.footage.capture.footage import EXCLUSIONS, background_turn, turned_picture
+from studio.footage.capture.footage_source import CameraSource
+from studio.footage.capture.pictures import check_picture, is_picture, painted_picture, png_of, with_polygon
+from studio.footage.capture.video import measure_video
+from studio.foundations.arrays import Array, Bytes
+from studio.foundations.errors import FootageError, NotFoundError
+from studio.foundations.foreign_files import read_file
 from studio.sessions import atomic_files
 from studio.sessions.names import free_name, name_from
 from studio.sessions.record_files import RecordFile

@@ -4,13 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from studio.calibration.board_footage_reading import HowTaken, find_board_footage
-from studio.calibration.boards import Board
-from studio.calibration.findings import Finding, blocking
-from studio.calibration.report import calibration_source, write_calibrated
-from studio.calibration.verbs import Calibrated, calibrate
-from studio.errors import CalibrationError, NotFoundError
-from studio.progress import Progress
+from studio.footage.calibration.board_footage_reading import HowTaken, find_board_footage
+from studio.footage.calibration.boards import Board
+from studio.footage.calibration.findings import Finding, blocking
+from studio.footage.calibration.report import calibration_source, write_calibrated
+from studio.footage.calibration.verbs import Calibrated, calibrate
+from studio.foundations.errors import CalibrationError, NotFoundError
+from studio.foundations.progress import Progress
 from studio.sessions.calibration_changes import NewCalibration, fit_to_session, replace_calibration
 from studio.sessions.session import CAMERAS_PATH, Session
 from studio.sessions.workspace import Workspace
@@ -102,7 +102,7 @@ def solve_boards(
     refine_lenses: bool = False,
     progress: Progress | None = None,
 ) -> Calibrated:
-    """`calibration.verbs.calibrate` with cameras named, sized and turned as the session's footage is.
+    """`footage.calibration.verbs.calibrate` with cameras named, sized and turned as the session's footage is.
 
     intrinsics, extrinsics : default those of the place. offsets : of the common footage, frames by camera. Nothing is
     written. Raises CalibrationError, FootageError.

@@ -18,15 +18,21 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from studio.calibration.report import write_calibrated
-from studio.calibration.verbs import Calibrated
-from studio.capture.calibration_files import AssumedCrop, Calibration, read_calibration, write_calibration
-from studio.capture.footage_fit import NO_BARS, Margins, black_margins, fit_camera
-from studio.capture.footage_source import CameraSource
-from studio.capture.naming import CameraMatch, listed, match_names
-from studio.errors import CalibrationError, FootageError, NotFoundError, SessionError
-from studio.foreign_files import LARGEST_RECORD, read_file
-from studio.geometry.camera import Camera
+from studio.footage.calibration.report import write_calibrated
+from studio.footage.calibration.verbs import Calibrated
+from studio.footage.capture.calibration_files import (
+    AssumedCrop,
+    Calibration,
+    read_calibration,
+    write_calibration,
+)
+from studio.footage.capture.footage_fit import NO_BARS, Margins, black_margins, fit_camera
+from studio.footage.capture.footage_source import CameraSource
+from studio.footage.capture.naming import CameraMatch, listed, match_names
+from studio.foundations.errors import CalibrationError, FootageError, NotFoundError, SessionError
+from studio.foundations.foreign_files import LARGEST_RECORD, read_file
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.typed_decoding import decode_json, is_list, is_table
 from studio.sessions import atomic_files, provenance
 from studio.sessions.file_checksums import forget_files
 from studio.sessions.manifest import SessionManifest
@@ -40,7 +46,6 @@ from studio.sessions.session import (
     described_anew,
 )
 from studio.sessions.work_under_way import one_at_a_time
-from studio.typed_decoding import decode_json, is_list, is_table
 
 EARLIER = "earlier"
 REPORT_NAME = "cameras.report.json"

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import msgspec
 
-from studio.errors import SessionError
-from studio.foreign_files import LARGEST, open_file
+from studio.foundations.errors import SessionError
+from studio.foundations.foreign_files import LARGEST, open_file
 from studio.sessions.record_files import RecordFile
 
 NAME = ".checksums.json"

@@ -13,18 +13,18 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from studio.arrays import Array
-from studio.capture.footage import camera_reader
-from studio.capture.footage_source import CameraSource, FootageSource
-from studio.capture.frame_pairing import paired_by_time
-from studio.capture.interlacing import times_of_fields
-from studio.capture.naming import listed, match_names
-from studio.capture.pictures import list_pictures
-from studio.capture.synchrony import MOST_SECONDS, Synchrony, estimate_synchrony
-from studio.capture.timestamps import TimedOffsets, offsets_from_times, read_timestamps
-from studio.capture.video import measure_video, probe_video
-from studio.errors import FootageError, SessionError
-from studio.progress import Progress, unheard
+from studio.footage.capture.footage import camera_reader
+from studio.footage.capture.footage_source import CameraSource, FootageSource
+from studio.footage.capture.frame_pairing import paired_by_time
+from studio.footage.capture.interlacing import times_of_fields
+from studio.footage.capture.naming import listed, match_names
+from studio.footage.capture.pictures import list_pictures
+from studio.footage.capture.synchrony import MOST_SECONDS, Synchrony, estimate_synchrony
+from studio.footage.capture.timestamps import TimedOffsets, offsets_from_times, read_timestamps
+from studio.footage.capture.video import measure_video, probe_video
+from studio.foundations.arrays import Array
+from studio.foundations.errors import FootageError, SessionError
+from studio.foundations.progress import Progress, unheard
 from studio.sessions.background_files import (
     MASKS_GONE,
     forget_unused_masks,

@@ -12,10 +12,17 @@ from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from studio.arrays import LARGEST_ARCHIVE, MOST_ARRAYS
-from studio.capture.pictures import is_picture
-from studio.errors import NotFoundError, StudioError
-from studio.foreign_files import KINDS, LARGEST, LARGEST_RECORD, MANIFEST_NAME, check_inside, open_file
+from studio.footage.capture.pictures import is_picture
+from studio.foundations.arrays import LARGEST_ARCHIVE, MOST_ARRAYS
+from studio.foundations.errors import NotFoundError, StudioError
+from studio.foundations.foreign_files import (
+    KINDS,
+    LARGEST,
+    LARGEST_RECORD,
+    MANIFEST_NAME,
+    check_inside,
+    open_file,
+)
 from studio.sessions.archives import ArchiveLimits, check_archive, is_archive
 from studio.sessions.atomic_files import PARTIAL_PREFIX
 from studio.sessions.results_reader import FILE_NAME as RESULTS_NAME

@@ -19,13 +19,14 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from studio.capture.calibration_files import write_calibration
-from studio.capture.footage_source import CameraSource, FootageSource
-from studio.capture.live_cameras import PictureSet, SpreadFigures, spread_figures
-from studio.capture.pictures import picture_path
-from studio.capture.stream_files import jpeg_of
-from studio.errors import FootageError, SessionError
-from studio.foreign_files import foreign_file, leads_out, read_text
+from studio.footage.capture.calibration_files import write_calibration
+from studio.footage.capture.footage_source import CameraSource, FootageSource
+from studio.footage.capture.live_cameras import PictureSet, SpreadFigures, spread_figures
+from studio.footage.capture.pictures import picture_path
+from studio.footage.capture.stream_files import jpeg_of
+from studio.foundations.errors import FootageError, SessionError
+from studio.foundations.foreign_files import foreign_file, leads_out, read_text
+from studio.foundations.words import sentence
 from studio.sessions import atomic_files
 from studio.sessions.background_files import BACKGROUND_NAME, EVIDENCE_NAME, read_evidence
 from studio.sessions.manifest import now, write_manifest
@@ -40,7 +41,6 @@ from studio.sessions.session import (
     described_anew,
     start_pose_files,
 )
-from studio.words import sentence
 
 LIVE, SETS_NAME, GO_NAME, LOCK_NAME = "live", "sets.csv", "go", "lock"
 COLUMNS = ("frame", "moment", "spread_ms", "lagging", "left_out", "arrivals")

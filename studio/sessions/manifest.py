@@ -10,9 +10,9 @@ from pathlib import Path, PurePath
 
 import msgspec
 
-from studio.capture.footage_source import FootageSource
-from studio.capture.naming import CameraMatch
-from studio.foreign_files import MANIFEST_NAME
+from studio.footage.capture.footage_source import FootageSource
+from studio.footage.capture.naming import CameraMatch
+from studio.foundations.foreign_files import MANIFEST_NAME
 from studio.sessions.record_files import RecordFile
 
 SCHEMA_VERSION = 1

@@ -13,11 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
-from studio.arrays import Array, Indices
 from studio.body.model import BodyModel
-from studio.errors import BodyError
-from studio.foreign_files import foreign_file, read_foreign_text
-from studio.geometry.reach import REACH_HINT, within_reach
+from studio.foundations.arrays import Array, Indices
+from studio.foundations.errors import BodyError
+from studio.foundations.foreign_files import foreign_file, read_foreign_text
+from studio.foundations.geometry.reach import REACH_HINT, within_reach
 from studio.sessions.atomic_files import write_text
 
 FRAME, FPS = "frame", "fps"

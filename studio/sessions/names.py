@@ -13,7 +13,7 @@ import re
 import unicodedata
 from pathlib import Path, PurePosixPath
 
-from studio.errors import NotFoundError, SessionError, StudioError
+from studio.foundations.errors import NotFoundError, SessionError, StudioError
 
 PATTERN = re.compile(r"[A-Za-z0-9_-]{1,64}")
 LONGEST = 64

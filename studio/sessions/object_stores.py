@@ -14,7 +14,7 @@ from typing import Any
 from urllib.parse import unquote, urlsplit
 from urllib.request import url2pathname
 
-from studio.errors import NotFoundError, SessionError, StudioError
+from studio.foundations.errors import NotFoundError, SessionError, StudioError
 from studio.sessions.atomic_files import PARTIAL_PREFIX
 from studio.sessions.names import place_in, relative_path
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from studio.body.catalogue import SUFFIX, packaged_bodies
-from studio.errors import BodyError
+from studio.foundations.errors import BodyError
 from studio.sessions.atomic_files import write_text, writing
 from studio.sessions.names import checked_name
 from studio.sessions.session import BODIES_NAME, Session

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import msgspec
 
-from studio.capture.footage import EXCLUSIONS
-from studio.foreign_files import read_file
+from studio.footage.capture.footage import EXCLUSIONS
+from studio.foundations.foreign_files import read_file
 from studio.sessions.background_files import EVIDENCE_NAME
 from studio.sessions.record_files import RecordFile
 from studio.sessions.session import CAMERAS_PATH, START_POSE_NAME, SUBJECT_NAME, Session

@@ -9,10 +9,10 @@ from typing import Any, Generic, TypeVar
 
 import msgspec
 
-from studio.errors import NotFoundError, SessionError
-from studio.foreign_files import LARGEST_RECORD, read_file
+from studio.foundations.errors import NotFoundError, SessionError
+from studio.foundations.foreign_files import LARGEST_RECORD, read_file
+from studio.foundations.typed_decoding import decode_json
 from studio.sessions.atomic_files import write_bytes
-from studio.typed_decoding import decode_json
 
 Record = TypeVar("Record", bound=msgspec.Struct)
 Entries = dict[str, Any]

@@ -7,19 +7,19 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from studio.arrays import Array
-from studio.capture.calibration_files import read_calibration
-from studio.capture.live_cameras import APART, SpreadFigures, furthest, spread_figures
-from studio.capture.stream_files import mend_recording
-from studio.capture.timestamps import read_timestamps
-from studio.errors import FootageError
-from studio.progress import Progress, unheard
+from studio.footage.capture.calibration_files import read_calibration
+from studio.footage.capture.live_cameras import APART, SpreadFigures, furthest, spread_figures
+from studio.footage.capture.stream_files import mend_recording
+from studio.footage.capture.timestamps import read_timestamps
+from studio.foundations.arrays import Array
+from studio.foundations.errors import FootageError
+from studio.foundations.progress import Progress, unheard
+from studio.foundations.words import sentence
 from studio.sessions.importers.importing import ImportReport, import_source
 from studio.sessions.manifest import FILE_NAME as MANIFEST_NAME
 from studio.sessions.names import is_name
 from studio.sessions.session import CAMERAS_PATH, Session, described_anew
 from studio.sessions.workspace import Workspace
-from studio.words import sentence
 
 TIMES_NAME = "timestamps.csv"
 LATE_SECONDS = 1e-6

@@ -25,9 +25,9 @@ from tempfile import TemporaryDirectory
 
 import platformdirs
 
-from studio.errors import NotFoundError, SessionError
-from studio.foreign_files import LARGEST_RECORD, check_inside, read_file, read_text
-from studio.progress import Progress, unheard
+from studio.foundations.errors import NotFoundError, SessionError
+from studio.foundations.foreign_files import LARGEST_RECORD, check_inside, read_file, read_text
+from studio.foundations.progress import Progress, unheard
 from studio.sessions.atomic_files import (
     PARTIAL_PREFIX,
     copy_database,

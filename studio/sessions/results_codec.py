@@ -26,9 +26,10 @@ import numpy as np
 import zstandard
 from numpy.typing import NDArray
 
-from studio.arrays import Array, Indices, read_archive
-from studio.errors import SessionError
-from studio.trackers.tracker import (
+from studio.foundations.arrays import Array, Indices, read_archive
+from studio.foundations.errors import SessionError
+from studio.foundations.typed_decoding import is_table
+from studio.search.trackers.tracker import (
     TRACKING_STATES,
     Estimate,
     FilterState,
@@ -36,7 +37,6 @@ from studio.trackers.tracker import (
     LayerRecord,
     ParticleSet,
 )
-from studio.typed_decoding import is_table
 
 LEVEL = -1
 LARGEST_BLOB = 128 << 20

@@ -17,8 +17,11 @@ from typing import Any, TypeVar
 import numpy as np
 from msgspec import DecodeError
 
-from studio.arrays import Array, Indices
-from studio.errors import DamagedError, NotFoundError, SessionError
+from studio.foundations.arrays import Array, Indices
+from studio.foundations.errors import DamagedError, NotFoundError, SessionError
+from studio.foundations.typed_decoding import decode_json
+from studio.search.settings import SettingsEntry
+from studio.search.trackers.tracker import TRACKED, TRACKING_STATES, FrameResult, LayerRecord
 from studio.sessions.manifest import MOST_FRAMES
 from studio.sessions.results_codec import (
     FRAME,
@@ -33,9 +36,6 @@ from studio.sessions.results_codec import (
     unpack_result,
 )
 from studio.sessions.session_databases import check_tables, open_database
-from studio.settings import SettingsEntry
-from studio.trackers.tracker import TRACKED, TRACKING_STATES, FrameResult, LayerRecord
-from studio.typed_decoding import decode_json
 
 FILE_NAME = "results.sqlite"
 UNREADABLE = (sqlite3.DatabaseError, UnicodeDecodeError)
@@ -81,7 +81,7 @@ class TimeTaken:
 @dataclass(frozen=True, slots=True, eq=False)
 class Timeline:
     """Columns of K finished frames for a timeline, all (K,). layers, evaluations, settings_version : int. tracking :
-    states of `tracking.tracker.TRACKING_STATES`. overlaps : NaN where unknown. doubts : int.
+    states of `search.trackers.tracker.TRACKING_STATES`. overlaps : NaN where unknown. doubts : int.
     """
 
     frames: Indices

@@ -16,9 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from studio.arrays import Array
-from studio.errors import RunError, SessionError
-from studio.foreign_files import MANIFEST_NAME, check_file
+from studio.foundations.arrays import Array
+from studio.foundations.errors import RunError, SessionError
+from studio.foundations.foreign_files import MANIFEST_NAME, check_file
+from studio.search.trackers.tracker import FrameResult, LayerRecord
 from studio.sessions.atomic_files import unwritable
 from studio.sessions.process_lock import ProcessLock
 from studio.sessions.results_codec import (
@@ -41,7 +42,6 @@ from studio.sessions.results_reader import (
 )
 from studio.sessions.session_databases import check_tables, open_database
 from studio.sessions.work_under_way import check_there, one_at_a_time
-from studio.trackers.tracker import FrameResult, LayerRecord
 
 Value = bool | int | float | str
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from studio.errors import RunError
-from studio.extras import load_extra
+from studio.foundations.errors import RunError
+from studio.foundations.extras import load_extra
+from studio.search.trackers.tracker import FrameResult, LayerRecord
 from studio.sessions.run_record import RunRecord
-from studio.trackers.tracker import FrameResult, LayerRecord
 
 EXTRA = "notebook"
 LARGEST_BYTES = 4 << 30

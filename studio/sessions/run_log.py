@@ -6,9 +6,9 @@ from pathlib import Path
 
 import msgspec
 
-from studio.errors import SessionError
-from studio.foreign_files import check_file, open_file
-from studio.typed_decoding import decode_json
+from studio.foundations.errors import SessionError
+from studio.foundations.foreign_files import check_file, open_file
+from studio.foundations.typed_decoding import decode_json
 
 FILE_NAME = "log.jsonl"
 LONGEST_TAIL = 1 << 20

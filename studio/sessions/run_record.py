@@ -1,8 +1,8 @@
 """`run.json`: the request of a run, written once when it is made.
 
 Everything that a run's poses depend on is here or in the run's folder: the body with its dimensions (`body/`), the
-cameras (`cameras.toml`), the behaviour model if any (`behaviour.model`), the start pose, σ0, the seed and the initial
-settings. Later settings and the progress are in the results store.
+cameras (`cameras.toml`), the behaviour model if any (`search.behaviour.model`), the start pose, σ0, the seed and the
+initial settings. Later settings and the progress are in the results store.
 """
 
 from pathlib import Path
@@ -30,11 +30,11 @@ class RunRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     text. sigma : σ0 of every parameter from frame to frame, rad and mm. software : the studio's version. notes : for
     readers of the results. behaviour : name of the behaviour model whose copy the run keeps, "" without one. live :
     frames came on a clock and those that came too fast were dropped; the results store lists the tracked ones.
-    ping_pong : the footage is played forwards and backwards without end (`capture.footage`), so that `last` may lie
-    behind its end. made_from : the run that was corrected, or that this one leaves with other knobs, "" if none: other
-    frames are that run's. corrected : the frame that restarts at corrected_pose. backwards_to : None where the frames
-    after it follow from it; else these are the old ones, and from it down to this frame each was tracked from the one
-    after it. subject_dimensions : the
+    ping_pong : the footage is played forwards and backwards without end (`footage.capture.footage`), so that `last`
+    may lie behind its end. made_from : the run that was corrected, or that this one leaves with other knobs, "" if
+    none: other frames are that run's. corrected : the frame that restarts at corrected_pose. backwards_to : None
+    where the frames after it follow from it; else these are the old ones, and from it down to this frame each was
+    tracked from the one after it. subject_dimensions : the
     subject's, where the first frames gave the body another shape; empty where they did not.
     """
 

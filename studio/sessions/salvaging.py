@@ -6,7 +6,7 @@ import sqlite3
 from pathlib import Path
 from typing import Any
 
-from studio.errors import RunError, SessionError
+from studio.foundations.errors import RunError, SessionError
 from studio.sessions.atomic_files import unwritable
 from studio.sessions.process_lock import ProcessLock
 from studio.sessions.results_codec import FRAME, GIVEN_UP

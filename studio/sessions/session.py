@@ -18,11 +18,11 @@ from studio.body.branches import within_limits
 from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
 from studio.body.subject import Subject, fit_subject, read_subject
-from studio.capture.calibration_files import calibration_text, read_calibration
-from studio.capture.footage import Footage, open_footage
-from studio.errors import NotFoundError, SessionError, StudioError
-from studio.foreign_files import check_links, read_file
-from studio.geometry.camera import Camera
+from studio.footage.capture.calibration_files import calibration_text, read_calibration
+from studio.footage.capture.footage import Footage, open_footage
+from studio.foundations.errors import NotFoundError, SessionError, StudioError
+from studio.foundations.foreign_files import check_links, read_file
+from studio.foundations.geometry.camera import Camera
 from studio.sessions import atomic_files
 from studio.sessions.atomic_files import NameTakenError, writing
 from studio.sessions.file_checksums import note_files

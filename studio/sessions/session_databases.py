@@ -11,8 +11,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from studio.errors import SessionError
-from studio.foreign_files import check_file
+from studio.foundations.errors import SessionError
+from studio.foundations.foreign_files import check_file
 
 LARGEST_VALUE = 256 << 20
 STEPS_AT_ONCE = 1_000_000

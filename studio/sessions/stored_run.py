@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from studio.behaviour.model import BehaviourModel
-from studio.behaviour.model_file import read_model
 from studio.body.catalogue import load_body
 from studio.body.dimensions import with_dimensions
 from studio.body.model import BodyModel
-from studio.capture.calibration_files import read_calibration
-from studio.errors import BodyError
-from studio.geometry.camera import Camera
+from studio.footage.capture.calibration_files import read_calibration
+from studio.foundations.errors import BodyError
+from studio.foundations.geometry.camera import Camera
+from studio.search.behaviour.model import BehaviourModel
+from studio.search.behaviour.model_file import read_model
 from studio.sessions.results_store import ResultsReader, is_being_written
 from studio.sessions.run_arrays import particles_dataset
 from studio.sessions.run_record import BEHAVIOUR_NAME, CAMERAS_NAME, RunRecord, read_run_record

@@ -14,13 +14,13 @@ from pathlib import Path
 
 import msgspec
 
-from studio.arrays import Bytes
-from studio.capture.footage import thresholded_mask, turned_picture
-from studio.capture.footage_source import CameraSource, FootageSource
-from studio.capture.pictures import read_picture
-from studio.errors import FootageError, SessionError
 from studio.evidence.strokes import Stroke
-from studio.foreign_files import check_regular
+from studio.footage.capture.footage import thresholded_mask, turned_picture
+from studio.footage.capture.footage_source import CameraSource, FootageSource
+from studio.footage.capture.pictures import read_picture
+from studio.foundations.arrays import Bytes
+from studio.foundations.errors import FootageError, SessionError
+from studio.foundations.foreign_files import check_regular
 from studio.sessions.background_files import STROKE_MASKS, made_folders, mask_name
 from studio.sessions.record_files import RecordFile
 from studio.sessions.session import Session

@@ -14,8 +14,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
-from studio.errors import NotFoundError, RunError, SessionError
-from studio.foreign_files import MANIFEST_NAME
+from studio.foundations.errors import NotFoundError, RunError, SessionError
+from studio.foundations.foreign_files import MANIFEST_NAME
 from studio.sessions.process_lock import ProcessLock
 from studio.sessions.run_record import FILE_NAME as RECORD_NAME
 

@@ -14,9 +14,9 @@ import platformdirs
 
 from studio.body.catalogue import body_file_text, body_path, load_body
 from studio.body.subject import DEFAULT_BODY
-from studio.capture.footage_source import FootageSource
-from studio.errors import NotFoundError, SessionError, StudioError
-from studio.progress import Progress, unheard
+from studio.footage.capture.footage_source import FootageSource
+from studio.foundations.errors import NotFoundError, SessionError, StudioError
+from studio.foundations.progress import Progress, unheard
 from studio.sessions import atomic_files
 from studio.sessions.atomic_files import made_whole, write_text
 from studio.sessions.file_checksums import forget_files, note_again

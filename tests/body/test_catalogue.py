@@ -9,7 +9,7 @@ from studio.body.definition import WORLD
 from studio.body.forward_kinematics import limb_ends, marker_points
 from studio.body.model import kinematic_tables
 from studio.body.reader import parse_body
-from studio.errors import BodyError
+from studio.foundations.errors import BodyError
 
 # Parameters and drawn limbs of each body.
 COUNTS = {

@@ -6,8 +6,8 @@ import pytest
 from studio.body.catalogue import list_bodies, load_body
 from studio.body.dragging import REACHED, Dragger
 from studio.body.forward_kinematics import limb_ends, marker_points
-from studio.errors import BodyError
-from studio.geometry.rotations import rotation_from_vector
+from studio.foundations.errors import BodyError
+from studio.foundations.geometry.rotations import rotation_from_vector
 
 PERSONS = ["human25", "human29", "human31", "human34"]
 

@@ -12,7 +12,7 @@ import studio.body
 from studio.body.catalogue import list_bodies, load_body
 from studio.body.forward_kinematics import joint_frames, limb_ends, limb_frames, marker_points
 from studio.body.model import BodyModel
-from studio.errors import BodyError
+from studio.foundations.errors import BodyError
 
 MODELS = Path(studio.body.__file__).parent / "models"
 AXES = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}

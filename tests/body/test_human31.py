@@ -12,9 +12,9 @@ from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_ends, limb_frames, marker_points
 from studio.body.model import kinematic_tables
 from studio.body.subject import fit_subject, subject_from_shape
-from studio.geometry.camera import Camera
-from studio.geometry.cones import limb_outlines
-from studio.geometry.projection import project
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.geometry.cones import limb_outlines
+from studio.foundations.geometry.projection import project
 
 pytestmark = pytest.mark.real_data
 

@@ -5,7 +5,7 @@ from studio.body.catalogue import list_bodies, load_body
 from studio.body.forward_kinematics import marker_points
 from studio.body.inverse_kinematics import pose_from_markers
 from studio.body.model import BodyModel
-from studio.errors import BodyError
+from studio.foundations.errors import BodyError
 
 
 def _names(body: BodyModel) -> tuple[str, ...]:

@@ -10,12 +10,12 @@ from studio.body.branches import within_limits
 from studio.body.catalogue import load_body
 from studio.body.inverse_kinematics import pose_from_markers
 from studio.body.model import BodyModel
+from studio.body.motion_files.trc import read_trc
 from studio.body.person import marker_motion
 from studio.body.subject import Subject, fit_subject
-from studio.motion_files.trc import read_trc
+from studio.results.drawing_footage.motions import make_motion
+from studio.results.drawing_footage.person import marker_lengths, skeleton_of_height
 from studio.sessions.session import Session
-from studio.synthesis.motions import make_motion
-from studio.synthesis.person import marker_lengths, skeleton_of_height
 
 HEIGHT = 1760.0
 

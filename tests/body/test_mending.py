@@ -14,9 +14,9 @@ from studio.body.mending import (
 )
 from studio.body.person import PersonMotion, joint_points
 from studio.body.retargeting import lowest_of_sole
-from studio.geometry.rotations import axis_turn
-from studio.synthesis.motions import make_motion
-from studio.synthesis.person import skeleton_of_height
+from studio.foundations.geometry.rotations import axis_turn
+from studio.results.drawing_footage.motions import make_motion
+from studio.results.drawing_footage.person import skeleton_of_height
 
 BONES = skeleton_of_height(1760.0, np.random.default_rng(1))
 WALK = make_motion("walk", BONES, 240, 120.0, {})

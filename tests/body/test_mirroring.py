@@ -7,7 +7,7 @@ from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
 from studio.body.mirroring import Mirror
 from studio.body.model import BodyModel
-from studio.errors import BodyError
+from studio.foundations.errors import BodyError
 
 
 def twin(name: str) -> str:

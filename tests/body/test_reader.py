@@ -5,7 +5,7 @@ import pytest
 from studio.body.dimensions import with_dimensions
 from studio.body.model import MOVE, TURN, Step
 from studio.body.reader import parse_body, read_body
-from studio.errors import BodyError
+from studio.foundations.errors import BodyError
 
 CRANE = """
 title = "Crane"

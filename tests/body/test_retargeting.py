@@ -7,12 +7,12 @@ import pytest
 from made_up_humanoid import humanoid
 from scipy.spatial.transform import Rotation
 
+from studio.body.motion_files.reading import read_recording
+from studio.body.motion_files.recorded_motion import RecordedMotion
 from studio.body.person import SIDES, PersonMotion, joint_points
 from studio.body.retargeting import above_floor, lowest_of_sole, on_skeleton
-from studio.errors import StudioError
-from studio.motion_files.reading import read_recording
-from studio.motion_files.recorded_motion import RecordedMotion
-from studio.synthesis.person import skeleton_of_height
+from studio.foundations.errors import StudioError
+from studio.results.drawing_footage.person import skeleton_of_height
 
 BONES = skeleton_of_height(1760.0, np.random.default_rng(1))
 FILES = ("05_01.amc", "05_03.amc", "CMU_01_01.bvh", "amp_humanoid_run.npz", "amp_humanoid_cartwheel.npz")

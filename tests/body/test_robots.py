@@ -11,15 +11,15 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import studio.body.robots as robots
-import studio.synthesis
+import studio.results.drawing_footage
 from studio.body.catalogue import body_file_text, list_bodies, load_body
 from studio.body.forward_kinematics import limb_ends, marker_points
 from studio.body.model import BodyModel
 from studio.body.reader import parse_body
 from studio.body.robots import THIN, fitted_cone
-from studio.errors import BodyError
+from studio.foundations.errors import BodyError
 
-ARM = Path(studio.synthesis.__file__).parent / "recipe_files" / "robot_arm.urdf"
+ARM = Path(studio.results.drawing_footage.__file__).parent / "recipe_files" / "robot_arm.urdf"
 
 GRIPPER = """<robot name="gripper">
 <link name="world_link"/>

@@ -10,19 +10,19 @@ from studio.body.catalogue import list_bodies, load_body
 from studio.body.dimensions import with_dimensions
 from studio.body.model import BodyModel
 from studio.body.scale import scale_of
-from studio.calibration.silhouette_checks import stature_findings
-from studio.calibration.standing import Posture
-from studio.evaluation.errors import lost_mm
 from studio.evidence.distance_maps import silhouette_distances
-from studio.geometry.camera import Camera
-from studio.runs.initialising import hull_of
+from studio.evidence.volume.body_space import space_of
+from studio.footage.calibration.silhouette_checks import stature_findings
+from studio.footage.calibration.standing import Posture
+from studio.foundations.geometry.camera import Camera
+from studio.results.evaluation.errors import lost_mm
 from studio.runs.jumps import jumps_of
 from studio.runs.search_space import default_sigma, search_space
+from studio.runs.setup.initialising import hull_of
 from studio.runs.tracks import Track
-from studio.trackers.agreement import Agreement
-from studio.trackers.initialisation import first_noise
-from studio.trackers.refinement import RefinementSettings, Refiner
-from studio.volume.body_space import space_of
+from studio.search.trackers.agreement import Agreement
+from studio.search.trackers.initialisation import first_noise
+from studio.search.trackers.refinement import RefinementSettings, Refiner
 from tests.drawn_people import drawn_evidence, ring_of_cameras
 
 EIGHTH = 0.125

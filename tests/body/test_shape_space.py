@@ -6,7 +6,7 @@ import pytest
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_ends
 from studio.body.shape_space import levelled, shape_space
-from studio.errors import BodyError
+from studio.foundations.errors import BodyError
 
 
 def test_sides_are_one_group_by_default() -> None:

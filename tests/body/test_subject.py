@@ -16,7 +16,7 @@ from studio.body.subject import (
     subject_from_shape,
     write_subject,
 )
-from studio.errors import BodyError
+from studio.foundations.errors import BodyError
 
 HEIGHT = 1780.0
 LIMBS = (

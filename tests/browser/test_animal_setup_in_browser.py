@@ -16,7 +16,7 @@ import pytest
 from guided_setup import GuidedSetup
 from playwright.sync_api import Page, expect
 
-from studio.synthesis.clips import ClipWriter
+from studio.results.drawing_footage.clips import ClipWriter
 
 pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.real_data, pytest.mark.timeout(3600)]
 

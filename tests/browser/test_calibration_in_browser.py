@@ -11,8 +11,8 @@ from playwright.sync_api import Browser, Page
 from studio_page import StudioPage
 from studio_server import StudioServer
 
-from studio.capture.calibration_files import export_calibration
-from studio.geometry.projection import project
+from studio.footage.capture.calibration_files import export_calibration
+from studio.foundations.geometry.projection import project
 from studio.sessions.workspace import Workspace
 
 pytestmark = pytest.mark.browser

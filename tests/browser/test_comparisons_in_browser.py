@@ -10,10 +10,10 @@ from scene_wire import until
 from studio_page import StudioPage
 from studio_server import StudioServer
 
-from studio.comparison.findings import Chart, Findings, Number, Series, Table
-from studio.comparison.findings_document import Making, as_document
-from studio.comparison.trials import Scale
-from studio.reproduction.experiment import Experiment
+from studio.garden.reproduction.experiment import Experiment
+from studio.results.comparison.findings import Chart, Findings, Number, Series, Table
+from studio.results.comparison.findings_document import Making, as_document
+from studio.results.comparison.trials import Scale
 
 pytestmark = pytest.mark.browser
 

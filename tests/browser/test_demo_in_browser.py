@@ -18,13 +18,13 @@ from stored_clouds import differing, drawn, run_path, stored_clouds
 from studio_page import StudioPage
 from studio_server import StudioServer
 
+from studio.app.scene.particle_view import glowing
+from studio.app.scene.viewpoint import on_screen
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import extremities
-from studio.runs.colour_tokens import colour_tokens
-from studio.scene.particle_view import glowing
-from studio.scene.viewpoint import on_screen
+from studio.runs.drawing.colour_tokens import colour_tokens
+from studio.search.settings import knob_table
 from studio.sessions.workspace import Workspace
-from studio.settings import knob_table
 
 pytestmark = pytest.mark.browser
 

@@ -11,9 +11,9 @@ from studio_page import StudioPage
 from studio_server import StudioServer
 from toy_session import make_session
 
-from studio.benchmarks.live_footage import learn_walk, make_footage
-from studio.benchmarks.live_stages import CHANGES, TRACKER, WEIGHTING, live_figures
-from studio.runs.live_summary import summary_of
+from studio.garden.benchmarks.live_footage import learn_walk, make_footage
+from studio.garden.benchmarks.live_stages import CHANGES, TRACKER, WEIGHTING, live_figures
+from studio.runs.live.live_summary import summary_of
 from studio.sessions.workspace import Workspace
 
 pytestmark = pytest.mark.browser

@@ -10,9 +10,9 @@ from store_records import layer_of, result_of
 from studio_page import StudioPage
 from studio_server import StudioServer
 
+from studio.search.trackers.tracker import LOST, NO_EVIDENCE, RECOVERED, TRACKED
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.workspace import Workspace
-from studio.trackers.tracker import LOST, NO_EVIDENCE, RECOVERED, TRACKED
 
 pytestmark = pytest.mark.browser
 

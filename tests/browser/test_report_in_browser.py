@@ -6,10 +6,10 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 from toy_experiments import measure, toy
 
-from studio.comparison.findings_document import Making, as_document, failed_document
-from studio.comparison.kept_trials import plain
-from studio.comparison.trials import Outcome, Scale
-from studio.reproduction.report_document import report_html
+from studio.garden.reproduction.report_document import report_html
+from studio.results.comparison.findings_document import Making, as_document, failed_document
+from studio.results.comparison.kept_trials import plain
+from studio.results.comparison.trials import Outcome, Scale
 
 pytestmark = pytest.mark.browser
 SEEDS = tuple(range(12))

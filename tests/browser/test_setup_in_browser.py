@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import Page, expect
 from studio_server import StudioServer
 
-from studio.runs.samples import sample_folder
+from studio.sessions.samples import sample_folder
 
 pytestmark = pytest.mark.browser
 

@@ -14,9 +14,9 @@ from playwright.sync_api import Browser, Page, expect
 from sample_walk import copy_of_walk
 from studio_server import StudioServer
 
-from studio.jobs.batch import track_to_end
+from studio.operations.jobs.batch import track_to_end
 from studio.runs.new_run import prepare_run
-from studio.runs.start_pose_file import keep_start_pose
+from studio.runs.setup.start_pose_file import keep_start_pose
 from studio.runs.tracks import read_track, write_track
 from studio.sessions.provenance import note
 from studio.sessions.session import Session

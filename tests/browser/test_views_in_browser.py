@@ -14,8 +14,8 @@ from scene_wire import until
 from studio_page import PATIENCE, StudioPage
 from studio_server import StudioServer
 
+from studio.search.trackers.tracker import LayerRecord
 from studio.sessions.workspace import Workspace
-from studio.trackers.tracker import LayerRecord
 
 pytestmark = pytest.mark.browser
 

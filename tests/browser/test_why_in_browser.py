@@ -10,8 +10,8 @@ from scene_wire import until
 from studio_page import PATIENCE, StudioPage
 from studio_server import StudioServer
 
-from studio.inspection.limbs import errors_of
-from studio.inspection.reading import InspectedRun
+from studio.results.inspection.limbs import errors_of
+from studio.results.inspection.reading import InspectedRun
 
 pytestmark = pytest.mark.browser
 

@@ -5,8 +5,8 @@ from click.testing import CliRunner
 
 from studio.cli.main import main
 from studio.cli.mask_commands import _answer
-from studio.runs.contrast import Contrast, ViewContrast
-from studio.runs.mask_quality import MaskQuality, ViewQuality
+from studio.runs.setup.contrast import Contrast, ViewContrast
+from studio.runs.setup.mask_quality import MaskQuality, ViewQuality
 from studio.sessions.background_files import SessionEvidence, write_evidence
 from studio.sessions.session import Session
 

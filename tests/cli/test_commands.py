@@ -16,7 +16,7 @@ from sample_walk import WALK, copy_of_walk
 from studio.cli import output
 from studio.cli.main import COMMANDS, load, main, summary
 from studio.cli.output import progress_lines
-from studio.jobs.open_run import OpenRun
+from studio.operations.jobs.open_run import OpenRun
 from studio.runs.new_run import prepare_run
 from studio.runs.tracking_run import Stepped
 from studio.sessions.session import Session

@@ -10,8 +10,8 @@ import pytest
 from click.testing import CliRunner
 from toy_footage import rig, write_pictures, write_video
 
-from studio.capture.calibration_files import export_calibration
 from studio.cli.main import main
+from studio.footage.capture.calibration_files import export_calibration
 from studio.sessions.session import Session
 
 FRAMES, LATE = 110, 6

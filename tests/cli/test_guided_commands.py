@@ -10,9 +10,9 @@ from click.testing import CliRunner, Result
 from toy_session import FRAMES, true_poses
 
 from studio.body.forward_kinematics import marker_points
+from studio.body.motion_files.trc import MarkerMotion, write_trc
 from studio.cli.main import main
-from studio.comparison.kept_comparison import BEHAVIOUR_NAME
-from studio.motion_files.trc import MarkerMotion, write_trc
+from studio.results.comparison.kept_comparison import BEHAVIOUR_NAME
 from studio.sessions.named_rows import write_pose
 from studio.sessions.provenance import note
 from studio.sessions.session import Session

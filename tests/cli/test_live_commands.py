@@ -6,8 +6,8 @@ import pytest
 from click.testing import CliRunner, Result
 from toy_session import FRAMES, true_poses
 
-from studio.benchmarks.live_stages import in_words, stage_rows
 from studio.cli.main import main
+from studio.garden.benchmarks.live_stages import in_words, stage_rows
 from studio.sessions.named_rows import write_pose
 from studio.sessions.session import Session
 

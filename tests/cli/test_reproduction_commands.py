@@ -10,8 +10,8 @@ from toy_experiments import toy
 
 from studio.cli import reproduction_commands
 from studio.cli.main import main
-from studio.reproduction import catalogue
-from studio.reproduction import runner as reproduction
+from studio.garden.reproduction import catalogue
+from studio.garden.reproduction import runner as reproduction
 from studio.sessions.workspace import workspace_root
 
 

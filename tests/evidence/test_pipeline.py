@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from toy_footage import looking_at, write_pictures, write_video
 
-from studio.capture.footage import Footage, open_footage
-from studio.capture.footage_source import CameraSource, FootageSource
-from studio.errors import FootageError
 from studio.evidence.backgrounds import Backgrounds, fitted_plate
 from studio.evidence.edges import bodytrack_edges
 from studio.evidence.pipeline import EvidenceMaker
 from studio.evidence.settings import BACKGROUND_MODELS, EvidenceSettings
+from studio.footage.capture.footage import Footage, open_footage
+from studio.footage.capture.footage_source import CameraSource, FootageSource
+from studio.foundations.errors import FootageError
 
 WIDTH, HEIGHT, COUNT = 128, 96, 24
 NAMES = ("masked", "plate", "clip", "bare")

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from studio.arrays import Bytes
 from studio.evidence.shared_masks import shared_mask
+from studio.foundations.arrays import Bytes
 
 
 def box(left: int, right: int, top: int = 2, bottom: int = 18) -> Bytes:

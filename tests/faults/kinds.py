@@ -19,8 +19,8 @@ from faults.process_kinds import PROCESS_KINDS, SERVER_KINDS
 from faults.seams import ALL, LOOK, NAME, OPEN, READING, STORE, WRITE, WRITING, Touch
 from faults.stage import DEEDS, DONE, NEW, files_of, frames_of, new_run, track
 from faults.trial import Trial
-from studio.errors import RunError
-from studio.runs.verifying import repair, verify
+from studio.foundations.errors import RunError
+from studio.results.verifying import repair, verify
 from studio.sessions.results_store import is_being_written
 
 STORE_NAME = "results.sqlite"

@@ -26,14 +26,14 @@ from websockets.sync.client import ClientConnection, connect
 from faults.seams import ALL, STORE, WRITE, Touch, watched
 from faults.stage import DEEDS, NEW, TOY, Place, frames_of, track
 from faults.trial import Trial
-from studio.capture.calibration_files import write_calibration
-from studio.capture.camera_addresses import camera_address
-from studio.capture.footage_source import CameraSource, FootageSource
+from studio.cli.launch import served_at
 from studio.cli.output import termination_as_interrupt
-from studio.errors import RunError, StudioError
-from studio.jobs.camera_readers import CameraReaders
-from studio.jobs.set_recording import SetRecording
-from studio.launch import served_at
+from studio.footage.capture.calibration_files import write_calibration
+from studio.footage.capture.camera_addresses import camera_address
+from studio.footage.capture.footage_source import CameraSource, FootageSource
+from studio.foundations.errors import RunError, StudioError
+from studio.operations.jobs.camera_readers import CameraReaders
+from studio.operations.jobs.set_recording import SetRecording
 from studio.sessions.live_recordings import begin_recording, read_sets, start_sets
 from studio.sessions.manifest import SessionManifest, now, write_manifest
 from studio.sessions.session import Session
@@ -183,7 +183,7 @@ def two_at_once(trial: Trial) -> None:
 SERVE = """
 import sys
 from pathlib import Path
-from studio.launch import serve
+from studio.cli.launch import serve
 if __name__ == "__main__":
     serve(Path(sys.argv[1]), port=0, announce=lambda text: print(text, flush=True))
 """

@@ -14,13 +14,13 @@ from flipped_bytes import flip_stored
 from toy_session import facing_camera, make_session, true_poses
 
 from faults.seams import watched
-from studio.errors import NotFoundError, SessionError
-from studio.export.exporting import export_run
-from studio.export.formats import FORMATS
-from studio.geometry.camera import Camera
-from studio.jobs.batch import track_to_end
+from studio.foundations.errors import NotFoundError, SessionError
+from studio.foundations.geometry.camera import Camera
+from studio.operations.jobs.batch import track_to_end
+from studio.results.export.exporting import export_run
+from studio.results.export.formats import FORMATS
+from studio.results.verifying import repair, verify
 from studio.runs.new_run import prepare_run
-from studio.runs.verifying import repair, verify
 from studio.sessions.importers.importing import ImportOptions, import_source
 from studio.sessions.named_rows import write_pose
 from studio.sessions.results_codec import particle_arrays

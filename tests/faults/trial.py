@@ -8,7 +8,7 @@ import numpy as np
 
 from faults.seams import Act, Touch, watched
 from faults.stage import DEEDS, DONE, FRAMES, NEW, Place, Stage, frames_of, problems_of
-from studio.errors import StudioError
+from studio.foundations.errors import StudioError
 
 
 @dataclass

@@ -13,26 +13,27 @@ import numpy as np
 from toy_session import make_session, true_poses
 from tracked_runs import finish
 
-from studio.behaviour.model_file import read_model
+from studio.body.motion_files.c3d import read_c3d
+from studio.body.motion_files.reading import read_recording
+from studio.body.motion_files.trc import read_trc
+from studio.body.motion_files.truth_files import read_truth
 from studio.body.reader import read_body
 from studio.body.robots import read_robot
 from studio.body.subject import Subject, write_subject
-from studio.calibration.floor import clicked_floor, read_clicks
-from studio.capture.calibration_files import find_calibrations, read_calibration, read_intrinsics
-from studio.capture.camera_addresses import camera_address
-from studio.capture.pictures import check_picture, list_pictures, read_picture
-from studio.capture.stream_files import mend_recording
-from studio.capture.timestamps import offsets_from_times, read_timestamps
-from studio.capture.video import VideoReader, measure_video, probe_video
-from studio.errors import StudioError
-from studio.motion_files.c3d import read_c3d
-from studio.motion_files.reading import read_recording
-from studio.motion_files.trc import read_trc
-from studio.motion_files.truth_files import read_truth
+from studio.footage.calibration.floor import clicked_floor, read_clicks
+from studio.footage.capture.calibration_files import find_calibrations, read_calibration, read_intrinsics
+from studio.footage.capture.camera_addresses import camera_address
+from studio.footage.capture.pictures import check_picture, list_pictures, read_picture
+from studio.footage.capture.stream_files import mend_recording
+from studio.footage.capture.timestamps import offsets_from_times, read_timestamps
+from studio.footage.capture.video import VideoReader, measure_video, probe_video
+from studio.foundations.errors import StudioError
+from studio.results.verifying import verify
 from studio.runs.new_run import prepare_run
-from studio.runs.session_settings import session_settings
+from studio.runs.setup.session_settings import session_settings
 from studio.runs.tracks import BEST, RAW, read_track, write_track
-from studio.runs.verifying import verify
+from studio.search.behaviour.model_file import read_model
+from studio.search.settings import changed_settings, default_settings
 from studio.sessions.archives import unpack
 from studio.sessions.importers.bodytrack import read_numbers
 from studio.sessions.importers.folder_layout import plan_folder
@@ -43,7 +44,6 @@ from studio.sessions.named_rows import write_pose, write_sigma
 from studio.sessions.run_log import append_to_log, read_log
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.settings import changed_settings, default_settings
 
 SEEDS = Path(__file__).resolve().parent / "seeds"
 Read = Callable[[Path], object]

@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 from fuzz import formats, reading
-from studio.errors import StudioError
+from studio.foundations.errors import StudioError
 
 turn = -1
 

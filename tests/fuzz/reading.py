@@ -15,7 +15,7 @@ import numpy as np
 
 from fuzz.formats import FORMATS
 from fuzz.mutations import mutated
-from studio.errors import StudioError
+from studio.foundations.errors import StudioError
 
 MEMORY_BYTES = 12 << 30
 CORPUS = Path(__file__).resolve().parent / "corpus"

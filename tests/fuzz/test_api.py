@@ -7,7 +7,7 @@ from faults.process_kinds import server
 from faults.stage import Stage
 
 from fuzz.api import REMOVING, ask, left_to_ask
-from studio.server.api_document import api_document
+from studio.app.server.api_document import api_document
 
 
 def test_only_what_removes_or_takes_long_is_not_asked() -> None:

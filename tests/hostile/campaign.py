@@ -30,9 +30,9 @@ from web_doubles import TOKEN, RecordingControl, RecordingScenes
 
 from hostile.commands import SESSION_COMMANDS
 from hostile.makers import MAKERS, NAME, RUN, SECRET, make_nothing, make_outside, make_plain
+from studio.app.server.api_document import api_document
+from studio.app.server.app import build_app
 from studio.cli.main import load, main
-from studio.server.api_document import api_document
-from studio.server.app import build_app
 from studio.sessions.workspace import Workspace
 
 AS_IT_IS = "as it is"

@@ -16,8 +16,8 @@ import zstandard
 from store_records import layer_of, record_of, result_of
 from toy_session import facing_camera, make_session, side_camera
 
-from studio.export.exporting import export_run
-from studio.export.formats import FORMATS
+from studio.results.export.exporting import export_run
+from studio.results.export.formats import FORMATS
 from studio.sessions.named_rows import write_pose
 from studio.sessions.results_store import ResultsWriter
 

@@ -3,8 +3,8 @@
 import re
 from pathlib import Path
 
-from studio.capture.calibration_files import CALIBRATION_FORMATS
-from studio.export.formats import FORMATS
+from studio.footage.capture.calibration_files import CALIBRATION_FORMATS
+from studio.results.export.formats import FORMATS
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "web_assets" / "guide" / "formats.md").read_text()

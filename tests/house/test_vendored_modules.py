@@ -3,7 +3,7 @@
 import re
 
 from studio.foundations.package import assets_folder
-from studio.runs.self_contained import modules_of
+from studio.results.self_contained import modules_of
 
 IMPORTED = re.compile(r'(?:from|import)\s*"([^"]+)"')
 

@@ -4,7 +4,7 @@ import pytest
 from nudged_camera import NUDGED, make_nudged_session
 
 import studio
-from studio.runs.workflow import background_step
+from studio.runs.setup.workflow import background_step
 from studio.sessions.session import CAMERAS_PATH, Session
 from studio.sessions.workspace import Workspace
 

@@ -8,10 +8,10 @@ import pytest
 from fastapi import FastAPI
 
 import studio
+from studio.app.server import app, guide_routes
+from studio.app.server.requests import MADE
 from studio.cli.main import load
-from studio.declaring import REQUIRED, Knobs, Operation, Parameter, declared
-from studio.server import app, guide_routes
-from studio.server.requests import MADE
+from studio.foundations.declaring import REQUIRED, Knobs, Operation, Parameter, declared
 
 NAMED = {
     "import_footage": "import",

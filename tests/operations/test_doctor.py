@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from studio import self_check as examination
+from studio.cli import self_check as examination
 from studio.cli.main import main
-from studio.errors import RunError
-from studio.likelihood.edge_region import DEVICE_MODULE, EdgeRegionFrameLikelihood
-from studio.self_check import Examined, doctor
+from studio.cli.self_check import Examined, doctor
+from studio.foundations.errors import RunError
+from studio.search.likelihood.edge_region import DEVICE_MODULE, EdgeRegionFrameLikelihood
 from studio.sessions.workspace import Workspace
 
 Plant = Callable[[pytest.MonkeyPatch, Path], None]

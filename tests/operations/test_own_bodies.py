@@ -9,7 +9,7 @@ from toy_session import make_session
 import studio
 from studio.body.catalogue import load_body
 from studio.cli.main import main
-from studio.errors import BodyError
+from studio.foundations.errors import BodyError
 from studio.sessions.own_bodies import bodies_folder, discard_body
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace

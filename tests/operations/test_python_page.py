@@ -8,7 +8,7 @@ import pytest
 from board_takes import PLACES, render_takes, two_cameras
 
 import studio
-from studio.motion_files.bvh import read_bvh_file
+from studio.body.motion_files.bvh import read_bvh_file
 from studio.operations.opening import Tracked
 
 ROOT = Path(__file__).resolve().parents[2]

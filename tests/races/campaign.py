@@ -22,10 +22,10 @@ from faults.stage import DONE, NEW, frames_of
 
 from races.stage import GONE, MARK, Outcome, Stage
 from races.verbs import ALONE, LEFT, OVERWRITES, PYTHON, SERVED, SLOW, TRACKING, Given, There, plain
-from studio.errors import StudioError
-from studio.foreign_files import MANIFEST_NAME
+from studio.foundations.errors import StudioError
+from studio.foundations.foreign_files import MANIFEST_NAME
+from studio.results.verifying import verify
 from studio.runs.notes import notes_of
-from studio.runs.verifying import verify
 from studio.sessions.atomic_files import PARTIAL_PREFIX, discard
 from studio.sessions.process_lock import ProcessLock
 from studio.sessions.run_record import FILE_NAME as RECORD_NAME

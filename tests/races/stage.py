@@ -17,11 +17,11 @@ from faults.process_kinds import Served, server, until
 from faults.stage import DONE, TOY, Place, build_source, frames_of
 
 from races.verbs import FRAMES, PYTHON, Given, build
-from studio.errors import StudioError, UnforeseenError
-from studio.export.exporting import export_run
-from studio.export.formats import FORMATS
+from studio.foundations.errors import StudioError, UnforeseenError
+from studio.results.export.exporting import export_run
+from studio.results.export.formats import FORMATS
+from studio.results.verifying import verify
 from studio.runs.notes import write_note
-from studio.runs.verifying import verify
 from studio.sessions.manifest import write_manifest
 from studio.sessions.session import Session
 from studio.sessions.work_under_way import STATE_NAME

@@ -12,14 +12,14 @@ from toy_session import facing_camera, side_camera, true_poses
 
 import studio
 from studio.body.forward_kinematics import limb_ends
-from studio.calibration.silhouette_alignment import AlignedCameras
-from studio.capture.calibration_files import read_calibration
-from studio.geometry.projection import project
-from studio.geometry.rotations import rotation_from_vector
-from studio.runs.aligning import SessionAlignment
+from studio.footage.calibration.silhouette_alignment import AlignedCameras
+from studio.footage.capture.calibration_files import read_calibration
+from studio.foundations.geometry.projection import project
+from studio.foundations.geometry.rotations import rotation_from_vector
 from studio.runs.notes import notes_of
+from studio.runs.setup.aligning import SessionAlignment
+from studio.runs.setup.turned_cameras import turn_cameras
 from studio.runs.tracks import track_names
-from studio.runs.turned_cameras import turn_cameras
 from studio.sessions.calibration_changes import EARLIER, NewCalibration, replace_calibration
 from studio.sessions.session import CAMERAS_PATH, Session
 from studio.sessions.stored_run import StoredRun

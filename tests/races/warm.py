@@ -9,8 +9,8 @@ import cv2
 from faults.stage import DONE, TOY, Place
 
 from races.verbs import PYTHON, Given, build
-from studio.errors import StudioError
-from studio.numba_in_threads import _helpers
+from studio.foundations.errors import StudioError
+from studio.foundations.numba_in_threads import _helpers
 from studio.sessions.workspace import VARIABLE
 
 WITH_PROCESSES = {"add footage", "import", "compare", "sweep"}

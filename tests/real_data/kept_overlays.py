@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 import studio
-from studio.runs.overlay_pictures import ViewComposer
+from studio.results.overlay_pictures import ViewComposer
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 

@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 import studio
-from studio.runs.background_setup import set_up_background
-from studio.runs.mask_quality import USABLE, mask_quality
-from studio.runs.session_settings import session_settings
+from studio.runs.setup.background_setup import set_up_background
+from studio.runs.setup.mask_quality import USABLE, mask_quality
+from studio.runs.setup.session_settings import session_settings
 from studio.sessions.background_files import set_backgrounds
 from studio.sessions.importers.importing import ImportOptions, import_source
 from studio.sessions.session import Session

@@ -6,7 +6,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from studio.runs.background_setup import set_up_background
+from studio.runs.setup.background_setup import set_up_background
 from studio.sessions.importers.importing import ImportOptions, import_source
 from studio.sessions.session import Session, described_anew
 

@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 
 import studio
 from studio.body.forward_kinematics import marker_points
-from studio.geometry.projection import project
-from studio.motion_files.trc import read_trc
+from studio.body.motion_files.trc import read_trc
+from studio.foundations.geometry.projection import project
 from studio.operations.cameras import Alignment
 from studio.runs.checking import RunCheck, check_run
-from studio.runs.mask_quality import MaskQuality
+from studio.runs.setup.mask_quality import MaskQuality
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from studio.runs.contrast import measure_contrast
-from studio.runs.session_settings import session_settings
+from studio.runs.setup.contrast import measure_contrast
+from studio.runs.setup.session_settings import session_settings
 from studio.sessions.importers.importing import import_source
 from studio.sessions.session import Session
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from studio.body.forward_kinematics import marker_points
-from studio.comparison.footage_cache import FootageCache
-from studio.motion_files.trc import read_trc
-from studio.reproduction.open_questions.other_people import imported
+from studio.body.motion_files.trc import read_trc
+from studio.garden.reproduction.open_questions.other_people import imported
+from studio.results.comparison.footage_cache import FootageCache
 from studio.sessions.session import Session
 
 pytestmark = pytest.mark.real_data

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.pipeline import EvidenceMaker
-from studio.geometry.camera import Camera
-from studio.runs.person_hull import spread_frames
-from studio.runs.session_settings import session_settings
-from studio.runs.silhouette_doubts import person_alone, silhouette_doubts
+from studio.foundations.geometry.camera import Camera
+from studio.runs.setup.person_hull import spread_frames
+from studio.runs.setup.session_settings import session_settings
+from studio.runs.setup.silhouette_doubts import person_alone, silhouette_doubts
 from studio.sessions.importers.importing import import_source
 from studio.sessions.session import Session
 

@@ -9,22 +9,22 @@ from random_people import people_session, random_moments
 from scipy import ndimage
 
 from studio.body.forward_kinematics import marker_points
+from studio.body.motion_files.reading import read_recording
+from studio.body.motion_files.trc import read_trc
 from studio.body.person import PersonMotion
 from studio.body.retargeting import on_skeleton
-from studio.capture.calibration_files import read_calibration
 from studio.evidence.frame_evidence import FrameEvidence
-from studio.likelihood.outlines import OutlineProjector
-from studio.likelihood.silhouette_areas import Silhouettes
-from studio.motion_files.reading import read_recording
-from studio.motion_files.trc import read_trc
-from studio.runs.initialising import WEIGHTING, initialise
+from studio.footage.capture.calibration_files import read_calibration
+from studio.results.drawing_footage.person import with_hands_and_feet
+from studio.results.drawing_footage.recipe_file import Recipe, find_recipe, read_recipe
+from studio.results.drawing_footage.recipes import recipe_motion, recipe_person
 from studio.runs.problem_source import ProblemSource
+from studio.runs.setup.initialising import WEIGHTING, initialise
+from studio.search.likelihood.outlines import OutlineProjector
+from studio.search.likelihood.silhouette_areas import Silhouettes
+from studio.search.settings import default_settings
 from studio.sessions.importers.importing import import_source
 from studio.sessions.session import Session
-from studio.settings import default_settings
-from studio.synthesis.person import with_hands_and_feet
-from studio.synthesis.recipe_file import Recipe, find_recipe, read_recipe
-from studio.synthesis.recipes import recipe_motion, recipe_person
 
 pytestmark = pytest.mark.real_data
 

@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studio.likelihood.bodytrack import score
 from studio.runs.problem_source import ProblemSource
 from studio.runs.search_space import search_space
+from studio.search.likelihood.bodytrack import score
+from studio.search.settings import changed_settings, default_settings
+from studio.search.trackers.catalogue import TRACKERS
+from studio.search.trackers.frame_loop import search_frame
+from studio.search.trackers.tracker import start_of
 from studio.sessions.importers.importing import import_source
 from studio.sessions.session import Session
-from studio.settings import changed_settings, default_settings
-from studio.trackers.catalogue import TRACKERS
-from studio.trackers.frame_loop import search_frame
-from studio.trackers.tracker import start_of
 
 pytestmark = pytest.mark.real_data
 

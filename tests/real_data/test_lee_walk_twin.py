@@ -11,22 +11,22 @@ from studio.body.forward_kinematics import joint_frames, marker_points
 from studio.body.inverse_kinematics import pose_from_markers
 from studio.body.person import MARKERS, PersonMotion, Skeleton, marker_motion
 from studio.body.subject import fit_subject, subject_from_shape
-from studio.capture.calibration_files import read_calibration
 from studio.evidence.background import gaussian_from_frames
 from studio.evidence.masks import cleaned
 from studio.evidence.settings import EvidenceSettings
-from studio.geometry.camera import Camera
-from studio.geometry.projection import project
-from studio.geometry.rotations import axis_turn
-from studio.synthesis.flesh import BOUND, BOUND_RADIUS, clothed_pieces, piece_tables
-from studio.synthesis.gait import leg_to_ankle
-from studio.synthesis.person import marker_lengths
-from studio.synthesis.person_footage import recipe_renderer
-from studio.synthesis.recipe_file import Recipe, find_recipe, read_recipe
-from studio.synthesis.recipes import recipe_motion, recipe_person
-from studio.synthesis.renderer import Renderer
-from studio.synthesis.rooms import room_called
-from studio.synthesis.wardrobes import PLAIN
+from studio.footage.capture.calibration_files import read_calibration
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.geometry.projection import project
+from studio.foundations.geometry.rotations import axis_turn
+from studio.results.drawing_footage.flesh import BOUND, BOUND_RADIUS, clothed_pieces, piece_tables
+from studio.results.drawing_footage.gait import leg_to_ankle
+from studio.results.drawing_footage.person import marker_lengths
+from studio.results.drawing_footage.person_footage import recipe_renderer
+from studio.results.drawing_footage.recipe_file import Recipe, find_recipe, read_recipe
+from studio.results.drawing_footage.recipes import recipe_motion, recipe_person
+from studio.results.drawing_footage.renderer import Renderer
+from studio.results.drawing_footage.rooms import room_called
+from studio.results.drawing_footage.wardrobes import PLAIN
 
 pytestmark = pytest.mark.real_data
 

@@ -14,10 +14,10 @@ import pytest
 from kept_overlays import keep_overlays
 
 import studio
-from studio.evaluation.errors import Evaluation
-from studio.motion_files.truth_files import read_truth
+from studio.body.motion_files.truth_files import read_truth
+from studio.results.evaluation.errors import Evaluation
 from studio.runs.checking import RunCheck
-from studio.runs.mask_quality import MaskQuality
+from studio.runs.setup.mask_quality import MaskQuality
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 

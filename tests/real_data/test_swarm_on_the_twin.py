@@ -12,14 +12,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studio.comparison.footage_cache import FootageCache
-from studio.comparison.statistics import sign_test
-from studio.comparison.tracked import Tracked, TrackingTrial, track
-from studio.reproduction.fleischmann import EQ13, EVALUATIONS, FILTER_3, SWARM, SWARM_3, TWIN, TWIN_20
-from studio.reproduction.tracking import Candidate
-from studio.settings import DEFAULT_WEIGHTING
-from studio.synthesis.recipes import synthesize
-from studio.trackers.catalogue import knobs_for_evaluations
+from studio.garden.reproduction.fleischmann import EQ13, EVALUATIONS, FILTER_3, SWARM, SWARM_3, TWIN, TWIN_20
+from studio.garden.reproduction.tracking import Candidate
+from studio.results.comparison.footage_cache import FootageCache
+from studio.results.comparison.statistics import sign_test
+from studio.results.comparison.tracked import Tracked, TrackingTrial, track
+from studio.results.drawing_footage.recipes import synthesize
+from studio.search.settings import DEFAULT_WEIGHTING
+from studio.search.trackers.catalogue import knobs_for_evaluations
 
 pytestmark = [pytest.mark.slow, pytest.mark.real_data]
 

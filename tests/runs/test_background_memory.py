@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from toy_footage import write_video
 
-from studio.capture import frame_spool
-from studio.capture.frame_spool import FrameSpool
-from studio.capture.video import VideoReader
 from studio.evidence.background import GaussianBackground
 from studio.evidence.masks import PackedMask
+from studio.footage.capture import frame_spool
+from studio.footage.capture.frame_spool import FrameSpool
+from studio.footage.capture.video import VideoReader
 
 COUNT = 40
 

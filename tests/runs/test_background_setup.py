@@ -7,16 +7,17 @@ import cv2
 import numpy as np
 import pytest
 
-from studio.capture.calibration_files import write_calibration
-from studio.errors import FootageError, NotFoundError, SettingsError
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.pipeline import EvidenceMaker
-from studio.geometry.camera import Camera
-from studio.geometry.projection import project
-from studio.runs.background_setup import set_up_background
-from studio.runs.clean_plates import median_of_empty
+from studio.footage.capture.calibration_files import write_calibration
+from studio.foundations.errors import FootageError, NotFoundError, SettingsError
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.geometry.projection import project
+from studio.results.drawing_footage.cameras import placed_camera
 from studio.runs.new_run import prepare_run
-from studio.runs.session_settings import session_settings
+from studio.runs.setup.background_setup import set_up_background
+from studio.runs.setup.clean_plates import median_of_empty
+from studio.runs.setup.session_settings import session_settings
 from studio.sessions.background_files import (
     given_backgrounds,
     polygon_exclusion,
@@ -27,7 +28,6 @@ from studio.sessions.background_files import (
 )
 from studio.sessions.importers.importing import ImportOptions, import_source
 from studio.sessions.session import Session
-from studio.synthesis.cameras import placed_camera
 
 FRAMES, SIZE = 12, (160, 120)
 

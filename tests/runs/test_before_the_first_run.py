@@ -7,10 +7,10 @@ import msgspec
 import pytest
 from nudged_camera import make_nudged_session, true_cameras
 
-from studio.capture.calibration_files import write_calibration
-from studio.errors import CalibrationError
-from studio.runs.mask_quality import look_before_the_first_run
-from studio.runs.silhouette_doubts import accepted_doubts, standing_doubts
+from studio.footage.capture.calibration_files import write_calibration
+from studio.foundations.errors import CalibrationError
+from studio.runs.setup.mask_quality import look_before_the_first_run
+from studio.runs.setup.silhouette_doubts import accepted_doubts, standing_doubts
 from studio.sessions.session import CAMERAS_PATH, Session, described_anew
 
 

@@ -10,25 +10,25 @@ from arm_behaviour import FPS, arm_model, keep_arm_model
 from toy_session import make_session, true_poses
 from tracked_runs import opened, poses_of
 
-from studio.behaviour.model_file import read_model, write_model
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
-from studio.comparison.footage_cache import FootageCache
-from studio.comparison.tracked import TrackingTrial, track
-from studio.errors import BehaviourError, NotFoundError, SettingsError, StudioError
-from studio.motion_files.trc import MarkerMotion, write_trc
+from studio.body.motion_files.trc import MarkerMotion, write_trc
+from studio.foundations.errors import BehaviourError, NotFoundError, SettingsError, StudioError
+from studio.results.comparison.footage_cache import FootageCache
+from studio.results.comparison.tracked import TrackingTrial, track
 from studio.runs.behaviour_models import check_prediction, fitting, models_folder, models_in
 from studio.runs.new_run import prepare_run
 from studio.runs.problem_source import ProblemSource
 from studio.runs.reannealing import Reannealing
 from studio.runs.run_behaviour import LEARNT_NAME
 from studio.runs.tracking_run import TrackingRun
+from studio.search.behaviour.model_file import read_model, write_model
+from studio.search.settings import changed_settings, default_settings
+from studio.search.trackers.guided_particles import STATES
 from studio.sessions.named_rows import write_pose
 from studio.sessions.run_record import BEHAVIOUR_NAME
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.settings import changed_settings, default_settings
-from studio.trackers.guided_particles import STATES
 
 GUIDED = {
     "behaviour": {"particles": 60},
@@ -177,7 +177,7 @@ LEARNING = {"online_learning": True, "learning_interval": 10}
 @pytest.fixture
 def long_session(models: Path, monkeypatch: pytest.MonkeyPatch) -> Session:
     """A session of two lessons, in which short stretches count."""
-    monkeypatch.setattr("studio.trackers.online_learning.SHORTEST_S", 0.03)
+    monkeypatch.setattr("studio.search.trackers.online_learning.SHORTEST_S", 0.03)
     return make_session(models.parent.parent / "long", 24)
 
 

@@ -8,16 +8,16 @@ import pytest
 from patched_ball import FRAMES, patched_ball
 from rendered_people import overlap
 
-from studio.arrays import Bytes
-from studio.errors import FootageError
-from studio.geometry.projection import project
-from studio.progress import unheard
-from studio.runs.background_setup import candidates, set_up_background
-from studio.runs.best_source import SampledMasks, can_be_subject, choose_sources
-from studio.runs.contrast import border_support
+from studio.foundations.arrays import Bytes
+from studio.foundations.errors import FootageError
+from studio.foundations.geometry.projection import project
+from studio.foundations.progress import unheard
+from studio.results.drawing_footage.cameras import placed_camera
+from studio.runs.setup.background_setup import candidates, set_up_background
+from studio.runs.setup.best_source import SampledMasks, can_be_subject, choose_sources
+from studio.runs.setup.contrast import border_support
 from studio.sessions.background_files import read_evidence
 from studio.sessions.session import Session
-from studio.synthesis.cameras import placed_camera
 
 CAMERAS = tuple(
     placed_camera(f"cam{n}", (x, y, 1500.0), (0.0, 0.0, 900.0), size=(240, 180), focal_px=165.0)
@@ -113,7 +113,7 @@ def test_masks_of_several_sources_become_files(tmp_path: Path, monkeypatch: pyte
         found.by_camera.update(cam0="threshold", cam1="strokes", cam2="strokes")
         return found
 
-    monkeypatch.setattr("studio.runs.background_setup.choose_sources", mixed)
+    monkeypatch.setattr("studio.runs.setup.background_setup.choose_sources", mixed)
     setup = set_up_background(
         made_ball.session,
         "best",

@@ -5,9 +5,9 @@ import pytest
 from toy_session import true_poses
 from tracked_runs import abandon, finish, opened
 
+from studio.results.overlay_pictures import compose_view
+from studio.runs.drawing.overlay_drawing import OVERLAYS
 from studio.runs.new_run import prepare_run
-from studio.runs.overlay_drawing import OVERLAYS
-from studio.runs.overlay_pictures import compose_view
 from studio.runs.reannealing import Reannealing
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun

@@ -7,12 +7,12 @@ from toy_session import FRAMES, make_session, true_poses
 
 from studio.body.catalogue import load_body
 from studio.body.mirroring import Mirror
-from studio.errors import RunError, SessionError
+from studio.foundations.errors import RunError, SessionError
 from studio.runs.checking import check_run, kept_check, sudden_turns
 from studio.runs.new_run import prepare_run
 from studio.runs.refining import SMOOTHED
+from studio.runs.setup.workflow import check_step, workflow_of
 from studio.runs.tracks import Track, best_track, write_track
-from studio.runs.workflow import check_step, workflow_of
 from studio.sessions.results_store import ResultsWriter
 
 

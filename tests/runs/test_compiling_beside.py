@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from sample_walk import copy_of_walk
 
-from studio import kernel_cache
+from studio.foundations import kernel_cache
 from studio.runs import compiling_beside
 from studio.runs.new_run import prepare_run
 from studio.sessions.stored_run import StoredRun
@@ -15,10 +15,10 @@ from studio.sessions.stored_run import StoredRun
 FORMS = """
 import sys
 from numba.core.dispatcher import Dispatcher
-from studio.jobs.open_run import OpenRun
+from studio.operations.jobs.open_run import OpenRun
 from studio.runs import compiling_beside
-from studio.trackers import agreement_kernels, refinement_kernels
-from studio.likelihood import area_kernels
+from studio.search.trackers import agreement_kernels, refinement_kernels
+from studio.search.likelihood import area_kernels
 from studio.evidence import distance_maps
 
 def forms():

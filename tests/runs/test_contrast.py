@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from alike_person import SIZE, make_alike_session, standing_pose
 
-from studio.runs.background_setup import set_up_background
-from studio.runs.contrast import Contrast, KnownPoses, ViewContrast, draw_contrast, measure_contrast
-from studio.runs.mask_quality import mask_quality, measure_masks
 from studio.runs.new_run import prepare_run
-from studio.runs.session_settings import session_settings
+from studio.runs.setup.background_setup import set_up_background
+from studio.runs.setup.contrast import Contrast, KnownPoses, ViewContrast, draw_contrast, measure_contrast
+from studio.runs.setup.mask_quality import mask_quality, measure_masks
+from studio.runs.setup.session_settings import session_settings
 from studio.sessions.background_files import SessionEvidence, write_evidence
 from studio.sessions.session import Session
 

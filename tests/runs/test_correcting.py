@@ -7,13 +7,13 @@ import pytest
 from toy_session import FRAMES, true_poses
 from tracked_runs import finish, opened, poses_of
 
-from studio.errors import NotFoundError, RunError
+from studio.foundations.errors import NotFoundError, RunError
 from studio.runs.correcting import prepare_correction, track_backwards
 from studio.runs.new_run import prepare_run
+from studio.search.trackers.tracker import LOST, TRACKED
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.trackers.tracker import LOST, TRACKED
 
 QUICK = {"particles": 60, "layers": 4, "start_repeats": 2}
 QUICK_FIRST_LAYERS = 2

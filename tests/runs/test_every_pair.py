@@ -7,18 +7,18 @@ from arm_behaviour import keep_arm_model
 from toy_session import true_poses
 from tracked_runs import finish
 
-from studio.benchmarks.kernels import made_evidence, ring_of_cameras
 from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence
-from studio.likelihood.catalogue import WEIGHTINGS
+from studio.garden.benchmarks.kernels import made_evidence, ring_of_cameras
 from studio.runs.new_run import prepare_run
 from studio.runs.search_space import default_sigma, search_space
+from studio.search.likelihood.catalogue import WEIGHTINGS
+from studio.search.settings import changed_settings, default_settings
+from studio.search.trackers.catalogue import TRACKERS, knobs_for_evaluations
+from studio.search.trackers.frame_loop import search_frame
+from studio.search.trackers.tracker import FrameResult, start_of
 from studio.sessions.session import Session
-from studio.settings import changed_settings, default_settings
-from studio.trackers.catalogue import TRACKERS, knobs_for_evaluations
-from studio.trackers.frame_loop import search_frame
-from studio.trackers.tracker import FrameResult, start_of
 
 PAIRS = [(tracker, weighting) for tracker in TRACKERS for weighting in WEIGHTINGS]
 EVALUATIONS = 240

@@ -8,14 +8,14 @@ from drawn_people import ring_of_cameras
 from planted_runs import FRAMES, LAYERS, PARTICLES, drawn_session, person_poses
 from tracked_runs import finish, opened
 
-from studio.errors import RunError
-from studio.export.exporting import export_run
-from studio.export.formats import format_of
-from studio.inspection.reading import InspectedRun
-from studio.inspection.shared_page import shared_page
+from studio.foundations.errors import RunError
+from studio.results.export.exporting import export_run
+from studio.results.export.formats import format_of
+from studio.results.inspection.reading import InspectedRun
+from studio.results.inspection.shared_page import shared_page
 from studio.runs.checking import check_run
 from studio.runs.new_run import prepare_run
-from studio.runs.workflow import run_changes
+from studio.runs.setup.workflow import run_changes
 from studio.sessions.importers.importing import ImportOptions, add_footage
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun

@@ -6,7 +6,7 @@ import pytest
 from studio.body.catalogue import load_body
 from studio.runs.frame_steps import LONGEST_SECONDS, carried_over, space_over, steps_between
 from studio.runs.search_space import default_sigma, search_space
-from studio.trackers.tracker import FilterState
+from studio.search.trackers.tracker import FilterState
 
 
 def test_steps_are_the_frames_that_passed_up_to_a_quarter_second() -> None:

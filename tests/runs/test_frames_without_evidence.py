@@ -10,14 +10,14 @@ import pytest
 from toy_session import HEIGHT, WIDTH, facing_camera, make_session, true_poses
 from tracked_runs import finish
 
-from studio.capture.calibration_files import write_calibration
-from studio.errors import RunError
-from studio.geometry.camera import Camera
-from studio.likelihood.edge_region import EdgeRegionFrameLikelihood
+from studio.footage.capture.calibration_files import write_calibration
+from studio.foundations.errors import RunError
+from studio.foundations.geometry.camera import Camera
 from studio.runs.new_run import prepare_run
+from studio.search.likelihood.edge_region import EdgeRegionFrameLikelihood
+from studio.search.trackers.tracker import FrameResult
 from studio.sessions.manifest import write_manifest
 from studio.sessions.session import Session
-from studio.trackers.tracker import FrameResult
 
 EMPTY = 4
 """The first frame of three without evidence."""

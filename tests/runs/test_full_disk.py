@@ -13,19 +13,19 @@ from live_driving import driving, live_run
 from toy_session import FPS, true_poses
 from tracked_runs import finish, opened, poses_of
 
-from studio.errors import SessionError
-from studio.runs.live_replay import compare, prepare_replay, replay
+from studio.foundations.errors import SessionError
+from studio.runs.live.live_replay import compare, prepare_replay, replay
 from studio.runs.new_run import prepare_run
 from studio.runs.problem_source import ProblemSource
 from studio.runs.reannealing import Reannealing
 from studio.runs.run_footage import footage_of
 from studio.runs.storing_behind import StoringBehind
 from studio.runs.tracking_run import TrackingRun
+from studio.search.settings import changed_settings
 from studio.sessions.results_codec import particle_arrays
 from studio.sessions.results_store import FILE_NAME
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.settings import changed_settings
 
 QUICK = {"particles": 20, "layers": 2, "start_repeats": 2}
 LAST = 3

@@ -5,11 +5,11 @@ import pytest
 
 from studio.body.catalogue import list_bodies, load_body
 from studio.body.model import BodyModel
+from studio.results.drawing_footage.recipe_file import RECIPES
 from studio.runs.hierarchy import hierarchy_of
 from studio.runs.search_space import default_sigma, search_space
-from studio.synthesis.recipe_file import RECIPES
-from studio.trackers import partitions
-from studio.trackers.swarm_settings import PARTITIONS, SwarmSettings
+from studio.search.trackers import partitions
+from studio.search.trackers.swarm_settings import PARTITIONS, SwarmSettings
 
 
 def named(name: str, chosen: np.ndarray) -> set[str]:

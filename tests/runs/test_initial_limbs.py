@@ -8,8 +8,8 @@ from moving_bodies import standing
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
-from studio.runs.initial_limbs import limbs_put_right
-from studio.trackers.loss_detection import Onlooker
+from studio.runs.setup.initial_limbs import limbs_put_right
+from studio.search.trackers.loss_detection import Onlooker
 
 CAMERAS = ring_of_cameras(4, 480, 360)
 

@@ -9,10 +9,15 @@ from random_people import people_session, random_moments
 
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
+from studio.body.motion_files.trc import read_trc
 from studio.body.subject import Subject
-from studio.errors import NotFoundError, RunError, WorkCancelledError
-from studio.motion_files.trc import read_trc
-from studio.runs.initialising import (
+from studio.foundations.errors import NotFoundError, RunError, WorkCancelledError
+from studio.results.drawing_footage.motions import make_motion
+from studio.results.drawing_footage.person import marker_lengths, skeleton_of_height
+from studio.results.drawing_footage.recipe_file import Picture, Recipe
+from studio.runs.new_run import prepare_run
+from studio.runs.search_space import default_sigma, parameter_names, search_space
+from studio.runs.setup.initialising import (
     InitialPose,
     hull_of,
     initialise,
@@ -20,16 +25,11 @@ from studio.runs.initialising import (
     seek,
     whole_problem,
 )
-from studio.runs.new_run import prepare_run
-from studio.runs.search_space import default_sigma, parameter_names, search_space
-from studio.runs.start_pose_file import start_pose_from_file
+from studio.runs.setup.start_pose_file import start_pose_from_file
+from studio.search.settings import default_settings
+from studio.search.trackers.initialisation import QUICK
+from studio.search.trackers.start_candidates import facing
 from studio.sessions.session import Session, start_pose_files
-from studio.settings import default_settings
-from studio.synthesis.motions import make_motion
-from studio.synthesis.person import marker_lengths, skeleton_of_height
-from studio.synthesis.recipe_file import Picture, Recipe
-from studio.trackers.initialisation import QUICK
-from studio.trackers.start_candidates import facing
 
 SETTINGS = default_settings("annealed", "edge-region-silhouette")
 

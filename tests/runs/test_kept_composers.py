@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 from toy_session import make_session
 
-from studio.runs import overlay_pictures
-from studio.runs.overlay_pictures import ViewComposer, compose_view, forget_composers
+from studio.results import overlay_pictures
+from studio.results.overlay_pictures import ViewComposer, compose_view, forget_composers
 from studio.sessions.session import Session
 
 

@@ -11,14 +11,14 @@ from store_records import record_of
 
 import studio
 from studio.body.forward_kinematics import limb_ends
-from studio.calibration.extrinsics import moved_cameras
-from studio.calibration.vertical import level_world
-from studio.capture.calibration_files import read_calibration, with_up, write_calibration
-from studio.geometry.projection import project
-from studio.geometry.rigid import rigid
-from studio.runs.levelling import level_by_silhouettes
+from studio.footage.calibration.extrinsics import moved_cameras
+from studio.footage.calibration.vertical import level_world
+from studio.footage.capture.calibration_files import read_calibration, with_up, write_calibration
+from studio.foundations.geometry.projection import project
+from studio.foundations.geometry.rigid import rigid
+from studio.runs.setup.levelling import level_by_silhouettes
+from studio.runs.setup.workflow import calibration_step
 from studio.runs.tracks import Track, write_track
-from studio.runs.workflow import calibration_step
 from studio.sessions.session import CAMERAS_PATH, Session
 
 

@@ -6,9 +6,9 @@ import pytest
 from drawn_people import drawn_mask, ring_of_cameras
 from moving_bodies import standing
 
-from studio.arrays import Bytes
 from studio.body.catalogue import load_body
-from studio.geometry.projection import project
+from studio.foundations.arrays import Bytes
+from studio.foundations.geometry.projection import project
 from studio.runs.limbs_elsewhere import LimbsElsewhere
 
 CAMERAS = ring_of_cameras(4, 480, 360)

@@ -5,16 +5,16 @@ import pytest
 from live_driving import driving, live_request, live_run
 from toy_session import FPS, true_poses
 
-from studio.errors import NotFoundError, RunError
-from studio.runs.live_replay import compare, prepare_replay, replay
-from studio.runs.live_summary import summary_of
+from studio.foundations.errors import NotFoundError, RunError
+from studio.runs.live.live_replay import compare, prepare_replay, replay
+from studio.runs.live.live_summary import summary_of
 from studio.runs.new_run import prepare_run
 from studio.runs.problem_source import ProblemSource
 from studio.runs.run_footage import footage_of
+from studio.search.settings import changed_settings
+from studio.search.trackers.recovery_settings import INITIALISE, SPREAD
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.settings import changed_settings
-from studio.trackers.recovery_settings import INITIALISE, SPREAD
 
 FRAME = 1.0 / FPS
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studio.runs.live_summary import LiveMeter, LiveStanding, LiveSummary, in_words, rate_of
-from studio.runs.set_following import SetNumbers
+from studio.runs.live.live_summary import LiveMeter, LiveStanding, LiveSummary, in_words, rate_of
+from studio.runs.live.set_following import SetNumbers
 from studio.runs.storing_behind import StoringBehind
 from studio.sessions.live_recordings import LIVE, SETS_NAME
 

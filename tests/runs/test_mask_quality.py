@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from toy_session import facing_camera, make_session, side_camera
 
-from studio.errors import FootageError
-from studio.geometry.camera import Camera
-from studio.geometry.projection import project
-from studio.runs import mask_quality as quality
-from studio.runs.initialising import initialise
-from studio.runs.person_hull import spread_frames
+from studio.foundations.errors import FootageError
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.geometry.projection import project
+from studio.results.drawing_footage.cameras import placed_camera
 from studio.runs.problem_source import ProblemSource
+from studio.runs.setup import mask_quality as quality
+from studio.runs.setup.initialising import initialise
+from studio.runs.setup.person_hull import spread_frames
 from studio.sessions.manifest import write_manifest
 from studio.sessions.session import Session
-from studio.synthesis.cameras import placed_camera
 
 CENTRE, RADIUS = np.array([0.0, 0.0, 900.0]), 350.0
 

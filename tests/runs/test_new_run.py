@@ -8,10 +8,10 @@ import pytest
 from toy_session import FRAMES, true_poses
 
 from studio.body.subject import Subject
-from studio.errors import BodyError, RunError, SettingsError, StudioError
+from studio.foundations.errors import BodyError, RunError, SettingsError, StudioError
 from studio.runs.new_run import prepare_run
 from studio.runs.search_space import default_sigma, parameter_names
-from studio.runs.start_pose_file import keep_start_pose
+from studio.runs.setup.start_pose_file import keep_start_pose
 from studio.sessions.named_rows import write_pose, write_sigma
 from studio.sessions.session import Session, described_anew
 

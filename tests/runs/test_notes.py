@@ -12,9 +12,9 @@ from tracked_runs import finish
 
 import studio
 from studio.cli.main import main
-from studio.errors import NotFoundError, SessionError, SettingsError
-from studio.inspection.reading import InspectedRun
-from studio.inspection.shared_page import shared_page
+from studio.foundations.errors import NotFoundError, SessionError, SettingsError
+from studio.results.inspection.reading import InspectedRun
+from studio.results.inspection.shared_page import shared_page
 from studio.runs.new_run import prepare_run
 from studio.runs.notes import FILE_NAME, LONGEST
 from studio.sessions.session import Session

@@ -13,11 +13,11 @@ from scipy.spatial import KDTree
 from studio.body.forward_kinematics import limb_frames
 from studio.body.model import BodyModel, Limb
 from studio.evidence.frame_evidence import ViewEvidence
-from studio.geometry.camera import Camera
-from studio.likelihood.catalogue import WEIGHTINGS
-from studio.likelihood.overlay import overlay_points
-from studio.runs.colour_tokens import colour_tokens
-from studio.runs.overlay_drawing import ViewMarks, draw_view
+from studio.foundations.geometry.camera import Camera
+from studio.runs.drawing.colour_tokens import colour_tokens
+from studio.runs.drawing.overlay_drawing import ViewMarks, draw_view
+from studio.search.likelihood.catalogue import WEIGHTINGS
+from studio.search.likelihood.overlay import overlay_points
 from studio.sessions.session import Session
 
 TOLERANCE_PX = 2.0

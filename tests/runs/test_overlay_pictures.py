@@ -6,14 +6,12 @@ import pytest
 
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_ends, limb_frames
-from studio.errors import StudioError
 from studio.evidence.frame_evidence import ViewEvidence
-from studio.geometry.camera import Camera
-from studio.likelihood.catalogue import WEIGHTINGS
-from studio.likelihood.overlay import overlay_points
-from studio.runs.colour_tokens import colour_tokens, parse_tokens, tokens_file
-from studio.runs.marker_lines import marker_links, marker_sides
-from studio.runs.overlay_drawing import (
+from studio.foundations.errors import StudioError
+from studio.foundations.geometry.camera import Camera
+from studio.runs.drawing.colour_tokens import colour_tokens, parse_tokens, tokens_file
+from studio.runs.drawing.marker_lines import marker_links, marker_sides
+from studio.runs.drawing.overlay_drawing import (
     ViewMarks,
     draw_view,
     encode_jpeg,
@@ -21,6 +19,8 @@ from studio.runs.overlay_drawing import (
     sample_costs,
     upright,
 )
+from studio.search.likelihood.catalogue import WEIGHTINGS
+from studio.search.likelihood.overlay import overlay_points
 
 HEIGHT, WIDTH = 240, 320
 

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 import studio
-from studio.arrays import Array
 from studio.body.forward_kinematics import limb_ends, marker_points
-from studio.motion_files.trc import read_trc
+from studio.body.motion_files.trc import read_trc
+from studio.foundations.arrays import Array
+from studio.results.drawing_footage.recipes import synthesize
 from studio.runs.tracks import read_track
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.synthesis.recipes import synthesize
 
 pytestmark = pytest.mark.slow
 

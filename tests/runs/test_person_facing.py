@@ -7,12 +7,12 @@ import pytest
 from rendered_people import FPS, rendered_walk
 from sized_people import drawn_and_seen
 
-from studio.arrays import Array
 from studio.body.catalogue import load_body
-from studio.runs.initialising import facing_as_said
-from studio.runs.person_facing import facing_agreement
-from studio.synthesis.motions import make_motion
-from studio.trackers.initialisation import FoundStart, confidence, facing_odds
+from studio.foundations.arrays import Array
+from studio.results.drawing_footage.motions import make_motion
+from studio.runs.setup.initialising import facing_as_said
+from studio.runs.setup.person_facing import facing_agreement
+from studio.search.trackers.initialisation import FoundStart, confidence, facing_odds
 
 SEED, CAMERAS = 3, 4
 

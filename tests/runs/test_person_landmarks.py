@@ -6,15 +6,21 @@ import numpy as np
 import pytest
 from rendered_people import FPS, Rendered, rendered_walk
 
-from studio.arrays import Array, Bytes
 from studio.body.person import marker_motion
-from studio.errors import FootageError
 from studio.evidence.person_network import INPUT, Crop, Sighting
-from studio.geometry.camera import Camera
-from studio.geometry.projection import project
-from studio.progress import unheard
-from studio.runs.person_landmarks import LEFT_AND_RIGHT, NAMES, RIGHT_AND_LEFT, _joints, person_landmarks
-from studio.synthesis.cameras import RIGS
+from studio.foundations.arrays import Array, Bytes
+from studio.foundations.errors import FootageError
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.geometry.projection import project
+from studio.foundations.progress import unheard
+from studio.results.drawing_footage.cameras import RIGS
+from studio.runs.setup.person_landmarks import (
+    LEFT_AND_RIGHT,
+    NAMES,
+    RIGHT_AND_LEFT,
+    _joints,
+    person_landmarks,
+)
 
 FRAMES = 3
 CAMERAS = RIGS["corners"]((480, 360), np.random.default_rng(1))
@@ -62,7 +68,7 @@ def test_the_left_side_is_what_most_cameras_call_left_in_all_frames(
         }
 
     frames = [(frame, seen(frame)) for frame in range(FRAMES)]
-    monkeypatch.setattr("studio.runs.person_landmarks.followed_person", lambda *_: iter(frames))
+    monkeypatch.setattr("studio.runs.setup.person_landmarks.followed_person", lambda *_: iter(frames))
     footage = RenderedFootage(None)  # pyright: ignore[reportArgumentType]
     motion = person_landmarks(CAMERAS, footage, unheard)  # pyright: ignore[reportArgumentType]
     np.testing.assert_allclose(motion.positions, np.broadcast_to(JOINTS, (FRAMES, 12, 3)), atol=0.1)

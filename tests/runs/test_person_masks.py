@@ -13,15 +13,15 @@ import numpy as np
 import pytest
 from rendered_people import FPS, SIZE, Rendered, overlap, rendered_walk
 
-from studio.arrays import Bytes
-from studio.capture.calibration_files import write_calibration
-from studio.capture.footage_source import CameraSource, FootageSource
-from studio.errors import FootageError, SessionError, WorkCancelledError
-from studio.geometry.camera import Camera
-from studio.progress import unheard
-from studio.runs.background_setup import frames_in_words, set_up_background
-from studio.runs.person_masks import PersonMasks, person_masks
-from studio.runs.session_settings import session_settings
+from studio.footage.capture.calibration_files import write_calibration
+from studio.footage.capture.footage_source import CameraSource, FootageSource
+from studio.foundations.arrays import Bytes
+from studio.foundations.errors import FootageError, SessionError, WorkCancelledError
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.progress import unheard
+from studio.runs.setup.background_setup import frames_in_words, set_up_background
+from studio.runs.setup.person_masks import PersonMasks, person_masks
+from studio.runs.setup.session_settings import session_settings
 from studio.sessions.background_files import PERSON_MASKS, read_evidence
 from studio.sessions.footage_changes import change_footage
 from studio.sessions.manifest import SessionManifest, now, write_manifest
@@ -93,7 +93,7 @@ def test_the_masks_are_the_sessions_own_until_others_are_chosen(session: Session
 def test_masks_that_came_with_the_footage_can_be_chosen_again(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("studio.runs.background_setup.person_masks", drawn)
+    monkeypatch.setattr("studio.runs.setup.background_setup.person_masks", drawn)
     set_up_background(session, "person", tune=False)
     assert masks_in_use(session) == tuple(f"person_masks/1/cam{n}" for n in (1, 2, 3))
     assert json.loads((session.path / "evidence.json").read_text())["schema"] == 2
@@ -126,7 +126,7 @@ def drawn(cameras: tuple[Camera, ...], *_: object) -> list[PersonMasks]:
 
 
 def test_who_is_not_seen_is_named(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("studio.runs.background_setup.person_masks", drawn)
+    monkeypatch.setattr("studio.runs.setup.background_setup.person_masks", drawn)
     assert set_up_background(session, "person", tune=False).notes == ("cam2: nobody was seen in frame 2.",)
     assert frames_in_words([5, 0, 1, 2, 9]) == "frames 0 to 2, 5, 9"
     assert frames_in_words(range(0, 20, 2)) == "frames 0, 2, 4, 6, 8, 10 and 4 more"
@@ -137,7 +137,7 @@ def test_who_is_not_seen_is_named(session: Session, monkeypatch: pytest.MonkeyPa
 def test_what_fails_leaves_all_as_it_was(
     session: Session, monkeypatch: pytest.MonkeyPatch, fault: str, *, again: bool
 ) -> None:
-    monkeypatch.setattr("studio.runs.background_setup.person_masks", drawn)
+    monkeypatch.setattr("studio.runs.setup.background_setup.person_masks", drawn)
     if again:
         set_up_background(session, "person", tune=False)
         session = Session(session.path)
@@ -148,7 +148,7 @@ def test_what_fails_leaves_all_as_it_was(
             raise WorkCancelledError("It was cancelled.", "")
 
         # Once the masks are written, and in use.
-        monkeypatch.setattr("studio.runs.background_setup.mask_quality", cancelled)
+        monkeypatch.setattr("studio.runs.setup.background_setup.mask_quality", cancelled)
         with pytest.raises(WorkCancelledError):
             set_up_background(session, "person")
     else:

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from studio.arrays import Bytes
-from studio.runs.pixel_owners import LimbColours, LimbMap, learn_colours, owners
+from studio.foundations.arrays import Bytes
+from studio.runs.setup.pixel_owners import LimbColours, LimbMap, learn_colours, owners
 
 HEIGHT, WIDTH = 40, 80
 LIGHT, DARK = 200, 60

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from toy_session import true_poses
 
-from studio.errors import NotFoundError
 from studio.evidence.pipeline import EvidenceMaker
+from studio.foundations.errors import NotFoundError
 from studio.runs.problem_source import KEPT_FRAMES, ProblemSource
+from studio.search.settings import changed_settings, default_settings
 from studio.sessions.session import Session
-from studio.settings import changed_settings, default_settings
 
 SETTINGS = default_settings()
 

@@ -5,13 +5,13 @@ import pytest
 
 from studio.body.inverse_kinematics import pose_from_markers
 from studio.body.model import BodyModel
-from studio.evaluation.errors import evaluate, rows_of_frames
-from studio.jobs.batch import track_to_end
-from studio.motion_files.trc import MarkerMotion, read_trc
+from studio.body.motion_files.trc import MarkerMotion, read_trc
+from studio.operations.jobs.batch import track_to_end
+from studio.results.evaluation.errors import evaluate, rows_of_frames
 from studio.runs.new_run import prepare_run
 from studio.runs.refining import refine_run, smooth_run
-from studio.runs.samples import install_sample
 from studio.runs.tracks import Track, read_track, write_track
+from studio.sessions.samples import install_sample
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace

@@ -8,15 +8,15 @@ from toy_session import true_poses
 from tracked_runs import finish, opened
 
 from studio.body.forward_kinematics import marker_points
-from studio.errors import NotFoundError, RunError, SettingsError, WorkCancelledError
+from studio.foundations.errors import NotFoundError, RunError, SettingsError, WorkCancelledError
 from studio.runs.new_run import prepare_run
 from studio.runs.refining import jitter, refine_run, smooth_run
 from studio.runs.tracks import Track, read_track, track_names, write_track
+from studio.search.trackers.refinement import RefinementSettings
+from studio.search.trackers.smoothing import SmoothingSettings
+from studio.search.trackers.tracker import LOST
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.trackers.refinement import RefinementSettings
-from studio.trackers.smoothing import SmoothingSettings
-from studio.trackers.tracker import LOST
 
 
 @pytest.fixture

@@ -8,18 +8,18 @@ from interrupted_session import BLACK, GONE, interrupted
 from sample_walk import WALK
 from tracked_runs import opened
 
-from studio.behaviour.model_file import write_model
-from studio.behaviour.model_learning import learn_model
-from studio.behaviour.settings import LearningSettings
 from studio.body.forward_kinematics import marker_points
-from studio.motion_files.trc import read_trc
+from studio.body.motion_files.trc import read_trc
+from studio.results.drawing_footage.recipes import synthesize
 from studio.results.motion_sources import read_source
 from studio.runs.new_run import prepare_run
 from studio.runs.reannealing import Reannealing
+from studio.search.behaviour.model_file import write_model
+from studio.search.behaviour.model_learning import learn_model
+from studio.search.behaviour.settings import LearningSettings
+from studio.search.trackers.tracker import LIMB_LOST, LOST, NO_EVIDENCE, RECOVERED, TRACKED, FrameResult
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.synthesis.recipes import synthesize
-from studio.trackers.tracker import LIMB_LOST, LOST, NO_EVIDENCE, RECOVERED, TRACKED, FrameResult
 
 STEP, FPS = 3, 20.0
 SMALL = {"particles": 100, "layers": 6}

@@ -14,13 +14,13 @@ from studio.body.dimensions import with_dimensions
 from studio.body.shape_space import dimension_kinds, end_lengths
 from studio.body.subject import Subject, fit_subject
 from studio.evidence.settings import EvidenceSettings
-from studio.runs import shape_on_the_way
 from studio.runs.new_run import prepare_run
 from studio.runs.search_space import default_sigma
-from studio.runs.shape_on_the_way import FOLDER, shaped_body
-from studio.runs.workflow import run_changes
+from studio.runs.setup import shape_on_the_way
+from studio.runs.setup.shape_on_the_way import FOLDER, shaped_body
+from studio.runs.setup.workflow import run_changes
+from studio.search.settings import default_settings
 from studio.sessions.session import Session
-from studio.settings import default_settings
 
 WALK = Path(__file__).parents[2] / "sample_sessions" / "walk"
 CAMERAS = ring_of_cameras(4, 480, 360)

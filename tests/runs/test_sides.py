@@ -9,10 +9,10 @@ from planted_sides import EXCHANGED, LAST, planted, stored, true_poses
 from sample_walk import copy_of_walk
 
 from studio.body.forward_kinematics import marker_points
-from studio.jobs.batch import track_to_end
-from studio.jobs.open_live_run import opened
-from studio.jobs.open_run import OpenRun
-from studio.jobs.tracking_job import SideLooking
+from studio.operations.jobs.batch import track_to_end
+from studio.operations.jobs.open_live_run import opened
+from studio.operations.jobs.open_run import OpenRun
+from studio.operations.jobs.tracking_job import SideLooking
 from studio.runs.problem_source import ProblemSource
 from studio.runs.refining import smooth_run
 from studio.runs.sides import notes_of, put_sides_right

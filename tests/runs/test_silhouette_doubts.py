@@ -9,15 +9,15 @@ import pytest
 from drawn_people import drawn_mask, ring_of_cameras
 
 from studio.body.catalogue import load_body
-from studio.capture.calibration_files import write_calibration
-from studio.errors import CalibrationError
-from studio.geometry.camera import Camera
-from studio.runs.mask_quality import mask_quality, measure_masks
+from studio.footage.capture.calibration_files import write_calibration
+from studio.foundations.errors import CalibrationError
+from studio.foundations.geometry.camera import Camera
 from studio.runs.new_run import prepare_run
-from studio.runs.samples import sample_folder
-from studio.runs.session_settings import session_settings
-from studio.runs.silhouette_doubts import silhouette_doubts
-from studio.runs.workflow import workflow_of
+from studio.runs.setup.mask_quality import mask_quality, measure_masks
+from studio.runs.setup.session_settings import session_settings
+from studio.runs.setup.silhouette_doubts import silhouette_doubts
+from studio.runs.setup.workflow import workflow_of
+from studio.sessions.samples import sample_folder
 from studio.sessions.session import CAMERAS_PATH, Session
 
 FRAMES = (5, 20, 35, 50)

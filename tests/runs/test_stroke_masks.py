@@ -12,12 +12,12 @@ import pytest
 from patched_ball import FRAMES, PatchedBall, patched_ball
 from rendered_people import overlap
 
-from studio.arrays import Bytes
-from studio.errors import FootageError, NotFoundError, SessionError, WorkCancelledError
 from studio.evidence.stroke_cut import StrokeCut
 from studio.evidence.strokes import Stroke
-from studio.runs.background_setup import set_up_background
-from studio.runs.stroke_masks import kept_frames, preview_mask
+from studio.foundations.arrays import Bytes
+from studio.foundations.errors import FootageError, NotFoundError, SessionError, WorkCancelledError
+from studio.runs.setup.background_setup import set_up_background
+from studio.runs.setup.stroke_masks import kept_frames, preview_mask
 from studio.sessions import stroke_files
 from studio.sessions.background_files import forget_unused_masks
 from studio.sessions.footage_changes import change_footage

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from sized_sessions import make_sized_session
 
-from studio.runs.subject_fitting import FitRequest, fit_session_subject
+from studio.runs.setup.subject_fitting import FitRequest, fit_session_subject
 
 PEOPLE = (104, 105, 106, 13, 14)
 """On whom nothing of the search was tuned."""

@@ -7,15 +7,15 @@ import pytest
 
 from studio.body.catalogue import load_body
 from studio.body.subject import Subject, fit_subject, read_subject
-from studio.errors import StudioError
-from studio.runs.subject_fitting import (
+from studio.foundations.errors import StudioError
+from studio.runs.setup.subject_fitting import (
     FitRequest,
     FittedSubject,
     fit_session_subject,
     keep_subject,
     subject_of,
 )
-from studio.runs.subject_frames import varied_frames
+from studio.runs.setup.subject_frames import varied_frames
 from studio.sessions.session import Session
 
 

@@ -9,19 +9,19 @@ import pytest
 from rendered_people import overlap
 from two_people import TwoPeople, two_people
 
-from studio.arrays import Bytes
-from studio.capture.footage import Footage
-from studio.errors import FootageError, RunError, SessionError, WorkCancelledError
+from studio.footage.capture.footage import Footage
+from studio.foundations.arrays import Bytes
+from studio.foundations.errors import FootageError, RunError, SessionError, WorkCancelledError
 from studio.operations.masks import background
 from studio.operations.subjects import subjects, together
-from studio.runs.background_setup import set_up_background
-from studio.runs.mask_quality import mask_quality
 from studio.runs.problem_source import ProblemSource
-from studio.runs.session_settings import session_settings
-from studio.runs.subject_masks import WholeMasks, cut_frames, seen_subjects
+from studio.runs.setup.background_setup import set_up_background
+from studio.runs.setup.mask_quality import mask_quality
+from studio.runs.setup.session_settings import session_settings
+from studio.runs.setup.subject_masks import WholeMasks, cut_frames, seen_subjects
 from studio.runs.together import track_together
+from studio.search.settings import default_settings
 from studio.sessions.session import Session
-from studio.settings import default_settings
 
 FRAMES = 18
 """They pass each other, half a metre apart, in the middle."""

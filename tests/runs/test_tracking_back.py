@@ -3,7 +3,7 @@
 import numpy as np
 from toy_session import FRAMES, true_poses
 
-from studio.jobs.batch import track_to_end
+from studio.operations.jobs.batch import track_to_end
 from studio.runs.correcting import prepare_correction, track_backwards
 from studio.runs.new_run import prepare_run
 from studio.sessions.session import Session

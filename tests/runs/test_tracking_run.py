@@ -5,18 +5,18 @@ import pytest
 from toy_session import true_poses
 from tracked_runs import abandon, finish, opened
 
-from studio.errors import NotFoundError, RunError, SettingsError
-from studio.jobs.batch import track_to_end
-from studio.progress import unheard
+from studio.foundations.errors import NotFoundError, RunError, SettingsError
+from studio.foundations.progress import unheard
+from studio.operations.jobs.batch import track_to_end
 from studio.runs.branching import prepare_branch
 from studio.runs.new_run import prepare_run
 from studio.runs.reannealing import Reannealing
 from studio.runs.tracking_run import TrackingRun
+from studio.search.settings import RunSettings, changed_settings
+from studio.search.trackers.tracker import LayerRecord
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.settings import RunSettings, changed_settings
-from studio.trackers.tracker import LayerRecord
 
 QUICK = {"particles": 40, "layers": 4, "start_repeats": 2}
 

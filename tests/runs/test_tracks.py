@@ -11,7 +11,7 @@ import pytest
 from store_records import layer_of, record_of, result_of
 from toy_session import make_session
 
-from studio.errors import NotFoundError, SessionError
+from studio.foundations.errors import NotFoundError, SessionError
 from studio.runs.tracks import (
     BEST,
     BestTrack,
@@ -23,9 +23,9 @@ from studio.runs.tracks import (
     track_names,
     write_track,
 )
+from studio.search.trackers.tracker import LOST, TRACKED
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.stored_run import StoredRun
-from studio.trackers.tracker import LOST, TRACKED
 
 
 @pytest.fixture

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from nudged_camera import DEGREES, NUDGED, make_nudged_session, nudged, true_cameras
 
-from studio.errors import CalibrationError, NotFoundError
-from studio.runs.aligning import SessionAlignment, align_cameras
+from studio.foundations.errors import CalibrationError, NotFoundError
 from studio.runs.new_run import prepare_run
-from studio.runs.turned_cameras import remember_alignment, turn_back, turn_cameras, turned_from
-from studio.runs.workflow import StepStatus, workflow_of
+from studio.runs.setup.aligning import SessionAlignment, align_cameras
+from studio.runs.setup.turned_cameras import remember_alignment, turn_back, turn_cameras, turned_from
+from studio.runs.setup.workflow import StepStatus, workflow_of
 from studio.sessions.calibration_changes import restore_calibration, stale_runs
 from studio.sessions.session import CAMERAS_PATH, Session
 

@@ -12,9 +12,9 @@ from toy_session import make_session, true_poses
 from tracked_runs import finish, opened, poses_of
 
 import studio
-from studio.errors import DamagedError, SessionError
+from studio.foundations.errors import DamagedError, SessionError
+from studio.results.verifying import repair, verify
 from studio.runs.new_run import prepare_run
-from studio.runs.verifying import repair, verify
 from studio.sessions import salvaging
 from studio.sessions.file_checksums import note_files
 from studio.sessions.results_store import FILE_NAME, ResultsWriter

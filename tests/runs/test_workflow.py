@@ -8,9 +8,9 @@ import pytest
 from tracked_runs import finish
 
 from studio.body.subject import Subject, write_subject
-from studio.errors import SessionError
+from studio.foundations.errors import SessionError
 from studio.runs.new_run import prepare_run
-from studio.runs.workflow import run_to_use, subject_step, workflow_of
+from studio.runs.setup.workflow import run_to_use, subject_step, workflow_of
 from studio.sessions.provenance import note
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import SUBJECT_NAME, Session

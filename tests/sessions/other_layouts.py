@@ -8,7 +8,7 @@ import tomli_w
 from sources import FRAMES, write_pose2sim
 from toy_footage import numbered_frame, rig, write_pictures, write_video
 
-from studio.capture.calibration_files import export_calibration
+from studio.footage.capture.calibration_files import export_calibration
 
 CAMERAS = rig(2, "cam_")
 

@@ -8,8 +8,8 @@ import tomli_w
 from toy_footage import numbered_frame, rig, write_pictures, write_video
 
 from studio.body.catalogue import load_body
-from studio.geometry.camera import Camera
-from studio.motion_files.trc import MarkerMotion, write_trc
+from studio.body.motion_files.trc import MarkerMotion, write_trc
+from studio.foundations.geometry.camera import Camera
 
 FRAMES = 12
 BODY = load_body("human31")

@@ -7,9 +7,9 @@ import cv2
 import pytest
 from toy_session import FRAMES, make_session
 
-from studio.errors import CalibrationError, FootageError, SessionError, WorkCancelledError
 from studio.evidence.strokes import Stroke
-from studio.runs.workflow import workflow_of
+from studio.foundations.errors import CalibrationError, FootageError, SessionError, WorkCancelledError
+from studio.runs.setup.workflow import workflow_of
 from studio.sessions.importers.importing import ImportOptions, add_footage
 from studio.sessions.session import Session
 from studio.sessions.stroke_files import OUTDATED, write_strokes

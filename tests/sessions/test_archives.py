@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from studio.errors import StudioError
+from studio.foundations.errors import StudioError
 from studio.sessions.archives import ArchiveError, ArchiveLimits, folder_of, unpack, unpacked, unwrapped
 
 

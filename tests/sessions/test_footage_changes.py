@@ -10,7 +10,7 @@ from other_layouts import pose2sim
 from sources import FRAMES, full_source
 from toy_footage import number_of
 
-from studio.errors import FootageError
+from studio.foundations.errors import FootageError
 from studio.runs.new_run import prepare_run
 from studio.sessions.footage_changes import change_footage, stale_runs
 from studio.sessions.importers.importing import ImportOptions, import_source

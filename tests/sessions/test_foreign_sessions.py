@@ -12,11 +12,11 @@ import zstandard
 from store_records import layer_of, record_of, result_of
 from toy_session import make_session
 
-from studio.errors import SessionError, StudioError
-from studio.foreign_files import read_file
-from studio.runs import verifying
+from studio.foundations.errors import SessionError, StudioError
+from studio.foundations.foreign_files import read_file
+from studio.results import verifying
+from studio.results.verifying import UNTOUCHED_SECONDS, remove_left_behind, verify
 from studio.runs.moved_knobs import FILE_NAME as MOVED_NAME
-from studio.runs.verifying import UNTOUCHED_SECONDS, remove_left_behind, verify
 from studio.sessions import atomic_files, file_checksums, foreign_sessions
 from studio.sessions.file_checksums import check_files
 from studio.sessions.foreign_sessions import inspect_place

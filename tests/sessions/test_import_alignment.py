@@ -8,7 +8,7 @@ from other_layouts import caliscope
 from sources import video_source
 from toy_footage import number_of, numbered_frame, write_video
 
-from studio.errors import CalibrationError, FootageError, StudioError
+from studio.foundations.errors import CalibrationError, FootageError, StudioError
 from studio.sessions.importers.importing import ImportOptions, import_source
 
 

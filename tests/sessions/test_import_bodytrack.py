@@ -9,7 +9,7 @@ import pytest
 from sources import everything_below
 
 from studio.body.forward_kinematics import limb_ends
-from studio.errors import BodyError
+from studio.foundations.errors import BodyError
 from studio.sessions.importers.importing import ImportOptions, import_source
 
 PERSON_TOP = 1705.0

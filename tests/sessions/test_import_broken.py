@@ -10,7 +10,7 @@ import pytest
 from sources import everything_below, full_source, write_pose2sim
 from toy_footage import numbered_frame, rig, write_pictures
 
-from studio.errors import BodyError, CalibrationError, FootageError, StudioError, TruthError
+from studio.foundations.errors import BodyError, CalibrationError, FootageError, StudioError, TruthError
 from studio.sessions.importers.importing import import_source
 
 

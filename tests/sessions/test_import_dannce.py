@@ -8,9 +8,9 @@ import scipy.io
 from sources import FRAMES
 from toy_footage import numbered_frame, rig, write_video
 
-from studio.capture.calibration_files import find_calibrations, read_calibration
-from studio.errors import CalibrationError
-from studio.geometry.camera import Camera
+from studio.footage.capture.calibration_files import find_calibrations, read_calibration
+from studio.foundations.errors import CalibrationError
+from studio.foundations.geometry.camera import Camera
 from studio.sessions.importers.importing import import_source
 
 CAMERAS = rig(2, "Camera")

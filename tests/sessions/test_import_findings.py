@@ -9,9 +9,9 @@ import pytest
 from sources import video_source
 from toy_footage import rig
 
-from studio.capture.calibration_files import export_calibration
-from studio.errors import CalibrationError
-from studio.geometry.camera import Camera
+from studio.footage.capture.calibration_files import export_calibration
+from studio.foundations.errors import CalibrationError
+from studio.foundations.geometry.camera import Camera
 from studio.sessions.importers.importing import ImportOptions, import_source
 
 CAMERAS = rig(2, "cam_")

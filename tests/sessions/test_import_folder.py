@@ -9,8 +9,8 @@ import pytest
 from sources import BODY, FRAMES, everything_below, full_source, video_source, write_pose2sim
 from toy_footage import number_of, numbered_frame, rig, write_pictures, write_video
 
-from studio.errors import CalibrationError, FootageError, SessionError, WorkCancelledError
-from studio.motion_files.trc import read_trc
+from studio.body.motion_files.trc import read_trc
+from studio.foundations.errors import CalibrationError, FootageError, SessionError, WorkCancelledError
 from studio.sessions.archives import ArchiveError
 from studio.sessions.importers.importing import ImportOptions, import_source
 

@@ -21,7 +21,7 @@ from other_layouts import (
 from sources import video_source, write_pose2sim
 from toy_footage import number_of
 
-from studio.errors import CalibrationError, FootageError
+from studio.foundations.errors import CalibrationError, FootageError
 from studio.sessions.importers.importing import ImportOptions, import_source
 
 

@@ -17,10 +17,10 @@ from toy_footage import number_of, numbered_frame, rig, write_pictures, write_vi
 import studio
 from studio.body.catalogue import load_body
 from studio.body.subject import DEFAULT_BODY
-from studio.capture.calibration_files import read_calibration
-from studio.capture.video import measure_video
-from studio.errors import BodyError, CalibrationError, FootageError
-from studio.runs.workflow import calibration_step
+from studio.footage.capture.calibration_files import read_calibration
+from studio.footage.capture.video import measure_video
+from studio.foundations.errors import BodyError, CalibrationError, FootageError
+from studio.runs.setup.workflow import calibration_step
 from studio.sessions.background_files import mask_name
 from studio.sessions.importers.importing import ImportOptions, ImportReport, import_source
 from studio.sessions.named_rows import write_pose

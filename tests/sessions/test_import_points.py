@@ -8,11 +8,11 @@ from sources import video_source, write_pose2sim
 from toy_footage import rig
 
 import studio
-from studio.calibration.carried_points import carried
-from studio.capture.calibration_files import read_calibration, with_up
-from studio.errors import CalibrationError, TruthError
-from studio.geometry.camera import Camera
-from studio.motion_files.trc import read_trc
+from studio.body.motion_files.trc import read_trc
+from studio.footage.calibration.carried_points import carried
+from studio.footage.capture.calibration_files import read_calibration, with_up
+from studio.foundations.errors import CalibrationError, TruthError
+from studio.foundations.geometry.camera import Camera
 from studio.sessions.importers.importing import ImportOptions, add_footage, import_source
 from studio.sessions.session import Session
 

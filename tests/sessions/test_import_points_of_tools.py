@@ -11,9 +11,9 @@ from other_layouts import CAMERAS, anipose, caliscope, freemocap, old_freemocap,
 from sources import FRAMES
 from toy_footage import numbered_frame, write_video
 
-from studio.errors import CalibrationError
-from studio.motion_files.points_arrays import MEDIAPIPE
-from studio.motion_files.trc import MarkerMotion, read_trc, write_trc
+from studio.body.motion_files.points_arrays import MEDIAPIPE
+from studio.body.motion_files.trc import MarkerMotion, read_trc, write_trc
+from studio.foundations.errors import CalibrationError
 from studio.sessions.importers.importing import ImportOptions, ImportReport, import_source
 
 MIDDLE = np.mean([camera.centre + 3000.0 * camera.rotation[2] for camera in CAMERAS], axis=0)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from sources import video_source
 
-from studio.capture.interlacing import FieldMotion, times_of_fields, whole_picture
-from studio.capture.timestamps import read_timestamps
-from studio.capture.video import VideoReader, measure_video
+from studio.footage.capture.interlacing import FieldMotion, times_of_fields, whole_picture
+from studio.footage.capture.timestamps import read_timestamps
+from studio.footage.capture.video import VideoReader, measure_video
 from studio.sessions.importers.importing import ImportOptions, ImportReport, import_source
 from studio.sessions.session import Session
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from studio.errors import NotFoundError, SessionError
+from studio.foundations.errors import NotFoundError, SessionError
 from studio.sessions.manifest import FILE_NAME, read_manifest
 from studio.sessions.session import Session
 

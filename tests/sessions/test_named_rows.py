@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studio.errors import BodyError
+from studio.foundations.errors import BodyError
 from studio.sessions.named_rows import poses_csv, read_pose, read_sigma, write_pose, write_sigma
 
 NAMES = ("a", "b", "c")

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from studio.errors import NotFoundError, SessionError
+from studio.foundations.errors import NotFoundError, SessionError
 from studio.sessions.names import checked_name, free_name, inside, is_name, name_from
 
 ATTACKS = [

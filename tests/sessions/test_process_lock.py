@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from studio.errors import SessionError
+from studio.foundations.errors import SessionError
 from studio.sessions import session_databases
 from studio.sessions.process_lock import ProcessLock
 

@@ -6,9 +6,9 @@ import msgspec
 import pytest
 from toy_session import make_session, true_poses
 
-from studio.capture.calibration_files import read_calibration, write_calibration
+from studio.footage.capture.calibration_files import read_calibration, write_calibration
 from studio.runs.new_run import prepare_run
-from studio.runs.workflow import workflow_of
+from studio.runs.setup.workflow import workflow_of
 from studio.sessions import provenance
 from studio.sessions.named_rows import write_pose
 from studio.sessions.results_store import ResultsWriter

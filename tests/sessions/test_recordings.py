@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from studio.errors import FootageError
+from studio.foundations.errors import FootageError
 from studio.sessions.recordings import calibration_given
 from studio.sessions.session import CAMERAS_PATH, Session
 from studio.sessions.workspace import Workspace, begin_session

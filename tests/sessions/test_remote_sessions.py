@@ -15,7 +15,7 @@ from s3_server import BUCKET, s3_server, used_here
 from store_records import layer_of, record_of, result_of
 from toy_session import make_session
 
-from studio.errors import NotFoundError, SessionError
+from studio.foundations.errors import NotFoundError, SessionError
 from studio.sessions import remote_sessions
 from studio.sessions.file_checksums import note_files
 from studio.sessions.object_stores import Store, above, below, folder_of, is_address

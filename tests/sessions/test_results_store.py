@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from store_records import layer_of, result_of
 
-from studio.errors import NotFoundError, RunError, SessionError
+from studio.foundations.errors import NotFoundError, RunError, SessionError
+from studio.search.trackers.tracker import LayerRecord
 from studio.sessions.results_codec import kept_rows, particles_from
 from studio.sessions.results_reader import FILE_NAME, Row
 from studio.sessions.results_store import ResultsReader, ResultsWriter, is_being_written
-from studio.trackers.tracker import LayerRecord
 
 ARRAYS = (
     "variance_weighed",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from store_records import layer_of, record_of, result_of
 
-from studio.errors import RunError, StudioError
+from studio.foundations.errors import RunError, StudioError
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.run_record import write_run_record
 from studio.sessions.session import Session

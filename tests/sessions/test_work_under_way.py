@@ -10,14 +10,14 @@ import pytest
 from toy_session import make_session, true_poses
 
 import studio
-from studio.comparison.folders import new_comparison, place_of
-from studio.comparison.sweep import plan_sweep
-from studio.errors import NotFoundError, RunError, SessionError
+from studio.foundations.errors import NotFoundError, RunError, SessionError
 from studio.operations import subjects
-from studio.runs.initialising import InitialPose, keep_pose
+from studio.results.comparison.folders import new_comparison, place_of
+from studio.results.comparison.sweep import plan_sweep
+from studio.results.verifying import verify
 from studio.runs.new_run import prepare_run
 from studio.runs.notes import notes_of, write_note
-from studio.runs.verifying import verify
+from studio.runs.setup.initialising import InitialPose, keep_pose
 from studio.sessions import atomic_files, calibration_changes, work_under_way
 from studio.sessions import workspace as workspace_module
 from studio.sessions.atomic_files import NameTakenError

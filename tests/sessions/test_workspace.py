@@ -8,7 +8,7 @@ import pytest
 from store_records import layer_of, record_of, result_of
 from toy_session import make_session
 
-from studio.errors import NotFoundError, SessionError
+from studio.foundations.errors import NotFoundError, SessionError
 from studio.sessions import workspace as workspace_module
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session, free_run_name, jpeg

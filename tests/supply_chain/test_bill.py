@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from studio.self_check import OLDEST_PYTHON
+from studio.cli.self_check import OLDEST_PYTHON
 from supply_chain import bill as bills
 from supply_chain.bill import bill, components, doubts, licence_of, table
 

@@ -22,9 +22,9 @@ from tracked_runs import finish
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
+from studio.app.scene.window_scenes import GRACE_SECONDS
+from studio.app.server.app import SWEEP_SECONDS
 from studio.runs.new_run import prepare_run
-from studio.scene.window_scenes import GRACE_SECONDS
-from studio.server.app import SWEEP_SECONDS
 from watching.figures import Figures, cpu_seconds
 
 WINDOWS, STRETCHES, FRAMES = 10, 8, 12

@@ -312,7 +312,7 @@ function takeRest(work) {
   if (inside && get("follow") && !get("whatIf")) showLive(work.frame, false);
 }
 
-/** How many layers a frame takes with these settings, null where one says so itself (studio/trackers/partitions.py). */
+/** How many layers a frame takes with these settings, null where one says so itself (studio/search/trackers/partitions.py). */
 function layersOf(values) {
   if (values.layers) return values.layers;
   if (!values.stage1_iterations) return null;

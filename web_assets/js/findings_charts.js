@@ -1,4 +1,4 @@
-// Charts given as plain values (studio/comparison/findings.py), drawn alike in the report and in the studio's pages.
+// Charts given as plain values (studio/results/comparison/findings.py), drawn alike in the report and in the studio's pages.
 
 import { element } from "./elements.js";
 import { heatOption, legendEntries, legendName, seriesOption } from "./findings_options.js";

@@ -48,7 +48,7 @@ export function select({ frame, ...changes }) {
 }
 
 const isSided = (name) => /left|right/.test(name);
-/** The limb that a limb's errors are counted with: itself where it is left or right or the body has no sides, else head and trunk (studio/inspection/reference.py). */
+/** The limb that a limb's errors are counted with: itself where it is left or right or the body has no sides, else head and trunk (studio/results/inspection/reference.py). */
 export const limbGroup = (name) =>
   !name || isSided(name) || !(get("parameters") ?? []).some((one) => isSided(one.limb))
     ? name

@@ -12,12 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
-from studio.arrays import Array
 from studio.body.catalogue import load_body
 from studio.body.subject import subject_from_shape
-from studio.capture.naming import natural_key
-from studio.errors import BodyError
-from studio.foreign_files import foreign_file, read_foreign_text
+from studio.footage.capture.naming import natural_key
+from studio.foundations.arrays import Array
+from studio.foundations.errors import BodyError
+from studio.foundations.foreign_files import foreign_file, read_foreign_text
 from studio.sessions.importers.folder_layout import choose_calibration
 from studio.sessions.importers.plan import SourcePlan
 

@@ -31,14 +31,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from studio.body.catalogue import body_files
-from studio.capture.calibration_easymocap import is_easymocap
-from studio.capture.calibration_files import PICKLES, find_calibrations
-from studio.capture.naming import listed, natural_key
-from studio.capture.pictures import is_picture, list_pictures
-from studio.capture.timestamps import TIMESTAMP_NAMES
-from studio.capture.video import VIDEO_SUFFIXES
-from studio.errors import CalibrationError, FootageError
-from studio.motion_files.truth_files import READERS
+from studio.body.motion_files.truth_files import READERS
+from studio.footage.capture.calibration_easymocap import is_easymocap
+from studio.footage.capture.calibration_files import PICKLES, find_calibrations
+from studio.footage.capture.naming import listed, natural_key
+from studio.footage.capture.pictures import is_picture, list_pictures
+from studio.footage.capture.timestamps import TIMESTAMP_NAMES
+from studio.footage.capture.video import VIDEO_SUFFIXES
+from studio.foundations.errors import CalibrationError, FootageError
 from studio.sessions.importers.plan import SourcePlan
 from studio.sessions.importers.points_of_tools import DANNCE_PROJECT, label3d_of, points_of_tool
 from studio.sessions.manifest import FILE_NAME, read_manifest

@@ -12,18 +12,18 @@ import msgspec
 import numpy as np
 from pydantic import Field
 
-from studio.calibration.checks import blocking, check_calibration
-from studio.calibration.rig_checks import room_findings
-from studio.capture.calibration_files import UNIT_PATTERN, Calibration, read_calibration
-from studio.capture.footage_source import CameraSource, FootageSource
-from studio.capture.naming import CameraMatch, listed
-from studio.capture.pictures import check_picture, list_pictures
-from studio.capture.video import probe_video
-from studio.declaring import Terminal, Web
-from studio.errors import CalibrationError, FootageError, SessionError
-from studio.foreign_files import leads_out
-from studio.geometry.camera import Camera
-from studio.progress import Progress, unheard
+from studio.footage.calibration.checks import blocking, check_calibration
+from studio.footage.calibration.rig_checks import room_findings
+from studio.footage.capture.calibration_files import UNIT_PATTERN, Calibration, read_calibration
+from studio.footage.capture.footage_source import CameraSource, FootageSource
+from studio.footage.capture.naming import CameraMatch, listed
+from studio.footage.capture.pictures import check_picture, list_pictures
+from studio.footage.capture.video import probe_video
+from studio.foundations.declaring import Terminal, Web
+from studio.foundations.errors import CalibrationError, FootageError, SessionError
+from studio.foundations.foreign_files import leads_out
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.progress import Progress, unheard
 from studio.sessions.archives import FOOTAGE_PARTS, folder_of, is_archive
 from studio.sessions.atomic_files import discard, made_whole, new_folder_beside, taken
 from studio.sessions.background_files import (

@@ -11,12 +11,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.arrays import Bytes
-from studio.capture.footage import MASK_LEVEL
-from studio.capture.pictures import list_pictures, png_of
-from studio.capture.video import VideoReader
-from studio.errors import FootageError
-from studio.foreign_files import foreign_file, read_file
+from studio.footage.capture.footage import MASK_LEVEL
+from studio.footage.capture.pictures import list_pictures, png_of
+from studio.footage.capture.video import VideoReader
+from studio.foundations.arrays import Bytes
+from studio.foundations.errors import FootageError
+from studio.foundations.foreign_files import foreign_file, read_file
 
 Levels = NDArray[np.uint8] | NDArray[np.uint16]
 """(H, W) or (H, W, C) levels of a picture as its file has them."""

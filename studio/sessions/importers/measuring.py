@@ -8,28 +8,28 @@ from typing import Literal, TypeVar
 
 import numpy as np
 
-from studio.arrays import Array
-from studio.capture.calibration_files import Calibration
-from studio.capture.calibration_parts import AssumedCrop
-from studio.capture.footage import background_turn, turned_picture
-from studio.capture.footage_fit import NO_BARS, Margins, black_margins, fit_camera
-from studio.capture.footage_source import TURNS, Turn
-from studio.capture.frame_pairing import Steps, drifts, file_frame, paired_by_time
-from studio.capture.interlacing import Fields, times_of_fields
-from studio.capture.naming import CameraMatch, listed, match_names
-from studio.capture.pictures import (
+from studio.evidence.backgrounds import check_plate_size
+from studio.footage.capture.calibration_files import Calibration
+from studio.footage.capture.calibration_parts import AssumedCrop
+from studio.footage.capture.footage import background_turn, turned_picture
+from studio.footage.capture.footage_fit import NO_BARS, Margins, black_margins, fit_camera
+from studio.footage.capture.footage_source import TURNS, Turn
+from studio.footage.capture.frame_pairing import Steps, drifts, file_frame, paired_by_time
+from studio.footage.capture.interlacing import Fields, times_of_fields
+from studio.footage.capture.naming import CameraMatch, listed, match_names
+from studio.footage.capture.pictures import (
     PictureReader,
     PicturesMeasure,
     check_picture,
     is_picture,
     measure_pictures,
 )
-from studio.capture.timestamps import offsets_from_times, read_timestamps
-from studio.capture.video import MAX_FRAMES, VideoMeasure, VideoReader, measure_video, probe_video
-from studio.errors import CalibrationError, FootageError
-from studio.evidence.backgrounds import check_plate_size
-from studio.geometry.camera import Camera
-from studio.progress import Progress
+from studio.footage.capture.timestamps import offsets_from_times, read_timestamps
+from studio.footage.capture.video import MAX_FRAMES, VideoMeasure, VideoReader, measure_video, probe_video
+from studio.foundations.arrays import Array
+from studio.foundations.errors import CalibrationError, FootageError
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.progress import Progress
 from studio.sessions.importers.mask_forms import MaskForm, form_of_masks
 from studio.sessions.importers.plan import SourcePlan
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
-from studio.arrays import Array
 from studio.body.subject import Subject
-from studio.capture.interlacing import Fields
+from studio.footage.capture.interlacing import Fields
+from studio.foundations.arrays import Array
 from studio.sessions.importers.points_of_tools import ToolPoints
 
 

@@ -16,9 +16,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from studio.capture.naming import natural_key
-from studio.errors import FootageError
-from studio.foreign_files import LARGEST_RECORD, foreign_file, read_foreign_text
+from studio.footage.capture.naming import natural_key
+from studio.foundations.errors import FootageError
+from studio.foundations.foreign_files import LARGEST_RECORD, foreign_file, read_foreign_text
 
 PLACES = (
     "pose-3d-filtered/*",

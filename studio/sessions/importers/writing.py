@@ -11,21 +11,21 @@ import numpy as np
 
 from studio.body.catalogue import body_file_text, load_body, packaged_bodies
 from studio.body.forward_kinematics import limb_ends
+from studio.body.motion_files.trc import MarkerMotion, read_trc, write_trc
+from studio.body.motion_files.truth_files import ANY_WORLD, read_truth
 from studio.body.subject import DEFAULT_BODY, Subject, fit_subject, read_subject, write_subject
-from studio.calibration.carried_points import carried
-from studio.capture.calibration_files import (
+from studio.footage.calibration.carried_points import carried
+from studio.footage.capture.calibration_files import (
     Calibration,
     find_calibrations,
     read_calibration,
     write_calibration,
 )
-from studio.capture.calibration_toml import is_canonical
-from studio.capture.footage_source import CameraSource, FootageSource
-from studio.capture.pictures import list_pictures
-from studio.errors import SessionError, StudioError
-from studio.motion_files.trc import MarkerMotion, read_trc, write_trc
-from studio.motion_files.truth_files import ANY_WORLD, read_truth
-from studio.progress import Progress
+from studio.footage.capture.calibration_toml import is_canonical
+from studio.footage.capture.footage_source import CameraSource, FootageSource
+from studio.footage.capture.pictures import list_pictures
+from studio.foundations.errors import SessionError, StudioError
+from studio.foundations.progress import Progress
 from studio.sessions.atomic_files import write_text
 from studio.sessions.importers.mask_forms import write_meant_masks
 from studio.sessions.importers.measuring import MeasuredSource

@@ -1,0 +1,117 @@
+"""What the routes need of the storeys below: the tracking process, the scenes, and where things lie."""
+
+from collections.abc import Generator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any
+
+from fastapi import Depends, Request
+
+from studio.app.scene.scene_server import SceneServer
+from studio.app.scene.window_scenes import WindowScenes
+from studio.app.server.access import VIEWING
+from studio.app.server.calibration_proposals import Proposals
+from studio.app.server.event_stream import EventStream
+from studio.app.server.windows import Window
+from studio.foundations.errors import RunError
+from studio.foundations.foreign_files import MANIFEST_NAME
+from studio.operations.jobs.camera_service import CameraService
+from studio.operations.jobs.commands import Close
+from studio.operations.jobs.control import StudioControl
+from studio.operations.jobs.job_runner import JobKind, JobRunner, SessionJob
+from studio.results.inspection.likelihoods import forget_evaluations
+from studio.results.overlay_pictures import forget_composers
+from studio.sessions.session import RUNS_NAME
+from studio.sessions.work_under_way import STATE_NAME, working_on
+from studio.sessions.workspace import Workspace
+
+
+@dataclass(slots=True)
+class AppState:
+    """Everything a route may use, kept in `app.state.studio`.
+
+    scenes : of all windows. footage_roots : folders that may be imported from. log_path :
+    the server's log file. proposals : calibrations not in use yet. uploads : those under way, by their identifiers.
+    jobs : work in the background. cameras : where live ones are looked at and recorded.
+    """
+
+    workspace: Workspace
+    control: StudioControl
+    scenes: WindowScenes
+    events: EventStream
+    footage_roots: tuple[Path, ...] = ()
+    log_path: Path | None = None
+    proposals: Proposals = field(default_factory=Proposals)
+    uploads: dict[str, dict[str, int]] = field(default_factory=dict[str, dict[str, int]])
+    jobs: JobRunner = field(init=False)
+    cameras: CameraService = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Give all work beside the routes its place, which reports its progress to all watchers."""
+        self.jobs = JobRunner(self.events.publish, self.log_path, self._working)
+        self.cameras = CameraService(self.jobs)
+
+    def _working(self, kind: JobKind[Any], state: SessionJob) -> AbstractContextManager[None]:
+        """What keeps other processes from moving a job's session, unless that is only being made."""
+        session = self.workspace.root / state.session
+        if not state.session or (kind.makes_session and not (session / MANIFEST_NAME).is_file()):
+            return nullcontext()
+        verb = str(getattr(state, "verb", "") or kind.noun)
+        return working_on(session.resolve(), verb, str(getattr(state, "run", "") or ""))
+
+    @property
+    def state_folder(self) -> Path:
+        """Where the server keeps what is its own: preferences, presets, unfinished uploads."""
+        return self.workspace.root / STATE_NAME
+
+
+def app_state(request: Request) -> AppState:
+    """What routes use, as their dependency."""
+    return request.app.state.studio
+
+
+App = Annotated[AppState, Depends(app_state)]
+
+
+def scene_of(app: App, window: Window = "") -> SceneServer:
+    """The scene of the requesting window, as a dependency of routes."""
+    return app.scenes.scene(window, VIEWING.get())
+
+
+Scene = Annotated[SceneServer, Depends(scene_of)]
+
+
+@contextmanager
+def moving(app: AppState, session: str, run: str = "") -> Generator[None]:
+    """Inside, a session (or a run of it) may be renamed or deleted: nothing has it open, and no job of it begins.
+
+    Raises RunError while a job of it is under way, or as `release`.
+    """
+    with app.jobs.moving(session, run):
+        release(app, session, run)
+        yield
+
+
+def release(app: AppState, session: str, run: str = "") -> None:
+    """Free a session (or only a run of it) for renaming or deleting: footage, results and scene are closed.
+
+    Raises RunError while the run is being tracked, or trackers are being compared on the session.
+    """
+    if not run:
+        app.jobs.check_movable(session)
+    state, folder = app.control.state, app.workspace.root / session
+    # Else the process itself knows whether that is what it has open; a search elsewhere is not waited for.
+    if state.state != "lost" and (state.session == session or state.state not in ("tracking", "compiling")):
+        try:
+            app.control.request(Close(session=str(folder), run=str(folder / RUNS_NAME / run) if run else ""))
+        except RunError:
+            # A process that died meanwhile has nothing open any more.
+            if app.control.state.state != "lost":
+                raise
+    for scene in app.scenes.open_scenes().values():
+        if scene.shown.session == session and (not run or scene.shown.run == run):
+            scene.show_run(session if run else "")
+    app.events.tried.forget(session, run)
+    forget_composers()
+    forget_evaluations()

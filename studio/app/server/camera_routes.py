@@ -1,0 +1,178 @@
+"""Live cameras: looked at, recorded, tracked. One set of cameras at a time; `recording` events report progress.
+
+Cameras in the local network may be read, the studio's own ports may not; files only from the folders that footage may
+be taken from.
+"""
+
+import asyncio
+from pathlib import Path
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query
+from fastapi import Request as HttpRequest
+from fastapi.responses import Response
+from pydantic import Field
+
+from studio.app.server import files
+from studio.app.server.app_state import App, AppState
+from studio.app.server.requests import Arguments, body_of
+from studio.app.server.safe_paths import folder_to_import
+from studio.app.server.schemas import Answer, Number, Request, RunName
+from studio.footage.capture.camera_addresses import CameraAddress, camera_address, without_own
+from studio.footage.capture.live_cameras import CameraStanding
+from studio.footage.capture.stream_files import preview_jpeg
+from studio.foundations.errors import NotFoundError
+from studio.operations.jobs.camera_service import RecordingState
+from studio.operations.jobs.camera_tracking import LiveRecordingRequest
+from studio.operations.jobs.commands import Start, about
+from studio.operations.tracking import live
+from studio.sessions.names import PathRefused
+from studio.sessions.recordings import calibration_given
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+
+router = APIRouter(prefix="/api", tags=["cameras"])
+
+
+Knob = bool | int | float | str
+
+
+class CameraRequest(Request):
+    """A camera: its name in the calibration, and http://… (MJPEG), rtsp://…, /dev/video0 or the path of a video to be
+    replayed. Names and passwords in it are neither shown nor logged.
+    """
+
+    name: str = Field(min_length=1, max_length=40)
+    address: str = Field(min_length=1, max_length=2000)
+
+
+class CamerasRequest(Request):
+    """The cameras to look at, instead of those before; none closes all."""
+
+    cameras: list[CameraRequest] = Field(max_length=16)
+
+
+class SpreadView(Answer):
+    """How far apart the pictures of the last sets came, ms. apart: sets of more than half a frame, of `sets`."""
+
+    median: Number
+    most: Number
+    worst: Number
+    apart: int
+    sets: int
+    lagging: str
+
+
+class CamerasView(Answer):
+    """The cameras that are open, and the last recording."""
+
+    cameras: tuple[CameraStanding, ...]
+    spread: SpreadView
+    fps: float
+    recording: RecordingState | None
+
+
+OF_RUN = ("tracker", "weighting", "body", "behaviour", "seed", "knobs")
+TRACKED = ("seconds", "keep_start", *OF_RUN)
+RECORDED: dict[str, Any] = {
+    "name": (RunName, Field(description="Of the session that is made.")),
+    "calibration": (str, Field(description="A session whose calibration is taken.")),
+    "track": (
+        bool,
+        Field(False, description="Follow the body at once, with that session's person and room."),
+    ),
+}
+
+
+@router.get("/cameras")
+def cameras(app: App) -> CamerasView:
+    """The cameras that are open: state, rate, age of the last picture, how far apart their pictures come."""
+    return _view(app)
+
+
+@router.post("/cameras/preview")
+async def preview(request: CamerasRequest, http: HttpRequest, app: App) -> CamerasView:
+    """Open these cameras instead of those before. They close when they are not read for a while."""
+    server = http.scope.get("server") or ("", 0)
+    ports = {int(server[1] or 0), *(scene.port for scene in app.scenes.open_scenes().values())}
+    addresses = [_address(one, app) for one in request.cameras]
+    await asyncio.to_thread(_open, app, addresses, ports)
+    return _view(app)
+
+
+@router.get("/cameras/{name}.jpg", response_class=Response)
+def picture(
+    name: str,
+    app: App,
+    height: Annotated[int | None, Query(ge=16, le=4320, description="Empty: as it came.")] = None,
+) -> Response:
+    """A camera's last picture (JPEG)."""
+    shot = app.cameras.newest(name)
+    return files.picture(preview_jpeg(shot, height))
+
+
+@router.get("/recordings")
+def recording(app: App) -> RecordingState:
+    """The recording that is under way, or the last one."""
+    found = app.cameras.standing.recording
+    if found is None:
+        raise NotFoundError("Nothing was recorded yet.", "Begin a recording.")
+    return found
+
+
+@router.post("/recordings", status_code=202)
+async def begin(
+    arguments: Annotated[Arguments, body_of(live, "RecordingRequest", only=TRACKED, **RECORDED)], app: App
+) -> RecordingState:
+    """Record the open cameras into a new session; with `track` follow the body at once."""
+    base = app.workspace.session(arguments.more["calibration"])
+    place = app.workspace.place_for(arguments.more["name"])
+    if not arguments.more["track"]:
+        calibration = calibration_given(base.path)
+        return await asyncio.to_thread(app.cameras.record, place, calibration, arguments.get("seconds"))
+    run_options = {name: arguments[name] for name in arguments if name in OF_RUN} | {"live": True}
+
+    def track(session: Session, run: StoredRun) -> None:
+        app.control.send(Start(**about(run.folder)))
+        app.events.session_changed(session.name)
+
+    recording = LiveRecordingRequest(place, arguments.get("seconds"), keep_start=arguments["keep_start"])
+    return await asyncio.to_thread(app.cameras.track, base, recording, run_options, track)
+
+
+@router.post("/recordings/stop", status_code=202)
+def stop(app: App) -> RecordingState:
+    """End the recording; it becomes a session in the background."""
+    found = app.cameras.stop()
+    if found is None:
+        raise NotFoundError("Nothing is being recorded.", "Begin a recording.")
+    return found
+
+
+def _address(camera: CameraRequest, app: AppState) -> CameraAddress:
+    """The address of a camera that a page names. Raises FootageError, PathRefused."""
+    text = camera.address.strip()
+    if "://" in text or text.startswith("/dev/"):
+        return camera_address(camera.name, text)
+    path = Path(text).expanduser()
+    if not path.is_absolute():
+        raise PathRefused(
+            f"'{text[:80]}' is no camera's address and no full path.",
+            "Give http://…, rtsp://… or /dev/video0.",
+        )
+    folder = folder_to_import(str(path.parent), app.footage_roots)
+    return camera_address(camera.name, str(folder / path.name), replays=True)
+
+
+def _open(app: AppState, addresses: list[CameraAddress], ports: set[int]) -> None:
+    app.cameras.open([without_own(address, ports) for address in addresses])
+
+
+def _view(app: AppState) -> CamerasView:
+    standing = app.cameras.standing
+    return CamerasView(
+        cameras=standing.cameras,
+        spread=SpreadView.model_validate(standing.spreads),
+        fps=standing.fps,
+        recording=standing.recording,
+    )

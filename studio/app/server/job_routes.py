@@ -1,0 +1,103 @@
+"""Work in the background: the list of all of it, and of every kind the addresses of its state and to stop it."""
+
+from string import Formatter
+from typing import Annotated
+from urllib.parse import quote
+
+from fastapi import APIRouter, Query
+from pydantic import Field
+
+from studio.app.server.app_state import App
+from studio.app.server.schemas import Answer, Number
+from studio.operations.jobs.job_runner import Job, JobKind, SessionJob, State
+
+router = APIRouter(prefix="/api", tags=["jobs"])
+
+
+class JobLine(Answer):
+    """A job that is under way, or over since the studio was started. kind: type of its events. noun: what it is called.
+    at: the address of its whole state, "" where the page has it. page: where what came of it is shown.
+    """
+
+    kind: str
+    key: str = Field(description="By which it is stopped.")
+    noun: str
+    session: str
+    name: str = Field("", description="Of what it makes, where that has one.")
+    run: str = ""
+    verb: str = ""
+    began: float
+    state: str
+    step: str
+    done: int
+    total: int
+    seconds_left: Number
+    message: str
+    hint: str
+    at: str
+    page: str
+
+
+class JobList(Answer):
+    """All work in the background, the oldest first."""
+
+    jobs: list[JobLine]
+
+
+@router.get("/jobs")
+def jobs(
+    app: App,
+    session: Annotated[str | None, Query(max_length=64, description="Of this session only.")] = None,
+    kind: Annotated[str, Query(max_length=64, description="Of this kind only.")] = "",
+) -> JobList:
+    """What is under way, and what is over since the studio was started: how a page that was loaded again, or another
+    one, finds it.
+    """
+    return JobList(jobs=[_line(job) for job in app.jobs.jobs(session, kind)])
+
+
+@router.delete("/jobs/{kind}/{key:path}", status_code=202)
+def stop_job(kind: str, key: str, app: App) -> JobLine:
+    """Stop a job; nothing of it is kept but what is done frame by frame or trial by trial."""
+    return _line(app.jobs.stop(kind, key))
+
+
+def _line(job: Job) -> JobLine:
+    state, kind = job.state, job.kind
+    fields = dict(state)
+    fields["run"] = fields.get("made_run") or fields.get("run")
+    return JobLine.of(
+        state,
+        kind=kind.event,
+        noun=kind.noun,
+        key=state.key,
+        **{name: str(fields.get(name) or "") for name in ("name", "run", "verb")},
+        began=job.began,
+        at=_filled(kind.at, fields),
+        page=_filled(kind.page, fields),
+    )
+
+
+def _filled(address: str, fields: dict[str, object]) -> str:
+    """An address with fields of the state in it."""
+    parts = {
+        name: quote(str(fields.get(name) or ""), safe="")
+        for _, name, _, _ in Formatter().parse(address)
+        if name
+    }
+    return address.format(**parts)
+
+
+def add_job_routes(router: APIRouter, path: str, kind: JobKind[State]) -> None:
+    """Addresses of the state of a kind of jobs, and to stop one. path : with `{identifier}`."""
+
+    @router.get(path, response_model=kind.states, summary=f"How a {kind.noun} stands")
+    def job_state(identifier: str, app: App) -> SessionJob:
+        """How it stands, and what came of it."""
+        return app.jobs.state(kind, identifier)
+
+    @router.delete(path, response_model=kind.states, status_code=202, summary=f"Stop a {kind.noun}")
+    def cancel_job(identifier: str, app: App) -> SessionJob:
+        """Stop it; nothing of it is kept but what is done frame by frame."""
+        app.jobs.cancel(kind, identifier)
+        return app.jobs.state(kind, identifier)

@@ -1,0 +1,66 @@
+"""How far a run's poses are from the session's truth, measured again only when there is more to measure."""
+
+import threading
+from collections import OrderedDict
+from functools import lru_cache
+from pathlib import Path
+
+from studio.body.motion_files.trc import MarkerMotion, read_trc
+from studio.foundations.arrays import Array, Indices
+from studio.results.evaluation.errors import Evaluation, evaluate
+from studio.runs.tracks import RAW, read_track, track_stamp
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+
+KEPT = 64
+
+_lock = threading.Lock()
+_evaluations: OrderedDict[tuple[Path, int, int, str, int], Evaluation] = OrderedDict()
+
+
+def evaluation_of(
+    session: Session, run: StoredRun, track: str = RAW, *, blobs: bool = True
+) -> Evaluation | None:
+    """The errors of all frames of a track (the search's own: the finished ones); None without a truth or before the
+    first frame. blobs : as `ResultsReader.damaged`.
+
+    Raises TruthError, BodyError, NotFoundError where there is no such track.
+    """
+    path = session.truth_path
+    if path is None:
+        return None
+    stamp = path.stat().st_mtime_ns
+    frames, poses = _poses_of(run, track, blobs)
+    if not len(frames):
+        return None
+    key = (run.folder, len(frames), stamp, track, track_stamp(run, track))
+    # A run's page asks for it three times at once: one measures, the others wait for that.
+    with _lock:
+        if key in _evaluations:
+            return _evaluations[key]
+        measured = evaluate(poses, frames, run.body(), _truth(path, stamp), run.record.fps)
+        _evaluations[key] = measured
+        if len(_evaluations) > KEPT:
+            _evaluations.popitem(last=False)
+    return measured
+
+
+def mean_error(session: Session, run: StoredRun, done: int) -> float | None:
+    """The mean marker error in mm; None where there is nothing to measure."""
+    measured = evaluation_of(session, run, blobs=False) if done else None
+    return None if measured is None else measured.mean_mm
+
+
+def _poses_of(run: StoredRun, track: str, blobs: bool) -> tuple[Indices, Array]:
+    """The frames (K,) of a track and its poses (K, D)."""
+    if track != RAW:
+        found = read_track(run, track)
+        return found.frames, found.poses
+    with run.results() as results:
+        return results.poses(blobs=blobs)
+
+
+@lru_cache(maxsize=8)
+def _truth(path: Path, _stamp: int) -> MarkerMotion:
+    """The motion in a TRC; its time of change is part of the question, so that a new file is read."""
+    return read_trc(path)

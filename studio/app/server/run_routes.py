@@ -1,0 +1,303 @@
+"""Runs: make, look, and every command to the tracking process.
+
+Commands are posted and answered at once with an identifier; an `acknowledged` event with it follows on the
+event stream. Each names its run, which the process opens first if it is not open.
+"""
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Query
+from pydantic import Field
+
+from studio.app.server.app_state import App, AppState, moving
+from studio.app.server.event_encoding import message_of, plain
+from studio.app.server.requests import Arguments, body_of
+from studio.app.server.schemas import Answer, Numbers, Request, Value
+from studio.app.server.session_routes import NewName, OpenSession, SessionChange, TrashEntry, trash_entry
+from studio.app.server.session_views import ParameterView, RunLine, parameter_views, run_line
+from studio.foundations.declaring import LARGEST
+from studio.foundations.errors import RunError
+from studio.foundations.progress import unheard
+from studio.operations.jobs import commands
+from studio.operations.jobs.search_pace import MOST_SECONDS, SpeedChoice, offered
+from studio.operations.tracking import branch, branched_run, new_run
+from studio.runs.sides import notes_of
+from studio.sessions.run_log import read_log
+from studio.sessions.stored_run import StoredRun
+
+router = APIRouter(prefix="/api", tags=["runs"])
+
+
+class Frame(Request):
+    """A frame by its number."""
+
+    frame: int = Field(ge=0, le=LARGEST)
+
+
+class ReannealRequest(Request):
+    """Which frame (-1: the selected one), and whether the answer replaces the stored one."""
+
+    frame: int = Field(-1, ge=-1, le=LARGEST)
+    keep: bool = False
+
+
+class Posted(Answer):
+    """A command handed to the tracking process; an `acknowledged` event with its identifier follows."""
+
+    identifier: str
+    command: str
+
+
+class RunList(Answer):
+    """The runs of a session, newest first."""
+
+    runs: list[RunLine]
+
+
+class RunDetail(Answer):
+    """A run and its request. settings: at its start; parameters: of its pose vector, as sigma and start_pose."""
+
+    run: RunLine
+    settings: dict[str, Value]
+    parameters: list[ParameterView]
+    sigma: Numbers
+    start_pose: Numbers | None
+    start_source: str
+    software: str
+    fps: float
+    notes: list[str]
+    behaviour: str = ""
+    live: bool = False
+
+
+class LogEntry(Answer):
+    """One line of a run's log. time: seconds since the epoch."""
+
+    level: str
+    time: float
+    text: str
+
+
+class LogLines(Answer):
+    """What the tracking process said, oldest first."""
+
+    lines: list[LogEntry]
+
+
+class PaceRequest(Request):
+    """How long each tracked layer takes at least; 0: as fast as it can."""
+
+    seconds_a_layer: float = Field(ge=0.0, le=MOST_SECONDS, allow_inf_nan=False)
+
+
+class PaceView(Answer):
+    """The pace that the search has, and what is offered: fast to slow, the present one among them."""
+
+    seconds_a_layer: float
+    choices: list[SpeedChoice]
+
+
+SEARCHING = ("tracking", "compiling")
+RUN = "/sessions/{session}/runs/{run}"
+
+
+def run_of(session: OpenSession, run: str) -> StoredRun:
+    """The run that an address names, as a dependency. Raises NameRefused, NotFoundError."""
+    return session.run(run)
+
+
+OpenRun = Annotated[StoredRun, Depends(run_of)]
+Checked = Annotated[
+    bool,
+    Query(
+        description="Whether all that is stored is read and checked for damage first, once by each server: of thousands"
+        " of frames it takes seconds. False: numbers and poses are checked, and known damage is left out."
+    ),
+]
+
+
+@router.get("/sessions/{session}/runs")
+def runs(session: OpenSession) -> RunList:
+    """The session's runs, newest first."""
+    return RunList(runs=[run_line(run.summary(), session) for run in reversed(session.runs())])
+
+
+@router.post("/sessions/{session}/runs", status_code=201)
+def make_run(
+    session: OpenSession, arguments: Annotated[Arguments, body_of(new_run, "RunRequest")], app: App
+) -> RunLine:
+    """A new run, ready to be started; what is left out is the session's own or the studio's default."""
+    options: dict[str, Any] = {
+        **arguments,
+        "start_source": arguments.get("start_source") or "set in the studio",
+    }
+    made = new_run(session, **options, progress=unheard)
+    app.events.session_changed(session.name, made.name)
+    return run_line(made.summary(), session)
+
+
+@router.post(RUN + "/branch", status_code=201)
+def make_branch(
+    session: OpenSession,
+    run: OpenRun,
+    arguments: Annotated[Arguments, body_of(branch, "BranchRequest")],
+    app: App,
+) -> RunLine:
+    """A new run with this one's frames before a frame, ready to be started: it and all after it are tracked with other
+    knobs (those that were moved in this run, where none are given). This run stays as it is.
+    """
+    made = branched_run(run, **arguments)
+    app.events.session_changed(session.name, made.name)
+    return run_line(made.summary(), session)
+
+
+@router.get(RUN)
+def run_detail(session: OpenSession, run: OpenRun, check: Checked = True) -> RunDetail:
+    """What was requested of the run, how far it got, and its body's parameters."""
+    record = run.record
+    return RunDetail.of(
+        record,
+        run=run_line(run.summary(blobs=check), session),
+        parameters=parameter_views(run.body()),
+        notes=list(notes_of(run)),
+    )
+
+
+@router.patch(RUN)
+def rename_run(session: OpenSession, run: OpenRun, change: SessionChange, app: App) -> NewName:
+    """Give a run another name. Refused while it is being tracked."""
+    name = run.name
+    if change.name is not None and change.name != name:
+        with moving(app, session.name, name):
+            name = app.workspace.rename_run(session.name, name, change.name).name
+    app.events.session_changed(session.name, name)
+    return NewName(name=name)
+
+
+@router.delete(RUN)
+def delete_run(session: OpenSession, run: OpenRun, app: App) -> TrashEntry:
+    """Move a run to the trash. Refused while it is being tracked."""
+    with moving(app, session.name, run.name):
+        place = app.workspace.trash_run(session.name, run.name)
+    app.events.session_changed(session.name)
+    return trash_entry(place)
+
+
+@router.get(RUN + "/log")
+def log_of(run: OpenRun) -> LogLines:
+    """What the tracking process said of this run, oldest first."""
+    return LogLines(lines=[LogEntry.model_validate(line) for line in read_log(run.folder)])
+
+
+@router.get("/worker")
+def worker_state(app: App) -> dict[str, object]:
+    """The tracking process's state, as the `state` events carry it."""
+    return plain(message_of(app.control.state))
+
+
+@router.post("/worker/restart", status_code=202)
+def restart_worker(app: App) -> dict[str, object]:
+    """Start the tracking process again after it died, and resume what it tracked."""
+    app.control.restart()
+    return plain(message_of(app.control.state))
+
+
+@router.get("/worker/pace")
+def pace(app: App) -> PaceView:
+    """How slowly a search goes that is watched, and the choices that are offered."""
+    seconds = app.control.state.seconds_a_layer
+    return PaceView(seconds_a_layer=seconds, choices=list(offered(seconds)))
+
+
+@router.post("/worker/pace", status_code=202)
+def set_pace(request: PaceRequest, app: App) -> Posted:
+    """Let each tracked layer take at least so many seconds, until the tracking process ends; results stay the same.
+
+    Single steps and re-annealing are not slowed.
+    """
+    return _post(app, commands.SetPace(seconds_a_layer=request.seconds_a_layer))
+
+
+@router.post(RUN + "/open", status_code=202)
+def open_run(run: OpenRun, app: App) -> Posted:
+    """Make the run the one that the other commands and the sliders are about."""
+    return _post(app, commands.Open(**commands.about(run.folder)))
+
+
+@router.post(RUN + "/start", status_code=202)
+def start(run: OpenRun, app: App) -> Posted:
+    """Track on from the first frame that has no result; also after the process died (resume).
+
+    While another run is being tracked this one waits for its turn.
+    """
+    return _post(app, commands.Start(**commands.about(run.folder)))
+
+
+@router.post(RUN + "/dequeue", status_code=202)
+def dequeue(run: OpenRun, app: App) -> Posted:
+    """Take the run out of those that wait to be tracked."""
+    return _post(app, commands.Dequeue(**commands.about(run.folder)))
+
+
+@router.post(RUN + "/pause", status_code=202)
+def pause(run: OpenRun, app: App) -> Posted:
+    """Stop after the layer in progress."""
+    return _post_for(app, run, commands.Pause(**commands.about(run.folder)))
+
+
+@router.post(RUN + "/step-layer", status_code=202)
+def step_layer(run: OpenRun, app: App) -> Posted:
+    """One layer, then pause inside the frame."""
+    return _post_for(app, run, commands.StepLayer(**commands.about(run.folder)))
+
+
+@router.post(RUN + "/step-frame", status_code=202)
+def step_frame(run: OpenRun, app: App) -> Posted:
+    """Finish the frame at hand or do the next, then pause."""
+    return _post_for(app, run, commands.StepFrame(**commands.about(run.folder)))
+
+
+@router.post(RUN + "/seek", status_code=202)
+def seek(run: OpenRun, where: Frame, app: App) -> Posted:
+    """Choose the frame that re-annealing works on."""
+    return _post_for(app, run, commands.Seek(frame=where.frame, **commands.about(run.folder)))
+
+
+@router.post(RUN + "/reanneal", status_code=202)
+def reanneal(run: OpenRun, where: ReannealRequest, app: App) -> Posted:
+    """Anneal a frame again with the knobs as they are; the stored answer stays, unless `keep` replaces it: then the
+    frames after it are dropped, and the run as it was goes to the trash.
+    """
+    return _post_for(
+        app, run, commands.Reanneal(frame=where.frame, keep=where.keep, **commands.about(run.folder))
+    )
+
+
+@router.post(RUN + "/cancel", status_code=202)
+def cancel(run: OpenRun, app: App) -> Posted:
+    """End the run; what was tracked stays."""
+    return _post_for(app, run, commands.Cancel(**commands.about(run.folder)))
+
+
+def check_free(app: AppState, run: StoredRun) -> None:
+    """Raise RunError at once where the process would refuse: another run is being tracked, as far as is known here."""
+    state = app.control.state
+    if state.state in SEARCHING and (state.session, state.run) != (session_name(run), run.name):
+        raise RunError(
+            f"Run '{state.run}' of session '{state.session}' is being tracked.", "Pause it first, or wait."
+        )
+
+
+def session_name(run: StoredRun) -> str:
+    """The name of the session that a run lies in, as events carry it."""
+    return run.folder.parent.parent.name
+
+
+def _post_for(app: AppState, run: StoredRun, command: commands.Command) -> Posted:
+    check_free(app, run)
+    return _post(app, command)
+
+
+def _post(app: AppState, command: commands.Command) -> Posted:
+    app.control.send(command)
+    return Posted(identifier=command.identifier, command=type(command).__name__)

@@ -1,0 +1,1 @@
+"""Footage and its cameras: reading it, and where the cameras stand."""

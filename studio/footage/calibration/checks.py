@@ -1,0 +1,45 @@
+"""The checks that a reprojection error cannot make, together."""
+
+from collections.abc import Mapping, Sequence
+
+from studio.footage.calibration.board_checks import board_findings
+from studio.footage.calibration.boards import Board, Sighting
+from studio.footage.calibration.findings import Finding, Severity, blocking
+from studio.footage.calibration.rig_checks import distance_findings, rig_findings, size_findings
+from studio.footage.calibration.silhouette_checks import Masks, silhouette_findings
+from studio.foundations.geometry.camera import Camera
+
+__all__ = ["Finding", "Masks", "Severity", "blocking", "check_calibration"]
+
+FIRST_CAUSES = frozenset(("resolution", "rotation", "handedness", "transposed-rotation"))
+
+
+def check_calibration(
+    cameras: Sequence[Camera],
+    *,
+    footage_sizes: Mapping[str, tuple[int, int]] | None = None,
+    board: Board | None = None,
+    sightings: Sequence[Sighting] = (),
+    masks: Masks | None = None,
+    height_mm: float | None = None,
+    scale: float = 1.0,
+    distances_mm: Mapping[tuple[str, str], float] | None = None,
+) -> tuple[Finding, ...]:
+    """All findings on a calibration, blocking ones first; none for a good one.
+
+    footage_sizes : (width, height) of each camera's footage. board, sightings : board footage taken with these
+    cameras. masks : silhouettes of one person, frame → camera → (H, W), nonzero = person. height_mm : the person's.
+    scale : of the body beside a person (`scale_of`).
+    distances_mm : measured distances between two cameras' lenses. Each argument adds checks.
+    """
+    sizes = {sighting.camera: sighting.size for sighting in sightings} | dict(footage_sizes or {})
+    found = [*size_findings(cameras, sizes), *rig_findings(cameras)]
+    # Where sizes or rotations are wrong, views disagree for that reason; nothing more is to be learnt from them.
+    if not any(finding.code in FIRST_CAUSES for finding in found):
+        if board is not None and sightings:
+            found += board_findings(cameras, board, sightings)
+        if masks and not blocking(found):
+            found += silhouette_findings(cameras, masks, height_mm, board, scale)
+        if not any(finding.code in ("scale", "square-size") for finding in found):
+            found += distance_findings(cameras, distances_mm or {}, board)
+    return tuple(sorted(found, key=lambda finding: finding.severity != "blocks"))

@@ -1,0 +1,132 @@
+"""Numbers over seeds compared with a paper's claims.
+
+Three kinds of claim. A value that the paper prints: `results.comparison.statistics.number`. That something holds, of
+which the paper shows one run: `share`. That one thing is smaller than another, no worse, or equal to it, or beyond a
+bound: `ratio`, `beyond`. An experiment's verdict is that of its hardest claim; a number that no claim of the paper
+rests on (a setting of ours, a time on another machine) is shown without a verdict.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.stats import binomtest
+
+from studio.results.comparison.findings import Number, Plain, Table
+from studio.results.comparison.statistics import (
+    LEVEL,
+    ONE_SIDED,
+    equal_to,
+    number,
+    ratio_number,
+    sign_test,
+    verdict_of,
+)
+
+EQUAL, NO_WORSE, LOWER, HIGHER = "equal", "no worse", "lower", "higher"
+FEWEST_SEEDS = 5
+"""With fewer, nothing is found equal or no worse, however little they scatter."""
+HALF = 0.5
+ONE_SIDED_P = 0.05
+
+
+def share(name: str, held: Iterable[bool], paper: float | None = 1.0) -> Number:
+    """Share of the seeds in which something holds, with its exact (Clopper & Pearson) 95 % interval.
+
+    paper : 1 where the paper shows that it holds, 0 where it shows that it does not, None without a claim. Reproduced
+    where significantly more than half of the seeds are as the paper's (exact binomial test, one-sided at 5 %), not
+    reproduced where significantly fewer, else undecided; five seeds that agree suffice, of ten it takes nine.
+    """
+    seen = [bool(value) for value in held]
+    holds, count = sum(seen), len(seen)
+    if not count:
+        return number(name, [], "of 1", paper=paper)
+    interval = binomtest(holds, count).proportion_ci(method="exact")
+    verdict = "answered"
+    if paper is not None:
+        agreeing = holds if paper > HALF else count - holds
+        more, fewer = (
+            binomtest(agreeing, count, HALF, alternative=side).pvalue for side in ("greater", "less")
+        )
+        verdict = "not reproduced" if fewer <= ONE_SIDED_P else "undecided"
+        verdict = "reproduced" if more <= ONE_SIDED_P else verdict
+    low, high = float(interval.low), float(interval.high)
+    return Number(name, holds / count, low, high, "of 1", paper, "", count, verdict)
+
+
+def percent(name: str, held: Iterable[bool], least: float | None = None) -> Number:
+    """Per cent of some cases in which something holds, with its exact (Clopper & Pearson) 95 % interval, which is not
+    empty where all or none do. least : claimed, per cent; better where the whole interval lies above.
+    """
+    seen = [bool(value) for value in held]
+    holds, count = sum(seen), len(seen)
+    if not count:
+        return number(name, [], "%", paper=least, better="higher")
+    test = binomtest(holds, count)
+    outer, inner = (test.proportion_ci(level, method="exact") for level in (LEVEL, ONE_SIDED))
+    low, high = 100.0 * float(outer.low), 100.0 * float(outer.high)
+    tested = 100.0 * float(inner.low), 100.0 * float(inner.high)
+    verdict = verdict_of((low, high), tested, least, "higher")
+    return Number(name, 100.0 * holds / count, low, high, "%", least, "higher", count, verdict)
+
+
+def ratio(name: str, ours: Sequence[float], theirs: Sequence[float], claim: str = "") -> Number:
+    """The ratio of two settings' errors, paired by seed.
+
+    claim : EQUAL (within the margin of equality on both sides, so that *better* refutes it as *worse* does), NO_WORSE
+    (no larger than 1 by that margin), LOWER (`beyond` 1), or none.
+    """
+    paper = 1.0 if claim in (EQUAL, NO_WORSE) else None
+    found = ratio_number(name, ours, theirs, "×", paper=paper, better="" if claim == EQUAL else "lower")
+    if claim == LOWER:
+        return beyond(found, 1.0, LOWER)
+    enough = paper is None or found.seeds >= FEWEST_SEEDS or found.verdict != "reproduced"
+    return found if enough else replace(found, verdict="undecided")
+
+
+def beyond(found: Number, bound: float, side: str) -> Number:
+    """The number with the verdict on the claim that it is lower (or higher) than a bound: reproduced where the whole
+    interval is, not reproduced where none of it is by more than the margin of equality, else undecided.
+    """
+    if not (math.isfinite(found.low) and math.isfinite(found.high)):
+        return replace(found, better=side, verdict="not reproduced")
+    lower_end, upper_end = equal_to(bound)
+    shown = found.high < bound if side == LOWER else found.low > bound
+    denied = found.low >= lower_end if side == LOWER else found.high <= upper_end
+    verdict = "reproduced" if shown else "not reproduced" if denied else "undecided"
+    return replace(found, better=side, verdict=verdict)
+
+
+def beside(found: Number) -> Number:
+    """The number beside the paper's, without a verdict: no claim rests on it."""
+    return replace(found, verdict="answered")
+
+
+def geometric_mean(values: Any, axis: int = -1) -> Any:  # noqa: ANN401 - what NumPy's own mean takes and gives
+    """exp of the mean log: for ratios, and for numbers of particles tried in equal ratios."""
+    return np.exp(np.mean(np.log(values), axis=axis))
+
+
+def sign_tests(
+    of: Callable[[str], tuple[Sequence[float], Sequence[float]]], pairs: Iterable[tuple[str, str]]
+) -> Table:
+    """Sign tests of pairs of settings over seeds and frames, a line a pair. of : a setting's errors of seeds, and of
+    all their frames. Frames of one run are correlated, so that their p is too small.
+    """
+    rows: list[tuple[Plain, ...]] = []
+    for first, second in pairs:
+        tests = [sign_test(ours, theirs) for ours, theirs in zip(of(first), of(second), strict=True)]
+        counts = [
+            cell for test in tests for cell in (f"{test.better} : {test.worse}", float(f"{test.p:.2g}"))
+        ]
+        rows.append((f"{first} against {second}", *counts))
+    columns = (
+        "pair",
+        "nearer in seeds",
+        "p over seeds",
+        "nearer in frames",
+        "p over frames, which are not independent",
+    )
+    return Table("Sign tests", columns, tuple(rows))

@@ -1,0 +1,188 @@
+"""The tracking process: commands in, events out, one layer between them; and its other end, in the server.
+
+It is started with `spawn`, so it shares nothing with the server but two pipes. Commands come through one,
+which also says (by its end) that the server is gone; events leave through the other from a thread of their
+own, newest first to win, so that a slow server never holds up the search. The same thread sends a heartbeat
+when there is nothing else to say.
+"""
+
+import contextlib
+import dataclasses
+import logging
+import multiprocessing
+import pickle
+import queue
+import signal
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+
+from studio.foundations.errors import RunError
+from studio.operations.jobs.commands import Command, Stop
+from studio.operations.jobs.events import Event, LayerFinished, LogLine
+from studio.operations.jobs.tracking_job import TrackingJob
+from studio.operations.jobs.watchers import Subscription
+
+HEARTBEAT_SECONDS = 1.0
+WAIT_SECONDS = 0.5
+SILENT_SECONDS = 20.0
+"""A process sends a heartbeat every second; after this long without one it is said to be silent."""
+STARTING_SECONDS = 120.0
+"""How long its first one may take: on a busy machine the imports alone take longer than SILENT_SECONDS."""
+LOST_HINT = "Resume: the run goes on from its last finished frame with the same result."
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Heartbeat:
+    """The process lives. at : `time.monotonic()`."""
+
+    at: float
+
+
+def run_process(inbox: Connection, outbox: Connection) -> None:
+    """The process's whole life: until a Stop, or until the server is gone."""
+    # Ctrl-C in the terminal reaches both processes; the server decides what becomes of this one.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    events = Subscription[Event]()
+    sender = threading.Thread(target=_send_all, args=(events, outbox), name="events-out", daemon=True)
+    sender.start()
+    job = TrackingJob(lambda event: events.put(event, event.key))
+    try:
+        _loop(job, inbox)
+    except Exception:
+        events.put(LogLine("", "", "error", time.time(), traceback.format_exc()))
+        raise
+    finally:
+        job.close()
+        events.close()
+        sender.join(timeout=5.0)
+
+
+def _loop(job: TrackingJob, inbox: Connection) -> None:
+    """Serve every command that waits, then do a layer if there is one to do.
+
+    While a run is watched at a pace, the time that is left of its last layer is spent listening.
+    """
+    while not job.stopped:
+        try:
+            while inbox.poll(job.rest if job.busy else WAIT_SECONDS):
+                command: Command = inbox.recv()
+                job.serve(command)
+                if job.stopped:
+                    return
+        except (EOFError, OSError):
+            logger.info("The server is gone; the tracking process ends.")
+            return
+        if job.busy:
+            job.advance()
+
+
+def _send_all(events: Subscription[Event], outbox: Connection) -> None:
+    """Send events as they come, and heartbeats between them, until the stream is closed and empty."""
+    with contextlib.suppress(BrokenPipeError, OSError):
+        while True:
+            try:
+                event = events.get(timeout=HEARTBEAT_SECONDS)
+            except queue.Empty:
+                if events.closed:
+                    return
+                outbox.send(Heartbeat(time.monotonic()))
+                continue
+            if isinstance(event, LayerFinished):
+                event = dataclasses.replace(event, left_at=time.monotonic())
+            outbox.send(event)
+
+
+# ------------------------------------------------------------------ in the server
+
+
+class OwnedProcess:
+    """One life of the process, as seen from the server: started at once, spoken to, listened to, ended.
+
+    heard, silent, ended : called from a thread of its own with this and an event that came, with this and whether
+    nothing has come for long or something came again, and with this when it is gone (`exit_code` says how).
+    """
+
+    def __init__(
+        self,
+        heard: "Callable[[OwnedProcess, Event], None]",
+        silent: "Callable[[OwnedProcess, bool], None]",
+        ended: "Callable[[OwnedProcess], None]",
+    ) -> None:
+        context = multiprocessing.get_context("spawn")
+        inbox_end, inbox = context.Pipe(duplex=False)
+        outbox, outbox_end = context.Pipe(duplex=False)
+        self._heard, self._silent, self._ended = heard, silent, ended
+        self._inbox, self._outbox = inbox, outbox
+        self._sending = threading.Lock()
+        self._process = context.Process(
+            target=run_process, args=(inbox_end, outbox_end), name="studio-tracking", daemon=True
+        )
+        self._process.start()
+        # Only the process itself may hold these ends: then a pipe ends when the process does.
+        inbox_end.close()
+        outbox_end.close()
+        self._thread = threading.Thread(target=self._listen, name="tracking-events", daemon=True)
+        self._thread.start()
+
+    @property
+    def identifier(self) -> int | None:
+        """The process's id, None once it is gone."""
+        return self._process.pid if self._process.is_alive() else None
+
+    @property
+    def exit_code(self) -> int | None:
+        """How it ended (0: as it was requested to; negative: by a signal), None while it lives."""
+        return self._process.exitcode
+
+    def send(self, command: Command) -> None:
+        """Post a command. Raises RunError if the process is gone."""
+        try:
+            with self._sending:
+                self._inbox.send(command)
+        except (BrokenPipeError, OSError):
+            raise RunError("The tracking process has died.", LOST_HINT) from None
+
+    def end(self, patience: float) -> None:
+        """Ask the process to end (patience > 0: and wait so many seconds), then make it."""
+        if patience > 0.0:
+            with contextlib.suppress(RunError):
+                self.send(Stop())
+            self._process.join(patience)
+        if self._process.is_alive():
+            self._process.kill()
+        self._process.join()
+        if threading.current_thread() is not self._thread:
+            self._thread.join()
+        self._inbox.close()
+
+    def _listen(self) -> None:
+        """Take everything that the process says, until it ends."""
+        outbox, silent, patience = self._outbox, False, STARTING_SECONDS
+        while True:
+            try:
+                if not outbox.poll(patience):
+                    if not silent:
+                        silent = True
+                        self._silent(self, True)
+                    continue
+                message, patience = outbox.recv(), SILENT_SECONDS
+            except (EOFError, OSError, pickle.UnpicklingError):
+                break
+            try:
+                if silent:
+                    silent = False
+                    self._silent(self, False)
+                if not isinstance(message, Heartbeat):
+                    self._heard(self, message)
+            except Exception:
+                # One event that cannot be passed on must not make its owner deaf.
+                logger.exception("An event of the tracking process could not be passed on.")
+        outbox.close()
+        self._process.join()
+        self._ended(self)

@@ -1,0 +1,89 @@
+"""The trial of a sweep or a batch: a run of the session, tracked to its end and measured."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+from studio.foundations.progress import report
+from studio.operations.jobs.batch import track_to_end
+from studio.results.comparison.footage_cache import FootageCache
+from studio.results.comparison.sweep import measured_run
+from studio.results.comparison.trials import ALLOW_INCONSISTENT, kept_as
+from studio.runs.new_run import checked_frames, prepare_run
+from studio.runs.setup.session_settings import session_settings
+from studio.search.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, values
+from studio.sessions.names import free_name
+from studio.sessions.remote_sessions import bring_runs, put_run, remote_runs
+from studio.sessions.run_record import RunRecord
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+
+
+@kept_as("swept_runs.measure_run")
+def measure_run(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
+    """Track a run and measure it; the fields of `Swept`. One of the same name that was begun so is gone on with; of a
+    session in a store also one that another machine put there, and what is tracked is put there.
+    """
+    session = cache.session(arguments["footage"])
+    bring_runs(session, arguments["run"])
+    run = _begun(session, arguments) or _new(session, arguments)
+    if run.summary(blobs=False).done < run.record.frame_count:
+        track_to_end(session, run, report)
+    if run.name not in remote_runs(session):
+        put_run(session, run)
+    return asdict(measured_run(session, run))
+
+
+@kept_as("swept_runs.measure_run_of_batch")
+def measure_run_of_batch(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
+    """The same of a session that whoever asks has not opened: what is left out is the session's own."""
+    session = cache.session(arguments["footage"])
+    about, first = session.manifest, arguments["first"]
+    first, last = checked_frames(
+        session, session.start_pose_frame() if first is None else first, arguments["last"]
+    )
+    filled = {
+        "first": first,
+        "last": last,
+        "tracker": arguments["tracker"] or about.tracker or DEFAULT_TRACKER,
+        "weighting": arguments["weighting"] or about.weighting or DEFAULT_WEIGHTING,
+    }
+    return measure_run({**arguments, **filled}, cache)
+
+
+def _begun(session: Session, arguments: Mapping[str, Any]) -> StoredRun | None:
+    """The run that an earlier attempt at this trial left, None without one. Its record has the trial's note, if any."""
+    wanted = session_settings(session, arguments["tracker"], arguments["weighting"], arguments["changes"])
+    for run in session.runs():
+        # A name that was taken has a number behind it.
+        if not run.name.startswith(arguments["run"]) or not _is_of(run.record, arguments):
+            continue
+        if "note" in arguments and arguments["note"] not in run.record.notes:
+            continue
+        if dict(run.record.settings) == dict(values(wanted)) and not run.being_tracked():
+            return run
+    return None
+
+
+def _is_of(record: RunRecord, arguments: Mapping[str, Any]) -> bool:
+    names = ("tracker", "weighting", "seed", "first", "last", *(["body"] if arguments["body"] else []))
+    return all(getattr(record, name) == arguments[name] for name in names)
+
+
+def _new(session: Session, arguments: Mapping[str, Any]) -> StoredRun:
+    taken = {run.name for run in session.runs()}
+    return prepare_run(
+        session,
+        tracker=arguments["tracker"],
+        weighting=arguments["weighting"],
+        body=arguments["body"],
+        behaviour=arguments.get("behaviour", ""),
+        first=arguments["first"],
+        last=arguments["last"],
+        seed=arguments["seed"],
+        knobs=arguments["changes"],
+        fit_shape=arguments["fit_shape"],
+        allow_inconsistent=arguments.get(ALLOW_INCONSISTENT, False),
+        note=arguments.get("note", ""),
+        name=free_name(arguments["run"], taken),
+    )

@@ -1,0 +1,225 @@
+"""A comparison as an experiment's findings (drawn in the same way), as plain JSON, CSV and text."""
+
+from typing import Any
+
+from studio.foundations.words import counted
+from studio.results.comparison.findings import Chart, Findings, Series, Table
+from studio.results.comparison.plan import Comparison, PairTest, TrackerResult
+from studio.results.comparison.statistics import SignTest, number
+from studio.search.settings import values
+from studio.sessions.named_rows import as_csv
+
+SIGNIFICANT = 0.05
+COLUMNS = (
+    "tracker", "evaluations a frame", "mean (mm)", "over seeds (mm)", "worst frame (mm)", "frames with a limb lost",
+    "runs without loss", "search (ms a frame)",
+)  # fmt: skip
+NOT_INDEPENDENT = (
+    "Consecutive frames are correlated, so the frames' p is too small: it describes, it does"
+    " not prove. Seeds are independent."
+)
+
+
+def findings(comparison: Comparison) -> Findings:
+    """Mean errors with their intervals over the seeds, the table, error curves, the sign tests as text."""
+    return Findings(
+        verdict="answered",
+        words=in_words(comparison),
+        numbers=tuple(
+            number(f"{result.tracker}: mean error", result.means, "mm") for result in comparison.trackers
+        ),
+        tables=(_table(comparison), _tests(comparison)) if comparison.pairs else (_table(comparison),),
+        charts=(error_chart(comparison), seeds_chart(comparison)),
+        settings=_settings(comparison),
+    )
+
+
+def error_chart(comparison: Comparison) -> Chart:
+    """Error over frames: every seed thin, each tracker's mean over the seeds thick."""
+    frames = tuple(float(frame) for frame in comparison.frames)
+    series: list[Series] = []
+    for result in comparison.trackers:
+        if len(result.seeds) > 1:
+            series += [
+                Series(
+                    f"{result.tracker}, seed {seed}",
+                    frames,
+                    tuple(run.per_frame_mm),
+                    group=result.tracker,
+                    thin=True,
+                )
+                for seed, run in zip(comparison.plan.seeds, result.seeds, strict=True)
+            ]
+        series.append(Series(result.tracker, frames, tuple(result.curve), group=result.tracker))
+    return Chart("Error over the frames", "lines", "frame", "mean error of the markers (mm)", tuple(series))
+
+
+def seeds_chart(comparison: Comparison) -> Chart:
+    """Each seed's mean error, the trackers beside one another as the sign test pairs them."""
+    names = tuple(str(seed) for seed in comparison.plan.seeds)
+    series = tuple(
+        Series(
+            result.tracker,
+            tuple(float(at) for at in range(len(names))),
+            tuple(result.means),
+            group=result.tracker,
+        )
+        for result in comparison.trackers
+    )
+    return Chart("Mean error of each seed", "bars", "seed", "mean error (mm)", series, categories=names)
+
+
+def document(comparison: Comparison) -> dict[str, Any]:
+    """The JSON of `studio compare --json`: `trackers` with their seeds, the sign tests; without single frames."""
+    plan = comparison.plan
+    return {
+        "session": plan.session,
+        "frames": [plan.first, plan.last],
+        "fps": plan.fps,
+        "body": plan.body,
+        "evaluations": plan.evaluations,
+        "seeds": list(plan.seeds),
+        "trackers": [_plain_tracker(result, plan.seeds) for result in comparison.trackers],
+        "settings": {
+            candidate.name: {"weighting": candidate.weighting, **dict(candidate.changes)}
+            for candidate in plan.candidates
+        },
+        "sign_tests": [
+            {
+                "first": pair.first,
+                "second": pair.second,
+                "frames": pair.frames._asdict(),
+                "seeds": pair.seeds._asdict(),
+            }
+            for pair in comparison.pairs
+        ],
+    }
+
+
+def frames_csv(comparison: Comparison) -> str:
+    """A row a tracker, seed and frame: its error and the limbs lost in it."""
+    rows = [
+        (result.tracker, seed, frame, f"{error:.3f}", " ".join(lost))
+        for result in comparison.trackers
+        for seed, run in zip(comparison.plan.seeds, result.seeds, strict=True)
+        for frame, error, lost in zip(comparison.frames, run.per_frame_mm, run.lost, strict=True)
+    ]
+    return as_csv([("tracker", "seed", "frame", "error_mm", "limbs_lost"), *rows])
+
+
+def in_words(comparison: Comparison) -> str:
+    """The ranking, and each pair's sign tests, as sentences."""
+    ranked = sorted(comparison.trackers, key=lambda result: result.mean_mm)
+    order = ", ".join(f"{result.tracker} {result.mean_mm:.1f} mm" for result in ranked)
+    count, seeds = len(comparison.frames), len(comparison.plan.seeds)
+    sentences = [f"Mean error over {count} frames and {counted(seeds, 'seed')}, best first: {order}."]
+    sentences += [pair_words(pair) for pair in comparison.pairs]
+    if comparison.pairs:
+        sentences.append(NOT_INDEPENDENT)
+        if 0.5 ** (seeds - 1) > SIGNIFICANT:
+            least = 0.5 ** (seeds - 1)
+            sentences.append(f"With {counted(seeds, 'seed')} the seeds' p cannot fall below {least:.2g};")
+            sentences[-1] += " six or more can show a difference at 5 %."
+    return " ".join(sentences)
+
+
+def pair_words(pair: PairTest) -> str:
+    """One pair's sign tests as a sentence."""
+    ahead = pair.frames.better >= pair.frames.worse
+    winner, other = (pair.first, pair.second) if ahead else (pair.second, pair.first)
+    return (
+        f"{winner} is nearer than {other} in {_share(pair.frames, ahead)} frames ({p_words(pair.frames.p)}) and in"
+        f" {_share(pair.seeds, ahead)} seeds ({p_words(pair.seeds.p)})."
+    )
+
+
+def p_words(p: float) -> str:
+    """A probability as text."""
+    return "p < 0.0001" if p < 1e-4 else f"p = {p:.2g}"
+
+
+def table_text(comparison: Comparison) -> str:
+    """The table and the text for a terminal."""
+    rows = [[str(cell) for cell in row] for row in ([*COLUMNS], *_table(comparison).rows)]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(COLUMNS))]
+    lines = [
+        "  ".join(
+            cell.ljust(width) if column == 0 else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in rows
+    ]
+    sentences = in_words(comparison).replace(". ", ".\n")
+    return "\n".join([*lines, "", sentences])
+
+
+def _share(test: SignTest, ahead: bool) -> str:
+    """ "140 of 150" of the side that is ahead in frames."""
+    count = test.better if ahead else test.worse
+    return f"{count} of {test.better + test.worse + test.ties}"
+
+
+def _table(comparison: Comparison) -> Table:
+    frames = max(1, comparison.plan.frame_count - 1)
+    rows: list[tuple[Any, ...]] = []
+    for result in comparison.trackers:
+        means = result.means
+        clean = sum(seed.lost_frames == 0 for seed in result.seeds)
+        count = len(result.seeds)
+        rows.append(
+            (
+                result.tracker,
+                result.evaluations,
+                round(result.mean_mm, 1),
+                f"{min(means):.1f} to {max(means):.1f}",
+                round(result.worst_mm, 1),
+                f"{result.lost_frames} of {count * len(comparison.frames)}",
+                f"{clean} of {count}",
+                round(1000.0 * result.seconds / count / frames, 1),
+            )
+        )
+    return Table("All trackers", COLUMNS, tuple(rows))
+
+
+def _tests(comparison: Comparison) -> Table:
+    """The sign tests, a row a pair."""
+    columns = ("pair", "nearer in frames", "p over frames", "nearer in seeds", "p over seeds")
+    rows = tuple(
+        (
+            f"{pair.first} against {pair.second}",
+            f"{pair.frames.better} : {pair.frames.worse}",
+            float(f"{pair.frames.p:.2g}"),
+            f"{pair.seeds.better} : {pair.seeds.worse}",
+            float(f"{pair.seeds.p:.2g}"),
+        )
+        for pair in comparison.pairs
+    )
+    return Table("Sign tests", columns, rows)
+
+
+def _settings(comparison: Comparison) -> dict[str, Any]:
+    plan = comparison.plan
+    listed: dict[str, Any] = {
+        "session": plan.session,
+        "frames": f"{plan.first} to {plan.last - 1} at {plan.fps:g} per second",
+        "body": plan.body or "the session's",
+        "seeds": ", ".join(str(seed) for seed in plan.seeds),
+    }
+    for candidate in plan.candidates:
+        defaults = values(candidate.settings())
+        listed[candidate.name] = ", ".join(
+            [candidate.weighting, *(f"{knob} {defaults[knob]}" for knob in candidate.changes)]
+        )
+    return listed
+
+
+def _plain_tracker(result: TrackerResult, seeds: tuple[int, ...]) -> dict[str, Any]:
+    """A tracker's figures and its seeds', without single frames."""
+    names = ("evaluations", "mean_mm", "worst_mm", "lost_frames", "seconds")
+    runs = [
+        {"tracker": result.tracker, **{name: getattr(run, name) for name in names}, "seed": seed}
+        for seed, run in zip(seeds, result.seeds, strict=True)
+    ]
+    fields = {name: getattr(result, name) for name in names}
+    rounded = {"mean_mm": round(result.mean_mm, 4), "seconds": round(result.seconds, 4)}
+    return {"tracker": result.tracker, **fields, **rounded, "seeds": runs}

@@ -1,0 +1,284 @@
+"""A tracker on a footage, in memory only: the trial of most experiments."""
+
+import dataclasses
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.inverse_kinematics import known_markers, pose_from_markers
+from studio.body.model import BodyModel
+from studio.body.motion_files.trc import read_trc
+from studio.body.subject import read_subject
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.foundations.arrays import Array
+from studio.foundations.errors import NotFoundError, TruthError
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.progress import report
+from studio.results.comparison.footage_cache import FootageCache
+from studio.results.comparison.trials import Trial, kept_as
+from studio.results.evaluation.errors import evaluate, rows_of_frames
+from studio.runs.behaviour_models import check_prediction, fitting, model_folders, model_path
+from studio.runs.live.following import Following
+from studio.runs.search_space import search_space, session_sigma
+from studio.runs.setup.shape_on_the_way import WEIGHTING, shaped_body
+from studio.runs.sides import known_silhouettes
+from studio.search.behaviour.model import BehaviourModel
+from studio.search.behaviour.model_file import read_model
+from studio.search.likelihood.catalogue import WEIGHTINGS
+from studio.search.likelihood.hard_priors import HardPriors
+from studio.search.settings import RunSettings, changed_settings, default_settings
+from studio.search.trackers.frame_refinement import FrameRefiner
+from studio.search.trackers.refinement import Distances
+from studio.search.trackers.side_exchange import with_sides_right
+from studio.search.trackers.tracker import LayerRecord, start_of
+from studio.sessions.session import Session
+
+AS_PUBLISHED: Mapping[str, Any] = {"refine_frames": False}
+"""Knobs without refinement, as in the papers; a trial that refines sets them."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrackingTrial:
+    """One run: all that its poses depend on, plain values.
+
+    footage : a recipe's name, or the path of a session. changes : knobs by flat name. first, last : frames, half
+    open; last None means all. every : step between the frames used (fps is divided, σ0 multiplied). cameras :
+    names, empty for all. body : a body's name or file, "" for the session's own. subject : a subject file beside the
+    session's own, such as "subject_shape.toml" of the Lee-walk twin (no hands and feet), "" for its own. sigma_scale :
+    multiplies σ0. behaviour : a behaviour model, by its name in the workspace's models or by path. shape_frames :
+    number of frames tracked first, to which the shape of the run is fitted (`runs.setup.shape_on_the_way`).
+    """
+
+    footage: str
+    tracker: str
+    weighting: str
+    seed: int
+    changes: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    first: int = 0
+    last: int | None = None
+    every: int = 1
+    cameras: tuple[str, ...] = ()
+    body: str = ""
+    sigma_scale: float = 1.0
+    subject: str = ""
+    behaviour: str = ""
+    shape_frames: int = 0
+
+    def plain(self) -> dict[str, Any]:
+        """As a trial's arguments; fields added later are left out at their defaults, so that stored outcomes stay
+        valid.
+        """
+        return {
+            name: value
+            for name, value in asdict(self).items()
+            if value or name not in ("behaviour", "shape_frames")
+        }
+
+    @classmethod
+    def of_plain(cls, arguments: Mapping[str, Any]) -> "TrackingTrial":
+        """From a trial's arguments, as read from JSON."""
+        words: dict[str, Any] = {**arguments, "cameras": tuple(arguments.get("cameras", ()))}
+        return cls(**words)
+
+
+@dataclass(frozen=True, slots=True)
+class Tracked:
+    """The errors of a trial, mm without alignment.
+
+    frames : numbers in the footage. per_frame_mm : mean over markers. lost : per frame the names of limbs that are
+    lost (a marker more than 150 mm off). evaluations : poses weighed in a frame after the first. seconds : of the
+    search (weighting and tracker), without reading and preparing pictures. named : per frame the limbs that the tracker
+    itself reported lost, as in a run's timeline. impossible_frames : frames whose pose breaks a hard prior (a joint
+    beyond its limits, a limb inside another); -1 in outcomes that were kept before it was counted.
+    """
+
+    frames: list[int]
+    per_frame_mm: list[float]
+    lost: list[list[str]]
+    mean_mm: float
+    worst_mm: float
+    lost_frames: int
+    lost_limbs: list[str]
+    evaluations: int
+    seconds: float
+    named: list[list[str]] = field(default_factory=list[list[str]])
+    impossible_frames: int = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Changed:
+    """Disturbance of a tracker's input by an experiment. cameras : of all views. evidence : of each frame."""
+
+    cameras: Callable[[tuple[Camera, ...]], tuple[Camera, ...]] = lambda cameras: cameras
+    evidence: Callable[[FrameEvidence], FrameEvidence] = lambda evidence: evidence
+
+
+UNCHANGED = Changed()
+
+
+def track(
+    trial: TrackingTrial,
+    cache: FootageCache,
+    *,
+    on_layer: Callable[[LayerRecord], None] | None = None,
+    spoilt: Changed = UNCHANGED,
+) -> Tracked:
+    """Track and measure; each frame is reported. on_layer : called with every layer.
+
+    Raises TruthError for a footage without truth and what tracking raises.
+    """
+    session = cache.session(trial.footage)
+    if session.truth_path is None:
+        raise TruthError(f"Session '{session.name}' has no truth.", "Take one made by 'studio synthesize'.")
+    subject = read_subject(session.path / trial.subject, session.manifest.body) if trial.subject else None
+    body = session.body(trial.body or None, subject)
+    changes = {**AS_PUBLISHED, **trial.changes}
+    settings = changed_settings(default_settings(trial.tracker, trial.weighting), changes)
+    cameras, fps = _cameras(session, trial.cameras), session.manifest.fps
+    seen_with, rate = spoilt.cameras(cameras), fps / trial.every
+    count = session.manifest.frame_count
+    frames = range(trial.first, trial.last or count, trial.every)
+    if frames[-1] >= count:
+        raise NotFoundError(f"There is no frame {frames[-1]}. '{trial.footage}' has 0 to {count - 1}.", "")
+
+    def evidence(frame: int, name: str = trial.weighting) -> FrameEvidence:
+        """The evidence of a frame for a weighting."""
+        kind, pictures = WEIGHTINGS[name].edge_kind, WEIGHTINGS[name].reads_pictures
+        return spoilt.evidence(cache.evidence(session, cameras, frame, settings.evidence, kind, pictures))
+
+    start = _start_pose(session, body, trial.first)
+    if trial.shape_frames and start is not None:
+        sigma, first = session_sigma(session, body, rate), frames[: trial.shape_frames]
+        of_shape = partial(evidence, name=WEIGHTING)
+        shaped = shaped_body(body, seen_with, of_shape, first, np.array(start), sigma)
+        body, start = shaped.body, tuple(float(value) for value in shaped.start)
+    following = Following(
+        settings,
+        search_space(
+            body,
+            session_sigma(session, body, rate) * trial.sigma_scale,
+            _behaviour(session, body, settings, trial),
+        ),
+        start_of(start),
+        trial.seed,
+        FrameRefiner(body, seen_with, trial.seed),
+        on_layer,
+    )
+    likelihood = WEIGHTINGS[trial.weighting].prepare(body, seen_with, settings.weighting)
+    seconds, evaluations, named = 0.0, 0, list[list[str]]()
+    for number, frame in enumerate(frames):
+        seen = evidence(frame)
+        began = time.perf_counter()
+        result = following.step(frame, likelihood.problem(seen), seen)
+        evaluations = result.evaluations
+        named.append(list(result.limbs_lost))
+        seconds += time.perf_counter() - began if number else 0.0
+        report("tracking", number + 1, len(frames))
+    poses = np.array(following.poses)
+    if settings.refinement.refine_frames:
+
+        def silhouettes_of(frame: int) -> Mapping[str, Distances]:
+            row = frames.index(frame)
+            return known_silhouettes(body, seen_with, evidence(frame), poses[row], following.memories[row])
+
+        poses = with_sides_right(body, seen_with, np.array(frames), poses, rate, silhouettes_of)[0]
+    found = measured(session, body, poses, np.array(frames), evaluations, seconds)
+    by_frame = dict(zip(frames, named, strict=True))
+    impossible = int((~HardPriors(body).hold(poses, limbs_apart=True)).sum())
+    named_of = [by_frame[frame] for frame in found.frames]
+    return dataclasses.replace(found, named=named_of, impossible_frames=impossible)
+
+
+def measured(
+    session: Session,
+    body: BodyModel,
+    poses: Array,
+    frames: NDArray[np.int64],
+    evaluations: int,
+    seconds: float,
+) -> Tracked:
+    """The errors of poses (K, D) of frames (K,) of a session with truth."""
+    assert session.truth_path is not None
+    truth = read_trc(session.truth_path)
+    found = evaluate(poses, frames, body, truth, session.manifest.fps)
+    return Tracked(
+        frames=[int(frame) for frame in found.frames],
+        per_frame_mm=[round(value, 3) for value in found.per_frame_mm],
+        lost=[list(limbs) for limbs in found.lost_by_frame],
+        mean_mm=round(found.mean_mm, 4),
+        worst_mm=round(found.worst_mm, 3),
+        lost_frames=found.lost_frames,
+        lost_limbs=list(found.lost_limbs),
+        evaluations=evaluations,
+        seconds=round(seconds, 4),
+    )
+
+
+def _behaviour(
+    session: Session, body: BodyModel, settings: RunSettings, trial: TrackingTrial
+) -> BehaviourModel | None:
+    """The trial's model at the rate of its frames. Raises SettingsError where one is needed and none given."""
+    if not trial.behaviour:
+        check_prediction(settings, has_model=False)
+        return None
+    path = model_path(model_folders(session), trial.behaviour)
+    return fitting(read_model(path), body, session.manifest.fps / trial.every)
+
+
+def _cameras(session: Session, names: tuple[str, ...]) -> tuple[Camera, ...]:
+    """The session's cameras, or the named ones, in the session's order."""
+    known = session.cameras()
+    unknown = set(names) - {camera.name for camera in known}
+    if unknown:
+        words = ", ".join(camera.name for camera in known)
+        raise NotFoundError(f"'{session.name}' has no camera '{min(unknown)}'.", f"It has {words}.")
+    return tuple(camera for camera in known if not names or camera.name in names)
+
+
+def start_of_trial(session: Session, body: str, first: int) -> tuple[float, ...] | None:
+    """The pose that a trial starts from. body : a name, "" for the session's own."""
+    return _start_pose(session, session.body(body or None), first)
+
+
+def _start_pose(session: Session, body: BodyModel, first: int) -> tuple[float, ...] | None:
+    """The session's start pose; for a later first frame, and for a body other than the session's, the pose
+    fitted to the true markers of that frame.
+    """
+    is_own = body.name == session.manifest.body
+    own = session.start_pose(body) if is_own else None
+    pose = own if first == 0 and is_own else pose_on_truth(session, body, first, own)
+    return None if pose is None else tuple(float(value) for value in pose)
+
+
+def pose_on_truth(session: Session, body: BodyModel, frame: int, near: Array | None = None) -> Array:
+    """(D,) the pose whose markers come closest to the true ones of a frame, angles near `near` where given.
+
+    Raises TruthError where the truth lacks the frame.
+    """
+    assert session.truth_path is not None
+    truth = read_trc(session.truth_path)
+    rows = rows_of_frames(truth, session.manifest.fps)
+    if frame not in rows:
+        raise TruthError(f"The truth has no row for frame {frame}.", "Start at a frame that it has.")
+    kept, names = known_markers(body, truth.names)
+    points = truth.positions[rows[frame], kept]
+    return pose_from_markers(body, names, points, body.neutral if near is None else near)[0]
+
+
+# The trial that experiments on tracked footage and comparisons share: equal settings are the same trial.
+
+
+def tracking_trial(group: str, trial: TrackingTrial) -> Trial:
+    """A tracking as a trial of an experiment. group : candidate and setting in words, the same for all its seeds."""
+    return Trial(f"{group}, seed {trial.seed}", trial.plain())
+
+
+@kept_as("tracking_trials.measure_tracking")
+def measure_tracking(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
+    """Track; the fields of `Tracked`."""
+    return asdict(track(TrackingTrial.of_plain(arguments), cache))

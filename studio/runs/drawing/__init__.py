@@ -1,0 +1,1 @@
+"""The studio's colours, and drawing onto pictures."""

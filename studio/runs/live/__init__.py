@@ -1,0 +1,1 @@
+"""Runs of running cameras, and their replay."""

@@ -1,0 +1,87 @@
+"""Consecutive frames searched one after the other in memory: a run without its store, events and "
+"recovery."""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+
+from studio.evidence.distance_maps import silhouettes_by_camera
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.foundations.arrays import Array
+from studio.runs.run_behaviour import learner_of
+from studio.search.behaviour.model import BehaviourModel
+from studio.search.settings import RunSettings
+from studio.search.trackers.catalogue import TRACKERS
+from studio.search.trackers.frame_loop import search_frame
+from studio.search.trackers.frame_refinement import FrameRefiner, space_after
+from studio.search.trackers.tracker import FilterState, FrameLikelihood, FrameResult, LayerRecord, SearchSpace
+
+
+@dataclass(eq=False)
+class Following:
+    """Tracks consecutive frames given to `step`. carried : state for the next frame. refiner : None: no refinement.
+    overlap_of : a frame's number and a pose (D,) to their silhouettes' overlap, for online learning; None: not known.
+
+    poses, log_weights, memories, overlaps : results and the search's memory so far, one each frame.
+    """
+
+    settings: RunSettings
+    space: SearchSpace
+    carried: FilterState
+    seed: int
+    refiner: FrameRefiner | None = None
+    on_layer: Callable[[LayerRecord], None] | None = None
+    overlap_of: Callable[[int, Array], float] | None = None
+    poses: list[Array] = field(default_factory=list[Array])
+    log_weights: list[float] = field(default_factory=list[float])
+    memories: list[Mapping[str, Array]] = field(default_factory=list[Mapping[str, Array]])
+    overlaps: list[float] = field(default_factory=list[float])
+
+    def __post_init__(self) -> None:
+        self._learner = learner_of(self.space.behaviour, self.settings, self.seed)
+
+    @property
+    def model(self) -> BehaviourModel | None:
+        """The behaviour model of the next frame."""
+        if self._learner is None:
+            return self.space.behaviour
+        return self._learner.model_in(len(self.poses), self._tracked)
+
+    def step(self, frame: int, problem: FrameLikelihood, seen: FrameEvidence | None = None) -> FrameResult:
+        """Search a frame. seen : its masks, if it is to be refined."""
+        settings, number, space = self.settings, len(self.poses), self.space
+        if self._learner is not None:
+            space = dataclasses.replace(space, behaviour=self.model)
+            self.carried = self._learner.carried_into(number, self.carried, self._tracked)
+        if self.refiner is not None:
+            space = space_after(space, self.carried, settings.refinement)
+        result = search_frame(
+            TRACKERS[settings.tracker_name],
+            problem,
+            self.carried,
+            space,
+            seed=self.seed,
+            frame=frame,
+            settings_source=lambda: (1, settings.tracker),
+            repeats=1 if number else settings.tracker.start_repeats,
+            on_layer=self.on_layer,
+        )
+        if self.refiner is not None and seen is not None:
+            silhouettes = partial(silhouettes_by_camera, seen)
+            result = self.refiner.refined(result, silhouettes, problem, settings.refinement)
+        self.carried = result.carried
+        self.poses.append(result.estimate.pose)
+        self.log_weights.append(result.estimate.log_weight)
+        self.memories.append(result.carried.memory)
+        known = None if self._learner is None else self.overlap_of
+        self.overlaps.append(float("nan") if known is None else known(frame, result.estimate.pose))
+        return result
+
+    def _tracked(self, count: int) -> tuple[Array, Array, Array]:
+        poses, log_weights, overlaps = (
+            np.array(known[:count]) for known in (self.poses, self.log_weights, self.overlaps)
+        )
+        return poses, log_weights, overlaps

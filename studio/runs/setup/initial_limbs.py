@@ -1,0 +1,45 @@
+"""A start pose corrected limb by limb on the silhouettes, and refined.
+
+The search for a start pose scores whole poses with the requested likelihood. In a room full of edges that prefers an
+arm in front of the chest and leaves silhouette beside the trunk unexplained. So the pose is refined on the
+silhouettes' borders, and limbs contradicted by the silhouettes are redrawn, as in tracking
+(`search.trackers.frame_refinement`).
+"""
+
+import numpy as np
+
+from studio.body.branches import within_limits
+from studio.body.model import BodyModel
+from studio.evidence.distance_maps import silhouette_distances
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.foundations.arrays import Array
+from studio.foundations.geometry.camera import Camera
+from studio.search.trackers.agreement import Agreement
+from studio.search.trackers.frame_refinement import Hypothesis, SeenFrame, redrawn
+from studio.search.trackers.refinement import RefinementSettings, Refiner
+
+ROUNDS = 3
+"""Passes: a limb may be found only once another one has moved away."""
+
+
+def limbs_put_right(
+    body: BodyModel,
+    cameras: tuple[Camera, ...],
+    evidence: FrameEvidence,
+    pose: Array,
+    seed: int,
+    *,
+    draw: bool = True,
+) -> Hypothesis:
+    """The pose (D,) with its limbs corrected to a frame's masks, and what still disagrees. draw : whether limbs may be
+    redrawn; else the pose is unchanged.
+    """
+    refiner = Refiner(body, cameras, RefinementSettings())
+    frame = SeenFrame(refiner, Agreement(body, cameras), silhouette_distances(evidence))
+    if not draw:
+        return frame.hypothesis(pose)
+    rng = np.random.default_rng(np.random.SeedSequence((seed, 0x11B5)))
+    found = frame.hypothesis(refiner.refine(within_limits(body, pose), frame.silhouettes).pose)
+    for _ in range(ROUNDS):
+        found, _ = redrawn(rng, found, frame)
+    return found

@@ -1,0 +1,373 @@
+"""The quality of each camera's masks without ground truth: how far the views agree in the visual hull.
+
+Where a mask contains something else than the person (a bystander, a reflection), the other views carve it away, and
+the hull's silhouette leaves that part of the mask uncovered. Where a mask has a hole, its own camera carves the
+person, and the *other* masks stay uncovered. So for each camera the hull is carved once more without it: the part of
+the other masks that is then covered is removed by this camera alone.
+
+Agreement says nothing of what all masks lack. So the contrast of subject and background has a say too
+(`runs.setup.contrast`), and where masks are not made by contrast, the edges of the pictures along their borders.
+"""
+
+import dataclasses
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.scale import scale_of
+from studio.evidence.frame_evidence import ViewEvidence
+from studio.evidence.masks import PackedMasks, reduced
+from studio.evidence.pipeline import EvidenceMaker
+from studio.evidence.settings import EvidenceSettings
+from studio.evidence.volume.hull_settings import HullSettings
+from studio.evidence.volume.reconstruction import Reconstructor, check_views
+from studio.footage.calibration.findings import Finding, blocking
+from studio.foundations.arrays import Bytes
+from studio.foundations.errors import FootageError, RunError, StudioError
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.progress import Progress, unheard
+from studio.foundations.words import enumerated
+from studio.runs.setup.contrast import Contrast, border_support, measure_contrast
+from studio.runs.setup.person_hull import (
+    FINE,
+    JUDGED_SIDE,
+    ROUGH,
+    covered,
+    large_hull,
+    person_box,
+    spread_frames,
+)
+from studio.runs.setup.session_settings import masks_of, session_settings
+from studio.runs.setup.silhouette_doubts import MEASURED, height_of, person_alone, silhouette_doubts
+from studio.runs.setup.subject_masks import count_subjects
+from studio.sessions.provenance import changed_inputs, note, origin_of
+from studio.sessions.session import Session
+
+FRAMES = 5
+USABLE = 0.9
+"""Agreement from which masks are usable (issue 5)."""
+MOST_FILLED = 0.5
+"""Masks that cover more of the picture agree in every view and show nothing."""
+LEAST_BORDER = 0.25
+"""`border_support` from which a mask lies where something ends."""
+BLAMED = 0.05
+"""Share of the other masks that one camera may remove before it is named."""
+
+
+@dataclass(frozen=True, slots=True)
+class ViewQuality:
+    """One camera's masks against the hull, pixels of all frames together.
+
+    covered : share of the mask that the hull's silhouette covers. inside : share of the silhouette that lies in the
+    mask. denied : share of the other cameras' masks that only this camera's mask removes from the hull. frames :
+    (covered, inside) of each frame; NaN where there is nothing. filled : share of the picture that the masks cover.
+    border : how much the pictures change along the masks' border, 0 to 1 (`border_support`); NaN: not measured.
+    """
+
+    camera: str
+    covered: float
+    inside: float
+    denied: float
+    frames: tuple[tuple[float, float], ...]
+    filled: float = 0.0
+    border: float = float("nan")
+
+    @property
+    def agreement(self) -> float:
+        """The smaller of covered and inside."""
+        return min(self.covered, self.inside)
+
+    @property
+    def usable(self) -> bool:
+        """Whether the masks agree well enough with the other views."""
+        return self.agreement >= USABLE and self.filled <= MOST_FILLED
+
+    def in_words(self) -> str:
+        """What the user should check, "" if the masks are good."""
+        if np.isnan(self.agreement):
+            return "The mask, or the hull that all views allow, is empty: check the masks of all cameras."
+        sentences: list[str] = []
+        if self.filled > MOST_FILLED:
+            share = f"{100.0 * self.filled:.0f} %"
+            sentences.append(f"The mask covers {share} of the picture: is it inverted, or of no person?")
+        if self.denied > BLAMED:
+            share = f"{100.0 * self.denied:.0f} %"
+            sentences.append(f"The mask has holes: it alone removes {share} of what the other cameras see.")
+        if self.covered < USABLE:
+            share = f"{100.0 * (1.0 - self.covered):.0f} %"
+            sentences.append(
+                f"{share} of the mask is seen by no other camera: exclude it, or find the camera whose mask has holes."
+            )
+        if self.inside < USABLE:
+            sentences.append("The mask lacks parts of what the other cameras see.")
+        return " ".join(sentences)
+
+
+@dataclass(frozen=True, slots=True)
+class MaskQuality:
+    """The quality of all cameras' masks in some frames. hull_litres : the hull's volume in each. doubts : findings of
+    the silhouettes on the calibration. subjects : seen in two frames or more (in one, of one), 0: not counted.
+    contrast : of subject and background; None: not measured, or the masks are not made by it.
+    """
+
+    frames: tuple[int, ...]
+    views: tuple[ViewQuality, ...]
+    hull_litres: tuple[float, ...]
+    doubts: tuple[Finding, ...] = ()
+    subjects: int = 0
+    contrast: Contrast | None = None
+
+    @property
+    def agreeing(self) -> bool:
+        """Whether every camera's masks agree with the others, of one subject, and show no fault of the calibration."""
+        return all(view.usable for view in self.views) and self.subjects < 2 and not blocking(self.doubts)
+
+    @property
+    def usable(self) -> bool:
+        """Whether they agree, and something else confirms them: for what all of them lack they agree about, too."""
+        return self.agreeing and not self.why_not_confirmed()
+
+    def why_not_confirmed(self) -> str:
+        """Why agreement does not prove the masks, "" where it does: low contrast; without contrast, borders that lie on
+        no edges of the pictures.
+        """
+        if self.contrast is not None:
+            return self.contrast.in_words()
+        faint = [view.camera for view in self.views if not view.border >= LEAST_BORDER]
+        if not faint:
+            return ""
+        if all(np.isnan(view.border) for view in self.views):
+            return "nothing but the agreement was measured"
+        return f"the masks' borders lie on no edges of the pictures of {enumerated(faint)}"
+
+    @property
+    def worst(self) -> str:
+        """The camera to check first, "" where all are usable: one that removes what the others see causes their poor
+        agreement; else the one that agrees least.
+        """
+        if all(view.usable for view in self.views):
+            return ""
+        denying = max(self.views, key=lambda view: view.denied)
+        if denying.denied > BLAMED:
+            return denying.camera
+        return min(self.views, key=lambda view: np.nan_to_num(view.agreement, nan=-1.0)).camera
+
+    def in_words(self) -> str:
+        """The agreement of the worst camera, as text."""
+        if stops := blocking(self.doubts):
+            return _doubted(stops[0])
+        if self.subjects > 1:
+            return f"{self.subjects} subjects are in view: say which of them the masks shall be of"
+        least = min(float(np.nan_to_num(view.agreement)) for view in self.views)
+        fullest = max(self.views, key=lambda view: view.filled)
+        if fullest.filled > MOST_FILLED:
+            share = f"{100.0 * fullest.filled:.0f} %"
+            return f"the masks of camera {fullest.camera} cover {share} of the picture: are they inverted?"
+        if self.usable:
+            return f"every view agrees by {least:.2f} or more"
+        if self.agreeing:
+            return f"every view agrees by {least:.2f} or more, but {self.why_not_confirmed()}"
+        # Rounded down: what is below the mark never reads like it.
+        least = np.floor(1000.0 * least) / 1000.0
+        return f"least agreement {least:.3f}, below the mark of {USABLE:g}: check camera {self.worst}"
+
+
+def _doubted(finding: Finding) -> str:
+    return f"the calibration is in doubt: {finding.message}"
+
+
+def mask_quality(
+    session: Session,
+    settings: EvidenceSettings,
+    frames: Sequence[int] = (),
+    *,
+    blame: bool = True,
+    progress: Progress = unheard,
+) -> MaskQuality:
+    """The quality of a session's masks in some frames (default: five, evenly spread).
+
+    blame : compute what each camera alone removes (most of the time; else 0), check the calibration by the
+    silhouettes, and count the subjects. Only one camera's pictures are held at a time. Raises RunError for a single
+    camera, FootageError, NotFoundError.
+    """
+    cameras = session.cameras()
+    if len(cameras) < 2:
+        raise RunError(
+            f"Session '{session.name}' has one camera: masks cannot be compared between views.",
+            "Check its masks by eye instead.",
+        )
+    check_views(cameras)
+    lenses = {camera.name: camera.reduced(JUDGED_SIDE) for camera in cameras}
+    small, scale = tuple(lenses.values()), scale_of(session.body())
+    with masks_of(session, settings) as maker:
+        chosen = tuple(frames) or spread_frames(maker.footage.frame_count, FRAMES)
+        if not chosen:
+            raise FootageError(
+                f"Session '{session.name}' has no frame whose masks could be measured.", "Add footage."
+            )
+        masks: dict[int, list[Bytes]] = {frame: [] for frame in chosen}
+        people = {frame: PackedMasks() for frame in chosen}
+        total = (len(cameras) + 1) * len(masks)
+        borders: dict[str, list[float]] = {camera.name: [] for camera in cameras}
+        for camera, frame, view in _each_view(maker, cameras, sorted(masks), total, progress):
+            masks[frame].append(reduced(view.mask, lenses[camera.name]))
+            borders[camera.name].append(border_support(view.picture, view.mask))
+            if blame:
+                people[frame].put(camera.name, person_alone(view.mask))
+        counted: list[FrameCounts] = []
+        seen: list[int] = []
+        for done, frame in enumerate(chosen):
+            progress("comparing masks", len(cameras) * len(masks) + done, total)
+            seen += [count_subjects(masks[frame], small, scale)] if blame else []
+            counted.append(count_frame(masks[frame], small, blame, scale=scale))
+    found = summed(chosen, tuple(camera.name for camera in cameras), counted)
+    doubts = silhouette_doubts(cameras, people, height_of(session), scale) if blame else ()
+    subjects = sorted(seen, reverse=True)[:2][-1] if seen else 0
+    contrast = measure_contrast(session, settings, progress=progress)
+    views = tuple(
+        dataclasses.replace(view, border=float(np.mean(borders[view.camera]))) for view in found.views
+    )
+    return dataclasses.replace(found, views=views, doubts=doubts, subjects=subjects, contrast=contrast)
+
+
+def _each_view(
+    maker: EvidenceMaker, cameras: tuple[Camera, ...], frames: Sequence[int], total: int, progress: Progress
+) -> Iterator[tuple[Camera, int, ViewEvidence]]:
+    """Picture and mask of every camera and frame, camera by camera: only one camera's pictures are held."""
+    for done, camera in enumerate(cameras):
+        for number, frame in enumerate(frames):
+            progress("comparing masks", done * len(frames) + number, total)
+            yield camera, frame, maker.view(camera.name, frame)
+        maker.release(camera.name)
+
+
+def measure_masks(session: Session, frames: Sequence[int] = (), progress: Progress = unheard) -> MaskQuality:
+    """The quality of the session's masks. For the default frames it is stored: a blocking finding then refuses new runs
+    (`silhouette_doubts.accepted_doubts`). Raises as `mask_quality` does.
+    """
+    found = mask_quality(session, session_settings(session).evidence, frames, progress=progress)
+    if frames:
+        return found
+    stops = tuple(str(finding) for finding in blocking(found.doubts))
+    note(session, MEASURED, found.in_words(), found.usable, stops)
+    return found
+
+
+def look_before_the_first_run(session: Session, progress: Progress = unheard) -> bool:
+    """Whether nothing was tracked yet of imported footage. Its masks are measured then, unless that was done: exchanged
+    cameras, a mirrored video or a wrong unit refuse the run, instead of losing its frames. Masks that cannot be
+    compared say nothing.
+    """
+    if not session.manifest.layout or len(session.manifest.footage.cameras) < 2 or session.runs():
+        return False
+    measured = origin_of(session, MEASURED)
+    if measured is not None and not changed_inputs(session, MEASURED, ("footage", "calibration")):
+        return True
+    try:
+        doubts = _doubts_by_silhouettes(session, progress)
+    except StudioError:
+        return True
+    if stops := blocking(doubts):
+        note(session, MEASURED, _doubted(stops[0]), False, tuple(map(str, stops)))
+    return True
+
+
+def _doubts_by_silhouettes(session: Session, progress: Progress) -> tuple[Finding, ...]:
+    """What the silhouettes say against the calibration: the part of `mask_quality` that takes little time."""
+    cameras = session.cameras()
+    check_views(cameras)
+    with masks_of(session, session_settings(session).evidence) as maker:
+        people = {frame: PackedMasks() for frame in spread_frames(maker.footage.frame_count, FRAMES)}
+        total = len(cameras) * len(people)
+        for camera, frame, view in _each_view(maker, cameras, tuple(people), total, progress):
+            people[frame].put(camera.name, person_alone(view.mask))
+    return silhouette_doubts(cameras, people, height_of(session), scale_of(session.body()))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameCounts:
+    """Pixels of one frame, (V,) each: of mask, silhouette, both; denied[v]: of the other masks, removed only by v.
+    pixels : of the picture.
+    """
+
+    mask: NDArray[np.int64]
+    hull: NDArray[np.int64]
+    both: NDArray[np.int64]
+    denied: NDArray[np.int64]
+    litres: float
+    pixels: NDArray[np.int64] | None = None
+
+
+def count_frame(
+    masks: Sequence[Bytes],
+    cameras: tuple[Camera, ...],
+    blame: bool = True,
+    fineness: HullSettings = FINE,
+    scale: float = 1.0,
+) -> FrameCounts:
+    """The pixels that `ViewQuality`'s shares are made of.
+
+    masks : (H, W) 0 or 255, in the order of the cameras. fineness : of the hull that the masks are compared with.
+    scale : of the body (`scale_of`).
+    """
+    box = person_box(masks, cameras, scale)
+    whole = None if box is None else large_hull(Reconstructor(cameras, box, fineness), masks)
+    mask = np.array([np.count_nonzero(one) for one in masks])
+    covers = [covered(whole, camera) for camera in cameras]
+    both = np.array([np.count_nonzero(one & cover) for one, cover in zip(masks, covers, strict=True)])
+    denied = np.zeros(len(cameras), dtype=np.int64)
+    if blame and len(cameras) > 2 and box is not None:
+        denied = denied_pixels(masks, cameras, Reconstructor(cameras, box, ROUGH))
+    hull = np.array([np.count_nonzero(cover) for cover in covers])
+    pixels = np.array([one.size for one in masks])
+    return FrameCounts(mask, hull, both, denied, 0.0 if whole is None else whole.volume() * 1e-6, pixels)
+
+
+def denied_pixels(
+    masks: Sequence[Bytes], cameras: tuple[Camera, ...], carver: Reconstructor
+) -> NDArray[np.int64]:
+    """(V,) pixels of the other cameras' masks that the hull covers only when a camera is left out."""
+    whole = large_hull(carver, masks)
+    open_yet = [mask & ~covered(whole, camera) for mask, camera in zip(masks, cameras, strict=True)]
+    denied = np.zeros(len(cameras), dtype=np.int64)
+    for left_out in range(len(cameras)):
+        alone = large_hull(carver, without(masks, left_out))
+        for other, camera in enumerate(cameras):
+            if other != left_out:
+                denied[left_out] += np.count_nonzero(open_yet[other] & covered(alone, camera))
+    return denied
+
+
+def without(masks: Sequence[Bytes], left_out: int) -> list[Bytes]:
+    """The masks with one camera's filled, so that it removes nothing."""
+    changed = list(masks)
+    changed[left_out] = np.full_like(masks[left_out], 255)
+    return changed
+
+
+def summed(frames: tuple[int, ...], names: tuple[str, ...], counted: Sequence[FrameCounts]) -> MaskQuality:
+    """The quality over all frames' pixels. names : of the cameras. counted : one entry a frame."""
+    mask, hull = np.stack([one.mask for one in counted]), np.stack([one.hull for one in counted])
+    both, denied = np.stack([one.both for one in counted]), np.stack([one.denied for one in counted])
+    covered, inside = _share(both, mask), _share(both, hull)
+    everything = mask.sum()
+    pixels = np.sum([one.mask * 0 if one.pixels is None else one.pixels for one in counted], axis=0)
+    views = tuple(
+        ViewQuality(
+            camera=name,
+            covered=float(_share(both[:, v].sum(), mask[:, v].sum())),
+            inside=float(_share(both[:, v].sum(), hull[:, v].sum())),
+            denied=float(_share(denied[:, v].sum(), everything - mask[:, v].sum())),
+            frames=tuple((float(c), float(i)) for c, i in zip(covered[:, v], inside[:, v], strict=True)),
+            filled=float(np.nan_to_num(_share(mask[:, v].sum(), pixels[v]))),
+        )
+        for v, name in enumerate(names)
+    )
+    return MaskQuality(frames, views, tuple(one.litres for one in counted))
+
+
+def _share(part: NDArray[np.int64], whole: NDArray[np.int64]) -> NDArray[np.float64]:
+    """part / whole, NaN where the whole is nothing."""
+    return np.where(whole > 0, part / np.maximum(whole, 1), np.nan)

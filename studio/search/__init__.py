@@ -1,0 +1,1 @@
+"""The search itself: trackers, what they weigh poses by, what a body tends to do, and their settings."""

@@ -1,0 +1,308 @@
+"""Edge and region weighting of Deutscher & Reid 2005, section 4.2.
+
+    Σe = 1/N Σ (1 - p)²    over samples along the sides of the projected cones, p from the edge map  (Eq. 14)
+    Σr = 1/N Σ (1 - p)²    over samples within them, p from the foreground map                       (Eq. 15)
+    log w = - Σ over cameras of (a Σe + b Σr)                                                    (Eq. 16, 17)
+
+Eq. 17 is printed without the minus sign of Eq. 16; it belongs there, else the worst pose weighs most. The
+paper's weights are a = b = 1 ("an equal weighting to each component was determined empirically").
+
+Every limb has the same number of samples in every view, spread evenly: `edge_samples` on its two sides
+together, `region_samples` on three lines within (Fig. 6).
+
+**Where nothing is seen.** N is the same for every pose: a sample outside the picture, or of a limb that
+reaches behind a camera or out of its lens, reads p = 0, the worst there is. So no pose gains by leaving a
+picture, a view that sees nothing of the body costs a + b, and log w lies between -(a + b) × cameras and 0 for
+any finite pose. Leaving such samples out instead, as the benchmark does, rewards hiding; the cost of not
+doing so is small: with all four Lee-walk pictures cut off below the hips the best root position moves by 20
+mm.
+
+**On a device.** `device` has the sums of Eq. 14 and 15 found on a graphics card (`edge_region_device`, which also says
+how equal they are); occlusion-aware edges are the processor's alone. With `auto` a card that is not there, or that
+fails in compiling or launching a kernel, leaves the work to the processor, and a frame's notes say why, once.
+
+**Occlusion-aware edges.** A side that passes behind a nearer limb makes no edge in the picture. With the
+option on, such samples are left out of Eq. 14 and its N (of that view and pose) counts the others; if none is
+left, Σe = 1.
+"""
+
+import importlib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.model import BodyModel
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.foundations.arrays import Array
+from studio.foundations.errors import SettingsError, StudioError
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.knobs import next_frame_knob
+from studio.foundations.numba_in_threads import parallel_blocks
+from studio.search.likelihood.edge_region_kernels import (
+    CHUNK,
+    EDGE_LINES,
+    REGION_LINES,
+    WORST,
+    record_indices,
+    weight_blocks,
+)
+from studio.search.likelihood.evidence_check import check_views
+from studio.search.likelihood.outline_kernels import LANES
+from studio.search.likelihood.picture_maps import Maps, joined_maps
+from studio.search.likelihood.problem import BaseFrameLikelihood, Preparation, Shares
+from studio.search.likelihood.visible_edges import hidden_samples, limb_sides
+
+if TYPE_CHECKING:
+    from studio.search.likelihood.edge_region_device import EdgeRegionDevice
+
+IntArray = NDArray[np.int64]
+Words = NDArray[np.uint32]
+
+CPU, AUTO, GPU = "cpu", "auto", "gpu"
+DEVICE_MODULE = "studio.search.likelihood.edge_region_device"
+NO_DEVICE_HINT = (
+    "It needs an NVIDIA card, its driver and the extra `gpu` (pip install 'capture-studio[gpu]'), which `studio doctor`"
+    " tries; set device to cpu, or to auto, which takes a card only where one works."
+)
+# About half a millisecond of a four-camera frame.
+BLOCKS_A_THREAD = 24
+
+
+@dataclass(frozen=True, slots=True)
+class EdgeRegionSettings:
+    """Knobs of the edge and region weighting. A frame's problem is made once, so all take effect with the
+    next.
+    """
+
+    title: ClassVar[str] = "Edge and region"
+
+    edge_weight: float = next_frame_knob(
+        1.0,
+        0.0,
+        5.0,
+        0.05,
+        help="Weight of the edge term, Eq. 14; the paper's is 1.",
+    )
+    region_weight: float = next_frame_knob(
+        1.0,
+        0.0,
+        5.0,
+        0.05,
+        help="Weight of the silhouette term, Eq. 15; the paper's is 1.",
+    )
+    edge_samples: int = next_frame_knob(
+        32, 32, 128, 32, help="Edge samples a limb and view (to the nearest 32)."
+    )
+    region_samples: int = next_frame_knob(
+        48, 48, 192, 48, help="Region samples a limb and view (to the nearest 48)."
+    )
+    occlusion_aware: bool = next_frame_knob(
+        False,
+        help="Leave out edge samples that nearer limbs hide; takes two to three times as long.",
+    )
+
+    device: str = next_frame_knob(
+        CPU,
+        choices=(CPU, AUTO, GPU),
+        help="What evaluates edges and region: the processor, or an NVIDIA card with CUDA (extra `gpu`), which agrees"
+        " but for a sample in thousands; auto takes a card where there is one.",
+    )
+
+    @property
+    def edge_chunks(self) -> int:
+        """Samples on each side, in units of sixteen."""
+        return max(1, round(self.edge_samples / (EDGE_LINES * CHUNK)))
+
+    @property
+    def region_chunks(self) -> int:
+        """Samples on each inner line, in units of sixteen."""
+        return max(1, round(self.region_samples / (REGION_LINES * CHUNK)))
+
+
+class EdgeRegionLikelihood(Preparation):
+    """Makes that of any frame. device : what finds the sums in place of the processor. unsaid : why the processor finds
+    them where a card was to be taken if there is one; the next frame's notes say it.
+    """
+
+    def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: EdgeRegionSettings) -> None:
+        super().__init__(body, cameras, settings)
+        self.device: EdgeRegionDevice | None = None
+        self.unsaid: tuple[str, ...] = ()
+        try:
+            self.device = device_for(settings, self)
+        except StudioError as error:
+            self.unsaid = without_device(settings, error)
+
+    @property
+    def samples_per_evaluation(self) -> int:
+        """Map reads of one pose."""
+        settings = self.settings
+        chunks = EDGE_LINES * settings.edge_chunks + REGION_LINES * settings.region_chunks
+        return chunks * CHUNK * self.projector.limb_count * len(self.cameras)
+
+    def problem(self, evidence: FrameEvidence) -> "EdgeRegionFrameLikelihood":
+        """One frame as a function of poses. Raises FootageError where views do not fit the cameras."""
+        check_views(self.cameras, evidence)
+        return EdgeRegionFrameLikelihood(self, weighting_maps(evidence))
+
+
+class EdgeRegionFrameLikelihood(BaseFrameLikelihood):
+    """One frame as a function of poses."""
+
+    def __init__(self, likelihood: EdgeRegionLikelihood, maps: Maps) -> None:
+        self.likelihood, self.priors, self.maps = likelihood, likelihood.priors, maps
+        self._notes, likelihood.unsaid = likelihood.unsaid, ()
+        device = likelihood.device
+        try:
+            self._there = None if device is None else device.maps(maps)
+        except Exception as error:
+            self._give_up(error)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Why the processor finds the sums, in the first frame after a card was not there or failed."""
+        return self._notes
+
+    def log_likelihood(self, poses: Array, stage: int = 0) -> Array:
+        """(N, D) poses to (N,) log-weights, Eq. 17. Raises BodyError for poses that are no finite (N, D)."""
+        there = self.terms_there(poses)
+        if there is not None:
+            return self._shares(*there).values.sum(axis=(1, 2))
+        outlines = self.likelihood.projector.blocks(poses)
+        return self._evaluated(outlines, self.hidden(outlines), len(poses))[1]
+
+    def terms(self, poses: Array) -> tuple[Array, Array]:
+        """Σe and Σr, each (N, V), of poses (N, D)."""
+        there = self.terms_there(poses)
+        if there is not None:
+            return there
+        outlines = self.likelihood.projector.blocks(poses)
+        return self.terms_of(outlines, self.hidden(outlines), len(poses))
+
+    def shares(self, poses: Array) -> Shares:
+        """-a Σe and -b Σr of every camera."""
+        return self._shares(*self.terms(poses))
+
+    def _shares(self, edge: Array, region: Array) -> Shares:
+        settings, names = self.likelihood.settings, tuple(camera.name for camera in self.likelihood.cameras)
+        values = np.stack([-settings.edge_weight * edge, -settings.region_weight * region], axis=2)
+        return Shares(names, ("edge", "region"), values)
+
+    def terms_of(
+        self, outlines: NDArray[np.float32], hidden: NDArray[np.uint64], count: int
+    ) -> tuple[Array, Array]:
+        """Σe and Σr, each (N, V), over the limbs in outlines (B, V, L, 160) of N = `count` poses; hidden : of the same
+        limbs.
+        """
+        terms = self._evaluated(outlines, hidden, count)[0]
+        return terms[..., 0], terms[..., 1]
+
+    def terms_there(self, poses: Array, limbs: NDArray[np.int64] | None = None) -> tuple[Array, Array] | None:
+        """Σe and Σr, each (N, V), of poses (N, D) over some limbs by number (None: all), found on the device; None
+        where the processor is to find them.
+
+        Raises BodyError for poses that are no finite (N, D), StudioError where a card that was asked for fails.
+        """
+        device, settings = self.likelihood.device, self.likelihood.settings
+        if device is None or self._there is None:
+            return None
+        finite = self.likelihood.projector.checked(poses)
+        try:
+            # Kernels are compiled by a process's first launch.
+            chosen = device.limbs(limbs)
+            sums = device.sums(finite, self._there, chosen)
+        except Exception as error:
+            self._give_up(error)
+            return None
+        samples = CHUNK * np.array([EDGE_LINES * settings.edge_chunks, REGION_LINES * settings.region_chunks])
+        terms = sums / (WORST * samples * len(chosen.frame))
+        return terms[..., 0], terms[..., 1]
+
+    def _give_up(self, error: Exception) -> None:
+        """The processor from now on, in this frame and the next. Raises StudioError where the card was asked for."""
+        refused = StudioError(f"The card failed: {in_a_line(error)}.", NO_DEVICE_HINT)
+        note = without_device(self.likelihood.settings, refused)
+        # Another frame's failure has said it already.
+        self._notes += note if self.likelihood.device is not None else ()
+        self.likelihood.device = self._there = None
+
+    def _evaluated(
+        self, outlines: NDArray[np.float32], hidden: NDArray[np.uint64], count: int
+    ) -> tuple[Array, Array]:
+        """Terms (N, V, 2) and log-weights (N,)."""
+        settings = self.likelihood.settings
+        blocks, views = outlines.shape[:2]
+        terms = np.empty((blocks, LANES, views, 2))
+        log_weights = np.empty((blocks, LANES))
+        chunks = settings.edge_chunks, settings.region_chunks
+        weights = np.array([settings.edge_weight, settings.region_weight])
+        given = count, outlines, hidden, *chunks, self.maps, weights
+        parallel_blocks(weight_blocks, blocks, BLOCKS_A_THREAD, *given, terms, log_weights)
+        return terms.reshape(-1, views, 2)[:count], log_weights.ravel()[:count]
+
+    def recorded_indices(self, outlines: NDArray[np.float32]) -> tuple[Words, Words]:
+        """The pixels that the kernel reads, for the benchmark and for tests: (B, V, 16, L, chunks, lines, 16) of
+        edges and of regions, numbered from 0 in each picture; see `edge_region_kernels` for numbers beyond it.
+        """
+        settings = self.likelihood.settings
+        blocks, views, limbs = outlines.shape[:3]
+        shape = (blocks, views, LANES, limbs)
+        edges = np.zeros((*shape, settings.edge_chunks, EDGE_LINES, CHUNK), dtype=np.uint32)
+        region = np.zeros((*shape, settings.region_chunks, REGION_LINES, CHUNK), dtype=np.uint32)
+        record_indices(outlines, self.hidden(outlines), self.maps.views, edges, region)
+        return edges, region
+
+    def hidden(self, outlines: NDArray[np.float32]) -> NDArray[np.uint64]:
+        """(B, V, L, 2, 16) a bit for each hidden edge sample; of no blocks where the option is off."""
+        blocks, views, limbs = outlines.shape[:3]
+        if not self.likelihood.settings.occlusion_aware:
+            return np.zeros((0, views, limbs, EDGE_LINES, LANES), dtype=np.uint64)
+        samples = self.likelihood.settings.edge_chunks * CHUNK
+        hidden = hidden_samples(outlines, limb_sides(limbs), samples)
+        return hidden.reshape(blocks, views, limbs, EDGE_LINES, LANES)
+
+
+def device_for(settings: EdgeRegionSettings, likelihood: Preparation) -> "EdgeRegionDevice | None":
+    """What the setting `device` asks for; None is the processor.
+
+    Raises SettingsError for what is not computed there, StudioError where there is no device or it cannot be used.
+    """
+    if settings.device == CPU:
+        return None
+    projector = likelihood.projector
+    if settings.occlusion_aware:
+        raise SettingsError(
+            "Occlusion-aware edges are not found on a GPU.",
+            "Set device to cpu, or occlusion_aware to false.",
+        )
+    samples = settings.edge_chunks * CHUNK, settings.region_chunks * CHUNK
+    try:
+        module = importlib.import_module(DEVICE_MODULE)
+        why = module.missing()
+        if not why:
+            return module.EdgeRegionDevice(projector.program, projector.camera_table, samples)
+    except StudioError:
+        raise
+    except Exception as error:
+        raise StudioError(f"A GPU cannot be used: {in_a_line(error)}.", NO_DEVICE_HINT) from error
+    raise StudioError(f"A GPU cannot be used: {why}.", NO_DEVICE_HINT)
+
+
+def without_device(settings: EdgeRegionSettings, error: StudioError) -> tuple[str, ...]:
+    """A note that says why the processor evaluates. Raises the error where the settings ask for the card."""
+    if settings.device == GPU:
+        raise error
+    return (f"The processor evaluates edges and region. {error.message}",)
+
+
+def in_a_line(error: Exception) -> str:
+    """An error of a library in one line, its kind where it says nothing else."""
+    return " ".join(str(error).split()).rstrip(" :.") or type(error).__name__
+
+
+def weighting_maps(evidence: FrameEvidence) -> Maps:
+    """Edge and foreground maps of all views as 255 (1 - p)², p = value / 255."""
+    table = np.round(WORST * (1.0 - np.arange(256) / 255.0) ** 2).astype(np.uint8)
+    return joined_maps([[(v.edges, table), (v.mask, table)] for v in evidence.views], (WORST, 0), np.uint8)

@@ -1,0 +1,127 @@
+"""Three terms, each 0...1 in every view: edges and region of Deutscher & Reid, bidirectional silhouette of
+Fleischmann et al.
+
+    f     = mean over views of  a (1 - Σe) + b (1 - Σr) + c f_s
+    log w = - Σ over cameras of (a Σe + b Σr + c (1 - f_s))  =  cameras · (f - a - b - c)
+
+Σe and Σr are those of `edge_region` (Eq. 14 and 15 of Deutscher & Reid 2005), f_s that of `edge_silhouette`
+(Fleischmann et al. 2012, section 2.2); the log-weight is Eq. 16 and 17 with a third term. The region compares inside
+the model only, f_s in both directions; together, 1 : 1 : 1, they lost the fewest limbs in the prototypes. In the first
+stage of a search only the trunk's edges count, the other two terms use the whole body. With a GPU, edges and region
+are found there, silhouettes on the processor.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from studio.body.model import BodyModel
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.foundations.arrays import Array
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.knobs import next_frame_knob
+from studio.search.likelihood.area_kernels import three_terms
+from studio.search.likelihood.edge_region import (
+    EdgeRegionFrameLikelihood,
+    EdgeRegionLikelihood,
+    EdgeRegionSettings,
+)
+from studio.search.likelihood.problem import TRUNK_FIRST, WHOLE_BODY, BaseFrameLikelihood, Shares
+from studio.search.likelihood.silhouette_areas import Areas, Silhouettes, resolution_knob, silhouettes_of
+from studio.search.likelihood.visible_edges import body_edges
+
+
+@dataclass(frozen=True, slots=True)
+class EdgeRegionSilhouetteSettings(EdgeRegionSettings):
+    """The knobs of the edge and region weighting, and the silhouette's. All take effect with the next frame."""
+
+    title: ClassVar[str] = "Edge, region and silhouette"
+
+    silhouette_weight: float = next_frame_knob(
+        1.0, 0.0, 5.0, 0.05, help="Weight of the bidirectional silhouette term."
+    )
+    silhouette_resolution: str = resolution_knob()
+
+
+class EdgeRegionSilhouetteLikelihood:
+    """Makes the likelihood of any frame."""
+
+    def __init__(
+        self, body: BodyModel, cameras: tuple[Camera, ...], settings: EdgeRegionSilhouetteSettings
+    ) -> None:
+        self.settings, self.cameras = settings, cameras
+        self.edge_region = EdgeRegionLikelihood(body, cameras, settings)
+        self.trunk = np.unique(body_edges(body).trunk[:, 0])
+
+    def problem(self, evidence: FrameEvidence) -> "EdgeRegionSilhouetteFrameLikelihood":
+        """One frame as a function of poses. Raises FootageError where views do not fit the cameras."""
+        edge_region = self.edge_region.problem(evidence)
+        silhouettes = silhouettes_of(evidence, self.settings.silhouette_resolution)
+        return EdgeRegionSilhouetteFrameLikelihood(self, edge_region, silhouettes)
+
+
+class EdgeRegionSilhouetteFrameLikelihood(BaseFrameLikelihood):
+    """One frame as a function of poses."""
+
+    def __init__(
+        self,
+        likelihood: EdgeRegionSilhouetteLikelihood,
+        edge_region: EdgeRegionFrameLikelihood,
+        silhouettes: Silhouettes,
+    ) -> None:
+        self.likelihood, self.edge_region, self.silhouettes = likelihood, edge_region, silhouettes
+        self.priors = edge_region.priors
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Those of edges and region."""
+        return self.edge_region.notes
+
+    def terms(self, poses: Array, stage: int = WHOLE_BODY) -> tuple[Array, Array, Array]:
+        """1 - Σe, 1 - Σr and f_s, each (N, V), of poses (N, D).
+
+        Raises BodyError for poses that are no finite (N, D).
+        """
+        edge, region, areas = self._found(poses, stage)
+        return 1.0 - edge, 1.0 - region, areas.fitness()
+
+    def _found(self, poses: Array, stage: int) -> tuple[Array, Array, Areas]:
+        """Σe and Σr, each (N, V), and the areas of poses (N, D)."""
+        outlines = self.likelihood.edge_region.projector.blocks(poses)
+        trunk = self.likelihood.trunk
+        trunk_alone = stage == TRUNK_FIRST and len(trunk) < outlines.shape[2]
+        there = self.edge_region.terms_there(poses)
+        trunk_there = self.edge_region.terms_there(poses, trunk) if there and trunk_alone else None
+        if there is not None and (trunk_there is not None or not trunk_alone):
+            edge, region = there
+            edge = edge if trunk_there is None else trunk_there[0]
+        else:
+            hidden = self.edge_region.hidden(outlines)
+            edge, region = self.edge_region.terms_of(outlines, hidden, len(poses))
+            if trunk_alone:
+                parts = np.ascontiguousarray(outlines[:, :, trunk]), np.ascontiguousarray(hidden[:, :, trunk])
+                edge = self.edge_region.terms_of(*parts, len(poses))[0]
+        return edge, region, self.silhouettes.areas(outlines, len(poses))
+
+    def shares(self, poses: Array) -> Shares:
+        """-a Σe, -b Σr and -c (1 - f_s) of every camera."""
+        settings, names = self.likelihood.settings, tuple(camera.name for camera in self.likelihood.cameras)
+        factors = settings.edge_weight, settings.region_weight, settings.silhouette_weight
+        values = [factor * (term - 1.0) for factor, term in zip(factors, self.terms(poses), strict=True)]
+        return Shares(names, ("edge", "region", "silhouette"), np.stack(values, axis=2))
+
+    def fitness(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
+        """(N,) f of poses (N, D), between 0 and the sum of the weights."""
+        settings = self.likelihood.settings
+        weights = np.array([settings.edge_weight, settings.region_weight, settings.silhouette_weight])
+        edge, region, areas = self._found(poses, stage)
+        outside = np.ascontiguousarray(areas.outside)  # one form of the kernel, not two
+        found = areas.both, areas.projected, areas.observed, outside
+        return three_terms(edge, region, *found, weights)
+
+    def log_likelihood(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
+        """(N,) log-weights of poses (N, D). Raises BodyError for poses that are no finite (N, D)."""
+        settings = self.likelihood.settings
+        best = settings.edge_weight + settings.region_weight + settings.silhouette_weight
+        return len(self.likelihood.cameras) * (self.fitness(poses, stage) - best)

@@ -1,0 +1,111 @@
+"""How well a pose explains all views, per limb and in both directions: model outside the silhouettes, and silhouette
+that no limb covers.
+
+A limb that lies on another one covers nothing wrong; only the silhouette that it leaves uncovered shows the error. So
+both are counted in every view, beyond a distance that allows for clothes and rough masks, and assigned to the nearest
+limb. Everything is in mm² at a body of a person's size (`mm_at`), so that cameras, rates and the body's size do not
+matter.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from studio.body.model import BodyModel
+from studio.foundations.arrays import Array
+from studio.foundations.geometry.camera import Camera
+from studio.search.likelihood.outlines import OutlineProjector
+from studio.search.trackers.agreement_kernels import FIELDS, add_limb_counts, far_points, view_counts
+from studio.search.trackers.refinement import Distances, mm_at
+
+FAR_MM = 45.0
+"""mm: larger than what clothes, hair and rough masks make."""
+LEAST_AREA = 1000.0
+"""mm²: a limb with less area than this is seen by no view."""
+GRID_MM = 14.0
+"""mm, about: spacing of the points that are counted; at least a pixel."""
+COARSE_GRID_MM = 25.0
+"""mm: the same where many positions of a limb are compared."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Disagreement:
+    """Of V views and L drawn limbs, mm² at the body. area : (V, L) that a limb covers. outside : (V, L) of it farther
+    than FAR_MM from the silhouette. bare : (V, L) silhouette farther than FAR_MM from every limb, given to the nearest.
+    limbs : (L,) name of the limb that each drawn one belongs to, from the body's parameters. corners : (V, L, 4, 2)
+    pixels of the pose's outlines. mm : (V,) size of a pixel at the body.
+    """
+
+    area: Array
+    outside: Array
+    bare: Array
+    limbs: tuple[str, ...]
+    corners: Array
+    mm: Sequence[float]
+
+    def shares(self) -> dict[str, float]:
+        """Disagreeing area by limb (named as in the body's parameters), as a share of the limb's area."""
+        area = np.maximum(self.area.sum(axis=0), LEAST_AREA)
+        off = (self.outside + self.bare).sum(axis=0)
+        groups = np.array(self.limbs)
+        return {
+            limb: float(off[groups == limb].sum() / area[groups == limb].sum())
+            for limb in dict.fromkeys(self.limbs)
+        }
+
+
+class Agreement:
+    """Compares poses of a body with silhouettes in some cameras."""
+
+    def __init__(self, body: BodyModel, cameras: tuple[Camera, ...]) -> None:
+        self.body, self.cameras = body, cameras
+        self._limbs = limb_names(body)
+        self._projector = OutlineProjector.of_body(body, cameras)
+
+    def corners(self, pose: Array) -> Array:
+        """(V, L, 4, 2) pixels of the outlines of a pose (D,)."""
+        return self._projector.corners(pose[None])[0][0]
+
+    def mm_per_pixel(self, pose: Array) -> list[float]:
+        """Size of a pixel of each view at the body, mm at a person's size (`mm_at`)."""
+        return mm_at(self.body, self.cameras, pose)
+
+    def of(self, pose: Array, silhouettes: Sequence[Distances]) -> Disagreement:
+        """Where a pose (D,) and a frame's silhouettes, one a camera, disagree."""
+        corners, sizes = self.corners(pose), self.mm_per_pixel(pose)
+        counts: Array = np.zeros((*corners.shape[:2], FIELDS))
+        for own, quads, view, mm in zip(counts, corners, silhouettes, sizes, strict=True):
+            step = max(1, round(GRID_MM / mm))
+            view_counts(quads, view.signed, view.corner, view.size, step, FAR_MM / mm, own)
+            own *= (step * mm) ** 2
+        return Disagreement(counts[..., 0], counts[..., 1], counts[..., 2], self._limbs, corners, sizes)
+
+    def of_places(self, poses: Array, silhouettes: Sequence[Distances], without: str | None = None) -> Array:
+        """(N,) mm² by which poses (N, D) that differ in a limb or two disagree with a frame's silhouettes there, on a
+        coarse grid: what these limbs cover outside, and silhouette far from all limbs. without : a limb to leave
+        out.
+        """
+        corners, _ = self._projector.corners(poses)
+        corners[:, :, [limb == without for limb in self._limbs]] = np.nan
+        moving = (corners != corners[:1]).any(axis=(0, 1, 3, 4))
+        found = np.zeros(len(poses))
+        for number, (view, mm) in enumerate(zip(silhouettes, self.mm_per_pixel(poses[0]), strict=True)):
+            step, counts = max(1, round(COARSE_GRID_MM / mm)), np.zeros(len(poses))
+            others, own = corners[0, number, ~moving], np.ascontiguousarray(corners[:, number, moving])
+            points = far_points(others, view.signed, view.corner, step, FAR_MM / mm)
+            add_limb_counts(own, points, view.signed, view.corner, view.size, step, FAR_MM / mm, counts)
+            found += counts * (step * mm) ** 2
+        return found
+
+
+def limb_names(body: BodyModel) -> tuple[str, ...]:
+    """(L,) limb that each drawn one belongs to: that of the nearest parameter towards the root."""
+    found: list[str] = []
+    for limb in body.drawn:
+        joint, moved = limb.joint, list[int]()
+        while joint >= 0 and not moved:
+            moved = [step.parameter for step in body.joints[joint].steps if step.parameter >= 0]
+            joint = body.joints[joint].parent
+        found.append(body.parameters[moved[-1]].limb if moved else "")
+    return tuple(found)

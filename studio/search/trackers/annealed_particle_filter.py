@@ -1,0 +1,176 @@
+"""The annealed particle filter of Deutscher & Reid (2005), sections 3 and 6.
+
+Idea: one frame is searched in M layers. Each weighs the particles, flattens the weights by an exponent β so
+that a chosen share α of them survives, draws the survivors and spreads them with less and less noise, so that
+the cloud moves over local maxima towards the best pose. Two additions make the paper's improved filter:
+adaptive diffusion (noise in proportion to what is still uncertain, Eq. 18) and crossover (children of two
+survivors, Eq. 19).
+
+Symbols: S_{t,m}, the set of layer m, which the paper counts M … 1 and we count 0 … M - 1 in the order they
+run; π, normalised weights; β, α, D see `annealing`; P, B, σ0 see `diffusion`; γ, ε see `crossover`.
+
+Beyond the paper, a frame's first set may be predicted by a behaviour model instead of Eq. 9 and 10 (Caillette et al.
+2007; see `guided_start`). Particles carry their automaton's state from frame to frame. Within a frame, where layers
+draw, cross and spread them, a particle follows its first parent; at the frame's end its state is the one that follows
+from its ancestor's at the end of the last frame by the cluster of its pose and movement.
+
+Reference: J. Deutscher, I. Reid, Articulated Body Motion Capture by Stochastic Search, IJCV 61(2), 185-205.
+"""
+
+import numpy as np
+
+from studio.foundations.arrays import Array, Indices
+from studio.search.trackers.annealing import anneal
+from studio.search.trackers.crossover import cross
+from studio.search.trackers.diffusion import (
+    Spread,
+    noise_about,
+    planned_sigma,
+    proportional_noise,
+    shrunk_noise,
+)
+from studio.search.trackers.guided_particles import STATES, foreseen, is_guided
+from studio.search.trackers.guided_start import arrived, descended, guided_set, settled_set
+from studio.search.trackers.layer_record import layer_record
+from studio.search.trackers.model_free import judged, share_in
+from studio.search.trackers.particle_kernels import Moments, moments
+from studio.search.trackers.particles import (
+    ParticleFilter,
+    expected,
+    first_set,
+    settle,
+    uniform_poses,
+    unweighted,
+    weigh,
+    weighted_variance,
+)
+from studio.search.trackers.resampling import draw, equal_draw
+from studio.search.trackers.settings import PRESETS, VARIANTS, AnnealedSettings, layer_survivals
+from studio.search.trackers.tracker import (
+    NO_PARENT,
+    FilterState,
+    FrameLikelihood,
+    LayerRecord,
+    ParticleSet,
+    SearchSpace,
+)
+
+
+class AnnealedParticleFilter(ParticleFilter):
+    """One frame in M annealing layers; evaluations = layers × particles."""
+
+    name = "annealed"
+    label = "Annealed particle filter"
+    settings_type = AnnealedSettings
+    size_knobs = (("layers", "particles"),)
+    variants = VARIANTS
+    presets = PRESETS
+
+    def layer_count(self, settings: AnnealedSettings) -> int:
+        return settings.layers
+
+    def evaluation_knobs(self, evaluations: int, layers: int) -> dict[str, int]:
+        """`layers` layers of evaluations / layers particles."""
+        return {"layers": layers, "particles": round(evaluations / max(layers, 1))}
+
+    def least_evaluations(self, layers: int) -> int:
+        """Two particles in each layer."""
+        return 2 * layers
+
+    def begin_frame(
+        self, rng: np.random.Generator, previous: FilterState, space: SearchSpace, settings: AnnealedSettings
+    ) -> ParticleSet:
+        """Step 1, 2 and 7: the unweighted set of the first layer, the last frame's plus B_0 (Eq. 9, 10)."""
+        if previous.particles is None:
+            return unweighted(uniform_poses(rng, settings.particles, space))
+        carried = _carried(rng, previous.particles, settings)
+        if is_guided(space, settings.prediction):
+            return guided_set(rng, previous, carried, space, settings)
+        predicted = expected(previous.particles.poses[carried], previous, settings.dynamics)
+        return first_set(rng, predicted, space, settings)
+
+    def step_layer(
+        self,
+        rng: np.random.Generator,
+        particles: ParticleSet,
+        layer: int,
+        problem: FrameLikelihood,
+        space: SearchSpace,
+        settings: AnnealedSettings,
+    ) -> tuple[ParticleSet, LayerRecord]:
+        """Steps 3 to 5: weigh (Eq. 3, 6, 11, 12), draw, cross (Eq. 19) and spread (Eq. 7, 13 or 18)."""
+        guided = STATES in particles.extra
+        if layer == 0:
+            particles = settled_set(rng, particles, problem, space, settings)
+        raw, eligible = weigh(problem, particles.poses, settings)
+        free, extra = share_in(particles.extra), judged(particles.extra, eligible)
+        survival = layer_survivals(settings, layer + 1)[-1]
+        annealed = anneal(eligible, survival)
+        weighted = ParticleSet(particles.poses, annealed.log_weights, raw, extra)
+        if layer == settings.layers - 1:
+            kept = weighted_variance(weighted)
+            record = layer_record(
+                layer, weighted, annealed, survival, resampled=kept, diffused=kept, free=free
+            )
+            if guided:
+                extra = arrived(rng, particles.poses, extra, space)
+            return ParticleSet(particles.poses, annealed.log_weights, raw, extra), record
+        survivors, first, second = _survivors(rng, weighted, space, settings)
+        of_survivors = moments(survivors)
+        spread = _spread(survivors, of_survivors, layer, space, settings)
+        poses = settle(rng, spread, spread.draw(rng), survivors, problem, space, settings)
+        record = layer_record(
+            layer,
+            weighted,
+            annealed,
+            survival,
+            resampled=of_survivors.variance,
+            diffused=moments(poses).variance,
+            free=free,
+            parents=np.stack([first, second]),
+        )
+        return unweighted(poses, descended(extra, first) if guided else extra), record
+
+    def expectations(self, particles: ParticleSet, space: SearchSpace, settings: AnnealedSettings) -> Array:
+        """(S, D) poses that the first layer's set expects: one unless a behaviour model guides it (`foreseen`)."""
+        return foreseen(particles, space)
+
+
+def _carried(rng: np.random.Generator, last: ParticleSet, settings: AnnealedSettings) -> Indices:
+    """(N,) indices of the particles that start this frame: all (Eq. 9), survivors drawn by π, or the mode."""
+    weights = np.exp(last.log_weights)
+    drawn = draw(rng, weights, settings.particles, settings.resampling)
+    if settings.carry == "weighted":
+        drawn = equal_draw(len(weights), settings.particles)
+    elif settings.carry == "mode":
+        drawn = np.full(settings.particles, np.argmax(weights))
+    return drawn
+
+
+def _survivors(
+    rng: np.random.Generator, weighted: ParticleSet, space: SearchSpace, settings: AnnealedSettings
+) -> tuple[Array, Indices, Indices]:
+    """(N, D) drawn by π with replacement, some of them children of two (step 4 as section 6.2.1 amends it); (N,) the
+    first parent of each, and (N,) the second, -1 where there is none.
+    """
+    weights, count = np.exp(weighted.log_weights), len(weighted.poses)
+    parents = draw(rng, weights, count, settings.resampling)
+    first = weighted.poses[parents]
+    # A systematic draw is sorted; shuffling makes the two parents of a child independent.
+    others = rng.permutation(draw(rng, weights, count, settings.resampling))
+    second = weighted.poses[others]
+    children, crossed = cross(rng, first, second, space, share=settings.crossover, by=settings.crossover_by)
+    return children, parents, np.where(crossed, others, NO_PARENT)
+
+
+def _spread(
+    survivors: Array, own: Moments, layer: int, space: SearchSpace, settings: AnnealedSettings
+) -> Spread:
+    """Survivors (N, D), whose moments these are, plus B_m: planned (Eq. 13) or by their own covariance (Eq. 18)."""
+    if not settings.adaptive_diffusion:
+        survivals = layer_survivals(settings, layer + 2)
+        sigma = planned_sigma(space.sigma * settings.diffusion_scale, survivals, settings.diffusion_decay)
+        return noise_about(survivors, sigma)
+    if settings.diffusion_form == "shrink":
+        return shrunk_noise(survivors, own, settings.diffusion_fraction, settings.diffusion_covariance)
+    return proportional_noise(survivors, own, settings.diffusion_constant, settings.diffusion_covariance)

@@ -1,0 +1,255 @@
+"""The search of one frame, a layer at a time: it can be stopped between layers, saved and resumed.
+
+A frame is searched `repeats` times over (more than once only where a run starts): each search begins with
+what the one before ended with. Layers are numbered through: layer i of search r is record r M + i. Random
+numbers are keyed by (seed, frame, that number), so a frame replays bit for bit from the same particles and
+settings, wherever it was interrupted.
+"""
+
+import dataclasses
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from studio.foundations.errors import RunError
+from studio.foundations.knobs import knobs_of
+from studio.search.likelihood.problem import FittedToPoses
+from studio.search.trackers.particles import WeightError
+from studio.search.trackers.tracker import (
+    HIDDEN,
+    MOVED,
+    Array,
+    FilterState,
+    FrameLikelihood,
+    FrameResult,
+    LayerRecord,
+    ParticleSet,
+    SearchSpace,
+    Tracker,
+    generator,
+    keyed_generator,
+)
+
+# The current version of the settings and the tracker's own settings.
+SettingsSource = Callable[[], tuple[int, Any]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SearchState:
+    """State of an unfinished frame: all that is needed to resume it, besides what the frame started from.
+
+    layers_done : over all repeats. layer_count : M, layers of one search (0 before the first layer).
+    particles : the set that the next layer weighs (None before the first; the last search's weighted set
+    where a repeat begins, or at the end). settings : read when the search began; its "next frame" knobs hold
+    until the search ends. settings_version : of the settings used last. evaluations : poses weighed.
+    milliseconds : time of the layers. expected : (S, D) poses that this search expected before it began (None
+    before the first layer). memory : the likelihood's state after this frame, once all layers are done.
+    """
+
+    layers_done: int = 0
+    layer_count: int = 0
+    particles: ParticleSet | None = None
+    settings: Any = None
+    settings_version: int = 0
+    evaluations: int = 0
+    milliseconds: float = 0.0
+    expected: Array | None = None
+    memory: Mapping[str, Array] = field(default_factory=dict[str, Array])
+
+
+class FrameSearch:
+    """The search of one frame. Call `step` until `finished`, then `result`.
+
+    `state` is immutable and may be kept at any moment; a search made with a kept state goes on from there
+    with the same result, bit for bit, as one that was never interrupted.
+    """
+
+    def __init__(
+        self,
+        tracker: Tracker,
+        previous: FilterState,
+        space: SearchSpace,
+        *,
+        seed: int,
+        frame: int,
+        repeats: int = 1,
+        state: SearchState | None = None,
+    ) -> None:
+        self.tracker, self.previous, self.space = tracker, previous, space
+        self.seed, self.frame, self.repeats = seed, frame, repeats
+        self.state = state or SearchState()
+        self._prepared: tuple[FrameLikelihood, int, FrameLikelihood] | None = None
+
+    @property
+    def problem(self) -> FrameLikelihood | None:
+        """Likelihood of the last layer done here, given the expected poses; None before the first."""
+        return None if self._prepared is None else self._prepared[2]
+
+    @property
+    def layer_count(self) -> int:
+        """Layers of one of its searches; 0 before the first layer."""
+        return self.state.layer_count
+
+    @property
+    def finished(self) -> bool:
+        """Whether all layers of all repeats are done."""
+        state = self.state
+        return state.layer_count > 0 and state.layers_done == self.repeats * state.layer_count
+
+    def step(self, problem: FrameLikelihood, version: int, settings: Any) -> LayerRecord:  # noqa: ANN401
+        """Do one layer with these settings (of the tracker's type) and return its record.
+
+        Knobs that take effect with the next frame keep the value they had when the search began.
+        """
+        if self.finished:
+            raise RunError(f"Frame {self.frame} has no layer left.", "Continue with the next frame.")
+        began = time.perf_counter()
+        state = self.state
+        held = state.settings if state.layers_done else settings
+        in_use = held_over(settings, held)
+        count = self.tracker.layer_count(in_use)
+        repeat, layer = divmod(state.layers_done, count)
+        particles, expected = state.particles, state.expected
+        if layer == 0:
+            particles = self._beginning(repeat, in_use)
+            expected = self._expected(particles, in_use)
+        assert particles is not None
+        informed = problem if expected is None else self._with_expectations(problem, repeat, expected)
+        rng = generator(self.seed, self.frame, state.layers_done)
+        try:
+            following, record = self.tracker.step_layer(rng, particles, layer, informed, self.space, in_use)
+        except WeightError as error:
+            raise WeightError(
+                f"Frame {self.frame}, layer {state.layers_done + 1}: {error.message}", error.hint
+            ) from None
+        is_last = state.layers_done + 1 == self.repeats * count
+        memory: Mapping[str, Array] = self._remembered(informed, following, in_use) if is_last else {}
+        milliseconds = 1000.0 * (time.perf_counter() - began)
+        self.state = SearchState(
+            layers_done=state.layers_done + 1,
+            layer_count=count,
+            particles=following,
+            settings=held,
+            settings_version=version,
+            evaluations=state.evaluations + len(record.poses),
+            milliseconds=state.milliseconds + milliseconds,
+            expected=expected,
+            memory=memory,
+        )
+        return dataclasses.replace(
+            record,
+            frame=self.frame,
+            layer=state.layers_done,
+            settings_version=version,
+            milliseconds=milliseconds,
+        )
+
+    def result(self, settings: Any = None) -> FrameResult:  # noqa: ANN401
+        """The frame's result; settings : of the tracker's type, those held since the beginning if None.
+
+        Raises RunError while layers remain.
+        """
+        state = self.state
+        if not self.finished or state.particles is None:
+            raise RunError(f"Frame {self.frame} is not searched to its end.", "Do the remaining layers.")
+        in_use = state.settings if settings is None else held_over(settings, state.settings)
+        estimate = self.tracker.end_frame(state.particles, self.space, in_use)
+        return FrameResult(
+            frame=self.frame,
+            estimate=estimate,
+            layers=state.layers_done,
+            evaluations=state.evaluations,
+            settings_version=state.settings_version,
+            milliseconds=state.milliseconds,
+            carried=FilterState(state.particles, estimate.pose, self.previous.estimate, state.memory),
+        )
+
+    def _beginning(self, repeat: int, settings: Any) -> ParticleSet:  # noqa: ANN401
+        """The unweighted set of a search's first layer."""
+        rng = beginning_generator(self.seed, self.frame, repeat)
+        start = self.previous if repeat == 0 else FilterState(self.state.particles)
+        return self.tracker.begin_frame(rng, start, self.space, settings)
+
+    def _expected(self, particles: ParticleSet, settings: Any) -> Array:  # noqa: ANN401
+        """(S, D) poses expected by a search that starts from these particles: the tracker's; after
+        the first come the last pose moved on at constant velocity and the last reported pose, as far as they are
+        known.
+        """
+        poses = self.tracker.expectations(particles, self.space, settings)
+        last, before = self.previous.estimate, self.previous.previous_estimate
+        if last is None:
+            return poses
+        known = last[None] if before is None else np.stack([2.0 * last - before, last])
+        return np.concatenate([poses[:1], known, poses[1:]])
+
+    def _with_expectations(self, problem: FrameLikelihood, repeat: int, expected: Array) -> FrameLikelihood:
+        """The frame's likelihood given the expected poses, made once a search, if it uses them."""
+        kept = self._prepared
+        if kept is None or kept[0] is not problem or kept[1] != repeat:
+            informed = problem
+            if isinstance(problem, FittedToPoses):
+                informed = problem.expecting(expected, self.previous.memory)
+            kept = self._prepared = (problem, repeat, informed)
+        return kept[2]
+
+    def _remembered(
+        self,
+        informed: FrameLikelihood,
+        particles: ParticleSet,
+        settings: Any,  # noqa: ANN401
+    ) -> Mapping[str, Array]:
+        """Memory for the next frame: the likelihood's, updated with this frame's estimate, and the hidden areas."""
+        before = self.previous.memory
+        if not isinstance(informed, FittedToPoses):
+            return before
+        found = informed.remembered(self.tracker.end_frame(particles, self.space, settings).pose)
+        return {
+            **{name: values for name, values in before.items() if name.startswith((HIDDEN, MOVED))},
+            **found,
+        }
+
+
+def search_frame(
+    tracker: Tracker,
+    problem: FrameLikelihood,
+    previous: FilterState,
+    space: SearchSpace,
+    *,
+    seed: int,
+    frame: int,
+    settings_source: SettingsSource,
+    repeats: int = 1,
+    on_layer: Callable[[LayerRecord], None] | None = None,
+) -> FrameResult:
+    """Search a frame to its end.
+
+    settings_source : called before every layer, gives (version, tracker settings). on_layer : gets each record.
+    """
+    search = FrameSearch(tracker, previous, space, seed=seed, frame=frame, repeats=repeats)
+    settings = None
+    while not search.finished:
+        version, settings = settings_source()
+        record = search.step(problem, version, settings)
+        if on_layer is not None:
+            on_layer(record)
+    return search.result(settings)
+
+
+def held_over(settings: Any, held: Any) -> Any:  # noqa: ANN401
+    """`settings`, except that knobs which do not take effect with the next layer keep their values in `held`."""
+    if settings == held:
+        return settings
+    slow = [entry.name for entry in knobs_of(settings) if entry.takes_effect != "next layer"]
+    return dataclasses.replace(settings, **{name: getattr(held, name) for name in slow})
+
+
+def beginning_generator(seed: int, frame: int, repeat: int) -> np.random.Generator:
+    """The random numbers of `begin_frame`: `generator(seed, frame, -1)` for the first search, others for
+    repeats.
+    """
+    if repeat == 0:
+        return generator(seed, frame, -1)
+    return keyed_generator(seed, frame, 0, repeat)

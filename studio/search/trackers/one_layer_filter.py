@@ -1,0 +1,52 @@
+"""Filters that weigh every particle once: a frame is one layer."""
+
+from abc import abstractmethod
+from typing import Any
+
+import numpy as np
+
+from studio.foundations.arrays import Array
+from studio.search.trackers.annealing import Annealed
+from studio.search.trackers.guided_start import settled_set
+from studio.search.trackers.layer_record import layer_record
+from studio.search.trackers.model_free import share_in
+from studio.search.trackers.particles import ParticleFilter, weigh, weighted_variance
+from studio.search.trackers.tracker import Arrays, FrameLikelihood, LayerRecord, ParticleSet, SearchSpace
+
+
+class OneLayerFilter(ParticleFilter):
+    """One frame in one layer; evaluations = particles."""
+
+    def layer_count(self, settings: Any) -> int:  # noqa: ANN401 - the tracker's own settings_type
+        return 1
+
+    def step_layer(
+        self,
+        rng: np.random.Generator,
+        particles: ParticleSet,
+        layer: int,
+        problem: FrameLikelihood,
+        space: SearchSpace,
+        settings: Any,  # noqa: ANN401
+    ) -> tuple[ParticleSet, LayerRecord]:
+        particles = settled_set(rng, particles, problem, space, settings)
+        raw, eligible = weigh(problem, particles.poses, settings)
+        chosen, wanted, extra = self.selected(eligible, particles.extra, settings)
+        weighted = ParticleSet(particles.poses, chosen.log_weights, raw, extra)
+        kept = weighted_variance(weighted)
+        record = layer_record(
+            layer, weighted, chosen, wanted, resampled=kept, diffused=kept, free=share_in(extra)
+        )
+        return weighted, record
+
+    @abstractmethod
+    def selected(
+        self,
+        log_weights: Array,
+        extra: Arrays,
+        settings: Any,  # noqa: ANN401
+    ) -> tuple[Annealed, float, Arrays]:
+        """The weights that choose the survivors, the survival rate aimed at (NaN: none), and the set's arrays.
+
+        log_weights : (N,) log w, -inf where a pose is impossible. extra : the set's arrays before it was weighed.
+        """

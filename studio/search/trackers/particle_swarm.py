@@ -1,0 +1,329 @@
+"""Particle swarm optimisation with soft search space partitioning (Fleischmann, Austvoll & Kwolek 2012).
+
+Idea: particles move through the pose space, each attracted to the best pose p_i that it has found and to the best
+pose p_g that any has found; a constriction χ damps their velocity. A frame is divided into stages (see
+`partitions`), each a swarm of its own that starts from the best pose of the one before.
+
+Symbols (Algorithm 1, Eq. 2 and 3): x_i, v_i, position and velocity of particle i; f, the fitness, which is
+maximised; N, iterations of a stage, k the one at hand; c = c1 = c2; φ = c1 + c2; χ; ε1, ε2, uniform in 0 … 1, one
+for each parameter; σ, the expected movement from frame to frame times the stage's freedom; x̂, the pose a stage
+starts from.
+
+Where the paper leaves a choice: k = 1 is the swarm as it was sampled, so that N iterations weigh N times the
+particles, which is how Table 1 adds up to 1000. p_g is updated after every iteration, not after every particle, so
+that a swarm is weighed at once. Poses that the body cannot take: see `hard_priors`; where such a particle is weighed
+all the same, a possible pose is always better than an impossible one. Without a start pose the first stage is
+spread over the limits and moves everything, as there is nothing yet that could be kept.
+
+Beyond the paper, x̂ may be predicted by a behaviour model (`guided_swarm`). A layer is one iteration. Its record:
+variance_weighed, of the positions; variance_resampled, of the particles' bests (what is kept); variance_diffused, of
+the positions after the move, or of the next stage's sampled swarm. β and α have no meaning and are NaN; all particles
+weigh the same.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from studio.foundations.arrays import Array
+from studio.search.likelihood.problem import WHOLE_BODY
+from studio.search.trackers.guided_particles import foreseen, is_guided
+from studio.search.trackers.guided_swarm import BEFORE, handed_on, leader_arrived, predicted_starts
+from studio.search.trackers.hard_priors import Indices, Mask, Proposals, possible, settled
+from studio.search.trackers.model_free import FREE, judged, share_in
+from studio.search.trackers.particle_kernels import moments
+from studio.search.trackers.particles import checked_values, expected, uniform_poses, unweighted
+from studio.search.trackers.partitions import Stage, evaluations, layer_count, moment_of, stages_of
+from studio.search.trackers.swarm_settings import PRESETS, VARIANTS, SwarmSettings
+from studio.search.trackers.tracker import (
+    Arrays,
+    Estimate,
+    FilterState,
+    FrameLikelihood,
+    LayerRecord,
+    ParticleSet,
+    SearchSpace,
+    Tracker,
+)
+
+# Arrays of a set: (N, D), (N, D), (N,), (N,), (D,), (1,), (1,), (D,) or (N, D), (D,).
+VELOCITIES, BEST_POSES, BEST_VALUES, BEST_POSSIBLE = (
+    "velocities",
+    "best_poses",
+    "best_values",
+    "best_possible",
+)
+LEADER, LEADER_VALUE, LEADER_POSSIBLE = "leader", "leader_value", "leader_possible"
+START, FREEDOM = "start", "freedom"
+
+# Table 1: 10 particles × 20 iterations, then 20 × 40.
+STAGE1_ITERATIONS, STAGE2_ITERATIONS = 20, 40
+# A particle alone has no others to learn from.
+SMALLEST_SWARM = 2
+
+
+class ParticleSwarm(Tracker):
+    """One frame in the iterations of all stages; evaluations = Σ particles × iterations."""
+
+    name = "swarm"
+    label = "Particle swarm"
+    settings_type = SwarmSettings
+    size_knobs = (("stage1_particles", "stage1_iterations"), ("stage2_particles", "stage2_iterations"))
+    score = ("Best fitness", "f")
+    variants = VARIANTS
+    presets = PRESETS
+
+    def layer_count(self, settings: SwarmSettings) -> int:
+        """Iterations N of all stages together."""
+        return layer_count(settings)
+
+    def evaluations(self, settings: SwarmSettings) -> int:
+        """Poses weighed in all stages together."""
+        return evaluations(settings)
+
+    def evaluation_knobs(self, evaluations: int, layers: int) -> dict[str, int]:
+        """Table 1 in proportion: n1 and n2 with 20 n1 + 40 n2 as close to the total as can be, n2 as close to 2 n1.
+
+        The paper gives the table for 1000 evaluations only; our choice keeps the iterations and scales the particles
+        of both stages, so that every multiple of 20 is met exactly.
+        """
+        twenties = round(evaluations / STAGE1_ITERATIONS)
+        first = max(round(twenties / 5), SMALLEST_SWARM)
+        # The remainder must be divisible by two, as the second stage has twice the iterations.
+        first += (twenties - first) % 2
+        return {
+            "stage1_particles": first,
+            "stage1_iterations": STAGE1_ITERATIONS,
+            "stage2_particles": (twenties - first) // 2,
+            "stage2_iterations": STAGE2_ITERATIONS,
+        }
+
+    def least_evaluations(self, layers: int) -> int:
+        """The smallest swarm in both stages."""
+        return SMALLEST_SWARM * (STAGE1_ITERATIONS + STAGE2_ITERATIONS)
+
+    def begin_frame(
+        self, rng: np.random.Generator, previous: FilterState, space: SearchSpace, settings: SwarmSettings
+    ) -> ParticleSet:
+        """The first stage's swarm, sampled about x̂: x ← N(x̂, Σ), v ← U(-σ, σ)."""
+        first = stages_of(space.hierarchy, settings)[0]
+        last = previous.particles
+        if last is None:
+            freedom = np.ones(len(space.names))
+            sigma = space.sigma * settings.diffusion_scale
+            spread = uniform_poses(rng, first.particles, space)
+            drawn = Proposals(spread, _start_velocities(rng, spread.shape, sigma, settings))
+            return _new_swarm(drawn, spread.mean(axis=0), freedom)
+        pose = _last_pose(previous, last)
+        sigma = space.sigma * settings.diffusion_scale * first.freedom
+        starts, arrays = expected(pose[None], previous, settings.dynamics)[0], {}
+        if is_guided(space, settings.prediction) and previous.estimate is not None:
+            starts, arrays = predicted_starts(rng, previous, pose, first.particles, space, settings)
+        drawn = _sampled(rng, starts, sigma, first.particles, settings)
+        return _new_swarm(drawn, starts, first.freedom, arrays)
+
+    def step_layer(
+        self,
+        rng: np.random.Generator,
+        particles: ParticleSet,
+        layer: int,
+        problem: FrameLikelihood,
+        space: SearchSpace,
+        settings: SwarmSettings,
+    ) -> tuple[ParticleSet, LayerRecord]:
+        """Weigh the swarm, update the bests, and move it; at a stage's end sample the next stage's swarm."""
+        stages = stages_of(space.hierarchy, settings)
+        now = moment_of(stages, layer)
+        stage = stages[now.number]
+        if layer == 0:
+            particles = _kept_possible(rng, particles, problem, space, settings)
+        everything_moves = bool(particles.extra[FREEDOM].all())
+        looks_at = WHOLE_BODY if everything_moves else stage.looks_at
+        values = checked_values(problem.fitness(particles.poses, looks_at), len(particles.poses))
+        allowed = possible(problem, particles.poses, settings)
+        free, extra = share_in(particles.extra), _with_bests(particles, values, allowed)
+        if FREE in extra:
+            extra = judged(extra, np.where(allowed, values, -np.inf) if allowed.any() else values)
+            del extra[FREE]
+        weighed = ParticleSet(particles.poses, particles.log_weights, values, extra)
+        if now.iteration < stage.iterations:
+            c = acceleration(now.iteration + 1, stage.iterations, settings.c_first, settings.c_last)
+            following = _moved(rng, weighed, c, problem, space, settings)
+        elif now.number + 1 < len(stages):
+            following = _next_swarm(rng, extra, stages[now.number + 1], problem, space, settings)
+        else:
+            following = weighed
+        record = _record(layer, weighed, allowed, following, free)
+        if following is weighed and is_guided(space, settings.prediction):
+            following = replace(weighed, extra=leader_arrived(rng, extra[LEADER], extra, space))
+        return following, record
+
+    def expectations(self, particles: ParticleSet, space: SearchSpace, settings: SwarmSettings) -> Array:
+        """(S, D) poses that the first stage's swarm expects: one unless a behaviour model guides it (`foreseen`)."""
+        return foreseen(particles, space)
+
+    def end_frame(self, particles: ParticleSet, space: SearchSpace, settings: SwarmSettings) -> Estimate:
+        """p_g of the last stage, or the mean of its p_i."""
+        leader, mean = particles.extra[LEADER], particles.extra[BEST_POSES].mean(axis=0)
+        pose = leader if settings.estimate == "mode" else mean
+        return Estimate(pose, mean, leader, float(particles.extra[LEADER_VALUE][0]))
+
+
+def acceleration(iteration: int, iterations: int, c_first: float, c_last: float) -> float:
+    """c1 = c2 (Eq. 2) of iteration k = 2 … N; N > 2."""
+    return (c_last - c_first) / (iterations - 2) * (iteration - 2) + c_first
+
+
+def constriction(c: float) -> float:
+    """χ (Eq. 3) for c1 = c2 = c > 2."""
+    phi = 2.0 * c
+    return 2.0 / abs(2.0 - phi - math.sqrt(phi * phi - 4.0 * phi))
+
+
+def _moved(
+    rng: np.random.Generator,
+    swarm: ParticleSet,
+    c: float,
+    problem: FrameLikelihood,
+    space: SearchSpace,
+    settings: SwarmSettings,
+) -> ParticleSet:
+    """The swarm one step further: velocities (Algorithm 1, inner loop), limited to 2 σ, then positions."""
+    places, extra = swarm.poses, swarm.extra
+    limit = 2.0 * (space.sigma * settings.diffusion_scale * extra[FREEDOM])
+    shrink = constriction(c)
+    to_own, to_leader = extra[BEST_POSES] - places, extra[LEADER] - places
+
+    def proposed(rows: Indices | slice) -> Proposals:
+        own, leader = to_own[rows], to_leader[rows]
+        luck = rng.random((2, *own.shape))
+        velocities = shrink * (extra[VELOCITIES][rows] + c * luck[0] * own + c * luck[1] * leader)
+        velocities = np.minimum(np.maximum(velocities, -limit), limit)
+        return Proposals(places[rows] + velocities, velocities)
+
+    done = settled(problem, space, settings, proposed(slice(None)), places, proposed)
+    return ParticleSet(done.poses, swarm.log_weights, extra=extra | {VELOCITIES: done.velocities})
+
+
+def _next_swarm(
+    rng: np.random.Generator,
+    extra: Arrays,
+    stage: Stage,
+    problem: FrameLikelihood,
+    space: SearchSpace,
+    settings: SwarmSettings,
+) -> ParticleSet:
+    """A stage's swarm, sampled about the best pose of the stage before."""
+    start, sigma = extra[LEADER], space.sigma * settings.diffusion_scale * stage.freedom
+    drawn = _sampled(rng, start, sigma, stage.particles, settings)
+    sampled = _new_swarm(drawn, start, stage.freedom, handed_on(extra))
+    return _kept_possible(rng, sampled, problem, space, settings)
+
+
+def _kept_possible(
+    rng: np.random.Generator,
+    swarm: ParticleSet,
+    problem: FrameLikelihood,
+    space: SearchSpace,
+    settings: SwarmSettings,
+) -> ParticleSet:
+    """A sampled swarm after the hard priors."""
+    starts = np.broadcast_to(swarm.extra[START], swarm.poses.shape)
+    velocities = swarm.extra[VELOCITIES]
+    sigma = space.sigma * settings.diffusion_scale * swarm.extra[FREEDOM]
+
+    def again(rows: Indices) -> Proposals:
+        normal = rng.standard_normal((len(rows), starts.shape[1]))
+        return Proposals(starts[rows] + normal * sigma, velocities[rows])
+
+    drawn = Proposals(swarm.poses, velocities)
+    # An impossible prediction is replaced by where the swarm was before.
+    before = np.broadcast_to(swarm.extra[BEFORE], starts.shape) if FREE in swarm.extra else starts
+    done = settled(problem, space, settings, drawn, before, again)
+    return unweighted(
+        done.poses, swarm.extra | {VELOCITIES: done.velocities, BEST_POSES: np.array(done.poses)}
+    )
+
+
+def _sampled(
+    rng: np.random.Generator, start: Array, sigma: Array, count: int, settings: SwarmSettings
+) -> Proposals:
+    """x ← N(x̂, Σ), v ← U(-σ, σ). start : (D,) or (count, D), x̂."""
+    poses = start + rng.standard_normal((count, start.shape[-1])) * sigma
+    return Proposals(poses, _start_velocities(rng, poses.shape, sigma, settings))
+
+
+def _start_velocities(
+    rng: np.random.Generator, shape: tuple[int, ...], sigma: Array, settings: SwarmSettings
+) -> Array:
+    uniform = (2.0 * rng.random(shape) - 1.0) * sigma
+    return uniform if settings.start_velocity == "uniform" else np.zeros(shape)
+
+
+def _new_swarm(drawn: Proposals, start: Array, freedom: Array, more: Arrays | None = None) -> ParticleSet:
+    """A swarm before its first evaluation. start : (D,) or (N, D). more : further arrays."""
+    count = len(drawn.poses)
+    return unweighted(
+        drawn.poses,
+        (more or {})
+        | {
+            VELOCITIES: drawn.velocities,
+            BEST_POSES: drawn.poses,
+            BEST_VALUES: np.full(count, -np.inf),
+            BEST_POSSIBLE: np.zeros(count, dtype=bool),
+            LEADER: np.atleast_2d(start)[0],
+            LEADER_VALUE: np.array([-np.inf]),
+            LEADER_POSSIBLE: np.zeros(1, dtype=bool),
+            START: start,
+            FREEDOM: freedom,
+        },
+    )
+
+
+def _with_bests(swarm: ParticleSet, values: Array, allowed: Mask) -> Arrays:
+    """The set's arrays with p_i and p_g updated; a value equal to the best so far does not replace it."""
+    extra = swarm.extra
+    known, was_allowed = extra[BEST_VALUES], extra[BEST_POSSIBLE]
+    better = np.where(allowed == was_allowed, values > known, allowed)
+    best_values = np.where(better, values, known)
+    best_allowed = np.where(better, allowed, was_allowed)
+    best_poses = np.where(better[:, None], swarm.poses, extra[BEST_POSES])
+    ranked = np.where(best_allowed, best_values, -np.inf) if best_allowed.any() else best_values
+    first = int(np.argmax(ranked))
+    bests = extra | {BEST_POSES: best_poses, BEST_VALUES: best_values, BEST_POSSIBLE: best_allowed}
+    rank = (bool(best_allowed[first]), float(best_values[first]))
+    if rank > (bool(extra[LEADER_POSSIBLE][0]), float(extra[LEADER_VALUE][0])):
+        bests[LEADER] = best_poses[first]
+        bests[LEADER_VALUE], bests[LEADER_POSSIBLE] = best_values[[first]], best_allowed[[first]]
+    return bests
+
+
+def _last_pose(previous: FilterState, last: ParticleSet) -> Array:
+    """x̂ of the frame before: the reported pose, in a repeated search p_g, in a run's first the start pose."""
+    if previous.estimate is not None:
+        return previous.estimate
+    if LEADER in last.extra:
+        return last.extra[LEADER]
+    return last.poses[int(np.argmax(last.log_weights))]
+
+
+def _record(
+    layer: int, weighed: ParticleSet, allowed: Mask, following: ParticleSet, free: float
+) -> LayerRecord:
+    """The record of a layer. free : `share_in`."""
+    values = weighed.raw_log_weights
+    best = int(np.argmax(np.where(allowed, values, -np.inf) if allowed.any() else values))
+    kept, own = moments(weighed.extra[BEST_POSES]).variance, moments(weighed.poses)
+    return LayerRecord(
+        layer=layer,
+        variance_weighed=own.variance,
+        variance_resampled=kept,
+        variance_diffused=kept if following is weighed else moments(following.poses).variance,
+        best=weighed.poses[best],
+        best_log_weight=float(values[best]),
+        mean=own.mean,
+        poses=weighed.poses,
+        log_weights=values,
+        model_free_share=free,
+    )

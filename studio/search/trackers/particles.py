@@ -1,0 +1,155 @@
+"""Steps on particles that the trackers share: start, predict, weigh and estimate."""
+
+import numpy as np
+
+from studio.foundations.arrays import Array
+from studio.foundations.errors import RunError
+from studio.search.trackers.diffusion import Spread, noise_about
+from studio.search.trackers.hard_priors import Proposals, possible, settled
+from studio.search.trackers.shared_knobs import SearchSettings
+from studio.search.trackers.tracker import (
+    Arrays,
+    Estimate,
+    FilterState,
+    FrameLikelihood,
+    ParticleSet,
+    SearchSpace,
+    Tracker,
+)
+
+CAME_FROM = "came_from"
+
+
+class WeightError(RunError):
+    """Poses cannot be weighed: a weight is no finite number."""
+
+
+def unweighted(poses: Array, extra: Arrays | None = None) -> ParticleSet:
+    """A set (Eq. 5) in which all particles of poses (N, D) weigh the same."""
+    return ParticleSet(poses, np.full(len(poses), -np.log(len(poses))), extra=extra or {})
+
+
+def uniform_poses(rng: np.random.Generator, count: int, space: SearchSpace) -> Array:
+    """(count, D) poses spread evenly between the limits; raises RunError where a parameter has none."""
+    bounded = np.isfinite(space.lower) & np.isfinite(space.upper)
+    if not bounded.all():
+        name = space.names[int(np.argmin(bounded))]
+        raise RunError(
+            f"A search without a start pose samples between the limits, but '{name}' has none.",
+            "Give a start pose, or give every parameter of the body finite limits.",
+        )
+    return space.lower + rng.random((count, len(space.names))) * (space.upper - space.lower)
+
+
+def expected(poses: Array, previous: FilterState, dynamics: str) -> Array:
+    """Poses (N, D) predicted for the next frame: f of Eq. 10.
+
+    dynamics : "none" leaves them; "constant_velocity" adds the last movement of the reported pose, once there
+    is one.
+    """
+    if dynamics == "none" or previous.estimate is None or previous.previous_estimate is None:
+        return poses
+    return poses + (previous.estimate - previous.previous_estimate)
+
+
+def weigh(problem: FrameLikelihood, poses: Array, rules: SearchSettings) -> tuple[Array, Array]:
+    """(N,) raw log w, and (N,) the same with -inf for particles that the body cannot take.
+
+    Where the body can take none of them, or constraints are ignored, all may survive. Raises WeightError for a
+    weight that is not finite.
+    """
+    raw = checked_values(problem.log_likelihood(poses), len(poses))
+    if rules.constraints == "ignore":
+        return raw, raw
+    taken = possible(problem, poses, rules)
+    return raw, np.where(taken, raw, -np.inf) if taken.any() else raw
+
+
+def checked_values(values: Array, count: int) -> Array:
+    """A weighting's values for `count` poses as float64; raises WeightError unless there are `count` finite numbers."""
+    raw = np.asarray(values, dtype=np.float64)
+    if raw.shape != (count,) or not np.isfinite(raw).all():
+        wrong = raw[~np.isfinite(raw)]
+        raise WeightError(
+            f"The weighting gave {wrong[0] if wrong.size else raw.shape} for a pose.",
+            "Check the calibration and the start pose, or report this as a fault of the weighting.",
+        )
+    return raw
+
+
+def first_set(
+    rng: np.random.Generator, predicted: Array, space: SearchSpace, rules: SearchSettings
+) -> ParticleSet:
+    """The unweighted set that a filter's frame begins with: predicted poses (N, D) plus B_0 (Eq. 9, 10).
+
+    Whether limbs are apart is known only with the frame's problem: with "redraw" the poses that the particles
+    came from are kept in the set, for `settled_first`.
+    """
+    drawn = noise_about(predicted, space.sigma * rules.diffusion_scale).draw(rng)
+    if rules.constraints == "clamp":
+        drawn = np.clip(drawn, space.lower, space.upper)
+    came_from = {CAME_FROM: predicted} if rules.constraints == "redraw" else {}
+    return unweighted(drawn, came_from)
+
+
+def settled_first(
+    rng: np.random.Generator,
+    particles: ParticleSet,
+    problem: FrameLikelihood,
+    space: SearchSpace,
+    rules: SearchSettings,
+) -> ParticleSet:
+    """A frame's first set with its impossible particles redrawn; unchanged where it does not keep their origins."""
+    if CAME_FROM not in particles.extra:
+        return particles
+    extra = {name: value for name, value in particles.extra.items() if name != CAME_FROM}
+    spread = noise_about(particles.extra[CAME_FROM], space.sigma * rules.diffusion_scale)
+    first = settle(rng, spread, particles.poses, spread.centres, problem, space, rules)
+    return ParticleSet(first, particles.log_weights, particles.raw_log_weights, extra)
+
+
+def settle(
+    rng: np.random.Generator,
+    spread: Spread,
+    drawn: Array,
+    came_from: Array,
+    problem: FrameLikelihood,
+    space: SearchSpace,
+    rules: SearchSettings,
+) -> Array:
+    """(N, D) poses `drawn` from a spread, after the rules."""
+    done = settled(
+        problem,
+        space,
+        rules,
+        Proposals.at(drawn),
+        came_from,
+        lambda rows: Proposals.at(spread.draw(rng, rows)),
+    )
+    return done.poses
+
+
+def weighted_mean(particles: ParticleSet) -> Array:
+    """(D,) Σ π s (Eq. 1, 8)."""
+    return np.exp(particles.log_weights) @ particles.poses
+
+
+def weighted_variance(particles: ParticleSet) -> Array:
+    """(D,) Σ π (s - mean)²: the expected variance after resampling."""
+    return np.exp(particles.log_weights) @ (particles.poses - weighted_mean(particles)) ** 2
+
+
+def estimate(particles: ParticleSet, kind: str) -> Estimate:
+    """The reported pose of a weighted set: its "mean" (Eq. 8) or its "mode" (Eq. 2)."""
+    best = int(np.argmax(particles.log_weights))
+    mean, mode = weighted_mean(particles), particles.poses[best]
+    pose = mean if kind == "mean" else mode
+    return Estimate(pose, mean, mode, float(particles.raw_log_weights[best]))
+
+
+class ParticleFilter(Tracker):
+    """A tracker that reports its last layer's weighted set."""
+
+    def end_frame(self, particles: ParticleSet, space: SearchSpace, settings: SearchSettings) -> Estimate:
+        """The weighted mean (Eq. 1, 8) or the mode (Eq. 2)."""
+        return estimate(particles, settings.estimate)

@@ -1,0 +1,240 @@
+"""The set-up of backgrounds over the API: in the background, with progress, cancelled, refused; plates by upload."""
+
+import threading
+import time
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+import pytest
+from patched_ball import FRAMES, patched_ball
+from rendered_people import overlap
+from two_people import two_people
+from waiting import PATIENCE
+from web_doubles import Studio
+
+from studio.evidence.strokes import Stroke
+from studio.foundations.errors import FootageError
+from studio.operations import masks
+from studio.runs.setup.background_setup import BackgroundSetup
+from studio.sessions.background_files import SessionEvidence, read_evidence, write_evidence
+from studio.sessions.footage_changes import change_footage
+from studio.sessions.session import Session
+from studio.sessions.stroke_files import write_strokes
+
+PLACE = "/api/sessions/take1"
+
+
+def ended(studio: Studio, place: str = PLACE) -> dict:
+    """The set-up's state when it has ended."""
+    deadline = time.monotonic() + PATIENCE
+    while time.monotonic() < deadline:
+        job = studio.client.get(f"{place}/background").json()["job"]
+        if job["state"] not in ("queued", "running", "cancelling"):
+            return job
+    raise AssertionError("the set-up did not end")
+
+
+def plate_upload(studio: Studio, name: str, picture: np.ndarray) -> str:
+    """An upload of one picture."""
+    identifier = studio.client.post("/api/uploads").json()["identifier"]
+    content = cv2.imencode(".png", picture)[1].tobytes()
+    place = f"/api/uploads/{identifier}/files?path={name}"
+    assert studio.client.put(place, content=content).status_code == 200
+    return identifier
+
+
+def test_the_median_is_set_up_and_said(studio: Studio) -> None:
+    before = studio.client.get(f"{PLACE}/background").json()
+    assert "median" in before["possible"]
+    assert "plate" not in before["possible"]
+    assert {"mask_threshold", "background_model"} <= set(before["settings"])
+    begun = studio.client.post(f"{PLACE}/background", json={"source": "median", "tune": False})
+    assert begun.status_code == 202
+    assert ended(studio)["state"] == "done"
+    after = studio.client.get(f"{PLACE}/background").json()
+    assert after["source"] == "median"
+    assert after["own"] == {"background_model": "median"}
+
+
+def test_a_person_is_looked_for_and_nobody_found(studio: Studio) -> None:
+    before = studio.client.get(f"{PLACE}/background").json()
+    assert "person" in before["possible"]
+    assert "masks" not in before["possible"]
+    assert studio.client.post(f"{PLACE}/background", json={"source": "person"}).status_code == 202
+    job = ended(studio)
+    assert job["state"] == "failed"
+    assert "No camera sees a person" in job["message"]
+    after = studio.client.get(f"{PLACE}/background").json()
+    assert (after["source"], after["own"]) == (before["source"], before["own"])
+
+
+def test_given_masks_stay_remembered_when_knobs_are_kept(studio: Studio) -> None:
+    session = studio.workspace.session("take1")
+    given = {source.name: "masks/x" for source in session.manifest.footage.cameras}
+    write_evidence(session, SessionEvidence(given_masks=given))
+    assert studio.client.put(f"{PLACE}/evidence", json={"mask_threshold": 5}).status_code == 200
+    assert read_evidence(session) == SessionEvidence(knobs={"mask_threshold": 5}, given_masks=given)
+
+
+def test_progress_cancel_and_a_second_one_at_once(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+    at_work = threading.Event()
+
+    def waits(
+        _: Session, *__: object, progress: Callable[[str, int, int], None], **___: object
+    ) -> BackgroundSetup:
+        progress("finding empty regions", 1, 4)
+        at_work.set()
+        while True:
+            progress("finding empty regions", 2, 4)
+            time.sleep(0.01)
+
+    monkeypatch.setattr(masks, "set_up_background", waits)
+    assert studio.client.post(f"{PLACE}/background", json={"source": "median"}).status_code == 202
+    assert at_work.wait(PATIENCE)
+    job = studio.client.get(f"{PLACE}/background").json()["job"]
+    assert (job["step"], job["total"]) == ("finding empty regions", 4)
+    again = studio.client.post(f"{PLACE}/background", json={"source": "median"})
+    assert again.status_code == 409
+    assert studio.client.delete(f"{PLACE}/background").status_code == 202
+    assert ended(studio)["state"] == "cancelled"
+
+
+def test_what_cannot_be_is_refused_in_words(studio: Studio) -> None:
+    assert studio.client.post(f"{PLACE}/background", json={"source": "magic"}).status_code == 422
+    wrong = studio.client.post(f"{PLACE}/background", json={"source": "median", "knobs": {"mask_x": 1}})
+    assert wrong.status_code == 422
+    studio.client.post(f"{PLACE}/background", json={"source": "plate"})
+    job = ended(studio)
+    assert job["state"] == "failed"
+    assert "has no plate" in job["message"]
+
+
+def test_a_failure_leaves_backgrounds_as_they_were(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: object, **__: object) -> None:
+        raise FootageError("The clip ends.", "Give another.")
+
+    monkeypatch.setattr("studio.runs.setup.background_setup.given_backgrounds", fails)
+    studio.client.post(f"{PLACE}/background", json={"source": "median"})
+    assert ended(studio)["message"] == "The clip ends."
+    assert not (studio.workspace.session("take1").path / "evidence.json").exists()
+
+
+def test_uploaded_plates_are_matched_by_name_or_as_said(studio: Studio) -> None:
+    sources = studio.workspace.session("take1").manifest.footage.cameras
+    source = sources[0]
+    picture = np.full((source.height, source.width, 3), 90, np.uint8)
+    for camera in sources:
+        upload = plate_upload(studio, f"empty_{camera.name}.png", picture)
+        response = studio.client.post(f"{PLACE}/backgrounds", json={"upload": upload})
+        assert response.status_code == 200, response.text
+        assert studio.client.get(f"/api/uploads/{upload}").status_code == 404
+    assert [camera["given"] for camera in response.json()["cameras"]] == ["plate"] * len(sources)
+    assert "plate" in response.json()["possible"]
+    named = plate_upload(studio, "whatever.png", picture)
+    wish = {"upload": named, "files": {source.name: "whatever.png"}}
+    assert studio.client.post(f"{PLACE}/backgrounds", json=wish).status_code == 200
+    small = plate_upload(studio, f"{source.name}.png", picture[:10, :10])
+    assert studio.client.post(f"{PLACE}/backgrounds", json={"upload": small}).status_code == 422
+    outside = {"upload": plate_upload(studio, "a.png", picture), "files": {source.name: "../../a.png"}}
+    assert studio.client.post(f"{PLACE}/backgrounds", json=outside).status_code in (403, 422)
+
+
+def test_strokes_are_painted_tried_kept_and_carried(studio: Studio) -> None:
+    ball = patched_ball(studio.workspace.root / "ball")
+    here = "/api/sessions/ball"
+    place = f"{here}/strokes"
+    before = studio.client.get(place).json()["cameras"]
+    assert [(one["camera"], one["strokes"], one["ready"]) for one in before] == [
+        (f"cam{n}", [], False) for n in range(3)
+    ]
+    assert "strokes" not in studio.client.get(f"{here}/background").json()["possible"]
+    painted = {
+        name: [
+            {
+                "frame": 2,
+                "kind": one.kind,
+                "width": one.width,
+                "points": [list(point) for point in one.points],
+            }
+            for one in ball.strokes(2, name)
+        ]
+        for name in ("cam0", "cam1", "cam2")
+    }
+    strokes, true = painted["cam1"], ball.masks["cam1", 2]
+    assert (
+        studio.client.post(f"{place}/cam1/preview", json={"frame": 0, "strokes": strokes}).status_code == 204
+    )
+    paths = studio.client.get("/api/openapi.json").json()["paths"]
+    assert "204" in paths["/api/sessions/{session}/strokes/{camera}/preview"]["post"]["responses"]
+    shown = studio.client.post(f"{place}/cam1/preview", json={"frame": 2, "strokes": strokes})
+    assert shown.headers["content-type"] == "image/png"
+    picture = cv2.imdecode(np.frombuffer(shown.content, np.uint8), cv2.IMREAD_UNCHANGED)
+    assert picture is not None
+    assert picture.shape == (*true.shape, 4)
+    assert overlap(picture[..., 3], true) > 0.9
+    wrong = [*strokes, {"frame": 99, "kind": "inside", "width": 1, "points": [[5, 5]]}]
+    refused = studio.client.put(f"{place}/cam1", json={"strokes": wrong})
+    assert refused.status_code >= 400
+    assert "no frame 99" in refused.json()["message"]
+    assert studio.client.put(f"{place}/side", json={"strokes": strokes}).status_code == 404
+    for name, those in painted.items():
+        assert studio.client.put(f"{place}/{name}", json={"strokes": those}).status_code == 200
+    kept = studio.client.get(place).json()["cameras"][1]
+    assert (kept["strokes"], kept["ready"], kept["made"]) == (strokes, True, False)
+    assert (
+        studio.client.post(f"{here}/background", json={"source": "strokes", "tune": False}).status_code == 202
+    )
+    assert ended(studio, here)["state"] == "done"
+    after = studio.client.get(f"{here}/background").json()
+    assert after["source"] == "strokes"
+    assert "best" in after["possible"]
+    assert studio.client.get(place).json()["cameras"][1]["made"]
+
+
+def test_strokes_can_be_painted_again_after_the_footage_has_become_shorter(studio: Studio) -> None:
+    ball = patched_ball(studio.workspace.root / "ball")
+    late = [
+        Stroke(camera=name, frame=FRAMES - 1, kind="inside", width=4.0, points=((5.0, 5.0),))
+        for name in ("cam0", "cam1", "cam2")
+    ]
+    write_strokes(ball.session, late)
+    change_footage(ball.session, offsets={"cam0": 1})
+    place = "/api/sessions/ball/strokes"
+    assert [one["strokes"] for one in studio.client.get(place).json()["cameras"]] == [[], [], []]
+    again = {"frame": 0, "kind": "inside", "width": 4, "points": [[5, 5]]}
+    for name in ("cam0", "cam1", "cam2"):
+        kept = studio.client.put(f"{place}/{name}", json={"strokes": [again]})
+        assert kept.status_code == 200, kept.text
+    assert "strokes" in studio.client.get("/api/sessions/ball/background").json()["possible"]
+
+
+def test_one_of_several_is_chosen_by_where_he_stands(studio: Studio) -> None:
+    made = two_people(studio.workspace.root / "two", 2)
+    place = "/api/sessions/two"
+    seen = studio.client.get(f"{place}/subjects").json()["subjects"]
+    assert len(seen) == 2
+    assert all(0.0 <= share < 1.0 for one in seen for point in one["points"].values() for share in point)
+    before = studio.client.get(f"{place}/background").json()
+    assert "subject" in before["possible"]
+    nobody = studio.client.post(f"{place}/background", json={"source": "subject"})
+    assert nobody.status_code == 202
+    assert "Nobody was chosen" in ended(studio, place)["message"]
+    chosen = min(seen, key=lambda one: abs(one["at"][0] - made.places()[1][0]))
+    request = {"source": "subject", "subject_at": chosen["at"]}
+    assert studio.client.post(f"{place}/background", json=request).status_code == 202
+    job = ended(studio, place)
+    assert job["state"] == "done", job
+    assert job["quality"]["subjects"] == 1
+    assert studio.client.get(f"{place}/background").json()["source"] == "subject"
+    footage = Session(made.session.path).footage()
+    mask = footage.mask("cam1", 1)
+    footage.close()
+    assert mask is not None
+    assert overlap(mask, made.masks[1]["cam1", 1]) > overlap(mask, made.masks[0]["cam1", 1])
+
+
+@pytest.mark.parametrize("place", [[1.0], ["x", 0.0], [0.0, 1.0, 2.0], 3.0])
+def test_a_place_is_two_numbers(studio: Studio, place: object) -> None:
+    refused = studio.client.post(f"{PLACE}/background", json={"source": "subject", "subject_at": place})
+    assert refused.status_code == 422

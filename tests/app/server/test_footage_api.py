@@ -1,0 +1,160 @@
+"""Offsets, turns and their estimate over the API."""
+
+import threading
+import time
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from waiting import PATIENCE
+from web_doubles import Studio
+
+from studio.app.server import footage_routes
+from studio.footage.capture.synchrony import PairLag, Synchrony
+from studio.foundations.errors import FootageError
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+
+HERE = "/api/sessions/take1/footage"
+SYNCHRONY = "/api/sessions/take1/synchrony"
+FOUND = Synchrony(
+    {"cam1": 0, "cam2": 3}, {"cam1": 2.5, "cam2": 2.5}, {"cam1": 1, "cam2": 1},
+    (PairLag("cam1", "cam2", 3, 0.9, 2.5, 1),), True, (),
+)  # fmt: skip
+
+
+def ended(studio: Studio) -> dict:
+    deadline = time.monotonic() + PATIENCE
+    while time.monotonic() < deadline:
+        response = studio.client.get(SYNCHRONY).json()
+        if response["state"] not in ("queued", "running", "cancelling"):
+            return response
+    raise AssertionError("the estimate did not end")
+
+
+def test_the_footage_as_it_is(studio: Studio) -> None:
+    response = studio.client.get(HERE).json()
+    assert (response["frame_count"], response["fps"], response["stale_runs"]) == (4, 25.0, [])
+    assert response["layout"] == "folder in the studio's layout"
+    assert [(camera["name"], camera["offset"], camera["turned"]) for camera in response["cameras"]] == [
+        ("cam1", 0, 0),
+        ("cam2", 0, 0),
+    ]
+
+
+def test_a_change_is_written_and_says_what_it_makes_stale(studio: Studio, tracked: StoredRun) -> None:
+    picture = studio.client.get("/api/sessions/take1/thumbnail.jpg")
+    assert picture.status_code == 200
+    response = studio.client.patch(HERE, json={"offsets": {"cam2": 1}, "rotations": {"cam1": 180}}).json()
+    assert [(camera["offset"], camera["turned"]) for camera in response["cameras"]] == [(0, 180), (1, 0)]
+    assert response["frame_count"] == 3
+    assert response["stale_runs"] == ["first"]
+    assert any("Run first was tracked before this change" in note for note in response["notes"])
+    assert any("start pose" in note for note in response["notes"])
+    # The run keeps its numbers.
+    assert studio.client.get("/api/sessions/take1/runs/first").status_code == 200
+    assert tracked.record.last == 4
+    again = studio.client.get(HERE).json()
+    assert again["stale_runs"] == ["first"]
+    footage = Session(tracked.folder.parent.parent).footage()
+    other = cv2.imread(str(Path(footage.folder) / "pictures" / "cam1" / "0002.png"))
+    np.testing.assert_array_equal(footage.picture("cam1", 2), cv2.rotate(other, cv2.ROTATE_180))
+    nothing = studio.client.patch(HERE, json={"offsets": {"cam2": 1}}).json()
+    assert nothing["notes"] == ["Nothing changes."]
+
+
+@pytest.mark.parametrize(
+    ("wish", "said"),
+    [
+        ({"offsets": {"cam9": 1}}, "There is no camera 'cam9'"),
+        ({"offsets": {"cam1": 4}}, "no frame is left"),
+        ({"rotations": {"cam1": 90}}, "are 64x96, and its calibration is for 96x64"),
+    ],
+)
+def test_what_cannot_be_changed(studio: Studio, wish: dict, said: str) -> None:
+    answer = studio.client.patch(HERE, json=wish)
+    assert 400 <= answer.status_code < 500
+    assert said in answer.json()["message"]
+    assert answer.json()["hint"]
+    assert [camera["offset"] for camera in studio.client.get(HERE).json()["cameras"]] == [0, 0]
+
+
+def test_requests_that_make_no_sense(studio: Studio) -> None:
+    for wish in ({"rotations": {"cam1": 45}}, {"offsets": {"cam1": "x"}}, {"speed": 3}):
+        assert studio.client.patch(HERE, json=wish).status_code == 422
+
+
+def test_an_estimate_is_shown_and_not_applied(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[float] = []
+
+    def estimate(session: Session, report: object, within: float) -> Synchrony:
+        asked.append(within)
+        assert callable(report)
+        report("motion in cam1", 2, 4)
+        return FOUND
+
+    monkeypatch.setattr(footage_routes, "synchrony_of", estimate)
+    assert studio.client.get(SYNCHRONY).json() is None
+    assert studio.client.post(SYNCHRONY, json={"within": 2.0}).status_code == 202
+    response = ended(studio)
+    assert (response["state"], response["offsets"], response["sure"]) == (
+        "done",
+        {"cam1": 0, "cam2": 3},
+        True,
+    )
+    assert response["confidence"] == {"cam1": 2.5, "cam2": 2.5}
+    assert response["spread"] == {"cam1": 1, "cam2": 1}
+    assert response["pairs"][0]["lag"] == 3
+    assert asked == [2.0]
+    assert [camera["offset"] for camera in studio.client.get(HERE).json()["cameras"]] == [0, 0]
+
+
+def test_a_real_estimate_of_too_few_frames_says_why(studio: Studio) -> None:
+    studio.client.post(SYNCHRONY)
+    response = ended(studio)
+    assert response["state"] == "failed"
+    assert "Camera cam1 has 4 frames" in response["message"]
+    assert response["hint"]
+
+
+def test_an_estimate_can_be_stopped(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+    begun, stopped = threading.Event(), threading.Event()
+
+    def estimate(session: Session, report: object, within: float) -> Synchrony:
+        begun.set()
+        assert stopped.wait(PATIENCE)
+        assert callable(report)
+        report("motion in cam1", 2, 4)
+        raise FootageError("not stopped", "")
+
+    monkeypatch.setattr(footage_routes, "synchrony_of", estimate)
+    studio.client.post(SYNCHRONY)
+    assert begun.wait(PATIENCE)
+    studio.client.delete(SYNCHRONY)
+    stopped.set()
+    response = ended(studio)
+    assert (response["state"], response["code"]) == ("cancelled", "cancelled")
+
+
+def test_an_import_puts_cameras_in_step_and_says_whose_layout_it_was(studio: Studio, source: Path) -> None:
+    wish = {
+        "name": "stepped",
+        "source": str(source),
+        "fps": 25,
+        "offsets": {"cam2": 1},
+        "rotations": {"cam1": 180},
+        "unit": "mm",
+    }
+    identifier = studio.client.post("/api/imports", json=wish).json()["identifier"]
+    deadline = time.monotonic() + PATIENCE
+    state = {"state": "running"}
+    while state["state"] in ("queued", "running", "cancelling") and time.monotonic() < deadline:
+        state = studio.client.get(f"/api/imports/{identifier}").json()
+    assert state["state"] == "done", state
+    assert state["layout"] == "folder in the studio's layout"
+    response = studio.client.get("/api/sessions/stepped/footage").json()
+    assert [(camera["offset"], camera["turned"]) for camera in response["cameras"]] == [(0, 180), (1, 0)]
+    assert response["frame_count"] == 3
+    for bad in ({"trial": 3}, {"rotations": {"cam1": 30}}, {"unit": "inch"}, {"up": "w"}):
+        assert studio.client.post("/api/imports", json={**wish, "name": "other", **bad}).status_code == 422

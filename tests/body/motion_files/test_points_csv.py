@@ -1,0 +1,116 @@
+"""CSV files of named points: both shapes, units, gaps, and everything that can be wrong with one."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from studio.body.motion_files.points_csv import read_points
+from studio.body.motion_files.truth_files import read_truth
+from studio.foundations.errors import StudioError, TruthError
+
+LONG = "frame,point,x_mm,y_mm,z_mm,score\n0,Nose,1,2,3,0.9\n0,Tail,4,5,6,0.8\n2,Nose,7,8,9,0.7\n2,Tail,,,,\n"
+
+
+def written(folder: Path, text: str, name: str = "points.csv") -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_row_a_point_with_a_frame_left_out_and_a_point_missing(tmp_path: Path) -> None:
+    motion = read_points(written(tmp_path, LONG), 30.0)
+    assert motion.names == ("Nose", "Tail")
+    assert motion.unit == "mm"
+    np.testing.assert_allclose(motion.times, [0.0, 1 / 30, 2 / 30])
+    np.testing.assert_allclose(motion.positions[0], [[1, 2, 3], [4, 5, 6]])
+    assert np.isnan(motion.positions[1]).all()
+    np.testing.assert_allclose(motion.positions[2, 0], [7, 8, 9])
+    assert np.isnan(motion.positions[2, 1]).all()
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_a_row_a_frame_as_anipose_writes_it(tmp_path: Path, separator: str) -> None:
+    rows = [
+        ["Ear_L_x", "Ear_L_y", "Ear_L_z", "Ear_L_error", "M_00", "Nose_x", "Nose_y", "Nose_z", "fnum"],
+        ["1.5", "2", "3", "0.2", "1", "4", "5", "6", "0"],
+        ["nan", "nan", "nan", "", "0", "4", "5", "7", "1"],
+    ]
+    motion = read_points(written(tmp_path, "\n".join(map(separator.join, rows))), 60.0)
+    assert motion.names == ("Ear_L", "Nose")
+    assert motion.unit == ""
+    np.testing.assert_allclose(motion.positions[0], [[1.5, 2, 3], [4, 5, 6]])
+    assert np.isnan(motion.positions[1, 0]).all()
+
+
+def test_metres_and_seconds(tmp_path: Path) -> None:
+    motion = read_truth(written(tmp_path, "time,marker,x_m,y_m,z_m\n0.5,Hip,1,0,0.25\n"), 10.0)
+    assert len(motion.times) == 6
+    np.testing.assert_allclose(motion.positions[5, 0], [1000, 0, 250])
+
+
+@pytest.mark.parametrize(
+    ("text", "cause"),
+    [
+        ("", "no rows"),
+        ("frame,point,x,y,z\n", "no rows"),
+        ("point,x,y,z\nNose,1,2,3\n", "frames or times"),
+        ("frame,point,u,v\n0,Nose,1,2\n", "coordinates"),
+        ("frame,point,x,y\n0,Nose,1,2\n", "no column z"),
+        ("frame,Nose_x,Nose_y\n0,1,2\n", "point 'Nose'"),
+        ("frame,point,x,x,z\n0,Nose,1,2,3\n", "two columns 'x'"),
+        ("frame,point,x_mm,y_m,z_mm\n0,Nose,1,2,3\n", "m, mm"),
+        ("frame,point,x,y,z\n0,Nose,1,2\n", "line 2 has 4 columns"),
+        ("frame,point,x,y,z\n0,Nose,1,2,3,4\n", "line 2 has 6 columns"),
+        ("frame,point,x,y,z\n0,Nose,1,two,3\n", "y of point 'Nose' is 'two'"),
+        ("frame,point,x,y,z\n0,Nose,1,,3\n", "y of point 'Nose' is ''"),
+        ("frame,point,x,y,z\n0,Nose,1,inf,3\n", "'inf'"),
+        ("frame,point,x,y,z\n0,Nose,1,1e12,3\n", "1e\\+12"),
+        ("frame,point,x,y,z\n0,,1,2,3\n", "names no point"),
+        ("frame,point,x,y,z\n-1,Nose,1,2,3\n", "'-1' is no frame"),
+        ("frame,point,x,y,z\n0.5,Nose,1,2,3\n", "'0.5' is no frame"),
+        ("frame,point,x,y,z\n999999999,Nose,1,2,3\n", "is no frame"),
+        ("frame,point,x,y,z\nnan,Nose,1,2,3\n", "is no frame"),
+        ("time,point,x,y,z\n-2,Nose,1,2,3\n", "is no time"),
+        ("frame,point,x,y,z\n0,Nose,1,2,3\n0,Nose,1,2,3\n", "a second time"),
+        ('frame,point,x,y,z\n0,"Nose,1,2,3\n', "damaged"),
+        ("frame,point,x,y,z\n0,N\0ose,1,2,3,4,5\n", "line 2"),
+    ],
+)
+def test_what_is_wrong_is_named(tmp_path: Path, text: str, cause: str) -> None:
+    with pytest.raises(TruthError, match=cause) as raised:
+        read_points(written(tmp_path, text), 30.0)
+    assert "points.csv" in str(raised.value)
+    assert raised.value.hint
+
+
+def test_more_numbers_than_memory_holds_are_refused(tmp_path: Path) -> None:
+    rows = "\n".join(f"0,p{number},1,2,3" for number in range(200))
+    with pytest.raises(TruthError, match="200 points and 500000"):
+        read_points(written(tmp_path, f"frame,point,x,y,z\n{rows}\n499999,p0,1,2,3\n"), 30.0)
+
+
+def test_other_files_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(TruthError, match="no truth that can be read"):
+        read_truth(written(tmp_path, LONG, "points.txt"), 30.0)
+    with pytest.raises(TruthError, match="cannot be read"):
+        read_truth(tmp_path / "none.csv", 30.0)
+    (tmp_path / "bytes.csv").write_bytes(bytes(range(256)))
+    with pytest.raises(TruthError, match=r"bytes\.csv"):
+        read_truth(tmp_path / "bytes.csv", 30.0)
+
+
+@pytest.mark.slow
+@given(st.integers(0, len(LONG) - 1), st.text(max_size=4))
+def test_no_change_of_a_file_raises_anything_else(
+    tmp_path_factory: pytest.TempPathFactory, at: int, put: str
+) -> None:
+    path = tmp_path_factory.mktemp("fuzz") / "points.csv"
+    path.write_bytes((LONG[:at] + put + LONG[at + 1 :]).encode("utf-8", "surrogatepass"))
+    try:
+        motion = read_points(path, 30.0)
+    except StudioError:
+        return
+    assert motion.positions.shape == (len(motion.times), len(motion.names), 3)

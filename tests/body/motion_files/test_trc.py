@@ -1,0 +1,106 @@
+"""TRC files in and out."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from studio.body.motion_files.trc import MarkerMotion, read_trc, write_trc
+from studio.foundations.errors import TruthError
+
+HEADER = (
+    "PathFileType\t4\t(X/Y/Z)\twalk.trc\n"
+    "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames\n"
+    "60\t60\t2\t2\t{unit}\t60\t1\t2\n"
+    "Frame#\tTime\tHip\t\t\tNeck\t\t\n"
+    "\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n"
+    "\n"
+)
+ROWS = "1\t0.0\t1\t2\t3\t4\t5\t6\n2\t0.0166667\t1.5\t2.5\t3.5\t4.5\t5.5\t6.5\n"
+
+
+def written(folder: Path, rows: str = ROWS, unit: str = "m", header: str = HEADER) -> Path:
+    path = folder / "walk.trc"
+    path.write_text(header.format(unit=unit) + rows)
+    return path
+
+
+def test_y_up_metres_become_z_up_millimetres(tmp_path: Path) -> None:
+    motion = read_trc(written(tmp_path))
+    assert motion.names == ("Hip", "Neck")
+    np.testing.assert_allclose(motion.positions[0], [[3000, 1000, 2000], [6000, 4000, 5000]])
+    np.testing.assert_allclose(motion.times, [0.0, 0.0166667])
+    assert (motion.unit, motion.rate) == ("m", 60.0)
+
+
+def test_the_unit_of_the_header_counts(tmp_path: Path) -> None:
+    np.testing.assert_allclose(read_trc(written(tmp_path, unit="mm")).positions[0, 0], [3, 1, 2])
+
+
+@pytest.mark.parametrize(("unit", "tolerance"), [("m", 1e-4), ("mm", 1e-4)])
+def test_what_is_written_is_read_back(tmp_path: Path, unit: str, tolerance: float) -> None:
+    rng = np.random.default_rng(3)
+    positions = rng.normal(0.0, 1000.0, (5, 3, 3))
+    positions[2, 1] = np.nan
+    motion = MarkerMotion(("A", "B", "C"), np.arange(5) / 60.0, positions, unit, 60.0)
+    write_trc(tmp_path / "out.trc", motion)
+    back = read_trc(tmp_path / "out.trc")
+    np.testing.assert_allclose(back.positions, positions, atol=tolerance)
+    np.testing.assert_allclose(back.times, motion.times, atol=1e-8)
+    assert back.names == motion.names
+    assert [path.name for path in tmp_path.iterdir()] == ["out.trc"]
+
+
+@pytest.mark.parametrize("unit", ["m", "cm", "mm"])
+def test_a_marker_in_the_origin_is_not_missing(tmp_path: Path, unit: str) -> None:
+    positions = np.zeros((2, 1, 3))
+    write_trc(tmp_path / "out.trc", MarkerMotion(("A",), np.arange(2) / 60.0, positions, unit, 60.0))
+    np.testing.assert_allclose(read_trc(tmp_path / "out.trc").positions, positions, atol=2e-4)
+
+
+def test_a_marker_with_three_blank_cells_is_missing(tmp_path: Path) -> None:
+    motion = read_trc(written(tmp_path, ROWS.replace("4.5\t5.5\t6.5", "\t\t")))
+    assert np.isnan(motion.positions[1, 1]).all()
+    assert np.isfinite(motion.positions[1, 0]).all()
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        (ROWS.replace("2.5", "nan"), "line 8 gives only part of marker Hip"),
+        (ROWS.replace("2.5", "inf"), "column 4 (Hip Y)"),
+        (ROWS.replace("5.5", "five"), "column 7 (Neck Y) is 'five'"),
+        (ROWS.replace("0.0166667", ""), "column 2 (Time)"),
+        (ROWS.replace("2.5", ""), "only part of marker Hip"),
+        (ROWS.replace("\t6.5", ""), "line 8 has 7 columns, not 8"),
+        (ROWS.replace("0.0166667", "0.0"), "does not rise"),
+        (ROWS.splitlines()[0], "has 1 rows and its header says 2"),
+        ("", "has 0 rows"),
+    ],
+)
+def test_a_broken_row_is_named(tmp_path: Path, rows: str, message: str) -> None:
+    with pytest.raises(TruthError) as caught:
+        read_trc(written(tmp_path, rows))
+    assert message in caught.value.message
+    assert caught.value.hint
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("{unit}", "feet"), "unit 'feet'"),
+        (("Neck", "Hip"), "marker 'Hip' twice"),
+        (("60\t60\t2\t2", "60\t60\t2\t3"), "2 markers and line 3 says 3"),
+        (("PathFileType", "Something"), "five header lines"),
+        (("60\t60\t2", "x\t60\t2"), "no DataRate"),
+    ],
+)
+def test_a_broken_header_is_named(tmp_path: Path, change: tuple[str, str], message: str) -> None:
+    with pytest.raises(TruthError, match=message):
+        read_trc(written(tmp_path, header=HEADER.replace(*change)))
+
+
+def test_binary_rubbish_is_no_trc(tmp_path: Path) -> None:
+    (tmp_path / "x.trc").write_bytes(bytes(range(256)))
+    with pytest.raises(TruthError, match="is not a TRC file"):
+        read_trc(tmp_path / "x.trc")

@@ -1,0 +1,150 @@
+"""Blobs learnt from hulls whose colours and poses are known."""
+
+import itertools
+
+import numpy as np
+import pytest
+from posed_hulls import empty_hull, hull_of, learn_blobs, limb_colours, near, plain
+
+from studio.body.catalogue import load_body
+from studio.body.model import BodyModel
+from studio.evidence.volume.blob_acquisition import (
+    BINS,
+    SUMS,
+    Profiles,
+    blobs_of,
+    colour_change,
+    parts_of,
+)
+from studio.evidence.volume.blob_model import cone_blobs
+
+Array = np.ndarray
+
+
+@pytest.fixture(scope="module")
+def body() -> BodyModel:
+    return load_body("human25")
+
+
+def limb_number(body: BodyModel, name: str) -> int:
+    return next(index for index, limb in enumerate(body.drawn) if limb.name == name)
+
+
+def slices_of(colours: Array, spread: float = 5.0, length: float = 400.0) -> Array:
+    """(BINS, SUMS) of a limb with the given colour in each slice."""
+    rng = np.random.default_rng(0)
+    made = np.zeros((BINS, SUMS))
+    for index, colour in enumerate(colours):
+        z = length * (index + rng.random(200)) / BINS
+        place = np.column_stack([rng.normal(0, 20, (200, 2)), z])
+        seen = colour + rng.normal(0, spread, (200, 3))
+        rows = np.column_stack([np.ones(200), place, place**2, place[:, 2:] * seen, seen, seen**2])
+        made[index] = rows.sum(axis=0)
+    return made
+
+
+def stepped(*levels: float) -> Array:
+    """(BINS, 3) equal stretches of grey."""
+    return np.repeat(np.array(levels), BINS // len(levels))[:, None] * np.ones(3)
+
+
+def test_limbs_of_one_colour_keep_one_blob_and_it_is_the_limbs(body: BodyModel) -> None:
+    poses = np.stack([near(body, body.neutral, seed, frames=4) for seed in range(5)])
+    model = learn_blobs(body, [hull_of(body, pose, seed=n) for n, pose in enumerate(poses)], poses)
+    cones, colours = cone_blobs(body), limb_colours(body)
+    shins = [limb_number(body, "left shin"), limb_number(body, "right forearm"), limb_number(body, "head")]
+    for limb in shins:
+        (blob,) = np.flatnonzero(model.limb == limb)
+        np.testing.assert_allclose(model.colour[blob], colours[limb], atol=4.0)
+        assert model.offset[blob] == pytest.approx(cones.offset[limb], abs=20.0)
+        # The grid's own size is in the eigenvalues, and joints are shared with neighbours.
+        np.testing.assert_allclose(
+            np.sqrt(model.eigenvalues[blob]), np.sqrt(cones.eigenvalues[limb]), atol=8.0
+        )
+    assert model.weight.sum() == pytest.approx(1.0)
+
+
+def test_a_limb_of_two_colours_is_split_where_they_meet(body: BodyModel) -> None:
+    thigh = limb_number(body, "left thigh")
+    even = plain(body)
+
+    def shorts(limb: int, along: Array) -> Array:
+        colours = even(limb, along)
+        if limb == thigh:
+            colours = np.where(along[:, None] < 0.4, [40.0, 60.0, 80.0], [150.0, 160.0, 190.0])
+        return colours
+
+    poses = np.stack([near(body, body.neutral, seed, frames=4) for seed in range(4)])
+    hulls = [hull_of(body, pose, colour=shorts, seed=n) for n, pose in enumerate(poses)]
+    model = learn_blobs(body, hulls, poses)
+    own = np.flatnonzero(model.limb == thigh)
+    assert len(own) == 2
+    length = abs(body.drawn[thigh].length)
+    ends = [blob for blob in own if abs(model.offset[blob]) > 0.4 * length]
+    tops = [blob for blob in own if abs(model.offset[blob]) <= 0.4 * length]
+    np.testing.assert_allclose(model.colour[tops[0]], [40, 60, 80], atol=15)
+    np.testing.assert_allclose(model.colour[ends[0]], [150, 160, 190], atol=15)
+    share = model.weight[tops[0]] / model.weight[own].sum()
+    assert share == pytest.approx(0.45, abs=0.1)
+    assert len(np.flatnonzero(model.limb == limb_number(body, "right thigh"))) == 1
+
+
+def test_the_criterion_in_closed_form() -> None:
+    """A step of Δ in the middle of an even limb: cov(z, c) = Δ L / 8 a channel, over L / √12."""
+    grey = colour_change(slices_of(stepped(80.0, 120.0)).sum(axis=0))
+    assert grey == pytest.approx(np.sqrt(3) * 40.0 * np.sqrt(12) / 8, rel=0.03)
+    assert colour_change(slices_of(stepped(80.0)).sum(axis=0)) < 1.0
+    longer = colour_change(slices_of(stepped(80.0, 120.0), length=90.0).sum(axis=0))
+    assert longer == pytest.approx(grey, rel=0.05)
+
+
+def test_splits_go_where_colours_change_and_stop_at_the_threshold() -> None:
+    assert parts_of(slices_of(stepped(80.0)), 12.0) == [(0, BINS)]
+    assert parts_of(slices_of(stepped(80.0, 140.0)), 12.0) == [(0, 12), (12, BINS)]
+    assert parts_of(slices_of(stepped(40.0, 100.0, 160.0)), 12.0) == [(0, 8), (8, 16), (16, BINS)]
+    assert parts_of(slices_of(stepped(40.0, 100.0, 160.0)), 12.0, most_parts=2) in (
+        [(0, 8), (8, BINS)],
+        [(0, 16), (16, BINS)],
+    )
+    assert parts_of(slices_of(stepped(80.0, 90.0)), 12.0) == [(0, BINS)]
+    # As the paper's criterion has it, stripes that return to where they began are no change along the bone.
+    assert parts_of(slices_of(stepped(80.0, 140.0, 80.0)), 12.0) == [(0, BINS)]
+
+
+def test_halves_of_different_splits_merge() -> None:
+    """A steady climb within a step: cut first at the step, then in its parts, of which two are alike again."""
+    slices = slices_of(stepped(40.0, 40.0, 90.0, 90.0, 90.0, 190.0))
+    parts = parts_of(slices, 12.0)
+    assert parts == [(0, 8), (8, 20), (20, BINS)]
+    for first, second in itertools.pairwise(parts):
+        union = slices[first[0] : second[1]].sum(axis=0)
+        assert colour_change(union) >= 6.0
+
+
+def test_frames_add_up_and_a_limb_never_seen_keeps_its_cone(body: BodyModel) -> None:
+    pose = body.neutral
+    hull = hull_of(body, pose)
+    profiles = Profiles.none(body).with_frame(body, cone_blobs(body), hull, pose)
+    assert profiles.sums[..., 0].sum() == pytest.approx(hull.volume())
+    twice = profiles.with_frame(body, cone_blobs(body), hull, pose)
+    assert twice.frames == 2
+    np.testing.assert_allclose(twice.sums, 2.0 * profiles.sums)
+    once, again = blobs_of(body, profiles, 12.0), blobs_of(body, twice, 12.0)
+    np.testing.assert_allclose(again.eigenvalues, once.eigenvalues)
+    hidden = limb_number(body, "right foot")
+    sums = profiles.sums.copy()
+    sums[hidden] = 0.0
+    model = blobs_of(body, Profiles(sums, 1), 12.0)
+    (blob,) = np.flatnonzero(model.limb == hidden)
+    cones = cone_blobs(body)
+    assert np.isnan(model.colour[blob]).all()
+    assert model.offset[blob] == cones.offset[hidden]
+    assert 0.0 < model.weight[blob] < cones.weight[hidden]
+
+
+def test_nothing_learnt_is_the_cones(body: BodyModel) -> None:
+    model, cones = blobs_of(body, Profiles.none(body), 12.0), cone_blobs(body)
+    for name in ("limb", "offset", "eigenvalues", "colour", "weight"):
+        np.testing.assert_array_equal(getattr(model, name), getattr(cones, name))
+    learnt = learn_blobs(body, [empty_hull()], body.neutral[None])
+    np.testing.assert_array_equal(learnt.offset, cones.offset)

@@ -1,0 +1,107 @@
+"""A tracker on a footage, in memory: measured, reproducible, and as plain values."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
+from studio.evidence.settings import EvidenceSettings
+from studio.foundations.errors import NotFoundError, SessionError
+from studio.foundations.progress import heard_by
+from studio.results.comparison.footage_cache import FootageCache
+from studio.results.comparison.tracked import Changed, TrackingTrial, track
+
+SAMPLES = Path(__file__).parents[4] / "sample_sessions"
+SMALL = {"layers": 3, "particles": 20}
+
+
+@pytest.fixture(scope="module")
+def cache():
+    """The bundled sessions."""
+    found = FootageCache(SAMPLES)
+    yield found
+    found.close()
+
+
+def attempt(**wanted) -> TrackingTrial:
+    """A few frames of the walk."""
+    fields = {"seed": 3, "changes": SMALL, "last": 4, **wanted}
+    return TrackingTrial("walk", "annealed", "edge-region", **fields)
+
+
+def same(one, other) -> bool:
+    """All fields but the time."""
+    return {**asdict(one), "seconds": 0} == {**asdict(other), "seconds": 0}
+
+
+def test_an_attempt_is_measured_and_gives_the_same_again(cache) -> None:
+    first = track(attempt(), cache)
+    assert first.frames == [0, 1, 2, 3]
+    assert first.evaluations == 60
+    assert 0.0 < first.mean_mm < 150.0
+    assert first.worst_mm == max(first.per_frame_mm)
+    assert same(first, track(attempt(), cache))
+    assert not same(first, track(attempt(seed=4), cache))
+
+
+def test_attempts_and_results_survive_json(cache) -> None:
+    kept = attempt(cameras=("cam1", "cam3"))
+    assert TrackingTrial.of_plain(json.loads(json.dumps(kept.plain()))) == kept
+    json.dumps(asdict(track(attempt(last=1), cache)), allow_nan=False)
+
+
+def test_a_later_first_frame_starts_near_the_truth_and_steps_skip_frames(cache) -> None:
+    found = track(attempt(first=60, last=70, every=3, changes={"particles": 60}), cache)
+    assert found.frames == [60, 63, 66, 69]
+    assert found.per_frame_mm[0] < 40.0
+
+
+def test_damage_changes_the_trackers_input_and_nothing_stored(cache) -> None:
+    def blind(evidence: FrameEvidence) -> FrameEvidence:
+        views = [
+            ViewEvidence(view.camera, view.picture, np.zeros_like(view.mask), np.zeros_like(view.edges))
+            for view in evidence.views
+        ]
+        return FrameEvidence(evidence.frame, tuple(views))
+
+    seen = track(attempt(), cache)
+    assert not same(track(attempt(), cache, spoilt=Changed(evidence=blind)), seen)
+    assert same(track(attempt(), cache), seen)
+
+
+def test_layers_and_frames_are_reported(cache) -> None:
+    layers, frames = [], []
+    with heard_by(lambda step, done, total: frames.append((step, done, total))):
+        track(attempt(last=2), cache, on_layer=layers.append)
+    assert frames == [("tracking", 1, 2), ("tracking", 2, 2)]
+    assert [record.frame for record in layers] == [0] * 6 + [1] * 3
+
+
+def test_unknown_footage_and_camera_are_named(cache) -> None:
+    with pytest.raises(SessionError, match="no-such-walk"):
+        track(TrackingTrial("no-such-walk", "annealed", "edge-region", 0), cache)
+    with pytest.raises(NotFoundError, match="cam9"):
+        track(attempt(cameras=("cam9",)), cache)
+    count = cache.session("walk").manifest.frame_count
+    with pytest.raises(NotFoundError, match=f"no frame {count}"):
+        track(attempt(last=count + 1), cache)
+
+
+def test_the_cache_drops_the_oldest_evidence_first() -> None:
+    cache = FootageCache(SAMPLES, most_bytes=4_000_000)
+    session = cache.session("walk")
+    cameras = session.cameras()
+    try:
+        made = [cache.evidence(session, cameras, frame, EvidenceSettings(), "proximity") for frame in (0, 1)]
+        assert cache.evidence(session, cameras, 1, EvidenceSettings(), "proximity") is made[1]
+        again = cache.evidence(session, cameras, 0, EvidenceSettings(), "proximity")
+        assert again is not made[0]
+        for one, other in zip(again.views, made[0].views, strict=True):
+            np.testing.assert_array_equal(one.mask, other.mask)
+            np.testing.assert_array_equal(one.edges, other.edges)
+            assert one.picture.size == 0
+    finally:
+        cache.close()

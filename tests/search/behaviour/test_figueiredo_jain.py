@@ -1,0 +1,178 @@
+"""Component-wise EM finds the number of Gaussians, and fits them as well as plain EM that is given it."""
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from studio.foundations.errors import BehaviourError
+from studio.search.behaviour.figueiredo_jain import Search, fit_mixture, parameters_of
+from studio.search.behaviour.gaussian_mixture import GaussianMixture
+
+
+@dataclass(frozen=True)
+class Truth:
+    """A mixture with known components."""
+
+    weights: np.ndarray
+    means: np.ndarray
+    covariances: np.ndarray
+
+    def sample(self, count: int, rng: np.random.Generator) -> np.ndarray:
+        numbers = rng.choice(len(self.weights), count, p=self.weights)
+        factors = np.linalg.cholesky(self.covariances)
+        noise = rng.standard_normal((count, self.means.shape[1]))
+        return self.means[numbers] + np.einsum("nij,nj->ni", factors[numbers], noise)
+
+
+def separated() -> Truth:
+    """Five clusters far from each other in three dimensions."""
+    rng = np.random.default_rng(11)
+    means = np.array([[0, 0, 0], [9, 0, 0], [0, 9, 0], [0, 0, 9], [9, 9, 9]], dtype=float)
+    factors = rng.standard_normal((5, 3, 3))
+    return Truth(np.full(5, 0.2), means, factors @ factors.transpose(0, 2, 1) + 0.3 * np.eye(3))
+
+
+def overlapping() -> Truth:
+    """Four clusters, two of which share their mean (the second example of Figueiredo & Jain, section 6.1)."""
+    means = np.array([[-4.0, -4.0], [-4.0, -4.0], [2.0, 2.0], [-1.0, -6.0]])
+    covariances = np.array(
+        [[[1, 0.5], [0.5, 1]], [[6, -2], [-2, 6]], [[2, -1], [-1, 2]], [[0.125, 0], [0, 0.125]]], dtype=float
+    )
+    return Truth(np.array([0.3, 0.3, 0.3, 0.1]), means, covariances)
+
+
+def unequal() -> Truth:
+    """Three elongated clusters of 70, 25 and 5 %."""
+    means = np.array([[0.0, 0.0], [6.0, 0.0], [3.0, 6.0]])
+    covariances = np.array([[[2, 0], [0, 0.2]], [[0.3, 0.2], [0.2, 1.5]], [[0.2, 0], [0, 0.1]]])
+    return Truth(np.array([0.7, 0.25, 0.05]), means, covariances)
+
+
+def plain_em(points: np.ndarray, truth: Truth, steps: int = 100) -> float:
+    """The log-likelihood that textbook EM reaches from the truth, with the right number of components."""
+    weights, means, covariances = truth.weights, truth.means, truth.covariances
+    for _ in range(steps):
+        parts = zip(weights, means, covariances, strict=True)
+        joint = np.stack([w * multivariate_normal(m, c).pdf(points) for w, m, c in parts], axis=1)
+        shares = joint / joint.sum(axis=1, keepdims=True)
+        counts = shares.sum(axis=0)
+        weights, means = counts / len(points), shares.T @ points / counts[:, None]
+        away = points[:, None] - means
+        covariances = np.einsum("nk,nki,nkj->kij", shares, away, away) / counts[:, None, None]
+    return float(np.log(joint.sum(axis=1)).sum())
+
+
+@pytest.mark.parametrize("make", [separated, overlapping, unequal])
+@pytest.mark.parametrize("seed", range(6))
+def test_the_number_of_components_is_found_and_the_fit_is_that_of_plain_em(make, seed: int) -> None:
+    truth = make()
+    rng = np.random.default_rng(seed)
+    points = truth.sample(1000, rng)
+    mixture, history = fit_mixture(points, rng, Search(most=20))
+    assert mixture.size == len(truth.weights)
+    reached, wanted = mixture.log_likelihood(points), plain_em(points, truth)
+    # Its weights are those of a penalised likelihood, so that it stays a little below.
+    assert wanted - 0.005 * len(points) < reached < wanted + 0.001 * len(points)
+    assert [entry.components for entry in history][-1] == 1
+
+
+def test_found_components_are_the_true_ones() -> None:
+    truth = separated()
+    points = truth.sample(3000, np.random.default_rng(5))
+    mixture, _ = fit_mixture(points, np.random.default_rng(6), Search(most=20))
+    distances = np.linalg.norm(mixture.means[:, None] - truth.means, axis=2)
+    match = distances.argmin(axis=0)
+    assert sorted(match) == list(range(5))
+    np.testing.assert_allclose(mixture.weights[match], truth.weights, atol=0.03)
+    np.testing.assert_allclose(mixture.means[match], truth.means, atol=0.3)
+    np.testing.assert_allclose(mixture.covariances[match], truth.covariances, atol=0.8)
+
+
+def test_the_answer_has_the_shortest_message() -> None:
+    points = overlapping().sample(800, np.random.default_rng(1))
+    mixture, history = fit_mixture(points, np.random.default_rng(2), Search(most=15))
+    n, k, size = 800, mixture.size, 2 + 3
+    support = mixture.responsibilities(points).sum(axis=0)
+    length = size / 2 * np.log(support).sum() + k / 2 * np.log(n) - mixture.log_likelihood(points)
+    shortest = min(history, key=lambda entry: entry.length)
+    assert length == pytest.approx(shortest.length, rel=1e-10)
+    assert shortest.components == k
+    assert shortest.log_likelihood == pytest.approx(mixture.log_likelihood(points), rel=1e-10)
+
+
+def test_every_component_has_points_for_its_parameters() -> None:
+    points = np.random.default_rng(0).standard_normal((400, 6))
+    mixture, history = fit_mixture(points, np.random.default_rng(1), Search(most=60))
+    assert mixture.size == 1
+    assert max(entry.components for entry in history) <= 400 / (parameters_of(6, "full") / 2)
+
+
+def test_repeated_and_constant_values_make_no_singularity() -> None:
+    rng = np.random.default_rng(0)
+    points = np.concatenate(
+        [np.zeros((100, 3)), np.ones((100, 3)), 0.1 * rng.standard_normal((100, 3)) + 5.0]
+    )
+    points[:, 2] = 7.0
+    mixture, _ = fit_mixture(points, rng, Search(most=10))
+    assert mixture.size >= 3
+    assert (np.linalg.eigvalsh(mixture.covariances) > 0.0).all()
+    assert np.isfinite(mixture.log_likelihood(points))
+
+
+def test_diagonal_covariances() -> None:
+    rng = np.random.default_rng(4)
+    points = np.concatenate([rng.standard_normal((300, 8)) * 0.3, rng.standard_normal((300, 8)) + 4.0])
+    mixture, _ = fit_mixture(points, rng, Search(most=15, covariance="diagonal"))
+    assert mixture.size == 2
+    off = mixture.covariances * (1.0 - np.eye(8))
+    assert not off.any()
+    assert parameters_of(8, "diagonal") == 16
+
+
+def test_patience_ends_the_search_and_keeps_the_best() -> None:
+    points = separated().sample(1000, np.random.default_rng(9))
+    whole, long = fit_mixture(points, np.random.default_rng(1), Search(most=20))
+    short, history = fit_mixture(points, np.random.default_rng(1), Search(most=20, patience=2))
+    assert len(history) < len(long)
+    np.testing.assert_array_equal(short.means, whole.means)
+
+
+def test_same_seed_same_mixture() -> None:
+    points = unequal().sample(600, np.random.default_rng(0))
+    one, _ = fit_mixture(points, np.random.default_rng(7), Search(most=12))
+    other, _ = fit_mixture(points, np.random.default_rng(7), Search(most=12))
+    np.testing.assert_array_equal(one.covariances, other.covariances)
+
+
+def test_progress_is_reported() -> None:
+    steps: list[tuple[str, int, int]] = []
+    points = unequal().sample(300, np.random.default_rng(0))
+    fit_mixture(points, np.random.default_rng(0), Search(most=8), lambda *step: steps.append(step))
+    assert steps[-1][1:] == (7, 8)
+    assert all(before[1] < after[1] for before, after in itertools.pairwise(steps))
+
+
+@pytest.mark.parametrize(
+    ("points", "search", "words"),
+    [
+        (np.zeros((100, 38)), Search(most=5), "100 frames are too few"),
+        (np.full((100, 2), np.nan), Search(most=5), "not finite"),
+        (np.zeros((100, 2)), Search(most=5, least=6), "from 5 down to 6"),
+        (np.zeros((100, 2)), Search(most=5, covariance="round"), "'round'"),
+    ],
+)
+def test_bad_input_is_refused(points: np.ndarray, search: Search, words: str) -> None:
+    with pytest.raises(BehaviourError, match=words) as refusal:
+        fit_mixture(points, np.random.default_rng(0), search)
+    assert refusal.value.hint
+
+
+def test_mixture_is_a_density() -> None:
+    mixture, _ = fit_mixture(
+        unequal().sample(500, np.random.default_rng(3)), np.random.default_rng(3), Search(most=10)
+    )
+    assert isinstance(mixture, GaussianMixture)
+    assert mixture.weights.sum() == pytest.approx(1.0)

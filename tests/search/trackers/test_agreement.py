@@ -1,0 +1,70 @@
+"""Disagreement of limbs and silhouettes, per limb and in both directions."""
+
+import numpy as np
+import pytest
+from drawn_people import drawn_evidence, ring_of_cameras
+from moving_bodies import standing
+
+from studio.body.model import BodyModel
+from studio.evidence.distance_maps import silhouette_distances
+from studio.search.trackers.agreement import Agreement, limb_names
+from studio.search.trackers.tracker import LIMB_LOST_SHARE
+
+CAMERAS = ring_of_cameras(4, 480, 360)
+
+
+def place(body: BodyModel, **angles: float) -> np.ndarray:
+    """Standing with limbs apart, some angles more."""
+    apart = {"left_shoulder_rx": 0.5, "right_shoulder_rx": -0.5, "left_hip_ry": 0.4, "right_hip_ry": -0.4}
+    return standing(body, **{**apart, **angles})
+
+
+def shares(body: BodyModel, pose: np.ndarray, truth: np.ndarray) -> dict[str, float]:
+    agreement = Agreement(body, CAMERAS)
+    return agreement.of(pose, silhouette_distances(drawn_evidence(body, truth, CAMERAS))).shares()
+
+
+def test_the_true_pose_agrees_everywhere(body: BodyModel) -> None:
+    truth = place(body)
+    assert max(shares(body, truth, truth).values()) < 0.5 * LIMB_LOST_SHARE
+
+
+@pytest.mark.parametrize(
+    ("limb", "angle", "by"), [("left arm", "left_shoulder_ry", 0.9), ("right leg", "right_hip_ry", -0.7)]
+)
+def test_a_misplaced_limb_is_the_one_that_disagrees(
+    body: BodyModel, limb: str, angle: str, by: float
+) -> None:
+    truth = place(body)
+    found = shares(body, place(body, **{angle: by}), truth)
+    assert found[limb] > LIMB_LOST_SHARE
+    assert max(found, key=found.__getitem__) == limb
+
+
+def test_both_legs_on_one_leave_the_other_uncovered(body: BodyModel) -> None:
+    """Little of the model is outside the silhouettes: only the uncovered silhouette shows the error."""
+    truth = place(body)
+    names = [entry.name for entry in body.parameters]
+    both = truth.copy()
+    both[names.index("left_hip_ry")] = truth[names.index("right_hip_ry")]
+    agreement = Agreement(body, CAMERAS)
+    found = agreement.of(both, silhouette_distances(drawn_evidence(body, truth, CAMERAS)))
+    legs = np.isin(found.limbs, ["left leg", "right leg"])
+    assert found.bare[:, legs].sum() > 1.5 * found.outside[:, legs].sum()
+    by_limb = found.shares()
+    assert max(by_limb["left leg"], by_limb["right leg"]) > LIMB_LOST_SHARE
+    assert by_limb["left arm"] < LIMB_LOST_SHARE
+
+
+def test_drawn_limbs_belong_to_the_limbs_of_the_parameters(body: BodyModel) -> None:
+    found = dict(zip((limb.name for limb in body.drawn), limb_names(body), strict=True))
+    assert found["left forearm"] == found["left upper arm"] == "left arm"
+    assert found["torso"] == "root"
+
+
+def test_an_empty_view_leaves_every_limb_outside(body: BodyModel) -> None:
+    truth = place(body)
+    agreement = Agreement(body, CAMERAS)
+    found = agreement.of(truth, silhouette_distances(drawn_evidence(body, None, CAMERAS)))
+    assert np.array_equal(found.outside, found.area)
+    assert not found.bare.any()
