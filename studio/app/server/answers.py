@@ -1,0 +1,102 @@
+"""Schemas of answers made from the records that verbs return, as bodies of requests are made from their parameters.
+
+A route returns the record itself; its annotation says which. Numbers that are not finite are null, arrays are lists.
+"""
+
+import dataclasses
+import types
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from typing import Annotated, Any, Union, cast, get_args, get_origin, get_type_hints
+
+import msgspec
+import numpy as np
+from fastapi import APIRouter
+from fastapi.datastructures import Default, DefaultPlaceholder
+from pydantic import BaseModel, Field, create_model
+from starlette.responses import Response
+
+from studio.app.server.schemas import Answer, Number, Numbers
+
+Kind = Any
+"""A type as an annotation has it."""
+
+
+OF_ANNOTATION = Default(None)
+
+
+class Router(APIRouter):
+    """Routes whose answers are described by what their functions are annotated to return."""
+
+    def add_api_route(
+        self,
+        path: str,
+        endpoint: Callable[..., Any],
+        *,
+        response_model: Kind = OF_ANNOTATION,
+        **more: Any,  # noqa: ANN401 - as FastAPI takes it
+    ) -> None:
+        """Add a route, as APIRouter does."""
+        if isinstance(response_model, DefaultPlaceholder):
+            returned = get_type_hints(endpoint, include_extras=True).get("return")
+            if not (isinstance(returned, type) and issubclass(returned, Response)):
+                response_model = shown_as(returned)
+        super().add_api_route(path, endpoint, response_model=response_model, **more)
+
+
+def shown_as(kind: Kind) -> Kind:
+    """The type in an answer's schema for a type of the studio: records as models, numbers that may be none as such."""
+    if kind is float:
+        return Number
+    if get_origin(kind) is np.ndarray or kind is np.ndarray:
+        return Numbers
+    if _fields_of(kind):
+        return _model_of(kind)
+    origin, parts = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        return Annotated[(shown_as(parts[0]), *kind.__metadata__)]
+    if origin in (tuple, list, Sequence, frozenset, set):
+        many = parts[-1] is Ellipsis or origin is not tuple
+        return list[shown_as(parts[0])] if many else tuple[tuple(shown_as(part) for part in parts)]
+    if origin in (dict, Mapping):
+        return dict[parts[0], shown_as(parts[1])]
+    if origin in (Union, types.UnionType):
+        return Union[tuple(shown_as(part) for part in parts)]  # noqa: UP007 - of parts known only now
+    return kind
+
+
+@cache
+def _model_of(record: type) -> type[BaseModel]:
+    """A record's model: the same entries, what it says of itself as description."""
+    fields: dict[str, Any] = {
+        name: (shown_as(kind), Field(...) if default is _NONE else default)
+        for name, kind, default in _fields_of(record)
+    }
+    return create_model(
+        record.__name__, __base__=Answer, __doc__=record.__doc__, __module__=record.__module__, **fields
+    )
+
+
+_NONE = object()
+
+
+def _fields_of(kind: Kind) -> list[tuple[str, Kind, object]]:
+    """Name, type and default of a record's entries; none of what is no record."""
+    if not isinstance(kind, type) or issubclass(cast("type[object]", kind), BaseModel):
+        return []
+    record = cast("Any", kind)
+    hints: dict[str, Kind] = get_type_hints(record, include_extras=True)
+    if dataclasses.is_dataclass(record):
+        return [(one.name, hints[one.name], _default(one)) for one in dataclasses.fields(record)]
+    if issubclass(record, msgspec.Struct):
+        return [(one.name, hints[one.name], _default(one)) for one in msgspec.structs.fields(record)]
+    # A NamedTuple.
+    defaults: dict[str, object] = getattr(record, "_field_defaults", {})
+    names: tuple[str, ...] = getattr(record, "_fields", ())
+    return [(name, hints[name], defaults.get(name, _NONE)) for name in names]
+
+
+def _default(entry: Any) -> object:  # noqa: ANN401 - a field of a dataclass or of a struct
+    if entry.default_factory not in (dataclasses.MISSING, msgspec.NODEFAULT):
+        return Field(default_factory=entry.default_factory)
+    return _NONE if entry.default in (dataclasses.MISSING, msgspec.NODEFAULT) else entry.default

@@ -1,0 +1,102 @@
+"""The doors (server and scene, command line) reach what lies on disk through the verbs in `operations` alone.
+
+From the rooms below them they take types, constants, and functions of values (limb ends of a body, knobs of settings):
+whatever reads or changes a session, a run, footage or what was made of them is a verb.
+"""
+
+import ast
+
+import pytest
+from test_house_rules import ROOT
+
+BEHIND = ("studio.sessions.", "studio.runs.", "studio.footage.", "studio.results.")
+OF_VALUES = ("studio.sessions.names", "studio.runs.drawing.")
+"""Words checked and pictures drawn: nothing on disk."""
+
+
+def functions_taken(door: str) -> dict[str, set[str]]:
+    """By module of a door, the functions that it imports from the rooms behind the verbs."""
+    taken: dict[str, set[str]] = {}
+    for path in sorted((ROOT / "studio" / door).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if not isinstance(node, ast.ImportFrom) or not (node.module or "").startswith(BEHIND):
+                continue
+            names = {one.name for one in node.names if one.name[0].islower()}
+            if names and not f"{node.module}.".startswith(tuple(f"{one.rstrip('.')}." for one in OF_VALUES)):
+                taken.setdefault(path.relative_to(ROOT).as_posix(), set()).update(names)
+    return taken
+
+
+STILL: dict[str, int] = {
+    "studio/app/scene/body_view.py": 1,
+    "studio/app/scene/controller.py": 1,
+    "studio/app/scene/frame_volume.py": 1,
+    "studio/app/scene/opened_run.py": 5,
+    "studio/app/scene/pose_refining.py": 1,
+    "studio/app/scene/recording.py": 1,
+    "studio/app/scene/scene_pictures.py": 1,
+    "studio/app/scene/window_scenes.py": 1,
+    "studio/app/server/alignment_routes.py": 5,
+    "studio/app/server/app.py": 4,
+    "studio/app/server/app_state.py": 3,
+    "studio/app/server/background_routes.py": 18,
+    "studio/app/server/behaviour_learning_routes.py": 3,
+    "studio/app/server/behaviour_routes.py": 5,
+    "studio/app/server/body_routes.py": 3,
+    "studio/app/server/calibration_proposals.py": 13,
+    "studio/app/server/calibration_routes.py": 10,
+    "studio/app/server/calibration_solving.py": 8,
+    "studio/app/server/calibration_views.py": 5,
+    "studio/app/server/camera_routes.py": 4,
+    "studio/app/server/comparison_routes.py": 12,
+    "studio/app/server/error_responses.py": 1,
+    "studio/app/server/event_encoding.py": 2,
+    "studio/app/server/export_routes.py": 9,
+    "studio/app/server/footage_routes.py": 5,
+    "studio/app/server/gallery_routes.py": 2,
+    "studio/app/server/import_routes.py": 5,
+    "studio/app/server/layer_outlines.py": 1,
+    "studio/app/server/note_routes.py": 1,
+    "studio/app/server/page_routes.py": 1,
+    "studio/app/server/picture_routes.py": 3,
+    "studio/app/server/pose_routes.py": 3,
+    "studio/app/server/report_routes.py": 1,
+    "studio/app/server/result_routes.py": 7,
+    "studio/app/server/run_errors.py": 3,
+    "studio/app/server/run_routes.py": 2,
+    "studio/app/server/safe_paths.py": 3,
+    "studio/app/server/scene_picture_routes.py": 1,
+    "studio/app/server/session_routes.py": 6,
+    "studio/app/server/session_views.py": 3,
+    "studio/app/server/setting_views.py": 3,
+    "studio/app/server/settings_routes.py": 6,
+    "studio/app/server/stroke_routes.py": 6,
+    "studio/app/server/subject_routes.py": 5,
+    "studio/app/server/track_routes.py": 11,
+    "studio/app/server/trial_routes.py": 4,
+    "studio/app/server/view_routes.py": 6,
+    "studio/app/server/workflow_routes.py": 3,
+    "studio/cli/bench_commands.py": 2,
+    "studio/cli/camera_commands.py": 2,
+    "studio/cli/comparison_commands.py": 6,
+    "studio/cli/deriving.py": 1,
+    "studio/cli/diagnostics_archive.py": 3,
+    "studio/cli/footage_commands.py": 2,
+    "studio/cli/inspection_commands.py": 2,
+    "studio/cli/launch.py": 3,
+    "studio/cli/mask_commands.py": 4,
+    "studio/cli/output.py": 1,
+    "studio/cli/reproduction_commands.py": 4,
+    "studio/cli/result_commands.py": 3,
+    "studio/cli/self_check.py": 2,
+    "studio/cli/serving_commands.py": 1,
+    "studio/cli/session_commands.py": 3,
+    "studio/cli/tracking_commands.py": 4,
+}
+"""Functions that a module still takes; a module that is mended leaves this table."""
+
+
+@pytest.mark.parametrize("door", ["app", "cli"])
+def test_doors_take_no_functions_from_behind_the_verbs(door: str) -> None:
+    taken = {name: len(names) for name, names in functions_taken(door).items()}
+    assert taken == {name: count for name, count in STILL.items() if name.startswith(f"studio/{door}/")}
