@@ -1,6 +1,7 @@
 """Schemas of answers made from the records that verbs return, as bodies of requests are made from their parameters.
 
-A route returns the record itself; its annotation says which. Numbers that are not finite are null, arrays are lists.
+A route returns the record itself; its annotation says which. Numbers that are not finite are null, arrays are lists. A
+property whose annotation has a Field is an entry as well.
 """
 
 import dataclasses
@@ -13,7 +14,9 @@ import msgspec
 import numpy as np
 from fastapi import APIRouter
 from fastapi.datastructures import Default, DefaultPlaceholder
-from pydantic import BaseModel, Field, create_model
+from pydantic import BaseModel, Field, GetCoreSchemaHandler, create_model
+from pydantic.fields import FieldInfo
+from pydantic_core import CoreSchema
 from starlette.responses import Response
 
 from studio.app.server.schemas import Answer, Number, Numbers
@@ -42,6 +45,14 @@ class Router(APIRouter):
             if not (isinstance(returned, type) and issubclass(returned, Response)):
                 response_model = shown_as(returned)
         super().add_api_route(path, endpoint, response_model=response_model, **more)
+
+
+class Shown:
+    """A mark of a model's field: `Annotated[Record, Shown]` is validated and described as an answer of that record."""
+
+    @staticmethod
+    def __get_pydantic_core_schema__(kind: Kind, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return handler.generate_schema(shown_as(kind))
 
 
 def shown_as(kind: Kind) -> Kind:
@@ -87,13 +98,30 @@ def _fields_of(kind: Kind) -> list[tuple[str, Kind, object]]:
     record = cast("Any", kind)
     hints: dict[str, Kind] = get_type_hints(record, include_extras=True)
     if dataclasses.is_dataclass(record):
-        return [(one.name, hints[one.name], _default(one)) for one in dataclasses.fields(record)]
-    if issubclass(record, msgspec.Struct):
-        return [(one.name, hints[one.name], _default(one)) for one in msgspec.structs.fields(record)]
-    # A NamedTuple.
-    defaults: dict[str, object] = getattr(record, "_field_defaults", {})
-    names: tuple[str, ...] = getattr(record, "_fields", ())
-    return [(name, hints[name], defaults.get(name, _NONE)) for name in names]
+        defaults = {one.name: _default(one) for one in dataclasses.fields(record)}
+    elif issubclass(record, msgspec.Struct):
+        defaults = {one.name: _default(one) for one in msgspec.structs.fields(record)}
+    else:
+        # A NamedTuple.
+        given: dict[str, object] = getattr(record, "_field_defaults", {})
+        defaults = {name: given.get(name, _NONE) for name in getattr(record, "_fields", ())}
+    own = [(name, hints[name], default) for name, default in defaults.items()]
+    return own and own + [(name, result, _NONE) for name, result in _properties(kind)]
+
+
+def _properties(record: type[object]) -> list[tuple[str, Kind]]:
+    """Name and type of a record's properties whose annotation has a Field."""
+    of_class = {name: one for base in reversed(record.__mro__) for name, one in vars(base).items()}
+    results = {
+        name: get_type_hints(one.fget, include_extras=True).get("return")
+        for name, one in of_class.items()
+        if isinstance(one, property) and one.fget is not None
+    }
+    return [
+        (name, result)
+        for name, result in results.items()
+        if any(isinstance(mark, FieldInfo) for mark in getattr(result, "__metadata__", ()))
+    ]
 
 
 def _default(entry: Any) -> object:  # noqa: ANN401 - a field of a dataclass or of a struct

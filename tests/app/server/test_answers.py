@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from fastapi import FastAPI
 from httpx import ASGITransport, AsyncClient
-from pydantic import Field
+from pydantic import BaseModel, Field
 
-from studio.app.server.answers import Router, shown_as
+from studio.app.server.answers import Router, Shown, shown_as
 from studio.foundations.arrays import Array
 
 
@@ -43,6 +43,14 @@ class Track:
     pair: tuple[str, float]
     words: Annotated[str, Field(description="In words.")] = ""
     more: list[Place] = dataclasses.field(default_factory=list)
+
+    @property
+    def whole(self) -> Annotated[bool, Field(description="Whether nothing lacks.")]:
+        return bool(np.isfinite(self.poses).all())
+
+    @property
+    def inner(self) -> int:
+        raise AssertionError("a property without a Field is no entry")
 
 
 TRACK = Track(Place(math.nan), Kept("a", (1, 2)), np.array([1.0, math.inf]), {"b": Place(2.0)}, ("c", 3.0))
@@ -79,6 +87,7 @@ def test_a_record_is_answered_whole_with_null_for_what_is_not_finite(answers: Ca
         "pair": ["c", 3.0],
         "words": "",
         "more": [],
+        "whole": False,
     }
     assert answers("/many") == [answered, answered]
 
@@ -88,6 +97,19 @@ def test_the_schema_says_what_the_record_says(answers: Callable[[str], Any]) -> 
     assert schemas["Place"]["description"] == "A place. x : mm."
     assert {"type": "null"} in schemas["Place"]["properties"]["x"]["anyOf"]
     assert schemas["Track"]["properties"]["words"]["description"] == "In words."
+    assert schemas["Track"]["properties"]["whole"]["description"] == "Whether nothing lacks."
+
+
+def test_a_model_holds_records_as_answers_show_them() -> None:
+    class State(BaseModel):
+        places: Annotated[tuple[Place, ...], Shown] = ()
+
+    state = State.model_validate({"places": [Place(math.nan), Place(2.0)]})
+    assert state.model_dump(mode="json") == {
+        "places": [{"x": None, "kept": False}, {"x": 2.0, "kept": False}]
+    }
+    again = State.model_validate({**dict(state)})
+    assert again == state
 
 
 def test_other_types_stay_as_they_are() -> None:
