@@ -1,5 +1,5 @@
-// The address is the state: what is open, shown and chosen stands in it, so that reload, back, forward, a copied link and a
-// second window show the same.
+// The address is the state: what is open, shown and chosen stands in it, so that reload, back,
+// forward, a copied link and a second window show the same.
 
 import { complain, say } from "./messages.js";
 import { openSession } from "./sessions.js";
@@ -18,8 +18,8 @@ const place = {
 /** A run by its name; "" says that none is open, nothing that the newest is meant. */
 const run = { read: (text) => text || null, write: (value) => value ?? "" };
 
-// Every entry of the state that the address holds. `usual`: what is meant where it is left out. `step`: whether "back" takes a
-// change of it back.
+// Every entry of the state that the address holds. `usual`: what is meant where it is left out.
+// `step`: whether "back" takes a change of it back.
 const HELD = [
   { name: "session", kind: word, step: true },
   { name: "run", kind: run, usual: undefined, step: true },
@@ -58,7 +58,10 @@ export function held(query = location.search) {
   );
 }
 
-/** The address of the state as it is, with some entries changed: a link to it. @param {Record<string, any>} [changes] */
+/**
+ * The address of the state as it is, with some entries changed: a link to it.
+ * @param {Record<string, any>} [changes]
+ */
 export function addressOf(changes = {}) {
   const query = new URLSearchParams();
   // A frame that is followed while it is searched is not a place to come back to.
@@ -78,7 +81,10 @@ let isDue = false;
 let timer = 0;
 let restoring = true; // whether what changes now follows from an address that was opened
 
-/** Write the state into the address: as a step of its own where one of its steps changed, else over the last one. */
+/**
+ * Write the state into the address: as a step of its own where one of its steps changed, else over
+ * the last one.
+ */
 function write() {
   isDue = false;
   const wanted = addressOf();
@@ -100,7 +106,10 @@ function writeIn(milliseconds) {
   timer = window.setTimeout(write, milliseconds);
 }
 
-/** Steps are written at once, so that "back" finds them; what moves with every frame is written when it rests. */
+/**
+ * Steps are written at once, so that "back" finds them; what moves with every frame is written when
+ * it rests.
+ */
 const writeSoon = () => {
   if (!isDue) writeIn(SETTLE_MILLISECONDS);
   isDue = true;
@@ -111,8 +120,8 @@ const writeNow = () => {
 };
 
 /**
- * Show what the address says: the newest run of a session where it names none, the first session where it names none.
- * A session or run that is not here is said, and no other one opened.
+ * Show what the address says: the newest run of a session where it names none, the first session
+ * where it names none. A session or run that is not here is said, and no other one opened.
  */
 function read() {
   restoring = true;
@@ -140,7 +149,10 @@ function read() {
   writeNow();
 }
 
-/** What an address shows of a session without a run, where it names a frame that its footage does not have. */
+/**
+ * What an address shows of a session without a run, where it names a frame that its footage does
+ * not have.
+ */
 function frameOfFootage(entry, chosen, shown) {
   const hasRun = chosen === undefined ? entry.runs.length > 0 : chosen !== null;
   if (hasRun || shown.frame === null || shown.frame < entry.frame_count) return shown;
@@ -150,7 +162,9 @@ function frameOfFootage(entry, chosen, shown) {
   return { ...shown, frame: null };
 }
 
-/** Open what the address says, and keep it true from then on; called once the sessions are known. */
+/**
+ * Open what the address says, and keep it true from then on; called once the sessions are known.
+ */
 export function startAddress() {
   read();
   addEventListener("popstate", read);

@@ -1,5 +1,6 @@
-// The JSON API. Errors carry the server's cause and remedy; every call names the window, whose scene it may concern.
-// The types of requests and answers come from the API's own description (api_types.d.ts).
+// The JSON API. Errors carry the server's cause and remedy; every call names the window, whose
+// scene it may concern. The types of requests and answers come from the API's own description
+// (api_types.d.ts).
 
 import { windowName } from "./window.js";
 
@@ -18,7 +19,10 @@ export async function accepted(answer) {
   throw fault(message, hint, { status: answer.status });
 }
 
-/** Whether this browser may only look: what changes something is refused, and the page does not offer it. */
+/**
+ * Whether this browser may only look: what changes something is refused, and the page does not
+ * offer it.
+ */
 export const readOnly = document.documentElement.dataset.access === "view";
 const LOOKING = ["show", "view", "play-layers", "camera", "point"].map(
   (what) => `/api/scene/${what}`,
@@ -51,13 +55,25 @@ async function call(method, path, body, options = {}) {
   return kind.includes("json") && text ? JSON.parse(text) : text;
 }
 
-/** @type {<const P extends string>(path: Address<P, "get">, options?: RequestInit) => Promise<Answer<P, "get">>} */
+/**
+ * @type {<const P extends string>(path: Address<P, "get">, options?: RequestInit) =>
+ *   Promise<Answer<P, "get">>}
+ */
 export const fetchJson = (path, options) => call("GET", path, undefined, options);
-/** @type {<const P extends string>(path: Address<P, "post">, body?: Body<P, "post">) => Promise<Answer<P, "post">>} */
+/**
+ * @type {<const P extends string>(path: Address<P, "post">, body?: Body<P, "post">) =>
+ *   Promise<Answer<P, "post">>}
+ */
 export const post = (path, body) => call("POST", path, body ?? {});
-/** @type {<const P extends string>(path: Address<P, "put">, body: Body<P, "put">) => Promise<Answer<P, "put">>} */
+/**
+ * @type {<const P extends string>(path: Address<P, "put">, body: Body<P, "put">) =>
+ *   Promise<Answer<P, "put">>}
+ */
 export const put = (path, body) => call("PUT", path, body);
-/** @type {<const P extends string>(path: Address<P, "patch">, body: Body<P, "patch">) => Promise<Answer<P, "patch">>} */
+/**
+ * @type {<const P extends string>(path: Address<P, "patch">, body: Body<P, "patch">) =>
+ *   Promise<Answer<P, "patch">>}
+ */
 export const patch = (path, body) => call("PATCH", path, body, { keepalive: true }); // also when the page is left at once
 /** @type {<const P extends string>(path: Address<P, "delete">) => Promise<Answer<P, "delete">>} */
 export const remove = (path) => call("DELETE", path);
@@ -69,9 +85,15 @@ export const sessionPath = (session) => `/api/sessions/${encodeURIComponent(sess
 /** @returns {`/api/sessions/${string}/runs/${string}`} */
 export const runPath = (session, run) =>
   `/api/sessions/${encodeURIComponent(session)}/runs/${encodeURIComponent(run)}`;
-/** A view's numbers of a whole run. @returns {`/api/sessions/${string}/runs/${string}/views/${string}`} */
+/**
+ * A view's numbers of a whole run.
+ * @returns {`/api/sessions/${string}/runs/${string}/views/${string}`}
+ */
 export const runView = (session, run, view, query = "") =>
   `${runPath(session, run)}/views/${view}${query && `?${query}`}`;
-/** A view's numbers of a frame. @returns {`/api/sessions/${string}/runs/${string}/frames/${string}/views/${string}`} */
+/**
+ * A view's numbers of a frame.
+ * @returns {`/api/sessions/${string}/runs/${string}/frames/${string}/views/${string}`}
+ */
 export const frameView = (session, run, frame, view, query = "") =>
   `${runPath(session, run)}/frames/${frame}/views/${view}${query && `?${query}`}`;

@@ -1,4 +1,5 @@
-// What each address of the API takes and answers, from the studio's own OpenAPI document (make check writes build/api.d.ts).
+// What each address of the API takes and answers, from the studio's own OpenAPI document (make
+// check writes build/api.d.ts).
 
 import type { components, paths } from "../../build/api";
 
@@ -19,7 +20,10 @@ type Success<R> = R extends { responses: infer A }
   ? Content<A[keyof A & (200 | 201 | 202)]>
   : never;
 
-/** An address that the API has for this method; one that is only known when it is called is taken as it is. */
+/**
+ * An address that the API has for this method; one that is only known when it is called is taken as
+ * it is.
+ */
 export type Address<P extends string, M extends Method> = P extends `/api/${string}`
   ? [Route<P, M>] extends [never]
     ? never

@@ -7,7 +7,10 @@ const LARGEST = 34;
 const SMALLEST = 8;
 const SHOWN_LINES = 400;
 
-/** Draw the graph into an element; choose is called with a cluster. Returns a function that takes it away. */
+/**
+ * Draw the graph into an element; choose is called with a cluster. Returns a function that takes it
+ * away.
+ */
 export function drawAutomaton(box, { clusters, transitions }, echarts, choose) {
   const chart = echarts.init(box, null, { renderer: "canvas" });
   const most = Math.max(...clusters.map((cluster) => cluster.share));

@@ -100,7 +100,10 @@ function read(form, knobs) {
   };
 }
 
-/** Show the form in `content`. choices: as `GET /api/learning` has them. started: called when it has begun. */
+/**
+ * Show the form in `content`. choices: as `GET /api/learning` has them. started: called when it has
+ * begun.
+ */
 export function showLearningForm(content, { choices, sessions, started }) {
   const wrong = optional();
   const motions = files({ name: "files", multiple: true, accept: choices.endings.join(",") });

@@ -7,7 +7,10 @@ import { complain } from "./messages.js";
 
 const FRAMES = 600;
 
-/** The card that generates and plays. Returns {box, close}. @param {`/api/behaviours/${string}`} path */
+/**
+ * The card that generates and plays. Returns {box, close}.
+ * @param {`/api/behaviours/${string}`} path
+ */
 export function walkCard(path, model) {
   const canvas = element("canvas", { role: "img", ariaLabel: "The generated movement" });
   const again = button("Generate", generate, "primary");

@@ -1,4 +1,5 @@
-// The page of behaviour models: a list at the left; clusters as poses, transitions, entropies and a generated movement at the right.
+// The page of behaviour models: a list at the left; clusters as poses, transitions, entropies and a
+// generated movement at the right.
 
 import * as echarts from "../vendor/echarts.esm.min.js";
 import { fault, fetchJson, patch, post, remove } from "./api.js";
@@ -93,7 +94,10 @@ function drawList() {
   fill(byId("entries"), rows.length ? rows : element("p", { className: "empty" }, "No model yet."));
 }
 
-/** Show a model's name or the form in the list, the title and the address; what was shown before is released. */
+/**
+ * Show a model's name or the form in the list, the title and the address; what was shown before is
+ * released.
+ */
 function turnTo(name, title, query) {
   for (const release of releases) release();
   releases = [];
@@ -374,7 +378,10 @@ function showProgress() {
     });
 }
 
-/** Ask how far it is while something is learnt; what was learnt opens, unless another model is being looked at. */
+/**
+ * Ask how far it is while something is learnt; what was learnt opens, unless another model is being
+ * looked at.
+ */
 function watchLearning() {
   clearTimeout(timer);
   if (!isGoing(learning)) return;

@@ -1,5 +1,6 @@
-// The page of bodies: a list at the left; a body's sizes, limits and markers beside the scene, in which it stands with a session's
-// pictures behind it. Every change is made and checked by the studio; what comes back is the body's file, so undo is the text before.
+// The page of bodies: a list at the left; a body's sizes, limits and markers beside the scene, in
+// which it stands with a session's pictures behind it. Every change is made and checked by the
+// studio; what comes back is the body's file, so undo is the text before.
 
 import { fault, fetchJson, post, put, readOnly, remove, sessionPath } from "./api.js";
 import { openForm } from "./studio/dialogs.js";
@@ -192,7 +193,8 @@ function entry(label, value, send, more = {}) {
   input.onchange = () => {
     if (input.value === written(value)) return;
     const typed = input.value.trim();
-    // A field that holds no number is empty to the page: only where nothing may be written is that meant.
+    // A field that holds no number is empty to the page: only where nothing may be written is that
+    // meant.
     if (typed === "" && (!more.free || input.validity.badInput)) {
       wrong = fault(`${label} is no number.`, "Write one, or undo.");
       input.setAttribute("aria-invalid", "true");
@@ -525,7 +527,8 @@ function saveForm() {
         : []),
     ],
     send: async (values) => {
-      // What was typed last is saved, too; what was refused is in its field still, and not in the body.
+      // What was typed last is saved, too; what was refused is in its field still, and not in the
+      // body.
       await changing;
       if (wrong) throw wrong;
       const saved = await post(`${pathOf(body.name)}/edit`, {

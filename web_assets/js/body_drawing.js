@@ -1,4 +1,5 @@
-// Bodies drawn on a canvas: limbs as tapered strokes seen from any side, arrows where their ends are going.
+// Bodies drawn on a canvas: limbs as tapered strokes seen from any side, arrows where their ends
+// are going.
 
 import { onTheme, token } from "./theme.js";
 
@@ -16,9 +17,14 @@ function redrawAll() {
   for (const view of views) if (view.canvas.isConnected) view.draw();
 }
 
-/** A canvas that shows one body; all of them are turned together by dragging, and by the arrow keys. */
+/**
+ * A canvas that shows one body; all of them are turned together by dragging, and by the arrow keys.
+ */
 export class BodyDrawing {
-  /** shapes: {side, radius_start, radius_end} of every limb. points: all ends that are ever shown, for the scale. lines: [from, to, colour] that stand behind. */
+  /**
+   * shapes: {side, radius_start, radius_end} of every limb. points: all ends that are ever shown,
+   * for the scale. lines: [from, to, colour] that stand behind.
+   */
   constructor(canvas, shapes, points, lines = []) {
     this.canvas = canvas;
     this.lines = lines;
@@ -56,7 +62,10 @@ export class BodyDrawing {
     this.draw();
   }
 
-  /** Points over the body: {at: [x, y, z] mm, colour, radius: pixels, alpha}. clarity: how solid the body is, 0 to 1. Drawn with the next body. */
+  /**
+   * Points over the body: {at: [x, y, z] mm, colour, radius: pixels, alpha}. clarity: how solid the
+   * body is, 0 to 1. Drawn with the next body.
+   */
   over(points, clarity = 1) {
     this.points = points;
     this.clarity = clarity;

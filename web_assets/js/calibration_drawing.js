@@ -13,7 +13,10 @@ const side = (across) => (Math.abs(across) < 0.4 ? "middle" : across < 0 ? "star
 export const plainNumbers = (value, digits = 1) =>
   value === null || value === undefined ? "–" : value.toFixed(digits);
 
-/** The cameras seen from above: where they look, how high they stand, the axes, a person for scale where there is room for one. */
+/**
+ * The cameras seen from above: where they look, how high they stand, the axes, a person for scale
+ * where there is room for one.
+ */
 export function rigFromAbove(rig) {
   const [width, height, margin] = [620, 320, 46];
   const across = rig.cameras.map((camera) => camera.position[0]).concat(0);
@@ -151,7 +154,10 @@ export function rigFromAbove(rig) {
   );
 }
 
-/** The findings on a calibration, blocking ones first, each with its remedy. @param {{ findings?: any[] }} what */
+/**
+ * The findings on a calibration, blocking ones first, each with its remedy.
+ * @param {{ findings?: any[] }} what
+ */
 export function findingList({ findings }) {
   if (!findings.length)
     return element("p", { className: "all-well" }, "✓ No fault found in this calibration.");

@@ -12,7 +12,10 @@ import {
 
 const FEWEST = 3;
 
-/** Pixels of the stored picture under a point of the upright image: shares x, y (0..1) from its top left corner. */
+/**
+ * Pixels of the stored picture under a point of the upright image: shares x, y (0..1) from its top
+ * left corner.
+ */
 function storedPixel(camera, x, y) {
   const turned = [
     [x, y],

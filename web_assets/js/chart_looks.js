@@ -8,7 +8,9 @@ const root = document.documentElement;
 /** A token's colour in the theme in use. */
 export const token = (name) => getComputedStyle(root).getPropertyValue(`--${name}`).trim();
 
-/** Type of a chart, pixels, in step with the page's own (page.css), which grows on large screens. */
+/**
+ * Type of a chart, pixels, in step with the page's own (page.css), which grows on large screens.
+ */
 export const typeSize = (pixels) =>
   Math.round(pixels * Math.max(1, parseFloat(token("size-text")) / 13 || 1));
 

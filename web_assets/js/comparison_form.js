@@ -44,7 +44,10 @@ const writeKnobs = (settings) =>
     .map(([name, value]) => `${name}=${value}`)
     .join(", ");
 
-/** The rows of trackers: `box` and `lineUp` are put on the page, `fill(trackers)` and `read()` as the API has them. */
+/**
+ * The rows of trackers: `box` and `lineUp` are put on the page, `fill(trackers)` and `read()` as
+ * the API has them.
+ */
 function candidates({ candidates: offered, weightings, lineups }, changed) {
   let rows = [];
   const list = element("div", { className: "candidates" });
@@ -177,7 +180,10 @@ function candidates({ candidates: offered, weightings, lineups }, changed) {
   };
 }
 
-/** Show the form in `content`. initial: what it is filled with, as the API takes it. started: called with the line of what was begun. instead: what leads to the other form. */
+/**
+ * Show the form in `content`. initial: what it is filled with, as the API takes it. started: called
+ * with the line of what was begun. instead: what leads to the other form.
+ */
 export function showForm(content, { sessions, choices, bodies, initial, started, instead }) {
   const able = sessions.filter((one) => one.has_truth && !one.problem);
   if (!able.length) {

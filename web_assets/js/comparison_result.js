@@ -70,7 +70,10 @@ export const isSweep = (line) => Object.keys(line.vary ?? {}).length > 0;
 const comparedWords = (line) =>
   dotted(`${line.trackers.length} trackers`, `${line.evaluations} poses`, seedWords(line.seeds));
 
-/** Show a comparison in `content`. actions: {cancel, resume, again, remove, look, show}. @param {Schemas["ComparisonDetail"]} detail */
+/**
+ * Show a comparison in `content`. actions: {cancel, resume, again, remove, look, show}.
+ * @param {Schemas["ComparisonDetail"]} detail
+ */
 export function showComparison(content, detail, actions) {
   clearComparison();
   if (isSweep(detail.comparison)) {
@@ -195,7 +198,10 @@ function results({ result, trials }, actions) {
   ];
 }
 
-/** Every trial, with its worst frame: the run of it, which is tracked again with the same settings and seed where it is not stored. */
+/**
+ * Every trial, with its worst frame: the run of it, which is tracked again with the same settings
+ * and seed where it is not stored.
+ */
 function trialsCard(trials, { session, look }) {
   const names = [...new Set(trials.map((trial) => trial.tracker))];
   const frameOf = (trial) =>

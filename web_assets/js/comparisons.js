@@ -123,7 +123,10 @@ async function look(trial) {
   }
 }
 
-/** Go to the run of a trial; where there is none, to the button that makes it. @param {Schemas["TrialLine"]} trial */
+/**
+ * Go to the run of a trial; where there is none, to the button that makes it.
+ * @param {Schemas["TrialLine"]} trial
+ */
 function showTrial(trial, frame = trial.worst_frame) {
   if (trial.run) location.href = studioPath(open.session, trial.run, { frame, panel: "why" });
   else
@@ -186,7 +189,10 @@ function initialLike({ comparison: line, settings, body }) {
   };
 }
 
-/** What the form has to be filled with to sweep the same again. @param {Schemas["ComparisonDetail"]} detail */
+/**
+ * What the form has to be filled with to sweep the same again.
+ * @param {Schemas["ComparisonDetail"]} detail
+ */
 function sweepLike({ comparison: line, settings, body, behaviour, fit_shape }) {
   const [{ weighting, ...knobs }] = Object.values(settings);
   const fixed = Object.entries(knobs)

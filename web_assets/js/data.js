@@ -1,4 +1,5 @@
-// What the state is filled from: the stored run over the API, the search as it happens over the events.
+// What the state is filled from: the stored run over the API, the search as it happens over the
+// events.
 
 import { fetchJson, post, runPath } from "./api.js";
 import { onEvent } from "./live.js";
@@ -15,10 +16,11 @@ const DETAIL_MILLISECONDS = 80;
 const SCENE_MILLISECONDS = 33;
 const SESSIONS_MILLISECONDS = 800;
 const MOVED_MILLISECONDS = 250;
-// A frame that takes longer than this is shown layer by layer while it is searched, quicker ones when they are done;
-// a search that is slowed to be watched is shown layer by layer always.
+// A frame that takes longer than this is shown layer by layer while it is searched, quicker ones
+// when they are done; a search that is slowed to be watched is shown layer by layer always.
 const PATIENCE_MILLISECONDS = 700;
-// A frame that is annealed again is shown when it is whole; one that takes longer than this, with the layers so far.
+// A frame that is annealed again is shown when it is whole; one that takes longer than this, with
+// the layers so far.
 const AGAIN_MILLISECONDS = 250;
 
 const searching = () => ["tracking", "compiling"].includes(get("work")?.state);
@@ -40,7 +42,10 @@ let isAnew = true; // whether the page was loaded since: a frame that was anneal
 
 const sceneLater = paced(() => showInScene(), SCENE_MILLISECONDS);
 
-/** The run's frames: shown at once, with the chosen one, before anything of `next`; and again when the server has read all that is stored of them and knows what is damaged. */
+/**
+ * The run's frames: shown at once, with the chosen one, before anything of `next`; and again when
+ * the server has read all that is stored of them and knows what is damaged.
+ */
 async function loadSummary(next = () => {}) {
   const isAll = await loadFrames(get("summary") !== null);
   isOpening = false;
@@ -50,7 +55,10 @@ async function loadSummary(next = () => {}) {
   if (!isAll) await loadFrames(true);
 }
 
-/** Load the run's frames; those that finish while the answer is on its way are kept. Whether no other answer is to be requested. */
+/**
+ * Load the run's frames; those that finish while the answer is on its way are kept. Whether no
+ * other answer is to be requested.
+ */
 async function loadFrames(check) {
   const [session, run] = [get("session"), get("run")];
   if (!run) return true;
@@ -69,7 +77,8 @@ async function loadFrames(check) {
       summary,
       frame: get("frame") === null || (get("follow") && searching()) ? newest : get("frame"),
     });
-    // An address may name a frame that is not tracked; the one in which the search stands has layers.
+    // An address may name a frame that is not tracked; the one in which the search stands has
+    // layers.
     const known =
       summary.frames.some((line) => line.frame === get("frame")) ||
       [summary.partial, get("detail")?.frame].includes(get("frame"));
@@ -174,7 +183,10 @@ const eyeOf = (text) => text?.split(",").map(Number) ?? null;
 const wantedNow = () => shownNow(get("follow") && searching() ? null : get("frame"));
 const isElsewhere = (shown) => Object.keys(shown).some((name) => shown[name] !== scene[name]);
 
-/** Hold the scene at the layer that the page shows, also where it said that one last and has gone on since. */
+/**
+ * Hold the scene at the layer that the page shows, also where it said that one last and has gone on
+ * since.
+ */
 export function holdLayer() {
   isHeld = true;
   moves += 1;
@@ -198,7 +210,10 @@ async function showInScene() {
   await post("/api/scene/show", moved).catch(complain);
 }
 
-/** The scene's own controls moved, or it plays: follow them, without sending the change back. What it said before it knew of the page's own last move is old. */
+/**
+ * The scene's own controls moved, or it plays: follow them, without sending the change back. What
+ * it said before it knew of the page's own last move is old.
+ */
 function takeScene(event) {
   if (!isShown(event.session, event.run) || event.request_number !== moves) return;
   const chosen = {
@@ -232,7 +247,10 @@ function takeScene(event) {
   set(changes);
 }
 
-/** A layer: those of a what-if stand beside the stored answer; those of a frame in progress are shown when it is slow. */
+/**
+ * A layer: those of a what-if stand beside the stored answer; those of a frame in progress are
+ * shown when it is slow.
+ */
 function takeLayer(event) {
   if (event.reannealed) {
     // What another window anneals again, or this one did before it moved on, changes nothing here.
@@ -251,7 +269,10 @@ function takeLayer(event) {
   if (!searching() || slow || isWatched()) showLive(event.frame, false);
 }
 
-/** Show the layers of the frame that is annealed again, all that came together: each would have every chart drawn anew, beside the scene. */
+/**
+ * Show the layers of the frame that is annealed again, all that came together: each would have
+ * every chart drawn anew, beside the scene.
+ */
 function showAgain() {
   clearTimeout(showsAgain);
   showsAgain = 0;
@@ -312,7 +333,10 @@ function takeRest(work) {
   if (inside && get("follow") && !get("whatIf")) showLive(work.frame, false);
 }
 
-/** How many layers a frame takes with these settings, null where one says so itself (studio/search/trackers/partitions.py). */
+/**
+ * How many layers a frame takes with these settings, null where one says so itself
+ * (studio/search/trackers/partitions.py).
+ */
 function layersOf(values) {
   if (values.layers) return values.layers;
   if (!values.stage1_iterations) return null;

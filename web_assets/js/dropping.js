@@ -3,7 +3,11 @@
 import { element } from "./elements.js";
 import { complain } from "./messages.js";
 
-/** The files of a folder that was dropped, with their paths below it. @param {any} entry @returns {Promise<File[]>} */
+/**
+ * The files of a folder that was dropped, with their paths below it.
+ * @param {any} entry
+ * @returns {Promise<File[]>}
+ */
 async function filesIn(entry) {
   if (entry.isFile) {
     const file = await new Promise((resolve, reject) => entry.file(resolve, reject));
@@ -32,8 +36,8 @@ async function filesOf(data) {
 }
 
 /**
- * Take files that are dropped anywhere on the page. `words`: said while they are held over it. `take(files)` gets them
- * all; a folder's keep their paths.
+ * Take files that are dropped anywhere on the page. `words`: said while they are held over it.
+ * `take(files)` gets them all; a folder's keep their paths.
  * @param {string} words @param {(files: File[]) => any} take
  */
 export function acceptDrops(words, take) {

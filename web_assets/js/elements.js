@@ -1,8 +1,10 @@
-// The pages' components, made of elements: texts, fields, tables, progress, errors. Every page uses these and no others.
+// The pages' components, made of elements: texts, fields, tables, progress, errors. Every page uses
+// these and no others.
 
 /**
  * @typedef {Node | string | number | false | null | undefined} Child
- * @typedef {{ className?: string, dataset?: Record<string, string | number>, [property: string]: any }} Properties
+ * @typedef {{ className?: string, dataset?: Record<string, string | number>, [property: string]:
+ *   any }} Properties
  */
 
 /**
@@ -31,7 +33,10 @@ const present = (children) =>
 /** A part of a page by its id. @returns {any} */
 export const byId = (id) => document.getElementById(id);
 
-/** What finds an element again among those that replace it: its key, label, id or name (with the value, of several alike). */
+/**
+ * What finds an element again among those that replace it: its key, label, id or name (with the
+ * value, of several alike).
+ */
 function keyOf(focused) {
   const name = ["data-key", "aria-label", "id", "name"].find((one) => focused.getAttribute(one));
   const has = (attribute) => `[${attribute}="${CSS.escape(focused.getAttribute(attribute))}"]`;
@@ -39,8 +44,8 @@ function keyOf(focused) {
 }
 
 /**
- * Put children into a place instead of what is there. What has the focus keeps it, found again by its key, name, id or
- * label; a list that was scrolled stays so.
+ * Put children into a place instead of what is there. What has the focus keeps it, found again by
+ * its key, name, id or label; a list that was scrolled stays so.
  * @param {Element} place
  * @param {(Child | Child[])[]} children
  */
@@ -72,7 +77,10 @@ export const hint = (...children) => element("p", { className: "hint" }, ...chil
 export const notice = (...children) => element("p", { className: "notice" }, ...children);
 /** The introduction to a part of the page. */
 export const lead = (...children) => element("p", { className: "lead" }, ...children);
-/** An error with its remedy; nothing without an error. @param {{ message: string, hint?: string } | null} error */
+/**
+ * An error with its remedy; nothing without an error.
+ * @param {{ message: string, hint?: string } | null} error
+ */
 export const failure = (error) =>
   error &&
   element(
@@ -142,7 +150,10 @@ export const picture = (image, name, ...words) =>
 
 // Buttons and fields.
 
-/** A button that does something; while it is being done it cannot be pressed again. @param {Properties} [more] */
+/**
+ * A button that does something; while it is being done it cannot be pressed again.
+ * @param {Properties} [more]
+ */
 export function button(label, act, className = "", more = {}) {
   const made = element("button", { type: "button", className, textContent: label, ...more });
   made.onclick = async () => {
@@ -156,7 +167,9 @@ export function button(label, act, className = "", more = {}) {
   return made;
 }
 
-/** A field under its label; what it is for stands below it or, as `title`, where the pointer rests. */
+/**
+ * A field under its label; what it is for stands below it or, as `title`, where the pointer rests.
+ */
 export const field = (label, made, { title = "", below = "" } = {}) =>
   element("label", { title }, label, made, below && element("span", { className: "hint" }, below));
 /** A box to be checked before its label. @param {Properties} [properties] */
@@ -172,11 +185,19 @@ export const text = (properties = {}) => element("input", { type: "text", ...pro
 /** A number of 0 or more. @param {Properties} [properties] */
 export const number = (value, properties = {}) =>
   element("input", { type: "number", value, step: "any", min: 0, ...properties });
-/** A choice. @param {([string, string] | string)[]} options values with their words, or words alone @param {Properties} [properties] */
+/**
+ * A choice.
+ * @param {([string, string] | string)[]} options values with their words, or words alone
+ * @param {Properties} [properties]
+ */
 export const select = (options, value = undefined, properties = {}) =>
   offer(element("select", properties), options, value);
 
-/** Offer other options in a choice. @param {HTMLSelectElement} choice @param {([string, string] | string)[]} options */
+/**
+ * Offer other options in a choice.
+ * @param {HTMLSelectElement} choice
+ * @param {([string, string] | string)[]} options
+ */
 export function offer(choice, options, value = undefined) {
   choice.replaceChildren(
     ...options.map((one) => {
@@ -206,7 +227,10 @@ export const NAME = {
   title: "Letters, digits, - and _, up to 64",
 };
 
-/** Let a form be sent: what went wrong stands over its buttons (`wrong`), the button is pressed once at a time. */
+/**
+ * Let a form be sent: what went wrong stands over its buttons (`wrong`), the button is pressed once
+ * at a time.
+ */
 export function sends(form, submit, wrong, send) {
   const label = submit.textContent;
   form.onsubmit = async (event) => {
@@ -237,7 +261,8 @@ export const bar = (share, className = "progress") =>
   );
 
 /**
- * A bar with words and a button that cancels; null takes it away. What is there already is changed in place.
+ * A bar with words and a button that cancels; null takes it away. What is there already is changed
+ * in place.
  * @param {HTMLElement} place
  * @param {{ words: string, share: number | null, cancel?: () => void } | null} state
  */
@@ -262,7 +287,9 @@ export function drawProgress(place, state) {
 
 const cancels = new WeakMap();
 
-/** Show a picture when it is decoded, so that nothing flickers; of several requests the newest wins. */
+/**
+ * Show a picture when it is decoded, so that nothing flickers; of several requests the newest wins.
+ */
 export function showPicture(image, address) {
   if (image.wanted === address) return;
   image.wanted = address;

@@ -18,10 +18,16 @@ export function listen(type, handler) {
 /** @type {Set<(event: any) => void>} */
 const forAll = new Set();
 
-/** Call `handler(event)` on every event, whatever its type. @param {(event: any) => void} handler */
+/**
+ * Call `handler(event)` on every event, whatever its type.
+ * @param {(event: any) => void} handler
+ */
 export const listenToAll = (handler) => forAll.add(handler);
 
-/** Open the socket and keep it open. opened, closed: called then; `closed` resolves with the pause before the next try. */
+/**
+ * Open the socket and keep it open. opened, closed: called then; `closed` resolves with the pause
+ * before the next try.
+ */
 export function startEvents(opened = () => {}, closed = async () => RETRY_MILLISECONDS) {
   const socket = eventSocket();
   socket.onopen = opened;

@@ -1,5 +1,6 @@
-// A figure: a title, the question that it answers, its drawing with exact numbers, the same numbers as a table, and what it can
-// be written as: SVG, a page to print (PDF), CSV, a link. Everything that is written carries the caption.
+// A figure: a title, the question that it answers, its drawing with exact numbers, the same numbers
+// as a table, and what it can be written as: SVG, a page to print (PDF), CSV, a link. Everything
+// that is written carries the caption.
 
 import * as echarts from "../vendor/echarts.esm.min.js";
 import { addressOf } from "./address.js";
@@ -23,10 +24,12 @@ const EXPORT_WIDTH = 1180,
 const LEAST_ROOM = 170;
 
 /**
- * What a figure shows. `draw`: fills a sheet and returns the exact numbers of what is chosen, in a sentence. `tables`: the numbers
- * behind it. `link`: its address, null where it has none.
- * @typedef {{ name: string, title: string, question: string, caption: string, notes: string[], tables: { name: string, title: string, columns: { key: string, label: string, unit?: string }[], rows: any[][] }[],
- *   draw: (sheet: Sheet, room: number) => string, choose: (changes: Record<string, any>) => void, link: (() => string) | null }} Shown
+ * What a figure shows. `draw`: fills a sheet and returns the exact numbers of what is chosen, in a
+ * sentence. `tables`: the numbers behind it. `link`: its address, null where it has none.
+ * @typedef {{ name: string, title: string, question: string, caption: string, notes: string[],
+ *   tables: { name: string, title: string, columns: { key: string, label: string, unit?: string
+ *   }[], rows: any[][] }[], draw: (sheet: Sheet, room: number) => string, choose: (changes:
+ *   Record<string, any>) => void, link: (() => string) | null }} Shown
  */
 
 /** A cell of a table as text, exact. */
@@ -39,7 +42,10 @@ const cellText = (value) =>
 const headText = (column) => (column.unit ? `${column.label} [${column.unit}]` : column.label);
 const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
 
-/** A row's values as people read them: a layer, an index in the answer and in the address, is counted from 1. */
+/**
+ * A row's values as people read them: a layer, an index in the answer and in the address, is
+ * counted from 1.
+ */
 const readable = (columns, row) =>
   row.map((value, at) =>
     columns[at].key === "layer" && Number.isInteger(value) ? value + 1 : value,
@@ -54,8 +60,8 @@ const chosenBy = (columns, row) =>
   );
 
 /**
- * A row's cells; the first that can be chosen is a link to what the row speaks of, its frame before all. A click chooses it here,
- * where it is of this run.
+ * A row's cells; the first that can be chosen is a link to what the row speaks of, its frame before
+ * all. A click chooses it here, where it is of this run.
  * @param {Shown} shown
  */
 function linked(columns, row, shown) {
@@ -122,7 +128,10 @@ function onPaper(work) {
   }
 }
 
-/** A drawing from its text. The page's policy allows no styles in a text: they are set one by one; rules for a pointer are left out. */
+/**
+ * A drawing from its text. The page's policy allows no styles in a text: they are set one by one;
+ * rules for a pointer are left out.
+ */
 function drawingOf(text) {
   const bare = text
     .replaceAll(/<style[^>]*>.*?<\/style>/gs, "")
@@ -137,7 +146,11 @@ function drawingOf(text) {
   return drawing;
 }
 
-/** The figure as a drawing with title, question and caption, in the light colours. @param {Shown} shown @returns {SVGElement} */
+/**
+ * The figure as a drawing with title, question and caption, in the light colours.
+ * @param {Shown} shown
+ * @returns {SVGElement}
+ */
 function svgOf(shown) {
   return onPaper(() => {
     const sheet = new Sheet(EXPORT_WIDTH);
@@ -186,7 +199,10 @@ function svgOf(shown) {
   });
 }
 
-/** Put the figure alone on the page and let the browser print it; there it can be kept as PDF. @param {Shown} shown */
+/**
+ * Put the figure alone on the page and let the browser print it; there it can be kept as PDF.
+ * @param {Shown} shown
+ */
 function print(shown) {
   const sheet = element("div", { id: "paper" }, svgOf(shown));
   const before = document.title;

@@ -1,5 +1,6 @@
-// Results of experiments: a summary with all verdicts, then each with the paper's claim beside ours.
-// Used by the report (garden/reproduction/report_document.py) and by the studio's pages; looks are in report.css.
+// Results of experiments: a summary with all verdicts, then each with the paper's claim beside
+// ours. Used by the report (garden/reproduction/report_document.py) and by the studio's pages;
+// looks are in report.css.
 
 import { duration, element, shape } from "./elements.js";
 import { drawChart } from "./findings_charts.js";

@@ -1,4 +1,5 @@
-// Charts given as plain values (studio/results/comparison/findings.py), drawn alike in the report and in the studio's pages.
+// Charts given as plain values (studio/results/comparison/findings.py), drawn alike in the report
+// and in the studio's pages.
 
 import { element } from "./elements.js";
 import { heatOption, legendEntries, legendName, seriesOption } from "./findings_options.js";
@@ -115,7 +116,10 @@ class Drawing {
     return drawn;
   }
 
-  /** The curve within reach of a place of the sheet, px, and its value that is nearest along x; a group's thin curves before its thick one. */
+  /**
+   * The curve within reach of a place of the sheet, px, and its value that is nearest along x; a
+   * group's thin curves before its thick one.
+   */
   nearest(x, y) {
     if (!this.drawn.containPixel("grid", [x, y])) return null;
     const selected = this.drawn.getOption().legend[0].selected;

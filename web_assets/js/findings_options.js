@@ -17,7 +17,10 @@ const MARKS = ["circle", "diamond", "rect", "triangle", "roundRect"];
 
 const root = document.documentElement;
 
-/** Ours, the interval's ends and the paper's value of a number in words, as `figures` of findings_files.py has them. */
+/**
+ * Ours, the interval's ends and the paper's value of a number in words, as `figures` of
+ * findings_files.py has them.
+ */
 export function figures(number) {
   const own = [number.ours, number.low, number.high];
   const known = own.filter((value) => value !== null);
@@ -75,7 +78,9 @@ export function legendEntries(chart) {
   return entries;
 }
 
-/** The legend entry that shows and hides a series: a thin one goes with the thick one of its group. */
+/**
+ * The legend entry that shows and hides a series: a thin one goes with the thick one of its group.
+ */
 export function legendName(chart, series) {
   if (!series.thin) return series.name;
   return (
@@ -171,7 +176,10 @@ const bounds = (values) =>
     [Infinity, -Infinity],
   );
 
-/** A logarithmic axis that ends just beyond its values, with labels at powers of ten, or 1-2-5 where these are few. */
+/**
+ * A logarithmic axis that ends just beyond its values, with labels at powers of ten, or 1-2-5 where
+ * these are few.
+ */
 function logarithmic(values) {
   const above0 = values.filter((value) => value > 0);
   if (!above0.length) return { type: "log" };
@@ -242,7 +250,10 @@ function categoryLabels(chart, width) {
   };
 }
 
-/** Whether the values lie so far from zero that an axis from zero would flatten them (bars always stand on it). */
+/**
+ * Whether the values lie so far from zero that an axis from zero would flatten them (bars always
+ * stand on it).
+ */
 function farFromZero(chart) {
   if (chart.kind === "bars") return false;
   const [least, most] = bounds(valuesAlong(chart, "y"));
@@ -407,7 +418,10 @@ function band(chart, series, name, colour) {
   };
 }
 
-/** Bars stand side by side; a thin series is dots on its group's bar; what the paper printed a dashed stroke over it. */
+/**
+ * Bars stand side by side; a thin series is dots on its group's bar; what the paper printed a
+ * dashed stroke over it.
+ */
 function barParts(chart, series, group) {
   const colour = token(group.colour);
   const name = legendName(chart, series);

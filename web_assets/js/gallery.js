@@ -1,4 +1,5 @@
-// The gallery: a card for every session that can be opened or made. What can be made here is made at a click, as work in the background.
+// The gallery: a card for every session that can be opened or made. What can be made here is made
+// at a click, as work in the background.
 
 import { fetchJson, post, readOnly, remove } from "./api.js";
 import {

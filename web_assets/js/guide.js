@@ -1,5 +1,6 @@
-// The guide takes the theme that every page remembers; what is wider than its place can be scrolled by keys. Pages of its
-// course know whether the runs are there that they lead to. The papers' claims are drawn of the findings' files.
+// The guide takes the theme that every page remembers; what is wider than its place can be scrolled
+// by keys. Pages of its course know whether the runs are there that they lead to. The papers'
+// claims are drawn of the findings' files.
 
 import { fetchJson, post, readOnly } from "./api.js";
 import { button, drawProgress, element, failure, fill, hint } from "./elements.js";
@@ -11,7 +12,10 @@ import { startTheme } from "./theme.js";
 const POLL_MILLISECONDS = 700;
 const RUN = /^course-/;
 
-/** Links of the page into runs of the course, by the runs' names. @returns {[HTMLAnchorElement, string[]][]} */
+/**
+ * Links of the page into runs of the course, by the runs' names.
+ * @returns {[HTMLAnchorElement, string[]][]}
+ */
 function links() {
   return [...document.querySelectorAll("main a")].flatMap((link) => {
     const { searchParams } = new URL(/** @type {HTMLAnchorElement} */ (link).href);

@@ -16,8 +16,9 @@ export const GOING = ["queued", "running", "cancelling"];
 export const isGoing = (job) => GOING.includes(job?.state);
 
 /**
- * Follow the job at an address; resolves with its last state, "done" or "cancelled", and throws what went wrong.
- * `report` gets each state on the way; once `gone()` nothing waits any more: resolves with null.
+ * Follow the job at an address; resolves with its last state, "done" or "cancelled", and throws
+ * what went wrong. `report` gets each state on the way; once `gone()` nothing waits any more:
+ * resolves with null.
  * @param {string} path
  */
 export async function followJob(path, report = (_job) => {}, gone = () => false) {
@@ -33,8 +34,9 @@ export async function followJob(path, report = (_job) => {}, gone = () => false)
 }
 
 /**
- * The newest job of a kind that the server knows of, as it stands there; null for none. By it a page that was loaded
- * again, or another window, finds work and its answer. `fits`: whether a line of the list is the one.
+ * The newest job of a kind that the server knows of, as it stands there; null for none. By it a
+ * page that was loaded again, or another window, finds work and its answer. `fits`: whether a line
+ * of the list is the one.
  * @param {{ session?: string, kind: string }} which
  */
 export async function findJob({ session, kind }, fits = (_line) => true) {
@@ -44,7 +46,9 @@ export async function findJob({ session, kind }, fits = (_line) => true) {
   return line ? fetchJson(/** @type {any} */ (line.at)) : null;
 }
 
-/** Like `followJob` for work that nothing follows from when it was cancelled: that too is thrown. */
+/**
+ * Like `followJob` for work that nothing follows from when it was cancelled: that too is thrown.
+ */
 export async function jobDone(path, report = (_job) => {}, gone = () => false) {
   const job = await followJob(path, report, gone);
   if (job?.state === "cancelled") throw fault(job.message, job.hint, { code: CANCELLED });

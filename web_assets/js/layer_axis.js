@@ -1,5 +1,5 @@
-// Layers on the axes of the views: counted within their search, whose name stands beside them where a frame has several (a
-// run's first frame has).
+// Layers on the axes of the views: counted within their search, whose name stands beside them where
+// a frame has several (a run's first frame has).
 
 import { searchName } from "./studio/shown_layers.js";
 import { categories } from "./view_sheet.js";
@@ -24,8 +24,8 @@ export const layerInSearch = (layer, /** @type {Counted} */ at) =>
   `layer ${layerNumber(layer, at)}${at.searches > 1 ? ` of the ${searchName(Math.floor(layer / at.searchLayers))}` : ""}`;
 
 /**
- * An axis of layers. A value is a layer's number, counted through from 1 (`layerValue`); beside the numbers the sheet writes
- * the names of the searches.
+ * An axis of layers. A value is a layer's number, counted through from 1 (`layerValue`); beside the
+ * numbers the sheet writes the names of the searches.
  * @param {number[]} layers counted through from 0
  * @param {Counted} at
  */
@@ -57,13 +57,14 @@ function searchesOf(layers, { searchLayers }) {
 }
 
 /**
- * The answers for what is stored and what was tried with their layers on one axis, search beside search: where one has more
- * layers in a search than the other, those after it move on.
+ * The answers for what is stored and what was tried with their layers on one axis, search beside
+ * search: where one has more layers in a search than the other, those after it move on.
  * @param {any} stored tables by name, and how their layers are counted
  * @param {any} tried null for nothing
- * @returns {{ stored: any, tried: any, counted: Counted, there: (layer: number | null) => number | null, back: (layer: number) => number }}
- *   there, back: a layer of the shown frame (what was tried, if anything) on that axis, and back; of a
- *   place that its search does not reach the search's last layer
+ * @returns {{ stored: any, tried: any, counted: Counted, there: (layer: number | null) => number |
+ *   null, back: (layer: number) => number }} there, back: a layer of the shown frame (what was
+ *   tried, if anything) on that axis, and back; of a place that its search does not reach the
+ *   search's last layer
  */
 export function onOneAxis(stored, tried) {
   const sides = [stored, ...(tried ? [tried] : [])];

@@ -1,4 +1,5 @@
-// How limbs are told apart, the same in every frame, chart and scene: by the colour of their side, and by a shape each.
+// How limbs are told apart, the same in every frame, chart and scene: by the colour of their side,
+// and by a shape each.
 
 import { token } from "./chart_looks.js";
 import { get } from "./state.js";
@@ -12,8 +13,8 @@ const sideOf = (limb) => (/left/.test(limb) ? "left" : /right/.test(limb) ? "rig
 const limbsOfBody = () => [...new Set((get("parameters") ?? []).map((one) => one.limb))];
 
 /**
- * Colour and shape of a limb. `among`: limbs that are drawn together, in an order that stays. Limbs of a body without sides
- * have a colour each.
+ * Colour and shape of a limb. `among`: limbs that are drawn together, in an order that stays. Limbs
+ * of a body without sides have a colour each.
  * @param {string} limb
  * @param {string[]} among
  */

@@ -10,10 +10,16 @@ const STRANGER_MILLISECONDS = 15000;
 
 const isHere = (event) => event.session === get("session") && event.run === get("run");
 
-/** Call `handler(event, here)` on every event of a type; here: whether it is of the run that is open. */
+/**
+ * Call `handler(event, here)` on every event of a type; here: whether it is of the run that is
+ * open.
+ */
 export const onEvent = (type, handler) => listen(type, (event) => handler(event, isHere(event)));
 
-/** Whether the studio that answers here still knows this browser; one that was started anew does not. */
+/**
+ * Whether the studio that answers here still knows this browser; one that was started anew does
+ * not.
+ */
 async function isKnown() {
   const answer = await fetch("/api/worker").catch(() => null);
   return answer === null || answer.status !== 403;

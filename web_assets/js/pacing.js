@@ -27,7 +27,8 @@ async function serve() {
     await nextFrame();
     const began = performance.now();
     drawAll();
-    // The next frame begins when this one has been handed over: only then it is known how long the drawing took.
+    // The next frame begins when this one has been handed over: only then it is known how long the
+    // drawing took.
     await nextFrame();
     const took = performance.now() - began;
     await pause(Math.min(LONGEST_PAUSE_MILLISECONDS, Math.max(LEAST_PAUSE_MILLISECONDS, took)));
@@ -36,8 +37,9 @@ async function serve() {
 }
 
 /**
- * Call `draw` soon: all drawings together, before a frame of the screen, the newest request of each only. However often they
- * are requested, every other frame and a pause are left to everything else, so a machine that draws slowly still answers.
+ * Call `draw` soon: all drawings together, before a frame of the screen, the newest request of each
+ * only. However often they are requested, every other frame and a pause are left to everything
+ * else, so a machine that draws slowly still answers.
  */
 export function drawSoon(draw) {
   requested.add(draw);
@@ -45,8 +47,9 @@ export function drawSoon(draw) {
 }
 
 /**
- * What is asked about one subject at a time: a question about another aborts it, one about the same is asked (`again`) once
- * it is answered, so that what changes all the time is shown as often as answers come.
+ * What is asked about one subject at a time: a question about another aborts it, one about the same
+ * is asked (`again`) once it is answered, so that what changes all the time is shown as often as
+ * answers come.
  * @param {() => void} again
  */
 export function askingAbout(again) {
@@ -75,7 +78,10 @@ export function askingAbout(again) {
   return { ask, stop };
 }
 
-/** A function that requests `work` (may be asynchronous): never twice at once, not more often than allowed, the last request always served. */
+/**
+ * A function that requests `work` (may be asynchronous): never twice at once, not more often than
+ * allowed, the last request always served.
+ */
 export function paced(work, milliseconds) {
   let wanted = false;
   let busy = false;

@@ -1,4 +1,5 @@
-// Live cameras: which, what they show now, how far apart their pictures come; record them, or track what they see.
+// Live cameras: which, what they show now, how far apart their pictures come; record them, or track
+// what they see.
 
 import { fetchJson, post } from "./api.js";
 import {

@@ -1,5 +1,5 @@
-// What was found when the papers' experiments were run again, drawn as in the command's own report; and the form that
-// runs one.
+// What was found when the papers' experiments were run again, drawn as in the command's own report;
+// and the form that runs one.
 
 import * as echarts from "../vendor/echarts.esm.min.js";
 import { fetchJson, post, readOnly, remove } from "./api.js";

@@ -1,4 +1,5 @@
-// Put first into viser's own page: without a graphics card a smoothed picture takes the processor about twice as long.
+// Put first into viser's own page: without a graphics card a smoothed picture takes the processor
+// about twice as long.
 
 if (window.parent.document.documentElement.dataset.drawing === "software") {
   const prototype = HTMLCanvasElement.prototype;

@@ -1,4 +1,5 @@
-// The scene's frame: viser's own page, in the studio's type and colours, with the page's keys working in it.
+// The scene's frame: viser's own page, in the studio's type and colours, with the page's keys
+// working in it.
 
 import { post } from "./api.js";
 import { byId } from "./elements.js";
@@ -8,7 +9,10 @@ import { onTheme, theme, token } from "./theme.js";
 /** @type {HTMLIFrameElement} */
 const frame = byId("scene");
 const FONT = "/assets/vendor/inter.woff2";
-/** Pixels up to which a scene is too narrow for its panel beside the body: it is there when it is asked for. */
+/**
+ * Pixels up to which a scene is too narrow for its panel beside the body: it is there when it is
+ * asked for.
+ */
 export const NARROW = 620;
 const CONTROLS = "[role=slider], [role=tab], input, textarea, select";
 const style = document.createElement("style");
@@ -58,20 +62,29 @@ function keepToControls(event) {
   if (event.target.closest?.(CONTROLS)) event.stopPropagation();
 }
 
-/** The page's keys come first: arrows step through the timeline wherever the focus is, and do not turn the view as well. */
+/**
+ * The page's keys come first: arrows step through the timeline wherever the focus is, and do not
+ * turn the view as well.
+ */
 const first = (takeKey) => (event) => {
   if (event.target.closest?.(CONTROLS)) return;
   takeKey(event);
   if (event.defaultPrevented) event.stopImmediatePropagation();
 };
 
-/** Show the panel with the knobs in a scene that is too narrow for it, or no longer. @param {boolean} isShown */
+/**
+ * Show the panel with the knobs in a scene that is too narrow for it, or no longer.
+ * @param {boolean} isShown
+ */
 export function showKnobs(isShown) {
   hasKnobs = isShown;
   frame.contentDocument?.documentElement.toggleAttribute("data-knobs", hasKnobs);
 }
 
-/** Put the keyboard into the scene's panel: the frame is no stop of the page's own, for its many controls' sake. */
+/**
+ * Put the keyboard into the scene's panel: the frame is no stop of the page's own, for its many
+ * controls' sake.
+ */
 export function enterScene() {
   const tab = /** @type {HTMLElement} */ (
     frame.contentDocument?.querySelector("[role=tab][aria-selected=true]")
@@ -102,7 +115,10 @@ function placeOf(event) {
   return across >= 0 && across <= 1 && down >= 0 && down <= 1 ? [across, down] : null;
 }
 
-/** The wheel goes to what is under the pointer and never loses the body: the studio moves the camera, not viser. */
+/**
+ * The wheel goes to what is under the pointer and never loses the body: the studio moves the
+ * camera, not viser.
+ */
 function zoomWithWheel(page) {
   let [turned, at, isSending] = [0, [0.5, 0.5], false];
   const send = async () => {
@@ -130,7 +146,10 @@ function zoomWithWheel(page) {
   );
 }
 
-/** Call `hover(place, event)` as the pointer moves over the scene (null where it leaves), `click(place)` where it is clicked. */
+/**
+ * Call `hover(place, event)` as the pointer moves over the scene (null where it leaves),
+ * `click(place)` where it is clicked.
+ */
 function followPointer(page, { hover, click }) {
   let pressed = null;
   page.addEventListener(
@@ -171,7 +190,10 @@ export function shareKeys(/** @type {HTMLIFrameElement} */ scene, takeKey) {
   scene.contentWindow.addEventListener("keydown", leaveScene, true);
 }
 
-/** Load the scene, dressed as the page; `takeKey` handles the page's keys in it, `pointer` what the pointer does over it. */
+/**
+ * Load the scene, dressed as the page; `takeKey` handles the page's keys in it, `pointer` what the
+ * pointer does over it.
+ */
 export function startSceneFrame(takeKey, pointer) {
   frame.addEventListener("load", () => {
     if (frame.src.endsWith("about:blank")) return;

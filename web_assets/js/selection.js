@@ -1,5 +1,5 @@
-// The one selection: frame, layer, limb, parameter, particle and camera. Timeline, charts, pictures, scene and address follow it;
-// whatever can be clicked changes it here.
+// The one selection: frame, layer, limb, parameter, particle and camera. Timeline, charts,
+// pictures, scene and address follow it; whatever can be clicked changes it here.
 
 import { get, set } from "./state.js";
 
@@ -33,8 +33,10 @@ export function goTo(frame) {
 }
 
 /**
- * Choose a frame, layer, limb, parameter, particle or camera; what is left out stays. A particle is one of a frame's layer and goes with it.
- * @param {{ frame?: number, layer?: number | null, limb?: string | null, parameter?: string | null, particle?: number | null, camera?: string | null }} changes
+ * Choose a frame, layer, limb, parameter, particle or camera; what is left out stays. A particle is
+ * one of a frame's layer and goes with it.
+ * @param {{ frame?: number, layer?: number | null, limb?: string | null, parameter?: string | null,
+ *   particle?: number | null, camera?: string | null }} changes
  */
 export function select({ frame, ...changes }) {
   if (frame !== undefined && frame !== null && frame !== get("frame")) goTo(frame);
@@ -48,7 +50,10 @@ export function select({ frame, ...changes }) {
 }
 
 const isSided = (name) => /left|right/.test(name);
-/** The limb that a limb's errors are counted with: itself where it is left or right or the body has no sides, else head and trunk (studio/results/inspection/reference.py). */
+/**
+ * The limb that a limb's errors are counted with: itself where it is left or right or the body has
+ * no sides, else head and trunk (studio/results/inspection/reference.py).
+ */
 export const limbGroup = (name) =>
   !name || isSided(name) || !(get("parameters") ?? []).some((one) => isSided(one.limb))
     ? name
@@ -65,7 +70,10 @@ export const comparedRuns = () =>
     .filter((name) => name.includes("/") && name !== `${get("session")}/${get("run")}`)
     .slice(0, MOST_COMPARED - 1);
 
-/** Choose something; what is chosen already is let go. @param {"layer" | "limb" | "parameter" | "particle" | "camera"} name */
+/**
+ * Choose something; what is chosen already is let go.
+ * @param {"layer" | "limb" | "parameter" | "particle" | "camera"} name
+ */
 export const toggle = (name, value) => select({ [name]: get(name) === value ? null : value });
 
 /** Whether the shown frame moves on with a search that is under way. */
@@ -78,14 +86,20 @@ export const followsSearch = () =>
 export const isStored = () =>
   Boolean(get("summary")?.frames.some((line) => line.frame === get("frame")));
 
-/** The numbers of a trial of the shown frame, null while they are not known. @returns {Schemas["TrialView"] | null} */
+/**
+ * The numbers of a trial of the shown frame, null while they are not known.
+ * @returns {Schemas["TrialView"] | null}
+ */
 const trialNamed = (name) =>
   (get("trials")?.frame === get("frame") &&
     get("trials").trials.find((one) => one.name === name)) ||
   null;
 /** The trial that is shown. */
 export const shownTrial = () => trialNamed(get("trial"));
-/** What the shown trial is compared with: what is stored, or another trial. @returns {Schemas["FrameNumbers"] | null} */
+/**
+ * What the shown trial is compared with: what is stored, or another trial.
+ * @returns {Schemas["FrameNumbers"] | null}
+ */
 export const besideTrial = () =>
   shownTrial() ? (trialNamed(get("against")) ?? get("trials").stored) : null;
 

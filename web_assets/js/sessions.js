@@ -17,8 +17,8 @@ export async function refreshSessions() {
 }
 
 /**
- * Open a session and one of its runs: the newest unless said, none where `run` is null. `shown`: what of it is shown and chosen,
- * by the state's names.
+ * Open a session and one of its runs: the newest unless said, none where `run` is null. `shown`:
+ * what of it is shown and chosen, by the state's names.
  * @param {string | null} session @param {string | null} [run] @param {Record<string, any>} [shown]
  */
 export function openSession(session, run = undefined, shown = {}) {
@@ -55,8 +55,8 @@ export function openSession(session, run = undefined, shown = {}) {
 }
 
 /**
- * The comparison as it goes on with another of its runs, or of the session's: where that was one of the others, the run that
- * was open is now.
+ * The comparison as it goes on with another of its runs, or of the session's: where that was one of
+ * the others, the run that was open is now.
  */
 function comparedWith(session, run) {
   const [open, next, others] = [
@@ -74,7 +74,8 @@ export const sessionWords = ({ name, title }) =>
 /** The guided set-up of a session, at its next step. */
 export const setupPath = (entry) => `/way?session=${encodeURIComponent(entry.name)}`;
 /**
- * The studio's own window on a session, or on one of its runs; `more`: what is shown of it, such as {frame: 12}.
+ * The studio's own window on a session, or on one of its runs; `more`: what is shown of it, such as
+ * {frame: 12}.
  * @param {string} session @param {string} [run] @param {Record<string, string | number>} [more]
  */
 export const studioPath = (session, run = "", more = {}) =>

@@ -1,8 +1,8 @@
 // The guided set-up: the stepper, the step's panel, pictures or the scene beside it.
 //
-// A step's module `setup_<step>.js` (start-pose: setup_start_pose.js) exports `mount(place, setup) -> () => void`. `place` is
-// empty and the panel's; what it returns releases everything when another step is shown. One `button.primary` a step:
-// Enter presses the first that is shown.
+// A step's module `setup_<step>.js` (start-pose: setup_start_pose.js) exports `mount(place, setup)
+// -> () => void`. `place` is empty and the panel's; what it returns releases everything when
+// another step is shown. One `button.primary` a step: Enter presses the first that is shown.
 
 import { fetchJson, post, sessionPath } from "./api.js";
 import { closeDialog, openForm } from "./studio/dialogs.js";
@@ -31,17 +31,23 @@ import { startTheme } from "./theme.js";
 
 /**
  * @import { Schemas } from "./api_types"
- * @typedef {{ begin?: boolean, dropped?: File[] }} Asked what a step does at once: track; take files that were dropped
+ * @typedef {{ begin?: boolean, dropped?: File[] }} Asked what a step does at once: track; take
+ *   files that were dropped
  * @typedef Setup what a step is given
  * @property {string} session
- * @property {Schemas["SessionDetail"]} detail the session as it was when the step was mounted (no cameras before the calibration)
- * @property {HTMLElement} aside the empty element at the right, for pictures (class "pictures" with `picture`s in it, if it fits)
+ * @property {Schemas["SessionDetail"]} detail the session as it was when the step was mounted (no
+ *   cameras before the calibration)
+ * @property {HTMLElement} aside the empty element at the right, for pictures (class "pictures" with
+ *   `picture`s in it, if it fits)
  * @property {Schemas["Workflow"]["steps"][number]} step this step as the server sees it now
  * @property {() => Promise<any>} refresh load the steps again, after something was made
- * @property {(step: string, asked?: Asked) => Promise<void>} go show another step; `asked`: to do at once
+ * @property {(step: string, asked?: Asked) => Promise<void>} go show another step; `asked`: to do
+ *   at once
  * @property {Asked} asked what the step is asked to do at once
- * @property {(shown?: object) => Promise<void>} scene show the 3-D scene in `aside` instead, moved to what is to be shown
- * @property {(type: string, handler: (event: any) => void) => void} on hear events of this session while the step is shown
+ * @property {(shown?: object) => Promise<void>} scene show the 3-D scene in `aside` instead, moved
+ *   to what is to be shown
+ * @property {(type: string, handler: (event: any) => void) => void} on hear events of this session
+ *   while the step is shown
  */
 
 const STEPS = {
@@ -249,7 +255,10 @@ async function drawSessions() {
   return sessions.map((one) => one.name);
 }
 
-/** The form of a session that begins empty. The body is asked for first of all: its size is that of the space in which it is sought. */
+/**
+ * The form of a session that begins empty. The body is asked for first of all: its size is that of
+ * the space in which it is sought.
+ */
 async function beginForm(dropped = null) {
   const { bodies, default_body: usual } = await fetchJson("/api/choices").catch(() => ({
     bodies: [],

@@ -1,4 +1,5 @@
-// Footage taken into the session: uploaded from this browser, or from a folder of the studio's computer.
+// Footage taken into the session: uploaded from this browser, or from a folder of the studio's
+// computer.
 
 import { fault, fetchJson, post, remove, sessionPath } from "./api.js";
 import {
@@ -25,7 +26,10 @@ import { uploadFiles } from "./uploading.js";
 
 const MOST_FOLDERS = 60;
 
-/** Draw the form in `place` (a details element); `done(job)` is called when footage was taken in. @param {import("./setup.js").Setup} setup */
+/**
+ * Draw the form in `place` (a details element); `done(job)` is called when footage was taken in.
+ * @param {import("./setup.js").Setup} setup
+ */
 export function adder(place, setup, done) {
   let abort = null;
   let stopped = false;

@@ -1,4 +1,5 @@
-// Do the cameras agree? How far silhouettes miss, camera by camera; turning the cameras until they do, and back.
+// Do the cameras agree? How far silhouettes miss, camera by camera; turning the cameras until they
+// do, and back.
 
 import { fetchJson, post, remove, sessionPath } from "./api.js";
 import {
@@ -22,7 +23,11 @@ const WHY =
   "A tripod that was touched after the calibration turns a camera by a degree, or twenty pixels. Silhouettes show it, without a board.";
 const pixels = (value) => (value === null ? "–" : `${value.toFixed(1)} px`);
 
-/** The box in `place`; `changed()` is called when the session has other cameras. Returns {load, measure, stop}. @param {import("./setup.js").Setup} setup */
+/**
+ * The box in `place`; `changed()` is called when the session has other cameras. Returns {load,
+ * measure, stop}.
+ * @param {import("./setup.js").Setup} setup
+ */
 export function alignmentBox(setup, place, changed) {
   const here = /** @type {const} */ (`${sessionPath(setup.session)}/alignment`);
   /** @type {import("./api_types").Schemas["AlignmentAnswer"]} */

@@ -1,4 +1,5 @@
-// Step Background: what backgrounds are made of, how masks are cut, what does not count, how far the views agree.
+// Step Background: what backgrounds are made of, how masks are cut, what does not count, how far
+// the views agree.
 
 import { fetchJson, post, put, remove, sessionPath } from "./api.js";
 import {
@@ -118,7 +119,8 @@ export function mount(place, setup) {
   const cameras = element("section", { className: "background-quality", hidden: true });
   const knobs = element("details", { className: "background-knobs" });
   place.append(make, agreement, cameras, knobs);
-  // Turned cameras see the same masks otherwise: whether they agree now is measured at once, else the step waits for it.
+  // Turned cameras see the same masks otherwise: whether they agree now is measured at once, else
+  // the step waits for it.
   const alignment = alignmentBox(setup, cameras, async () => {
     quality = null;
     drawQuality();
@@ -137,9 +139,13 @@ export function mount(place, setup) {
           : recommended();
   }
 
-  /** Where nothing was set yet: without any picture of the empty room, somebody who stays in place has no background. */
+  /**
+   * Where nothing was set yet: without any picture of the empty room, somebody who stays in place
+   * has no background.
+   */
   function recommended() {
-    // What somebody began to paint is what is wanted, also after the page was left; the network knows people only.
+    // What somebody began to paint is what is wanted, also after the page was left; the network
+    // knows people only.
     const hasNone = !background.cameras.some((camera) => camera.given);
     if (
       strokes.some((camera) => camera.strokes.length) ||
@@ -210,7 +216,10 @@ export function mount(place, setup) {
     if (!gone) drawMake();
   }
 
-  /** Who is in view in the first frame, to be clicked on the picture in which most of them are seen, or in the list. */
+  /**
+   * Who is in view in the first frame, to be clicked on the picture in which most of them are seen,
+   * or in the list.
+   */
   function subjectList() {
     if (!seen) return hint("Looking who is in view in the first frame…");
     if (!seen.subjects.length)

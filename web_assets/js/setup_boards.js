@@ -1,4 +1,5 @@
-// Calibration from a printed board: the board, where its footage lies, the floor, what was measured, a board to print.
+// Calibration from a printed board: the board, where its footage lies, the floor, what was
+// measured, a board to print.
 
 import { fault, fetchJson, sessionPath } from "./api.js";
 import {
@@ -33,7 +34,10 @@ const KINDS = [
 ];
 const REMEMBERED = "calibration-board";
 
-/** The fields that describe a board. `description()`: the board as `studio calibrate --board` takes it, remembered for the next time. */
+/**
+ * The fields that describe a board. `description()`: the board as `studio calibrate --board` takes
+ * it, remembered for the next time.
+ */
 function boardFields() {
   const kept = JSON.parse(localStorage.getItem(REMEMBERED) ?? "null") ?? {
     kind: "charuco",
@@ -286,8 +290,9 @@ const sessionOffsets = async (session) =>
   );
 
 /**
- * The form. cameras: the footage's; inputs: what was entered so far, which it goes on with; `solve(() => request)` begins;
- * `uploaded(input)` uploads and resolves with the upload's identifier.
+ * The form. cameras: the footage's; inputs: what was entered so far, which it goes on with;
+ * `solve(() => request)` begins; `uploaded(input)` uploads and resolves with the upload's
+ * identifier.
  */
 export function boardForm(session, { cameras, inputs, hasFootage, isChief, uploaded, solve }) {
   const board = boardFields();

@@ -1,5 +1,5 @@
-// A brush over a camera's picture: what is painted does not count. Mouse, pen or keyboard; kept as a PNG of the
-// footage's own size and orientation.
+// A brush over a camera's picture: what is painted does not count. Mouse, pen or keyboard; kept as
+// a PNG of the footage's own size and orientation.
 
 import { fault, putBytes, sessionPath } from "./api.js";
 import { button, element, fill, spring } from "./elements.js";
@@ -11,8 +11,8 @@ const HELP =
   "Paint what is not the subject. Keys: arrows move, space paints, x paints or erases, [ and ] change the size, ctrl z undoes, enter keeps, escape leaves.";
 
 /** Edit what is excluded of `lens` (name, picture_width, picture_height, quarter_turns, frame, excluded: whether there is
- * something already, shown before a stroke can be made: one that came after would undo what was painted meanwhile);
- * `done(saved)` when left. */
+ * something already, shown before a stroke can be made: one that came after would undo what was
+ * painted meanwhile); `done(saved)` when left. */
 export async function brush(setup, lens, done) {
   const place = `${sessionPath(setup.session)}/exclusions/${encodeURIComponent(lens.name)}`;
   const colour = getComputedStyle(document.documentElement).getPropertyValue("--accent").trim();
@@ -88,7 +88,10 @@ export async function brush(setup, lens, done) {
   const keep = button("Keep", save, "primary");
   const leave = button("Leave", () => done(false), "quiet");
 
-  /** A picture turned clockwise by quarter turns. @returns {[HTMLCanvasElement, CanvasRenderingContext2D]} */
+  /**
+   * A picture turned clockwise by quarter turns.
+   * @returns {[HTMLCanvasElement, CanvasRenderingContext2D]}
+   */
   function turned(source, by, size) {
     const out = element("canvas", { width: size[0], height: size[1] });
     const drawn = out.getContext("2d");

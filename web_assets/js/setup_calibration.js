@@ -1,4 +1,5 @@
-// Calibration: the one in use or one that is proposed, three ways to get one, what speaks for and against it.
+// Calibration: the one in use or one that is proposed, three ways to get one, what speaks for and
+// against it.
 
 import { accepted, fetchJson, post, remove, sessionPath } from "./api.js";
 import { findingList, plainNumbers, residualBars, rigFromAbove } from "./calibration_drawing.js";
@@ -62,7 +63,10 @@ export function mount(place, setup) {
   let showsBoard = true; // whether the pictures are of the board, else of the recording
   let failed = null;
   let gone = false;
-  /** @type {{ path: string, upload: string, unit: Schemas["CalibrationFileRequest"]["unit"], up: Schemas["CalibrationFileRequest"]["up"] }} */
+  /**
+   * @type {{ path: string, upload: string, unit: Schemas["CalibrationFileRequest"]["unit"], up:
+   *   Schemas["CalibrationFileRequest"]["up"] }}
+   */
   const fromFile = { path: "", upload: null, unit: "", up: "z" };
   const fromBoard = { distances: [], offsets: {} };
 
@@ -172,7 +176,10 @@ export function mount(place, setup) {
     }
   }
 
-  /** Turn the world of the calibration in use to the vertical, with the floor under the person by the silhouettes. */
+  /**
+   * Turn the world of the calibration in use to the vertical, with the floor under the person by
+   * the silhouettes.
+   */
   async function level() {
     failed = proposal = null;
     try {

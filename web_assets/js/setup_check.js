@@ -1,4 +1,5 @@
-// Step Check: whether the motion fits the pictures, frame by frame; refining and smoothing; which track is exported.
+// Step Check: whether the motion fits the pictures, frame by frame; refining and smoothing; which
+// track is exported.
 
 import { fetchJson, post, remove, runPath } from "./api.js";
 import {
@@ -339,7 +340,11 @@ export function mount(place, setup) {
     );
   }
 
-  /** Begin refining, smoothing or measuring, and follow it to its end; nothing else can be begun meanwhile. @param {"refine" | "smooth" | "check" | "landmarks"} verb */
+  /**
+   * Begin refining, smoothing or measuring, and follow it to its end; nothing else can be begun
+   * meanwhile.
+   * @param {"refine" | "smooth" | "check" | "landmarks"} verb
+   */
   function begin(verb, request) {
     failed = null;
     job = { verb, state: "running" };
@@ -347,7 +352,10 @@ export function mount(place, setup) {
     return carry(() => post(`${here}/${verb}`, request));
   }
 
-  /** Follow a job, and what follows from it: a track that was made is looked at, whether it is better is the next question. */
+  /**
+   * Follow a job, and what follows from it: a track that was made is looked at, whether it is
+   * better is the next question.
+   */
   async function carry(begun) {
     try {
       for (let start = begun; start && !stopped; ) {

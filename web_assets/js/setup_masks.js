@@ -1,4 +1,5 @@
-// The pictures of all views with their masks, in a frame that can be chosen; knobs that are tried show at once.
+// The pictures of all views with their masks, in a frame that can be chosen; knobs that are tried
+// show at once.
 
 import { sessionPath } from "./api.js";
 import { button, check, element, fill, spring } from "./elements.js";
@@ -7,7 +8,10 @@ import { agreementOf } from "./setup_quality.js";
 const HEIGHT = 420;
 const SPREAD = 5;
 
-/** Pictures in `setup.aside`; `paint(camera)` opens the brush, `strokes(camera)` that for strokes. @param {import("./setup.js").Setup} setup */
+/**
+ * Pictures in `setup.aside`; `paint(camera)` opens the brush, `strokes(camera)` that for strokes.
+ * @param {import("./setup.js").Setup} setup
+ */
 export function maskPictures(setup, paint, strokes) {
   const here = sessionPath(setup.session);
   const state = {
@@ -22,7 +26,10 @@ export function maskPictures(setup, paint, strokes) {
   const bar = element("div", { className: "mask-bar" });
   const grid = element("div", { className: "pictures masks" });
 
-  /** Before the first mask the picture alone, as it is recorded: a session's first masks take their time. */
+  /**
+   * Before the first mask the picture alone, as it is recorded: a session's first masks take their
+   * time.
+   */
   function first(camera) {
     const lens = setup.detail.cameras.find((one) => one.name === camera);
     return lens?.quarter_turns

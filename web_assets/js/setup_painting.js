@@ -1,4 +1,5 @@
-// A camera's picture, upright, to paint over with mouse, pen or keyboard: what brush and strokes have in common.
+// A camera's picture, upright, to paint over with mouse, pen or keyboard: what brush and strokes
+// have in common.
 
 import { sessionPath } from "./api.js";
 import { element } from "./elements.js";
@@ -15,15 +16,17 @@ export function upright({
 }
 
 /**
- * The picture of `lens` (name, picture_width, picture_height, quarter_turns) under a canvas. Places are pixels of the
- * upright picture, whose first pixel has its middle at `-centre + 0.5`; an arrow key goes a `slowness`-th of the brush.
- * `begin(at)`, `to(at, isKey)` and `end()` paint a stroke, `dress(ring)` shows on the brush what it paints, `keys` are
- * other keys' doings.
+ * The picture of `lens` (name, picture_width, picture_height, quarter_turns) under a canvas. Places
+ * are pixels of the upright picture, whose first pixel has its middle at `-centre + 0.5`; an arrow
+ * key goes a `slowness`-th of the brush. `begin(at)`, `to(at, isKey)` and `end()` paint a stroke,
+ * `dress(ring)` shows on the brush what it paints, `keys` are other keys' doings.
  * @param {import("./setup.js").Setup} setup
- * @param {{ name: string, picture_width: number, picture_height: number, quarter_turns?: number }} lens
- * @param {{ label: string, className?: string, size: number, least: number, most: number, centre: number, slowness: number,
- *   layers?: HTMLElement[], begin: (at: number[]) => void, to: (at: number[], isKey: boolean) => void, end: () => void,
- *   dress: (ring: HTMLElement) => void, keys: Record<string, (event: KeyboardEvent) => void> }} brush
+ * @param {{ name: string, picture_width: number, picture_height: number, quarter_turns?: number }}
+ *   lens
+ * @param {{ label: string, className?: string, size: number, least: number, most: number, centre:
+ *   number, slowness: number, layers?: HTMLElement[], begin: (at: number[]) => void, to: (at:
+ *   number[], isKey: boolean) => void, end: () => void, dress: (ring: HTMLElement) => void, keys:
+ *   Record<string, (event: KeyboardEvent) => void> }} brush
  */
 export function painting(setup, lens, brush) {
   const turns = (((lens.quarter_turns ?? 0) % 4) + 4) % 4;
@@ -139,7 +142,11 @@ export function painting(setup, lens, brush) {
   };
   canvas.onblur = release;
 
-  /** Show a frame's picture. @param {number} frame @param {string} [show] of its address: "show=mask&" */
+  /**
+   * Show a frame's picture.
+   * @param {number} frame
+   * @param {string} [show] of its address: "show=mask&"
+   */
   function showFrame(frame, show = "") {
     photo.src = `${sessionPath(setup.session)}/frames/${frame}/views/${encodeURIComponent(lens.name)}.jpg?${show}height=${turns % 2 ? stored[1] : Math.min(PICTURE_HEIGHT, stored[1])}`;
   }

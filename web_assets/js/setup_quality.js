@@ -1,4 +1,5 @@
-// How far the views' masks agree in the hull: a bar a camera with words, and the camera to look at first.
+// How far the views' masks agree in the hull: a bar a camera with words, and the camera to look at
+// first.
 
 import { sessionPath } from "./api.js";
 import { findingList } from "./calibration_drawing.js";
@@ -8,7 +9,9 @@ import { button, element, hint, notice, percent, shape } from "./elements.js";
 
 const USABLE = 0.9;
 
-/** A camera's agreement in per cent, so fine that what is below the mark never reads like the mark. */
+/**
+ * A camera's agreement in per cent, so fine that what is below the mark never reads like the mark.
+ */
 export const agreementOf = ({ agreement, usable }) =>
   usable || agreement === null
     ? percent(agreement)
@@ -37,7 +40,9 @@ function agreementBar(line) {
 }
 
 /** What is said of a quality (`GET S/masks/quality`), null where it was not measured since the studio was opened (then what
- * is known in words, `measured`, is said); `paint(camera)` opens the brush; `source` : of the masks. @param {import("./setup.js").Setup} setup */
+ * is known in words, `measured`, is said); `paint(camera)` opens the brush; `source` : of the
+ * masks.
+ * @param {import("./setup.js").Setup} setup */
 export function qualityList(setup, quality, paint, measured = "", source = "") {
   if (!quality && measured)
     return [hint(`When it was last measured, ${measured}. Measure again to see every camera.`)];
@@ -86,7 +91,10 @@ export function qualityList(setup, quality, paint, measured = "", source = "") {
 
 const sentence = (words) => `${words[0].toUpperCase()}${words.slice(1)}.`;
 
-/** Why agreement does not prove the masks, what may help, and where, camera by camera; nothing where something else does. */
+/**
+ * Why agreement does not prove the masks, what may help, and where, camera by camera; nothing where
+ * something else does.
+ */
 function unconfirmed(setup, { contrast, unconfirmed: why }) {
   if (!contrast?.low)
     return why && notice(`The views agree, but ${why}: look at the masks yourself.`);
@@ -103,7 +111,10 @@ function unconfirmed(setup, { contrast, unconfirmed: why }) {
   );
 }
 
-/** A camera's picture with what might as well be background outlined. @param {Schemas["ViewContrast"]} view */
+/**
+ * A camera's picture with what might as well be background outlined.
+ * @param {Schemas["ViewContrast"]} view
+ */
 function alikePicture(setup, view) {
   const lens = setup.detail.cameras.find((one) => one.name === view.camera);
   const lines = view.outlines.map((outline) =>
@@ -130,7 +141,10 @@ function alikePicture(setup, view) {
   );
 }
 
-/** How the sources compare (job `choice`): agreement and edges by camera, the used ones marked. @param {Schemas["SourceChoiceAnswer"]} choice */
+/**
+ * How the sources compare (job `choice`): agreement and edges by camera, the used ones marked.
+ * @param {Schemas["SourceChoiceAnswer"]} choice
+ */
 export function sourceTable(choice) {
   const cameras = Object.keys(choice.by_camera);
   const row = (line, name) =>

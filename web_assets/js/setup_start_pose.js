@@ -1,5 +1,5 @@
-// Step Start pose: found automatically with its confidence, checked in all views (left and right by colour), corrected
-// by hand in the scene or by a turn, made better by a short search.
+// Step Start pose: found automatically with its confidence, checked in all views (left and right by
+// colour), corrected by hand in the scene or by a turn, made better by a short search.
 
 import { fault, fetchJson, post, put, remove, sessionPath } from "./api.js";
 import {
@@ -44,7 +44,11 @@ export function mount(place, setup) {
   const verdicts = element("section", { className: "start-pose-check" });
   place.append(steps, progress, verdicts);
 
-  /** Wait for a job of the background, its bar drawn meanwhile; what it found. @param {string} jobs @param {{ identifier?: string }} job */
+  /**
+   * Wait for a job of the background, its bar drawn meanwhile; what it found.
+   * @param {string} jobs
+   * @param {{ identifier?: string }} job
+   */
   async function waited(jobs, { identifier }, words) {
     const cancel = () => remove(`${jobs}/${identifier}`).catch(complain);
     try {
@@ -98,7 +102,10 @@ export function mount(place, setup) {
     better = (await waited(REFINEMENTS, job, "searching around the pose")) ?? better;
   };
 
-  /** What was begun before this step was shown: a search that is under way is followed, what the last one found is said. */
+  /**
+   * What was begun before this step was shown: a search that is under way is followed, what the
+   * last one found is said.
+   */
   async function findAgain() {
     const [search, refinement] = await Promise.all([
       findJob({ session: setup.session, kind: "initialise" }),

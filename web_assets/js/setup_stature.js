@@ -1,5 +1,6 @@
-// A body as it stands, with the lengths of its limbs: what a height or a fit makes of it. People are seen from the front, animals
-// and whatever else is longer than high from the side; all are drawn as large as a person.
+// A body as it stands, with the lengths of its limbs: what a height or a fit makes of it. People
+// are seen from the front, animals and whatever else is longer than high from the side; all are
+// drawn as large as a person.
 
 import { element, fill, shape } from "./elements.js";
 
@@ -14,7 +15,9 @@ const LINE = 88;
 const PERSON = 1700;
 const BULGE = 0.4; // of a radius: how far a limb's end is rounded, so that cones look like limbs
 
-/** A tapered limb seen from the front, as a path. flat: mm, y to the right of the picture, z down. */
+/**
+ * A tapered limb seen from the front, as a path. flat: mm, y to the right of the picture, z down.
+ */
 function outline({ start, end, radii }) {
   const [a, b] = [
     [start[1], -start[2]],
@@ -55,7 +58,10 @@ const spanOf = (limbs, axis) => {
 /** A length in words: metres of a person, millimetres of a mouse. */
 const longWords = (mm) => (mm < 500 ? `${Math.round(mm)} mm` : `${(mm / 1000).toFixed(2)} m`);
 
-/** Limbs turned to be seen from where they are longest, in sizes of a person: what the drawing has for a limb of `true` mm. */
+/**
+ * Limbs turned to be seen from where they are longest, in sizes of a person: what the drawing has
+ * for a limb of `true` mm.
+ */
 function turned(limbs, isLong, scale) {
   const turn = ([x, y, z]) => (isLong ? [-y, x, z] : [x, y, z]).map((value) => value / scale);
   return limbs.map((limb) => ({
@@ -67,7 +73,10 @@ function turned(limbs, isLong, scale) {
   }));
 }
 
-/** Draw limbs in `place`; `before`: those drawn dashed beside them, and by how much their lengths differ. */
+/**
+ * Draw limbs in `place`; `before`: those drawn dashed beside them, and by how much their lengths
+ * differ.
+ */
 export function drawStature(place, given, givenBefore, words) {
   const tall = spanOf(given, 2);
   const isLong = spanOf(given, 0) > 1.2 * Math.max(tall, spanOf(given, 1));

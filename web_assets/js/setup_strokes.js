@@ -1,5 +1,6 @@
-// Strokes inside and outside the subject, painted over a camera's picture in any frame; the mask that they give there
-// follows each stroke. Kept with the session; all frames are made of them by "Set up the background".
+// Strokes inside and outside the subject, painted over a camera's picture in any frame; the mask
+// that they give there follows each stroke. Kept with the session; all frames are made of them by
+// "Set up the background".
 
 import { accepted, fetchJson, put, sessionPath } from "./api.js";
 import { button, element, fill, spring } from "./elements.js";
@@ -14,8 +15,8 @@ const HELP =
   "Paint over the subject, and over what is not the subject: a few lines each are enough. Keys: arrows move, space paints, x changes between inside and outside, [ and ] change the size, , and . go a frame back and on, ctrl z undoes, enter keeps, escape leaves.";
 
 /**
- * Paint strokes of `lens` (name, picture_width, picture_height, quarter_turns), beginning in `frame`, of `count` frames;
- * `done(saved, frame)` when left.
+ * Paint strokes of `lens` (name, picture_width, picture_height, quarter_turns), beginning in
+ * `frame`, of `count` frames; `done(saved, frame)` when left.
  * @param {import("./setup.js").Setup} setup
  */
 export async function paintStrokes(setup, lens, frame, count, done) {

@@ -1,4 +1,5 @@
-// Step Subject: which body, how tall, what follows from it; and the fit to the footage, with lengths before and after.
+// Step Subject: which body, how tall, what follows from it; and the fit to the footage, with
+// lengths before and after.
 
 import { fault, fetchJson, post, put, remove, sessionPath } from "./api.js";
 import {
@@ -310,7 +311,10 @@ export function mount(place, setup) {
     if (!gone) draw();
   }
 
-  /** The fit that was begun before this page was loaded, or in another window: how far it is, or what it found. */
+  /**
+   * The fit that was begun before this page was loaded, or in another window: how far it is, or
+   * what it found.
+   */
   async function findFit() {
     const known = await findJob({ session: setup.session, kind: "subject" });
     if (!known || gone || fit) return;

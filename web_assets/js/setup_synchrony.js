@@ -1,4 +1,5 @@
-// The cameras in step: offsets by hand, by a recorder's times, or estimated; an estimate is shown and applied only by a click.
+// The cameras in step: offsets by hand, by a recorder's times, or estimated; an estimate is shown
+// and applied only by a click.
 
 import { accepted, post, remove, sessionPath } from "./api.js";
 import {

@@ -1,4 +1,5 @@
-// Step Track: the short form of a run, how far it is, and the outlines over the pictures as they are found.
+// Step Track: the short form of a run, how far it is, and the outlines over the pictures as they
+// are found.
 
 import { fetchJson, post, remove, runPath, sessionPath } from "./api.js";
 import { valuesOf } from "./studio/dialogs.js";

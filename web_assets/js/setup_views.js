@@ -1,4 +1,5 @@
-// All cameras' pictures of one frame beside the step, with what a run found drawn over them; or the scene instead.
+// All cameras' pictures of one frame beside the step, with what a run found drawn over them; or the
+// scene instead.
 
 import { post, runPath } from "./api.js";
 import { openPicture } from "./studio/dialogs.js";
@@ -10,7 +11,11 @@ import { studioPath } from "./sessions.js";
 const HEIGHT = 420;
 const LARGE = 1080;
 
-/** The wall in `setup.aside`. show({run, frame, track, show}) draws; empty(words) says why there is nothing. @param {import("./setup.js").Setup} setup */
+/**
+ * The wall in `setup.aside`. show({run, frame, track, show}) draws; empty(words) says why there is
+ * nothing.
+ * @param {import("./setup.js").Setup} setup
+ */
 export function viewWall(setup) {
   let shown = null; // what is shown: run, frame, track, show
   let stopped = false;

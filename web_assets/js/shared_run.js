@@ -1,4 +1,5 @@
-// A run as a page of its own, without the studio: the body moving, the views of its search, its settings.
+// A run as a page of its own, without the studio: the body moving, the views of its search, its
+// settings.
 
 import { BodyDrawing } from "./body_drawing.js";
 import { button, byId, card, element, fill, hint } from "./elements.js";
@@ -37,7 +38,10 @@ const POINT = { least: 1.2, more: 2.2, faint: 0.25, glass: 0.22 };
 
 const bytesOf = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
 
-/** The particles of a frame by layer: [{beta, of, particles: [{tips: [[x, y, z]], parent, weight}]}]. */
+/**
+ * The particles of a frame by layer: [{beta, of, particles: [{tips: [[x, y, z]], parent,
+ * weight}]}].
+ */
 function unpackedCloud({ offset, step, tips, layers }) {
   return layers.map(({ points, parents, weights, beta, of }) => {
     const values = new DataView(bytesOf(points).buffer);
@@ -57,7 +61,9 @@ function unpackedCloud({ offset, step, tips, layers }) {
   });
 }
 
-/** Points of a layer, its particles so far on their way (phase 0 to 1) from their parents' places. */
+/**
+ * Points of a layer, its particles so far on their way (phase 0 to 1) from their parents' places.
+ */
 function pointsOf(layers, index, phase) {
   const colour = layerColour(index, layers.length);
   const before = layers[index - 1]?.particles;

@@ -1,4 +1,5 @@
-// One observable value for the whole page: what is open, which frame and layer are shown, what the worker does.
+// One observable value for the whole page: what is open, which frame and layer are shown, what the
+// worker does.
 
 const values = {
   sessions: null, // [{name, title, thumbnail, runs: [...]}], null while unknown
@@ -68,5 +69,8 @@ export function watch(names, watcher) {
   watcher(values);
 }
 
-/** Call `follower(changed)` with every change of any values, before the watchers; for the signals of components. */
+/**
+ * Call `follower(changed)` with every change of any values, before the watchers; for the signals of
+ * components.
+ */
 export const onChange = (follower) => followers.add(follower);

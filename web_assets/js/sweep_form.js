@@ -1,4 +1,5 @@
-// The form of a new sweep: knobs with their values, seeds, frames; how many runs that is and how long they take.
+// The form of a new sweep: knobs with their values, seeds, frames; how many runs that is and how
+// long they take.
 
 import { fetchJson, post, sessionPath } from "./api.js";
 import {
@@ -35,7 +36,9 @@ const words = (line) =>
     .map((one) => one.trim())
     .filter(Boolean);
 
-/** Three values to begin with: about the default, within the knob's range; all choices of a word. */
+/**
+ * Three values to begin with: about the default, within the knob's range; all choices of a word.
+ */
 function proposed(knob) {
   if (knob.kind === "bool") return "true, false";
   if (knob.choices.length) return knob.choices.join(", ");
@@ -158,7 +161,10 @@ function variedKnobs(changed) {
   };
 }
 
-/** Show the form in `content`. initial: what it is filled with. started: called with the line of what was begun. instead: what leads to the other form. */
+/**
+ * Show the form in `content`. initial: what it is filled with. started: called with the line of
+ * what was begun. instead: what leads to the other form.
+ */
 export async function showSweepForm(
   content,
   { sessions, trackers, weightings, initial, started, instead },

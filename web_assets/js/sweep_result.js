@@ -1,5 +1,5 @@
-// The result of a sweep: parallel coordinates of all runs, a heat map of two knobs, a curve over one knob with its interval over
-// the seeds. A click opens a run at its worst frame.
+// The result of a sweep: parallel coordinates of all runs, a heat map of two knobs, a curve over
+// one knob with its interval over the seeds. A click opens a run at its worst frame.
 
 import { figure as words, token, typeSize } from "./chart_looks.js";
 import { card, dotted, element, field, fill, hint, select } from "./elements.js";
@@ -9,7 +9,11 @@ import { categories, distinct, extent, numbers, records, tipOf } from "./view_sh
 
 /** @import { Schemas } from "./api_types" */
 /** @import { Sheet } from "./view_sheet.js" */
-/** @typedef {{ vary: Record<string, any[]>, knobs: any[], measures: any[], tables: any[], session: string, tracker: string, weighting: string, seeds: number[], frames: number[], software: string, best: any }} Result */
+/**
+ * @typedef {{ vary: Record<string, any[]>, knobs: any[], measures: any[], tables: any[], session:
+ *   string, tracker: string, weighting: string, seeds: number[], frames: number[], software:
+ *   string, best: any }} Result
+ */
 
 const CAP = 5;
 const SHADE_STEPS = 10;
@@ -39,7 +43,11 @@ function reading(result) {
   return { result, runs, points, names, labelOf, isAt };
 }
 
-/** Show a finished sweep in `place`. @param {HTMLElement} place @param {Schemas["ComparisonDetail"]} detail */
+/**
+ * Show a finished sweep in `place`.
+ * @param {HTMLElement} place
+ * @param {Schemas["ComparisonDetail"]} detail
+ */
 export function showSweep(place, detail) {
   const result = /** @type {Result} */ (/** @type {unknown} */ (detail.result));
   const own = reading(result);
@@ -188,7 +196,10 @@ function digitsFor(values) {
 /** Cool where it is good, warm where it is bad. */
 const shade = (share) => layerColour(Math.round(share * (SHADE_STEPS - 1)), SHADE_STEPS);
 
-/** Every run as a line across its knobs and measures; the chosen measure colours it. @param {Sheet} sheet */
+/**
+ * Every run as a line across its knobs and measures; the chosen measure colours it.
+ * @param {Sheet} sheet
+ */
 function drawParallel(sheet, own, room) {
   const { runs, measure, names, result, labelOf } = own;
   const good = badness(
@@ -340,7 +351,10 @@ function drawMap(sheet, own, room) {
     : "";
 }
 
-/** Over one knob: a line for each value of the other, the mean with its interval, every seed a dot. @param {Sheet} sheet */
+/**
+ * Over one knob: a line for each value of the other, the mean with its interval, every seed a dot.
+ * @param {Sheet} sheet
+ */
 function drawCurve(sheet, own, room) {
   const { points, runs, measure, chosen, fixed, result, labelOf } = own;
   const across = inOrder(result.vary[chosen.across]);

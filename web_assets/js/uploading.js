@@ -1,5 +1,5 @@
-// Uploading files: one after the other, piece by piece, so that it can be said how far it is; a piece that breaks goes on
-// where it broke.
+// Uploading files: one after the other, piece by piece, so that it can be said how far it is; a
+// piece that breaks goes on where it broke.
 
 import { accepted, fault, fetchJson, post, remove } from "./api.js";
 import { dotted } from "./elements.js";
@@ -47,7 +47,10 @@ async function sendFile(identifier, file, path, arrived, signal) {
   }
 }
 
-/** Send files; report(words, share) says how far. Resolves with the upload's identifier. signal: of an AbortController. */
+/**
+ * Send files; report(words, share) says how far. Resolves with the upload's identifier. signal: of
+ * an AbortController.
+ */
 export async function uploadFiles(files, report, signal = undefined) {
   const { identifier } = await post("/api/uploads");
   const total = [...files].reduce((sum, file) => sum + file.size, 0) || 1;

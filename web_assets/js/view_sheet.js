@@ -1,12 +1,16 @@
-// A sheet of drawings: several plots beside and below one another in one chart, so that they are seen, exported and printed
-// together. A drawing function fills one; what of it can be clicked says what it chooses.
+// A sheet of drawings: several plots beside and below one another in one chart, so that they are
+// seen, exported and printed together. A drawing function fills one; what of it can be clicked says
+// what it chooses.
 
 import { axis, figure, token, typeSize } from "./chart_looks.js";
 
 const HEADING = 30,
   LEGEND = 17,
   WORD = 12;
-/** Pixels below which what stands side by side stands one below the other, and how high it is there at least. */
+/**
+ * Pixels below which what stands side by side stands one below the other, and how high it is there
+ * at least.
+ */
 export const NARROW = 640;
 const STACKED = 150;
 const KEY_GAP = 10;
@@ -18,14 +22,18 @@ const GROUPS = "groups";
 const FAMILY = "Inter, system-ui, sans-serif";
 
 /**
- * @typedef {{ left: number, top?: number, width: number, height: number, isBelow?: boolean }} Box pixels of the plot itself, without its
- *   labels; `isBelow`: it stands below all that is on the sheet so far
+ * @typedef {{ left: number, top?: number, width: number, height: number, isBelow?: boolean }} Box
+ *   pixels of the plot itself, without its labels; `isBelow`: it stands below all that is on the
+ *   sheet so far
  * @typedef {Record<string, any>} Changes of the selection
  */
 
 const pen = document.createElement("canvas").getContext("2d");
 
-/** A text that takes at most `width` pixels: whole words of it, none where less than half of it fits. */
+/**
+ * A text that takes at most `width` pixels: whole words of it, none where less than half of it
+ * fits.
+ */
 function shortened(text, width) {
   if (pen.measureText(text).width <= width) return text;
   let kept = text;
@@ -50,7 +58,10 @@ export class Sheet {
   };
   /** @type {Map<string, (event: any) => Changes | null>} */
   clicks = new Map();
-  /** What is called with a place in a plot that is clicked where nothing is. @type {{ box: Box, index: number, act: (x: number, y: number) => Changes | null }[]} */
+  /**
+   * What is called with a place in a plot that is clicked where nothing is.
+   * @type {{ box: Box, index: number, act: (x: number, y: number) => Changes | null }[]}
+   */
   grounds = [];
   height = 0;
 
@@ -59,10 +70,12 @@ export class Sheet {
   }
 
   /**
-   * Places of plots side by side, of equal (or given) shares of the width, each with room for labels at its left; on a narrow
-   * sheet one below the other, unless `stacks` is false. `height`: of all, or of each; `least`: that each needs where it stands alone.
+   * Places of plots side by side, of equal (or given) shares of the width, each with room for
+   * labels at its left; on a narrow sheet one below the other, unless `stacks` is false. `height`:
+   * of all, or of each; `least`: that each needs where it stands alone.
    * @param {number} count
-   * @param {{ height?: number | number[], least?: number | number[], gutters?: number | number[], right?: number, shares?: number[], stacks?: boolean }} [how]
+   * @param {{ height?: number | number[], least?: number | number[], gutters?: number | number[],
+   *   right?: number, shares?: number[], stacks?: boolean }} [how]
    * @returns {Box[]}
    */
   columns(
@@ -101,7 +114,8 @@ export class Sheet {
   /**
    * A plot with its axes. `x`, `y`: ECharts' axes; returns its number, by which series name it.
    * @param {Box} box
-   * @param {{ title?: string, unit?: string, x: any, y: any, below?: number, names?: string[], over?: (points: any[]) => string, click?: (x: number, y: number) => Changes | null }} more
+   * @param {{ title?: string, unit?: string, x: any, y: any, below?: number, names?: string[],
+   *   over?: (points: any[]) => string, click?: (x: number, y: number) => Changes | null }} more
    */
   plot(box, { title = "", unit = "", x, y, below = 34, names = null, over = null, click = null }) {
     const index = this.option.grid.length;
@@ -246,10 +260,12 @@ export class Sheet {
   }
 
   /**
-   * A map of cells [column, row, value] on two axes of categories; the colours run from `low` to `high`. `key`: how high their key
-   * beside it is; 0 for none.
+   * A map of cells [column, row, value] on two axes of categories; the colours run from `low` to
+   * `high`. `key`: how high their key beside it is; 0 for none.
    * @param {number} plot
-   * @param {{ cells: any[], low: number, high: number, colours?: string[], ends?: [string, string], key?: number, click?: (event: any) => Changes | null, tip: (event: any) => string, framed?: boolean }} more
+   * @param {{ cells: any[], low: number, high: number, colours?: string[], ends?: [string, string],
+   *   key?: number, click?: (event: any) => Changes | null, tip: (event: any) => string, framed?:
+   *   boolean }} more
    */
   heat(
     plot,
@@ -278,8 +294,9 @@ export class Sheet {
   }
 
   /**
-   * A map whose cells are split along their diagonal: stored above it, `tried` below it, on one scale; with `tried` null
-   * a map like any other. A column or row that only one of both has is half empty.
+   * A map whose cells are split along their diagonal: stored above it, `tried` below it, on one
+   * scale; with `tried` null a map like any other. A column or row that only one of both has is
+   * half empty.
    * @param {number} plot
    * @param {{ cells: any[], tried: any[] | null, low: number, high: number, colours?: string[],
    *   ends?: [string, string], key?: number, framed?: boolean,
@@ -338,8 +355,8 @@ export class Sheet {
   }
 
   /**
-   * Where the words of vertical lines stand so that none covers another: which side of its line, and how many lines of text
-   * below the plot's top.
+   * Where the words of vertical lines stand so that none covers another: which side of its line,
+   * and how many lines of text below the plot's top.
    * @param {{ x?: any, word?: string }[]} marks
    * @param {[number, number]} range of the axis
    * @param {number} width of the plot, pixels
@@ -535,7 +552,8 @@ export const logarithmic = (name = "", more = {}) => ({
 });
 
 /**
- * What is drawn side by side: what is stored, and beside it what was tried, each with its tables and colour.
+ * What is drawn side by side: what is stored, and beside it what was tried, each with its tables
+ * and colour.
  * @returns {{ name: string, tables: any, colour: string }[]}
  */
 export const sidesOf = (

@@ -1,5 +1,6 @@
-// Views of the answer: what the likelihood looks like around it, which camera and term pulls where, whether there is a second
-// answer, whether another seed agrees, whether the spread predicts the error; and weight and error over the frames.
+// Views of the answer: what the likelihood looks like around it, which camera and term pulls where,
+// whether there is a second answer, whether another seed agrees, whether the spread predicts the
+// error; and weight and error over the frames.
 
 import { figure, token } from "./chart_looks.js";
 import { layerAxis, layerInSearch } from "./layer_axis.js";
@@ -36,7 +37,10 @@ function poseAt(ends, place, [first, last]) {
   return ends.map((row) => row.from + share * (row.to - row.from));
 }
 
-/** Landscape: the log weight along a line or over two parameters, at each layer's β, by camera and term. */
+/**
+ * Landscape: the log weight along a line or over two parameters, at each layer's β, by camera and
+ * term.
+ */
 function landscape(sheet, { slice, terms, tempered, plane, rug, marks, ends, scale }, at) {
   const unit = slice[0]?.unit ?? "";
   const isParameter = Boolean(at.parameter) && unit !== "";
@@ -877,7 +881,10 @@ function overFrames(sheet, { frames: rows }, at) {
     : "";
 }
 
-/** How each view is drawn; see SEARCH_VIEWS. @type {Record<string, { frame?: Drawing, run?: Drawing }>} */
+/**
+ * How each view is drawn; see SEARCH_VIEWS.
+ * @type {Record<string, { frame?: Drawing, run?: Drawing }>}
+ */
 export const ANSWER_VIEWS = {
   landscape: { frame: landscape },
   blame: { frame: blame },

@@ -1,5 +1,6 @@
-// Views of the search itself: what each layer settled, whether annealing proceeded as asked, who descends from whom, how the
-// weight is shared out, what the clouds learnt, which parameters trade off, what the dead had wrong.
+// Views of the search itself: what each layer settled, whether annealing proceeded as asked, who
+// descends from whom, how the weight is shared out, what the clouds learnt, which parameters trade
+// off, what the dead had wrong.
 
 import { figure, token } from "./chart_looks.js";
 import { layerAxis, layerInSearch, layerNumber, layerValue } from "./layer_axis.js";
@@ -25,11 +26,15 @@ import {
 
 /** @import { Sheet } from "./view_sheet.js" */
 /**
- * What a drawing knows beside its tables. `label`: of a parameter; `room`: pixels of height that are free; `tried`: the same tables
- * of the trial that is shown, else null. `searchLayers`, `searches`: how the frame's layers are counted.
- * @typedef {{ searchLayers: number, searches: number, layer: number | null, limb: string | null, parameter: string | null, particle: number | null, camera: string | null, frame: number, over: boolean,
- *   layers: number, label: (name: string) => string, room: number, tried: any, score: [string, string] }} At
- * @typedef {(sheet: Sheet, tables: any, at: At) => string} Drawing fills a sheet with tables (rows by key); the exact numbers of what is chosen in a sentence
+ * What a drawing knows beside its tables. `label`: of a parameter; `room`: pixels of height that
+ * are free; `tried`: the same tables of the trial that is shown, else null. `searchLayers`,
+ * `searches`: how the frame's layers are counted.
+ * @typedef {{ searchLayers: number, searches: number, layer: number | null, limb: string | null,
+ *   parameter: string | null, particle: number | null, camera: string | null, frame: number, over:
+ *   boolean, layers: number, label: (name: string) => string, room: number, tried: any, score:
+ *   [string, string] }} At
+ * @typedef {(sheet: Sheet, tables: any, at: At) => string} Drawing fills a sheet with tables (rows
+ *   by key); the exact numbers of what is chosen in a sentence
  */
 
 const ROW = 13;
@@ -55,10 +60,16 @@ function parameterAxis(names, at) {
   });
 }
 
-/** Decades below the first layer's variance that a colour tells apart: the same in every frame and run. */
+/**
+ * Decades below the first layer's variance that a colour tells apart: the same in every frame and
+ * run.
+ */
 const DECADES = 3;
 
-/** Variance reduction of a frame: two maps that share one scale, and the chosen parameter over the layers. */
+/**
+ * Variance reduction of a frame: two maps that share one scale, and the chosen parameter over the
+ * layers.
+ */
 function varianceOfFrame(sheet, tables, at) {
   const { layers: rows, settled } = tables;
   const sides = sidesOf(tables, at);
@@ -190,7 +201,10 @@ const tipOfLayer = (/** @type {At} */ at) => (points) =>
       .map((point) => [point.seriesName, point.data?.value ?? point.data]),
   );
 
-/** Of frames that are searched several times over the rows of the last search, whose result is the frame's; `step`: its layers counted from 0. */
+/**
+ * Of frames that are searched several times over the rows of the last search, whose result is the
+ * frame's; `step`: its layers counted from 0.
+ */
 export function lastSearches(rows) {
   return [...grouped(rows, "frame").values()].flatMap((own) => {
     const search = Math.max(...own.map((row) => row.search));
@@ -203,7 +217,9 @@ export function lastSearches(rows) {
 /** Decades to either side of a run's median that a colour tells apart: the same in every run. */
 const DECADES_BESIDE = 1.5;
 
-/** Variance of the run: parameters over the frames, and the chosen parameter as layers over frames. */
+/**
+ * Variance of the run: parameters over the frames, and the chosen parameter as layers over frames.
+ */
 function varianceOfRun(sheet, { last, parameter: searched }, at) {
   const parameter = lastSearches(searched);
   const frames = last.map((row) => row.frame);
@@ -681,7 +697,10 @@ function weights(sheet, tables, at) {
   return `${words.join("; ")}.`;
 }
 
-/** First and last cloud: every parameter's interval before and after, and the chosen one's densities over the layers. */
+/**
+ * First and last cloud: every parameter's interval before and after, and the chosen one's densities
+ * over the layers.
+ */
 function clouds(sheet, { summary, own: steps, ridges, marks }, at) {
   const tried = at.tried;
   const byParameter = grouped(summary, "parameter");
@@ -828,7 +847,8 @@ function clouds(sheet, { summary, own: steps, ridges, marks }, at) {
       splitLine: { show: false },
     },
   });
-  // Where a search begins, above its first layer's set; the first set as drawn belongs to the first search.
+  // Where a search begins, above its first layer's set; the first set as drawn belongs to the first
+  // search.
   const starts = own.flatMap(([set], index) =>
     at.searches > 1 && set >= 0 && set % at.searchLayers === 0
       ? [
@@ -914,7 +934,10 @@ function clouds(sheet, { summary, own: steps, ridges, marks }, at) {
   return `${at.label(chosen)}: ${words(summary)}${beside}; estimate ${withUnit(estimate, unit)}${Number.isFinite(truth) ? `, truth ${withUnit(truth, unit)}` : ""}.`;
 }
 
-/** Coupling: correlations of a layer's set in the order of settling, and one parameter against its nearest partners. */
+/**
+ * Coupling: correlations of a layer's set in the order of settling, and one parameter against its
+ * nearest partners.
+ */
 function coupling(sheet, { matrix, order, particles }, at) {
   const tried = at.tried;
   const names = [...order].sort((a, b) => a.place - b.place).map((row) => row.parameter);
@@ -1052,7 +1075,10 @@ const MOST_AXES = 14;
 const AXIS_ROOM = 56;
 const MOST_LINES = 300;
 
-/** Survivors and dead: parallel coordinates of a layer's particles, and how far the two groups lie apart. */
+/**
+ * Survivors and dead: parallel coordinates of a layer's particles, and how far the two groups lie
+ * apart.
+ */
 function survivors(sheet, { particles, difference }, at) {
   const tried = at.tried;
   const ranked = [...difference].sort(
@@ -1180,16 +1206,14 @@ function survivors(sheet, { particles, difference }, at) {
       name,
       type: "bar",
       barMaxWidth: 10,
-      data: list
-        .slice(0, MOST_AXES)
-        .map((row) => ({
-          value: row.difference,
-          row,
-          itemStyle: {
-            color: token(name || ((row.difference ?? 0) < 0 ? "less" : "more")),
-            opacity: (row.p_value ?? 1) < 0.05 ? 1 : 0.35,
-          },
-        })),
+      data: list.slice(0, MOST_AXES).map((row) => ({
+        value: row.difference,
+        row,
+        itemStyle: {
+          color: token(name || ((row.difference ?? 0) < 0 ? "less" : "more")),
+          opacity: (row.p_value ?? 1) < 0.05 ? 1 : 0.35,
+        },
+      })),
       click: ({ data }) => ({ parameter: data.row.parameter }),
       tip: ({ data: { row } }) =>
         tipOf(at.label(row.parameter), [
@@ -1208,7 +1232,10 @@ function survivors(sheet, { particles, difference }, at) {
   return `${alive(particles)} survive this layer${tried ? `, tried ${alive(tried.particles)}` : ""}. ${most ? `They differ most in ${at.label(most.parameter)}: ${withUnit(most.survivors, most.unit)} against ${withUnit(most.dead, most.unit)}, ${figure(most.difference)} deviations.` : ""}`;
 }
 
-/** How each view is drawn: of a frame and, where it has that, of the run. @type {Record<string, { frame?: Drawing, run?: Drawing }>} */
+/**
+ * How each view is drawn: of a frame and, where it has that, of the run.
+ * @type {Record<string, { frame?: Drawing, run?: Drawing }>}
+ */
 export const SEARCH_VIEWS = {
   variance: { frame: varianceOfFrame, run: varianceOfRun },
   schedule: { frame: scheduleOfFrame, run: scheduleOfRun },

@@ -1,4 +1,5 @@
-// Limbs over the frames, and how near the particles of each layer came: what the words on why a frame failed rest on.
+// Limbs over the frames, and how near the particles of each layer came: what the words on why a
+// frame failed rest on.
 
 import { figure as figureWords, token } from "./chart_looks.js";
 import { layerAxis, layerInSearch } from "./layer_axis.js";

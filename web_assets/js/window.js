@@ -1,5 +1,6 @@
-// This window's name: its scene in the studio goes by it. A window keeps it over reloads and from page to page; a copy of
-// the window gets another one, because the name is in the store only while the window is between two pages.
+// This window's name: its scene in the studio goes by it. A window keeps it over reloads and from
+// page to page; a copy of the window gets another one, because the name is in the store only while
+// the window is between two pages.
 
 const KEY = "window";
 

@@ -147,7 +147,10 @@ function open(name) {
   openSession(session, run, { frame: get("frame"), panel: "compare" });
 }
 
-/** The worst frame of each run. @param {{ rows: any[], colours: Map<string, number> }} properties */
+/**
+ * The worst frame of each run.
+ * @param {{ rows: any[], colours: Map<string, number> }} properties
+ */
 const Worst = ({ rows, colours }) => html`<table class="figures compared">
   <thead>
     <tr>

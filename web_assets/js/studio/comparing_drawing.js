@@ -20,7 +20,8 @@ const tipOfLayer = (points) =>
 const given = new Map();
 
 /**
- * The colour's number of each run: it stays with the run, whichever of them is open and whatever joins.
+ * The colour's number of each run: it stays with the run, whichever of them is open and whatever
+ * joins.
  * @param {string[]} runs
  * @returns {Map<string, number>}
  */
@@ -69,7 +70,8 @@ export function lastSearch({ tables, search_layers: layers, searches }) {
  * Draw them; the numbers of the shown frame in a sentence.
  * @param {any} sheet
  * @param {{ curves: any[], runs: string[], frame: number | null, layer: number | null,
- *   layered: { run: string, layers: any[] }[] }} what `layered`: the layers of the shown frame's last search, by run
+ *   layered: { run: string, layers: any[] }[] }} what `layered`: the layers of the shown frame's
+ * last search, by run
  * @param {number} room
  */
 export function drawCompared(sheet, { curves, runs, frame: shown, layer, layered }, room) {

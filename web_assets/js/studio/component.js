@@ -1,8 +1,10 @@
-// What the studio page's components are made of: Preact, its hooks, signals, and `html`, markup in a template string.
+// What the studio page's components are made of: Preact, its hooks, signals, and `html`, markup in
+// a template string.
 //
-// A component is a function of its properties that returns html`…`; it renders itself again when a signal that it read
-// has changed. The page's values are read by `follow(name)` (of state.js) inside a component or an effect, and by
-// `get(name)` in event handlers. The files of this folder are formatted (biome, 100 columns) and checked for nulls.
+// A component is a function of its properties that returns html`…`; it renders itself again when a
+// signal that it read has changed. The page's values are read by `follow(name)` (of state.js)
+// inside a component or an effect, and by `get(name)` in event handlers. The files of this folder
+// are formatted (biome, 100 columns) and checked for nulls.
 
 import htm from "../../vendor/htm.js";
 import { h, render } from "../../vendor/preact.js";

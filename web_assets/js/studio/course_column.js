@@ -1,5 +1,6 @@
-// The course as a column beside the scene. What is scrolled to is shown: each link into the studio is a state of the page,
-// and the last one above the middle of the column is opened. A link that names a knob is a number to be dragged.
+// The course as a column beside the scene. What is scrolled to is shown: each link into the studio
+// is a state of the page, and the last one above the middle of the column is opened. A link that
+// names a knob is a number to be dragged.
 
 import { fetchJson, post, readOnly } from "../api.js";
 import { complain } from "../messages.js";
@@ -43,7 +44,10 @@ function show(link, place) {
   visit(Object.fromEntries(query));
 }
 
-/** A number in a sentence, dragged or turned by the arrow keys. @param {{ name: string, words: string }} properties */
+/**
+ * A number in a sentence, dragged or turned by the arrow keys.
+ * @param {{ name: string, words: string }} properties
+ */
 function KnobNumber({ name, words }) {
   const knob = useKnob(name);
   const from = useRef({ x: 0, value: 0 });
@@ -94,7 +98,10 @@ function KnobNumber({ name, words }) {
   >`;
 }
 
-/** Whether the runs that a page speaks of are there; they are made here. @param {{ name: string }} properties */
+/**
+ * Whether the runs that a page speaks of are there; they are made here.
+ * @param {{ name: string }} properties
+ */
 function Runs({ name }) {
   const [course, setCourse] = useState(/** @type {any} */ (null));
   const look = async () => {
@@ -135,7 +142,10 @@ function Runs({ name }) {
   </div>`;
 }
 
-/** The text of a page of the guide, its links and knobs alive. @param {{ name: string }} properties */
+/**
+ * The text of a page of the guide, its links and knobs alive.
+ * @param {{ name: string }} properties
+ */
 function Lesson({ name }) {
   const place = useRef(/** @type {any} */ (null));
   useEffect(() => {
@@ -232,7 +242,9 @@ function CourseColumn() {
     </div>`;
 }
 
-/** Show the course where it was docked before, or where the address asks for it (`course=LESSON`). */
+/**
+ * Show the course where it was docked before, or where the address asks for it (`course=LESSON`).
+ */
 export function startCourseColumn() {
   const place = /** @type {HTMLElement} */ (document.getElementById("course-column"));
   const wanted = new URLSearchParams(location.search).get("course") ?? localStorage.getItem(KEPT);

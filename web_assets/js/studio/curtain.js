@@ -1,5 +1,5 @@
-// What lies over the scene: that there is nothing to look at yet, that the studio does not answer, that kernels are compiled,
-// that the tracking process ended.
+// What lies over the scene: that there is nothing to look at yet, that the studio does not answer,
+// that kernels are compiled, that the tracking process ended.
 
 import { post, runPath } from "../api.js";
 import { byId } from "../elements.js";

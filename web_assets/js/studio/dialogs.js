@@ -64,9 +64,9 @@ export const openPicture = (caption, source) =>
   openDialog(html`<${LargePicture} caption=${caption} source=${source} />`, "large-view");
 
 /**
- * A field of a form. `kind`: of its input, or "check", or "file"; `choices`: those of a select, as {value, label} or words;
- * `hint`: stands below it, `help`: where the pointer rests; all else are the input's own
- * attributes.
+ * A field of a form. `kind`: of its input, or "check", or "file"; `choices`: those of a select, as
+ * {value, label} or words; `hint`: stands below it, `help`: where the pointer rests; all else are
+ * the input's own attributes.
  */
 export function Field(
   /** @type {Record<string, any>} */ {

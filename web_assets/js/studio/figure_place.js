@@ -5,10 +5,10 @@ import { Figure } from "../figure.js";
 import { follow, html, mount, useEffect, useLayoutEffect, useRef } from "./component.js";
 
 /**
- * @param {{ panel: string, label: string, shown: import("../figure.js").Shown | null, words?: string,
- *   busy?: boolean, tools?: any, take?: (figure: Figure) => void }} properties
- *   `panel`: in which it stands: it is drawn while that one is open. `words`: why nothing is shown.
- * `tools`: a component   of what can be chosen of it. `take`: gets the figure, once.
+ * @param {{ panel: string, label: string, shown: import("../figure.js").Shown | null, words?:
+ *   string, busy?: boolean, tools?: any, take?: (figure: Figure) => void }} properties `panel`: in
+ *   which it stands: it is drawn while that one is open. `words`: why nothing is shown. `tools`: a
+ *   component   of what can be chosen of it. `take`: gets the figure, once.
  */
 export function FigurePlace({ panel, label, shown, words = "", busy = false, tools, take }) {
   const place = useRef(/** @type {HTMLElement | null} */ (null));

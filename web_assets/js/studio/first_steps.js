@@ -1,6 +1,6 @@
-// The first two minutes, in four steps beside the scene: what is seen, what the survival rate changes, how it fails, and
-// what comes next. They are there while a session has the two runs that travel with the walk, until they are closed: the
-// studio remembers that.
+// The first two minutes, in four steps beside the scene: what is seen, what the survival rate
+// changes, how it fails, and what comes next. They are there while a session has the two runs that
+// travel with the walk, until they are closed: the studio remembers that.
 
 import { fetchJson, patch, readOnly } from "../api.js";
 import { complain } from "../messages.js";
@@ -19,7 +19,12 @@ const PREFERENCE = "first-steps";
 
 const isClosed = signal(true);
 
-/** @param {number} step counted from 0 @param {string} run @param {number} frame @param {Record<string, string>} shown */
+/**
+ * @param {number} step counted from 0
+ * @param {string} run
+ * @param {number} frame
+ * @param {Record<string, string>} shown
+ */
 function look(step, run, frame, shown) {
   visit({ session: get("session"), run, frame, ...shown, step: step + 1 });
   playWhenShown().catch(complain);
@@ -125,7 +130,10 @@ const STEPS = [
   },
 ];
 
-/** What stands in a step's place while another run is open than those it is about. @param {{ runs: string[], again: () => void }} properties */
+/**
+ * What stands in a step's place while another run is open than those it is about.
+ * @param {{ runs: string[], again: () => void }} properties
+ */
 const Elsewhere = ({ runs, again }) => html`<p>
     You are looking at <b>${follow("run")}</b>; this step is about <b>${runs.join(" and ")}</b>.
   </p>
@@ -184,7 +192,10 @@ function FirstSteps() {
   </section>`;
 }
 
-/** Show the steps in their place, unless they were closed, at the one that the address names (`step`). */
+/**
+ * Show the steps in their place, unless they were closed, at the one that the address names
+ * (`step`).
+ */
 export async function startFirstSteps() {
   const place = /** @type {HTMLElement} */ (document.getElementById("first-steps"));
   mount(place, html`<${FirstSteps} />`);

@@ -3,8 +3,8 @@
 import { dotted } from "../elements.js";
 
 /**
- * What the search says of a frame: its name here, its colour, and what is said of it; frames that were simply tracked carry
- * no mark.
+ * What the search says of a frame: its name here, its colour, and what is said of it; frames that
+ * were simply tracked carry no mark.
  * @type {Record<string, [string, string, string]>}
  */
 export const STATES = {
@@ -38,8 +38,8 @@ export function knownFrames(summary) {
 }
 
 /**
- * Where the marks that are drawn begin: frames of which something is to be said that is not said of the one before, and those
- * with a note.
+ * Where the marks that are drawn begin: frames of which something is to be said that is not said of
+ * the one before, and those with a note.
  * @param {{ frame: number }[]} notes
  * @returns {number[]}
  */

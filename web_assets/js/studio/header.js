@@ -1,4 +1,5 @@
-// The header: the run, the state of the tracking process, progress and time left; and the buttons that operate it.
+// The header: the run, the state of the tracking process, progress and time left; and the buttons
+// that operate it.
 
 import { byId } from "../elements.js";
 import { follow, html, mount, useEffect } from "./component.js";

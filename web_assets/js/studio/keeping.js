@@ -8,11 +8,12 @@ import { openSession, refreshSessions } from "../sessions.js";
 import { get, set } from "../state.js";
 
 /**
- * A run of its own with the frames before this one, tracked on from it with the knobs that were moved; it is opened, and the
- * run that was shown stays as it is. The frame's result is the one that was tried, for the start and the random numbers are
- * the same.
+ * A run of its own with the frames before this one, tracked on from it with the knobs that were
+ * moved; it is opened, and the run that was shown stays as it is. The frame's result is the one
+ * that was tried, for the start and the random numbers are the same.
  * @param {number} frame
- * @param {Record<string, any>} settings the knobs that it is tracked with; none: those that were moved
+ * @param {Record<string, any>} settings the knobs that it is tracked with; none: those that were
+ *   moved
  */
 export async function keepAsNewRun(frame, settings = {}) {
   const [session, run] = [get("session"), get("run")];

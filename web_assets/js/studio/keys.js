@@ -33,7 +33,8 @@ const MARKS =
   "found again, corrected, noted";
 
 /**
- * The key, what it does in words, whether an event is it, and what it does: false where it did nothing.
+ * The key, what it does in words, whether an event is it, and what it does: false where it did
+ * nothing.
  * @type {[string, string, (event: any) => boolean, (event: KeyboardEvent) => unknown][]}
  */
 const KEYS = [
@@ -91,8 +92,8 @@ function showKeys() {
   );
 }
 
-// What needs all keys for itself, and what needs the arrows only up and down or not at all. Timeline and layers are sliders
-// that the page's own keys move as well.
+// What needs all keys for itself, and what needs the arrows only up and down or not at all.
+// Timeline and layers are sliders that the page's own keys move as well.
 const TYPING =
   "input:not([type=checkbox]), textarea, dialog:not(.large-view), " +
   "[role=slider]:not(#track, #layer-tiles), [role=menu], [role=tab]";

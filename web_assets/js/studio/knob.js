@@ -1,4 +1,5 @@
-// A knob of the open run, to be turned from a sentence or a strip: the shown frame is searched again with it.
+// A knob of the open run, to be turned from a sentence or a strip: the shown frame is searched
+// again with it.
 
 import { fetchJson, patch, runPath } from "../api.js";
 import { complain } from "../messages.js";
@@ -8,10 +9,14 @@ import { follow, useEffect, useMemo, useState } from "./component.js";
 
 const SEND_MILLISECONDS = 120;
 
-/** @typedef {{ value: number, low: number, high: number, step: number, turn: (value: number) => void }} Turned */
+/**
+ * @typedef {{ value: number, low: number, high: number, step: number, turn: (value: number) => void
+ *   }} Turned
+ */
 
 /**
- * The knob's value now, its range, and what turns it; null while it is not known or the run has none of this name.
+ * The knob's value now, its range, and what turns it; null while it is not known or the run has
+ * none of this name.
  * @param {string} name
  * @returns {Turned | null}
  */

@@ -1,8 +1,12 @@
-// A layer's cloud as a small drawing: where hands, feet and head of its particles lie, about the mean body.
+// A layer's cloud as a small drawing: where hands, feet and head of its particles lie, about the
+// mean body.
 
 import { html } from "./component.js";
 
-/** Standard deviations that an ellipse reaches at least; so much of the figure's height at most the largest of a frame. */
+/**
+ * Standard deviations that an ellipse reaches at least; so much of the figure's height at most the
+ * largest of a frame.
+ */
 const REACH = 1.5;
 const LARGEST = 0.2;
 const MARGIN = 0.04;
@@ -18,9 +22,9 @@ function axesOf(xx, xy, yy) {
 }
 
 /**
- * How the outlines of a frame's layers are drawn, all alike; null without any. `box`: the part of the picture that holds
- * them, as an SVG's viewBox. `reach`: standard deviations of an ellipse's half axes, more than they are where the cloud is
- * too small to be seen beside its body.
+ * How the outlines of a frame's layers are drawn, all alike; null without any. `box`: the part of
+ * the picture that holds them, as an SVG's viewBox. `reach`: standard deviations of an ellipse's
+ * half axes, more than they are where the cloud is too small to be seen beside its body.
  * @param {(Outline | null | undefined)[]} outlines
  */
 export function scaleOf(outlines) {
@@ -48,7 +52,8 @@ export function scaleOf(outlines) {
 
 /**
  * The outline of one layer.
- * @param {{ outline?: Outline | null, scale: ReturnType<typeof scaleOf>, colour: string }} properties
+ * @param {{ outline?: Outline | null, scale: ReturnType<typeof scaleOf>, colour: string }}
+ *   properties
  */
 export function LayerOutline({ outline, scale, colour }) {
   if (!outline || !scale) return html`<svg class="layer-outline" aria-hidden="true"></svg>`;

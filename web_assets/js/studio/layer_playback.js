@@ -1,5 +1,5 @@
-// Playing the layers of the shown frame: in a loop or forth and back, so many a second. The scene plays them and says each
-// move; frames rest meanwhile.
+// Playing the layers of the shown frame: in a loop or forth and back, so many a second. The scene
+// plays them and says each move; frames rest meanwhile.
 
 import { fetchJson, post } from "../api.js";
 import { holdLayer } from "../data.js";
@@ -27,7 +27,10 @@ function take(now) {
   }
 }
 
-/** Begin, end, or change how the layers are played; what is left out stays. @param {Partial<LayerPlayback>} changes */
+/**
+ * Begin, end, or change how the layers are played; what is left out stays.
+ * @param {Partial<LayerPlayback>} changes
+ */
 export async function playLayers(changes) {
   const before = layerPlayback.value;
   if (changes.playing === false) leaveOffPlaying();
@@ -43,7 +46,10 @@ export async function playLayers(changes) {
 /** Play the layers of the shown frame, or stop. */
 export const toggleLayers = () => playLayers({ playing: !layerPlayback.value.playing });
 
-/** Show one layer by hand, null for all together: what is played stops. @param {number | null} layer */
+/**
+ * Show one layer by hand, null for all together: what is played stops.
+ * @param {number | null} layer
+ */
 export function scrubTo(layer) {
   const played = layerPlayback.value.playing;
   if (played) playLayers({ playing: false });

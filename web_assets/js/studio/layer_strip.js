@@ -1,7 +1,8 @@
-// The layer transport, under the timeline: a tile for each layer of the shown frame, and what plays them.
+// The layer transport, under the timeline: a tile for each layer of the shown frame, and what plays
+// them.
 //
-// All tiles of a frame are there from its first layer on, so nothing moves while it is searched; a layer that is still to
-// come is an empty tile.
+// All tiles of a frame are there from its first layer on, so nothing moves while it is searched; a
+// layer that is still to come is an empty tile.
 
 import { figure } from "../chart_looks.js";
 import { byId } from "../elements.js";
@@ -19,7 +20,9 @@ const PAUSE = "M4 3h3v10H4zM9 3h3v10H9z";
 const LOOP =
   "M8 2.5a5.5 5.5 0 0 1 4.6 2.5V2.8h1.5V8H9V6.5h2.6A4 4 0 1 0 12 8.9h1.5A5.5 5.5 0 1 1 8 2.5z";
 const PINGPONG = "M5 3v2.2h6V3l4 3.5L11 10V7.8H5V10L1 6.5zM2 12h12v1.5H2z";
-/** The variance bar of a layer that has so small a share of the first layer's, or less, is empty. */
+/**
+ * The variance bar of a layer that has so small a share of the first layer's, or less, is empty.
+ */
 const LEAST_SHARE = 1e-4;
 
 const icon = (path) => html`<svg viewBox="0 0 16 16"><path d=${path} /></svg>`;
@@ -43,7 +46,10 @@ function numbersOf(layer) {
   return parts.join(" · ");
 }
 
-/** How high a layer's variance bar stands, 0 to 1: the share of the first layer's variance on a log scale. */
+/**
+ * How high a layer's variance bar stands, 0 to 1: the share of the first layer's variance on a log
+ * scale.
+ */
 const barOf = (share) =>
   share === null ? 0 : Math.max(0, 1 - Math.log(Math.min(1, share)) / Math.log(LEAST_SHARE));
 
@@ -238,7 +244,10 @@ export function step(by) {
   stepLayer(by);
 }
 
-/** Leave the layers: stop what plays and show all of them together. Whether there was anything to leave. */
+/**
+ * Leave the layers: stop what plays and show all of them together. Whether there was anything to
+ * leave.
+ */
 export function leaveLayers() {
   if (!layerPlayback.value.playing && get("layer") === null) return false;
   scrubTo(null);

@@ -1,5 +1,5 @@
-// What a link names that is not here: a session or a run that was renamed, deleted, or is of another studio. It is said,
-// and what is here is offered; nothing else is opened in its place.
+// What a link names that is not here: a session or a run that was renamed, deleted, or is of
+// another studio. It is said, and what is here is offered; nothing else is opened in its place.
 
 import { readOnly } from "../api.js";
 import { openSession } from "../sessions.js";

@@ -1,5 +1,5 @@
-// Notes and bookmarks on frames: marks over the timeline, and the note of the shown frame, written where the frame is
-// named. They are kept with the run; every window hears of them.
+// Notes and bookmarks on frames: marks over the timeline, and the note of the shown frame, written
+// where the frame is named. They are kept with the run; every window hears of them.
 
 import { fetchJson, put, readOnly, remove, runPath } from "../api.js";
 import { onEvent } from "../live.js";

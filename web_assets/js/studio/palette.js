@@ -24,7 +24,8 @@ function fit({ words, more, kind, also = "" }, wanted) {
   if (!wanted.split(" ").every((part) => text.includes(part))) return -1;
   const name = words.toLowerCase();
   if (name.startsWith(wanted)) return 3;
-  // A word of its name that begins so comes before letters inside of one, and those before what only its help says.
+  // A word of its name that begins so comes before letters inside of one, and those before what
+  // only its help says.
   if (` ${name}`.includes(` ${wanted}`)) return 2;
   return name.includes(wanted) ? 1 : 0;
 }

@@ -1,4 +1,5 @@
-// Playing the stored frames: play, pause, speed, loop, first and last. The layers of a frame rest meanwhile.
+// Playing the stored frames: play, pause, speed, loop, first and last. The layers of a frame rest
+// meanwhile.
 
 import { goTo } from "../selection.js";
 import { get, set, watch } from "../state.js";

@@ -45,7 +45,8 @@ const Words = ({ name, facts }) =>
   html`<div><div class="name">${name}</div><div class="facts">${facts}</div></div>`;
 
 /**
- * A line of the list: a click or Enter opens it, its button the menu. `own`: attributes that only some lines have.
+ * A line of the list: a click or Enter opens it, its button the menu. `own`: attributes that only
+ * some lines have.
  * @param {{ id: string, name: string, kind: string, own: Record<string, any>, open: () => void,
  *   menu: (opener: Element) => void, children?: any }} properties
  */

@@ -22,7 +22,8 @@ const go = (address) => {
 };
 
 /**
- * Do something to an open session or run that makes its name void: it is closed meanwhile, and opened again if that fails.
+ * Do something to an open session or run that makes its name void: it is closed meanwhile, and
+ * opened again if that fails.
  * @param {boolean} open
  * @param {() => Promise<any>} work
  */

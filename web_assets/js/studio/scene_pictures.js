@@ -1,5 +1,6 @@
-// What is taken along of the scene: a picture as it stands, or a film of the frame's layers or the run's frames. The film is
-// kept with the run's exports, where it is found again; here it is offered once it is done.
+// What is taken along of the scene: a picture as it stands, or a film of the frame's layers or the
+// run's frames. The film is kept with the run's exports, where it is found again; here it is
+// offered once it is done.
 
 import { accepted, fetchJson, post, readOnly, remove, runPath } from "../api.js";
 import { download } from "../elements.js";
@@ -34,7 +35,11 @@ async function takePicture(transparent) {
   );
 }
 
-/** A film of the run that is still being made, begun before the page was loaded. @param {any} session @param {any} run */
+/**
+ * A film of the run that is still being made, begun before the page was loaded.
+ * @param {any} session
+ * @param {any} run
+ */
 async function refind(session, run) {
   if (!run || isGoing(film.value)) return;
   const { running } = await fetchJson(`${runPath(session, run)}/exports`);

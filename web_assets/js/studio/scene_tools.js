@@ -17,7 +17,9 @@ const follows = signal(false);
 const isNarrow = signal(false);
 const hasKnobs = signal(false);
 /** @typedef {NonNullable<Answer<"/api/scene/point", "post">>} Pointed */
-/** @type {import("@preact/signals").Signal<{ found: Pointed, left: number, top: number } | null>} */
+/**
+ * @type {import("@preact/signals").Signal<{ found: Pointed, left: number, top: number } | null>}
+ */
 const pointed = signal(null);
 
 /** @param {"body" | "front" | "side" | "top" | "first"} move */
@@ -39,7 +41,9 @@ export function toggleFollow() {
   if (follows.value) frameBody();
 }
 
-/** What the pointer does over the scene: it names the particle that it is on, a click chooses it. */
+/**
+ * What the pointer does over the scene: it names the particle that it is on, a click chooses it.
+ */
 export const scenePointer = { hover, click };
 
 let isAsking = false;
@@ -87,7 +91,8 @@ function PointedCard() {
 }
 
 /**
- * @param {{ label: string, title: string, act: () => void, pressed?: boolean, children: any }} properties
+ * @param {{ label: string, title: string, act: () => void, pressed?: boolean, children: any }}
+ *   properties
  */
 function Tool({ label, title, act, pressed, children }) {
   return html`<button

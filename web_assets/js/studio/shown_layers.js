@@ -1,6 +1,8 @@
-// The layers of the shown frame, whatever they are of: a stored frame, one that is searched, one annealed again.
+// The layers of the shown frame, whatever they are of: a stored frame, one that is searched, one
+// annealed again.
 //
-// A run's first frame is searched several times over: its layers are counted through, and each search has a name.
+// A run's first frame is searched several times over: its layers are counted through, and each
+// search has a name.
 
 import { get } from "../state.js";
 
@@ -10,7 +12,8 @@ const USUAL = 10;
 
 /**
  * What is known of the shown frame's layers.
- * @typedef {{ layers: any[], count: number, searchLayers: number, searches: number, isTrial: boolean }} ShownLayers
+ * @typedef {{ layers: any[], count: number, searchLayers: number, searches: number, isTrial:
+ *   boolean }} ShownLayers
  */
 
 /**
@@ -44,13 +47,19 @@ export function layerWords(layer, { searchLayers, searches }) {
   return searches > 1 ? `${within}, ${searchName(Math.floor(layer / searchLayers))}` : within;
 }
 
-/** How many particles a layer's weights leave: those that survive it (Eq. 12), null where there are no weights. */
+/**
+ * How many particles a layer's weights leave: those that survive it (Eq. 12), null where there are
+ * no weights.
+ */
 export function survivorsOf({ alpha_reached: share, effective_share: effective, particles }) {
   const left = share ?? effective;
   return left === null || left === undefined ? null : Math.round(left * particles);
 }
 
-/** How much of the first layer's variance a layer still has: the mean over the parameters of its orders of magnitude. */
+/**
+ * How much of the first layer's variance a layer still has: the mean over the parameters of its
+ * orders of magnitude.
+ */
 export function varianceShare(first, layer) {
   const ratios = first.variance_weighed
     .map((before, at) => layer.variance_weighed[at] / before)

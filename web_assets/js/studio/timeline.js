@@ -1,4 +1,5 @@
-// The timeline: what plays the frames, the run over its frames, and what is said of the frame that is shown.
+// The timeline: what plays the frames, the run over its frames, and what is said of the frame that
+// is shown.
 
 import { figure } from "../chart_looks.js";
 import { byId, dotted } from "../elements.js";

@@ -1,4 +1,5 @@
-// The timeline as it is drawn: what is tracked, weight and error over the frames, lost spans, settings changes, the cursor.
+// The timeline as it is drawn: what is tracked, weight and error over the frames, lost spans,
+// settings changes, the cursor.
 
 import { range } from "../selection.js";
 import { token } from "../theme.js";
@@ -53,7 +54,10 @@ function markTruth({ pen, width, height }, frames) {
   }
 }
 
-/** A band along the top: where the tracker was lost, saw nothing, or found the body again. @param {Sheet} sheet */
+/**
+ * A band along the top: where the tracker was lost, saw nothing, or found the body again.
+ * @param {Sheet} sheet
+ */
 function markStates({ pen, width }, frames) {
   const step = stepOf(width);
   for (const entry of frames) {
@@ -65,7 +69,8 @@ function markStates({ pen, width }, frames) {
 }
 
 /**
- * Where a person corrected the run: a diamond, and the line of the frames that were tracked backwards from it.
+ * Where a person corrected the run: a diamond, and the line of the frames that were tracked
+ * backwards from it.
  * @param {Sheet} sheet
  */
 function markCorrection({ pen, width, height }, summary) {

@@ -1,6 +1,7 @@
-// What is made of a run's poses in the background: a track refined or smoothed, a frame corrected. It stands over the
-// scene while the run is open, with a way to stop it, in every window and after every reload; what comes of it is opened
-// in the window that began it, once that shows the studio again.
+// What is made of a run's poses in the background: a track refined or smoothed, a frame corrected.
+// It stands over the scene while the run is open, with a way to stop it, in every window and after
+// every reload; what comes of it is opened in the window that began it, once that shows the studio
+// again.
 
 import { fault, fetchJson, post, readOnly, remove, runPath } from "../api.js";
 import { openForm } from "./dialogs.js";
@@ -15,7 +16,10 @@ import { html, mount, signal } from "./component.js";
 import { VERBS } from "./work_list.js";
 
 /** @typedef {import("../api_types").Schemas["TrackJobState"]} TrackJob */
-/** What this window does with what comes of a job. @typedef {{ frame?: number, starts?: boolean }} After */
+/**
+ * What this window does with what comes of a job.
+ * @typedef {{ frame?: number, starts?: boolean }} After
+ */
 
 const KEY = "track-jobs";
 const MAKING = {
@@ -39,7 +43,10 @@ const job = signal(/** @type {TrackJob | null} */ (null));
 /** Jobs that were heard to end: an answer that was under way meanwhile does not bring them back. */
 const ended = new Set();
 
-/** By identifier the jobs that this window began and what it does after them. @returns {Record<string, After>} */
+/**
+ * By identifier the jobs that this window began and what it does after them.
+ * @returns {Record<string, After>}
+ */
 const begun = () => JSON.parse(sessionStorage.getItem(KEY) ?? "{}");
 
 /** @param {Record<string, After>} jobs */
@@ -48,7 +55,8 @@ const keepBegun = (jobs) => sessionStorage.setItem(KEY, JSON.stringify(jobs));
 /**
  * Follow a job that this window has begun.
  * @param {TrackJob} state
- * @param {After} [after] frame: to be shown of the corrected run; starts: whether that is tracked on
+ * @param {After} [after] frame: to be shown of the corrected run; starts: whether that is tracked
+ *   on
  */
 export function followTrackJob(state, after = {}) {
   keepBegun({ ...begun(), [state.identifier]: after });
@@ -57,7 +65,10 @@ export function followTrackJob(state, after = {}) {
   catchUp();
 }
 
-/** Let a job of this window go; what it wanted to do after it, null for a job of another one. @param {string} identifier */
+/**
+ * Let a job of this window go; what it wanted to do after it, null for a job of another one.
+ * @param {string} identifier
+ */
 function letGo(identifier) {
   const { [identifier]: after = null, ...others } = begun();
   if (after) keepBegun(others);
@@ -82,7 +93,11 @@ function sayMade(ended) {
   say(`Track ${ended.track} of ${ended.run} is made: ${words}.`);
 }
 
-/** Open the corrected run, and track it on where that was wanted. @param {TrackJob} ended @param {After} after */
+/**
+ * Open the corrected run, and track it on where that was wanted.
+ * @param {TrackJob} ended
+ * @param {After} after
+ */
 async function openCorrected(ended, { frame, starts }) {
   await refreshSessions();
   openSession(ended.session, ended.made_run);
@@ -245,7 +260,8 @@ export function startTrackWork() {
     find().catch(complain);
     if (get("connected") && get("run")) catchUp();
   });
-  // What this window began before it was loaded again, or while the studio was out of reach, may have ended meanwhile.
+  // What this window began before it was loaded again, or while the studio was out of reach, may
+  // have ended meanwhile.
   watch(["connected"], () => {
     if (!get("connected")) return;
     // What came of it is shown once the run that the address names is open.

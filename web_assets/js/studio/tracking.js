@@ -1,4 +1,5 @@
-// The tracking process as the page operates it: what it does, in words, its commands, and the speed of the search.
+// The tracking process as the page operates it: what it does, in words, its commands, and the speed
+// of the search.
 
 import { fetchJson, post, runPath } from "../api.js";
 import { complain } from "../messages.js";
@@ -56,7 +57,10 @@ function stateLine(work) {
   return parts.join(" · ");
 }
 
-/** How a run stands by what is stored of it: how the tracking process ended elsewhere says nothing of this one. */
+/**
+ * How a run stands by what is stored of it: how the tracking process ended elsewhere says nothing
+ * of this one.
+ */
 function storedStanding(session, run, summary) {
   const idle = (words) => ({ name: "idle", words, title: "", share: null });
   if (!run) return idle(session ? "no run" : "idle");
@@ -67,8 +71,8 @@ function storedStanding(session, run, summary) {
 }
 
 /**
- * The state of tracking as the header shows it. `name`: of its colour; `share`: of the frames that are done, null where
- * no bar is shown.
+ * The state of tracking as the header shows it. `name`: of its colour; `share`: of the frames that
+ * are done, null where no bar is shown.
  */
 export function standing(work, session, run, connected, summary) {
   const here = isOpen(work, session, run) && Boolean(run);
@@ -140,8 +144,8 @@ export function reanneal() {
   }
 }
 
-// The speed at which the search is slowed down to be watched. The choices and their words are the server's, the speed in
-// use is the tracking process's own.
+// The speed at which the search is slowed down to be watched. The choices and their words are the
+// server's, the speed in use is the tracking process's own.
 
 /** The offered speeds, fast to slow: {label, seconds_a_layer}. */
 export const speeds = signal(/** @type {any[]} */ ([]));

@@ -1,5 +1,6 @@
-// The card under the knobs: which knobs were moved, what the shown trial changes beside the stored result (or another
-// trial), and the tray of all trials of the frame. Bars to the left are better, to the right worse, on scales that stay.
+// The card under the knobs: which knobs were moved, what the shown trial changes beside the stored
+// result (or another trial), and the tray of all trials of the frame. Bars to the left are better,
+// to the right worse, on scales that stay.
 
 import { readOnly } from "../api.js";
 import { figure } from "../chart_looks.js";
@@ -16,9 +17,10 @@ const DOUBLED = Math.log(2);
 const SKETCH = 64;
 
 /**
- * A quantity of both results. `share`: how much worse the tried one is, from -1 (better by a whole bar) to 1.
- * `isCost`: more of it is neither better nor worse.
- * @typedef {{ name: string, stored: any, tried: any, unit: string, share: number | null, isCost?: boolean }} Line
+ * A quantity of both results. `share`: how much worse the tried one is, from -1 (better by a whole
+ * bar) to 1. `isCost`: more of it is neither better nor worse.
+ * @typedef {{ name: string, stored: any, tried: any, unit: string, share: number | null, isCost?:
+ *   boolean }} Line
  */
 
 /** @param {any} value */
@@ -30,13 +32,20 @@ function worse(stored, tried, scale) {
   return Math.max(-1, Math.min(1, (tried - stored) / scale));
 }
 
-/** The same of a cost: a bar is filled by its double or half. @param {any} stored @param {any} tried */
+/**
+ * The same of a cost: a bar is filled by its double or half.
+ * @param {any} stored
+ * @param {any} tried
+ */
 function dearer(stored, tried) {
   if (!(stored > 0 && tried > 0)) return null;
   return worse(Math.log(stored), Math.log(tried), DOUBLED);
 }
 
-/** What fills a bar of an error, mm: the run's largest error, so that it is the same for every trial. */
+/**
+ * What fills a bar of an error, mm: the run's largest error, so that it is the same for every
+ * trial.
+ */
 function errorScale() {
   const frames = follow("summary")?.frames ?? [];
   const errors = frames.map((/** @type {any} */ line) => line.error_mm).filter(isNumber);
@@ -104,7 +113,10 @@ function linesOf(stored, tried, inShares, scale) {
   ];
 }
 
-/** A line: both values, and the change as a bar from the middle. @param {{ line: Line }} properties */
+/**
+ * A line: both values, and the change as a bar from the middle.
+ * @param {{ line: Line }} properties
+ */
 function ChangeLine({ line }) {
   const { name, stored, tried, unit, share, isCost } = line;
   const [less, more] = isCost ? ["less", "more"] : ["better", "worse"];
@@ -242,7 +254,10 @@ function Tray() {
   </ul>`;
 }
 
-/** What becomes of the shown trial. @param {{ frame: number, tried: Schemas["TrialView"] | null }} properties */
+/**
+ * What becomes of the shown trial.
+ * @param {{ frame: number, tried: Schemas["TrialView"] | null }} properties
+ */
 function Keeping({ frame, tried }) {
   // The process has the newest trial's knobs: that one can take the stored frame's place.
   const list = /** @type {Schemas["TrialList"] | null} */ (follow("trials"));

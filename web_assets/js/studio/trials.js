@@ -1,5 +1,6 @@
-// Trials of the shown frame: which of them is shown, what it is compared with, and what the studio keeps of them. A trial is
-// a frame that was annealed again with moved knobs and is not stored; the address names it.
+// Trials of the shown frame: which of them is shown, what it is compared with, and what the studio
+// keeps of them. A trial is a frame that was annealed again with moved knobs and is not stored; the
+// address names it.
 
 import { fetchJson, post, remove, runPath } from "../api.js";
 import { onEvent } from "../live.js";
@@ -64,7 +65,10 @@ export function showTrial(name) {
   set({ trial: name, against: get("against") === name ? null : get("against") });
 }
 
-/** Compare the shown trial with another one, or (null) with what is stored. @param {string | null} name */
+/**
+ * Compare the shown trial with another one, or (null) with what is stored.
+ * @param {string | null} name
+ */
 export function compareWith(name) {
   set({ against: name });
   post("/api/scene/show", { against: placeOf(name) }).catch(complain);
@@ -101,7 +105,8 @@ export function startTrials() {
   watch(["session", "run", "frame", "moved", "trial"], listLater);
   onEvent("frame", (/** @type {any} */ event, /** @type {boolean} */ isHere) => {
     if (!isHere || !event.reannealed || event.frame !== get("frame")) return;
-    // By then its layers are taken; those that came before this window's scene showed the run are missing.
+    // By then its layers are taken; those that came before this window's scene showed the run are
+    // missing.
     queueMicrotask(() => {
       const isWhole = get("whatIf")?.length === event.layers;
       held = isWhole ? (event.trial ?? null) : null;

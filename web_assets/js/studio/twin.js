@@ -1,5 +1,6 @@
-// The twin: while a trial is shown, a second scene lies over the first one's canvas, cut off by a divider that can be
-// dragged: stored at its left, tried at its right. The studio keeps both scenes' cameras and choices the same.
+// The twin: while a trial is shown, a second scene lies over the first one's canvas, cut off by a
+// divider that can be dragged: stored at its left, tried at its right. The studio keeps both
+// scenes' cameras and choices the same.
 
 import { post, readOnly } from "../api.js";
 import { byId } from "../elements.js";
@@ -19,16 +20,24 @@ const KEPT = "twin-share";
 
 /** Where the divider stands, as a share of the canvas. */
 const share = signal(Number(localStorage.getItem(KEPT)) || 0.5);
-/** The box of the first scene's canvas in the stage, null while it has none. @type {import("@preact/signals").Signal<DOMRect | null>} */
+/**
+ * The box of the first scene's canvas in the stage, null while it has none.
+ * @type {import("@preact/signals").Signal<DOMRect | null>}
+ */
 const canvasBox = signal(null);
-/** Whether a trial was shown since the page was loaded: from then on the second scene is kept ready. */
+/**
+ * Whether a trial was shown since the page was loaded: from then on the second scene is kept ready.
+ */
 const isNeeded = signal(false);
 /** Whether the second scene draws. */
 const isReady = signal(false);
 /** Whether the scenes are split: then trials are in the second one. */
 const isSplit = signal(false);
 
-/** Whether the scenes were split before the trial had ended: then some of its layers were not heard by the second one. */
+/**
+ * Whether the scenes were split before the trial had ended: then some of its layers were not heard
+ * by the second one.
+ */
 let isUnnamed = false;
 
 /** @param {number} value */

@@ -107,7 +107,8 @@ async function cloudsOf(session, run, frame, view, trial, { among, signal }) {
  * A view's numbers.
  * @param {any} view
  * @param {string | null} trial whose
- * @param {{ signal?: AbortSignal, among?: string | null }} [how] `among`: the parameter whose clouds are drawn where none is chosen
+ * @param {{ signal?: AbortSignal, among?: string | null }} [how] `among`: the parameter whose
+ *   clouds are drawn where none is chosen
  * @returns {Promise<any>}
  */
 export async function numbersOf(view, trial, { signal, among = null } = {}) {

@@ -29,7 +29,10 @@ export function leaveOffPlaying() {
   stops += 1;
 }
 
-/** Play the layers once the frame is there: what the page says of it to the scene meanwhile would stop them. */
+/**
+ * Play the layers once the frame is there: what the page says of it to the scene meanwhile would
+ * stop them.
+ */
 export async function playWhenShown() {
   const stopped = stops;
   for (let waited = 0; waited < PATIENCE && !isShown(); waited++) await wait(TRY_MILLISECONDS);

@@ -158,7 +158,10 @@ const knobWords = (settings) =>
     .map(([name, value]) => `${name.replaceAll("_", " ")} ${valueWords(value)}`)
     .join(", ");
 
-/** Track again with a remedy from the frame on where the failure began, as a run of its own. @param {Remedy} remedy */
+/**
+ * Track again with a remedy from the frame on where the failure began, as a run of its own.
+ * @param {Remedy} remedy
+ */
 async function trackAgain({ frame, settings }) {
   if (frame !== null && frame !== undefined) await keepAsNewRun(frame, settings ?? {});
 }

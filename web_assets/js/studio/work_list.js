@@ -1,5 +1,6 @@
-// The work in the background, wherever it was begun: how far it is, a way to stop it, and where its answer is. Every page
-// that shows this finds a job again after a reload, in another window and after Back.
+// The work in the background, wherever it was begun: how far it is, a way to stop it, and where its
+// answer is. Every page that shows this finds a job again after a reload, in another window and
+// after Back.
 
 import { fetchJson, readOnly, remove } from "../api.js";
 import { listenToAll } from "../events.js";
