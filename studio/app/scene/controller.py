@@ -73,7 +73,14 @@ from studio.foundations.errors import BodyError, StudioError
 from studio.foundations.knobs import Value, checked
 from studio.operations.jobs import commands
 from studio.operations.jobs.control import StudioControl
-from studio.operations.jobs.events import Acknowledged, Event, FrameFinished, LayerFinished, StateChanged
+from studio.operations.jobs.events import (
+    Acknowledged,
+    Event,
+    FrameFinished,
+    LayerFinished,
+    RunState,
+    StateChanged,
+)
 from studio.runs.drawing.colour_tokens import ColourTokens, colour_tokens
 from studio.runs.setup.pose_search import BetterPose
 from studio.runs.setup.start_pose_file import keep_start_pose
@@ -608,7 +615,7 @@ class SceneController:
         pictures.calm = ANNEALED_PICTURES_WAIT if late else PICTURES_WAIT
         pictures.pause = LIVE_PICTURE_SECONDS if late else picture_pause(self.model.search)
         search = self.model.search
-        is_fast = search.state == "tracking" and not search.seconds_a_layer
+        is_fast = search.state is RunState.TRACKING and not search.seconds_a_layer
         scene.share, pictures.share = SHARES if is_fast else (1.0, 1.0)
 
     def _patience(self) -> float:
@@ -819,7 +826,9 @@ class Due:
 
 def picture_pause(state: StateChanged) -> float:
     """Seconds between two updates of the pictures; what is searched comes first."""
-    searches = state.state == "reannealing" or (state.live is not None and state.state == "tracking")
+    searches = state.state is RunState.REANNEALING or (
+        state.live is not None and state.state is RunState.TRACKING
+    )
     return LIVE_PICTURE_SECONDS if searches else PICTURE_SECONDS
 
 

@@ -15,13 +15,19 @@ from studio.body.mirroring import Mirror
 from studio.body.model import BodyModel, extremities
 from studio.foundations.arrays import Array
 from studio.foundations.knobs import Value
-from studio.operations.jobs.events import Event, FrameFinished, LayerFinished, SettingsApplied, StateChanged
+from studio.operations.jobs.events import (
+    Event,
+    FrameFinished,
+    LayerFinished,
+    RunState,
+    SettingsApplied,
+    StateChanged,
+)
 from studio.runs.drawing.marker_lines import extremity_markers
 from studio.runs.tracks import RAW
 from studio.search.settings import RunSettings, all_knobs, changed_settings, values
 from studio.search.trackers.tracker import FrameResult, LayerRecord
 
-SEARCHING = ("tracking", "compiling")
 NEAR_THE_END = 3
 """A viewer who goes to one of the last frames while more are tracked keeps following."""
 REMEMBERED = 256
@@ -256,7 +262,7 @@ class Model:
     @property
     def is_searching(self) -> bool:
         """Whether frames are being tracked, of whatever run."""
-        return self.search.state in SEARCHING
+        return self.search.state.searches
 
     @property
     def is_searched(self) -> bool:
@@ -272,7 +278,11 @@ class Model:
 def same_drawing(one: Model, other: Model) -> bool:
     """Whether two models are drawn alike: while a stored run is shown, how the search of another one goes is not."""
     others = (entry.name for entry in fields(Model) if entry.name != "search")
-    searches = [one.is_searched, other.is_searched, *(model.search.state == "lost" for model in (one, other))]
+    searches = [
+        one.is_searched,
+        other.is_searched,
+        *(model.search.state is RunState.LOST for model in (one, other)),
+    ]
     return (
         one.subject is not None
         and not any(searches)
@@ -601,7 +611,7 @@ def hear(model: Model, event: Event, frames: tuple[int, ...] = ()) -> Model:
 def _hear_state(model: Model, state: StateChanged) -> Model:
     before = model.is_searched and model.is_searching
     model = replace(model, search=state)
-    if state.state == "lost" and model.knobs is not None:
+    if state.state is RunState.LOST and model.knobs is not None:
         model = replace(model, knobs=replace(model.knobs, requested={}))
     if model.is_searched and model.is_searching and not before:
         model = edit_pose(model, ended)  # show the search

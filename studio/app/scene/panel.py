@@ -11,7 +11,7 @@ from studio.app.scene.opened_run import Moment
 from studio.app.scene.pose_panel import PosePanel
 from studio.app.scene.settings_panel import Request, SettingsPanel
 from studio.app.scene.show_panel import ShowPanel, css
-from studio.operations.jobs.events import StateChanged
+from studio.operations.jobs.events import RunState, StateChanged
 from studio.runs.drawing.colour_tokens import ColourTokens
 from studio.search.trackers.tracker import LIMB_LOST, LOST, NO_EVIDENCE, RECOVERED
 
@@ -22,7 +22,11 @@ MARKS = {
     NO_EVIDENCE: ("text-quiet", "no evidence, the pose is held"),
     RECOVERED: ("good", "the body was found again"),
 }
-STATE_WORDS = {"reannealing": "annealing again", "lost": "worker lost", "compiling": "compiling, once"}
+STATE_WORDS = {
+    RunState.REANNEALING: "annealing again",
+    RunState.LOST: "worker lost",
+    RunState.COMPILING: "compiling, once",
+}
 
 
 class Panel:
@@ -88,7 +92,7 @@ def status_html(model: Model) -> str:
     selection, state, subject = model.selection, model.search, model.subject
     if model.trial is not None:
         return _two_lines(model.trial.body.title, "As it is being made.")
-    if subject is None or model.is_searched or state.state == "lost":
+    if subject is None or model.is_searched or state.state is RunState.LOST:
         return search_html(state)
     first, last = subject.span
     if not selection.run:
@@ -108,9 +112,9 @@ def search_html(state: StateChanged) -> str:
     parts = [f"{state.done} of {state.last - state.first} done"]
     if state.frame < state.last:
         parts.insert(0, f"frame {state.frame}")
-    if state.state == "tracking" and state.frames_per_second == state.frames_per_second:
+    if state.state is RunState.TRACKING and state.frames_per_second == state.frames_per_second:
         parts.append(f"{state.frames_per_second:.3g} fps")
-    if state.state == "tracking" and state.seconds_left == state.seconds_left:
+    if state.state is RunState.TRACKING and state.seconds_left == state.seconds_left:
         parts.append(f"{clock(state.seconds_left)} left")
     return _two_lines(name, " · ".join(messages if state.message else parts))
 

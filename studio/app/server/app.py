@@ -9,7 +9,7 @@ from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
 from http import HTTPStatus
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from fastapi import FastAPI
 from starlette.staticfiles import StaticFiles
@@ -59,13 +59,17 @@ from studio.app.server.app_state import AppState
 from studio.app.server.body_limit import BodyLimit
 from studio.app.server.content_policy import PolicyHeaders
 from studio.app.server.error_responses import ErrorsInWords, add_error_handlers, log
+from studio.app.server.event_messages import event_schemas
 from studio.app.server.event_stream import EventStream
 from studio.app.server.layer_outlines import LayerOutlines
 from studio.app.server.left_requests import LeftRequests
 from studio.app.server.schemas import ErrorAnswer
 from studio.app.server.viewers_budget import ViewersBudget
 from studio.foundations.package import assets_folder
+from studio.operations.jobs.camera_service import RECORDINGS
 from studio.operations.jobs.control import StudioControl
+from studio.operations.jobs.events import RunState
+from studio.operations.jobs.job_runner import JobKind
 from studio.results.inspection.likelihoods import forget_evaluations, let_evaluations_rest
 from studio.results.overlay_pictures import forget_composers, let_composers_rest
 from studio.sessions.workspace import Workspace
@@ -118,6 +122,25 @@ ROUTERS = (
 )
 # As the routers made them: one that is included makes its routes a second time, while the first requests wait.
 ROUTES = [route for router in ROUTERS for route in router.routes]
+JOBS: tuple[JobKind[Any], ...] = (
+    gallery_routes.GALLERY,
+    import_routes.IMPORT,
+    footage_routes.SYNCHRONY,
+    RECORDINGS,
+    calibration_solving.CALIBRATION,
+    background_routes.BACKGROUND,
+    alignment_routes.ALIGNMENT,
+    subject_routes.SUBJECT,
+    pose_routes.START_POSE,
+    track_routes.TRACK,
+    export_routes.EXPORT,
+    course_routes.COURSE,
+    view_routes.SEEDS,
+    comparison_routes.COMPARISON,
+    behaviour_learning_routes.LEARNING,
+    report_routes.REPRODUCTION,
+)
+"""Work of which pages hear events."""
 ERRORS = (400, 403, 404, 409, 422, 500)
 SWEEP_SECONDS = 5.0
 
@@ -132,6 +155,10 @@ class Application(FastAPI):
             schemas = document["components"]["schemas"]
             for unused in ("HTTPValidationError", "ValidationError"):  # FastAPI's own, which no route answers
                 del schemas[unused]
+            for name in schemas.keys() - _named_in_requests(document):
+                if properties := schemas[name].get("properties"):
+                    schemas[name]["required"] = list(properties)
+            schemas |= {name: one for name, one in event_schemas(JOBS).items() if name not in schemas}
             schemas["ErrorAnswer"] = ErrorAnswer.model_json_schema()
             content = {"application/json": {"schema": {"$ref": "#/components/schemas/ErrorAnswer"}}}
             errors = {str(one): {"description": HTTPStatus(one).phrase, "content": content} for one in ERRORS}
@@ -139,6 +166,25 @@ class Application(FastAPI):
                 for operation in operations.values():
                     operation["responses"] |= errors
         return super().openapi()
+
+
+def _named_in_requests(document: dict[str, Any]) -> set[str]:
+    """The schemas of what is sent to the API: of these, entries may be left out. Answers have all of theirs."""
+    schemas = document["components"]["schemas"]
+    named: set[str] = set()
+    left = [op.get("requestBody") for operations in document["paths"].values() for op in operations.values()]
+    while left:
+        one = left.pop()
+        if isinstance(one, dict):
+            entry = cast("dict[str, object]", one)
+            name = str(entry.get("$ref", "")).rpartition("/")[2]
+            if name and name not in named:
+                named.add(name)
+                left.append(schemas[name])
+            left += entry.values()
+        elif isinstance(one, list):
+            left += cast("list[object]", one)
+    return named
 
 
 def build_app(
@@ -181,7 +227,7 @@ def build_app(
     # The last one added is the first to see a request.
     app.add_middleware(BodyLimit)
     app.add_middleware(LeftRequests)
-    app.add_middleware(ViewersBudget, tracking=lambda: control.state.state == "tracking")
+    app.add_middleware(ViewersBudget, tracking=lambda: control.state.state is RunState.TRACKING)
     app.add_middleware(
         AccessGuard,
         token=token,

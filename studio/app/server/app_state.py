@@ -19,6 +19,7 @@ from studio.foundations.foreign_files import MANIFEST_NAME
 from studio.operations.jobs.camera_service import CameraService
 from studio.operations.jobs.commands import Close
 from studio.operations.jobs.control import StudioControl
+from studio.operations.jobs.events import RunState
 from studio.operations.jobs.job_runner import JobKind, JobRunner, SessionJob
 from studio.results.inspection.likelihoods import forget_evaluations
 from studio.results.overlay_pictures import forget_composers
@@ -102,12 +103,12 @@ def release(app: AppState, session: str, run: str = "") -> None:
         app.jobs.check_movable(session)
     state, folder = app.control.state, app.workspace.root / session
     # Else the process itself knows whether that is what it has open; a search elsewhere is not waited for.
-    if state.state != "lost" and (state.session == session or state.state not in ("tracking", "compiling")):
+    if state.state is not RunState.LOST and (state.session == session or not state.state.searches):
         try:
             app.control.request(Close(session=str(folder), run=str(folder / RUNS_NAME / run) if run else ""))
         except RunError:
             # A process that died meanwhile has nothing open any more.
-            if app.control.state.state != "lost":
+            if app.control.state.state is not RunState.LOST:
                 raise
     for scene in app.scenes.open_scenes().values():
         if scene.shown.session == session and (not run or scene.shown.run == run):

@@ -1,8 +1,8 @@
 """Events as JSON: small values only.
 
-Each message has `type` (state, acknowledged, layer, frame, settings, log; the web's own: sessions, scene, dropped, and
-the kinds of jobs), `session` and `run`. NaN and infinities become null. A layer's
-particles are not in it: they are fetched from
+Each message has `type` (state, acknowledged, layer, frame, settings, log; the web's own: sessions, notes, scene,
+dropped, and the kinds of jobs), `session` and `run`; `event_messages` describes them for the API's document. NaN and
+infinities become null. A layer's particles are not in it: they are fetched from
 `/api/sessions/{session}/runs/{run}/frames/{frame}/layers/{layer}/particles`, or drawn by the scene.
 """
 
@@ -55,6 +55,7 @@ def message_of(event: Event) -> dict[str, object]:
             "waited_milliseconds": 1000.0 * (event.left_at - event.requested_at),
             "search_layers": event.search_layers,
             "searches": event.searches,
+            "outline": None,
         }
         return head | more | layer_summary(event.record)
     if isinstance(event, FrameFinished):

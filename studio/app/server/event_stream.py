@@ -17,7 +17,14 @@ from studio.app.server.event_encoding import as_json, key_of, message_of
 from studio.app.server.layer_outlines import LayerOutlines
 from studio.app.server.windows import WindowInQuery
 from studio.operations.jobs.control import StudioControl
-from studio.operations.jobs.events import Event, LayerFinished, SettingsApplied, StateChanged
+from studio.operations.jobs.events import (
+    Event,
+    FrameFinished,
+    LayerFinished,
+    RunState,
+    SettingsApplied,
+    StateChanged,
+)
 from studio.operations.jobs.tried_frames import TriedFrames
 from studio.operations.jobs.watchers import Subscription
 
@@ -108,13 +115,14 @@ class EventStream:
             while True:
                 event = await source.next()
                 message = message_of(event)
-                if name := self.tried.hear(event):
-                    message["trial"] = name
+                tried = self.tried.hear(event)
+                if isinstance(event, FrameFinished):
+                    message["trial"] = tried
                 if isinstance(event, LayerFinished) and self._outlines is not None and self._watchers:
                     message["outline"] = self._outlines.of_event(event)
                 if isinstance(event, SettingsApplied):
                     self._settings = message
-                elif isinstance(event, StateChanged) and event.state == "idle":
+                elif isinstance(event, StateChanged) and event.state is RunState.IDLE:
                     self._settings = None
                 self.publish(message)
                 # A flood of events must not keep the loop from everything else.

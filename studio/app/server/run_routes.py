@@ -97,7 +97,6 @@ class PaceView(Answer):
     choices: list[SpeedChoice]
 
 
-SEARCHING = ("tracking", "compiling")
 RUN = "/sessions/{session}/runs/{run}"
 
 
@@ -189,13 +188,19 @@ def log_of(run: OpenRun) -> LogLines:
     return LogLines(lines=[LogEntry.model_validate(line) for line in read_log(run.folder)])
 
 
-@router.get("/worker")
+# As the document describes the `state` events.
+STATE: dict[int | str, dict[str, Any]] = {
+    200: {"content": {"application/json": {"schema": {"$ref": "#/components/schemas/StateChanged"}}}}
+}
+
+
+@router.get("/worker", response_model=None, responses=STATE)
 def worker_state(app: App) -> dict[str, object]:
     """The tracking process's state, as the `state` events carry it."""
     return plain(message_of(app.control.state))
 
 
-@router.post("/worker/restart", status_code=202)
+@router.post("/worker/restart", status_code=202, response_model=None, responses={202: STATE[200]})
 def restart_worker(app: App) -> dict[str, object]:
     """Start the tracking process again after it died, and resume what it tracked."""
     app.control.restart()
@@ -282,7 +287,7 @@ def cancel(run: OpenRun, app: App) -> Posted:
 def check_free(app: AppState, run: StoredRun) -> None:
     """Raise RunError at once where the process would refuse: another run is being tracked, as far as is known here."""
     state = app.control.state
-    if state.state in SEARCHING and (state.session, state.run) != (session_name(run), run.name):
+    if state.state.searches and (state.session, state.run) != (session_name(run), run.name):
         raise RunError(
             f"Run '{state.run}' of session '{state.session}' is being tracked.", "Pause it first, or wait."
         )

@@ -1,5 +1,6 @@
 """What the 3-D scene shows: the page's timeline, layer buttons and camera keys arrive here."""
 
+import dataclasses
 from typing import Annotated, Literal
 
 import numpy as np
@@ -248,19 +249,7 @@ def report_moves(app: AppState) -> None:
         app.events.publish(
             {
                 "type": "scene",
-                "session": shown.session,
-                "run": shown.run,
-                "frame": shown.frame,
-                "layer": shown.layer,
-                "limb": shown.limb,
-                "parameter": shown.parameter,
-                "particle": shown.particle,
-                "camera": shown.camera,
-                "look_through": shown.look_through,
-                "eye": shown.eye,
-                "follow": shown.follow,
-                "editing": shown.editing,
-                "request_number": shown.request_number,
+                **dataclasses.asdict(shown),
                 "layers": _played(layers),
             },
             window,

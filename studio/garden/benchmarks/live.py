@@ -28,7 +28,7 @@ from studio.garden.benchmarks.live_stages import (
 )
 from studio.garden.benchmarks.timing import IdleShare, resident_megabytes
 from studio.operations.jobs.control import StudioControl
-from studio.operations.jobs.events import Event, StateChanged
+from studio.operations.jobs.events import Event, RunState, StateChanged
 from studio.operations.jobs.live_tracking import track_live
 from studio.operations.jobs.watchers import Subscription
 from studio.runs.live.live_summary import LiveSummary, summary_of
@@ -91,7 +91,7 @@ def track_watched(
         idle, frames = IdleShare(), run.record.frame_count
         _until(events, lambda state: state.frame - state.first >= EARLY * frames, report)
         early = _memory(control)
-        if control.state.state != "finished":
+        if control.state.state is not RunState.FINISHED:
             _until(events, lambda state: state.state == "finished", report)
         spent, idle_share, late = time.monotonic() - began, idle.so_far(), _memory(control)
         if viewer:

@@ -25,7 +25,7 @@ from studio.foundations.errors import (
     StudioError,
 )
 from studio.operations.jobs import commands
-from studio.operations.jobs.events import Acknowledged, Event, StateChanged, nothing_open
+from studio.operations.jobs.events import Acknowledged, Event, RunState, StateChanged, nothing_open
 from studio.operations.jobs.process import LOST_HINT, SILENT_SECONDS, OwnedProcess
 from studio.operations.jobs.process_executor import ending
 from studio.operations.jobs.watchers import Subscription, Watchers
@@ -87,7 +87,7 @@ class StudioControl:
         if command.run:
             with self._reviving:
                 # Whoever comes second finds it revived.
-                if self._state.state == "lost":
+                if self._state.state is RunState.LOST:
                     self.restart(resume=False)
         with self._lock:
             self._note(command)
@@ -175,7 +175,7 @@ class StudioControl:
             about: commands.About = {"session": place[0], "run": place[1]}
             # What was renamed or deleted meanwhile stays closed.
             with contextlib.suppress(NotFoundError):
-                if resume and said.state in ("tracking", "compiling"):
+                if resume and said.state.searches:
                     # Refused if the process died just after its last frame: then nothing is left to go on with.
                     with contextlib.suppress(RunError):
                         self.request(commands.Start(**about))
@@ -237,7 +237,7 @@ class StudioControl:
 
     def _lose(self, message: str) -> None:
         logger.error("%s", message)
-        self._publish(dataclasses.replace(self._said, state="lost", message=message, hint=LOST_HINT))
+        self._publish(dataclasses.replace(self._said, state=RunState.LOST, message=message, hint=LOST_HINT))
 
     def _publish(self, state: StateChanged) -> None:
         self._state = state

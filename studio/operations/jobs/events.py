@@ -4,11 +4,31 @@ the store except a layer's own cloud, which travels with `LayerFinished` so that
 import math
 from collections.abc import Hashable
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 from studio.runs.live.live_summary import LiveStanding
 from studio.search.trackers.tracker import FrameResult, LayerRecord
 
 Value = bool | int | float | str
+
+
+class RunState(StrEnum):
+    """What the tracking process does with the run that is open. LOST: the process died."""
+
+    IDLE = "idle"
+    COMPILING = "compiling"
+    TRACKING = "tracking"
+    PAUSED = "paused"
+    REANNEALING = "reannealing"
+    FINISHED = "finished"
+    CANCELLED = "cancelled"
+    FAILED = "failed"
+    LOST = "lost"
+
+    @property
+    def searches(self) -> bool:
+        """Whether frames are tracked, or will be once kernels are compiled."""
+        return self in (RunState.COMPILING, RunState.TRACKING)
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,17 +46,14 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class StateChanged(Event):
-    """state : idle, compiling, tracking, paused, reannealing, finished, cancelled, failed, lost (process
-    died).
-
-    frame, layer : where the search stands. first, last : frames of the run, half open. done : frames
+    """frame, layer : where the search stands. first, last : frames of the run, half open. done : frames
     finished. frames_per_second and seconds_left : measured, NaN while unknown. message, hint : for failed and
     lost. waiting : (session, run) names of the runs that are tracked after this one. selected : the frame
     that re-anneal works on, -1 for none. seconds_a_layer : what each tracked layer takes at least, 0 as fast as
     it can (`commands.SetPace`); both estimates hold for this pace. live : how a live run keeps up, None for others.
     """
 
-    state: str
+    state: RunState
     frame: int = 0
     layer: int = 0
     first: int = 0
@@ -136,4 +153,4 @@ class LogLine(Event):
 
 def nothing_open(seconds_a_layer: float = 0.0) -> StateChanged:
     """The state of a process with no run open."""
-    return StateChanged("", "", "idle", seconds_a_layer=seconds_a_layer)
+    return StateChanged("", "", RunState.IDLE, seconds_a_layer=seconds_a_layer)

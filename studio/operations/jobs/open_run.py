@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from studio.foundations.errors import SessionError, SettingsError, StudioError
+from studio.operations.jobs.events import RunState
 from studio.runs.behaviour_models import check_prediction
 from studio.runs.compiling_beside import compiling_beside
 from studio.runs.derived_runs import copied_beside
@@ -75,7 +76,6 @@ class SettingsMailbox:
             return moved
 
 
-PAUSED, FINISHED = "paused", "finished"
 VIEW_THREADS = 2
 """Cameras of a frame that are decoded and masked at once."""
 
@@ -127,9 +127,11 @@ class OpenRun:
         return self.stored.record.weighting
 
     @property
-    def resting(self) -> str:
+    def resting(self) -> RunState:
         """The state of the run while nothing is done to it: finished, cancelled or paused."""
-        return FINISHED if self.tracking.finished else self.tracking.ended or PAUSED
+        if self.tracking.finished:
+            return RunState.FINISHED
+        return RunState.CANCELLED if self.tracking.ended == RunState.CANCELLED else RunState.PAUSED
 
     def warm_up(self) -> None:
         """Weigh one pose, so that what has to be compiled is compiled before a frame's time is taken."""

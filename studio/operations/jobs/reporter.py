@@ -13,6 +13,7 @@ from studio.operations.jobs.events import (
     FrameFinished,
     LayerFinished,
     LogLine,
+    RunState,
     SettingsApplied,
     StateChanged,
     nothing_open,
@@ -23,7 +24,6 @@ from studio.runs.live.live_run import LiveRun, without_particles
 from studio.runs.tracking_run import Stepped
 from studio.search.settings import RunSettings, values
 
-IDLE = "idle"
 Place = tuple[str, str]
 """Folders of a session and of one of its runs, as text."""
 
@@ -36,12 +36,12 @@ class Reporter:
 
     def __init__(self, post: Callable[[Event], None], pace: SearchPace, waiting: Sequence[Place]) -> None:
         self.post = post
-        self.state_name = IDLE
+        self.state_name = RunState.IDLE
         self._pace, self._waiting = pace, waiting
         self._words = ("", "")
         self._values: dict[str, Value] = {}
 
-    def state(self, run: OpenRun | None, name: str, message: str = "", hint: str = "") -> None:
+    def state(self, run: OpenRun | None, name: RunState, message: str = "", hint: str = "") -> None:
         """Say where the search stands."""
         self.state_name, self._words = name, (message, hint)
         pace = self._pace.seconds_a_layer

@@ -17,10 +17,10 @@ from typing import Any
 
 from studio.foundations.errors import RunError, StudioError, WorkCancelledError
 from studio.operations.jobs import commands
-from studio.operations.jobs.events import Acknowledged, Event, FrameFinished, LayerFinished
+from studio.operations.jobs.events import Acknowledged, Event, FrameFinished, LayerFinished, RunState
 from studio.operations.jobs.open_live_run import opened
-from studio.operations.jobs.open_run import FINISHED, PAUSED, OpenRun
-from studio.operations.jobs.reporter import IDLE, Place, Reporter, names_of, unforeseen
+from studio.operations.jobs.open_run import OpenRun
+from studio.operations.jobs.reporter import Place, Reporter, names_of, unforeseen
 from studio.operations.jobs.search_pace import SearchPace
 from studio.runs.problem_source import ProblemSource
 from studio.runs.sides import can_be_looked_at, in_words, put_sides_right
@@ -70,8 +70,6 @@ class SideLooking:
             )
 
 
-COMPILING, TRACKING, REANNEALING = "compiling", "tracking", "reannealing"
-CANCELLED, FAILED = "cancelled", "failed"
 UNOPENED = (commands.Open, commands.Start, commands.Dequeue, commands.Close)
 """What opens its run itself, or needs none."""
 RUN_ON, TO_FRAME_END, ONE_LAYER = "run on", "to the frame's end", "one layer"
@@ -123,7 +121,7 @@ class TrackingJob:
 
     @property
     def _tracking(self) -> bool:
-        return self._say.state_name == TRACKING
+        return self._say.state_name == RunState.TRACKING
 
     def serve(self, command: commands.Command) -> None:
         """Do what a command says and acknowledge it; a refusal says why."""
@@ -174,7 +172,7 @@ class TrackingJob:
         if run.warmed_as in self._compiled:
             return
         state = self._say.state_name
-        self._state(COMPILING)
+        self._state(RunState.COMPILING)
         try:
             run.warm_up()
         finally:
@@ -191,13 +189,13 @@ class TrackingJob:
             self._say.log(run, "info", f"Finished: {run.tracking.done} frames.")
             run.tracking.keep_time()
             self._sides.add(run)
-            self._state(FINISHED)
+            self._state(RunState.FINISHED)
             self._begin_waiting()
         elif (stepped and self._goal == ONE_LAYER) or (self._goal == TO_FRAME_END and result is not None):
             run.tracking.save()
-            self._state(PAUSED)
+            self._state(RunState.PAUSED)
         elif result is not None:
-            self._state(TRACKING)
+            self._state(RunState.TRACKING)
 
     def _advance_reannealing(self, run: OpenRun) -> None:
         reannealing = run.reannealing
@@ -301,12 +299,12 @@ class TrackingJob:
         self._goal, self._requested_at = goal, requested_at if goal == ONE_LAYER else math.nan
         if goal == RUN_ON:
             self._say.log(run, "info", f"Tracking from frame {run.tracking.next_frame}.")
-        self._state(TRACKING)
+        self._state(RunState.TRACKING)
 
     def _pause(self, _: commands.Pause) -> None:
         run = self._opened()
         run.drop_reannealing()
-        if self._say.state_name in (TRACKING, REANNEALING):
+        if self._say.state_name in (RunState.TRACKING, RunState.REANNEALING):
             self._settle(run)
 
     def _seek(self, command: commands.Seek) -> None:
@@ -322,7 +320,7 @@ class TrackingJob:
         run.selected = run.reanneal(command.frame)
         run.tracking.save()
         run.keep_result, run.reanneal_again, self._requested_at = command.keep, False, command.requested_at
-        self._state(REANNEALING)
+        self._state(RunState.REANNEALING)
 
     def _cancel(self, _: commands.Cancel) -> None:
         run = self._opened()
@@ -331,7 +329,7 @@ class TrackingJob:
         run.drop_reannealing()
         run.tracking.mark_cancelled()
         self._say.log(run, "info", f"Cancelled at frame {run.tracking.next_frame}.")
-        self._state(CANCELLED)
+        self._state(RunState.CANCELLED)
         self._begin_waiting()
 
     def _change_settings(self, command: commands.ChangeSettings) -> None:
@@ -349,7 +347,7 @@ class TrackingJob:
         self._requested_at = command.requested_at
         if run.reannealing is None:
             run.reanneal()
-            self._state(REANNEALING)
+            self._state(RunState.REANNEALING)
         else:
             # The answer on its way is let out first: a slider that is dragged would else never show one.
             run.reanneal_again = True
@@ -371,7 +369,7 @@ class TrackingJob:
         if self._tracking:
             raise RunError(f"Run '{self._opened().run_name}' is being tracked.", "Cancel it first.")
         self._close_run()
-        self._state(IDLE)
+        self._state(RunState.IDLE)
 
     def _stop(self, _: commands.Stop) -> None:
         self.close()
@@ -409,10 +407,10 @@ class TrackingJob:
             return
         with contextlib.suppress(StudioError):
             run.tracking.save()
-        self._state(FAILED, message, hint)
+        self._state(RunState.FAILED, message, hint)
         self._begin_waiting()
 
-    def _state(self, name: str, message: str = "", hint: str = "") -> None:
-        if self._run is not None and name not in (TRACKING, COMPILING):
+    def _state(self, name: RunState, message: str = "", hint: str = "") -> None:
+        if self._run is not None and not name.searches:
             self._run.rest()
         self._say.state(self._run, name, message, hint)

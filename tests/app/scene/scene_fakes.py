@@ -11,7 +11,7 @@ import viser
 
 from studio.app.scene.model import Model
 from studio.operations.jobs.commands import Command
-from studio.operations.jobs.events import Acknowledged, Event, StateChanged
+from studio.operations.jobs.events import Acknowledged, Event, RunState, StateChanged
 from studio.operations.jobs.watchers import Subscription, Watchers
 
 
@@ -19,7 +19,7 @@ class FakeControl:
     """What a scene uses of `worker.control.StudioControl`; a test answers for it."""
 
     def __init__(self, session: str = "", run: str = "", state: str = "idle") -> None:
-        self.state = StateChanged(session, run, state, 0, 0, 0, 6, 5, math.nan, math.nan)
+        self.state = StateChanged(session, run, RunState(state), 0, 0, 0, 6, 5, math.nan, math.nan)
         self.commands: list[Command] = []
         self.watchers = Watchers()
 

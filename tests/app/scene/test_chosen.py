@@ -7,12 +7,12 @@ from studio.app.scene.body_view import BodyView
 from studio.app.scene.guarded_server import GuardedServer
 from studio.app.scene.model import LiveSearch, Model, discard_what_if, limb_clicked, same_pictures, select
 from studio.body.model import BodyModel
-from studio.operations.jobs.events import StateChanged
+from studio.operations.jobs.events import RunState, StateChanged
 from studio.results.evaluation.errors import limb_of_drawn, limb_of_markers
 from studio.runs.drawing.colour_tokens import colour_tokens
 
 DARK = colour_tokens(True)
-IDLE = StateChanged("", "", "idle")
+IDLE = StateChanged("", "", RunState.IDLE)
 
 
 def test_a_limb_is_chosen_and_let_go_by_a_click() -> None:

@@ -14,13 +14,20 @@ from studio.app.scene.pose_edit import edit_of
 from studio.body.dragging import Dragger
 from studio.body.mirroring import Mirror
 from studio.body.model import BodyModel
-from studio.operations.jobs.events import Event, FrameFinished, LayerFinished, SettingsApplied, StateChanged
+from studio.operations.jobs.events import (
+    Event,
+    FrameFinished,
+    LayerFinished,
+    RunState,
+    SettingsApplied,
+    StateChanged,
+)
 from studio.search.settings import changed_settings, default_settings
 
 FRAMES = tuple(range(5))
-NOTHING = StateChanged("", "", "idle", 0, 0, 0, 0, 0, math.nan, math.nan)
-TRACKING = StateChanged("s", "r", "tracking", 4, 0, 0, 6, 5, math.nan, math.nan)
-PAUSED = dataclasses.replace(TRACKING, state="paused")
+NOTHING = StateChanged("", "", RunState.IDLE, 0, 0, 0, 0, 0, math.nan, math.nan)
+TRACKING = StateChanged("s", "r", RunState.TRACKING, 4, 0, 0, 6, 5, math.nan, math.nan)
+PAUSED = dataclasses.replace(TRACKING, state=RunState.PAUSED)
 
 
 @pytest.fixture
@@ -66,7 +73,7 @@ def test_how_the_search_of_another_run_goes_is_not_drawn(shown: Model) -> None:
     assert scene.same_drawing(one, after(one, elsewhere[1]))
     assert not scene.same_drawing(one, after(one, PAUSED)), "its own run was opened"
     assert not scene.same_drawing(shown, after(shown, TRACKING))
-    assert not scene.same_drawing(one, after(one, dataclasses.replace(elsewhere[1], state="lost")))
+    assert not scene.same_drawing(one, after(one, dataclasses.replace(elsewhere[1], state=RunState.LOST)))
     assert not scene.same_drawing(one, scene.select(after(one, elsewhere[1]), frame=0))
 
 
@@ -341,7 +348,7 @@ def test_what_is_in_use_and_since_when(shown: Model) -> None:
     assert again.knobs.since is None
     assert knob(again) == knob(shown), "what was requested was about the run before"
     assert "one" in again.knobs.requested, "its refusal is reported anyway"
-    assert knob(after(other, dataclasses.replace(PAUSED, state="lost"))) == 0.7
+    assert knob(after(other, dataclasses.replace(PAUSED, state=RunState.LOST))) == 0.7
     assert changed_settings(default_settings(), {"survival": 0.7}) == applied.knobs.settings
 
 

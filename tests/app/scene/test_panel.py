@@ -26,14 +26,14 @@ from studio.app.scene.show_panel import ShowPanel, legend_html
 from studio.body.dragging import Dragger
 from studio.body.model import BodyModel
 from studio.foundations.knobs import Value, knobs_of
-from studio.operations.jobs.events import StateChanged
+from studio.operations.jobs.events import RunState, StateChanged
 from studio.runs.drawing.colour_tokens import colour_tokens
 from studio.search.settings import DEFAULT_WEIGHTING, all_knobs, changed_settings, default_settings, values
 from studio.search.trackers.catalogue import TRACKERS, presets
 from studio.search.trackers.settings import AnnealedSettings
 
 DEFAULTS = values(default_settings())
-STATE = StateChanged("walk", "run 7", "tracking", 128, 3, 0, 450, 128, 41.234, 8.2)
+STATE = StateChanged("walk", "run 7", RunState.TRACKING, 128, 3, 0, 450, 128, 41.234, 8.2)
 
 
 def model_of(body: BodyModel) -> Model:
@@ -319,11 +319,13 @@ def test_the_runs_status_in_words(posted: Posted) -> None:
     assert "walk / run 7" in text
     assert "41.2 fps" in text
     assert "0:08 left" in text
-    lost = dataclasses.replace(STATE, state="lost", message="It died.", hint="Resume.")
+    lost = dataclasses.replace(STATE, state=RunState.LOST, message="It died.", hint="Resume.")
     assert "It died." in search_html(lost)
     assert "No run" in search_html(dataclasses.replace(STATE, session="", run=""))
     assert f"frame {STATE.frame} ·" in search_html(STATE)
-    finished = dataclasses.replace(STATE, state="finished", frame=STATE.last, done=STATE.last - STATE.first)
+    finished = dataclasses.replace(
+        STATE, state=RunState.FINISHED, frame=STATE.last, done=STATE.last - STATE.first
+    )
     assert "frame " not in search_html(finished), "there is no frame after the last"
     other = dataclasses.replace(posted.model, search=dataclasses.replace(STATE, run="run 8"))
     assert "stored · 128 of 450 frames" in status_html(other)

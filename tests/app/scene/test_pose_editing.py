@@ -21,6 +21,7 @@ from studio.body.dragging import Dragger
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
 from studio.foundations.errors import StudioError
+from studio.operations.jobs.events import RunState
 from studio.sessions.workspace import Workspace
 
 
@@ -150,11 +151,11 @@ def test_the_editing_ends_when_the_run_is_tracked_or_another_is_opened(
     stage.poses.edit("swaying", "run-1", 2)
     until(lambda: stage.shown.editing and stage.shown.frame == 2)
     paused = control.state
-    control.emit(dataclasses.replace(paused, run="run-9", state="tracking"))
+    control.emit(dataclasses.replace(paused, run="run-9", state=RunState.TRACKING))
     control.emit(paused)
     by_hand(tab_of(stage).sliders[4].handle, 250.0)
     until(lambda: stage.poses.editing is not None and stage.poses.editing.moved)
-    control.emit(dataclasses.replace(paused, state="tracking"))
+    control.emit(dataclasses.replace(paused, state=RunState.TRACKING))
     until(lambda: not stage.shown.editing)
     assert stage.poses.editing is None
     handles = handles_of(stage)
@@ -162,7 +163,7 @@ def test_the_editing_ends_when_the_run_is_tracked_or_another_is_opened(
     # Whoever begins to edit while it goes on is left to it.
     stage.poses.edit("swaying", "run-1", 1)
     until(lambda: stage.shown.editing)
-    control.emit(dataclasses.replace(paused, state="tracking", frame=3))
+    control.emit(dataclasses.replace(paused, state=RunState.TRACKING, frame=3))
     stage.show_layer(1)
     until(lambda: stage.shown.layer == 1)
     assert stage.shown.editing

@@ -35,7 +35,7 @@ from studio.body.forward_kinematics import limb_ends, limb_frames, marker_points
 from studio.body.model import BodyModel, extremities
 from studio.foundations.errors import SettingsError, StudioError
 from studio.operations.jobs import commands
-from studio.operations.jobs.events import FrameFinished, LayerFinished, SettingsApplied
+from studio.operations.jobs.events import FrameFinished, LayerFinished, RunState, SettingsApplied
 from studio.runs.setup.start_pose_file import keep_start_pose
 from studio.sessions.results_codec import VERIFIED
 from studio.sessions.results_reader import FILE_NAME
@@ -115,7 +115,7 @@ def test_layers_in_the_making_are_drawn_at_once(
     stage: SceneServer, control: FakeControl, human: BodyModel
 ) -> None:
     open_run(stage)
-    control.emit(dataclasses.replace(control.state, state="tracking"))
+    control.emit(dataclasses.replace(control.state, state=RunState.TRACKING))
     new = FRAMES - 1
     for layer in range(2):
         control.emit(LayerFinished("swaying", "run-1", cloud_record(human, new, layer)))

@@ -12,12 +12,14 @@ from web_doubles import RecordingControl, RecordingStage, Studio, cookie_header,
 from websockets.sync.client import ClientConnection, connect
 
 from studio.app.scene.model import Selection
+from studio.app.server.api_document import api_document
 from studio.app.server.event_encoding import effective_share, key_of, layer_summary, message_of
 from studio.app.server.event_stream import LIMIT, EventStream, Watcher, _send_all
 from studio.operations.jobs.events import Acknowledged, FrameFinished, LayerFinished, LogLine, SettingsApplied
 from studio.search.trackers.tracker import Estimate, FilterState, FrameResult, LayerRecord
 
 NAN = float("nan")
+DOCUMENT = api_document()
 
 
 def layer(number: int = 0, particles: int = 2000) -> LayerRecord:
@@ -85,6 +87,23 @@ def test_effective_share_is_one_for_equal_weights_and_one_in_n_for_a_single_winn
     assert math.isclose(effective_share(np.array([0.0, 0.0, -1e5, -1e5]), 1.0), 0.5)
 
 
+def entries_of(schema: dict) -> dict:
+    """By name the schemas of what a message has."""
+    if "$ref" in schema:
+        return entries_of(DOCUMENT["components"]["schemas"][schema["$ref"].rpartition("/")[2]])
+    parts = [entries_of(part) for part in schema.get("allOf", ())]
+    return {name: entry for part in parts for name, entry in part.items()} | schema.get("properties", {})
+
+
+def check_described(message: dict) -> None:
+    """That the API's document has a message's entries, no more and no fewer, and says which may be null."""
+    kinds = map(entries_of, DOCUMENT["components"]["schemas"]["EventMessage"]["oneOf"])
+    entries = next(kind for kind in kinds if kind["type"]["const"] == message["type"])
+    assert set(message) == set(entries)
+    nulls = {name for name, value in message.items() if value is None}
+    assert nulls <= {name for name, entry in entries.items() if {"type": "null"} in entry.get("anyOf", ())}
+
+
 def test_every_event_reaches_every_watcher_in_order(studio: Studio) -> None:
     with watching(studio) as one, watching(studio) as two:
         for socket in (one, two):
@@ -99,16 +118,22 @@ def test_every_event_reaches_every_watcher_in_order(studio: Studio) -> None:
         studio.control.say(Acknowledged("take1", "first", "id-1", "Start", False, "No.", "Wait.", "run"))
         for socket in (one, two):
             state = next_of(socket, "state")
+            check_described(state)
             assert (state["session"], state["run"], state["state"]) == ("take1", "first", "tracking")
             assert state["seconds_left"] is None
-            assert next_of(socket, "log")["text"] == "begun"
+            line = next_of(socket, "log")
+            assert line["text"] == "begun"
             got = next_of(socket, "layer")
             assert (got["frame"], got["layer"], got["alpha_wanted"]) == (4, 3, None)
             assert got["variance_weighed"] == [1.0, None, 3.0]
-            assert next_of(socket, "frame")["pose"] == [1.0, 2.0, 3.0]
-            assert next_of(socket, "settings")["changed"] == ["survival"]
+            frame = next_of(socket, "frame")
+            assert frame["pose"] == [1.0, 2.0, 3.0]
+            settings = next_of(socket, "settings")
+            assert settings["changed"] == ["survival"]
             refusal = next_of(socket, "acknowledged")
             assert (refusal["identifier"], refusal["ok"], refusal["hint"]) == ("id-1", False, "Wait.")
+            for message in (line, got, frame, settings, refusal):
+                check_described(message)
 
 
 def test_who_comes_later_is_reported_state_and_settings(studio: Studio) -> None:
@@ -125,10 +150,13 @@ def test_changes_of_the_workspace_and_moves_of_the_scene_are_reported(studio: St
     with watching(studio) as socket:
         next_of(socket, "state")
         studio.client.post("/api/sessions/take1/duplicate", json={"name": "take2"})
-        assert next_of(socket, "sessions")["session"] == "take2"
+        changed = next_of(socket, "sessions")
+        assert changed["session"] == "take2"
+        check_described(changed)
         assert studio.scenes.moved is not None
         studio.scenes.moved("", studio.stage.shown, studio.stage.layers)
         moved = next_of(socket, "scene")
+        check_described(moved)
         assert moved["frame"] is None
         assert moved["layers"] == {"playing": False, "rate": 3.0, "mode": "loop"}
 
@@ -155,6 +183,7 @@ def test_a_sleeping_browser_is_reported_how_much_it_lost() -> None:
     sleeper = Sleeper()
     asyncio.run(_send_all(sleeper, watcher))  # pyright: ignore[reportArgumentType]
     assert sleeper.sent[0] == {"type": "dropped", "session": "", "run": "", "count": 3}
+    check_described(sleeper.sent[0])
     assert [said["text"] for said in sleeper.sent[1:]] == [str(number) for number in range(2, LIMIT + 2)]
     assert [json.loads(other.get_nowait())["frame"] for _ in range(2)] == [99, 99]
     with pytest.raises(queue.Empty):

@@ -19,7 +19,7 @@ from studio.body.model import BodyModel
 from studio.foundations.arrays import Bytes
 from studio.foundations.errors import RunError
 from studio.operations.jobs.commands import ChangeSettings, Command
-from studio.operations.jobs.events import Event, StateChanged
+from studio.operations.jobs.events import Event, RunState, StateChanged
 from studio.operations.jobs.watchers import Subscription, Watchers
 from studio.sessions.workspace import Workspace
 
@@ -30,7 +30,7 @@ VIEWERS_TOKEN = "of-those-who-may-only-look"
 
 def state_of(session: str = "", run: str = "", state: str = "idle") -> StateChanged:
     """A state with nothing measured."""
-    return StateChanged(session, run, state, 0, 0, 0, 4, 0, NAN, NAN)
+    return StateChanged(session, run, RunState(state), 0, 0, 0, 4, 0, NAN, NAN)
 
 
 class RecordingControl:

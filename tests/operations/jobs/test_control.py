@@ -22,7 +22,14 @@ from studio.foundations.errors import RunError, SettingsError
 from studio.operations.jobs import commands
 from studio.operations.jobs import process as tracking_process
 from studio.operations.jobs.control import StudioControl
-from studio.operations.jobs.events import Acknowledged, Event, FrameFinished, LayerFinished, StateChanged
+from studio.operations.jobs.events import (
+    Acknowledged,
+    Event,
+    FrameFinished,
+    LayerFinished,
+    RunState,
+    StateChanged,
+)
 from studio.operations.jobs.watchers import Subscription
 from studio.runs.new_run import prepare_run
 from studio.sessions.session import Session
@@ -303,7 +310,7 @@ def test_a_process_that_dies_after_its_last_frame_is_brought_back_with_what_wait
     control.track("toy", "a")
     wait_for(watching, in_state("finished"))
     # As if it had died before it could say so.
-    control._said = dataclasses.replace(control.state, state="tracking")
+    control._said = dataclasses.replace(control.state, state=RunState.TRACKING)
     psutil.Process(control.process_identifier).kill()
     wait_for(watching, in_state("lost"))
     control.restart()

@@ -1,0 +1,125 @@
+"""The messages of `WebSocket /api/events`, described for the API's document: `EventMessage`, distinguished by `type`.
+
+A message of the tracking process has the entries of its event (`jobs/events.py`), one of a job those of its state
+(`JobKind.states`). `event_encoding` makes them.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import TypeAdapter
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaMode, JsonSchemaValue
+from pydantic_core import core_schema
+
+from studio.app.scene.model import Selection
+from studio.app.server.event_encoding import TYPES
+from studio.app.server.result_routes import LayerView
+from studio.app.server.scene_routes import LayersPlayed
+from studio.app.server.schemas import Answer, Number, Numbers
+from studio.operations.jobs.events import Acknowledged, Event, LogLine, SettingsApplied, StateChanged
+from studio.operations.jobs.job_runner import JobKind
+
+REFERENCE = "#/components/schemas/{model}"
+
+
+@dataclass(frozen=True, slots=True)
+class Changed(Event):
+    """Something of a session or run is not as it was: ask for it again. "" for the list of sessions, for no run."""
+
+
+@dataclass(frozen=True, slots=True)
+class Dropped(Event):
+    """count : messages that this watcher was too slow for."""
+
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class SceneMoved(Selection):
+    """What a window's scene shows, after its own controls changed it. layers : whether and how they are played."""
+
+    layers: LayersPlayed = dataclasses.field(kw_only=True)
+
+
+class LayerSaid(LayerView):
+    """A layer without its particles. waited_milliseconds: from the slider that it answers, null where it answers none.
+    search_layers, searches: layers of one search of the frame, and how many searches the frame has.
+    """
+
+    session: str
+    run: str
+    reannealed: bool
+    waited_milliseconds: Number
+    search_layers: int
+    searches: int
+
+
+class FrameSaid(Answer):
+    """A frame's result. trial: the name under which a frame that was annealed again is kept, "" where it is not."""
+
+    session: str
+    run: str
+    reannealed: bool
+    frame: int
+    pose: Numbers
+    log_weight: Number
+    layers: int
+    evaluations: int
+    settings_version: int
+    milliseconds: Number
+    tracking: str
+    limbs_off: list[str]
+    trial: str
+
+
+MESSAGES: dict[str, type] = {
+    **{TYPES[kind]: kind for kind in (StateChanged, Acknowledged, SettingsApplied, LogLine)},
+    "layer": LayerSaid,
+    "frame": FrameSaid,
+    "scene": SceneMoved,
+    "sessions": Changed,
+    "notes": Changed,
+    "dropped": Dropped,
+}
+
+
+class _AsSent(GenerateJsonSchema):
+    """Every entry is sent; NaN becomes null."""
+
+    def float_schema(self, schema: core_schema.FloatSchema) -> JsonSchemaValue:
+        return {"anyOf": [{"type": "number"}, {"type": "null"}]}
+
+    def default_schema(self, schema: core_schema.WithDefaultSchema) -> JsonSchemaValue:
+        return self.generate_inner(schema["schema"])
+
+    def field_is_required(
+        self,
+        field: core_schema.ModelField | core_schema.DataclassField | core_schema.TypedDictField,
+        total: bool,
+    ) -> bool:
+        return True
+
+
+def event_schemas(kinds: Sequence[JobKind[Any]]) -> dict[str, Any]:
+    """Schemas by name: `EventMessage`, one of all messages, and what they are made of. kinds : of jobs, whose states
+    are sent.
+    """
+    contents = MESSAGES | {kind.event: kind.states for kind in kinds}
+    adapters: list[tuple[str, JsonSchemaMode, TypeAdapter[Any]]] = [
+        (name, "serialization", TypeAdapter(content)) for name, content in contents.items()
+    ]
+    made, known = TypeAdapter.json_schemas(adapters, ref_template=REFERENCE, schema_generator=_AsSent)
+    messages = [_message(name, made[name, "serialization"]) for name in contents]
+    return known["$defs"] | {"EventMessage": {"oneOf": messages}}
+
+
+def _message(name: str, content: JsonSchemaValue) -> JsonSchemaValue:
+    """The schema of a message: what all have, and its own entries."""
+    head = {
+        "type": "object",
+        "required": ["type", "session", "run"],
+        "properties": {"type": {"const": name}, "session": {"type": "string"}, "run": {"type": "string"}},
+    }
+    return {"allOf": [head, content]}
