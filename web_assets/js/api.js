@@ -28,8 +28,8 @@ const LOOKING = ["show", "view", "play-layers", "camera", "point"].map(
   (what) => `/api/scene/${what}`,
 );
 
-/** @param {RequestInit} [options] */
-async function call(method, path, body, options = {}) {
+/** @param {string} method @param {string} path @param {any} [body] @param {RequestInit} [options] */
+async function call(method, path, body = undefined, options = {}) {
   if (readOnly && method !== "GET" && !LOOKING.includes(path))
     throw fault(
       "This address is for looking: it changes nothing.",

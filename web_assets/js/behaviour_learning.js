@@ -146,7 +146,9 @@ export function showLearningForm(content, { choices, sessions, started }) {
   );
   sends(form, submit, wrong, async (report) => {
     const request = read(form, choices.knobs);
-    const upload = motions.files.length ? { upload: await uploadFiles(motions.files, report) } : {};
+    const upload = motions.files?.length
+      ? { upload: await uploadFiles(motions.files, report) }
+      : {};
     report("Beginning…");
     started(await post("/api/learning", { ...request, ...upload }));
   });

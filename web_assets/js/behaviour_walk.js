@@ -41,7 +41,7 @@ export function walkCard(path, model) {
       ),
     ),
   );
-  /** @type {import("./api_types").Schemas["GeneratedWalk"]} */
+  /** @type {import("./api_types").Schemas["GeneratedWalk"] | null} */
   let walk = null;
   let drawing = null;
   let frame = 0;
@@ -51,6 +51,7 @@ export function walkCard(path, model) {
   let closed = false;
 
   const show = () => {
+    if (!walk) return;
     drawing.show(walk.frames[frame]);
     slider.value = String(frame);
     const history = walk.histories[frame];
@@ -59,7 +60,7 @@ export function walkCard(path, model) {
       `predicted from ${history.length === 1 ? "the last frame" : `the last ${history.length} frames`}.`;
   };
   const step = (now) => {
-    if (closed || !playing || !box.isConnected) return;
+    if (closed || !playing || !walk || !box.isConnected) return;
     const due = Math.floor(((now - last) * walk.fps) / 1000);
     if (due >= 1) {
       last = due > 10 ? now : last + (due * 1000) / walk.fps;

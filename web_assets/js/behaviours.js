@@ -388,14 +388,14 @@ function watchLearning() {
   timer = setTimeout(async () => {
     try {
       learning = (await fetchJson("/api/learning")).progress;
-      if (learning.state === "done") {
+      if (learning?.learnt && learning.state === "done") {
         await refresh();
         say(
           `${learning.name} is learnt: ${learning.learnt.clusters} clusters, ${learning.learnt.states} states.`,
         );
         if (isNew) return await show(learning.name);
       } else if (isNew) showProgress();
-      else if (learning.state === "failed") complain(fault(learning.message, learning.hint));
+      else if (learning?.state === "failed") complain(fault(learning.message, learning.hint));
       drawList();
     } catch (error) {
       complain(error);

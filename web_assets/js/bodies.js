@@ -50,7 +50,7 @@ const content = byId("content");
 
 /** @type {Schemas["BodyEntry"][]} */
 let entries = [];
-/** @type {Body} */
+/** @type {Body | null} */
 let body = null;
 /** @type {Body[]} */
 let past = [];
@@ -136,8 +136,8 @@ async function openBody(name) {
 /** Show a body that was opened, with nothing to undo. @param {Body} opened */
 function show(opened) {
   [body, past, undone, wrong, notes] = [opened, [], [], null, []];
-  history.replaceState(null, "", query(body.name));
-  document.title = `${body.name} · Bodies`;
+  history.replaceState(null, "", query(opened.name));
+  document.title = `${opened.name} · Bodies`;
   drawList();
   draw();
 }
@@ -150,13 +150,15 @@ const inTurn = (change) => (changing = changing.then(change));
 /** @param {Partial<Schemas["BodyEdit"]>} change @param {HTMLInputElement | null} [input] */
 function apply(change, input = null) {
   return inTurn(async () => {
+    const before = body;
+    if (!before) return;
     try {
       const changed = await post(
-        `${pathOf(body.name)}/edit`,
-        /** @type {any} */ ({ ...change, text: body.text }),
+        `${pathOf(before.name)}/edit`,
+        /** @type {any} */ ({ ...change, text: before.text }),
       );
-      if (changed.text !== body.text) {
-        past = [...past, body].slice(-REMEMBERED);
+      if (changed.text !== before.text) {
+        past = [...past, before].slice(-REMEMBERED);
         undone = [];
       }
       [body, wrong, notes] = [changed, null, changed.notes];
@@ -169,10 +171,12 @@ function apply(change, input = null) {
   });
 }
 
+/** @param {Body[]} from @param {Body[]} to */
 function step(from, to) {
-  if (!from.length) return;
+  const next = from.pop();
+  if (!next || !body) return;
   to.push(body);
-  body = from.pop();
+  body = next;
   [wrong, notes] = [null, []];
   draw();
 }
@@ -208,7 +212,8 @@ function entry(label, value, send, more = {}) {
 
 // The parts of a body.
 
-function sizesTable() {
+/** @param {Body} body */
+function sizesTable(body) {
   const seen = new Set();
   const rows = body.limbs.map((limb) =>
     element(
@@ -285,7 +290,8 @@ function sizesTable() {
   ];
 }
 
-function limitsTable() {
+/** @param {Body} body */
+function limitsTable(body) {
   let group = "";
   const rows = body.limits.flatMap((one) => {
     const head =
@@ -343,7 +349,8 @@ function limitsTable() {
   ];
 }
 
-function markersTable() {
+/** @param {Body} body */
+function markersTable(body) {
   const marker = (name, joint, at) => `${name}=${joint},${at.join(",")}`;
   const rows = body.markers.map((one) =>
     element(
@@ -419,6 +426,8 @@ function drawSaid() {
 }
 
 function draw() {
+  const shown = body;
+  if (!shown) return;
   if (!content.contains(form)) {
     fill(
       content,
@@ -441,7 +450,7 @@ function draw() {
     );
     fill(aside, loadScene(element("iframe", { title: "3-D scene" })));
   }
-  const own = entries.find((one) => one.name === body.name)?.own;
+  const own = entries.find((one) => one.name === shown.name)?.own;
   const tabs = Object.entries(PARTS).map(([key, words]) =>
     element(
       "button",
@@ -458,20 +467,20 @@ function draw() {
       words,
     ),
   );
-  const table = { sizes: sizesTable, limits: limitsTable, markers: markersTable }[part]();
+  const table = { sizes: sizesTable, limits: limitsTable, markers: markersTable }[part](shown);
   fill(
     form,
     pageHead(
-      body.name,
-      dotted(body.title, past.length > 0 && "changed, not saved"),
-      !readOnly && own && button("Delete…", () => removeForm(body.name, own)),
+      shown.name,
+      dotted(shown.title, past.length > 0 && "changed, not saved"),
+      !readOnly && own && button("Delete…", () => removeForm(shown.name, own)),
       button(
         "TOML",
-        () => download(`${body.name}.toml`, new Blob([body.text], { type: "application/toml" })),
+        () => download(`${shown.name}.toml`, new Blob([shown.text], { type: "application/toml" })),
         "",
         { title: "The body's file" },
       ),
-      !readOnly && button("Save…", saveForm, "primary"),
+      !readOnly && button("Save…", () => saveForm(shown), "primary"),
     ),
     !readOnly &&
       element(
@@ -480,11 +489,11 @@ function draw() {
         button("Undo", undo, "", { disabled: !past.length, title: "Ctrl+Z" }),
         button("Redo", redo, "", { disabled: !undone.length, title: "Ctrl+Y" }),
         button("Left → right", () => apply({ mirror: "left" }), "", {
-          disabled: !body.sided,
+          disabled: !shown.sided,
           title: "The right side becomes the left one's mirror image",
         }),
         button("Right → left", () => apply({ mirror: "right" }), "", {
-          disabled: !body.sided,
+          disabled: !shown.sided,
           title: "The left side becomes the right one's mirror image",
         }),
       ),
@@ -497,11 +506,12 @@ function draw() {
     ...table.filter(Boolean).flat(2),
   );
   drawSaid();
-  post("/api/scene/show", { ...(session ? { session } : {}), body: body.text }).catch(complain);
+  post("/api/scene/show", { ...(session ? { session } : {}), body: shown.text }).catch(complain);
 }
 
-function saveForm() {
-  const own = entries.find((one) => one.name === body.name)?.own;
+/** @param {Body} shown */
+function saveForm(shown) {
+  const own = entries.find((one) => one.name === shown.name)?.own;
   const places = [
     ...(session ? [{ value: "session", label: `session ${session}` }] : []),
     { value: "workspace", label: "all sessions of this workspace" },
@@ -511,8 +521,8 @@ function saveForm() {
     action: "Save",
     intro: "Shipped bodies stay as they are; runs keep the copy that they were made with.",
     rows: [
-      [{ name: "name", label: "Name", value: own ? body.name : "", ...NAME }],
-      [{ name: "title", label: "Title", value: body.title, maxLength: 200 }],
+      [{ name: "name", label: "Name", value: own ? shown.name : "", ...NAME }],
+      [{ name: "title", label: "Title", value: shown.title, maxLength: 200 }],
       [{ name: "place", label: "For", choices: places, value: own || places[0].value }],
       [
         {
@@ -531,8 +541,8 @@ function saveForm() {
       // body.
       await changing;
       if (wrong) throw wrong;
-      const saved = await post(`${pathOf(body.name)}/edit`, {
-        text: body.text,
+      const saved = await post(`${pathOf(shown.name)}/edit`, {
+        text: (body ?? shown).text,
         title: values.title,
         save_as: values.name,
         replace: values.replace,

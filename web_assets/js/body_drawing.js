@@ -36,7 +36,7 @@ export class BodyDrawing {
     this.clarity = 1;
     this.seen = new IntersectionObserver(
       (entries) => {
-        this.isSeen = entries.at(-1).isIntersecting;
+        this.isSeen = Boolean(entries.at(-1)?.isIntersecting);
         this.draw();
       },
       { rootMargin: "200px" },

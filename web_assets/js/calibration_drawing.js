@@ -35,7 +35,7 @@ export function rigFromAbove(rig) {
     width / 2 + (x - (left + right) / 2) * scale,
     height / 2 - (y - (low + high) / 2) * scale,
   ];
-  const step = STEPS.find((one) => one * scale >= 40) ?? STEPS.at(-1);
+  const step = STEPS.find((one) => one * scale >= 40) ?? STEPS[STEPS.length - 1];
   const lines = [];
   for (let k = -60; k <= 60; k += 1) {
     const [x] = at(k * step, 0);
@@ -156,7 +156,7 @@ export function rigFromAbove(rig) {
 
 /**
  * The findings on a calibration, blocking ones first, each with its remedy.
- * @param {{ findings?: any[] }} what
+ * @param {{ findings: any[] }} what
  */
 export function findingList({ findings }) {
   if (!findings.length)

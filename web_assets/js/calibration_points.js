@@ -80,7 +80,8 @@ export function clickFloor(aside, { cameras, picture, send, stop }) {
   });
 
   function draw() {
-    if (points.at(-1) && Object.keys(points.at(-1).pixels).length > 1 && points.length < 32)
+    const last = points.at(-1);
+    if (last && Object.keys(last.pixels).length > 1 && points.length < 32)
       points.push({ pixels: {} });
     for (const { camera, marks } of views) {
       marks.replaceChildren(

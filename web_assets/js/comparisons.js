@@ -28,12 +28,19 @@ const content = byId("content");
 /** @type {Schemas["ComparisonLine"][]} */
 let lines = []; // of all comparisons
 let sessions = [];
-let open = null; // {session, name} of the shown one, null while the form is shown
-/** @type {Schemas["ComparisonDetail"]} */
+/** @typedef {{ session: string, name: string }} Place */
+/** @type {Place | null} */
+let open = null; // the shown one, null while the form is shown
+/** @type {Schemas["ComparisonDetail"] | null} */
 let detail = null;
 /** @type {Schemas["ComparisonChoices"]} */
-let choices = null;
-let [bodies, trackers, weightings] = [[], [], []];
+let choices = { candidates: [], lineups: [], weightings: [] };
+/** @type {any[]} */
+let bodies = [];
+/** @type {any[]} */
+let trackers = [];
+/** @type {any[]} */
+let weightings = [];
 let timer = 0;
 
 /** @returns {`/api/comparisons/${string}/${string}`} */
@@ -89,7 +96,7 @@ function drawList() {
 
 async function openComparison({ session, name }) {
   open = { session, name };
-  detail = await fetchJson(pathOf(open));
+  detail = await fetchJson(pathOf({ session, name }));
   address({ session, name });
   document.title = `${name} of ${session} · Comparisons`;
   show();
@@ -98,22 +105,28 @@ async function openComparison({ session, name }) {
 }
 
 function show() {
-  showComparison(content, detail, {
-    cancel: () => act(() => post(`${pathOf(open)}/cancel`)),
-    resume: () => act(() => post(`${pathOf(open)}/resume`)),
+  const [shown, place] = [detail, open];
+  if (!shown || !place) return;
+  showComparison(content, shown, {
+    cancel: () => act(place, () => post(`${pathOf(place)}/cancel`)),
+    resume: () => act(place, () => post(`${pathOf(place)}/resume`)),
     again: () =>
-      isSweep(detail.comparison) ? openNewSweep(sweepLike(detail)) : openNew(initialLike(detail)),
-    remove: () => removeForm(detail.comparison),
-    session: open.session,
-    look,
-    show: showTrial,
+      isSweep(shown.comparison) ? openNewSweep(sweepLike(shown)) : openNew(initialLike(shown)),
+    remove: () => removeForm(shown.comparison),
+    session: place.session,
+    look: (trial) => look(place, trial),
+    show: (trial, frame = trial.worst_frame) => showTrial(place, trial, frame),
   });
 }
 
-/** Open the run of a trial at its worst frame. @param {Schemas["TrialLine"]} trial */
-async function look(trial) {
+/**
+ * Open the run of a trial at its worst frame.
+ * @param {Place} place
+ * @param {Schemas["TrialLine"]} trial
+ */
+async function look(place, trial) {
   try {
-    const { session, run } = await post(`${pathOf(open)}/trials`, {
+    const { session, run } = await post(`${pathOf(place)}/trials`, {
       tracker: trial.tracker,
       seed: trial.seed,
     });
@@ -125,18 +138,21 @@ async function look(trial) {
 
 /**
  * Go to the run of a trial; where there is none, to the button that makes it.
+ * @param {Place} place
  * @param {Schemas["TrialLine"]} trial
+ * @param {number} frame
  */
-function showTrial(trial, frame = trial.worst_frame) {
-  if (trial.run) location.href = studioPath(open.session, trial.run, { frame, panel: "why" });
+function showTrial(place, trial, frame) {
+  if (trial.run) location.href = studioPath(place.session, trial.run, { frame, panel: "why" });
   else
     content.querySelector(`[data-trial="${CSS.escape(`${trial.tracker} ${trial.seed}`)}"]`).focus();
 }
 
-async function act(doing) {
+/** @param {Place} place @param {() => Promise<any>} doing */
+async function act(place, doing) {
   try {
     await doing();
-    await openComparison(open);
+    await openComparison(place);
     await refresh();
   } catch (error) {
     complain(error);

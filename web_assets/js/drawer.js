@@ -1,7 +1,9 @@
 // Where there is no room beside a page, its list and its places are a drawer: opened by the button
 // in the bar, closed by that button, by Escape, by a click beside it and by what was chosen in it.
 
-const toggle = document.getElementById("rail-toggle");
+import { byId } from "./elements.js";
+
+const toggle = byId("rail-toggle");
 const isOpen = () => document.body.classList.contains("rail-open");
 
 function show(open) {

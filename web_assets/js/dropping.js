@@ -67,7 +67,7 @@ export function acceptDrops(words, take) {
     event.preventDefault();
     end();
     try {
-      const files = await filesOf(event.dataTransfer);
+      const files = event.dataTransfer ? await filesOf(event.dataTransfer) : [];
       if (files.length) await take(files);
     } catch (error) {
       complain(error);

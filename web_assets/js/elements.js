@@ -188,6 +188,7 @@ export const number = (value, properties = {}) =>
 /**
  * A choice.
  * @param {([string, string] | string)[]} options values with their words, or words alone
+ * @param {string} [value]
  * @param {Properties} [properties]
  */
 export const select = (options, value = undefined, properties = {}) =>
@@ -197,6 +198,7 @@ export const select = (options, value = undefined, properties = {}) =>
  * Offer other options in a choice.
  * @param {HTMLSelectElement} choice
  * @param {([string, string] | string)[]} options
+ * @param {string} [value]
  */
 export function offer(choice, options, value = undefined) {
   choice.replaceChildren(
@@ -206,6 +208,13 @@ export function offer(choice, options, value = undefined) {
     }),
   );
   return choice;
+}
+
+/** What a canvas is drawn with. @param {HTMLCanvasElement} canvas */
+export function penOf(canvas) {
+  const pen = canvas.getContext("2d");
+  if (!pen) throw new Error("This browser gives no room to draw in: close other tabs.");
+  return pen;
 }
 
 /** Let the browser keep bytes as a file. */
@@ -268,24 +277,32 @@ export const bar = (share, className = "progress") =>
  */
 export function drawProgress(place, state) {
   if (!state) return fill(place);
-  if (!place.querySelector(".step-progress")) {
-    fill(
-      place,
-      element(
-        "div",
-        { className: "step-progress" },
-        element("p", { className: "hint", role: "status" }),
-        bar(0, "long-progress"),
-        state.cancel && actions(button("Cancel", () => cancels.get(place)(), "quiet small")),
-      ),
+  let shown = drawn.get(place);
+  if (shown?.whole.parentElement !== place) {
+    const words = element("p", { className: "hint", role: "status" });
+    const share = element("i");
+    const whole = element(
+      "div",
+      { className: "step-progress" },
+      words,
+      element("div", { className: "long-progress" }, share),
+      state.cancel && actions(button("Cancel", () => drawn.get(place)?.cancel?.(), "quiet small")),
     );
+    shown = { words, share, whole };
+    drawn.set(place, shown);
+    fill(place, whole);
   }
-  cancels.set(place, state.cancel);
-  place.querySelector("p").textContent = state.words;
-  place.querySelector("i").style.width = `${Math.round(100 * (state.share ?? 0))}%`;
+  shown.cancel = state.cancel;
+  shown.words.textContent = state.words;
+  shown.share.style.width = `${Math.round(100 * (state.share ?? 0))}%`;
 }
 
-const cancels = new WeakMap();
+/**
+ * What stands in a place that shows progress.
+ * @type {WeakMap<HTMLElement, { whole: HTMLElement, words: HTMLElement, share: HTMLElement,
+ *   cancel?: () => void }>}
+ */
+const drawn = new WeakMap();
 
 /**
  * Show a picture when it is decoded, so that nothing flickers; of several requests the newest wins.

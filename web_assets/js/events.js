@@ -8,10 +8,10 @@ const listeners = new Map();
 
 /** Call `handler(event)` on every event of a type; returns what stops that. */
 export function listen(type, handler) {
-  if (!listeners.has(type)) listeners.set(type, new Set());
-  listeners.get(type).add(handler);
+  const those = listeners.get(type) ?? new Set();
+  listeners.set(type, those.add(handler));
   return () => {
-    listeners.get(type).delete(handler);
+    those.delete(handler);
   };
 }
 

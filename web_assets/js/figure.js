@@ -110,8 +110,9 @@ function csvOf({ caption, title, tables }) {
 function wrapped(text, letters) {
   const lines = [""];
   for (const word of text.split(" ")) {
-    if (lines.at(-1).length + word.length > letters) lines.push(word);
-    else lines[lines.length - 1] += `${lines.at(-1) ? " " : ""}${word}`;
+    const last = lines[lines.length - 1];
+    if (last.length + word.length > letters) lines.push(word);
+    else lines[lines.length - 1] = last ? `${last} ${word}` : word;
   }
   return lines;
 }
@@ -140,7 +141,7 @@ function drawingOf(text) {
   for (const part of /** @type {NodeListOf<SVGElement>} */ (
     drawing.querySelectorAll("[data-style]")
   )) {
-    part.style.cssText = part.dataset.style;
+    part.style.cssText = part.dataset.style ?? "";
     delete part.dataset.style;
   }
   return drawing;
@@ -224,10 +225,10 @@ const fileName = (shown) => shown.name;
 export class Figure {
   /** @type {Shown | null} */
   shown = null;
-  /** @type {echarts.Chart} */
+  /** @type {echarts.Chart | null} */
   chart = null;
   isTable = false;
-  /** @type {Sheet} */
+  /** @type {Sheet | null} */
   sheet = null;
   redrawn = () => this.redraw();
 
@@ -367,7 +368,7 @@ export class Figure {
 
   clicked(event) {
     const changes = this.sheet?.clicks.get(event.seriesId)?.(event);
-    if (changes) this.shown.choose(changes);
+    if (changes) this.shown?.choose(changes);
   }
 
   /** A click on the ground of a plot, where nothing is. */
@@ -377,13 +378,14 @@ export class Figure {
       if (
         offsetX < box.left ||
         offsetX > box.left + box.width ||
-        offsetY < box.top ||
-        offsetY > box.top + box.height
+        offsetY < (box.top ?? 0) ||
+        offsetY > (box.top ?? 0) + box.height ||
+        !this.chart
       )
         continue;
       const [x, y] = this.chart.convertFromPixel({ gridIndex: index }, [offsetX, offsetY]);
       const changes = act(x, y);
-      if (changes) this.shown.choose(changes);
+      if (changes) this.shown?.choose(changes);
       return;
     }
   }
@@ -430,7 +432,7 @@ export class Figure {
       else if (kind === "csv")
         download(`${fileName(shown)}.csv`, new Blob([csvOf(shown)], { type: "text/csv" }));
       else if (kind === "pdf") print(shown);
-      else {
+      else if (shown.link) {
         await navigator.clipboard.writeText(location.origin + shown.link());
         say("The address of this view is copied.");
       }

@@ -106,7 +106,7 @@ function draw(place, card, wrong = null) {
     ),
   );
   place.dataset.card = card.name;
-  place.dataset.state = card.there ? "there" : going ? card.job.state : card.kind;
+  place.dataset.state = card.there ? "there" : (going && card.job?.state) || card.kind;
   if (going) {
     drawProgress(
       progress,

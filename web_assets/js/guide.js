@@ -30,7 +30,7 @@ function links() {
 /** Show whether the course's runs are there, and offer to make them. */
 async function showCourse() {
   const place = element("div", { className: "course-runs", role: "status" });
-  document.querySelector("main h1").after(place);
+  document.querySelector("main h1")?.after(place);
   const progress = element("div", {});
   let shown = "";
 
@@ -80,7 +80,7 @@ async function showCourse() {
 
 /** Draw what the reproductions found. @param {HTMLElement} place */
 async function showFindings(place) {
-  const files = place.dataset.files.split(" ").filter(Boolean);
+  const files = (place.dataset.files ?? "").split(" ").filter(Boolean);
   const [echarts, { drawFindings }, experiments] = await Promise.all([
     import("../vendor/echarts.esm.min.js"),
     import("./findings.js"),

@@ -59,8 +59,10 @@ export async function jobDone(path, report = (_job) => {}, gone = () => false) {
 export const shareOf = (job) => (job.total > 1 ? job.done / job.total : null);
 
 /** Where a job stands, in words. */
-export const standing = (job, otherwise) =>
-  dotted(job.step || otherwise, shareOf(job) === null ? "" : `${Math.round(100 * shareOf(job))} %`);
+export function standing(job, otherwise) {
+  const share = shareOf(job);
+  return dotted(job.step || otherwise, share === null ? "" : `${Math.round(100 * share)} %`);
+}
 
 /** How long a step still takes, in words; nothing where that is hardly any time, or not known. */
 export const timeLeft = (seconds) => (seconds > WORTH_SAYING ? `${duration(seconds)} left` : "");

@@ -5,7 +5,11 @@ import { byId, element, fill } from "./elements.js";
 const SECONDS_SHOWN = 9;
 const MOST_SHOWN = 4;
 
-/** Show a message; errors stay until closed. act: a button that follows from it. */
+/**
+ * Show a message; errors stay until closed. act: a button that follows from it.
+ * @param {string} text
+ * @param {{ remedy?: string, kind?: string, act?: HTMLElement | null }} [how]
+ */
 export function say(text, { remedy = "", kind = "info", act = null } = {}) {
   const box = byId("toasts");
   const close = element("button", {

@@ -28,7 +28,8 @@ const PREVIEW_HEIGHT = 270;
 const EXAMPLES = "http://10.0.0.7:8080/video · rtsp://… · /dev/video0";
 const STATES = { connecting: "calm", running: "good", stopped: "bad", ended: "calm" };
 
-/** @type {import("./api_types").Schemas["CamerasView"]} */
+/** @typedef {import("./api_types").Schemas["CamerasView"]} View */
+/** @type {View | null} */
 let view = null;
 let looking = 0;
 
@@ -115,16 +116,24 @@ const written = () =>
 
 async function show() {
   try {
-    view = await post("/api/cameras/preview", { cameras: written() });
-    drawCards();
-    update();
+    showAll(await post("/api/cameras/preview", { cameras: written() }));
   } catch (error) {
     complain(error);
   }
 }
 
-/** A card a camera: its picture, and how it stands. */
-function drawCards() {
+/** Show how all stands, with new cards where other cameras are shown than before. @param {View} now */
+function showAll(now) {
+  const namesOf = (/** @type {View | null} */ one) =>
+    one?.cameras.map((camera) => camera.name).join();
+  const isOther = namesOf(view) !== namesOf(now);
+  view = now;
+  if (isOther) drawCards(now);
+  update(now);
+}
+
+/** A card a camera: its picture, and how it stands. @param {View} view */
+function drawCards(view) {
   fill(
     grid,
     view.cameras.map((camera) => {
@@ -160,7 +169,7 @@ function drawCards() {
 function follow(made, image, camera) {
   const next = () => {
     if (!made.isConnected) return;
-    const here = view.cameras.find((one) => one.name === camera);
+    const here = view?.cameras.find((one) => one.name === camera);
     if (document.hidden || here?.state !== "running")
       return void setTimeout(next, LOOK_MILLISECONDS / 2);
     image.src = `/api/cameras/${encodeURIComponent(camera)}.jpg?height=${PREVIEW_HEIGHT}&at=${Date.now()}`;
@@ -173,7 +182,8 @@ function follow(made, image, camera) {
   setTimeout(next, 0);
 }
 
-function updateCard(made) {
+/** @param {View} view */
+function updateCard(view, made) {
   const camera = view.cameras.find((one) => one.name === made.dataset.name);
   if (!camera) return;
   const running = camera.state === "running";
@@ -189,7 +199,7 @@ function updateCard(made) {
   made.querySelector(".camera-facts").textContent = running
     ? dotted(
         `${plain(camera.fps)} fps`,
-        `${plain(1000 * camera.age, 0)} ms old`,
+        `${plain(camera.age === null ? null : 1000 * camera.age, 0)} ms old`,
         `${camera.width} × ${camera.height}`,
       )
     : camera.age === null
@@ -197,7 +207,8 @@ function updateCard(made) {
       : `last picture ${plain(camera.age)} s old`;
 }
 
-function spreadWords() {
+/** @param {View} view */
+function spreadWords(view) {
   const { sets, median, most, worst, apart, lagging } = view.spread;
   if (view.cameras.length < 2 || !sets) return "";
   const words = `Pictures of one moment arrive ${plain(median)} ms apart (95 %: ${plain(most)}, worst ${plain(worst)}).`;
@@ -206,9 +217,10 @@ function spreadWords() {
     : words;
 }
 
-function update() {
-  for (const made of grid.children) updateCard(made);
-  spread.textContent = spreadWords();
+/** @param {View} view */
+function update(view) {
+  for (const made of grid.children) updateCard(view, made);
+  spread.textContent = spreadWords(view);
   spread.classList.toggle("warn", view.spread.apart > 0);
   const is = going();
   for (const input of document.querySelectorAll(
@@ -220,27 +232,28 @@ function update() {
   record.disabled = !view.cameras.length;
   stop.hidden = !is;
   stop.disabled = view.recording?.step === "importing";
-  drawOutcome();
+  drawOutcome(view.recording);
 }
 
 async function begin() {
   try {
-    view.recording = await post("/api/recordings", {
+    const recording = await post("/api/recordings", {
       name: name.value.trim() || name.placeholder,
       calibration: session.value,
-      track: track.querySelector("input").checked,
+      track: track.querySelector("input")?.checked ?? false,
       ...(seconds.value ? { seconds: Number(seconds.value) } : {}),
     });
-    update();
+    if (view) showAll({ ...view, recording });
   } catch (error) {
     complain(error);
   }
 }
 
-function drawOutcome() {
-  if (!view.recording) return fill(outcome);
-  const { state, step, session: made, seconds: passed, limit, words, notes, run } = view.recording;
-  if (state === "failed") return fill(outcome, failure(view.recording));
+/** @param {View["recording"]} recording */
+function drawOutcome(recording) {
+  if (!recording) return fill(outcome);
+  const { state, step, session: made, seconds: passed, limit, words, notes, run } = recording;
+  if (state === "failed") return fill(outcome, failure(recording));
   const live = going() && step !== "importing";
   const counter = element(
     "span",
@@ -282,13 +295,7 @@ async function look() {
     const turn = ++looking;
     try {
       const answer = await fetchJson("/api/cameras");
-      if (turn === looking) {
-        const names = () => view?.cameras.map((camera) => camera.name).join();
-        const before = names();
-        view = answer;
-        if (before !== names()) drawCards();
-        update();
-      }
+      if (turn === looking) showAll(answer);
     } catch (error) {
       if (!view) complain(error);
     }

@@ -33,8 +33,10 @@ const ALL = "all";
 const column = element("div", { id: "findings" });
 const runner = element("section", {});
 const progress = optional();
-/** @type {Schemas["ExperimentList"] | null} */
-let known = null;
+/** @type {Schemas["ExperimentList"]["experiments"]} */
+let experiments = [];
+/** @type {Schemas["ExperimentList"]["job"]} */
+let job = null;
 let chosen = ALL;
 let quick = true;
 let failed = null;
@@ -42,7 +44,7 @@ let failed = null;
 async function begin() {
   failed = null;
   try {
-    known.job = await post("/api/reports/experiments", { name: chosen, quick });
+    job = await post("/api/reports/experiments", { name: chosen, quick });
   } catch (error) {
     failed = error;
   }
@@ -54,7 +56,6 @@ const stop = () => remove(`/api/jobs/${KIND}/${KIND}`).catch(complain);
 
 /** The form, or how far what was begun is, whichever page or window it was begun in. */
 function drawRunner() {
-  const { experiments, job } = known;
   const going = isGoing(job);
   const one = experiments.find((entry) => entry.name === chosen);
   const name = select(
@@ -111,14 +112,14 @@ function drawRunner() {
 }
 
 async function drawReports() {
-  const { experiments } = await fetchJson("/api/reports");
+  const made = (await fetchJson("/api/reports")).experiments;
   const files =
-    experiments.length > 0 &&
+    made.length > 0 &&
     Object.entries(FILES).map(([words, file]) =>
       element("a", { className: "download", href: `/api/reports/${file}`, download: file }, words),
     );
   fill(byId("downloads"), files);
-  if (experiments.length) return drawFindings(column, experiments, echarts);
+  if (made.length) return drawFindings(column, made, echarts);
   fill(
     column,
     lead(
@@ -131,15 +132,15 @@ async function start() {
   startTheme();
   fill(byId("content"), element("div", { className: "report-column" }, runner, column));
   fill(runner, hint("The experiments are being read …"));
-  known = await fetchJson("/api/reports/experiments");
+  ({ experiments, job } = await fetchJson("/api/reports/experiments"));
   drawRunner();
   await drawReports();
-  listen("reproduction", (job) => {
-    const was = known.job;
-    known.job = job;
-    if (isGoing(was) && isGoing(job)) drawProgress(progress, progressOf(job, "beginning", stop));
+  listen("reproduction", (now) => {
+    const was = job;
+    job = now;
+    if (isGoing(was) && isGoing(now)) drawProgress(progress, progressOf(now, "beginning", stop));
     else drawRunner();
-    if (!isGoing(job)) drawReports().catch(complain);
+    if (!isGoing(now)) drawReports().catch(complain);
   });
 }
 

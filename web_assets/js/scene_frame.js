@@ -183,11 +183,11 @@ function followPointer(page, { hover, click }) {
 }
 
 /** Let the page's keys work in a scene that was loaded; `takeKey` handles them. */
-export function shareKeys(/** @type {HTMLIFrameElement} */ scene, takeKey) {
+export function shareKeys(/** @type {Window} */ page, takeKey) {
   for (const kind of ["keydown", "keyup"])
-    scene.contentDocument.body.addEventListener(kind, keepToControls);
-  scene.contentWindow.addEventListener("keydown", first(takeKey), true);
-  scene.contentWindow.addEventListener("keydown", leaveScene, true);
+    page.document.body.addEventListener(kind, keepToControls);
+  page.addEventListener("keydown", first(takeKey), true);
+  page.addEventListener("keydown", leaveScene, true);
 }
 
 /**
@@ -196,13 +196,14 @@ export function shareKeys(/** @type {HTMLIFrameElement} */ scene, takeKey) {
  */
 export function startSceneFrame(takeKey, pointer) {
   frame.addEventListener("load", () => {
-    if (frame.src.endsWith("about:blank")) return;
+    const page = frame.contentWindow;
+    if (!page || frame.src.endsWith("about:blank")) return;
     dress();
-    shareKeys(frame, takeKey);
-    zoomWithWheel(frame.contentWindow);
-    followPointer(frame.contentWindow, pointer);
+    shareKeys(page, takeKey);
+    zoomWithWheel(page);
+    followPointer(page, pointer);
     // Whoever clicks a tab goes on with the timeline's keys.
-    frame.contentWindow.addEventListener("click", (/** @type {any} */ event) => {
+    page.addEventListener("click", (/** @type {any} */ event) => {
       if (event.detail) event.target.closest?.("[role=tab]")?.blur();
     });
   });

@@ -553,7 +553,10 @@ export function mount(place, setup) {
           oninput: ({ target }) => take(Number(target.value)),
         })
       : knob.choices.length
-        ? select(knob.choices, value, { ariaLabel, onchange: ({ target }) => take(target.value) })
+        ? select(knob.choices, String(value), {
+            ariaLabel,
+            onchange: ({ target }) => take(target.value),
+          })
         : element("input", {
             type: "checkbox",
             ariaLabel,

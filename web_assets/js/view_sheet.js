@@ -3,6 +3,7 @@
 // what it chooses.
 
 import { axis, figure, token, typeSize } from "./chart_looks.js";
+import { penOf } from "./elements.js";
 
 const HEADING = 30,
   LEGEND = 17,
@@ -28,7 +29,7 @@ const FAMILY = "Inter, system-ui, sans-serif";
  * @typedef {Record<string, any>} Changes of the selection
  */
 
-const pen = document.createElement("canvas").getContext("2d");
+const pen = penOf(document.createElement("canvas"));
 
 /**
  * A text that takes at most `width` pixels: whole words of it, none where less than half of it
@@ -114,8 +115,9 @@ export class Sheet {
   /**
    * A plot with its axes. `x`, `y`: ECharts' axes; returns its number, by which series name it.
    * @param {Box} box
-   * @param {{ title?: string, unit?: string, x: any, y: any, below?: number, names?: string[],
-   *   over?: (points: any[]) => string, click?: (x: number, y: number) => Changes | null }} more
+   * @param {{ title?: string, unit?: string, x: any, y: any, below?: number, names?: string[] | null,
+   *   over?: ((points: any[]) => string) | null,
+   *   click?: ((x: number, y: number) => Changes | null) | null }} more
    */
   plot(box, { title = "", unit = "", x, y, below = 34, names = null, over = null, click = null }) {
     const index = this.option.grid.length;
@@ -217,7 +219,12 @@ export class Sheet {
     });
   }
 
-  /** A series in a plot; `click` says what a click on one of its items chooses. */
+  /**
+   * A series in a plot; `click` says what a click on one of its items chooses, `tip` its words.
+   * @param {number} plot
+   * @param {{ click?: ((event: any) => Changes | null) | null,
+   *   tip?: ((event: any) => string) | null, [more: string]: any }} what
+   */
   series(plot, { click = null, tip = null, ...more }) {
     const id = `s${this.option.series.length}`;
     this.option.series.push({
@@ -264,8 +271,8 @@ export class Sheet {
    * `high`. `key`: how high their key beside it is; 0 for none.
    * @param {number} plot
    * @param {{ cells: any[], low: number, high: number, colours?: string[], ends?: [string, string],
-   *   key?: number, click?: (event: any) => Changes | null, tip: (event: any) => string, framed?:
-   *   boolean }} more
+   *   key?: number, click?: ((event: any) => Changes | null) | null, tip: (event: any) => string,
+   *   framed?: boolean }} more
    */
   heat(
     plot,
@@ -368,7 +375,7 @@ export class Sheet {
     const places = new Map();
     for (const mark of [...marks].sort((a, b) => a.x - b.x)) {
       const at = (width * (mark.x - low)) / (high - low || 1);
-      const size = pen.measureText(mark.word).width + 6;
+      const size = pen.measureText(mark.word ?? "").width + 6;
       const side = at + size > width ? -1 : 1;
       const [left, right] = side < 0 ? [at - size, at] : [at, at + size];
       const meets = (level) =>

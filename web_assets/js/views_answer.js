@@ -164,7 +164,7 @@ function landscape(sheet, { slice, terms, tempered, plane, rug, marks, ends, sca
     sheet.line(
       beta,
       `layer ${layer + 1}`,
-      rows.map((row) => ({ value: [put(row.at), row.density / most.get(layer)], row })),
+      rows.map((row) => ({ value: [put(row.at), row.density / (most.get(layer) ?? 1)], row })),
       layerColour(layer, at.layers),
       {
         width: at.layer === layer ? 3 : 1.4,

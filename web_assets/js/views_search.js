@@ -362,7 +362,7 @@ function scheduleOfFrame(sheet, tables, at) {
         sheet.line(plot, called, data, token(side ? colour : alone), { ...more, click });
       }
       const alarmed = own.layers.filter((row) => row.alarm);
-      const key = kinds.at(-1)[1];
+      const key = kinds[kinds.length - 1][1];
       if (alarmed.length)
         sheet.series(plot, {
           type: "scatter",
@@ -715,8 +715,7 @@ function clouds(sheet, { summary, own: steps, ridges, marks }, at) {
     shares: [1.15, 1],
   });
   const places = new Map(
-    names.map((name) => {
-      const first = byParameter.get(name)[0];
+    [...byParameter].map(([name, [first]]) => {
       const half = (first.q95 - first.q05) / 2;
       return [
         name,
@@ -732,6 +731,7 @@ function clouds(sheet, { summary, own: steps, ridges, marks }, at) {
     x: numbers("", { scale: false, min: -2, max: 2, interval: 1, position: "top" }),
     y: parameterAxis(names, at),
   });
+  const placed = (parameter, value) => places.get(parameter)?.(value) ?? null;
   const bar = (name, which, colour, thickness, lower = 0) =>
     sheet.series(all, {
       name,
@@ -742,8 +742,7 @@ function clouds(sheet, { summary, own: steps, ridges, marks }, at) {
       itemStyle: { color: token(colour) },
       data: names.flatMap((parameter, row) => {
         const own = which(byParameter.get(parameter), parameter);
-        const place = places.get(parameter);
-        const ends = [place(own.q05), place(own.q95)];
+        const ends = [placed(parameter, own.q05), placed(parameter, own.q95)];
         return ends[0] === null ? [] : [{ value: [...ends, row], own }];
       }),
       renderItem: (_params, api) => {
@@ -792,7 +791,7 @@ function clouds(sheet, { summary, own: steps, ridges, marks }, at) {
       symbolSize: 8,
       itemStyle: { color: token(colour), borderColor: token("surface"), borderWidth: 1 },
       data: names.flatMap((parameter, row) => {
-        const place = places.get(parameter)(marked.get(parameter)?.[key]);
+        const place = placed(parameter, marked.get(parameter)?.[key]);
         return place === null
           ? []
           : [{ value: [Math.max(-2, Math.min(2, place)), row], parameter }];

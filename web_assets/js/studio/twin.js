@@ -102,8 +102,8 @@ function TriedScene({ takeKey }) {
     let wait = 0;
     scene.addEventListener("load", () => {
       const page = scene.contentDocument;
-      if (!page) return;
-      shareKeys(scene, takeKey);
+      if (!page || !scene.contentWindow) return;
+      shareKeys(scene.contentWindow, takeKey);
       const style = page.createElement("style");
       // The first scene has the panel and says what there is to say.
       style.textContent =
