@@ -1,23 +1,27 @@
-"""Bodies of one's own: one that is there is changed and saved under another name."""
+"""Bodies of one's own: one that is there is changed and saved under another name, or moved to the trash.
 
-import dataclasses
+They are TOML files in a workspace's or a session's folder `bodies`.
+"""
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from studio.body.catalogue import SUFFIX, load_body
+from studio.body.catalogue import SUFFIX, load_body, packaged_bodies
 from studio.body.editing import edited
 from studio.body.model import BodyModel
 from studio.body.reader import parse_body
 from studio.body.writing import body_text
-from studio.foundations.declaring import Target, Terminal, Web, operation
+from studio.foundations.declaring import Target, Terminal, Web, operation, taking
+from studio.foundations.errors import BodyError
 from studio.operations.opening import SessionName, open_session
 from studio.operations.progress import Reporting, say
-from studio.sessions.own_bodies import bodies_folder, save_body
-from studio.sessions.session import Session
+from studio.sessions.atomic_files import write_text, writing
+from studio.sessions.names import checked_name
+from studio.sessions.session import BODIES_NAME, Session
 from studio.sessions.workspace import Workspace
 
 MOST_TEXT = 1_000_000
@@ -34,7 +38,55 @@ class EditedBody:
     file: Path | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class BodyChanges:
+    """What is changed of a body: sizes, limits and markers first, then one side is copied onto the other."""
+
+    sizes: Annotated[
+        Mapping[str, float] | None,
+        Field(
+            max_length=MOST_CHANGES,
+            description="A dimension, or a limb's LIMB.length, .radius_start, .radius_end, .scale_x, .scale_y, mm.",
+        ),
+        Terminal("--size", "NAME=MM"),
+    ] = None
+    limits: Annotated[
+        Mapping[str, float] | None,
+        Field(
+            max_length=MOST_CHANGES,
+            description="PARAMETER.lower, .upper, .neutral or .max_step, degrees or mm; inf for none.",
+        ),
+        Terminal("--limit", "NAME=DEGREES"),
+    ] = None
+    markers: Annotated[
+        Sequence[str],
+        Field(max_length=MOST_CHANGES, description="NAME=JOINT,X,Y,Z, mm in the joint's frame."),
+        Terminal("--marker", "NAME=JOINT,X,Y,Z"),
+    ] = ()
+    without_markers: Annotated[
+        Sequence[str],
+        Field(max_length=MOST_CHANGES, description="Markers that are taken away."),
+        Terminal("--without-marker", "NAME"),
+    ] = ()
+    mirror: Annotated[
+        Literal["", "left", "right"],
+        Field(description="The side that is copied onto the other, last of all."),
+    ] = ""
+    title: Annotated[
+        str, Field(max_length=200, description="What people see."), Terminal(metavar="WORDS"), Web(kind=str)
+    ] = ""
+    save_as: Annotated[
+        str,
+        Field(max_length=64, description="Name of the body of your own; default: nothing is saved."),
+        Terminal("--as", "NAME"),
+    ] = ""
+    replace: Annotated[bool, Field(description="In place of the body of your own that has that name.")] = (
+        False
+    )
+
+
 @operation
+@taking(BodyChanges)
 def edit_body(
     body: Annotated[
         str,
@@ -48,47 +100,6 @@ def edit_body(
         Terminal(left_out=True),
         Web(kind=str),
     ] = "",
-    sizes: Annotated[
-        Mapping[str, float] | None,
-        Field(
-            max_length=MOST_CHANGES,
-            description="A dimension, or a limb's LIMB.length, .radius_start, .radius_end, .scale_x, .scale_y, mm.",
-        ),
-        Terminal("--size", "NAME=MM"),
-    ] = None,
-    limits: Annotated[
-        Mapping[str, float] | None,
-        Field(
-            max_length=MOST_CHANGES,
-            description="PARAMETER.lower, .upper, .neutral or .max_step, degrees or mm; inf for none.",
-        ),
-        Terminal("--limit", "NAME=DEGREES"),
-    ] = None,
-    markers: Annotated[
-        Sequence[str],
-        Field(max_length=MOST_CHANGES, description="NAME=JOINT,X,Y,Z, mm in the joint's frame."),
-        Terminal("--marker", "NAME=JOINT,X,Y,Z"),
-    ] = (),
-    without_markers: Annotated[
-        Sequence[str],
-        Field(max_length=MOST_CHANGES, description="Markers that are taken away."),
-        Terminal("--without-marker", "NAME"),
-    ] = (),
-    mirror: Annotated[
-        Literal["", "left", "right"],
-        Field(description="The side that is copied onto the other, last of all."),
-    ] = "",
-    title: Annotated[
-        str, Field(max_length=200, description="What people see."), Terminal(metavar="WORDS"), Web(kind=str)
-    ] = "",
-    save_as: Annotated[
-        str,
-        Field(max_length=64, description="Name of the body of your own; default: nothing is saved."),
-        Terminal("--as", "NAME"),
-    ] = "",
-    replace: Annotated[
-        bool, Field(description="In place of the body of your own that has that name.")
-    ] = False,
     session: Annotated[
         SessionName | None,
         Field(description="It becomes this session's; default: all sessions of the workspace may use it."),
@@ -102,6 +113,7 @@ def edit_body(
         Terminal(kind=Path),
     ] = None,
     progress: Reporting = None,
+    **changes: Any,  # noqa: ANN401 - of the types that are declared
 ) -> EditedBody:
     """Change a body's sizes, limits of joints and markers, mirror one side onto the other, and save it as your own.
 
@@ -115,21 +127,22 @@ def edit_body(
     begun = (
         parse_body(text, Path(body).stem, f"{body}{SUFFIX}") if text else body_to_edit(body, opened, place)
     )
+    wanted = BodyChanges(**changes)
     change = edited(
         begun,
-        sizes=sizes,
-        limits=limits,
-        markers=markers,
-        without_markers=without_markers,
-        mirror=mirror,
-        title=title,
+        sizes=wanted.sizes,
+        limits=wanted.limits,
+        markers=wanted.markers,
+        without_markers=wanted.without_markers,
+        mirror=wanted.mirror,
+        title=wanted.title,
     )
-    found = EditedBody(change.body, body_text(change.body), change.notes)
-    if save_as:
-        file = save_body(found.text, save_as, place, replace)
-        found = dataclasses.replace(found, body=parse_body(found.text, save_as, file.name), file=file)
-    say(progress, found.notes)
-    return found
+    made, written, file = change.body, body_text(change.body), None
+    if wanted.save_as:
+        file = _save(written, wanted.save_as, place, replace=wanted.replace)
+        made = parse_body(written, wanted.save_as, file.name)
+    say(progress, change.notes)
+    return EditedBody(made, written, change.notes, file)
 
 
 def body_to_edit(body: str, session: Session | None, folder: Path) -> BodyModel:
@@ -137,3 +150,53 @@ def body_to_edit(body: str, session: Session | None, folder: Path) -> BodyModel:
     if session is not None and body == session.manifest.body:
         return session.body()
     return load_body(body, (folder, *(session.body_folders if session is not None else ())))
+
+
+def discard_body(workspace: Workspace, session: Session | None, name: str) -> Path:
+    """Move one's own body to the trash; where it lies then. Runs keep the copy that they were made with.
+
+    Raises BodyError where there is none, and while a session is to be tracked with it; NameRefused.
+    """
+    folder = bodies_folder(workspace, session)
+    path = folder / f"{checked_name(name, 'body')}{SUFFIX}"
+    if not path.is_file():
+        raise BodyError(f"There is no body of your own '{name}'.", "Shipped bodies stay as they are.")
+    users = [
+        entry.name
+        for entry in workspace.sessions()
+        if entry.body == name
+        and folder in (workspace.root / BODIES_NAME, workspace.root / entry.name / BODIES_NAME)
+    ]
+    if users:
+        raise BodyError(
+            f"Session '{users[0]}' is tracked with body '{name}'.", "Choose another body for it first."
+        )
+    return workspace.to_trash(path, f"body-{name}")
+
+
+def bodies_folder(workspace: Workspace, session: Session | None) -> Path:
+    """Where own bodies lie: a session's, else the workspace's."""
+    return (workspace.root if session is None else session.path) / BODIES_NAME
+
+
+def body_folders(workspace: Workspace, session: Session | None = None) -> tuple[Path, ...]:
+    """Where own bodies are looked for, a session's folder first; only folders that are there."""
+    if session is not None:
+        return session.body_folders
+    folder = bodies_folder(workspace, None)
+    return (folder,) if folder.is_dir() else ()
+
+
+def _save(text: str, name: str, folder: Path, *, replace: bool) -> Path:
+    """Write a body file that was checked. Raises BodyError for a shipped body's name, and for one that is there unless
+    it is replaced; NameRefused.
+    """
+    path = folder / f"{checked_name(name, 'body')}{SUFFIX}"
+    if name in packaged_bodies():
+        raise BodyError(f"'{name}' is a body that is shipped.", "Save yours under another name.")
+    if path.exists() and not replace:
+        raise BodyError(f"There is a body '{name}' already.", "Choose another name, or replace it.")
+    folder.mkdir(parents=True, exist_ok=True)
+    with writing("The body", path):
+        write_text(path, text)
+    return path

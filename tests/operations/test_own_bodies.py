@@ -10,7 +10,7 @@ import studio
 from studio.body.catalogue import load_body
 from studio.cli.main import main
 from studio.foundations.errors import BodyError
-from studio.sessions.own_bodies import bodies_folder, discard_body
+from studio.operations.own_bodies import discard_body
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
 
@@ -70,9 +70,9 @@ def test_a_body_in_use_is_not_thrown_away(workspace: Path) -> None:
     studio.edit_body("mouse", save_as="rat")
     studio.subject("toy", body="rat")
     with pytest.raises(BodyError, match="toy"):
-        discard_body(Workspace(), "rat", bodies_folder(Workspace(), None))
+        discard_body(Workspace(), None, "rat")
     studio.subject("toy", body="mouse")
-    place = discard_body(Workspace(), "rat", bodies_folder(Workspace(), None))
+    place = discard_body(Workspace(), None, "rat")
     assert place.is_file()
     assert not (workspace / "bodies" / "rat.toml").exists()
 

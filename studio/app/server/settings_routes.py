@@ -24,6 +24,7 @@ from studio.body.subject import DEFAULT_BODY
 from studio.foundations.declaring import LARGEST
 from studio.foundations.errors import SettingsError, StudioError
 from studio.operations.jobs import commands
+from studio.operations.own_bodies import body_folders
 from studio.runs.behaviour_models import check_prediction, models_folder, models_in
 from studio.runs.moved_knobs import settings_with_moved
 from studio.runs.pace import stored_pace
@@ -38,7 +39,6 @@ from studio.search.settings import (
     values,
 )
 from studio.search.trackers.catalogue import TRACKERS
-from studio.sessions.own_bodies import body_folders
 from studio.sessions.stored_run import StoredRun
 
 router = APIRouter(prefix="/api", tags=["settings"])

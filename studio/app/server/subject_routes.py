@@ -4,19 +4,20 @@ import asyncio
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Query, Response
+from fastapi import Query, Response
 from pydantic import Field
 
 from studio.app.server import files
+from studio.app.server.answers import Router, Shown
 from studio.app.server.app_state import App, AppState
 from studio.app.server.job_routes import add_job_routes
 from studio.app.server.picture_routes import Height
 from studio.app.server.requests import Arguments, body_of
 from studio.app.server.schemas import Answer, Number, Numbers
 from studio.app.server.session_routes import OpenSession
-from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
 from studio.body.subject import SHORTEST_MM, TALLEST_MM, Subject
+from studio.body.upright import LimbDrawing, limb_drawings
 from studio.foundations.arrays import Array
 from studio.foundations.errors import BodyError, NotFoundError
 from studio.foundations.progress import unheard
@@ -30,20 +31,7 @@ from studio.runs.setup.subject_fitting import FittedSubject
 from studio.sessions.provenance import origin_of
 from studio.sessions.session import SUBJECT_NAME, Session
 
-router = APIRouter(prefix="/api", tags=["subject"])
-
-
-class LimbDrawing(Answer):
-    """A drawn limb of the body as it stands upright. start, end: mm, x to the front, y to the left, z up. radii: at
-    both. dimension: the name of its length, "" where it has none.
-    """
-
-    name: str
-    side: str
-    start: list[float]
-    end: list[float]
-    radii: tuple[float, float]
-    dimension: str
+router = Router(prefix="/api", tags=["subject"])
 
 
 class SubjectAnswer(Answer):
@@ -56,7 +44,7 @@ class SubjectAnswer(Answer):
     dimensions: dict[str, float]
     notes: list[str]
     source: str
-    limbs: list[LimbDrawing]
+    limbs: list[Annotated[LimbDrawing, Shown]]
     saved: bool = False
     fitted: bool = False
 
@@ -93,7 +81,7 @@ class FitSubjectState(NumberedJob):
     sizes: list[SizeLine] = Field(default_factory=list[SizeLine])
     overlap_before: Numbers | None = None
     overlap: Numbers | None = None
-    limbs: list[LimbDrawing] = Field(default_factory=list[LimbDrawing])
+    limbs: list[Annotated[LimbDrawing, Shown]] = Field(default_factory=list[LimbDrawing])
     file: str = ""
 
 
@@ -230,24 +218,4 @@ def _found(identifier: str, app: AppState) -> FittedSubject:
     if not isinstance(found, FittedSubject):
         state = app.jobs.state(SUBJECT, identifier).state
         raise NotFoundError(f"This fit found no subject: it is {state}.", "Begin a new one.")
-    return found
-
-
-def limb_drawings(body: BodyModel) -> list[LimbDrawing]:
-    """The drawn limbs of a body as it stands upright."""
-    entries = {limb.name: limb for limb in body.definition.limbs} if body.definition else {}
-    ends = limb_ends(body, body.neutral)[0]
-    found: list[LimbDrawing] = []
-    for limb, (start, end) in zip(body.drawn, ends, strict=True):
-        length = entries[limb.name].length if limb.name in entries else ""
-        found.append(
-            LimbDrawing(
-                name=limb.name,
-                side=limb.side,
-                start=start.tolist(),
-                end=end.tolist(),
-                radii=(limb.radius_start, limb.radius_end),
-                dimension=length.lstrip("-") if isinstance(length, str) else "",
-            )
-        )
     return found
