@@ -1,7 +1,7 @@
 """Schemas of answers made from the records that verbs return, as bodies of requests are made from their parameters.
 
 A route returns the record itself; its annotation says which. Numbers that are not finite are null, arrays are lists. A
-property whose annotation has a Field is an entry as well.
+property whose annotation has a Field is an entry as well; one that is marked `Web(left_out=True)` is none.
 """
 
 import dataclasses
@@ -14,18 +14,21 @@ import msgspec
 import numpy as np
 from fastapi import APIRouter
 from fastapi.datastructures import Default, DefaultPlaceholder
-from pydantic import BaseModel, Field, GetCoreSchemaHandler, create_model
+from pydantic import BaseModel, BeforeValidator, Field, GetCoreSchemaHandler, create_model
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema
 from starlette.responses import Response
 
 from studio.app.server.schemas import Answer, Number, Numbers
+from studio.foundations.declaring import Web
+from studio.foundations.knobs import Value
 
 Kind = Any
 """A type as an annotation has it."""
 
 
 OF_ANNOTATION = Default(None)
+TypeName = Annotated[str, BeforeValidator(lambda kind: kind.__name__)]
 
 
 class Router(APIRouter):
@@ -59,6 +62,10 @@ def shown_as(kind: Kind) -> Kind:
     """The type in an answer's schema for a type of the studio: records as models, numbers that may be none as such."""
     if kind is float:
         return Number
+    if kind == Value:
+        return kind
+    if kind is type:
+        return TypeName
     if get_origin(kind) is np.ndarray or kind is np.ndarray:
         return Numbers
     if _fields_of(kind):
@@ -105,8 +112,13 @@ def _fields_of(kind: Kind) -> list[tuple[str, Kind, object]]:
         # A NamedTuple.
         given: dict[str, object] = getattr(record, "_field_defaults", {})
         defaults = {name: given.get(name, _NONE) for name in getattr(record, "_fields", ())}
-    own = [(name, hints[name], default) for name, default in defaults.items()]
+    shown = {name: hints[name] for name in defaults if not _is_left_out(hints[name])}
+    own = [(name, one, defaults[name]) for name, one in shown.items()]
     return own and own + [(name, result, _NONE) for name, result in _properties(kind)]
+
+
+def _is_left_out(kind: Kind) -> bool:
+    return any(isinstance(mark, Web) and mark.left_out for mark in getattr(kind, "__metadata__", ()))
 
 
 def _properties(record: type[object]) -> list[tuple[str, Kind]]:

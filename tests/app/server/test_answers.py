@@ -16,6 +16,8 @@ from pydantic import BaseModel, Field
 
 from studio.app.server.answers import Router, Shown, shown_as
 from studio.foundations.arrays import Array
+from studio.foundations.declaring import Web
+from studio.foundations.knobs import Value
 
 
 class Place(NamedTuple):
@@ -30,6 +32,9 @@ class Kept(msgspec.Struct, frozen=True):
 
     name: str
     sizes: tuple[int, ...] = ()
+    kind: type = float
+    value: Value = 2.0
+    file: Annotated[Path, Web(left_out=True)] = Path()
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -81,7 +86,7 @@ def test_a_record_is_answered_whole_with_null_for_what_is_not_finite(answers: Ca
     answered = answers("/track")
     assert answered == {
         "place": {"x": None, "kept": False},
-        "kept": {"name": "a", "sizes": [1, 2]},
+        "kept": {"name": "a", "sizes": [1, 2], "kind": "float", "value": 2.0},
         "poses": [1.0, None],
         "by_name": {"b": {"x": 2.0, "kept": False}},
         "pair": ["c", 3.0],
@@ -96,6 +101,7 @@ def test_the_schema_says_what_the_record_says(answers: Callable[[str], Any]) -> 
     schemas = answers("/openapi.json")["components"]["schemas"]
     assert schemas["Place"]["description"] == "A place. x : mm."
     assert {"type": "null"} in schemas["Place"]["properties"]["x"]["anyOf"]
+    assert {"type": "null"} not in schemas["Kept"]["properties"]["value"]["anyOf"]
     assert schemas["Track"]["properties"]["words"]["description"] == "In words."
     assert schemas["Track"]["properties"]["whole"]["description"] == "Whether nothing lacks."
 
