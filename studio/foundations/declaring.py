@@ -54,7 +54,7 @@ class Web:
     """How an HTTP body takes a parameter. By the rule text is a name (letters, digits, - and _), null its default, and
     what may be a path is left out, since no one far away chooses files of this machine.
 
-    name : of the entry. kind : its type there. left_out : no entry of the body.
+    name : of the entry. kind : its type there. left_out : no entry of the body; of a record no entry of the answer.
     """
 
     name: str = ""

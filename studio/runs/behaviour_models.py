@@ -10,8 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Annotated
 
 from studio.body.model import BodyModel
+from studio.foundations.declaring import Web
 from studio.foundations.errors import BehaviourError, NotFoundError, SettingsError, StudioError
 from studio.search.behaviour.model import BehaviourModel
 from studio.search.behaviour.model_file import read_model
@@ -32,7 +34,7 @@ class ModelSummary:
     """
 
     name: str
-    path: Path
+    path: Annotated[Path, Web(left_out=True)]
     body: str = ""
     parameters: tuple[str, ...] = ()
     fps: float = 0.0

@@ -67,8 +67,6 @@ STILL: dict[str, int] = {
     "studio/app/server/scene_picture_routes.py": 1,
     "studio/app/server/session_routes.py": 6,
     "studio/app/server/session_views.py": 3,
-    "studio/app/server/setting_views.py": 3,
-    "studio/app/server/settings_routes.py": 5,
     "studio/app/server/stroke_routes.py": 6,
     "studio/app/server/subject_routes.py": 5,
     "studio/app/server/track_routes.py": 11,

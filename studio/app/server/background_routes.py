@@ -11,12 +11,12 @@ from fastapi import Request as HttpRequest
 from pydantic import Field
 
 from studio.app.server import files
+from studio.app.server.answers import Shown
 from studio.app.server.app_state import App, AppState
 from studio.app.server.picture_routes import Knobs, knob_changes
 from studio.app.server.requests import Arguments, body_of
 from studio.app.server.schemas import Answer, Number, Request, RunName, Value
 from studio.app.server.session_routes import OpenSession
-from studio.app.server.setting_views import KnobView, knob_view
 from studio.app.server.upload_routes import forget, upload_folder
 from studio.footage.calibration.findings import Finding
 from studio.footage.capture.naming import match_names
@@ -24,7 +24,7 @@ from studio.footage.capture.pictures import is_picture
 from studio.foundations.errors import FootageError, NotFoundError, RunError, StudioError
 from studio.foundations.foreign_files import read_file
 from studio.foundations.geometry.projection import project
-from studio.foundations.knobs import knobs_of
+from studio.foundations.knobs import Knob, knobs_of
 from studio.operations.jobs.job_runner import Job, JobKind, SessionJob
 from studio.operations.masks import background as set_background
 from studio.results.overlay_pictures import forget_composers
@@ -161,7 +161,7 @@ class BackgroundAnswer(Answer):
     possible: list[BackgroundSource]
     frame_count: int
     cameras: list[BackgroundCamera]
-    knobs: list[KnobView]
+    knobs: list[Annotated[Knob, Shown]]
     settings: dict[str, Value]
     own: dict[str, Value]
     measured: str = ""
@@ -305,7 +305,7 @@ def background(session: OpenSession, app: App) -> BackgroundAnswer:
             "possible": possible,
             "frame_count": session.manifest.frame_count,
             "cameras": cameras,
-            "knobs": [knob_view(entry) for entry in knobs],
+            "knobs": list(knobs),
             "settings": {entry.name: now[entry.name] for entry in knobs},
             "own": evidence.knobs,
             "measured": known.words if (known := origin_of(session, "background")) is not None else "",

@@ -8,14 +8,14 @@ from typing import Annotated, Any
 from fastapi import APIRouter
 from pydantic import Field
 
+from studio.app.server.answers import Shown
 from studio.app.server.app_state import App, AppState
 from studio.app.server.requests import Arguments, MaybeName, body_of
 from studio.app.server.schemas import Answer
-from studio.app.server.setting_views import KnobView, knob_view
 from studio.app.server.upload_routes import forget, upload_folder
 from studio.body.catalogue import list_bodies, load_body
 from studio.foundations.errors import BehaviourError, NotFoundError
-from studio.foundations.knobs import knobs_of
+from studio.foundations.knobs import Knob, knobs_of
 from studio.operations.behaviours import learn
 from studio.operations.jobs.job_runner import Job, JobKind, SessionJob
 from studio.operations.jobs.learning_process import LearningOrder, learn_in_process
@@ -58,7 +58,7 @@ class LearningChoices(Answer):
     person, and what is being learnt or was last, null before the first.
     """
 
-    knobs: list[KnobView]
+    knobs: list[Annotated[Knob, Shown]]
     bodies: list[str]
     default_body: str
     fps: float
@@ -82,7 +82,7 @@ def choices(app: App) -> LearningChoices:
     """What can be learnt from and with, and what is being learnt."""
     knobs = [entry for kind in (LearningSettings, OversamplingSettings) for entry in knobs_of(kind)]
     return LearningChoices(
-        knobs=[knob_view(entry) for entry in knobs],
+        knobs=knobs,
         bodies=list(list_bodies((app.workspace.root / BODIES_NAME,))),
         default_body=app.workspace.usual_body(),
         fps=FPS,

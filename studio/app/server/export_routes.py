@@ -1,17 +1,19 @@
 """Exporting a run: in the background, with progress as `export` events; the files lie in the run's folder."""
 
+from typing import Annotated
+
 from fastapi import APIRouter
 from fastapi.responses import FileResponse, Response
 from pydantic import Field
 
+from studio.app.server.answers import Shown
 from studio.app.server.app_state import App
 from studio.app.server.job_routes import add_job_routes
 from studio.app.server.run_routes import RUN, OpenRun
 from studio.app.server.schemas import Answer, Request, Value
 from studio.app.server.session_routes import OpenSession
-from studio.app.server.setting_views import KnobView, knob_view
 from studio.footage.capture.calibration_files import CALIBRATION_FORMATS
-from studio.foundations.knobs import knobs_of
+from studio.foundations.knobs import Knob, knobs_of
 from studio.operations.jobs.job_runner import Job, JobKind, NumberedJob
 from studio.results.export.exporting import settled
 from studio.results.export.formats import FORMATS, format_of
@@ -44,7 +46,7 @@ class ExportChoices(Answer):
     """What a run can be exported to, and how. calibrations: writers by the ending of their files."""
 
     formats: list[FormatView]
-    options: list[KnobView]
+    options: list[Annotated[Knob, Shown]]
     calibrations: dict[str, list[str]]
 
 
@@ -111,7 +113,7 @@ def choices() -> ExportChoices:
         calibrations.setdefault(writer.suffix, []).append(name)
     return ExportChoices(
         formats=[FormatView.model_validate(form) for form in FORMATS.values()],
-        options=[knob_view(entry) for entry in knobs_of(ExportOptions)],
+        options=list(knobs_of(ExportOptions)),
         calibrations=calibrations,
     )
 

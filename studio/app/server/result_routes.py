@@ -10,16 +10,17 @@ from fastapi import APIRouter, Query, Response
 from pydantic import Field
 
 from studio.app.server import files
+from studio.app.server.answers import Shown
 from studio.app.server.event_encoding import layer_summary
 from studio.app.server.run_errors import evaluation_of
 from studio.app.server.run_routes import RUN, Checked, OpenRun
 from studio.app.server.schemas import Answer, Number, Numbers, Value
 from studio.app.server.session_routes import OpenSession
 from studio.app.server.session_views import ParameterView, describe, parameter_views
-from studio.app.server.setting_views import SettingsChange, changes_of, history_of
 from studio.body.model import BodyModel
 from studio.foundations.errors import NotFoundError, StudioError
 from studio.foundations.geometry.camera import Camera
+from studio.operations.run_settings import SettingsChange, changes_of, history_of
 from studio.results.evaluation.errors import Evaluation
 from studio.results.inspection.cloud_outlines import CloudOutline, outline_of
 from studio.results.inspection.reading import InspectedFrame, InspectedRun
@@ -87,7 +88,7 @@ class FramesSummary(Answer):
     describe: str
     score: tuple[str, str] = Field(description="What the best particle is reported by, and its unit.")
     frames: list[FrameLine]
-    settings_changes: list[SettingsChange]
+    settings_changes: list[Annotated[SettingsChange, Shown]]
     damaged: dict[int, str] = Field(
         {}, description="Frames damaged on the disk, and what of each; resuming the run tracks them again."
     )
@@ -243,7 +244,7 @@ def frames(
         describe=describe(record, history),
         score=TRACKERS.get(record.tracker, Tracker).score,
         frames=lines,
-        settings_changes=changes_of(history),
+        settings_changes=list(changes_of(history)),
         damaged=damaged,
         checked=checked,
         partial=partial.frame if partial else None,

@@ -7,13 +7,13 @@ from pydantic import Field
 
 from studio.app.server.run_errors import mean_error
 from studio.app.server.schemas import Answer, Number, Numbers
-from studio.app.server.setting_views import history_of
 from studio.body.dimensions import follows_height
 from studio.body.model import BodyModel
 from studio.footage.capture.footage_source import CameraSource
 from studio.footage.capture.naming import CameraMatch
 from studio.foundations.errors import StudioError
 from studio.foundations.geometry.camera import Camera
+from studio.operations.run_settings import history_of
 from studio.results.comparison.folders import comparison_count
 from studio.runs.setup.silhouette_doubts import standing_doubts
 from studio.search.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, SettingsHistory

@@ -8,6 +8,7 @@ from fastapi import APIRouter, Response
 from pydantic import Field
 
 from studio.app.server import files
+from studio.app.server.answers import Shown
 from studio.app.server.app_state import App, AppState
 from studio.app.server.job_routes import add_job_routes
 from studio.app.server.requests import Arguments, body_of
@@ -15,8 +16,7 @@ from studio.app.server.run_errors import evaluation_of
 from studio.app.server.run_routes import RUN, OpenRun
 from studio.app.server.schemas import Answer, Number
 from studio.app.server.session_routes import OpenSession
-from studio.app.server.setting_views import KnobView, knob_view
-from studio.foundations.knobs import changed, knobs_of
+from studio.foundations.knobs import Knob, changed, knobs_of
 from studio.foundations.progress import unheard
 from studio.operations.jobs.job_runner import Job, JobKind, NumberedJob, Work
 from studio.operations.person import landmarks
@@ -62,8 +62,8 @@ class TrackList(Answer):
 
     tracks: list[TrackLine]
     running: list["TrackJobState"]
-    refine_settings: list[KnobView]
-    smooth_settings: list[KnobView]
+    refine_settings: list[Annotated[Knob, Shown]]
+    smooth_settings: list[Annotated[Knob, Shown]]
 
 
 class LandmarksLine(Answer):
@@ -167,8 +167,8 @@ def tracks(session: OpenSession, run: OpenRun, app: App) -> TrackList:
     return TrackList(
         tracks=lines,
         running=going,
-        refine_settings=[knob_view(entry) for entry in knobs_of(RefinementSettings)],
-        smooth_settings=[knob_view(entry) for entry in knobs_of(SmoothingSettings)],
+        refine_settings=list(knobs_of(RefinementSettings)),
+        smooth_settings=list(knobs_of(SmoothingSettings)),
     )
 
 

@@ -31,8 +31,8 @@ class Kept(msgspec.Struct, frozen=True):
     """What is stored."""
 
     name: str
+    kind: type
     sizes: tuple[int, ...] = ()
-    kind: type = float
     value: Value = 2.0
     file: Annotated[Path, Web(left_out=True)] = Path()
 
@@ -58,7 +58,9 @@ class Track:
         raise AssertionError("a property without a Field is no entry")
 
 
-TRACK = Track(Place(math.nan), Kept("a", (1, 2)), np.array([1.0, math.inf]), {"b": Place(2.0)}, ("c", 3.0))
+TRACK = Track(
+    Place(math.nan), Kept("a", float, (1, 2)), np.array([1.0, math.inf]), {"b": Place(2.0)}, ("c", 3.0)
+)
 
 
 @pytest.fixture

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from studio.app.server.presets import FILE_NAME, all_presets, drop_preset, keep_preset, preset
 from studio.foundations.errors import SessionError
+from studio.operations.presets import FILE_NAME, all_presets, drop_preset, keep_preset, preset
 
 
 def test_presets_of_the_first_version_get_the_tracker_that_has_their_knobs(tmp_path: Path) -> None:

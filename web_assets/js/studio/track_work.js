@@ -154,7 +154,7 @@ async function catchUp() {
   }
 }
 
-/** @param {import("../api_types").Schemas["KnobView"]} knob */
+/** @param {import("../api_types").Schemas["Knob"]} knob */
 function fieldOf(knob) {
   const common = { name: knob.name, value: knob.default, hint: knob.help };
   if (knob.choices?.length) return { ...common, label: knob.label, choices: knob.choices };

@@ -1,21 +1,21 @@
-"""Ready-made settings: those that the studio brings, and those that a person kept (a file of the
-workspace).
-"""
+"""Ready-made settings: those that the studio brings, and those that a person kept (a file of the workspace)."""
 
 import threading
+from dataclasses import dataclass
 from pathlib import Path
 
 import msgspec
 
-from studio.app.server.schemas import Answer, Value
 from studio.foundations.errors import NotFoundError, StudioError
+from studio.foundations.knobs import Value
 from studio.search.settings import changed_settings, default_settings, in_todays_names, knob_table, values
 from studio.search.trackers.catalogue import TRACKERS, presets
 from studio.search.trackers.tracker import Preset
 from studio.sessions.record_files import Entries, RecordFile
 
 
-class PresetView(Answer):
+@dataclass(frozen=True, slots=True)
+class PresetView:
     """Ready-made settings: a handful of knobs, or a paper's whole tracker. tracker, weighting, body: what it is made
     for (weighting: the likelihood); empty fits any that has its knobs, and the session's body. own: made by a person,
     so that it can be deleted.
@@ -58,13 +58,13 @@ def _with_trackers(entries: Entries) -> Entries:
     """Version 1 had the presets by name, without what they are made for: the only tracker that has all their knobs,
     where there is one.
     """
-    found: Entries = {}
+    by_name: Entries = {}
     for name, kept in entries.items():
         if name != "schema":
             wanted = in_todays_names(kept["values"])
             having = [one for one in TRACKERS if wanted.keys() <= values(default_settings(one)).keys()]
-            found[name] = {**kept, "values": wanted, "tracker": having[0] if len(having) == 1 else ""}
-    return {"presets": found, "schema": 2}
+            by_name[name] = {**kept, "values": wanted, "tracker": having[0] if len(having) == 1 else ""}
+    return {"presets": by_name, "schema": 2}
 
 
 _KEPT = RecordFile(
@@ -80,7 +80,7 @@ _KEPT = RecordFile(
 def all_presets(folder: Path) -> list[PresetView]:
     """The studio's presets, then a person's own by name."""
     own = _own(folder)
-    return [_view(entry, entry.name in own) for entry in (*presets(), *own.values())]
+    return [_view(entry, own=entry.name in own) for entry in (*presets(), *own.values())]
 
 
 def preset(name: str, folder: Path) -> Preset:
@@ -147,11 +147,9 @@ def drop_preset(name: str, folder: Path) -> None:
         _write(folder, kept)
 
 
-def _view(entry: Preset, own: bool) -> PresetView:
-    made_for = {"tracker": entry.tracker, "weighting": entry.weighting, "body": entry.body}
-    return PresetView(
-        name=entry.name, label=entry.name, help=entry.help, values=entry.values, own=own, **made_for
-    )
+def _view(entry: Preset, *, own: bool) -> PresetView:
+    made_for = (entry.tracker, entry.weighting, entry.body)
+    return PresetView(entry.name, entry.name, entry.help, entry.values, *made_for, own)
 
 
 def _read(folder: Path) -> dict[str, _Kept]:
