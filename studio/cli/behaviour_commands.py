@@ -7,7 +7,7 @@ import click
 
 from studio.cli.deriving import Call, command_of
 from studio.operations.behaviours import LearntModel, learn, models
-from studio.runs.learning.model_repository import ModelSummary
+from studio.runs.behaviour_models import ModelSummary
 
 
 class _Sources(click.Command):

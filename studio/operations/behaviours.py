@@ -1,39 +1,38 @@
 """Behaviour models out of recorded motion."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, FiniteFloat
 
-from studio.body.catalogue import load_body
-from studio.foundations.declaring import Body, Knobs, Seed, Terminal, Values, Web, operation
-from studio.foundations.errors import SettingsError
-from studio.foundations.knobs import changed, knobs_of
+from studio.body.catalogue import list_bodies, load_body
+from studio.foundations.declaring import Terminal, Web, operation, taking
+from studio.foundations.errors import BehaviourError, NotFoundError
+from studio.foundations.knobs import Knob, knobs_of
+from studio.operations.jobs.learning_process import LearningOptions, LearningOrder, LearningProgress, Sources
+from studio.operations.model_repository import list_models, place_for_model
 from studio.operations.progress import Reporting, reporting, say
+from studio.results.drawing_footage.recipe_file import recipe_names
 from studio.results.motion_sources import read_sources
+from studio.runs.behaviour_models import SUFFIX, ModelSummary, models_folder
 from studio.runs.learning.learning import Learnt
 from studio.runs.learning.learning import learn as learn_from
-from studio.runs.learning.model_repository import ModelSummary, keep_model, list_models, place_for_model
 from studio.runs.learning.oversampling import OversamplingSettings
-from studio.runs.learning.recordings import FPS, Recording
+from studio.runs.learning.recordings import FPS, MOTION_FILES, Recording
 from studio.runs.live.live_summary import in_words as ranges
 from studio.search.behaviour.model import BehaviourModel
+from studio.search.behaviour.model_file import write_model
 from studio.search.behaviour.settings import LearningSettings
+from studio.sessions.archives import ENDINGS, unpacked
+from studio.sessions.names import checked_name
 from studio.sessions.session import BODIES_NAME
 from studio.sessions.workspace import Workspace
 
+SKELETON = ".asf"
 SHOWN_BAD_FRAMES = 12
-Sources = Annotated[
-    Sequence[str | Path],
-    Field(
-        max_length=500,
-        description="Motion files (.amc with its .asf, .bvh, .npz, .c3d, .trc), folders of them, runs as SESSION/RUN,"
-        " or recipes (their motion alone).",
-    ),
-    Web(kind=list[str]),
-]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,6 +47,7 @@ class LearntModel:
 
 
 @operation
+@taking(LearningOptions)
 def learn(
     sources: Annotated[Sources, Web(left_out=True)],
     into: Annotated[
@@ -57,28 +57,16 @@ def learn(
         Web("name"),
     ],
     *,
-    body: Annotated[
-        Body, Field(description="Body of the model's poses; default: the workspace's sessions' own.")
-    ] = "",
     skeleton: Annotated[
         str | Path | None,
         Field(description="ASF file of the .amc sources; default: NN.asf beside NN_MM.amc."),
         Terminal(metavar="FILE.asf", kind=Path),
     ] = None,
-    tests: Annotated[
-        Sources,
-        Field(description="Sources for the test entropy; default: the last fifth of each source."),
-        Terminal("--test", "SOURCES...", kind=Sequence[str]),
-    ] = (),
-    fps: Annotated[float, Field(ge=5.0, le=240.0, description="Frames per second.")] = FPS,
-    knobs: Annotated[
-        Values, Knobs(lambda: (*knobs_of(LearningSettings), *knobs_of(OversamplingSettings)))
-    ] = None,
-    seed: Seed = 0,
     replace: Annotated[
         bool, Field(description="Replace a model of that name."), Terminal("--force"), Web(left_out=True)
     ] = False,
     progress: Reporting = None,
+    **options: Any,  # noqa: ANN401 - of the types that are declared
 ) -> LearntModel:
     """Learn what a body tends to do from recorded motion.
 
@@ -87,40 +75,99 @@ def learn(
 
     Raises StudioError.
     """
-    workspace = Workspace()
-    tree = load_body(body or workspace.usual_body(), (workspace.root / BODIES_NAME,))
+    wanted, workspace = LearningOptions(**options), Workspace()
+    tree = load_body(wanted.body or workspace.usual_body(), (workspace.root / BODIES_NAME,))
     place = place_for_model(into, workspace, replace=replace)
-    learning, material = settings_of(knobs or {})
+    settings = wanted.settings()
     asf = Path(skeleton) if skeleton is not None else None
     with reporting(progress, "Reading motion") as report:
-        read = read_sources(sources, tree, asf, fps=fps, workspace=workspace, progress=report)
-        tested = None
-        if tests:
-            tested = read_sources(tests, tree, asf, fps=fps, workspace=workspace, progress=report)
-    say(progress, [note for one in (*read, *(tested or ())) for note in one.notes])
-    say(progress, [_misfits(one) for one in (*read, *(tested or ())) if one.bad_frames])
+        read = partial(read_sources, fps=wanted.fps, workspace=workspace, progress=report)
+        recordings = read(sources, tree, asf)
+        tested = read(wanted.tests, tree, asf) if wanted.tests else None
+    say(progress, [note for one in (*recordings, *(tested or ())) for note in one.notes])
+    say(progress, [_misfits(one) for one in (*recordings, *(tested or ())) if one.bad_frames])
     with reporting(progress, "Learning") as report:
-        model, learnt = learn_from(read, tree, learning, material, tested, seed=seed, progress=report)
-    keep_model(model, place)
-    return LearntModel(place.stem, place, model, learnt, read)
+        model, learnt = learn_from(recordings, tree, *settings, tested, seed=wanted.seed, progress=report)
+    write_model(model, place)
+    return LearntModel(place.stem, place, model, learnt, recordings)
+
+
+@dataclass(frozen=True, slots=True)
+class LearningChoices:
+    """What a form needs: the knobs group after group, the bodies, the endings of motion files, bundled recipes of a
+    person, and what is being learnt or was last, null before the first.
+    """
+
+    knobs: tuple[Knob, ...]
+    bodies: tuple[str, ...]
+    default_body: str
+    fps: FiniteFloat
+    endings: tuple[str, ...]
+    recipes: tuple[str, ...]
+    progress: LearningProgress | None
+
+
+def learning_choices(workspace: Workspace, progress: LearningProgress | None) -> LearningChoices:
+    """What can be learnt from and with. progress : of what is being learnt."""
+    return LearningChoices(
+        knobs=(*knobs_of(LearningSettings), *knobs_of(OversamplingSettings)),
+        bodies=list_bodies((workspace.root / BODIES_NAME,)),
+        default_body=workspace.usual_body(),
+        fps=FPS,
+        endings=(*MOTION_FILES, SKELETON, *ENDINGS),
+        recipes=recipe_names(),
+        progress=progress,
+    )
+
+
+def learning_order(
+    workspace: Workspace, name: str, sources: Sequence[str], upload: Path | None, options: LearningOptions
+) -> LearningOrder:
+    """What is to be learnt, checked. sources : runs as SESSION/RUN and recipes. upload : a folder of motion files.
+
+    Raises StudioError: a name that is taken, no such source, wrong knobs.
+    """
+    wanted = replace(options, body=options.body or workspace.usual_body())
+    if (models_folder(workspace.root) / f"{checked_name(name, 'model')}{SUFFIX}").exists():
+        raise BehaviourError(
+            f"There is a model '{name}' already.", "Choose another name, or delete that one first."
+        )
+    load_body(wanted.body, (workspace.root / BODIES_NAME,))
+    for source in (*sources, *wanted.tests):
+        _check_source(str(source), workspace)
+    order = LearningOrder(workspace.root, name, (*sources, *(_motion_in(upload) if upload else ())), wanted)
+    if not order.sources:
+        raise BehaviourError("There is nothing to learn from.", "Choose runs, or motion files to upload.")
+    wanted.settings()
+    return order
+
+
+def _check_source(source: str, workspace: Workspace) -> None:
+    """A run of the workspace or a bundled recipe, never a path. Raises NotFoundError, NameRefused."""
+    if source in recipe_names():
+        return
+    session, slash, run = source.partition("/")
+    if not slash:
+        raise NotFoundError(
+            f"There is no source '{source[:80]}'.", "Name a run as SESSION/RUN, or upload motion files."
+        )
+    workspace.session(session).run(run)
+
+
+def _motion_in(folder: Path) -> tuple[str, ...]:
+    """The motion files of an upload, out of its archive if it is one. Raises BehaviourError where there are none."""
+    files = [path for path in unpacked(folder).rglob("*") if path.is_file()]
+    motion = sorted(str(path) for path in files if path.suffix.lower() in MOTION_FILES)
+    if not motion:
+        raise BehaviourError(
+            "The uploaded files hold no motion.", f"Motion files end in {', '.join(MOTION_FILES)}."
+        )
+    return tuple(motion)
 
 
 def models() -> tuple[ModelSummary, ...]:
     """List the behaviour models of the workspace."""
-    return tuple(list_models(Workspace()))
-
-
-def settings_of(knobs: Mapping[str, object]) -> tuple[LearningSettings, OversamplingSettings]:
-    """Knobs of learning and of the training material, distinguished by name. Raises SettingsError."""
-    groups = (LearningSettings(), OversamplingSettings())
-    known = [{entry.name for entry in knobs_of(type(group))} for group in groups]
-    strange = sorted(set(knobs) - known[0] - known[1])
-    if strange:
-        raise SettingsError(
-            f"Learning has no knob '{strange[0]}'.", f"It has: {', '.join(sorted(known[0] | known[1]))}."
-        )
-    learning, material = ({name: value for name, value in knobs.items() if name in names} for names in known)
-    return changed(groups[0], learning), changed(groups[1], material)
+    return list_models(Workspace())
 
 
 def _misfits(recording: Recording) -> str:

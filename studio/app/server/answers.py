@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 from fastapi import APIRouter
 from fastapi.datastructures import Default, DefaultPlaceholder
-from pydantic import BaseModel, BeforeValidator, Field, GetCoreSchemaHandler, create_model
+from pydantic import AllowInfNan, BaseModel, BeforeValidator, Field, GetCoreSchemaHandler, create_model
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema
 from starlette.responses import Response
@@ -59,7 +59,9 @@ class Shown:
 
 
 def shown_as(kind: Kind) -> Kind:
-    """The type in an answer's schema for a type of the studio: records as models, numbers that may be none as such."""
+    """The type in an answer's schema for a type of the studio: records as models, null where a number may be none (not
+    for pydantic's FiniteFloat).
+    """
     if kind is float:
         return Number
     if kind == Value:
@@ -72,6 +74,8 @@ def shown_as(kind: Kind) -> Kind:
         return _model_of(kind)
     origin, parts = get_origin(kind), get_args(kind)
     if origin is Annotated:
+        if AllowInfNan(False) in kind.__metadata__:
+            return kind
         return Annotated[(shown_as(parts[0]), *kind.__metadata__)]
     if origin in (tuple, list, Sequence, frozenset, set):
         many = parts[-1] is Ellipsis or origin is not tuple

@@ -70,6 +70,7 @@ from studio.operations.jobs.camera_service import RECORDINGS
 from studio.operations.jobs.control import StudioControl
 from studio.operations.jobs.events import RunState
 from studio.operations.jobs.job_runner import JobKind
+from studio.operations.jobs.learning_process import LEARNING
 from studio.results.inspection.likelihoods import forget_evaluations, let_evaluations_rest
 from studio.results.overlay_pictures import forget_composers, let_composers_rest
 from studio.sessions.workspace import Workspace
@@ -137,7 +138,7 @@ JOBS: tuple[JobKind[Any], ...] = (
     course_routes.COURSE,
     view_routes.SEEDS,
     comparison_routes.COMPARISON,
-    behaviour_learning_routes.LEARNING,
+    LEARNING,
     report_routes.REPRODUCTION,
 )
 """Work of which pages hear events."""

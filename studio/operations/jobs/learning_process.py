@@ -2,22 +2,28 @@
 
 import dataclasses
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from concurrent.futures import wait
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field
 
 from studio.body.catalogue import load_body
-from studio.foundations.errors import BehaviourError
-from studio.foundations.knobs import Value, changed, knobs_of
+from studio.foundations.declaring import Body, Knobs, Seed, Terminal, Values, Web
+from studio.foundations.errors import BehaviourError, SettingsError
+from studio.foundations.knobs import changed, knobs_of
 from studio.foundations.progress import Progress, report
+from studio.operations.jobs.job_runner import JobKind, SessionJob
 from studio.operations.jobs.process_executor import ProcessExecutor, ProcessLostError
+from studio.operations.model_repository import place_for_model
 from studio.results.motion_sources import read_sources
 from studio.runs.behaviour_models import models_folder
 from studio.runs.learning.learning import learn
-from studio.runs.learning.model_repository import keep_model, place_for_model
 from studio.runs.learning.oversampling import OversamplingSettings
 from studio.runs.learning.recordings import FPS
+from studio.search.behaviour.model_file import write_model
 from studio.search.behaviour.settings import LearningSettings
 from studio.sessions.session import BODIES_NAME
 from studio.sessions.workspace import Workspace
@@ -26,31 +32,79 @@ READING = "reading motion"
 PARTS = 1000
 NICENESS = 5
 CHECK_SECONDS = 0.2
+Sources = Annotated[
+    Sequence[str | Path],
+    Field(
+        max_length=500,
+        description="Motion files (.amc with its .asf, .bvh, .npz, .c3d, .trc), folders of them, runs as SESSION/RUN,"
+        " or recipes (their motion alone).",
+    ),
+    Web(kind=list[str]),
+]
+
+
+class LearningProgress(SessionJob):
+    """How the learning stands. learnt: frames, clusters, states, entropies and the frames that fitted badly, when it is
+    done.
+    """
+
+    name: str
+    body: str
+    learnt: dict[str, object] = Field(default_factory=dict)
+
+
+LEARNING = JobKind(
+    "learning",
+    "learning",
+    LearningProgress,
+    busy="Model '{name}' is being learnt; one is learnt at a time.",
+    page="/behaviours?name={name}",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class LearningOptions:
+    """How a model is learnt. tests : motion files, runs as SESSION/RUN, bundled recipes."""
+
+    body: Annotated[
+        Body, Field(description="Body of the model's poses; default: the workspace's sessions' own.")
+    ] = ""
+    tests: Annotated[
+        Sources,
+        Field(description="Sources for the test entropy; default: the last fifth of each source."),
+        Terminal("--test", "SOURCES...", kind=Sequence[str]),
+    ] = ()
+    fps: Annotated[float, Field(ge=5.0, le=240.0, description="Frames per second.")] = FPS
+    knobs: Annotated[
+        Values, Knobs(lambda: (*knobs_of(LearningSettings), *knobs_of(OversamplingSettings)))
+    ] = None
+    seed: Seed = 0
+
+    def settings(self) -> tuple[LearningSettings, OversamplingSettings]:
+        """Knobs of learning and of the training material, distinguished by name. Raises SettingsError."""
+        groups, knobs = (LearningSettings(), OversamplingSettings()), self.knobs or {}
+        known = [{entry.name for entry in knobs_of(type(group))} for group in groups]
+        strange = sorted(set(knobs) - known[0] - known[1])
+        if strange:
+            raise SettingsError(
+                f"Learning has no knob '{strange[0]}'.", f"It has: {', '.join(sorted(known[0] | known[1]))}."
+            )
+        learning, material = (
+            {name: value for name, value in knobs.items() if name in names} for names in known
+        )
+        return changed(groups[0], learning), changed(groups[1], material)
 
 
 @dataclass(frozen=True, slots=True)
 class LearningOrder:
-    """What is to be learnt. root : of the workspace. name : of the model. sources, tests : motion files, runs as
-    SESSION/RUN, bundled recipes; without tests the last fifth of each source is the test. knobs : of LearningSettings
-    and OversamplingSettings, those that were changed.
+    """What is to be learnt. root : of the workspace. name : of the model. sources : motion files, runs as SESSION/RUN,
+    bundled recipes. options : their body is given.
     """
 
     root: Path
     name: str
-    body: str
     sources: tuple[str, ...]
-    tests: tuple[str, ...] = ()
-    fps: float = FPS
-    seed: int = 0
-    knobs: Mapping[str, Value] = field(default_factory=dict[str, Value])
-
-    def settings(self) -> tuple[LearningSettings, OversamplingSettings]:
-        """The knobs as settings. Raises SettingsError for one that there is not, or a value outside its range."""
-        material = {entry.name for entry in knobs_of(OversamplingSettings)}
-        # A name that is neither's is refused with the others of learning.
-        learning = {name: value for name, value in self.knobs.items() if name not in material}
-        others = {name: value for name, value in self.knobs.items() if name in material}
-        return changed(LearningSettings(), learning), changed(OversamplingSettings(), others)
+    options: LearningOptions
 
 
 def learn_in_process(
@@ -80,29 +134,30 @@ def learn_in_process(
 
 def learn_to_order(order: LearningOrder) -> dict[str, object]:
     """Learn and keep the model, reporting its progress; its numbers. Raises StudioError."""
-    workspace, body = Workspace(order.root), load_body(order.body, (order.root / BODIES_NAME,))
-    place_for_model(order.name, workspace)
-    learning, material = order.settings()
-    total = len(order.sources) + len(order.tests)
-    heard: list[str] = []
+    options, workspace = order.options, Workspace(order.root)
+    body = load_body(options.body, (order.root / BODIES_NAME,))
+    place = place_for_model(order.name, workspace)
+    learning, material = options.settings()
+    sources = (*order.sources, *options.tests)
+    steps: list[str] = []
 
     def reading(words: str, done: int, parts: int) -> None:
-        if not heard or heard[-1] != words:
-            heard.append(words)
-        share = (len(heard) - 1 + done / max(1, parts)) / total
+        if not steps or steps[-1] != words:
+            steps.append(words)
+        share = (len(steps) - 1 + done / max(1, parts)) / len(sources)
         report(READING, min(PARTS - 1, round(PARTS * share)), PARTS)
 
     report(READING, 0, PARTS)
     read = [
-        read_sources([source], body, fps=order.fps, workspace=workspace, progress=_named(reading, number))
-        for number, source in enumerate((*order.sources, *order.tests))
+        read_sources([source], body, fps=options.fps, workspace=workspace, progress=_named(reading, number))
+        for number, source in enumerate(sources)
     ]
     training = [one for group in read[: len(order.sources)] for one in group]
     tests = [one for group in read[len(order.sources) :] for one in group]
     model, numbers = learn(
-        training, body, learning, material, tests or None, seed=order.seed, progress=report
+        training, body, learning, material, tests or None, seed=options.seed, progress=report
     )
-    keep_model(model, place_for_model(order.name, workspace))
+    write_model(model, place)
     bad = {one.name: len(one.bad_frames) for one in (*training, *tests) if one.bad_frames}
     return {**dataclasses.asdict(numbers), "bad_frames": bad}
 

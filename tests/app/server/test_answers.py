@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from fastapi import FastAPI
 from httpx import ASGITransport, AsyncClient
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, FiniteFloat
 
 from studio.app.server.answers import Router, Shown, shown_as
 from studio.foundations.arrays import Array
@@ -25,6 +25,7 @@ class Place(NamedTuple):
 
     x: float
     kept: bool = False
+    certain: FiniteFloat = 1.0
 
 
 class Kept(msgspec.Struct, frozen=True):
@@ -87,10 +88,10 @@ def answers() -> Callable[[str], Any]:
 def test_a_record_is_answered_whole_with_null_for_what_is_not_finite(answers: Callable[[str], Any]) -> None:
     answered = answers("/track")
     assert answered == {
-        "place": {"x": None, "kept": False},
+        "place": {"x": None, "kept": False, "certain": 1.0},
         "kept": {"name": "a", "sizes": [1, 2], "kind": "float", "value": 2.0},
         "poses": [1.0, None],
-        "by_name": {"b": {"x": 2.0, "kept": False}},
+        "by_name": {"b": {"x": 2.0, "kept": False, "certain": 1.0}},
         "pair": ["c", 3.0],
         "words": "",
         "more": [],
@@ -103,6 +104,7 @@ def test_the_schema_says_what_the_record_says(answers: Callable[[str], Any]) -> 
     schemas = answers("/openapi.json")["components"]["schemas"]
     assert schemas["Place"]["description"] == "A place. x : mm."
     assert {"type": "null"} in schemas["Place"]["properties"]["x"]["anyOf"]
+    assert schemas["Place"]["properties"]["certain"]["type"] == "number"
     assert {"type": "null"} not in schemas["Kept"]["properties"]["value"]["anyOf"]
     assert schemas["Track"]["properties"]["words"]["description"] == "In words."
     assert schemas["Track"]["properties"]["whole"]["description"] == "Whether nothing lacks."
@@ -114,7 +116,7 @@ def test_a_model_holds_records_as_answers_show_them() -> None:
 
     state = State.model_validate({"places": [Place(math.nan), Place(2.0)]})
     assert state.model_dump(mode="json") == {
-        "places": [{"x": None, "kept": False}, {"x": 2.0, "kept": False}]
+        "places": [{"x": None, "kept": False, "certain": 1.0}, {"x": 2.0, "kept": False, "certain": 1.0}]
     }
     again = State.model_validate({**dict(state)})
     assert again == state

@@ -9,11 +9,11 @@ import pytest
 from toy_behaviour import FPS, recordings, toy_model
 from web_doubles import Studio
 
-from studio.app.server import behaviour_routes
 from studio.app.server.page_routes import RAILED, UNRAILED
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_ends
 from studio.foundations.errors import BodyError
+from studio.operations import behaviour_details
 from studio.runs.behaviour_models import SUFFIX, models_folder
 from studio.search.behaviour.model import BehaviourModel
 from studio.search.behaviour.model_file import write_model
@@ -177,7 +177,7 @@ def test_a_model_without_its_body_tells_its_numbers_and_says_why(
     def gone(name: str, _folders: tuple) -> None:
         raise BodyError(f"There is no body '{name}'.", "Known: human25.")
 
-    monkeypatch.setattr(behaviour_routes, "load_body", gone)
+    monkeypatch.setattr(behaviour_details, "load_body", gone)
     response = learnt.client.get("/api/behaviours/wave").json()
     assert "body 'planar_arm4' is not here any more" in response["problem"]
     assert response["clusters"] == response["limbs"] == []

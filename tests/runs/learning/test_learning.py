@@ -10,11 +10,11 @@ from toy_behaviour import FPS, SETTINGS, waves
 from studio.body.catalogue import load_body
 from studio.foundations.errors import BehaviourError, StudioError
 from studio.foundations.knobs import changed
+from studio.operations.model_repository import list_models, place_for_model
 from studio.runs.learning.learning import learn, parted
-from studio.runs.learning.model_repository import keep_model, list_models, place_for_model
 from studio.runs.learning.oversampling import OversamplingSettings
 from studio.runs.learning.recordings import Recording
-from studio.search.behaviour.model_file import read_model
+from studio.search.behaviour.model_file import read_model, write_model
 from studio.sessions.names import NameRefused
 from studio.sessions.workspace import Workspace
 
@@ -67,7 +67,7 @@ def test_models_are_kept_listed_and_not_overwritten(tmp_path: Path) -> None:
     model, learnt = learn(RECORDINGS, BODY, SETTINGS, PLAIN)
     place = place_for_model("waving", workspace)
     assert place == workspace.root / "models" / "waving.behaviour"
-    keep_model(model, place)
+    write_model(model, place)
     (workspace.root / "models" / "broken.behaviour").write_bytes(b"no model")
     broken, waving = list_models(workspace)
     assert (broken.name, waving.name) == ("broken", "waving")
@@ -84,7 +84,7 @@ def test_models_are_kept_listed_and_not_overwritten(tmp_path: Path) -> None:
         place_for_model("waving", workspace)
     assert place_for_model("waving", workspace, replace=True) == place
     elsewhere = place_for_model(str(tmp_path / "mine"), workspace)
-    keep_model(model, elsewhere)
+    write_model(model, elsewhere)
     assert read_model(tmp_path / "mine.behaviour").clusters == model.clusters
     for name in ("../up", ".", "a b", ""):
         with pytest.raises((NameRefused, BehaviourError)):

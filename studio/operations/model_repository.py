@@ -5,8 +5,6 @@ from pathlib import Path
 
 from studio.foundations.errors import BehaviourError, NotFoundError
 from studio.runs.behaviour_models import SUFFIX, ModelSummary, models_folder, models_in
-from studio.search.behaviour.model import BehaviourModel
-from studio.search.behaviour.model_file import write_model
 from studio.sessions import atomic_files
 from studio.sessions.names import checked_name, free_name, inside
 from studio.sessions.workspace import TRASH_NAME, Workspace
@@ -30,11 +28,6 @@ def place_for_model(name_or_path: str, workspace: Workspace, *, replace: bool = 
             f"A model already exists at '{path}'.", "Choose another name, or replace it with --force."
         )
     return path
-
-
-def keep_model(model: BehaviourModel, path: Path) -> None:
-    """Write the model to a file of `place_for_model`, atomically."""
-    write_model(model, path)
 
 
 def stored_model(workspace: Workspace, name: str) -> Path:
@@ -67,8 +60,8 @@ def throw_away_model(workspace: Workspace, name: str) -> Path:
 
 def thrown_model(place: Path) -> str:
     """The name of the model in a folder of the trash, "" if it holds none."""
-    found = sorted(place.glob(f"*{SUFFIX}")) if place.is_dir() else []
-    return found[0].stem if len(found) == 1 else ""
+    models = sorted(place.glob(f"*{SUFFIX}")) if place.is_dir() else []
+    return models[0].stem if len(models) == 1 else ""
 
 
 def bring_back_model(workspace: Workspace, trashed_name: str) -> Path:
