@@ -10,7 +10,7 @@ TOOLS := node_modules/.package-lock.json
 # Compiled modules are kept: every process that a test starts would compile some 500 of them anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: env browser demo gallery-pictures test test-fast test-slow faults fuzz hostile races soak watching audit test-opencv-4 check check-types check-style check-pages bench growth lock guide pictures wheel-test clean
+.PHONY: env as-before browser demo gallery-pictures test test-fast test-slow faults fuzz hostile races soak watching audit test-opencv-4 check check-types check-style check-pages bench growth lock guide pictures wheel-test clean
 
 env: $(READY)
 
@@ -67,6 +67,10 @@ hostile: env
 # `RACES="--seed 7 --groups 1"` fires a group again.
 races: env
 	PYTHONPATH=tests $(BIN)/python -m races $(or $(RACES),--groups 2000)
+
+# What the studio gave before its files moved into twelve rooms, beside what it gives now.
+as-before: env
+	$(BIN)/python tests/house/as_before.py $(AS_BEFORE)
 
 # 25 viewers, a run of eight hours, ten thousand runs, two thousand looks at a large store; `SOAK="--scale 1"` is unscaled.
 soak: env

@@ -22,6 +22,7 @@ from studio.foundations.declaring import (
     operation,
 )
 from studio.foundations.errors import RunError, SessionError
+from studio.foundations.knobs import Value
 from studio.operations.jobs.cluster import Cluster, chosen_executor
 from studio.operations.jobs.comparison_run import Found, done_before, run_comparison
 from studio.operations.jobs.process_executor import cores
@@ -37,7 +38,6 @@ from studio.runs.behaviour_models import needs_model
 from studio.runs.new_run import own_knobs
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.trackers.catalogue import TRACKERS
-from studio.search.trackers.tracker import Value
 from studio.sessions.names import checked_name
 from studio.sessions.object_stores import below
 from studio.sessions.remote_sessions import (

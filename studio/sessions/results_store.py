@@ -19,6 +19,7 @@ import numpy as np
 from studio.foundations.arrays import Array
 from studio.foundations.errors import RunError, SessionError
 from studio.foundations.foreign_files import MANIFEST_NAME, check_file
+from studio.foundations.knobs import Value
 from studio.search.trackers.tracker import FrameResult, LayerRecord
 from studio.sessions.atomic_files import unwritable
 from studio.sessions.process_lock import ProcessLock
@@ -42,8 +43,6 @@ from studio.sessions.results_reader import (
 )
 from studio.sessions.session_databases import check_tables, open_database
 from studio.sessions.work_under_way import check_there, one_at_a_time
-
-Value = bool | int | float | str
 
 __all__ = ["FILE_NAME", "ResultsReader", "ResultsWriter", "is_being_written"]
 

@@ -9,10 +9,9 @@ from pathlib import Path
 
 import msgspec
 
+from studio.foundations.knobs import Value
 from studio.sessions.manifest import FASTEST, MOST_FRAMES, is_time
 from studio.sessions.record_files import RecordFile, renamed
-
-Value = bool | int | float | str
 
 SCHEMA_VERSION = 2
 FILE_NAME = "run.json"

@@ -5,6 +5,7 @@ import importlib
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from toy_footage import write_video
 from toy_session import BODY, HEIGHT, WIDTH, true_poses
 
 import studio
+from studio import extending
 from studio.body.catalogue import load_body
 from studio.operations.progress import reporting as shown_in
 from studio.sessions.session import Session
@@ -28,12 +30,13 @@ def test_importing_studio_imports_no_room_until_a_verb_is_requested() -> None:
     assert found.stdout.strip() == "[] True False"
 
 
-def test_what_editors_know_is_what_is_there() -> None:
-    stub = ast.parse(Path(studio.__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
+@pytest.mark.parametrize("public", [studio, extending])
+def test_what_editors_know_is_what_is_there(public: ModuleType) -> None:
+    stub = ast.parse(Path(str(public.__file__)).with_suffix(".pyi").read_text(encoding="utf-8"))
     named = {entry.name: node.module for node in stub.body for entry in node.names}  # pyright: ignore[reportAttributeAccessIssue]
-    assert sorted(named) == dir(studio)
+    assert sorted(named) == dir(public)
     for name, module in named.items():
-        assert getattr(importlib.import_module(module), name) is getattr(studio, name)
+        assert getattr(importlib.import_module(module), name) is getattr(public, name)
 
 
 def test_all_verbs_are_there_with_a_docstring() -> None:

@@ -15,7 +15,7 @@ from studio.app.server.answers import Shown
 from studio.app.server.app_state import App, AppState
 from studio.app.server.picture_routes import Knobs, knob_changes
 from studio.app.server.requests import Arguments, body_of
-from studio.app.server.schemas import Answer, Number, Request, RunName, Value
+from studio.app.server.schemas import Answer, Number, Request, RunName
 from studio.app.server.session_routes import OpenSession
 from studio.app.server.upload_routes import forget, upload_folder
 from studio.footage.calibration.findings import Finding
@@ -24,7 +24,7 @@ from studio.footage.capture.pictures import is_picture
 from studio.foundations.errors import FootageError, NotFoundError, RunError, StudioError
 from studio.foundations.foreign_files import read_file
 from studio.foundations.geometry.projection import project
-from studio.foundations.knobs import Knob, knobs_of
+from studio.foundations.knobs import Knob, Value, knobs_of
 from studio.operations.jobs.job_runner import Job, JobKind, SessionJob
 from studio.operations.masks import background as set_background
 from studio.results.overlay_pictures import forget_composers

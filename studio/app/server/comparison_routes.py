@@ -14,10 +14,11 @@ from studio.app.server import files
 from studio.app.server.app_state import App, AppState, moving
 from studio.app.server.error_responses import log
 from studio.app.server.requests import Arguments, body_of
-from studio.app.server.schemas import Answer, Request, RunName, Value
+from studio.app.server.schemas import Answer, Request, RunName
 from studio.app.server.session_routes import OpenSession, TrashEntry, trash_entry
 from studio.foundations.errors import NotFoundError, RunError, StudioError, WorkCancelledError
 from studio.foundations.foreign_files import read_file
+from studio.foundations.knobs import Value
 from studio.operations.comparing import MOST_TRACKERS, compare, kept_sweep, planned, sweep
 from studio.operations.jobs import commands
 from studio.operations.jobs.cluster import chosen_executor

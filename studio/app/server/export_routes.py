@@ -10,10 +10,10 @@ from studio.app.server.answers import Shown
 from studio.app.server.app_state import App
 from studio.app.server.job_routes import add_job_routes
 from studio.app.server.run_routes import RUN, OpenRun
-from studio.app.server.schemas import Answer, Request, Value
+from studio.app.server.schemas import Answer, Request
 from studio.app.server.session_routes import OpenSession
 from studio.footage.capture.calibration_files import CALIBRATION_FORMATS
-from studio.foundations.knobs import Knob, knobs_of
+from studio.foundations.knobs import Knob, Value, knobs_of
 from studio.operations.jobs.job_runner import Job, JobKind, NumberedJob
 from studio.results.export.exporting import settled
 from studio.results.export.formats import FORMATS, format_of

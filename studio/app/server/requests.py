@@ -6,8 +6,9 @@ from typing import Annotated, Any, NamedTuple, get_args, get_origin
 from fastapi import Depends
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model
 
-from studio.app.server.schemas import RunName, Value
+from studio.app.server.schemas import RunName
 from studio.foundations.declaring import LARGEST, REQUIRED, Parameter, alternatives, declared
+from studio.foundations.knobs import Value
 
 MaybeName = Annotated[RunName | None, BeforeValidator(lambda value: None if value == "" else value)]
 

@@ -14,12 +14,13 @@ from studio.app.server.answers import Shown
 from studio.app.server.event_encoding import layer_summary
 from studio.app.server.run_errors import evaluation_of
 from studio.app.server.run_routes import RUN, Checked, OpenRun
-from studio.app.server.schemas import Answer, Number, Numbers, Value
+from studio.app.server.schemas import Answer, Number, Numbers
 from studio.app.server.session_routes import OpenSession
 from studio.app.server.session_views import ParameterView, describe, parameter_views
 from studio.body.model import BodyModel
 from studio.foundations.errors import NotFoundError, StudioError
 from studio.foundations.geometry.camera import Camera
+from studio.foundations.knobs import Value
 from studio.operations.run_settings import SettingsChange, changes_of, history_of
 from studio.results.evaluation.errors import Evaluation
 from studio.results.inspection.cloud_outlines import CloudOutline, outline_of

@@ -12,11 +12,12 @@ from pydantic import Field
 from studio.app.server.app_state import App, AppState, moving
 from studio.app.server.event_encoding import message_of, plain
 from studio.app.server.requests import Arguments, body_of
-from studio.app.server.schemas import Answer, Numbers, Request, Value
+from studio.app.server.schemas import Answer, Numbers, Request
 from studio.app.server.session_routes import NewName, OpenSession, SessionChange, TrashEntry, trash_entry
 from studio.app.server.session_views import ParameterView, RunLine, parameter_views, run_line
 from studio.foundations.declaring import LARGEST
 from studio.foundations.errors import RunError
+from studio.foundations.knobs import Value
 from studio.foundations.progress import unheard
 from studio.operations.jobs import commands
 from studio.operations.jobs.search_pace import MOST_SECONDS, SpeedChoice, offered

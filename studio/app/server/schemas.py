@@ -8,7 +8,6 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from studio.foundations.typed_decoding import is_list
 
-Value = bool | int | float | str
 NAME = r"^[A-Za-z0-9_-]{1,64}$"
 
 

@@ -9,11 +9,12 @@ from pydantic import Field
 from studio.app.server.app_state import App
 from studio.app.server.result_routes import LayerView, layer_view
 from studio.app.server.run_routes import RUN, OpenRun
-from studio.app.server.schemas import Answer, Number, Numbers, Value
+from studio.app.server.schemas import Answer, Number, Numbers
 from studio.app.server.session_routes import OpenSession
 from studio.body.forward_kinematics import limb_ends
 from studio.foundations.arrays import Array
 from studio.foundations.errors import NotFoundError
+from studio.foundations.knobs import Value
 from studio.results.inspection.reading import InspectedRun, TriedFrame
 from studio.results.inspection.reference import body_points, by_limb, limb_group, true_points
 from studio.search.settings import RunSettings, all_knobs, values

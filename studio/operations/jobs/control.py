@@ -24,6 +24,7 @@ from studio.foundations.errors import (
     SettingsError,
     StudioError,
 )
+from studio.foundations.knobs import Value
 from studio.operations.jobs import commands
 from studio.operations.jobs.events import Acknowledged, Event, RunState, StateChanged, nothing_open
 from studio.operations.jobs.process import LOST_HINT, SILENT_SECONDS, OwnedProcess
@@ -38,7 +39,6 @@ DIED = "died"
 """Code of an answer that no process gave."""
 REFUSALS = (RunError, SettingsError, NotFoundError, SessionError, BodyError, CalibrationError, FootageError)
 
-Value = bool | int | float | str
 
 logger = logging.getLogger(__name__)
 

@@ -6,10 +6,9 @@ from collections.abc import Hashable
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from studio.foundations.knobs import Value
 from studio.runs.live.live_summary import LiveStanding
 from studio.search.trackers.tracker import FrameResult, LayerRecord
-
-Value = bool | int | float | str
 
 
 class RunState(StrEnum):

@@ -10,10 +10,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from studio.foundations.errors import SettingsError
+from studio.foundations.knobs import Value
 from studio.search.settings import RunSettings, changed_settings, default_settings, values
 from studio.search.trackers.catalogue import TRACKERS, knobs_for_evaluations
 from studio.search.trackers.swarm_settings import PARTITIONS
-from studio.search.trackers.tracker import Value
 
 LABEL = re.compile(r"[A-Za-z0-9_-]{1,40}")
 WEIGHTING = "weighting"

@@ -15,6 +15,7 @@ import numpy as np
 from studio.body.model import BodyModel
 from studio.foundations.errors import RunError, TruthError
 from studio.foundations.foreign_files import read_file
+from studio.foundations.knobs import Value
 from studio.results.comparison.candidates import Candidate, Lineup, candidates
 from studio.results.comparison.statistics import SignTest, sign_test
 from studio.results.comparison.tracked import Tracked, TrackingTrial, tracking_trial
@@ -24,7 +25,6 @@ from studio.runs.new_run import checked_frames, start_of
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.settings import DEFAULT_WEIGHTING
 from studio.search.trackers.frame_refinement import FrameRefinementSettings
-from studio.search.trackers.tracker import Value
 from studio.sessions.session import Session
 
 MOST_SEEDS = 1000

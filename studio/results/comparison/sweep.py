@@ -14,7 +14,7 @@ import numpy as np
 
 from studio.body.motion_files.trc import read_trc
 from studio.foundations.errors import RunError, SettingsError, TruthError
-from studio.foundations.knobs import Knob, checked
+from studio.foundations.knobs import Knob, Value, checked
 from studio.foundations.progress import duration_in_words
 from studio.foundations.words import counted
 from studio.results.comparison.candidates import Candidate
@@ -30,7 +30,7 @@ from studio.runs.setup.session_settings import session_settings
 from studio.runs.setup.silhouette_doubts import accepted_doubts
 from studio.search.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, all_knobs, changed_settings, values
 from studio.search.trackers.catalogue import TRACKERS
-from studio.search.trackers.tracker import LIMB_LOST, LOST, Value
+from studio.search.trackers.tracker import LIMB_LOST, LOST
 from studio.sessions.named_rows import as_csv
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun

@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 
 from studio.foundations.errors import SettingsError
-from studio.foundations.knobs import changed, knobs_of
+from studio.foundations.knobs import Value, changed, knobs_of
 from studio.foundations.registry import Registry
 from studio.search.trackers.annealed_particle_filter import AnnealedParticleFilter
 from studio.search.trackers.behaviour_guided import BehaviourGuided
 from studio.search.trackers.condensation import Condensation
 from studio.search.trackers.particle_swarm import ParticleSwarm
-from studio.search.trackers.tracker import Preset, Tracker, Value
+from studio.search.trackers.tracker import Preset, Tracker
 
 NEEDED_KNOBS = ("start_repeats",)
 

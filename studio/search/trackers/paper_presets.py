@@ -7,7 +7,8 @@ keeps the studio's default, and the row says that it is not printed.
 
 from collections.abc import Mapping
 
-from studio.search.trackers.tracker import Preset, Printed, Value
+from studio.foundations.knobs import Value
+from studio.search.trackers.tracker import Preset, Printed
 
 # What the studio does beside a search; no paper has it.
 NOTHING_ELSE: Mapping[str, Value] = {

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from studio.foundations.errors import SettingsError
-from studio.foundations.knobs import knob, next_frame_knob, with_default
+from studio.foundations.knobs import Value, knob, next_frame_knob, with_default
 from studio.search.trackers.paper_presets import (
     DEUTSCHER_REID_EQ_13,
     DEUTSCHER_REID_SECTION_6,
@@ -18,7 +18,7 @@ from studio.search.trackers.shared_knobs import (
     prediction,
     resampling,
 )
-from studio.search.trackers.tracker import Preset, Value, Variant
+from studio.search.trackers.tracker import Preset, Variant
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.foundations.arrays import Array, Indices
+from studio.foundations.knobs import Value
 from studio.search.behaviour.model import BehaviourModel
 from studio.search.likelihood.problem import FrameLikelihood
 
 Arrays = dict[str, NDArray[Any]]
 """What a tracker keeps of each particle, by name."""
-Value = bool | int | float | str
 
 TRACKED, LOST, NO_EVIDENCE, RECOVERED = "tracked", "lost", "no evidence", "recovered"
 LIMB_LOST = "limb lost"

@@ -1,0 +1,57 @@
+"""What adding your own takes: everything that a tracker, a likelihood, an export or a calibration format is made of.
+
+Each name is imported on first use, like the verbs of `studio`. The guide's page *Adding your own* uses them all but a
+few.
+"""
+
+import importlib
+
+_NAMES = {
+    "studio.body.forward_kinematics": ("joint_frames", "limb_ends", "marker_points"),
+    "studio.body.model": ("BodyModel",),
+    "studio.evidence.frame_evidence": ("FrameEvidence",),
+    "studio.footage.capture.calibration_parts": ("FoundCameras",),
+    "studio.footage.capture.calibration_writers": ("CalibrationFormat", "WrittenCalibration"),
+    "studio.foundations.errors": ("CalibrationError", "ExportError", "RunError", "StudioError"),
+    "studio.foundations.geometry.camera": ("Camera",),
+    "studio.foundations.geometry.projection": ("project",),
+    "studio.foundations.knobs": ("knob",),
+    "studio.results.export.formats": ("FRAMES", "POINTS", "ExportFormat"),
+    "studio.results.export.task": ("ExportTask", "Written"),
+    "studio.search.likelihood.catalogue": ("LossLimit", "Weighting"),
+    "studio.search.likelihood.hard_priors": ("HardPriors",),
+    "studio.search.likelihood.problem": ("TRUNK_FIRST", "WHOLE_BODY", "FrameLikelihood"),
+    "studio.search.trackers.annealing": ("Annealed", "anneal"),
+    "studio.search.trackers.layer_record": ("layer_record",),
+    "studio.search.trackers.particles": (
+        "estimate",
+        "uniform_poses",
+        "unweighted",
+        "weighted_mean",
+        "weighted_variance",
+    ),
+    "studio.search.trackers.shared_knobs": ("SearchSettings", "start_repeats"),
+    "studio.search.trackers.tracker": (
+        "Estimate",
+        "FilterState",
+        "LayerRecord",
+        "ParticleSet",
+        "SearchSpace",
+        "Tracker",
+    ),
+}
+_MODULE_OF = {name: module for module, names in _NAMES.items() for name in names}
+
+
+def __getattr__(name: str) -> object:
+    """A name, imported on first use: a package may be loaded while the studio's own catalogues are."""
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module 'studio.extending' has no attribute '{name}'")
+    value = getattr(importlib.import_module(_MODULE_OF[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """The names."""
+    return sorted(_MODULE_OF)
