@@ -1,1 +1,1 @@
-"""From pictures to backgrounds, masks and edge maps."""
+"""From pictures to backgrounds, masks, edge maps and distance maps; the visual hull (`volume`)."""
