@@ -2,9 +2,9 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, cast
 
 from pydantic import Field
 
@@ -20,19 +20,27 @@ from studio.foundations.declaring import (
     Values,
     Web,
     operation,
+    taking,
 )
 from studio.foundations.errors import RunError, SessionError
 from studio.foundations.knobs import Value
+from studio.operations.comparison_folders import differences, new_comparison, place_of, unfinished_like
 from studio.operations.jobs.cluster import Cluster, chosen_executor
-from studio.operations.jobs.comparison_run import Found, done_before, run_comparison
+from studio.operations.jobs.comparison_run import Result, done_before, processes_beside, run_comparison
 from studio.operations.jobs.process_executor import cores
 from studio.operations.opening import AnySession, keeping_in_place, open_session
 from studio.operations.progress import Reporting, reporting, say
 from studio.results.comparison.candidates import DEFAULT_LAYERS, Lineup
-from studio.results.comparison.folders import differences, new_comparison, place_of, unfinished_like
 from studio.results.comparison.kept_comparison import RECORD_NAME, KeptComparison
 from studio.results.comparison.plan import Comparison, Plan, conclude, plan_comparison
-from studio.results.comparison.sweep import Sweep, conclude_sweep, expected, plan_sweep, run_name
+from studio.results.comparison.sweep import (
+    Sweep,
+    SweepExpected,
+    conclude_sweep,
+    expected,
+    plan_sweep,
+    run_name,
+)
 from studio.results.comparison.trials import Outcome
 from studio.runs.behaviour_models import needs_model
 from studio.runs.new_run import own_knobs
@@ -53,6 +61,54 @@ MOST_TRACKERS = 12
 USUAL = tuple(name for name in sorted(TRACKERS) if not needs_model(name, None))
 
 
+@dataclass(frozen=True, slots=True)
+class CompareRequest:
+    """What is compared with what."""
+
+    trackers: Annotated[
+        Sequence[str],
+        Field(description="Who is compared: trackers, tracker:label, or a name that stands for several."),
+        Terminal(metavar="A,B,C", kind=str),
+        Web(left_out=True),
+    ] = USUAL
+    evaluations: Annotated[int, Field(ge=1, le=1_000_000, description="Poses weighed a frame, by each.")] = (
+        1000
+    )
+    seeds: Annotated[int, Field(ge=1, le=1000, description="How many seeds each, from 0 on.")] = 5
+    weighting: Annotated[str, Field(description="Of all; default: the session's own."), OneOf(WEIGHTINGS)] = (
+        ""
+    )
+    body: Body = ""
+    behaviour: Annotated[
+        Model, Field(description="Behaviour model of those that need one, by name or file.")
+    ] = ""
+    first: First = None
+    last: Last = None
+    layers: Annotated[int, Field(ge=1, le=60, description="Of trackers whose layers can be chosen.")] = (
+        DEFAULT_LAYERS
+    )
+    changes: Annotated[
+        Mapping[str, Mapping[str, object]] | None,
+        Field(description='By tracker its own knobs; under "" those of all that have them.'),
+        Terminal(left_out=True),
+        Web(left_out=True),
+    ] = None
+
+    def plan(self, session: Session) -> Plan:
+        """What will be done. Raises StudioError for what cannot be compared."""
+        changes = cast("Mapping[str, Mapping[str, Value]]", self.changes or {})
+        lineup = Lineup(tuple(self.trackers), self.weighting, self.evaluations, self.layers, changes)
+        return plan_comparison(
+            session,
+            lineup,
+            range(self.seeds),
+            first=session.start_pose_frame() if self.first is None else self.first,
+            last=self.last,
+            body=self.body,
+            behaviour=self.behaviour,
+        )
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Compared:
     """A comparison and where it is kept."""
@@ -62,38 +118,11 @@ class Compared:
 
 
 @operation
+@taking(CompareRequest)
 @keeping_in_place
 def compare(
     session: AnySession,
     *,
-    trackers: Annotated[
-        Sequence[str],
-        Field(description="Who is compared: trackers, tracker:label, or a name that stands for several."),
-        Terminal(metavar="A,B,C", kind=str),
-        Web(left_out=True),
-    ] = USUAL,
-    evaluations: Annotated[
-        int, Field(ge=1, le=1_000_000, description="Poses weighed a frame, by each.")
-    ] = 1000,
-    seeds: Annotated[int, Field(ge=1, le=1000, description="How many seeds each, from 0 on.")] = 5,
-    weighting: Annotated[
-        str, Field(description="Of all; default: the session's own."), OneOf(WEIGHTINGS)
-    ] = "",
-    body: Body = "",
-    behaviour: Annotated[
-        Model, Field(description="Behaviour model of those that need one, by name or file.")
-    ] = "",
-    first: First = None,
-    last: Last = None,
-    layers: Annotated[
-        int, Field(ge=1, le=60, description="Of trackers whose layers can be chosen.")
-    ] = DEFAULT_LAYERS,
-    changes: Annotated[
-        Mapping[str, Mapping[str, object]] | None,
-        Field(description='By tracker its own knobs; under "" those of all that have them.'),
-        Terminal(left_out=True),
-        Web(left_out=True),
-    ] = None,
     name: Annotated[str, Field(description="Of the comparison; default: numbered.")] = "",
     out: Annotated[
         str | Path | None,
@@ -105,6 +134,7 @@ def compare(
     ] = None,
     cluster: Cluster = "",
     progress: Reporting = None,
+    **options: Any,  # noqa: ANN401 - of the types that are declared
 ) -> Compared:
     """Compare trackers on a session with a truth: same evidence, same number of evaluations a frame, same seeds.
 
@@ -116,25 +146,13 @@ def compare(
     """
     opened = open_session(session, remote=True)
     bring_comparisons(opened)
-    plan = planned(
-        opened,
-        trackers,
-        evaluations=evaluations,
-        seeds=seeds,
-        weighting=weighting,
-        body=body,
-        behaviour=behaviour,
-        first=first,
-        last=last,
-        layers=layers,
-        changes=changes,
-    )
+    plan = CompareRequest(**options).plan(opened)
     with chosen_executor(cluster, place_in_words(opened)) as executor:
         kept = _kept(opened, plan, name, Path(out) if out else None)
         before = done_before(kept, plan)
         lines = [executor.in_words] if executor else []
         if before:
-            lines.append(f"{before} of {seeds * len(plan.candidates)} trials are there already.")
+            lines.append(f"{before} of {len(plan.seeds) * len(plan.candidates)} trials are there already.")
         comparison = _measured(kept, opened, conclude, processes, executor, lines, progress)
     return Compared(comparison, kept)
 
@@ -147,39 +165,52 @@ class SweptGrid:
     kept: KeptComparison
 
 
-@operation
-@keeping_in_place
-def sweep(
-    session: AnySession,
-    *,
+@dataclass(frozen=True, slots=True)
+class SweepRequest:
+    """Which knobs are varied, and how every combination is tracked."""
+
     vary: Annotated[
         Mapping[str, Sequence[object]],
         Field(description="Values by knob; every combination of them is tracked."),
         Terminal(left_out=True),
         Web(kind=dict[str, list[Value]]),
-    ],
-    seeds: Annotated[int, Field(ge=1, le=1000, description="Runs of each combination: seeds from 0 on.")] = 3,
+    ]
+    seeds: Annotated[int, Field(ge=1, le=1000, description="Runs of each combination: seeds from 0 on.")] = 3
     tracker: Annotated[
         str, Field(description="Default: the session's own, else annealed."), OneOf(TRACKERS)
-    ] = "",
+    ] = ""
     weighting: Annotated[
         str, Field(description="The likelihood; default: the session's own."), OneOf(WEIGHTINGS)
-    ] = "",
-    body: Body = "",
-    behaviour: Model = "",
-    first: First = None,
-    last: Last = None,
+    ] = ""
+    body: Body = ""
+    behaviour: Model = ""
+    first: First = None
+    last: Last = None
     knobs: Annotated[
         Values,
         Field(description="Any other knob, of all runs."),
         Knobs(own_knobs, others=True, with_defaults=False),
-    ] = None,
+    ] = None
     fit_shape: Annotated[
         bool,
         Field(description="Each run begins with the radii, hands, feet and head that its first frames show."),
         Terminal("--fit-shape/--keep-shape"),
-    ] = True,
-    allow_inconsistent: AllowInconsistent = False,
+    ] = True
+    allow_inconsistent: AllowInconsistent = False
+
+    def plan(self, session: Session) -> Plan:
+        """What will be done. Raises StudioError for what cannot be swept."""
+        given: dict[str, Any] = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        given["seeds"] = range(self.seeds)
+        return plan_sweep(session, **given)
+
+
+@operation
+@taking(SweepRequest)
+@keeping_in_place
+def sweep(
+    session: AnySession,
+    *,
     name: Annotated[
         str, Field(description="Of the sweep, with which its runs' names begin; default: numbered.")
     ] = "",
@@ -188,6 +219,7 @@ def sweep(
     ] = None,
     cluster: Cluster = "",
     progress: Reporting = None,
+    **options: Any,  # noqa: ANN401 - of the types that are declared
 ) -> SweptGrid:
     """Track every combination of some knobs' values with several seeds, and compare the runs.
 
@@ -199,20 +231,7 @@ def sweep(
     """
     opened = open_session(session, remote=True)
     bring_comparisons(opened)
-    plan = plan_sweep(
-        opened,
-        vary,
-        range(seeds),
-        tracker=tracker,
-        weighting=weighting,
-        knobs=knobs,
-        body=body,
-        behaviour=behaviour,
-        first=first,
-        last=last,
-        fit_shape=fit_shape,
-        allow_inconsistent=allow_inconsistent,
-    )
+    plan = SweepRequest(**options).plan(opened)
     with chosen_executor(cluster, place_in_words(opened)) as executor:
         kept = kept_sweep(opened, plan, name)
         at_once = executor.threads or 1 if executor else processes or cores()
@@ -220,31 +239,40 @@ def sweep(
         lines = [*([executor.in_words] if executor else []), wait.in_words]
         if before := done_before(kept, plan):
             lines.append(f"{before} of {wait.runs} runs are there already.")
-        found = _measured(kept, opened, conclude_sweep, processes, executor, lines, progress)
-    return SweptGrid(found, kept)
+        swept = _measured(kept, opened, conclude_sweep, processes, executor, lines, progress)
+    return SweptGrid(swept, kept)
+
+
+def expected_sweep(session: Session, request: SweepRequest) -> SweepExpected:
+    """How many runs a sweep beside the studio has and about how long they take. Raises StudioError for what cannot be
+    swept.
+    """
+    return expected(session, request.plan(session), processes_beside(), cores())
 
 
 def _measured(
     kept: KeptComparison,
     session: Session,
-    conclude: Callable[[Plan, Sequence[Outcome]], Found],
+    conclude: Callable[[Plan, Sequence[Outcome]], Result],
     processes: int | None,
     executor: Executor | None,
     lines: list[str],
     progress: Reporting,
-) -> Found:
-    """What comes of all trials, put back where the session lies. lines : said before, and then where it is kept."""
+) -> Result:
+    """The conclusion from all trials, put back where the session lies. lines : said before, and then where it is
+    kept.
+    """
     say(progress, lines)
     with (
         comparison_put_back(session, kept.folder),
         reporting(progress, f"{session.name} / {kept.name}") as report,
     ):
-        found = run_comparison(kept, session, report, conclude, processes=processes, executor=executor)
+        result = run_comparison(kept, session, report, conclude, processes=processes, executor=executor)
     address = address_of(session)
     inside = address and kept.folder.is_relative_to(session.path)
     place = below(address, COMPARISONS, kept.name) if inside else str(kept.folder)
     say(progress, [f"Kept in {place}"])
-    return found
+    return result
 
 
 def kept_sweep(session: Session, plan: Plan, name: str = "") -> KeptComparison:
@@ -258,29 +286,6 @@ def kept_sweep(session: Session, plan: Plan, name: str = "") -> KeptComparison:
     if (folder / RECORD_NAME).is_file():
         return _same(folder, plan)
     return new_comparison(folder, plan, session)
-
-
-def planned(
-    session: Session,
-    trackers: Sequence[str],
-    *,
-    evaluations: int,
-    seeds: int,
-    weighting: str = "",
-    body: str = "",
-    behaviour: str = "",
-    first: int | None = None,
-    last: int | None = None,
-    layers: int = DEFAULT_LAYERS,
-    changes: Mapping[str, Mapping[str, object]] | None = None,
-    name: str = "",
-) -> Plan:
-    """What `compare` will do. Raises StudioError for what cannot be compared."""
-    lineup = Lineup(tuple(trackers), weighting, evaluations, layers, changes or {})  # pyright: ignore[reportArgumentType]
-    first = session.start_pose_frame() if first is None else first
-    return plan_comparison(
-        session, lineup, range(seeds), first=first, last=last, body=body, behaviour=behaviour
-    )
 
 
 def _kept(session: Session, plan: Plan, name: str, out: Path | None) -> KeptComparison:
@@ -304,7 +309,7 @@ def _kept(session: Session, plan: Plan, name: str, out: Path | None) -> KeptComp
 
 
 def _same(folder: Path, plan: Plan) -> KeptComparison:
-    """What a folder holds, if it is of the same request. Raises RunError."""
+    """The comparison in a folder, if it is of the same request. Raises RunError."""
     kept = KeptComparison(folder)
     other = differences(plan, kept.plan())
     if other:

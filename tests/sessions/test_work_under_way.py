@@ -12,7 +12,7 @@ from toy_session import make_session, true_poses
 import studio
 from studio.foundations.errors import NotFoundError, RunError, SessionError
 from studio.operations import subjects
-from studio.results.comparison.folders import new_comparison, place_of
+from studio.operations.comparison_folders import new_comparison, place_of
 from studio.results.comparison.sweep import plan_sweep
 from studio.results.verifying import verify
 from studio.runs.new_run import prepare_run

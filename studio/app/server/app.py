@@ -67,6 +67,7 @@ from studio.app.server.schemas import ErrorAnswer
 from studio.app.server.viewers_budget import ViewersBudget
 from studio.foundations.package import assets_folder
 from studio.operations.jobs.camera_service import RECORDINGS
+from studio.operations.jobs.comparison_run import COMPARISON
 from studio.operations.jobs.control import StudioControl
 from studio.operations.jobs.events import RunState
 from studio.operations.jobs.job_runner import JobKind
@@ -137,7 +138,7 @@ JOBS: tuple[JobKind[Any], ...] = (
     export_routes.EXPORT,
     course_routes.COURSE,
     view_routes.SEEDS,
-    comparison_routes.COMPARISON,
+    COMPARISON,
     LEARNING,
     report_routes.REPRODUCTION,
 )

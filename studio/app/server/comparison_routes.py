@@ -4,45 +4,52 @@ A comparison lies in its session's folder and is measured by processes of its ow
 names, one comparison at a time; how far it is comes as `comparison` events and in every list.
 """
 
-from functools import lru_cache
-from typing import Annotated, Any, Literal
+from dataclasses import dataclass
+from functools import partial
+from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Query, Response
+from fastapi import Depends, Query, Response
 from pydantic import Field
 
 from studio.app.server import files
+from studio.app.server.answers import Router
 from studio.app.server.app_state import App, AppState, moving
-from studio.app.server.error_responses import log
 from studio.app.server.requests import Arguments, body_of
-from studio.app.server.schemas import Answer, Request, RunName
+from studio.app.server.schemas import Request, RunName
 from studio.app.server.session_routes import OpenSession, TrashEntry, trash_entry
-from studio.foundations.errors import NotFoundError, RunError, StudioError, WorkCancelledError
-from studio.foundations.foreign_files import read_file
 from studio.foundations.knobs import Value
-from studio.operations.comparing import MOST_TRACKERS, compare, kept_sweep, planned, sweep
-from studio.operations.jobs import commands
-from studio.operations.jobs.cluster import chosen_executor
-from studio.operations.jobs.comparison_run import done_before, run_comparison
-from studio.operations.jobs.job_runner import Job, JobKind, SessionJob
-from studio.operations.jobs.process_executor import cores
-from studio.results.comparison.candidates import LINEUPS, VARIANTS, WEIGHTING
-from studio.results.comparison.folders import (
-    kept_comparison,
-    kept_comparisons,
-    new_comparison,
-    place_of,
-    runs_of,
-    throw_away,
+from studio.operations.comparing import (
+    MOST_TRACKERS,
+    CompareRequest,
+    SweepRequest,
+    compare,
+    expected_sweep,
+    kept_sweep,
+    sweep,
 )
+from studio.operations.comparison_folders import kept_comparison, new_comparison, place_of
+from studio.operations.comparisons import (
+    ComparisonChoices,
+    ComparisonDetail,
+    ComparisonLine,
+    comparison_choices,
+    comparison_detail,
+    comparison_line,
+    comparison_lines,
+    discard_comparison,
+    result_file,
+)
+from studio.operations.jobs import commands
+from studio.operations.jobs.comparison_run import COMPARISON, ComparisonState, run_in_background
+from studio.operations.jobs.job_runner import Job
+from studio.operations.trial_runs import run_of_trial
+from studio.results.comparison.candidates import WEIGHTING
 from studio.results.comparison.kept_comparison import FRAMES_NAME, RESULT_NAME, KeptComparison
-from studio.results.comparison.plan import Plan, conclude
-from studio.results.comparison.sweep import SweepExpected, conclude_sweep, expected, plan_sweep
-from studio.results.comparison.trial_runs import TrialLine, run_of_trial, trial_lines
-from studio.search.likelihood.catalogue import WEIGHTINGS
-from studio.search.trackers.catalogue import TRACKERS
+from studio.results.comparison.plan import Plan
+from studio.results.comparison.sweep import SweepExpected
 from studio.sessions.session import Session
 
-router = APIRouter(prefix="/api/comparisons", tags=["comparisons"])
+router = Router(prefix="/api/comparisons", tags=["comparisons"])
 
 
 class CandidateRequest(Request):
@@ -53,59 +60,6 @@ class CandidateRequest(Request):
     settings: dict[str, Value] = Field(default_factory=dict)
 
 
-class ComparisonState(SessionJob):
-    """How a comparison stands that is being worked at. step: the trial that was done last; done, total: trials."""
-
-    name: str
-
-    @property
-    def key(self) -> str:
-        """The name that it is requested by."""
-        return f"{self.session}/{self.name}"
-
-
-COMPARISON = JobKind(
-    "comparison",
-    "comparison",
-    ComparisonState,
-    busy="Comparison '{name}' of '{session}' is running; one runs at a time.",
-    keeps_session=True,
-    page="/comparisons?session={session}&name={name}",
-)
-
-
-class ComparisonLine(Answer):
-    """A comparison in a list. done, total: trials. best: the tracker with the smallest mean error, once it is done."""
-
-    session: str
-    name: str
-    created: str
-    status: Literal["queued", "running", "cancelling", "done", "interrupted", "cancelled", "failed"]
-    trackers: list[str]
-    tracker: str = Field("", description="Of a sweep.")
-    evaluations: int
-    seeds: int
-    first: int
-    last: int
-    done: int
-    total: int
-    step: str = ""
-    seconds_left: float | None = None
-    problem: str = ""
-    best: str = ""
-    best_mm: float | None = None
-    vary: dict[str, list[Value]] = Field(
-        default_factory=dict[str, list[Value]],
-        description="Of a sweep the values of each knob, else empty; trackers are then its points.",
-    )
-
-
-class ComparisonList(Answer):
-    """Comparisons, newest first within their session."""
-
-    comparisons: list[ComparisonLine]
-
-
 class TrialRequest(Request):
     """A trial by its tracker's name in the comparison and its seed."""
 
@@ -113,55 +67,20 @@ class TrialRequest(Request):
     seed: int = Field(ge=0, lt=2**63)
 
 
-class TrialRun(Answer):
+@dataclass(frozen=True, slots=True)
+class ComparisonList:
+    """Comparisons, newest first within their session."""
+
+    comparisons: list[ComparisonLine]
+
+
+@dataclass(frozen=True, slots=True)
+class TrialRun:
     """The run of a trial. is_new: made by this request and not tracked yet."""
 
     session: str
     run: str
     is_new: bool
-
-
-class ComparisonDetail(Answer):
-    """A comparison. settings: by tracker its weighting and knobs; result: null until it is done, else the numbers
-    as `studio compare --json` prints them, every frame's error and the findings; of a sweep as `studio sweep --json`.
-    trials: of a finished comparison.
-    """
-
-    comparison: ComparisonLine
-    body: str
-    behaviour: str = ""
-    fit_shape: bool = Field(False, description="Of a sweep: whether each run fits the body's shape.")
-    fps: float
-    settings: dict[str, dict[str, Value]]
-    result: dict[str, Any] | None
-    trials: list[TrialLine]
-
-
-class CandidateChoice(Answer):
-    """A name that can take part. changes: the knobs that it brings along. sized_by: those that follow from the
-    evaluations.
-    """
-
-    name: str
-    tracker: str
-    help: str
-    sized_by: list[str]
-    changes: dict[str, Value] = Field(default_factory=dict)
-
-
-class LineupChoice(Answer):
-    """A name that stands for several."""
-
-    name: str
-    trackers: list[str]
-
-
-class ComparisonChoices(Answer):
-    """Who can take part."""
-
-    candidates: list[CandidateChoice]
-    lineups: list[LineupChoice]
-    weightings: list[str]
 
 
 WHO: dict[str, Any] = {
@@ -186,33 +105,15 @@ Kept = Annotated[KeptComparison, Depends(comparison_of)]
 @router.get("/choices")
 def choices() -> ComparisonChoices:
     """Who can be compared: trackers, labels that bring their knobs, line-ups of several."""
-    candidates = [
-        CandidateChoice(
-            name=name,
-            tracker=tracker.name,
-            help=entry.help if entry else tracker.label,
-            sized_by=[knob for names in tracker.size_knobs for knob in names],
-            changes=dict(entry.changes) if entry else {},
-        )
-        for name, entry in {**dict.fromkeys(TRACKERS), **VARIANTS}.items()
-        for tracker in (TRACKERS[name.partition(":")[0]],)
-    ]
-    return ComparisonChoices(
-        candidates=candidates,
-        lineups=[LineupChoice(name=name, trackers=list(members)) for name, members in LINEUPS.items()],
-        weightings=list(WEIGHTINGS),
-    )
+    return comparison_choices()
 
 
 @router.get("")
 def comparisons(app: App, session: str | None = None) -> ComparisonList:
     """The comparisons of a session, or of all."""
     names = [session] if session else [entry.name for entry in app.workspace.sessions() if not entry.problem]
-    found: list[ComparisonLine] = []
-    for name in names:
-        opened = app.workspace.session(name)
-        found += [line for kept in kept_comparisons(opened) if (line := _line_or_none(app, opened, kept))]
-    return ComparisonList(comparisons=found)
+    opened = [app.workspace.session(name) for name in names]
+    return ComparisonList([line for one in opened for line in comparison_lines(one, partial(_going, app))])
 
 
 @router.post("", status_code=202)
@@ -233,7 +134,7 @@ def begin_sweep(
 ) -> ComparisonLine:
     """Begin a sweep: runs of the session for every combination of some knobs' values. 409 while a comparison runs."""
     session = app.workspace.session(arguments.more["session"])
-    plan = _sweep_plan(session, arguments)
+    plan = SweepRequest(**_unnamed(arguments)).plan(session)
     app.jobs.check_free(COMPARISON)
     return _start(app, session, kept_sweep(session, plan, arguments.get("name", "")))
 
@@ -244,26 +145,13 @@ def expected_of_sweep(
 ) -> SweepExpected:
     """How many runs a sweep has and about how long they take; 422 for what cannot be swept."""
     session = app.workspace.session(arguments.more["session"])
-    return expected(session, _sweep_plan(session, arguments), _processes(), cores())
+    return expected_sweep(session, SweepRequest(**_unnamed(arguments)))
 
 
 @router.get(ONE)
 def detail(session: OpenSession, kept: Kept, app: App) -> ComparisonDetail:
     """Everything about one comparison."""
-    plan = kept.plan(session)
-    return ComparisonDetail(
-        comparison=_line(app, session, kept),
-        body=plan.body,
-        behaviour=plan.behaviour,
-        fps=plan.fps,
-        settings={
-            candidate.name: {WEIGHTING: candidate.weighting, **candidate.changes}
-            for candidate in plan.candidates
-        },
-        fit_shape=plan.fit_shape,
-        result=kept.result(),
-        trials=trial_lines(session, kept),
-    )
+    return comparison_detail(session, kept, _going(app, session, kept))
 
 
 @router.post(ONE + "/trials")
@@ -273,10 +161,11 @@ def open_trial(session: OpenSession, kept: Kept, request: TrialRequest, app: App
     """
     before = {run.name for run in session.runs()}
     run = run_of_trial(session, kept, request.tracker, request.seed)
-    if run.name not in before:
+    is_new = run.name not in before
+    if is_new:
         app.events.session_changed(session.name)
         app.control.request(commands.Start(**commands.about(run.folder)))
-    return TrialRun(session=session.name, run=run.name, is_new=run.name not in before)
+    return TrialRun(session.name, run.name, is_new)
 
 
 @router.post(ONE + "/cancel", status_code=202)
@@ -302,13 +191,7 @@ def delete(
     runs: Annotated[bool, Query(description="Of a sweep: its runs, too.")] = False,
 ) -> TrashEntry:
     """Move it to the trash. 409 while it runs, or one of the runs that shall go is being tracked."""
-    own = [*runs_of(session, kept).values()] if runs and kept.plan().vary else []
-    if tracked := [run.name for run in own if run.being_tracked()]:
-        raise RunError(f"Run '{tracked[0]}' of the sweep is being tracked.", "Cancel it first.")
-    place = throw_away(app.workspace, session, kept)
-    for run in own:
-        with moving(app, session.name, run.name):
-            app.workspace.trash_run(session.name, run.name)
+    place = discard_comparison(app.workspace, session, kept, partial(moving, app), runs=runs)
     app.events.session_changed(session.name)
     return trash_entry(place)
 
@@ -316,13 +199,14 @@ def delete(
 @router.get(ONE + "/result.json", response_class=Response)
 def result_json(session: OpenSession, kept: Kept) -> Response:
     """The whole result as a file."""
-    return _file(session, kept, RESULT_NAME, "application/json", "json")
+    content = result_file(kept, RESULT_NAME)
+    return files.download(content, f"{session.name}-{kept.name}.json", "application/json")
 
 
 @router.get(ONE + "/frames.csv", response_class=Response)
 def frames_as_csv(session: OpenSession, kept: Kept) -> Response:
     """A row a tracker, seed and frame: its error in mm and the limbs lost."""
-    return _file(session, kept, FRAMES_NAME, files.CSV, "csv")
+    return files.download(result_file(kept, FRAMES_NAME), f"{session.name}-{kept.name}.csv", files.CSV)
 
 
 def _plan(session: Session, arguments: Arguments) -> Plan:
@@ -333,18 +217,13 @@ def _plan(session: Session, arguments: Arguments) -> Plan:
         own = dict(candidate.settings) | ({WEIGHTING: candidate.weighting} if candidate.weighting else {})
         if own:
             changes[candidate.name] = own
-    return planned(session, [candidate.name for candidate in candidates], changes=changes, **arguments)
+    names = [candidate.name for candidate in candidates]
+    return CompareRequest(trackers=names, changes=changes, **_unnamed(arguments)).plan(session)
 
 
-def _sweep_plan(session: Session, arguments: Arguments) -> Plan:
-    """The request, checked. Raises StudioError for what cannot be swept."""
-    given = {name: value for name, value in arguments.items() if name not in ("name", "seeds")}
-    return plan_sweep(session, seeds=range(arguments["seeds"]), **given)
-
-
-def _processes() -> int:
-    """One core stays free for the studio itself, which is being looked at meanwhile."""
-    return max(1, cores() - 1)
+def _unnamed(arguments: Arguments) -> dict[str, Any]:
+    """What a comparison is made of, without its name."""
+    return {name: value for name, value in arguments.items() if name != "name"}
 
 
 def _start(app: AppState, session: Session, kept: KeptComparison) -> ComparisonLine:
@@ -356,91 +235,18 @@ def _start(app: AppState, session: Session, kept: KeptComparison) -> ComparisonL
             if is_sweep:
                 app.events.session_changed(session.name)
 
-        try:
-            with chosen_executor("", session.path) as executor:
-                run_comparison(
-                    kept,
-                    session,
-                    report,
-                    conclude_sweep if is_sweep else conclude,
-                    processes=_processes(),
-                    executor=executor,
-                    checkpoint=job.check,
-                )
-        except WorkCancelledError:
-            if not job.closing:
-                kept.end("cancelled")
-            raise
-        except Exception as error:
-            words = str(error) if isinstance(error, StudioError) else f"{type(error).__name__}: {error}"
-            kept.end("failed", words)
-            raise
-        return {}
+        return run_in_background(kept, session, job, report)
 
     app.jobs.begin(COMPARISON, ComparisonState(session=session.name, name=kept.name), work)
     app.events.session_changed(session.name)
     return _line(app, session, kept)
 
 
-def _line_or_none(app: AppState, session: Session, kept: KeptComparison) -> ComparisonLine | None:
-    """A line; None for a folder that cannot be read, which its own address reports."""
-    try:
-        return _line(app, session, kept)
-    except StudioError as error:
-        log.warning("comparison '%s' is left out of the list: %s", kept.folder, error)
-        return None
-
-
 def _line(app: AppState, session: Session, kept: KeptComparison) -> ComparisonLine:
-    record, plan = kept.record(), kept.plan(session)
-    job = app.jobs.known(COMPARISON, f"{session.name}/{kept.name}")
-    going = job if job is not None and job.state.is_going else None
-    status = going.state.value if going else kept.status()
-    total = len(plan.seeds) * len(plan.candidates)
-    if status == "done":
-        done = total
-    else:
-        done = going.done if going and going.total else done_before(kept, plan)
-    line = ComparisonLine(
-        session=session.name,
-        name=kept.name,
-        created=record.created,
-        status=status,  # pyright: ignore[reportArgumentType]
-        trackers=[candidate.name for candidate in plan.candidates],
-        tracker=plan.candidates[0].tracker if plan.vary else "",
-        evaluations=plan.evaluations,
-        seeds=len(plan.seeds),
-        first=plan.first,
-        last=plan.last,
-        done=done,
-        total=total,
-        problem=record.problem,
-        vary={name: list(chosen) for name, chosen in plan.vary.items()},
-    )
-    if going:
-        return line.model_copy(update={"step": going.step, "seconds_left": going.seconds_left})
-    return _with_best(line, kept) if status == "done" else line
+    return comparison_line(session, kept, _going(app, session, kept))
 
 
-def _with_best(line: ComparisonLine, kept: KeptComparison) -> ComparisonLine:
-    path = kept.folder / RESULT_NAME
-    tracker, mean_mm = _best_of(kept, path.stat().st_mtime_ns)
-    return line.model_copy(update={"best": tracker, "best_mm": mean_mm})
-
-
-@lru_cache(maxsize=512)
-def _best_of(kept: KeptComparison, _written: int) -> tuple[str, float | None]:
-    """The tracker (or a sweep's point) with the smallest mean error of a result that was written at a moment."""
-    result = kept.result() or {}
-    if swept := result.get("best"):
-        return swept["point"], swept["mean"] if swept["measure"] == "error" else None
-    trackers = result.get("trackers", [])
-    best = min(trackers, key=lambda entry: entry["mean_mm"], default=None)
-    return ("", None) if best is None else (best["tracker"], best["mean_mm"])
-
-
-def _file(session: Session, kept: KeptComparison, name: str, kind: str, ending: str) -> Response:
-    path = kept.folder / name
-    if not path.is_file():
-        raise NotFoundError(f"Comparison '{kept.name}' is not finished.", "Wait for it, or let it go on.")
-    return files.download(read_file(path), f"{session.name}-{kept.name}.{ending}", kind)
+def _going(app: AppState, session: Session, kept: KeptComparison) -> ComparisonState | None:
+    """How a comparison stands where it is being worked at."""
+    state = app.jobs.known(COMPARISON, f"{session.name}/{kept.name}")
+    return state if state is not None and state.state.is_going else None

@@ -13,8 +13,8 @@ from studio.app.server.schemas import Answer, Request, RunName
 from studio.app.server.session_views import SessionDetail, SessionLine, session_detail, session_line
 from studio.foundations.errors import NotFoundError, StudioError
 from studio.foundations.foreign_files import read_file
+from studio.operations.comparison_folders import bring_back
 from studio.operations.model_repository import bring_back_model, thrown_model
-from studio.results.comparison.folders import bring_back
 from studio.results.comparison.kept_comparison import RECORD_NAME as COMPARISON_FILE_NAME
 from studio.results.comparison.kept_comparison import KeptComparison
 from studio.sessions.manifest import FILE_NAME, read_manifest

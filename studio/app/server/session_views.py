@@ -13,8 +13,8 @@ from studio.footage.capture.footage_source import CameraSource
 from studio.footage.capture.naming import CameraMatch
 from studio.foundations.errors import StudioError
 from studio.foundations.geometry.camera import Camera
+from studio.operations.comparison_folders import comparison_count
 from studio.operations.run_settings import history_of
-from studio.results.comparison.folders import comparison_count
 from studio.runs.setup.silhouette_doubts import standing_doubts
 from studio.search.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, SettingsHistory
 from studio.search.trackers.catalogue import size_in_words

@@ -8,21 +8,45 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TypeVar
 
-from studio.foundations.errors import RunError
+from studio.foundations.errors import RunError, StudioError, WorkCancelledError
 from studio.foundations.progress import Progress
+from studio.operations.jobs.cluster import chosen_executor
+from studio.operations.jobs.job_runner import Job, JobKind, SessionJob
+from studio.operations.jobs.process_executor import cores
 from studio.operations.jobs.swept_runs import measure_run
 from studio.operations.jobs.trials import TrialResult, run_jobs
 from studio.results.comparison.kept_comparison import KeptComparison, trial_key
 from studio.results.comparison.kept_trials import KeptOutcome, measured_by, plain
-from studio.results.comparison.plan import Comparison, Plan, trials
-from studio.results.comparison.sweep import Sweep, run_name, sweep_trials
+from studio.results.comparison.plan import Comparison, Plan, conclude, trials
+from studio.results.comparison.sweep import Sweep, conclude_sweep, run_name, sweep_trials
 from studio.results.comparison.tracked import measure_tracking
 from studio.results.comparison.trials import Outcome, Trial, TrialJob
 from studio.sessions.manifest import now
 from studio.sessions.object_stores import above
 from studio.sessions.session import Session
 
-Found = TypeVar("Found", bound=Comparison | Sweep)
+Result = TypeVar("Result", bound=Comparison | Sweep)
+
+
+class ComparisonState(SessionJob):
+    """How a comparison stands that is being worked at. step: the trial that was done last; done, total: trials."""
+
+    name: str
+
+    @property
+    def key(self) -> str:
+        """The name that it is requested by."""
+        return f"{self.session}/{self.name}"
+
+
+COMPARISON = JobKind(
+    "comparison",
+    "comparison",
+    ComparisonState,
+    busy="Comparison '{name}' of '{session}' is running; one runs at a time.",
+    keeps_session=True,
+    page="/comparisons?session={session}&name={name}",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,23 +66,54 @@ def run_comparison(
     kept: KeptComparison,
     session: Session,
     report: Progress,
-    conclusion: Callable[[Plan, Sequence[Outcome]], Found],
+    conclusion: Callable[[Plan, Sequence[Outcome]], Result],
     *,
     processes: int | None = None,
     executor: Executor | None = None,
     checkpoint: Callable[[], None] = lambda: None,
-) -> Found:
+) -> Result:
     """Do what is still to be done of a comparison, and write what `conclusion` makes of it.
 
-    conclusion : `conclude`, of a sweep `conclude_sweep`. processes, executor, checkpoint : see `trials.run_jobs`. What
-    ends it leaves the finished trials, and of runs the finished frames. Raises RunError where another process works at
-    it or a trial fails.
+    conclusion : `conclude`, of a sweep `conclude_sweep`. processes, executor, checkpoint : see `trials.run_jobs`.
+    However it ends, finished trials stay, and of runs the finished frames. Raises RunError where another process works
+    at it or a trial fails.
     """
     with _held(kept):
         plan, outcomes = _measured(kept, session, report, processes, executor, checkpoint)
-        found = conclusion(plan, outcomes)
-        kept.finish(found)
-    return found
+        result = conclusion(plan, outcomes)
+        kept.finish(result)
+    return result
+
+
+def run_in_background(
+    kept: KeptComparison, session: Session, job: Job, report: Progress
+) -> dict[str, object]:
+    """Work at a comparison as a job, and write into its record why it ended before it was done."""
+    try:
+        with chosen_executor("", session.path) as executor:
+            run_comparison(
+                kept,
+                session,
+                report,
+                conclude_sweep if kept.plan().vary else conclude,
+                processes=processes_beside(),
+                executor=executor,
+                checkpoint=job.check,
+            )
+    except WorkCancelledError:
+        if not job.closing:
+            kept.end("cancelled")
+        raise
+    except Exception as error:
+        words = str(error) if isinstance(error, StudioError) else f"{type(error).__name__}: {error}"
+        kept.end("failed", words)
+        raise
+    return {}
+
+
+def processes_beside() -> int:
+    """How many trials go on at once beside the studio, for which one core stays free."""
+    return max(1, cores() - 1)
 
 
 def done_before(kept: KeptComparison, plan: Plan) -> int:
@@ -91,9 +146,9 @@ def _measured(
 ) -> tuple[Plan, list[Outcome]]:
     """The outcomes of all trials, in their order; those that are not there yet are measured."""
     work = _Work.of(kept.plan(session))
-    found = _outcomes(kept, work)
-    jobs = [_job(kept, work, key) for key in work.trials if key not in found]
-    report("", len(found), len(work.trials))
+    outcomes = _outcomes(kept, work)
+    jobs = [_job(kept, work, key) for key in work.trials if key not in outcomes]
+    report("", len(outcomes), len(work.trials))
 
     def on_result(job: TrialJob, result: TrialResult) -> None:
         if result.measured is None:
@@ -105,11 +160,11 @@ def _measured(
             result.measured, "", result.seconds, measured_by(), now(), job.label, job.arguments
         )
         kept.kept_trials.write(job.key, outcome)
-        found[job.key] = Outcome(work.trials[job.key], result.measured)
-        report(job.label, len(found), len(work.trials))
+        outcomes[job.key] = Outcome(work.trials[job.key], result.measured)
+        report(job.label, len(outcomes), len(work.trials))
 
     run_jobs(jobs, above(work.plan.footage), on_result, processes, executor=executor, checkpoint=checkpoint)
-    return work.plan, [found[key] for key in work.trials]
+    return work.plan, [outcomes[key] for key in work.trials]
 
 
 def _job(kept: KeptComparison, work: _Work, key: str) -> TrialJob:
@@ -132,9 +187,9 @@ def _job(kept: KeptComparison, work: _Work, key: str) -> TrialJob:
 
 def _outcomes(kept: KeptComparison, work: _Work) -> dict[str, Outcome]:
     """The outcomes that this version of the studio measured."""
-    found: dict[str, Outcome] = {}
+    outcomes: dict[str, Outcome] = {}
     for key, trial in work.trials.items():
-        outcome = kept.kept_trials.read(key)
-        if outcome is not None and outcome.measured is not None and outcome.software == measured_by():
-            found[key] = Outcome(trial, outcome.measured)
-    return found
+        known = kept.kept_trials.read(key)
+        if known is not None and known.measured is not None and known.software == measured_by():
+            outcomes[key] = Outcome(trial, known.measured)
+    return outcomes

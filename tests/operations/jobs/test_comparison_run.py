@@ -7,9 +7,9 @@ import pytest
 from sample_walk import copy_of_walk
 
 from studio.foundations.errors import RunError
+from studio.operations.comparison_folders import new_comparison, place_of
 from studio.operations.jobs.comparison_run import done_before, run_comparison
 from studio.results.comparison.candidates import Lineup
-from studio.results.comparison.folders import new_comparison, place_of
 from studio.results.comparison.kept_comparison import KeptComparison
 from studio.results.comparison.plan import Plan, conclude, plan_comparison
 from studio.sessions.session import Session

@@ -25,8 +25,8 @@ from waiting import until
 import studio
 from studio.foundations.errors import SessionError
 from studio.garden.reproduction.runner import reproduce
+from studio.operations.comparison_folders import new_comparison, place_of
 from studio.operations.jobs.comparison_run import run_comparison
-from studio.results.comparison.folders import new_comparison, place_of
 from studio.results.comparison.sweep import conclude_sweep, plan_sweep
 from studio.results.comparison.trials import Scale
 from studio.sessions.object_stores import Store

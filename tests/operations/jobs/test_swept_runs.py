@@ -7,9 +7,9 @@ import pytest
 from sample_walk import copy_of_walk
 from tracked_runs import finish, poses_of
 
+from studio.operations.comparison_folders import new_comparison, place_of, runs_of
 from studio.operations.jobs.comparison_run import done_before, run_comparison
 from studio.operations.jobs.swept_runs import measure_run
-from studio.results.comparison.folders import new_comparison, place_of, runs_of
 from studio.results.comparison.footage_cache import FootageCache
 from studio.results.comparison.sweep import conclude_sweep, plan_sweep, sweep_document, sweep_trials
 from studio.runs.new_run import prepare_run

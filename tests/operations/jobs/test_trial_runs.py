@@ -9,12 +9,12 @@ from tracked_runs import finish
 from studio.body.motion_files.trc import read_trc
 from studio.foundations.errors import NotFoundError
 from studio.foundations.progress import unheard
+from studio.operations.comparison_folders import new_comparison, place_of
 from studio.operations.jobs.comparison_run import run_comparison
+from studio.operations.trial_runs import run_of_trial, trial_lines
 from studio.results.comparison.candidates import Lineup
-from studio.results.comparison.folders import new_comparison, place_of
 from studio.results.comparison.kept_comparison import KeptComparison
 from studio.results.comparison.plan import conclude, plan_comparison
-from studio.results.comparison.trial_runs import run_of_trial, trial_lines
 from studio.results.evaluation.errors import evaluate
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun

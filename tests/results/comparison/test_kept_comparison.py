@@ -8,7 +8,7 @@ from sample_walk import copy_of_walk
 from test_comparison import made_up, plan
 
 from studio.foundations.errors import NotFoundError, SessionError
-from studio.results.comparison.folders import (
+from studio.operations.comparison_folders import (
     bring_back,
     comparison_count,
     differences,

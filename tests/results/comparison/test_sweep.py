@@ -11,7 +11,7 @@ from sample_walk import copy_of_walk
 from store_records import result_of
 
 from studio.foundations.errors import CalibrationError, RunError, SettingsError
-from studio.results.comparison.folders import (
+from studio.operations.comparison_folders import (
     bring_back,
     differences,
     new_comparison,

@@ -7,10 +7,11 @@ Trials are tracked in memory and keep their errors only; with the same settings 
 from dataclasses import dataclass
 
 import numpy as np
+from pydantic import FiniteFloat
 
 from studio.foundations.errors import NotFoundError
+from studio.operations.comparison_folders import runs_of
 from studio.results.comparison.candidates import Candidate
-from studio.results.comparison.folders import runs_of
 from studio.results.comparison.kept_comparison import KeptComparison
 from studio.results.comparison.plan import Plan
 from studio.results.comparison.tracked import start_of_trial
@@ -30,8 +31,8 @@ class TrialLine:
 
     tracker: str
     seed: int
-    mean_mm: float
-    worst_mm: float
+    mean_mm: FiniteFloat
+    worst_mm: FiniteFloat
     worst_frame: int
     lost_frames: int
     run: str = ""
