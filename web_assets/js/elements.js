@@ -210,9 +210,13 @@ export function offer(choice, options, value = undefined) {
   return choice;
 }
 
-/** What a canvas is drawn with. @param {HTMLCanvasElement} canvas */
-export function penOf(canvas) {
-  const pen = canvas.getContext("2d");
+/**
+ * What a canvas is drawn with.
+ * @param {HTMLCanvasElement} canvas
+ * @param {CanvasRenderingContext2DSettings} [how]
+ */
+export function penOf(canvas, how) {
+  const pen = canvas.getContext("2d", how);
   if (!pen) throw new Error("This browser gives no room to draw in: close other tabs.");
   return pen;
 }

@@ -1,8 +1,9 @@
 // The guided set-up: the stepper, the step's panel, pictures or the scene beside it.
 //
-// A step's module `setup_<step>.js` (start-pose: setup_start_pose.js) exports `mount(place, setup)
-// -> () => void`. `place` is empty and the panel's; what it returns releases everything when
-// another step is shown. One `button.primary` a step: Enter presses the first that is shown.
+// A step's module `setup_<step>.js` (start-pose: setup_start_pose.js) exports `mount(place, setup,
+// loaded) -> () => void`. `place` is empty and the panel's; `loaded` is what its `load(session)`
+// resolves with, where it exports one; what `mount` returns releases everything when another step
+// is shown. One `button.primary` a step: Enter presses the first that is shown.
 
 import { fetchJson, post, sessionPath } from "./api.js";
 import { closeDialog, openForm } from "./studio/dialogs.js";
@@ -48,6 +49,11 @@ import { startTheme } from "./theme.js";
  *   to what is to be shown
  * @property {(type: string, handler: (event: any) => void) => void} on hear events of this session
  *   while the step is shown
+ */
+/**
+ * What mounts a step of which something is loaded first, by its `load(session)`.
+ * @template {(session: string) => Promise<any>} L
+ * @typedef {(place: HTMLElement, setup: Setup, loaded: Awaited<ReturnType<L>>) => () => void} Mount
  */
 
 const STEPS = {
@@ -198,9 +204,12 @@ async function go(name, asked = {}) {
   drawHead();
   if (statusOf(name).state === "blocked") return;
   try {
-    const [module, detail] = await Promise.all([moduleOf(name), fetchJson(sessionPath(session))]);
+    const [[module, loaded], detail] = await Promise.all([
+      moduleOf(name).then(async (one) => [one, await one.load?.(session)]),
+      fetchJson(sessionPath(session)),
+    ]);
     if (turn !== mounting) return;
-    releases.push(module.mount(place, setupOf(detail, asked)));
+    releases.push(module.mount(place, setupOf(detail, asked), loaded));
   } catch (error) {
     fill(place, element("p", {}, "This step cannot be shown."), failure(error));
   }
@@ -259,7 +268,7 @@ async function drawSessions() {
  * The form of a session that begins empty. The body is asked for first of all: its size is that of
  * the space in which it is sought.
  */
-async function beginForm(dropped = null) {
+async function beginForm(dropped = /** @type {File[] | null} */ (null)) {
   const { bodies, default_body: usual } = await fetchJson("/api/choices").catch(() => ({
     bodies: [],
     default_body: "",
@@ -301,9 +310,9 @@ async function beginForm(dropped = null) {
         ...(values.body ? { body: values.body } : {}),
       });
       closeDialog();
-      session = made.name;
+      session = made.name ?? values.name;
       await drawSessions();
-      await open(made.name);
+      await open(session);
       if (dropped) await go("footage", { dropped });
     },
   });

@@ -133,7 +133,8 @@ export function adder(place, setup, done) {
   let dropped = []; // from the computer's own windows
 
   async function chosenSource() {
-    const chosen = dropped.length ? dropped : videos.files.length ? videos.files : folder.files;
+    const picked = videos.files?.length ? videos.files : folder.files;
+    const chosen = dropped.length ? dropped : (picked ?? []);
     if (chosen.length)
       return {
         upload: await uploadFiles(

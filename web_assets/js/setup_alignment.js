@@ -30,7 +30,7 @@ const pixels = (value) => (value === null ? "–" : `${value.toFixed(1)} px`);
  */
 export function alignmentBox(setup, place, changed) {
   const here = /** @type {const} */ (`${sessionPath(setup.session)}/alignment`);
-  /** @type {import("./api_types").Schemas["AlignmentAnswer"]} */
+  /** @type {import("./api_types").Schemas["AlignmentAnswer"] | null} */
   let alignment = null;
   let failed = null;
   let busy = false;
@@ -43,7 +43,7 @@ export function alignmentBox(setup, place, changed) {
     return job.better ? `${job.words} Lenses and positions stay as they are.` : job.words;
   }
 
-  function turning(job) {
+  function turning(job, turned) {
     const turn =
       job?.needed &&
       job.better &&
@@ -53,7 +53,7 @@ export function alignmentBox(setup, place, changed) {
         title: "The previous calibration is kept; results made with it are marked as out of date.",
       });
     const back =
-      alignment.turned &&
+      turned &&
       button("Turn them back", () => change("undo"), "small quiet", {
         disabled: busy,
         title: "Restore the calibration from before the cameras were turned.",
@@ -92,7 +92,7 @@ export function alignmentBox(setup, place, changed) {
           done.cameras.map((line) => [
             line.camera,
             pixels(line.before_px),
-            `${line.turn_degrees.toFixed(2)}°`,
+            line.turn_degrees === null ? "–" : `${line.turn_degrees.toFixed(2)}°`,
             pixels(line.after_px),
           ]),
         ),
@@ -101,12 +101,12 @@ export function alignmentBox(setup, place, changed) {
       !done &&
         !going &&
         hint(turned ? "The cameras in use were turned by their silhouettes." : WHY),
-      turning(done),
+      turning(done, turned),
       notes.map((note) => notice(note)),
       // What was measured unasked raises no alarm.
       requested || failed ? failure(error) : error && hint(`${error.message} ${error.hint ?? ""}`),
     );
-    if (!going) return;
+    if (!job || !going) return;
     const measuring = !job.total || job.done < job.total;
     drawProgress(bar, {
       words: dotted(
@@ -127,7 +127,8 @@ export function alignmentBox(setup, place, changed) {
   async function measure() {
     failed = null;
     try {
-      alignment = { ...alignment, job: await post(here), notes: [] };
+      const job = await post(here);
+      if (alignment) alignment = { ...alignment, job, notes: [] };
     } catch (error) {
       failed = error;
     }

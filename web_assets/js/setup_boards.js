@@ -82,7 +82,7 @@ function boardFields() {
   };
   kind.dispatchEvent(new Event("change"));
   const description = () => {
-    const old = legacy.querySelector("input").checked;
+    const old = legacy.querySelector("input")?.checked ?? false;
     localStorage.setItem(
       REMEMBERED,
       JSON.stringify({
@@ -335,7 +335,7 @@ export function boardForm(session, { cameras, inputs, hasFootage, isChief, uploa
       ...(inputs.floorFolder ? { floor_footage: { path: inputs.floorFolder } } : {}),
       ...(inputs.intrinsics ? { intrinsics: { path: inputs.intrinsics } } : {}),
       ...(inputs.extrinsics ? { extrinsics: { path: inputs.extrinsics } } : {}),
-      ...(upload.files.length
+      ...(upload.files?.length
         ? { footage: { upload: await uploaded(upload) } }
         : path.value
           ? { footage: { path: path.value } }

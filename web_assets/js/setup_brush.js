@@ -2,7 +2,7 @@
 // a PNG of the footage's own size and orientation.
 
 import { fault, putBytes, sessionPath } from "./api.js";
-import { button, element, fill, spring } from "./elements.js";
+import { button, element, fill, penOf, spring } from "./elements.js";
 import { complain } from "./messages.js";
 import { painting, upright } from "./setup_painting.js";
 
@@ -17,7 +17,7 @@ export async function brush(setup, lens, done) {
   const place = `${sessionPath(setup.session)}/exclusions/${encodeURIComponent(lens.name)}`;
   const colour = getComputedStyle(document.documentElement).getPropertyValue("--accent").trim();
   let erasing = false;
-  /** Where the stroke is. @type {number[]} */
+  /** Where the stroke is. @type {number[] | null} */
   let last = null;
   /** @type {ImageData[]} */
   const before = [];
@@ -34,7 +34,7 @@ export async function brush(setup, lens, done) {
       last = at;
     },
     to: (at) => {
-      dab(last, at);
+      dab(last ?? at, at);
       last = at;
     },
     end: () => {
@@ -44,7 +44,7 @@ export async function brush(setup, lens, done) {
     keys: { x: () => setErasing(!erasing), z: takeBack, Enter: save, Escape: () => done(false) },
   });
   const { canvas, width, height, turns, stored } = sheet;
-  const context = canvas.getContext("2d", { willReadFrequently: true });
+  const context = penOf(canvas, { willReadFrequently: true });
   sheet.showFrame(lens.frame, "show=mask&");
 
   function dab(from, to) {
@@ -94,7 +94,7 @@ export async function brush(setup, lens, done) {
    */
   function turned(source, by, size) {
     const out = element("canvas", { width: size[0], height: size[1] });
-    const drawn = out.getContext("2d");
+    const drawn = penOf(out);
     drawn.translate(size[0] / 2, size[1] / 2);
     drawn.rotate((by * Math.PI) / 2);
     drawn.drawImage(source, -source.width / 2, -source.height / 2);
@@ -128,8 +128,8 @@ export async function brush(setup, lens, done) {
         "Open the brush again.",
       );
     const picture = await createImageBitmap(await answer.blob());
-    const [out] = turned(picture, turns, [width, height]);
-    const read = out.getContext("2d").getImageData(0, 0, width, height);
+    const [, drawn] = turned(picture, turns, [width, height]);
+    const read = drawn.getImageData(0, 0, width, height);
     for (let k = 0; k < read.data.length; k += 4) read.data[k + 3] = read.data[k] > 127 ? 255 : 0;
     context.putImageData(read, 0, 0);
     context.globalCompositeOperation = "source-in";

@@ -49,35 +49,51 @@ const AXES = [
 const savedAt = (name) =>
   `replaced ${name.slice(0, 4)}-${name.slice(4, 6)}-${name.slice(6, 8)} ${name.slice(9, 11)}:${name.slice(11, 13)} UTC`;
 
-/** The step. @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
-export function mount(place, setup) {
+/** @typedef {Omit<Schemas["CalibrationView"], "session">} View */
+/** What is shown where the calibration cannot be read: another one is read from a file. */
+const NONE = /** @type {View} */ ({
+  present: null,
+  board_footage: false,
+  earlier: [],
+  formats: {},
+  footage: [],
+  notes: [],
+  stale_runs: [],
+  changed: "",
+});
+
+/** @param {string} session */
+export async function load(session) {
+  try {
+    return { view: await fetchJson(`${sessionPath(session)}/calibration`), failed: null };
+  } catch (failed) {
+    return { view: NONE, failed };
+  }
+}
+
+/** @type {import("./setup.js").Mount<typeof load>} */
+export function mount(place, setup, loaded) {
   const here = /** @type {const} */ (`${sessionPath(setup.session)}/calibration`);
   const progress = optional();
-  /** @type {Schemas["CalibrationView"]} */
-  let view = null;
-  /** @type {Schemas["ProposalView"]} */
+  /** @type {View} */
+  let view = loaded.view;
+  /** @type {Schemas["ProposalView"] | null} */
   let proposal = null;
-  let tab = "";
+  let tab = view.present ? "used" : view.board_footage ? "boards" : "file";
   let job = ""; // the identifier of the calibration that is being computed
   let stopClicking = null;
   let showsBoard = true; // whether the pictures are of the board, else of the recording
-  let failed = null;
+  let failed = loaded.failed;
   let gone = false;
   /**
-   * @type {{ path: string, upload: string, unit: Schemas["CalibrationFileRequest"]["unit"], up:
+   * @type {{ path: string, upload: string | null, unit: Schemas["CalibrationFileRequest"]["unit"], up:
    *   Schemas["CalibrationFileRequest"]["up"] }}
    */
   const fromFile = { path: "", upload: null, unit: "", up: "z" };
   const fromBoard = { distances: [], offsets: {} };
 
-  const shown = () => proposal ?? view?.present;
+  const shown = () => proposal ?? view.present;
   const identifier = () => proposal?.identifier ?? "current";
-
-  async function load() {
-    view = await fetchJson(here);
-    tab ||= view.present ? "used" : view.board_footage ? "boards" : "file";
-    draw();
-  }
 
   /** Propose, and show what was answered; what went wrong stands where the button is. */
   async function propose(work) {
@@ -113,7 +129,7 @@ export function mount(place, setup) {
     });
     const read = () =>
       propose(async () => {
-        if (upload.files.length) fromFile.upload = await uploaded(upload);
+        if (upload.files?.length) fromFile.upload = await uploaded(upload);
         const from = fromFile.upload ? { upload: fromFile.upload } : { path: path.value };
         return post(`${here}/proposals`, { ...from, unit: fromFile.unit, up: fromFile.up });
       });
@@ -270,9 +286,9 @@ export function mount(place, setup) {
 
   // What is proposed, and what is done with it.
 
-  async function apply(anyway) {
+  async function apply(identifier, anyway) {
     try {
-      view = await post(`${here}/proposals/${proposal.identifier}/apply`, { anyway });
+      view = await post(`${here}/proposals/${String(identifier)}/apply`, { anyway });
       failed = proposal = null;
       tab = "used";
       await setup.refresh();
@@ -288,20 +304,21 @@ export function mount(place, setup) {
     return `${points.length} points: the clicks miss them by up to ${plainNumbers(off)} px, and they lie within ${plainNumbers(high, 0)} mm of one plane.`;
   }
 
-  function proposalBox() {
-    const blocked = proposal.findings.some((one) => one.severity === "blocks");
-    const use = button("Use this calibration", () => apply(blocked), "primary", {
+  /** @param {Schemas["ProposalView"]} made */
+  function proposalBox(made) {
+    const blocked = made.findings.some((one) => one.severity === "blocks");
+    const use = button("Use this calibration", () => apply(made.identifier, blocked), "primary", {
       disabled: blocked,
     });
     return element(
       "section",
       { className: "proposal" },
-      element("h2", {}, proposal.source),
-      proposal.unit_note && hint(proposal.unit_note),
-      proposal.notes.map((note) => hint(note)),
-      proposal.points.length > 0 && hint(pointWords(proposal.points)),
+      element("h2", {}, made.source),
+      made.unit_note && hint(made.unit_note),
+      made.notes.map((note) => hint(note)),
+      made.points.length > 0 && hint(pointWords(made.points)),
       blocked &&
-        proposal.cameras.length > 0 &&
+        made.cameras.length > 0 &&
         check("Use it although results will be wrong", {
           onchange: ({ target }) => {
             use.disabled = !target.checked;
@@ -327,7 +344,7 @@ export function mount(place, setup) {
       draw();
     };
     stopClicking = clickFloor(setup.aside, {
-      cameras: shown().cameras,
+      cameras: shown()?.cameras ?? [],
       picture: (camera) =>
         `${here}/proposals/${identifier()}/views/${encodeURIComponent(camera)}.jpg?height=720&board=${showsBoard}&axes=false`,
       send: async (points) => {
@@ -400,7 +417,7 @@ export function mount(place, setup) {
           { className: "aside-actions" },
           rig.cameras.length > 1 && button("Set the floor by clicks", startClicking, "small"),
           !proposal &&
-            view.present?.cameras.length > 1 &&
+            (view.present?.cameras.length ?? 0) > 1 &&
             setup.detail.cameras.length > 0 &&
             button("Level it", level, "small", {
               title:
@@ -427,7 +444,7 @@ export function mount(place, setup) {
   }
 
   function draw() {
-    if (gone || !view) return;
+    if (gone) return;
     const tabs = element(
       "div",
       { className: "group", role: "tablist" },
@@ -451,7 +468,7 @@ export function mount(place, setup) {
       { file: fileForm, boards, used: usedForm }[tab](),
       progress,
       failure(failed),
-      proposal && proposalBox(),
+      proposal && proposalBox(proposal),
       rig && (proposal || rig.findings.length || !setup.step?.why) && findingList(rig),
     );
     if (!stopClicking) drawAside();
@@ -469,19 +486,7 @@ export function mount(place, setup) {
       return undefined;
     })
     .catch(complain);
-  load().catch((error) => {
-    view = /** @type {any} */ ({
-      present: null,
-      earlier: [],
-      formats: {},
-      footage: [],
-      notes: [],
-      stale_runs: [],
-    });
-    tab = "file";
-    failed = error;
-    draw();
-  });
+  draw();
   return () => {
     gone = true;
     stopClicking?.();

@@ -45,7 +45,7 @@ export function mount(place, setup) {
     better,
   );
   const wall = viewWall(setup);
-  /** @type {Schemas["CheckAnswer"]} */
+  /** @type {Schemas["CheckAnswer"] | null} */
   let answer = null;
   /** @type {Schemas["TrackList"]["tracks"]} */
   let tracks = [];
@@ -84,13 +84,13 @@ export function mount(place, setup) {
     const check = answer?.check;
     const row = check?.frames.indexOf(frame) ?? -1;
     for (const camera of setup.detail.cameras) {
-      const view = row < 0 ? -1 : check.cameras.indexOf(camera.name);
-      const inside = view < 0 ? null : check.inside[row][view];
+      const view = row < 0 ? -1 : (check?.cameras.indexOf(camera.name) ?? -1);
+      const inside = check && view >= 0 ? check.inside[row][view] : null;
       wall.note(
         camera.name,
         view < 0
           ? ""
-          : `${percent(inside)} of the model in the mask, ${percent(check.covered[row][view])} of the mask under the model`,
+          : `${percent(inside)} of the model in the mask, ${percent(check?.covered[row][view])} of the mask under the model`,
         inside !== null && inside < GOOD ? "bad" : "",
       );
     }
@@ -260,7 +260,7 @@ export function mount(place, setup) {
               }),
               line.name === "raw" ? "raw (as searched)" : line.name,
             ),
-            line.made_by.exchanged && hint(/** @type {any} */ (line.made_by.exchanged).join("; ")),
+            Array.isArray(line.made_by.exchanged) && hint(line.made_by.exchanged.join("; ")),
             line.name === answer?.usual &&
               element(
                 "span",

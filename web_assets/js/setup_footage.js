@@ -16,20 +16,20 @@ import { complain, say } from "./messages.js";
 import { adder } from "./setup_adding.js";
 import { synchroniser } from "./setup_synchrony.js";
 
-/** @import { Schemas } from "./api_types" */
-
 const THUMB_HEIGHT = 420;
 const FRAME_MILLISECONDS = 120;
 
-/** @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
-export function mount(place, setup) {
+/** @param {string} session */
+export const load = (session) => fetchJson(`${sessionPath(session)}/footage`);
+
+/** @type {import("./setup.js").Mount<typeof load>} */
+export function mount(place, setup, loaded) {
   const here = sessionPath(setup.session);
   const list = element("section", { className: "footage-cameras" });
   const step = element("section", { className: "footage-step" });
   const add = element("details", { className: "footage-add" });
   const warnings = optional();
-  /** @type {Schemas["FootageState"]} */
-  let footage = null;
+  let footage = loaded;
   let shown = 0; // the frame that is looked at
   let age = 0; // rises when the pictures changed
   let wait = 0;
@@ -39,7 +39,8 @@ export function mount(place, setup) {
   const adding = adder(add, setup, async (job) => {
     age += 1;
     for (const note of job.notes) say(note);
-    await load(job.warnings);
+    footage = await load(setup.session);
+    show(job.warnings);
     await setup.refresh();
   });
 
@@ -172,8 +173,7 @@ export function mount(place, setup) {
     adding.draw(footage.cameras.length > 0);
   }
 
-  async function load(words) {
-    footage = await fetchJson(`${here}/footage`);
+  function show(words) {
     fill(
       warnings,
       words.map((each) => notice(each)),
@@ -183,9 +183,8 @@ export function mount(place, setup) {
 
   const takeDropped = ({ detail }) => adding.take(detail);
   document.addEventListener("footage", /** @type {any} */ (takeDropped));
-  load(setup.detail.warnings ?? [])
-    .then(() => (setup.asked.dropped ? adding.take(setup.asked.dropped) : null))
-    .catch(complain);
+  show(setup.detail.warnings ?? []);
+  if (setup.asked.dropped) adding.take(setup.asked.dropped).catch(complain);
   return () => {
     document.removeEventListener("footage", /** @type {any} */ (takeDropped));
     clearTimeout(wait);

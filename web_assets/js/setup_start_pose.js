@@ -23,12 +23,14 @@ import { foundWords, isUnsure } from "./studio/start_pose.js";
 const PICTURE_HEIGHT = 360;
 const REDRAW_MILLISECONDS = 250;
 
-/** @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
-export function mount(place, setup) {
+/** @param {string} session */
+export const load = (session) => fetchJson(`${sessionPath(session)}/start-pose`);
+
+/** @type {import("./setup.js").Mount<typeof load>} */
+export function mount(place, setup, loaded) {
   const here = sessionPath(setup.session);
   const last = Math.max(0, (setup.detail.frame_count ?? 1) - 1);
-  /** @type {import("./api_types").Schemas["PoseView"]} */
-  let pose = null;
+  let pose = loaded;
   let frame = Math.min(last, setup.detail.start_pose_frame ?? 0);
   let found = null; // what the automatic search found
   let better = null; // what the search around the pose found
@@ -76,7 +78,7 @@ export function mount(place, setup) {
     }
     going = false;
     if (gone) return;
-    await load();
+    await loadAgain();
     setup.refresh().catch(complain);
   }
 
@@ -117,7 +119,7 @@ export function mount(place, setup) {
     if (gone || going) return;
     if (isGoing(search)) return during(() => waitForFind(search));
     if (isGoing(refinement)) return during(() => waitForRefine(refinement));
-    const isStored = (job) => job?.state === "done" && pose?.stored && isSame(job.pose, pose.pose);
+    const isStored = (job) => job?.state === "done" && pose.stored && isSame(job.pose, pose.pose);
     if (isStored(search)) found = search;
     if (isStored(refinement)) better = refinement;
     if (search?.state === "failed") failed = search;
@@ -161,7 +163,7 @@ export function mount(place, setup) {
     } catch (error) {
       failed = error;
     }
-    await load();
+    await loadAgain();
     setup.refresh().catch(complain);
   }
 
@@ -185,7 +187,7 @@ export function mount(place, setup) {
       editing
         ? editingBox()
         : actions(
-            button("Find it automatically", find, pose?.stored ? "" : "primary", { disabled }),
+            button("Find it automatically", find, pose.stored ? "" : "primary", { disabled }),
             button("Edit by hand", edit, "", { disabled }),
           ),
       failure(failed),
@@ -195,7 +197,7 @@ export function mount(place, setup) {
   }
 
   function drawVerdicts() {
-    fill(verdicts, pose?.stored && !editing && [verdict(), ...mending()]);
+    fill(verdicts, pose.stored && !editing && [verdict(), ...mending()]);
   }
 
   const editingBox = () =>
@@ -288,7 +290,7 @@ export function mount(place, setup) {
     clearTimeout(timer);
     timer = setTimeout(() => {
       if (gone || editing) return;
-      const stored = Boolean(pose?.stored);
+      const stored = Boolean(pose.stored);
       fill(
         setup.aside,
         element(
@@ -309,9 +311,9 @@ export function mount(place, setup) {
     }, REDRAW_MILLISECONDS);
   }
 
-  async function load() {
+  async function loadAgain() {
     try {
-      const answer = await fetchJson(`${here}/start-pose`);
+      const answer = await load(setup.session);
       if (gone) return;
       pose = answer;
       age += 1;
@@ -327,10 +329,11 @@ export function mount(place, setup) {
     if (event.editing) begun = true;
     else if (begun) {
       editing = begun = false;
-      load();
+      loadAgain();
     }
   });
-  load().then(() => findAgain().catch(complain));
+  draw();
+  findAgain().catch(complain);
   return () => {
     gone = true;
     clearTimeout(timer);

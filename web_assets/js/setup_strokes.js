@@ -3,7 +3,7 @@
 // "Set up the background".
 
 import { accepted, fetchJson, put, sessionPath } from "./api.js";
-import { button, element, fill, spring } from "./elements.js";
+import { button, element, fill, penOf, spring } from "./elements.js";
 import { complain } from "./messages.js";
 import { painting, upright } from "./setup_painting.js";
 import { windowName } from "./window.js";
@@ -59,7 +59,8 @@ export async function paintStrokes(setup, lens, frame, count, done) {
         draw();
       },
       to: (at, isKey) => {
-        const [x, y] = line.at(-1);
+        if (!line) return;
+        const [x, y] = line[line.length - 1];
         if (isKey || Math.hypot(at[0] - x, at[1] - y) > 0.25 * state.size) {
           line.push(at);
           draw();
@@ -78,7 +79,7 @@ export async function paintStrokes(setup, lens, frame, count, done) {
         Escape: () => close(false),
       },
     });
-  const context = canvas.getContext("2d");
+  const context = penOf(canvas);
 
   // Strokes are kept in pixels of the stored picture; the canvas shows it upright.
   /** @param {number[]} point */

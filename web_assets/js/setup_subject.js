@@ -35,16 +35,25 @@ const PICTURE_HEIGHT = 300;
 
 const mean = (values) => values.reduce((sum, value) => sum + value, 0) / values.length;
 
-/** @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
-export function mount(place, setup) {
+/** @typedef {Schemas["FitSubjectState"]} Fit */
+
+/** @param {string} session */
+export const load = (session) =>
+  Promise.all([
+    fetchJson(`${sessionPath(session)}/subject`),
+    fetchJson(`/api/choices?session=${encodeURIComponent(session)}`),
+  ]);
+
+/** @type {import("./setup.js").Mount<typeof load>} */
+export function mount(place, setup, [loaded, choices]) {
   const here = sessionPath(setup.session);
-  /** @type {Schemas["SubjectAnswer"]} */
-  let subject = null;
+  let subject = loaded;
+  let body = subject.body;
+  let height = subject.height_mm; // null while it is unknown
   /** @type {{ name: string, label: string, by_height?: boolean }[]} */
-  let bodies = [];
-  let body = "";
-  let height = null; // mm, null while it is unknown
-  /** @type {Schemas["FitSubjectState"]} */
+  const bodies = choices.bodies;
+  if (!bodies.some((one) => one.name === body)) bodies.push({ name: body, label: body });
+  /** @type {Schemas["FitSubjectState"] | null} */
   let fit = null;
   let failed = null; // what went wrong with the height
   let unfitted = null; // what went wrong with the fit
@@ -86,7 +95,7 @@ export function mount(place, setup) {
     typed.oninput = () => {
       if (typed.value === "" || !typed.checkValidity()) return;
       take(Number(typed.value) * 10);
-      slider.value = height;
+      slider.value = String(height);
     };
     // "1.80" is metres: no person is that many centimetres tall.
     typed.onchange = () => {
@@ -97,7 +106,7 @@ export function mount(place, setup) {
     };
     slider.oninput = () => {
       take(Number(slider.value));
-      typed.value = String(height / 10);
+      typed.value = String(Number(slider.value) / 10);
     };
     saveHeight.textContent =
       isSized() || (!height && body !== subject.body) ? "Take this body" : "Set the height";
@@ -144,7 +153,7 @@ export function mount(place, setup) {
       if (!height && !isSized() && body === subject.body)
         throw fault("The height is not known yet.", "Type it, or move the slider.");
       await put(`${here}/subject`, { ...(height ? { height_mm: height } : {}), body });
-      await load();
+      await loadAgain();
       fit = null;
       setup.refresh().catch(complain);
     } catch (error) {
@@ -160,7 +169,7 @@ export function mount(place, setup) {
       const query = new URLSearchParams({ body, ...(height ? { height_mm: String(height) } : {}) });
       try {
         const shown = changed() ? await fetchJson(`${here}/subject?${query}`) : subject;
-        if (!gone && !fit?.limbs?.length && !(isGoing(fit) && fit.frames.length))
+        if (!gone && !fit?.limbs?.length && !(fit && isGoing(fit) && fit.frames.length))
           drawStature(setup.aside, shown.limbs, [], note(shown));
       } catch (error) {
         complain(error);
@@ -257,15 +266,15 @@ export function mount(place, setup) {
           button(
             found ? "Fit again" : "Fit the subject",
             beginFit,
-            isReady && !(found && !fit.file) ? "primary" : "",
+            isReady && !(found && !fit?.file) ? "primary" : "",
             { disabled: !isReady },
           ),
         ),
       progress,
       failure(unfitted),
-      found && results(),
+      fit && found && results(fit),
     );
-    if (going) drawGoing();
+    if (fit && going) drawGoing(fit);
     else fill(progress);
   }
 
@@ -294,13 +303,13 @@ export function mount(place, setup) {
 
   /** Follow the fit that is under way to its end. */
   async function followFit() {
-    if (!isGoing(fit)) return;
+    if (!fit || !isGoing(fit)) return;
     try {
       fit = await followJob(
         `/api/subject-fits/${fit.identifier}`,
         (job) => {
           fit = job;
-          drawGoing();
+          drawGoing(job);
         },
         () => gone,
       );
@@ -326,8 +335,8 @@ export function mount(place, setup) {
 
   let looks = -1; // which pictures of the fit under way are drawn
 
-  function drawGoing() {
-    const { identifier } = fit;
+  /** @param {Fit} fit */
+  function drawGoing(fit) {
     if (fit.looks !== looks && fit.frames.length) {
       looks = fit.looks;
       fill(
@@ -337,18 +346,19 @@ export function mount(place, setup) {
           { className: "pictures-bar" },
           hint("So far: the body as it is fitted, over the frames that are looked at."),
         ),
-        fitPictures(),
+        fitPictures(fit),
       );
     }
-    drawProgress(
-      progress,
-      progressOf(fit, "beginning", () => remove(`/api/subject-fits/${identifier}`).catch(complain)),
-    );
+    const cancel = () => remove(`/api/subject-fits/${fit.identifier}`).catch(complain);
+    drawProgress(progress, progressOf(fit, "beginning", cancel));
   }
 
   const sizeWords = (name) => name.replaceAll("_", " ").replace(/ (length|radius)$/, "");
 
-  function sizeTable(kind) {
+  const rounded = (/** @type {number | null} */ size) => (size === null ? "–" : Math.round(size));
+
+  /** @param {Fit} fit */
+  function sizeTable(fit, kind) {
     const sizes = fit.sizes.filter((size) => size.kind === kind);
     return (
       sizes.length > 0 &&
@@ -356,19 +366,19 @@ export function mount(place, setup) {
         [kind === "length" ? "Length (mm)" : "Radius (mm)", "before", "after", "±"],
         sizes.map((size) => [
           sizeWords(size.name),
-          Math.round(size.before),
-          element("td", { className: "after" }, Math.round(size.after)),
-          Math.max(1, Math.round(size.deviation)),
+          rounded(size.before),
+          element("td", { className: "after" }, rounded(size.after)),
+          size.deviation === null ? "–" : Math.max(1, Math.round(size.deviation)),
         ]),
         "sizes",
       )
     );
   }
 
-  async function keep() {
+  async function keep(identifier) {
     try {
-      fit = await post(`/api/subject-fits/${fit.identifier}/keep`);
-      await load();
+      fit = await post(`/api/subject-fits/${String(identifier)}/keep`);
+      await loadAgain();
       setup.refresh().catch(complain);
     } catch (error) {
       complain(error);
@@ -377,7 +387,8 @@ export function mount(place, setup) {
   }
 
   /** Each size before and after, and how far silhouettes overlap. */
-  function results() {
+  /** @param {Fit} fit */
+  function results(fit) {
     const frames =
       fit.frames.length > 1
         ? `frames ${fit.frames.slice(0, -1).join(", ")} and ${fit.frames.at(-1)}`
@@ -392,17 +403,20 @@ export function mount(place, setup) {
       ),
       fit.file
         ? hint("Saved. The old subject is kept beside it as subject-before.")
-        : actions(button("Save as the subject", keep, "primary")),
-      sizeTable("length"),
-      sizeTable("radius"),
+        : actions(button("Save as the subject", () => keep(fit.identifier), "primary")),
+      sizeTable(fit, "length"),
+      sizeTable(fit, "radius"),
       hint(
         "± is one standard deviation: two limbs in three, about, lie within it. Wrists and shoulders are the least certain.",
       ),
     );
   }
 
-  /** The pictures of the fit: the new body over each frame, a camera each in turn. */
-  function fitPictures() {
+  /**
+   * The pictures of the fit: the new body over each frame, a camera each in turn.
+   * @param {Fit} fit
+   */
+  function fitPictures(fit) {
     const names = setup.detail.cameras.map((camera) => camera.name);
     return element(
       "div",
@@ -434,7 +448,7 @@ export function mount(place, setup) {
   function draw() {
     drawWho();
     drawFit();
-    if (isGoing(fit) && fit.frames.length) return undefined;
+    if (fit && isGoing(fit) && fit.frames.length) return undefined;
     if (fit?.state !== "done") return look();
     drawStature(
       setup.aside,
@@ -444,25 +458,21 @@ export function mount(place, setup) {
         ? "Fitted and saved. Dashed: by height alone."
         : "As fitted. Dashed: before the fit.",
     );
-    setup.aside.append(fitPictures());
+    setup.aside.append(fitPictures(fit));
   }
 
-  async function load() {
-    subject = await fetchJson(`${here}/subject`);
+  async function loadAgain() {
+    [subject] = await load(setup.session);
     [body, height] = [subject.body, subject.height_mm];
   }
 
-  Promise.all([fetchJson(`/api/choices?session=${encodeURIComponent(setup.session)}`), load()])
-    .then(async ([choices]) => {
-      if (gone) return;
-      bodies = choices.bodies;
-      if (!bodies.some((one) => one.name === body)) bodies.push({ name: body, label: body });
-      await findFit().catch(complain);
-      if (gone) return;
+  findFit()
+    .catch(complain)
+    .then(() => {
+      if (gone) return undefined;
       draw();
-      await followFit();
-    })
-    .catch((error) => place.append(failure(error)));
+      return followFit();
+    });
 
   return () => {
     gone = true;

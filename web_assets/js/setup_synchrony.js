@@ -90,7 +90,7 @@ export function synchroniser(place, setup, use) {
     const bar = optional();
     const apply = button("Apply", () => use(entered()), "apply-offsets", { hidden: true });
     const times = files({ accept: ".csv", hidden: true });
-    times.onchange = () => readTimes(times.files[0]).catch(complain);
+    times.onchange = () => readTimes(times.files?.[0]).catch(complain);
     fill(
       place,
       element("h2", {}, "Synchronisation"),

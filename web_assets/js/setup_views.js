@@ -66,7 +66,7 @@ export function viewWall(setup) {
       ...(track ? { track } : {}),
     });
     if (!bar.isConnected) fill(setup.aside, bar);
-    if (wantsScene.querySelector("input").checked) {
+    if (wantsScene.querySelector("input")?.checked) {
       wall.remove();
       if (!setup.aside.querySelector("iframe"))
         setup.aside.append(
