@@ -2,166 +2,184 @@
 // do, and back.
 
 import { fetchJson, post, remove, sessionPath } from "./api.js";
-import {
-  actions,
-  button,
-  dotted,
-  drawProgress,
-  element,
-  failure,
-  fill,
-  hint,
-  notice,
-  optional,
-  percent,
-  table,
-} from "./elements.js";
+import { dotted, percent } from "./elements.js";
 import { isGoing, timeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
+import { html, signal } from "./studio/component.js";
+import { Action, Failure, Progress } from "./studio/parts.js";
+
+/** @import { Schemas } from "./api_types" */
+/** @typedef {NonNullable<Schemas["AlignmentAnswer"]["job"]>} Job */
 
 const WHY =
   "A tripod that was touched after the calibration turns a camera by a degree, or twenty pixels. Silhouettes show it, without a board.";
-const pixels = (value) => (value === null ? "–" : `${value.toFixed(1)} px`);
+const pixels = (/** @type {number | null} */ value) =>
+  value === null ? "–" : `${value.toFixed(1)} px`;
+const degrees = (/** @type {number | null} */ value) =>
+  value === null ? "–" : `${value.toFixed(2)}°`;
 
 /**
- * The box in `place`; `changed()` is called when the session has other cameras. Returns {load,
- * measure, stop}.
+ * What is known of the cameras' agreement, and what can be done; `changed()` is called when the
+ * session has other cameras.
  * @param {import("./setup.js").Setup} setup
+ * @param {() => void} changed
  */
-export function alignmentBox(setup, place, changed) {
+export function alignmentOf(setup, changed) {
   const here = /** @type {const} */ (`${sessionPath(setup.session)}/alignment`);
-  /** @type {import("./api_types").Schemas["AlignmentAnswer"] | null} */
-  let alignment = null;
-  let failed = null;
-  let busy = false;
-  let stopped = false;
-  let requested = false; // whether the user requested the measurement
+  const alignment = signal(/** @type {Schemas["AlignmentAnswer"] | null} */ (null));
+  const failed = signal(/** @type {any} */ (null));
+  /** Whether the person asked for the measurement: what was measured unasked raises no alarm. */
+  const isRequested = signal(false);
 
-  function verdict(job) {
-    if (job.kept) return "The session uses the turned cameras.";
-    if (!job.needed) return "The cameras agree: no correction is needed.";
-    return job.better ? `${job.words} Lenses and positions stay as they are.` : job.words;
-  }
-
-  function turning(job, turned) {
-    const turn =
-      job?.needed &&
-      job.better &&
-      !job.kept &&
-      button("Turn the cameras", () => change("keep"), "small", {
-        disabled: busy,
-        title: "The previous calibration is kept; results made with it are marked as out of date.",
-      });
-    const back =
-      turned &&
-      button("Turn them back", () => change("undo"), "small quiet", {
-        disabled: busy,
-        title: "Restore the calibration from before the cameras were turned.",
-      });
-    return (turn || back) && actions(turn, back);
-  }
-
-  function draw() {
-    if (stopped || !alignment) return;
-    const { job, possible, turned, notes } = alignment;
-    place.hidden = !possible;
-    const going = isGoing(job);
-    const done = job?.state === "done" ? job : null;
-    const error = failed ?? (job?.state === "failed" ? job : null);
-    const bar = optional();
-    fill(
-      place,
-      element(
-        "div",
-        { className: "head-line" },
-        element("h2", {}, "Do the cameras agree?"),
-        button(
-          done ? "Measure again" : "Measure",
-          () => {
-            requested = true;
-            return measure();
-          },
-          "small",
-          { disabled: going || busy, ariaLabel: "Measure whether the cameras agree" },
-        ),
-      ),
-      bar,
-      done && [
-        table(
-          ["camera", "misses by", "turned by", done.kept ? "misses now by" : "would miss by"],
-          done.cameras.map((line) => [
-            line.camera,
-            pixels(line.before_px),
-            line.turn_degrees === null ? "–" : `${line.turn_degrees.toFixed(2)}°`,
-            pixels(line.after_px),
-          ]),
-        ),
-        (done.needed && !done.kept ? notice : hint)(verdict(done)),
-      ],
-      !done &&
-        !going &&
-        hint(turned ? "The cameras in use were turned by their silhouettes." : WHY),
-      turning(done, turned),
-      notes.map((note) => notice(note)),
-      // What was measured unasked raises no alarm.
-      requested || failed ? failure(error) : error && hint(`${error.message} ${error.hint ?? ""}`),
-    );
-    if (!job || !going) return;
-    const measuring = !job.total || job.done < job.total;
-    drawProgress(bar, {
-      words: dotted(
-        measuring ? job.step || "beginning" : "turning the cameras",
-        measuring && job.done > 0 && percent(job.done / job.total),
-        timeLeft(job.seconds_left),
-      ),
-      share: job.total ? job.done / job.total : null,
-      cancel: () => remove(here).catch(complain),
-    });
-  }
-
-  async function load() {
-    alignment = await fetchJson(here);
-    draw();
-  }
-
-  async function measure() {
-    failed = null;
+  /** @param {() => Promise<void>} work */
+  async function attempt(work) {
+    failed.value = null;
     try {
+      await work();
+    } catch (error) {
+      failed.value = error;
+    }
+  }
+
+  const measure = () =>
+    attempt(async () => {
       const job = await post(here);
-      if (alignment) alignment = { ...alignment, job, notes: [] };
-    } catch (error) {
-      failed = error;
-    }
-    draw();
-  }
-
-  /** @param {"keep" | "undo"} how */
-  async function change(how) {
-    failed = null;
-    busy = true;
-    draw();
-    try {
-      alignment = await post(`${here}/${how}`);
-      changed();
-    } catch (error) {
-      failed = error;
-    }
-    busy = false;
-    draw();
-  }
+      if (alignment.value) alignment.value = { ...alignment.value, job, notes: [] };
+    });
 
   setup.on("alignment", (job) => {
-    if (!alignment) return;
-    alignment = { ...alignment, job };
-    draw();
+    if (!alignment.value) return;
+    alignment.value = { ...alignment.value, job };
     if (!isGoing(job)) setup.refresh().catch(complain);
   });
 
   return {
-    load,
+    alignment,
+    failed,
+    isRequested,
     measure,
-    stop: () => {
-      stopped = true;
+    load: async () => {
+      alignment.value = await fetchJson(here);
     },
+    request: () => {
+      isRequested.value = true;
+      return measure();
+    },
+    /** Turn the cameras as measured, or back. @param {"keep" | "undo"} how */
+    change: (how) =>
+      attempt(async () => {
+        alignment.value = await post(`${here}/${how}`);
+        changed();
+      }),
+    cancel: () => remove(here).catch(complain),
   };
+}
+
+/** @param {Job} job */
+function verdictOf(job) {
+  if (job.kept) return "The session uses the turned cameras.";
+  if (!job.needed) return "The cameras agree: no correction is needed.";
+  return job.better ? `${job.words} Lenses and positions stay as they are.` : job.words;
+}
+
+/** How far a measurement is, as `Progress` takes it. @param {Job} job */
+function standingOf(job) {
+  const measuring = !job.total || job.done < job.total;
+  return {
+    words: dotted(
+      measuring ? job.step || "beginning" : "turning the cameras",
+      measuring && job.done > 0 && percent(job.done / job.total),
+      timeLeft(job.seconds_left),
+    ),
+    share: job.total ? job.done / job.total : null,
+  };
+}
+
+/** @param {{ job: Job }} properties */
+const MissTable = ({ job }) => html`<table class="figures">
+    <thead>
+      <tr>
+        <th>camera</th>
+        <th>misses by</th>
+        <th>turned by</th>
+        <th>${job.kept ? "misses now by" : "would miss by"}</th>
+      </tr>
+    </thead>
+    <tbody>
+      ${job.cameras.map(
+        (line) => html`<tr key=${line.camera}>
+          <td>${line.camera}</td>
+          <td>${pixels(line.before_px)}</td>
+          <td>${degrees(line.turn_degrees)}</td>
+          <td>${pixels(line.after_px)}</td>
+        </tr>`,
+      )}
+    </tbody>
+  </table>
+  <p class=${job.needed && !job.kept ? "notice" : "hint"}>${verdictOf(job)}</p>`;
+
+/** The box. @param {{ model: ReturnType<typeof alignmentOf> }} properties */
+export function AlignmentBox({ model }) {
+  const known = model.alignment.value;
+  if (!known?.possible) return null;
+  const { job, turned, notes } = known;
+  const isUnderWay = isGoing(job);
+  const done = job?.state === "done" ? job : null;
+  const failed = model.failed.value;
+  const error = failed ?? (job?.state === "failed" ? job : null);
+  const canTurn = done?.needed && done.better && !done.kept;
+  return html`<section class="background-quality">
+    <div class="head-line">
+      <h2>Do the cameras agree?</h2>
+      <${Action}
+        kind="small"
+        act=${model.request}
+        disabled=${isUnderWay}
+        aria-label="Measure whether the cameras agree"
+      >
+        ${done ? "Measure again" : "Measure"}
+      </${Action}>
+    </div>
+    ${job && isUnderWay && html`<${Progress} ...${standingOf(job)} cancel=${model.cancel} />`}
+    ${done && html`<${MissTable} job=${done} />`}
+    ${
+      !done &&
+      !isUnderWay &&
+      html`<p class="hint">
+        ${turned ? "The cameras in use were turned by their silhouettes." : WHY}
+      </p>`
+    }
+    ${
+      (canTurn || turned) &&
+      html`<div class="step-actions">
+        ${
+          canTurn &&
+          html`<${Action}
+            kind="small"
+            act=${() => model.change("keep")}
+            title="The previous calibration is kept; results made with it are marked as out of date."
+          >
+            Turn the cameras
+          </${Action}>`
+        }
+        ${
+          turned &&
+          html`<${Action}
+            kind="small quiet"
+            act=${() => model.change("undo")}
+            title="Restore the calibration from before the cameras were turned."
+          >
+            Turn them back
+          </${Action}>`
+        }
+      </div>`
+    }
+    ${notes.map((note) => html`<p class="notice">${note}</p>`)}
+    ${
+      error &&
+      (model.isRequested.value || failed
+        ? html`<${Failure} error=${error} />`
+        : html`<p class="hint">${error.message} ${error.hint ?? ""}</p>`)
+    }
+  </section>`;
 }

@@ -2,75 +2,25 @@
 // the views agree.
 
 import { fetchJson, post, put, remove, sessionPath } from "./api.js";
-import {
-  actions,
-  button,
-  check,
-  drawProgress,
-  element,
-  failure,
-  field,
-  files,
-  fill,
-  hint,
-  notice,
-  optional,
-  select,
-} from "./elements.js";
 import { isGoing, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
-import { uploadFiles } from "./uploading.js";
-import { alignmentBox } from "./setup_alignment.js";
+import { AlignmentBox, alignmentOf } from "./setup_alignment.js";
 import { brush } from "./setup_brush.js";
-import { maskPictures } from "./setup_masks.js";
-import { qualityList, sourceTable } from "./setup_quality.js";
+import { MaskPictures, shownMasks } from "./setup_masks.js";
+import { QualityList, SourceTable } from "./setup_quality.js";
 import { paintStrokes } from "./setup_strokes.js";
+import { batch, html, mount as render, signal, useRef, useState } from "./studio/component.js";
+import { Action, Check, Failure, Progress } from "./studio/parts.js";
+import { uploadFiles } from "./uploading.js";
 
 /** @import { Schemas } from "./api_types" */
+/** @typedef {Schemas["BackgroundAnswer"]} Background */
+/** @typedef {Schemas["SubjectsAnswer"]["subjects"][number]} Subject */
+/** @typedef {ReturnType<typeof modelOf>} Model */
 
-const POLL_MILLISECONDS = 500;
 const PREVIEW_MILLISECONDS = 180;
 const HIGHEST_SLIDER = 5000;
-const SOURCES = {
-  combined: [
-    "Combined",
-    "Pictures of the empty room where there are any, the footage elsewhere; cleaned with the other views. The best choice with three cameras or more.",
-  ],
-  plate: ["Picture", "A picture of the empty room from each camera, unchanged."],
-  clip: ["Clip", "A short video of the empty room from each camera, unchanged."],
-  median: ["Median", "The median of the footage. Good if the subject moves about."],
-  person: [
-    "Person",
-    "A network finds the person and cuts him out, frame by frame: no picture of the empty room, and he may stay in place. People only; the one whom most cameras see.",
-  ],
-  strokes: [
-    "Strokes",
-    "Anything: you paint a few lines inside and outside the subject in one picture of each camera; they are carried through all frames, and corrected by more strokes in any frame.",
-  ],
-  threshold: [
-    "Brightness and colour",
-    "For a subject that is lit so that these alone tell it from all else: a white mouse on dark litter, a glove of one colour.",
-  ],
-  masks: ["Given masks", "The masks that came with the footage, unchanged."],
-  subject: [
-    "One of several",
-    "Of those in view you choose one; the others are cut out of the masks in use. For several at once: studio subjects, studio together.",
-  ],
-  best: [
-    "Best of all",
-    "Each of these that is possible is tried, which takes as long as all of them together; then each camera gets the one under which the views agree and the masks' borders lie on edges of the picture.",
-  ],
-};
-const MISSING = {
-  plate: "Give a picture for every camera below.",
-  clip: "Give a clip for every camera below.",
-  person: "Calibrate the cameras first: they must agree on who is seen.",
-  masks: "No masks came with the footage.",
-  best: "Calibrate the cameras first: by their agreement the sources are compared.",
-  subject: "Calibrate the cameras first: where somebody stands is seen by two of them.",
-};
-/** Sources that have no knobs to tune. */
-const AS_THEY_ARE = ["person", "strokes", "masks", "subject"];
+const ANY_FOOTAGE = "image/*,video/*";
 const THRESHOLDS = [
   "mask_darkest",
   "mask_brightest",
@@ -90,570 +40,633 @@ const FIRST = [
   "mask_keep_components",
 ];
 
-/** @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
-export function mount(place, setup) {
-  const here = sessionPath(setup.session);
-  /** @type {Schemas["BackgroundAnswer"]} */
-  let background = null;
-  /** @type {Schemas["BackgroundRequest"]["source"]} */
-  let source = null;
-  let tune = true;
-  let unused = false; // whether what the subject never comes near is excluded
-  /** @type {Record<string, string | number | boolean>} */
-  let changed = {}; // knobs that are tried
-  let quality = null;
-  /** @type {Schemas["CameraStrokes"][]} */
-  let strokes = [];
-  /** @type {Schemas["SubjectsAnswer"] | null} */
-  let seen = null; // who is in view in the first frame
-  /** @type {[number, number] | null} */
-  let subjectAt = null; // where the one stands who was chosen
-  let failed = null;
-  let gone = false;
-  let timer = 0;
-  let preview = 0;
+/** @param {string} session */
+export async function load(session) {
+  const here = sessionPath(session);
+  const [background, { cameras: strokes }] = await Promise.all([
+    fetchJson(`${here}/background`),
+    fetchJson(`${here}/strokes`),
+  ]);
+  return { background, strokes };
+}
 
-  const make = element("div", { className: "background-make" });
-  const going = optional();
-  const agreement = element("section", { className: "background-quality" });
-  const cameras = element("section", { className: "background-quality", hidden: true });
-  const knobs = element("details", { className: "background-knobs" });
-  place.append(make, agreement, cameras, knobs);
+/**
+ * What is to be chosen where nothing was set yet: without any picture of the empty room, somebody
+ * who stays in place has no background.
+ * @param {Awaited<ReturnType<typeof load>>} loaded
+ * @param {boolean} isPerson the network knows people only
+ */
+function recommended({ background, strokes }, isPerson) {
+  const hasNone = !background.cameras.some((camera) => camera.given);
+  // What somebody began to paint is what is wanted, also after the page was left.
+  if (strokes.some((camera) => camera.strokes.length) || (hasNone && !isPerson)) return "strokes";
+  if (hasNone && background.possible.includes("person")) return "person";
+  return background.cameras.length >= 3 ? "combined" : background.source;
+}
+
+/**
+ * What the step knows, and what can be done.
+ * @param {import("./setup.js").Setup} setup
+ * @param {Awaited<ReturnType<typeof load>>} loaded
+ */
+function modelOf(setup, loaded) {
+  const here = sessionPath(setup.session);
+  const isPerson = setup.detail.body.by_height;
+  const isSet = Object.keys(loaded.background.own).length || loaded.background.source === "masks";
+  const background = signal(loaded.background);
+  const strokes = signal(loaded.strokes);
+  /** The chosen source. @type {import("@preact/signals").Signal<Background["source"]>} */
+  const source = signal(isSet ? loaded.background.source : recommended(loaded, isPerson));
+  /** Whether the knobs are tuned, and whether what the subject never comes near is excluded. */
+  const isTuned = signal(true);
+  const isUnusedExcluded = signal(false);
+  /** Knobs that are tried. @type {import("@preact/signals").Signal<Record<string, any>>} */
+  const changed = signal({});
+  const quality = signal(loaded.background.job?.quality ?? null);
+  /** Who is in view in the first frame. @type {import("@preact/signals").Signal<Subject[] | null>} */
+  const seen = signal(null);
+  /** Who was chosen of them. @type {import("@preact/signals").Signal<Subject | null>} */
+  const subject = signal(null);
+  const failed = signal(
+    /** @type {any} */ (loaded.background.job?.state === "failed" ? loaded.background.job : null),
+  );
+  const shown = shownMasks(setup, loaded.background.frame_count);
   // Turned cameras see the same masks otherwise: whether they agree now is measured at once, else
   // the step waits for it.
-  const alignment = alignmentBox(setup, cameras, async () => {
-    quality = null;
-    drawQuality();
-    pictures.show();
-    await measureQuality();
+  const alignment = alignmentOf(setup, () => {
+    quality.value = null;
+    shown.refresh();
+    return measure();
   });
-  const pictures = maskPictures(setup, paint, paintLines);
+  let timer = 0;
+  let isLeft = false;
 
-  async function load() {
-    background = await fetchJson(`${here}/background`);
-    strokes = (await fetchJson(`${here}/strokes`)).cameras;
-    if (!source)
-      source =
-        Object.keys(background.own).length || background.source === "masks"
-          ? background.source
-          : recommended();
-  }
+  const isUnderWay = () => isGoing(background.value.job);
 
-  /**
-   * Where nothing was set yet: without any picture of the empty room, somebody who stays in place
-   * has no background.
-   */
-  function recommended() {
-    // What somebody began to paint is what is wanted, also after the page was left; the network
-    // knows people only.
-    const hasNone = !background.cameras.some((camera) => camera.given);
-    if (
-      strokes.some((camera) => camera.strokes.length) ||
-      (hasNone && !setup.detail.body.by_height)
-    )
-      return "strokes";
-    if (hasNone && background.possible.includes("person")) return "person";
-    return background.cameras.length >= 3 ? "combined" : background.source;
-  }
-
-  // What backgrounds are made of.
-
-  function sourceChoices() {
-    const rows = Object.entries(SOURCES).map(([key, [label, words]]) => {
-      const name = /** @type {Schemas["BackgroundRequest"]["source"]} */ (key);
-      // Strokes are painted once they are chosen.
-      const possible = name === "strokes" || background.possible.includes(name);
-      const used =
-        background.source === name && (name === "masks" || Object.keys(background.own).length > 0);
-      return element(
-        "label",
-        { className: "choice" },
-        element("input", {
-          type: "radio",
-          name: "background-source",
-          value: name,
-          checked: name === source,
-          disabled: !possible,
-          onchange: () => choose(name),
-        }),
-        element(
-          "span",
-          {},
-          element("b", {}, label),
-          used && element("span", { className: "badge good" }, "in use"),
-          element("span", { className: "hint" }, possible ? words : MISSING[name]),
-        ),
-      );
+  async function reload() {
+    const again = await load(setup.session);
+    batch(() => {
+      background.value = again.background;
+      strokes.value = again.strokes;
     });
-    return element(
-      "fieldset",
-      { className: "choices" },
-      element("legend", {}, "Source of the masks"),
-      rows,
-    );
   }
 
-  function choose(name) {
-    source = name;
-    // Thresholds are cheap to show: the pictures follow their knobs at once.
-    if (name === "threshold" && background.settings.background_model !== "threshold")
-      changed = { ...changed, background_model: "threshold" };
-    else if (name !== "threshold" && changed.background_model === "threshold")
-      delete changed.background_model;
-    pictures.preview(changed);
-    drawKnobs();
-    drawMake();
-    if (name === "subject") lookForSubjects();
-  }
-
-  async function lookForSubjects() {
-    seen = subjectAt = null;
-    try {
-      seen = await fetchJson(`${here}/subjects`);
-    } catch (error) {
-      failed = error;
-    }
-    if (!gone) drawMake();
-  }
-
-  /**
-   * Who is in view in the first frame, to be clicked on the picture in which most of them are seen,
-   * or in the list.
-   */
-  function subjectList() {
-    if (!seen) return hint("Looking who is in view in the first frame…");
-    if (!seen.subjects.length)
-      return notice("Nobody is seen in the first frame: look at the masks of all cameras.");
-    const marks = (camera) => seen.subjects.filter((one) => one.points[camera]).length;
-    const { name } = background.cameras.reduce((best, one) =>
-      marks(one.name) > marks(best.name) ? one : best,
-    );
-    const words = (one) => `at ${one.at.map((value) => value.toFixed(2)).join(", ")} m`;
-    const pick = (one) => {
-      subjectAt = one.at;
-      drawMake();
-    };
-    const chosen = (one) =>
-      subjectAt !== null && one.at[0] === subjectAt[0] && one.at[1] === subjectAt[1];
-    const dots = seen.subjects.map(
-      (one, at) =>
-        one.points[name] &&
-        element(
-          "button",
-          {
-            type: "button",
-            className: "subject-dot",
-            ariaPressed: String(chosen(one)),
-            ariaLabel: `Follow subject ${at + 1}, ${words(one)}`,
-            style: `left: ${100 * one.points[name][0]}%; top: ${100 * one.points[name][1]}%`,
-            onclick: () => pick(one),
-          },
-          String(at + 1),
-        ),
-    );
-    const rows = seen.subjects.map((one, at) =>
-      element(
-        "li",
-        {},
-        element("span", {}, `${at + 1}`),
-        element("span", { className: "hint" }, `${words(one)}, ${one.height.toFixed(2)} m high`),
-        button(chosen(one) ? "Followed" : "Follow", () => pick(one), "quiet small", {
-          ariaLabel: `Follow ${at + 1}`,
-        }),
-      ),
-    );
-    return element(
-      "section",
-      { className: "plates" },
-      hint("Click whom the masks shall be of."),
-      element(
-        "div",
-        { className: "subject-picture" },
-        element("img", {
-          src: `${here}/footage/${encodeURIComponent(name)}/0.jpg?height=420`,
-          alt: `First frame of ${name}`,
-        }),
-        dots,
-      ),
-      element("ul", { className: "plate-list" }, rows),
-    );
-  }
-
-  function strokeList() {
-    const rows = strokes.map(({ camera, strokes: painted, ready, made }) => {
-      const frames = new Set(painted.map((one) => one.frame)).size;
-      const words = !painted.length
-        ? "nothing painted yet"
-        : !ready
-          ? "nothing inside yet"
-          : `${painted.length} ${painted.length > 1 ? "strokes" : "stroke"} in ${frames} ${frames > 1 ? "frames" : "frame"}${made ? ", masks made" : ""}`;
-      return element(
-        "li",
-        {},
-        element("span", {}, camera),
-        element("span", { className: "hint" }, words),
-        button("Paint…", () => paintLines(camera), "quiet small", {
-          ariaLabel: `Paint on ${camera}`,
-        }),
-      );
-    });
-    return element(
-      "section",
-      { className: "plates" },
-      hint(
-        "Paint in a frame in which the camera sees the subject well: a line or two through each of its parts and colours, one around it. More strokes in a later frame correct what follows.",
-      ),
-      element("ul", { className: "plate-list" }, rows),
-    );
-  }
-
-  /** Paint strokes on a camera's picture. */
-  function paintLines(camera) {
-    const lens = setup.detail.cameras.find((one) => one.name === camera);
-    paintStrokes(setup, lens, pictures.frame, background.frame_count, async (saved, frame) => {
-      pictures.go(frame);
-      if (saved) {
-        source = "strokes";
-        await load().catch(complain);
-        drawMake();
-      }
-      pictures.show();
-    }).catch(complain);
-  }
-
-  function plates() {
-    const accept = "image/*,video/*";
-    const many = files({
-      multiple: true,
-      accept,
-      ariaLabel: "Pictures or clips of the empty room",
-      onchange: ({ target }) => give([...target.files], {}),
-    });
-    const rows = background.cameras.map(({ name, given, file }) => {
-      const input = files({
-        accept,
-        hidden: true,
-        onchange: ({ target }) => give([...target.files], { [name]: target.files[0]?.name }),
-      });
-      return element(
-        "li",
-        {},
-        element("span", {}, name),
-        element(
-          "span",
-          { className: "hint" },
-          given ? `${given === "clip" ? "clip" : "picture"} ${file}` : "none",
-        ),
-        button("Choose…", () => input.click(), "quiet small", {
-          ariaLabel: `Choose the empty room of ${name}`,
-        }),
-        input,
-      );
-    });
-    const given = background.cameras.filter((camera) => camera.given).length;
-    return element(
-      "details",
-      {
-        className: "plates",
-        open: make.querySelector("details")?.open ?? (!given && background.cameras.length < 3),
-      },
-      element(
-        "summary",
-        {},
-        `Pictures of the empty room: ${given} of ${background.cameras.length} cameras`,
-      ),
-      field("One picture or clip per camera, matched by name", many),
-      element("ul", { className: "plate-list" }, rows),
-      element("p", { className: "hint upload-words", role: "status" }),
-    );
-  }
-
-  async function give(chosen, named) {
-    if (!chosen.length) return;
-    const words = make.querySelector(".upload-words");
-    try {
-      const upload = await uploadFiles(chosen, (text) => {
-        words.textContent = text;
-      });
-      words.textContent = "Reading them…";
-      background = await post(`${here}/backgrounds`, { upload, files: named });
-      if (source === "person") source = recommended();
-      failed = null;
-      pictures.preview(changed);
-    } catch (error) {
-      failed = error;
-    }
-    drawMake();
-    make.querySelector("details")?.setAttribute("open", "");
-  }
-
-  function drawMake() {
-    const running = isGoing(background.job);
-    fill(
-      make,
-      background.source === "masks" &&
-        notice(
-          "Masks came with the footage and are used unchanged. Set up a background only if they are not good.",
-        ),
-      sourceChoices(),
-      source === "strokes" ? strokeList() : source === "subject" ? subjectList() : plates(),
-      !AS_THEY_ARE.includes(source) &&
-        check(
-          "tune the knobs for the best agreement of the views",
-          {
-            checked: tune,
-            onchange: ({ target }) => {
-              tune = target.checked;
-            },
-          },
-          "Knobs that you set below stay fixed.",
-        ),
-      source === "combined" &&
-        check(
-          "exclude regions that the subject never comes near",
-          {
-            checked: unused,
-            onchange: ({ target }) => {
-              unused = target.checked;
-            },
-          },
-          "A bystander, a monitor, a window: motion there is not the subject.",
-        ),
-      !running &&
-        actions(
-          button("Set up the background", setUp, "primary", {
-            disabled:
-              !source ||
-              !background.possible.includes(source) ||
-              (source === "subject" && !subjectAt),
-          }),
-        ),
-      going,
-      failure(failed),
-      background.job?.choice && sourceTable(background.job.choice),
-      (background.job?.notes ?? []).map((note) => hint(note)),
-    );
-    pictures.cut(running);
-    if (running) drawGoing();
-    else fill(going);
-  }
-
-  function drawGoing() {
-    drawProgress(
-      going,
-      progressOf(background.job, "Reading the footage", () =>
-        remove(`${here}/background`).catch(complain),
-      ),
-    );
-  }
-
-  async function setUp() {
-    failed = null;
-    try {
-      background.job = await post(`${here}/background`, {
-        source,
-        knobs: changed,
-        tune,
-        exclude_unused: unused && source === "combined",
-        subject_at: source === "subject" ? subjectAt : null,
-      });
-    } catch (error) {
-      failed = error;
-    }
-    drawMake();
-    follow();
-  }
-
-  /** Ask how the set-up stands until it ends. */
-  async function follow() {
+  /** Try other knobs; the pictures follow soon. @param {Record<string, any>} knobs */
+  function tryKnobs(knobs, milliseconds = 0) {
+    changed.value = knobs;
     clearTimeout(timer);
-    if (gone || !isGoing(background.job)) return;
-    timer = setTimeout(async () => {
-      await load().catch(complain);
-      if (gone) return;
-      const { job } = background;
-      if (isGoing(job)) {
-        drawGoing();
-        return follow();
-      }
-      if (job?.state === "failed") failed = job;
-      if (job?.state === "done") {
-        quality = job.quality;
-        changed = {};
-        pictures.preview(changed);
-        drawKnobs();
-        setup.refresh().catch(complain);
-        if (background.cameras.length > 1) alignment.measure();
-      }
-      drawQuality();
-      drawMake();
-    }, POLL_MILLISECONDS);
+    timer = window.setTimeout(() => shown.preview(knobs), milliseconds);
   }
 
-  // How far the views agree.
-
-  async function measureQuality() {
-    if (background.cameras.length < 2) return;
-    const words = agreement.querySelector(".hint");
-    if (words) words.textContent = "Comparing the masks of five frames…";
+  /** @param {() => Promise<void>} work */
+  async function attempt(work) {
+    failed.value = null;
     try {
-      quality = await post(`${here}/masks/quality`);
+      await work();
+    } catch (error) {
+      failed.value = error;
+    }
+  }
+
+  /** @param {Background["source"]} name */
+  function choose(name) {
+    source.value = name;
+    const { background_model: tried, ...knobs } = changed.value;
+    // Thresholds are cheap to show: the pictures follow their knobs at once.
+    const isOther = name === "threshold" && background.value.settings.background_model !== name;
+    const kept = tried && tried !== "threshold" ? { background_model: tried } : {};
+    tryKnobs({ ...knobs, ...(isOther ? { background_model: name } : kept) });
+    if (name !== "subject") return;
+    seen.value = subject.value = null;
+    attempt(async () => {
+      seen.value = (await fetchJson(`${here}/subjects`)).subjects;
+    });
+  }
+
+  const measure = async () => {
+    if (background.value.cameras.length < 2) return;
+    try {
+      quality.value = await post(`${here}/masks/quality`);
+      setup.refresh().catch(complain);
     } catch (error) {
       complain(error);
     }
-    if (gone) return;
-    drawQuality();
-    setup.refresh().catch(complain);
-  }
-
-  function drawQuality() {
-    const measure = button("Measure", measureQuality, "small", {
-      hidden: background.cameras.length < 2,
-    });
-    fill(
-      agreement,
-      element(
-        "div",
-        { className: "head-line" },
-        element("h2", {}, "Agreement of the views"),
-        measure,
-      ),
-      qualityList(setup, quality, paint, background.measured, background.source),
-    );
-    pictures.rate(quality);
-  }
-
-  // Knobs with a live preview.
-
-  const valueWords = (knob, value) =>
-    `${typeof value === "number" ? Number(value.toPrecision(3)) : ""} ${knob.unit}`;
-
-  function knobRow(knob) {
-    const value = changed[knob.name] ?? background.settings[knob.name];
-    const shown = element("output", {}, valueWords(knob, value));
-    const take = (wanted) => {
-      if (wanted === background.settings[knob.name]) delete changed[knob.name];
-      else changed[knob.name] = wanted;
-      shown.textContent = valueWords(knob, wanted);
-      row.classList.toggle("changed", knob.name in changed);
-      offerKeeping();
-      clearTimeout(preview);
-      preview = setTimeout(() => pictures.preview(changed), PREVIEW_MILLISECONDS);
-    };
-    const ariaLabel = knob.label;
-    const isNumber = knob.kind !== "bool" && !knob.choices.length;
-    const made = isNumber
-      ? element("input", {
-          type: "range",
-          ariaLabel,
-          min: knob.low,
-          max: Math.min(knob.high, HIGHEST_SLIDER),
-          step: knob.step || (knob.kind === "int" ? 1 : "any"),
-          value,
-          oninput: ({ target }) => take(Number(target.value)),
-        })
-      : knob.choices.length
-        ? select(knob.choices, String(value), {
-            ariaLabel,
-            onchange: ({ target }) => take(target.value),
-          })
-        : element("input", {
-            type: "checkbox",
-            ariaLabel,
-            checked: value,
-            onchange: ({ target }) => take(target.checked),
-          });
-    const row = element(
-      "label",
-      { className: knob.name in changed ? "knob changed" : "knob", title: knob.help },
-      element("span", {}, knob.label),
-      made,
-      isNumber && shown,
-    );
-    return row;
-  }
-
-  const keep = button(
-    "Keep",
-    async () => {
-      try {
-        await put(`${here}/evidence`, { ...background.own, ...changed });
-        changed = {};
-        await load();
-        drawKnobs();
-        drawMake();
-        pictures.preview(changed);
-        setup.refresh().catch(complain);
-      } catch (error) {
-        complain(error);
-      }
-    },
-    "small",
-  );
-  const reset = button(
-    "Reset",
-    () => {
-      changed = {};
-      drawKnobs();
-      pictures.preview(changed);
-    },
-    "quiet small",
-  );
-  const offerKeeping = () => {
-    keep.hidden = reset.hidden = !Object.keys(changed).length;
   };
 
-  function drawKnobs() {
-    const named = (name) => background.knobs.find((knob) => knob.name === name);
-    const first = source === "threshold" ? [...THRESHOLDS, ...FIRST.slice(-3)] : FIRST;
-    const rest = background.knobs.filter(
-      (knob) => knob.name.startsWith("mask_") && !first.includes(knob.name),
-    );
-    offerKeeping();
-    fill(
-      knobs,
-      element("summary", {}, "Fine adjustment"),
-      hint("The pictures follow; nothing is stored before you press Keep."),
-      first.map((name) => knobRow(named(name))),
-      element("details", {}, element("summary", {}, "More"), rest.map(knobRow)),
-      actions(keep, reset),
-    );
+  /** How the set-up stands now; newest, since an event may come before the answer to its request. */
+  let newest = background.value.job;
+  /** @param {Background["job"]} job */
+  function take(job) {
+    newest = job;
+    background.value = { ...background.value, job };
+    shown.cut(isGoing(job));
   }
 
-  /** Paint what does not count of a camera, over its picture. */
-  function paint(camera) {
-    const lens = setup.detail.cameras.find((one) => one.name === camera);
-    const { excluded } = background.cameras.find((one) => one.name === camera);
-    brush(setup, { ...lens, frame: pictures.frame, excluded }, async (saved) => {
-      if (!saved) return pictures.show();
-      quality = null;
-      await load().catch(complain);
-      pictures.mark(background.cameras);
-      pictures.show();
-      drawQuality();
+  setup.on("background", async (job) => {
+    take(job);
+    if (isGoing(job)) return;
+    await reload().catch(complain);
+    if (isLeft) return;
+    if (job.state === "failed") failed.value = job;
+    if (job.state !== "done") return;
+    quality.value = job.quality;
+    tryKnobs({});
+    setup.refresh().catch(complain);
+    if (background.value.cameras.length > 1) alignment.measure();
+  });
+
+  const setUp = () =>
+    attempt(async () => {
+      newest = null;
+      const begun = await post(`${here}/background`, {
+        source: source.value,
+        knobs: changed.value,
+        tune: isTuned.value,
+        exclude_unused: isUnusedExcluded.value && source.value === "combined",
+        subject_at: source.value === "subject" ? (subject.value?.at ?? null) : null,
+      });
+      if (!newest) take(begun);
+    });
+
+  /**
+   * Take pictures or clips of the empty room; `named`: which camera's a file is.
+   * @param {File[]} files
+   * @param {Record<string, string>} named
+   * @param {(words: string) => void} report
+   */
+  const give = (files, named, report) =>
+    attempt(async () => {
+      const upload = await uploadFiles(files, report);
+      report("Reading them…");
+      background.value = await post(`${here}/backgrounds`, { upload, files: named });
+      if (source.value === "person")
+        source.value = recommended(
+          { background: background.value, strokes: strokes.value },
+          isPerson,
+        );
+      shown.preview(changed.value);
+    });
+
+  async function keep() {
+    try {
+      await put(`${here}/evidence`, { ...background.value.own, ...changed.value });
+      await reload();
+      tryKnobs({});
       setup.refresh().catch(complain);
+    } catch (error) {
+      complain(error);
+    }
+  }
+
+  /** @param {string} camera */
+  const lensOf = (camera) => setup.detail.cameras.find((one) => one.name === camera);
+
+  /** Paint what does not count of a camera, over its picture. @param {string} camera */
+  function exclude(camera) {
+    const known = background.value.cameras.find((one) => one.name === camera);
+    const lens = { ...lensOf(camera), frame: shown.frame.value, excluded: known?.excluded };
+    render(setup.aside, null);
+    brush(setup, lens, async (/** @type {boolean} */ isSaved) => {
+      if (isSaved) {
+        quality.value = null;
+        await reload().catch(complain);
+        setup.refresh().catch(complain);
+      }
+      showPictures();
     });
   }
 
-  load()
-    .then(() => {
-      if (gone) return;
-      quality = background.job?.quality ?? null;
-      if (background.job?.state === "failed") failed = background.job;
-      pictures.begin(background);
-      drawMake();
-      drawQuality();
-      drawKnobs();
-      follow();
-      alignment.load().catch(complain);
-    })
-    .catch((error) => place.append(failure(error)));
+  /** Paint strokes on a camera's picture. @param {string} camera */
+  function paint(camera) {
+    render(setup.aside, null);
+    const count = background.value.frame_count;
+    paintStrokes(setup, lensOf(camera), shown.frame.value, count, async (isSaved, frame) => {
+      shown.frame.value = frame;
+      if (isSaved) {
+        source.value = "strokes";
+        await reload().catch(complain);
+      }
+      showPictures();
+    }).catch(complain);
+  }
 
+  const Pictures = () => html`<${MaskPictures}
+    shown=${shown}
+    cameras=${background.value.cameras}
+    quality=${quality.value}
+    exclude=${exclude}
+    paint=${paint}
+  />`;
+
+  function showPictures() {
+    if (isLeft) return;
+    shown.refresh();
+    setup.aside.replaceChildren();
+    render(setup.aside, html`<${Pictures} />`);
+  }
+
+  shown.cut(isUnderWay());
+  showPictures();
+  alignment.load().catch(complain);
+
+  return {
+    here,
+    setup,
+    background,
+    strokes,
+    source,
+    isTuned,
+    isUnusedExcluded,
+    changed,
+    quality,
+    seen,
+    subject,
+    failed,
+    alignment,
+    isUnderWay,
+    tryKnobs,
+    choose,
+    measure,
+    setUp,
+    give,
+    keep,
+    exclude,
+    paint,
+    cancel: () => remove(`${here}/background`).catch(complain),
+    close: () => {
+      isLeft = true;
+      clearTimeout(timer);
+      render(setup.aside, null);
+    },
+  };
+}
+
+/** What backgrounds are made of. @param {{ model: Model }} properties */
+function SourceChoices({ model }) {
+  const background = model.background.value;
+  return html`<fieldset class="choices">
+    <legend>Source of the masks</legend>
+    ${background.sources.map(({ name, label, help, lacking }) => {
+      // Strokes are painted once they are chosen.
+      const isPossible = !lacking || name === "strokes";
+      const isUsed =
+        background.source === name && (name === "masks" || Object.keys(background.own).length > 0);
+      return html`<label key=${name} class="choice">
+        <input
+          type="radio"
+          name="background-source"
+          value=${name}
+          checked=${model.source.value === name}
+          disabled=${!isPossible}
+          onChange=${() => model.choose(name)}
+        />
+        <span>
+          <b>${label}</b>${isUsed && html`<span class="badge good">in use</span>`}
+          <span class="hint">${isPossible ? help : lacking}</span>
+        </span>
+      </label>`;
+    })}
+  </fieldset>`;
+}
+
+/**
+ * Who is in view in the first frame, to be clicked on the picture in which most of them are seen, or
+ * in the list.
+ * @param {{ model: Model }} properties
+ */
+function SubjectList({ model }) {
+  const seen = model.seen.value;
+  if (!seen) return html`<p class="hint">Looking who is in view in the first frame…</p>`;
+  if (!seen.length)
+    return html`<p class="notice">
+      Nobody is seen in the first frame: look at the masks of all cameras.
+    </p>`;
+  const marks = (/** @type {string} */ camera) => seen.filter((one) => one.points[camera]).length;
+  const { name } = model.background.value.cameras.reduce((best, one) =>
+    marks(one.name) > marks(best.name) ? one : best,
+  );
+  const words = (/** @type {Subject} */ one) =>
+    `at ${one.at.map((value) => value.toFixed(2)).join(", ")} m`;
+  const pick = (/** @type {Subject} */ one) => {
+    model.subject.value = one;
+  };
+  const chosen = model.subject.value;
+  return html`<section class="plates">
+    <p class="hint">Click whom the masks shall be of.</p>
+    <div class="subject-picture">
+      <img
+        src=${`${model.here}/footage/${encodeURIComponent(name)}/0.jpg?height=420`}
+        alt=${`First frame of ${name}`}
+      />
+      ${seen.map((one, at) => {
+        const point = one.points[name];
+        return (
+          point &&
+          html`<button
+            type="button"
+            class="subject-dot"
+            aria-pressed=${String(one === chosen)}
+            aria-label=${`Follow subject ${at + 1}, ${words(one)}`}
+            style=${{ left: `${100 * point[0]}%`, top: `${100 * point[1]}%` }}
+            onClick=${() => pick(one)}
+          >
+            ${at + 1}
+          </button>`
+        );
+      })}
+    </div>
+    <ul class="plate-list">
+      ${seen.map(
+        (one, at) => html`<li key=${at}>
+          <span>${at + 1}</span>
+          <span class="hint">
+            ${words(one)}${one.height !== null && `, ${one.height.toFixed(2)} m high`}
+          </span>
+          <${Action} kind="quiet small" act=${() => pick(one)} aria-label=${`Follow ${at + 1}`}>
+            ${one === chosen ? "Followed" : "Follow"}
+          </${Action}>
+        </li>`,
+      )}
+    </ul>
+  </section>`;
+}
+
+/** @param {Schemas["CameraStrokes"]} line */
+function strokeWords({ strokes, ready, made }) {
+  if (!strokes.length) return "nothing painted yet";
+  if (!ready) return "nothing inside yet";
+  const frames = new Set(strokes.map((one) => one.frame)).size;
+  const painted = `${strokes.length} ${strokes.length > 1 ? "strokes" : "stroke"}`;
+  return `${painted} in ${frames} ${frames > 1 ? "frames" : "frame"}${made ? ", masks made" : ""}`;
+}
+
+/** @param {{ model: Model }} properties */
+const StrokeList = ({ model }) => html`<section class="plates">
+  <p class="hint">
+    Paint in a frame in which the camera sees the subject well: a line or two through each of its
+    parts and colours, one around it. More strokes in a later frame correct what follows.
+  </p>
+  <ul class="plate-list">
+    ${model.strokes.value.map(
+      (line) => html`<li key=${line.camera}>
+        <span>${line.camera}</span><span class="hint">${strokeWords(line)}</span>
+        <${Action}
+          kind="quiet small"
+          act=${() => model.paint(line.camera)}
+          aria-label=${`Paint on ${line.camera}`}
+        >
+          Paint…
+        </${Action}>
+      </li>`,
+    )}
+  </ul>
+</section>`;
+
+/** A camera's picture or clip of the empty room. */
+function Plate(
+  /** @type {{ camera: Background["cameras"][number], give: (files: File[]) => Promise<void> }} */ {
+    camera: { name, given, file },
+    give,
+  },
+) {
+  const input = useRef(/** @type {HTMLInputElement | null} */ (null));
+  return html`<li>
+    <span>${name}</span>
+    <span class="hint">${given ? `${given === "clip" ? "clip" : "picture"} ${file}` : "none"}</span>
+    <${Action}
+      kind="quiet small"
+      act=${() => input.current?.click()}
+      aria-label=${`Choose the empty room of ${name}`}
+    >
+      Choose…
+    </${Action}>
+    <input
+      ref=${input}
+      type="file"
+      accept=${ANY_FOOTAGE}
+      hidden
+      onChange=${({ target }) => give([...target.files])}
+    />
+  </li>`;
+}
+
+/** Pictures and clips of the empty room. @param {{ model: Model }} properties */
+function Plates({ model }) {
+  const { cameras } = model.background.value;
+  const given = cameras.filter((camera) => camera.given).length;
+  const [isOpen, setOpen] = useState(!given && cameras.length < 3);
+  const [words, setWords] = useState("");
+  const give = async (
+    /** @type {File[]} */ files,
+    /** @type {Record<string, string>} */ named = {},
+  ) => {
+    if (!files.length) return;
+    await model.give(files, named, setWords);
+    setWords("");
+  };
+  return html`<details
+    class="plates"
+    open=${isOpen}
+    onToggle=${({ currentTarget }) => setOpen(currentTarget.open)}
+  >
+    <summary>Pictures of the empty room: ${given} of ${cameras.length} cameras</summary>
+    <label>
+      One picture or clip per camera, matched by name
+      <input
+        type="file"
+        multiple
+        accept=${ANY_FOOTAGE}
+        aria-label="Pictures or clips of the empty room"
+        onChange=${({ target }) => give([...target.files])}
+      />
+    </label>
+    <ul class="plate-list">
+      ${cameras.map(
+        (camera) =>
+          html`<${Plate}
+            key=${camera.name}
+            camera=${camera}
+            give=${(/** @type {File[]} */ files) =>
+              give(files, Object.fromEntries(files.map((file) => [camera.name, file.name])))}
+          />`,
+      )}
+    </ul>
+    <p class="hint upload-words" role="status">${words}</p>
+  </details>`;
+}
+
+/** The sources, what the chosen one needs, and what sets it up. @param {{ model: Model }} properties */
+function Make({ model }) {
+  const { job, possible, sources, source: used } = model.background.value;
+  const source = model.source.value;
+  const isUnderWay = model.isUnderWay();
+  const isReady = possible.includes(source) && (source !== "subject" || model.subject.value);
+  const Needs = source === "strokes" ? StrokeList : source === "subject" ? SubjectList : Plates;
+  return html`<div class="background-make">
+    ${
+      used === "masks" &&
+      html`<p class="notice">
+        Masks came with the footage and are used unchanged. Set up a background only if they are not
+        good.
+      </p>`
+    }
+    <${SourceChoices} model=${model} />
+    <${Needs} model=${model} />
+    ${
+      sources.find((one) => one.name === source)?.has_knobs &&
+      html`<${Check}
+        checked=${model.isTuned.value}
+        take=${(checked) => {
+          model.isTuned.value = checked;
+        }}
+        title="Knobs that you set below stay fixed."
+      >
+        tune the knobs for the best agreement of the views
+      </${Check}>`
+    }
+    ${
+      source === "combined" &&
+      html`<${Check}
+        checked=${model.isUnusedExcluded.value}
+        take=${(checked) => {
+          model.isUnusedExcluded.value = checked;
+        }}
+        title="A bystander, a monitor, a window: motion there is not the subject."
+      >
+        exclude regions that the subject never comes near
+      </${Check}>`
+    }
+    ${
+      !isUnderWay &&
+      html`<div class="step-actions">
+        <${Action} kind="primary" act=${model.setUp} disabled=${!isReady}>
+          Set up the background
+        </${Action}>
+      </div>`
+    }
+    ${
+      isUnderWay && html`<${Progress} ...${progressOf(job, "Reading the footage", model.cancel)} />`
+    }
+    <${Failure} error=${model.failed.value} />
+    ${job?.choice && html`<${SourceTable} choice=${job.choice} />`}
+    ${job?.notes.map((note) => html`<p class="hint">${note}</p>`)}
+  </div>`;
+}
+
+/** How far the views agree. @param {{ model: Model }} properties */
+function Agreement({ model }) {
+  const { cameras, measured, source } = model.background.value;
+  const [isMeasuring, setMeasuring] = useState(false);
+  const measure = async () => {
+    setMeasuring(true);
+    await model.measure();
+    setMeasuring(false);
+  };
+  return html`<section class="background-quality">
+    <div class="head-line">
+      <h2>Agreement of the views</h2>
+      ${cameras.length > 1 && html`<${Action} kind="small" act=${measure}>Measure</${Action}>`}
+    </div>
+    ${isMeasuring && html`<p class="hint">Comparing the masks of five frames…</p>`}
+    ${
+      !(isMeasuring && !model.quality.value) &&
+      html`<${QualityList}
+        setup=${model.setup}
+        quality=${model.quality.value}
+        measured=${measured}
+        source=${source}
+        paint=${model.exclude}
+      />`
+    }
+  </section>`;
+}
+
+/** A knob of the masks. @param {{ model: Model, knob: Background["knobs"][number] }} properties */
+function KnobRow({ model, knob }) {
+  const stored = model.background.value.settings[knob.name];
+  const changed = model.changed.value;
+  const value = changed[knob.name] ?? stored;
+  const isChanged = knob.name in changed;
+  const take = (/** @type {any} */ wanted) => {
+    const { [knob.name]: _, ...others } = changed;
+    const knobs = wanted === stored ? others : { ...others, [knob.name]: wanted };
+    model.tryKnobs(knobs, PREVIEW_MILLISECONDS);
+  };
+  const isNumber = knob.kind !== "bool" && !knob.choices.length;
+  const made = isNumber
+    ? html`<input
+        type="range"
+        aria-label=${knob.label}
+        min=${knob.low}
+        max=${Math.min(knob.high ?? HIGHEST_SLIDER, HIGHEST_SLIDER)}
+        step=${knob.step || (knob.kind === "int" ? 1 : "any")}
+        value=${value}
+        onInput=${({ target }) => take(Number(target.value))}
+      />`
+    : knob.choices.length
+      ? html`<select aria-label=${knob.label} onChange=${({ target }) => take(target.value)}>
+          ${knob.choices.map(
+            (one) =>
+              html`<option key=${one} value=${one} selected=${one === value}>${one}</option>`,
+          )}
+        </select>`
+      : html`<input
+          type="checkbox"
+          aria-label=${knob.label}
+          checked=${value}
+          onChange=${({ target }) => take(target.checked)}
+        />`;
+  return html`<label class=${isChanged ? "knob changed" : "knob"} title=${knob.help}>
+    <span>${knob.label}</span>${made}
+    ${
+      isNumber &&
+      html`<output>
+        ${typeof value === "number" ? Number(value.toPrecision(3)) : ""} ${knob.unit}
+      </output>`
+    }
+  </label>`;
+}
+
+/** Knobs, whose preview the pictures show. @param {{ model: Model }} properties */
+function Knobs({ model }) {
+  const { knobs } = model.background.value;
+  const names = model.source.value === "threshold" ? [...THRESHOLDS, ...FIRST.slice(-3)] : FIRST;
+  const first = names.flatMap((name) => knobs.find((knob) => knob.name === name) ?? []);
+  const rest = knobs.filter((knob) => knob.name.startsWith("mask_") && !names.includes(knob.name));
+  const rows = (/** @type {Background["knobs"]} */ those) =>
+    those.map((knob) => html`<${KnobRow} key=${knob.name} model=${model} knob=${knob} />`);
+  return html`<details class="background-knobs">
+    <summary>Fine adjustment</summary>
+    <p class="hint">The pictures follow; nothing is stored before you press Keep.</p>
+    ${rows(first)}
+    <details>
+      <summary>More</summary>
+      ${rows(rest)}
+    </details>
+    ${
+      Object.keys(model.changed.value).length > 0 &&
+      html`<div class="step-actions">
+        <${Action} kind="small" act=${model.keep}>Keep</${Action}>
+        <${Action} kind="quiet small" act=${() => model.tryKnobs({})}>Reset</${Action}>
+      </div>`
+    }
+  </details>`;
+}
+
+/** @type {import("./setup.js").Mount<typeof load>} */
+export function mount(place, setup, loaded) {
+  const model = modelOf(setup, loaded);
+  render(
+    place,
+    html`
+      <${Make} model=${model} />
+      <${Agreement} model=${model} />
+      <${AlignmentBox} model=${model.alignment} />
+      <${Knobs} model=${model} />
+    `,
+  );
   return () => {
-    gone = true;
-    clearTimeout(timer);
-    clearTimeout(preview);
-    pictures.close();
-    alignment.stop();
+    model.close();
+    render(place, null);
   };
 }

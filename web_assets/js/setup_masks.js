@@ -2,207 +2,185 @@
 // show at once.
 
 import { sessionPath } from "./api.js";
-import { button, check, element, fill, spring } from "./elements.js";
 import { agreementOf } from "./setup_quality.js";
+import { batch, html, signal, useEffect, useRef, useState } from "./studio/component.js";
+import { Action, Check } from "./studio/parts.js";
+
+/** @import { Schemas } from "./api_types" */
 
 const HEIGHT = 420;
 const SPREAD = 5;
 
 /**
- * Pictures in `setup.aside`; `paint(camera)` opens the brush, `strokes(camera)` that for strokes.
+ * Which pictures are shown.
  * @param {import("./setup.js").Setup} setup
+ * @param {number} count of frames
  */
-export function maskPictures(setup, paint, strokes) {
-  const here = sessionPath(setup.session);
-  const state = {
-    frame: 0,
-    settings: {},
-    quality: null,
-    views: [],
-    age: 0,
-    bare: false,
-    cutting: false,
-  };
-  const bar = element("div", { className: "mask-bar" });
-  const grid = element("div", { className: "pictures masks" });
-
-  /**
-   * Before the first mask the picture alone, as it is recorded: a session's first masks take their
-   * time.
-   */
-  function first(camera) {
-    const lens = setup.detail.cameras.find((one) => one.name === camera);
-    return lens?.quarter_turns
-      ? ""
-      : `${here}/footage/${encodeURIComponent(camera)}/${state.frame}.jpg?height=${HEIGHT}`;
-  }
-
-  function address(camera) {
-    const settings = Object.keys(state.settings).length
-      ? `&settings=${encodeURIComponent(JSON.stringify(state.settings))}`
-      : "";
-    const show = state.bare || state.cutting ? "" : "mask";
-    return `${here}/frames/${state.frame}/views/${encodeURIComponent(camera)}.jpg?show=${show}&height=${HEIGHT}&age=${state.age}${settings}`;
-  }
-
-  /** One request a picture at a time; later requests follow afterwards. */
-  function load(view) {
-    const wanted = (view.seen ? "" : first(view.camera.name)) || address(view.camera.name);
-    if (view.busy || view.wanted === wanted) return;
-    view.wanted = wanted;
-    view.busy = true;
-    view.box.classList.add("waiting");
-    const done = (wrong) => {
-      view.busy = false;
-      view.box.classList.remove("waiting");
-      view.seen = true;
-      view.box.classList.toggle("failed", wrong);
-      if (grid.isConnected) load(view);
-    };
-    view.image.onload = () => done(false);
-    view.image.onerror = () => done(true);
-    view.image.src = wanted;
-  }
-
-  function draw() {
-    for (const view of state.views) load(view);
-  }
-
-  function caption(view) {
-    const line = state.quality?.cameras.find((one) => one.camera === view.camera.name);
-    fill(
-      view.caption,
-      element(
-        "div",
-        { className: "head-line" },
-        element("b", {}, view.camera.name),
-        line &&
-          element(
-            "span",
-            { className: `badge ${line.usable ? "good" : "bad"}` },
-            line.agreement === null ? "empty" : agreementOf(line),
-          ),
-        view.camera.excluded && element("span", { className: "hint" }, "regions excluded"),
-        spring(),
-        view.strokes,
-        view.brush,
-      ),
-    );
-  }
-
-  function begin({ frame_count: count, cameras }) {
-    const last = Math.max(0, count - 1);
-    state.frame = Math.min(last, Math.floor(count / 2));
-    const output = element("output", {}, `frame ${state.frame}`);
-    const slider = element("input", {
-      type: "range",
-      min: 0,
-      max: last,
-      value: state.frame,
-      ariaLabel: "Frame",
-    });
-    const go = () => {
-      state.frame = Number(slider.value);
-      output.textContent = `frame ${state.frame}`;
-      draw();
-    };
-    slider.oninput = go;
-    const apart = Math.max(1, Math.round(last / SPREAD));
-    const step = (words, by, ariaLabel) =>
-      button(
-        words,
-        () => {
-          slider.value = String(state.frame + by);
-          go();
-        },
-        "small",
-        { ariaLabel },
-      );
-    fill(
-      bar,
-      step("‹", -apart, "Some frames back"),
-      slider,
-      step("›", apart, "Some frames on"),
-      output,
-      check("picture alone", {
-        onchange: ({ target }) => {
-          state.bare = target.checked;
-          draw();
-        },
-      }),
-    );
-    state.views = cameras.map((camera) => {
-      const view = {
-        camera,
-        image: element("img", { alt: `Mask of ${camera.name}` }),
-        caption: element("figcaption"),
-        box: null,
-        strokes: button("Strokes…", () => strokes(camera.name), "small", {
-          ariaLabel: `Paint strokes of ${camera.name}`,
-        }),
-        brush: button("Exclude…", () => paint(camera.name), "small", {
-          ariaLabel: `Exclude regions of ${camera.name}`,
-        }),
-      };
-      view.box = element("figure", { className: "picture" }, view.image, view.caption);
-      caption(view);
-      return view;
-    });
-    fill(
-      grid,
-      state.views.map((view) => view.box),
-    );
-    show();
-  }
-
-  function show() {
-    fill(setup.aside, bar, grid);
-    state.age += 1;
-    draw();
-  }
-
-  return {
-    begin,
-    show,
-    get frame() {
-      return state.frame;
-    },
-    go(frame) {
-      state.frame = frame;
-      const slider = bar.querySelector("input");
-      if (slider) {
-        slider.value = String(frame);
-        bar.querySelector("output").textContent = `frame ${frame}`;
-      }
-    },
+export function shownMasks(setup, count) {
+  const last = Math.max(0, count - 1);
+  const shown = {
+    here: sessionPath(setup.session),
+    last,
+    /** Cameras of which a picture has been shown. @type {Set<string>} */
+    seen: new Set(),
+    frame: signal(Math.min(last, Math.floor(count / 2))),
+    /** Knobs that are tried. @type {import("@preact/signals").Signal<Record<string, any>>} */
+    settings: signal({}),
+    /** Rises whenever the masks may be others. */
+    age: signal(0),
+    isBare: signal(false),
     /** While new masks are cut the old ones are not shown: they would pass for the result. */
-    cut(isGoing) {
-      if (state.cutting === isGoing) return;
-      state.cutting = isGoing;
-      state.age += 1;
-      grid.classList.toggle("cutting", isGoing);
-      draw();
+    isCutting: signal(false),
+    refresh() {
+      shown.age.value += 1;
     },
-    preview(settings) {
-      state.settings = { ...settings };
-      state.age += 1;
-      draw();
+    /** Show the masks under other knobs. @param {Record<string, any>} settings */
+    preview: (settings) =>
+      batch(() => {
+        shown.settings.value = { ...settings };
+        shown.refresh();
+      }),
+    /** @param {boolean} isCutting */
+    cut: (isCutting) =>
+      batch(() => {
+        if (shown.isCutting.value !== isCutting) shown.refresh();
+        shown.isCutting.value = isCutting;
+      }),
+    /** @param {string} camera */
+    address(camera) {
+      const settings = shown.settings.value;
+      const tried = Object.keys(settings).length
+        ? `&settings=${encodeURIComponent(JSON.stringify(settings))}`
+        : "";
+      const show = shown.isBare.value || shown.isCutting.value ? "" : "mask";
+      return `${shown.here}/frames/${shown.frame.value}/views/${encodeURIComponent(camera)}.jpg?show=${show}&height=${HEIGHT}&age=${shown.age.value}${tried}`;
     },
-    rate(quality) {
-      state.quality = quality;
-      for (const view of state.views) caption(view);
-    },
-    mark(cameras) {
-      for (const view of state.views) {
-        view.camera = cameras.find((one) => one.name === view.camera.name) ?? view.camera;
-        caption(view);
-      }
-    },
-    close() {
-      for (const view of state.views) {
-        view.image.onload = view.image.onerror = null;
-        view.image.removeAttribute("src");
-      }
+    /**
+     * Before the first mask the picture alone, as it is recorded: a session's first masks take
+     * their time.
+     * @param {string} camera
+     */
+    first(camera) {
+      const lens = setup.detail.cameras.find((one) => one.name === camera);
+      return lens?.quarter_turns
+        ? ""
+        : `${shown.here}/footage/${encodeURIComponent(camera)}/${shown.frame.value}.jpg?height=${HEIGHT}`;
     },
   };
+  return shown;
+}
+
+/** @typedef {ReturnType<typeof shownMasks>} Shown */
+/** @typedef {Schemas["BackgroundAnswer"]["cameras"][number]} Camera */
+/**
+ * @typedef {{ shown: Shown, cameras: Camera[], quality: Schemas["MaskQualityAnswer"] | null,
+ *   exclude: (camera: string) => void, paint: (camera: string) => void }} MaskProperties
+ *   `exclude` opens the brush for what does not count, `paint` that for strokes
+ */
+
+/** The pictures, and the bar that chooses their frame. @param {MaskProperties} properties */
+export function MaskPictures({ shown, cameras, ...more }) {
+  const frame = shown.frame.value;
+  const apart = Math.max(1, Math.round(shown.last / SPREAD));
+  const go = (/** @type {number} */ to) => {
+    shown.frame.value = Math.max(0, Math.min(shown.last, to));
+  };
+  const step = (
+    /** @type {string} */ words,
+    /** @type {number} */ by,
+    /** @type {string} */ name,
+  ) =>
+    html`<${Action} kind="small" act=${() => go(frame + by)} aria-label=${name}>${words}</${Action}>`;
+  return html`
+    <div class="mask-bar">
+      ${step("‹", -apart, "Some frames back")}
+      <input
+        type="range"
+        min="0"
+        max=${shown.last}
+        value=${frame}
+        aria-label="Frame"
+        onInput=${({ target }) => go(Number(target.value))}
+      />
+      ${step("›", apart, "Some frames on")}
+      <output>frame ${frame}</output>
+      <${Check}
+        checked=${shown.isBare.value}
+        take=${(checked) => {
+          shown.isBare.value = checked;
+        }}
+      >
+        picture alone
+      </${Check}>
+    </div>
+    <div class=${shown.isCutting.value ? "pictures masks cutting" : "pictures masks"}>
+      ${cameras.map(
+        (camera) =>
+          html`<${MaskPicture} key=${camera.name} shown=${shown} camera=${camera} ...${more} />`,
+      )}
+    </div>
+  `;
+}
+
+/**
+ * One request at a time; the newest one follows when the last is answered.
+ * @param {Omit<MaskProperties, "cameras"> & { camera: Camera }} properties
+ */
+function MaskPicture({ shown, camera, quality, exclude, paint }) {
+  const image = useRef(/** @type {HTMLImageElement | null} */ (null));
+  const [state, setState] = useState("waiting");
+  const wanted = shown.address(camera.name);
+  const request = useRef({ newest: wanted, asked: "", isBusy: false });
+  request.current.newest = wanted;
+  const load = () => {
+    const now = request.current;
+    const address = (shown.seen.has(camera.name) ? "" : shown.first(camera.name)) || now.newest;
+    if (!image.current || now.isBusy || now.asked === address) return;
+    Object.assign(now, { asked: address, isBusy: true });
+    setState("waiting");
+    image.current.src = address;
+  };
+  const done = (/** @type {boolean} */ isWrong) => {
+    request.current.isBusy = false;
+    shown.seen.add(camera.name);
+    setState(isWrong ? "failed" : "");
+    load();
+  };
+  useEffect(load, [wanted]);
+  const line = quality?.cameras.find((one) => one.camera === camera.name);
+  return html`<figure class=${`picture ${state}`}>
+    <img
+      ref=${image}
+      alt=${`Mask of ${camera.name}`}
+      onLoad=${() => done(false)}
+      onError=${() => done(true)}
+    />
+    <figcaption>
+      <div class="head-line">
+        <b>${camera.name}</b>
+        ${
+          line &&
+          html`<span class=${`badge ${line.usable ? "good" : "bad"}`}>
+            ${line.agreement === null ? "empty" : agreementOf(line)}
+          </span>`
+        }
+        ${camera.excluded && html`<span class="hint">regions excluded</span>`}
+        <span class="spring"></span>
+        <${Action}
+          kind="small"
+          act=${() => paint(camera.name)}
+          aria-label=${`Paint strokes of ${camera.name}`}
+        >
+          Strokes…
+        </${Action}>
+        <${Action}
+          kind="small"
+          act=${() => exclude(camera.name)}
+          aria-label=${`Exclude regions of ${camera.name}`}
+        >
+          Exclude…
+        </${Action}>
+      </div>
+    </figcaption>
+  </figure>`;
 }

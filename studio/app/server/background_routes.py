@@ -28,7 +28,7 @@ from studio.foundations.knobs import Knob, Value, knobs_of
 from studio.operations.jobs.job_runner import Job, JobKind, SessionJob
 from studio.operations.masks import background as set_background
 from studio.results.overlay_pictures import forget_composers
-from studio.runs.setup.background_setup import HOME_OF, MODEL_OF, SOURCES, BackgroundSource
+from studio.runs.setup.background_setup import MASK_SOURCES, SOURCES, BackgroundSource
 from studio.runs.setup.best_source import SourceChoice
 from studio.runs.setup.contrast import ViewContrast
 from studio.runs.setup.mask_quality import MaskQuality, mask_quality, measure_masks
@@ -150,15 +150,28 @@ BACKGROUND = JobKind(
 )
 
 
+class SourceLine(Answer):
+    """What a session's masks can be made of. lacking: what is to be done first, "" where it is possible now. has_knobs:
+    whether knobs of the masks change what becomes of it.
+    """
+
+    name: BackgroundSource
+    label: str
+    help: str
+    lacking: str
+    has_knobs: bool
+
+
 class BackgroundAnswer(Answer):
     """A session's background. source: what it is made of, "masks" where masks came with the footage. possible: what it
-    can be made of now. settings: all knobs of masks with their values in use; own: those the session has said.
-    measured: how far the views agreed when that was last measured, in words.
+    can be made of now; sources: all of them. settings: all knobs of masks with their values in use; own: those the
+    session has said. measured: how far the views agreed when that was last measured, in words.
     """
 
     session: str
     source: BackgroundSource
     possible: list[BackgroundSource]
+    sources: list[SourceLine]
     frame_count: int
     cameras: list[BackgroundCamera]
     knobs: list[Annotated[Knob, Shown]]
@@ -303,6 +316,10 @@ def background(session: OpenSession, app: App) -> BackgroundAnswer:
             "session": session.name,
             "source": _source(settings.evidence.background_model, bool(evidence.given), cameras, session),
             "possible": possible,
+            "sources": [
+                SourceLine.of(one, name=name, lacking="" if name in possible else one.lacking)
+                for name, one in MASK_SOURCES.items()
+            ],
             "frame_count": session.manifest.frame_count,
             "cameras": cameras,
             "knobs": list(knobs),
@@ -417,12 +434,14 @@ def _source(model: str, cleaned: bool, cameras: list[BackgroundCamera], session:
     """What masks are made of."""
     if model == "mask" or (model == "auto" and cameras and all(one.masks for one in cameras)):
         homes = {home_of_masks(source) for source in session.manifest.footage.cameras}
-        made: list[BackgroundSource] = [source for source, home in HOME_OF.items() if homes == {home}]
+        made: list[BackgroundSource] = [
+            name for name, one in MASK_SOURCES.items() if one.home and homes == {one.home}
+        ]
         return made[0] if made else "masks"
-    if model == MODEL_OF["threshold"]:
+    if model == MASK_SOURCES["threshold"].model:
         return "threshold"
-    if cleaned or model == MODEL_OF["combined"]:
+    if cleaned or model == MASK_SOURCES["combined"].model:
         return "combined"
-    if model == MODEL_OF["median"] or not cameras or not all(one.given for one in cameras):
+    if model == MASK_SOURCES["median"].model or not cameras or not all(one.given for one in cameras):
         return "median"
     return "clip" if cameras[0].given == "clip" else "plate"

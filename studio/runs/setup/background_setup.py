@@ -72,27 +72,94 @@ BackgroundSource = Literal[
     "plate", "clip", "median", "combined", "person", "strokes", "threshold", "masks", "best", "subject"
 ]
 SOURCES: tuple[BackgroundSource, ...] = get_args(BackgroundSource)
-MODEL_OF: dict[BackgroundSource, str] = {
-    "plate": "gaussian",
-    "clip": "gaussian",
-    "median": "median",
-    "combined": "combined",
-    "person": "auto",
-    "strokes": "auto",
-    "threshold": "threshold",
-    "masks": "mask",
-    "best": "auto",
-    "subject": "auto",
+
+
+@dataclass(frozen=True, slots=True)
+class MaskSource:
+    """What masks can be made of. label, help : for a page. lacking : what is to be done where it is not possible.
+
+    model : of the evidence (`background_model`). home : where the studio's own masks of it lie, "" where they are not
+    kept. has_knobs : whether knobs of the masks change what becomes of it; those that have none need no background.
+    """
+
+    label: str
+    help: str
+    model: str
+    lacking: str = ""
+    home: str = ""
+    has_knobs: bool = True
+
+
+MASK_SOURCES: dict[BackgroundSource, MaskSource] = {
+    "combined": MaskSource(
+        "Combined",
+        "Pictures of the empty room where there are any, the footage elsewhere; cleaned with the other views. The best "
+        "choice with three cameras or more.",
+        "combined",
+    ),
+    "plate": MaskSource(
+        "Picture",
+        "A picture of the empty room from each camera, unchanged.",
+        "gaussian",
+        lacking="Give a picture for every camera below.",
+    ),
+    "clip": MaskSource(
+        "Clip",
+        "A short video of the empty room from each camera, unchanged.",
+        "gaussian",
+        lacking="Give a clip for every camera below.",
+    ),
+    "median": MaskSource("Median", "The median of the footage. Good if the subject moves about.", "median"),
+    "person": MaskSource(
+        "Person",
+        "A network finds the person and cuts him out, frame by frame: no picture of the empty room, and he may stay in "
+        "place. People only; the one whom most cameras see.",
+        "auto",
+        lacking="Calibrate the cameras first: they must agree on who is seen.",
+        home=PERSON_MASKS,
+        has_knobs=False,
+    ),
+    "strokes": MaskSource(
+        "Strokes",
+        "Anything: you paint a few lines inside and outside the subject in one picture of each camera; they are "
+        "carried through all frames, and corrected by more strokes in any frame.",
+        "auto",
+        lacking="Paint strokes on a picture of every camera.",
+        home=STROKE_MASKS,
+        has_knobs=False,
+    ),
+    "threshold": MaskSource(
+        "Brightness and colour",
+        "For a subject that is lit so that these alone tell it from all else: a white mouse on dark litter, a glove of "
+        "one colour.",
+        "threshold",
+    ),
+    "masks": MaskSource(
+        "Given masks",
+        "The masks that came with the footage, unchanged.",
+        "mask",
+        lacking="No masks came with the footage.",
+        has_knobs=False,
+    ),
+    "subject": MaskSource(
+        "One of several",
+        "Of those in view you choose one; the others are cut out of the masks in use. For several at once: studio "
+        "subjects, studio together.",
+        "auto",
+        lacking="Calibrate the cameras first: where somebody stands is seen by two of them.",
+        home=SUBJECT_MASKS,
+        has_knobs=False,
+    ),
+    "best": MaskSource(
+        "Best of all",
+        "Each of these that is possible is tried, which takes as long as all of them together; then each camera gets "
+        "the one under which the views agree and the masks' borders lie on edges of the picture.",
+        "auto",
+        lacking="Calibrate the cameras first: by their agreement the sources are compared.",
+        home=CHOSEN_MASKS,
+    ),
 }
-HOME_OF: dict[BackgroundSource, str] = {
-    "person": PERSON_MASKS,
-    "strokes": STROKE_MASKS,
-    "best": CHOSEN_MASKS,
-    "subject": SUBJECT_MASKS,
-}
-"""Where the studio's own masks of a source lie."""
-OF_MASKS = ("person", "strokes", "masks", "subject")
-"""Sources that need no background."""
+"""In the order in which a page offers them."""
 CLEANING_VIEWS = 3
 MOST_STRETCHES = 6
 """Of frames, named in a note."""
@@ -220,7 +287,7 @@ def _set_up(
     """`set_up_background` with checked arguments."""
     chosen, tune = wanted.knobs, wanted.tune
     notes: list[str] = []
-    model = MODEL_OF[source]
+    model = MASK_SOURCES[source].model
     if source == "person":
         notes += _make_person_masks(session, progress)
         session = Session(session.path)
@@ -242,7 +309,7 @@ def _set_up(
                 set_exclusion(session, name, png_of(plate.never_taken))
     own: dict[str, Knob] = {"background_model": model, **chosen}
     quality = None
-    if tune and source in OF_MASKS:
+    if tune and not MASK_SOURCES[source].has_knobs:
         quality = _agreement(session, own, progress)
     elif tune and len(session.manifest.footage.cameras) > 1:
         own, quality = _tuned(session, own, _trials(source), progress)
@@ -286,7 +353,7 @@ def _cut_to_subject(
     """The session with the masks of one subject in place of all subjects' ones that it has now."""
     lost = make_subject_masks(session, place, progress)
     session = Session(session.path)
-    own: dict[str, Knob] = {"background_model": MODEL_OF["subject"]}
+    own: dict[str, Knob] = {"background_model": MASK_SOURCES["subject"].model}
     write_evidence(session, msgspec.structs.replace(read_evidence(session), knobs=own))
     notes = (*made.notes, *([f"The subject is not seen in {frames_in_words(lost)}."] if lost else []))
     return BackgroundSetup("subject", own, notes, _agreement(session, own, progress), made.choice)
@@ -377,7 +444,7 @@ def _set_up_best(session: Session, wanted: _Wanted, progress: Progress) -> Backg
         # The masks that came with the footage are those of the session as it was found.
         _with_footage(session, manifest.footage)
         write_evidence(session, evidence)
-    own: dict[str, Knob] = {"background_model": MODEL_OF["best"]}
+    own: dict[str, Knob] = {"background_model": MASK_SOURCES["best"].model}
     now = Session(session.path)
     write_evidence(now, msgspec.structs.replace(read_evidence(now), knobs=own))
     notes.append(f"Together: {choice.mixed.in_words()}")
@@ -448,7 +515,7 @@ def _tuned(
                 plausible = plausible and all(map(can_be_subject, masks))
                 counted.append(count_frame(masks, small, blame=False, fineness=ROUGH, scale=scale))
             found = summed(trying.frames, tuple(camera.name for camera in cameras), counted)
-            if not plausible and knobs.get("background_model") == MODEL_OF["threshold"]:
+            if not plausible and knobs.get("background_model") == MASK_SOURCES["threshold"].model:
                 return 0.0, knobs, found
             worst = min((0.0 if view.agreement != view.agreement else view.agreement) for view in found.views)
             return round(worst, 9), knobs, found

@@ -18,7 +18,7 @@ from studio.foundations.errors import StudioError
 from studio.foundations.foreign_files import read_file
 from studio.foundations.words import counted, enumerated
 from studio.runs.checking import kept_check
-from studio.runs.setup.background_setup import MODEL_OF
+from studio.runs.setup.background_setup import MASK_SOURCES
 from studio.runs.setup.levelling import floor_was_set
 from studio.runs.setup.silhouette_doubts import standing_doubts
 from studio.runs.setup.turned_cameras import misses_in_words
@@ -128,9 +128,9 @@ def background_step(session: Session) -> StepStatus:
     known = origin_of(session, "background")
     model = read_evidence(session).knobs.get("background_model", "auto")
     homes = {home_of_masks(source) for source in sources}
-    if made == len(sources) and made and model == MODEL_OF["person"]:
+    if made == len(sources) and made and model == MASK_SOURCES["person"].model:
         words = MADE_WORDS[homes.pop()] if len(homes) == 1 else "masks that the studio made"
-    elif model == MODEL_OF["threshold"]:
+    elif model == MASK_SOURCES["threshold"].model:
         words = "by brightness and colour"
     elif given and model in ("auto", "mask"):
         words = "masks came with the footage"

@@ -48,6 +48,9 @@ def test_the_median_is_set_up_and_said(studio: Studio) -> None:
     before = studio.client.get(f"{PLACE}/background").json()
     assert "median" in before["possible"]
     assert "plate" not in before["possible"]
+    offered = {one["name"]: one for one in before["sources"]}
+    assert {name for name, one in offered.items() if not one["lacking"]} == set(before["possible"])
+    assert offered["plate"]["lacking"] == "Give a picture for every camera below."
     assert {"mask_threshold", "background_model"} <= set(before["settings"])
     begun = studio.client.post(f"{PLACE}/background", json={"source": "median", "tune": False})
     assert begun.status_code == 202

@@ -3,8 +3,7 @@
 //
 // A component is a function of its properties that returns html`…`; it renders itself again when a
 // signal that it read has changed. The page's values are read by `follow(name)` (of state.js)
-// inside a component or an effect, and by `get(name)` in event handlers. The files of this folder
-// are formatted (biome, 100 columns) and checked for nulls.
+// inside a component or an effect, and by `get(name)` in event handlers.
 
 import htm from "../../vendor/htm.js";
 import { h, render } from "../../vendor/preact.js";
