@@ -56,7 +56,7 @@ from studio.search.trackers.tracker import (
 )
 
 
-class AnnealedParticleFilter(ParticleFilter):
+class AnnealedParticleFilter(ParticleFilter[AnnealedSettings]):
     """One frame in M annealing layers; evaluations = layers × particles."""
 
     name = "annealed"

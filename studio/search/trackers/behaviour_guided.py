@@ -32,7 +32,7 @@ from studio.search.trackers.settings import BehaviourSettings
 from studio.search.trackers.tracker import Arrays, FilterState, ParticleSet, SearchSpace
 
 
-class BehaviourGuided(OneLayerFilter):
+class BehaviourGuided(OneLayerFilter[BehaviourSettings]):
     """Particles moved by the model and weighed once."""
 
     name = "behaviour"

@@ -9,12 +9,12 @@ from studio.search.trackers.annealed_particle_filter import AnnealedParticleFilt
 from studio.search.trackers.behaviour_guided import BehaviourGuided
 from studio.search.trackers.condensation import Condensation
 from studio.search.trackers.particle_swarm import ParticleSwarm
-from studio.search.trackers.tracker import Preset, Tracker
+from studio.search.trackers.tracker import AnyTracker, Preset, Tracker
 
 NEEDED_KNOBS = ("start_repeats",)
 
 
-def _check(tracker: Tracker) -> None:
+def _check(tracker: AnyTracker) -> None:
     """Raise SettingsError where a required knob is missing."""
     has = {entry.name for entry in knobs_of(tracker.settings_type)}
     for knob in (*NEEDED_KNOBS, *(one for names in tracker.size_knobs for one in names)):
@@ -22,7 +22,7 @@ def _check(tracker: Tracker) -> None:
             raise SettingsError(f"its settings have no knob '{knob}'")
 
 
-TRACKERS: Registry[Tracker] = Registry(
+TRACKERS: Registry[AnyTracker] = Registry(
     "tracker",
     "studio.trackers",
     Tracker,

@@ -24,7 +24,7 @@ from studio.search.trackers.tracker import Arrays, FilterState, ParticleSet, Sea
 SCALES = "log_scales"
 
 
-class Condensation(OneLayerFilter):
+class Condensation(OneLayerFilter[CondensationSettings]):
     """Survivors drawn by weight, moved, spread and weighed once."""
 
     name = "condensation"

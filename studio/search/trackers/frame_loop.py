@@ -21,6 +21,7 @@ from studio.search.trackers.particles import WeightError
 from studio.search.trackers.tracker import (
     HIDDEN,
     MOVED,
+    AnyTracker,
     Array,
     FilterState,
     FrameLikelihood,
@@ -28,7 +29,6 @@ from studio.search.trackers.tracker import (
     LayerRecord,
     ParticleSet,
     SearchSpace,
-    Tracker,
     generator,
     keyed_generator,
 )
@@ -69,7 +69,7 @@ class FrameSearch:
 
     def __init__(
         self,
-        tracker: Tracker,
+        tracker: AnyTracker,
         previous: FilterState,
         space: SearchSpace,
         *,
@@ -213,7 +213,7 @@ class FrameSearch:
 
 
 def search_frame(
-    tracker: Tracker,
+    tracker: AnyTracker,
     problem: FrameLikelihood,
     previous: FilterState,
     space: SearchSpace,

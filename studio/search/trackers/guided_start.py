@@ -24,7 +24,7 @@ from studio.search.trackers.guided_particles import (
 from studio.search.trackers.hard_priors import Proposals, settled
 from studio.search.trackers.model_free import BEATEN, FREE, chosen_free, share_of
 from studio.search.trackers.particles import CAME_FROM, first_set, settled_first, unweighted
-from studio.search.trackers.shared_knobs import GuidedSettings
+from studio.search.trackers.shared_knobs import GuidedSettings, SearchSettings
 from studio.search.trackers.tracker import Arrays, FilterState, FrameLikelihood, ParticleSet, SearchSpace
 
 CAME_FROM_STATES, CAME_FROM_VELOCITY = "came_from_state", "came_from_velocity"
@@ -58,7 +58,7 @@ def settled_set(
     particles: ParticleSet,
     problem: FrameLikelihood,
     space: SearchSpace,
-    rules: GuidedSettings,
+    rules: SearchSettings,
 ) -> ParticleSet:
     """A first set, guided or not, with its impossible particles redrawn; what guided ones came from stays with it.
 
@@ -67,7 +67,7 @@ def settled_set(
     if rules.constraints != "redraw" or CAME_FROM not in particles.extra:
         return particles
     extra, sigma = particles.extra, space.sigma * rules.diffusion_scale
-    if CAME_FROM_STATES not in extra:
+    if CAME_FROM_STATES not in extra or not isinstance(rules, GuidedSettings):
         first = settled_first(rng, particles, problem, space, rules)
         found = _found_near(rng, first.poses, space) if STATES in extra else {}
         return replace(first, extra=first.extra | found)

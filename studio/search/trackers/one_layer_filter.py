@@ -1,7 +1,6 @@
 """Filters that weigh every particle once: a frame is one layer."""
 
 from abc import abstractmethod
-from typing import Any
 
 import numpy as np
 
@@ -10,14 +9,14 @@ from studio.search.trackers.annealing import Annealed
 from studio.search.trackers.guided_start import settled_set
 from studio.search.trackers.layer_record import layer_record
 from studio.search.trackers.model_free import share_in
-from studio.search.trackers.particles import ParticleFilter, weigh, weighted_variance
+from studio.search.trackers.particles import ParticleFilter, Searching, weigh, weighted_variance
 from studio.search.trackers.tracker import Arrays, FrameLikelihood, LayerRecord, ParticleSet, SearchSpace
 
 
-class OneLayerFilter(ParticleFilter):
+class OneLayerFilter(ParticleFilter[Searching]):
     """One frame in one layer; evaluations = particles."""
 
-    def layer_count(self, settings: Any) -> int:  # noqa: ANN401 - the tracker's own settings_type
+    def layer_count(self, settings: Searching) -> int:
         return 1
 
     def step_layer(
@@ -27,7 +26,7 @@ class OneLayerFilter(ParticleFilter):
         layer: int,
         problem: FrameLikelihood,
         space: SearchSpace,
-        settings: Any,  # noqa: ANN401
+        settings: Searching,
     ) -> tuple[ParticleSet, LayerRecord]:
         particles = settled_set(rng, particles, problem, space, settings)
         raw, eligible = weigh(problem, particles.poses, settings)
@@ -44,7 +43,7 @@ class OneLayerFilter(ParticleFilter):
         self,
         log_weights: Array,
         extra: Arrays,
-        settings: Any,  # noqa: ANN401
+        settings: Searching,
     ) -> tuple[Annealed, float, Arrays]:
         """The weights that choose the survivors, the survival rate aimed at (NaN: none), and the set's arrays.
 

@@ -63,7 +63,7 @@ STAGE1_ITERATIONS, STAGE2_ITERATIONS = 20, 40
 SMALLEST_SWARM = 2
 
 
-class ParticleSwarm(Tracker):
+class ParticleSwarm(Tracker[SwarmSettings]):
     """One frame in the iterations of all stages; evaluations = Σ particles × iterations."""
 
     name = "swarm"

@@ -1,5 +1,7 @@
 """Steps on particles that the trackers share: start, predict, weigh and estimate."""
 
+from typing import TypeVar
+
 import numpy as np
 
 from studio.foundations.arrays import Array
@@ -18,6 +20,7 @@ from studio.search.trackers.tracker import (
 )
 
 CAME_FROM = "came_from"
+Searching = TypeVar("Searching", bound=SearchSettings)
 
 
 class WeightError(RunError):
@@ -147,9 +150,9 @@ def estimate(particles: ParticleSet, kind: str) -> Estimate:
     return Estimate(pose, mean, mode, float(particles.raw_log_weights[best]))
 
 
-class ParticleFilter(Tracker):
+class ParticleFilter(Tracker[Searching]):
     """A tracker that reports its last layer's weighted set."""
 
-    def end_frame(self, particles: ParticleSet, space: SearchSpace, settings: SearchSettings) -> Estimate:
+    def end_frame(self, particles: ParticleSet, space: SearchSpace, settings: Searching) -> Estimate:
         """The weighted mean (Eq. 1, 8) or the mode (Eq. 2)."""
         return estimate(particles, settings.estimate)

@@ -9,7 +9,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -256,20 +256,32 @@ class Variant:
     changes: Mapping[str, Value]
 
 
-class Tracker(ABC):
+PARTICLES = "particles"
+"""The knob that says how many poses a layer weighs, unless a tracker says otherwise."""
+S = TypeVar("S")
+"""The settings of a tracker."""
+
+
+class Tracker(ABC, Generic[S]):
     """A stochastic search of one frame, a layer at a time, and its registry entry.
 
-    name : its key in the catalogue. label : its name on screen. settings_type : the frozen dataclass of its knobs, with
-    `start_repeats` among them. The rest has defaults. size_knobs : knobs that say how much is searched, of each stage
-    those that are multiplied. needs_behaviour : it requires a behaviour model. scales_likelihood : it
-    multiplies log w by its own scale (`beta` of its records). score : name of the best particle's reported value, and
-    its unit. variants : known changes, by label, for comparisons. presets : for the pages, offered where a run has all
-    knobs that they set.
+    name : its key in the catalogue.
+    label : its name on screen.
+    settings_type : the frozen dataclass of its knobs, with `start_repeats` among them.
+    size_knobs : knobs that say how much is searched, of each stage those that are multiplied.
+    needs_behaviour : it requires a behaviour model.
+    scales_likelihood : it multiplies log w by its own scale (`beta` of its records).
+    score : name of the best particle's reported value, and its unit.
+    variants : known changes, by label, for comparisons.
+    presets : for the pages, offered where a run has all knobs that they set.
+
+    Its methods hold nothing: the same arguments give the same result. N is the number of particles of a set, D that of
+    the body's parameters.
     """
 
     name: str
     label: str
-    settings_type: type
+    settings_type: type[S]
     size_knobs: ClassVar[tuple[tuple[str, ...], ...]] = (("particles",),)
     needs_behaviour: ClassVar[bool] = False
     scales_likelihood: ClassVar[bool] = False
@@ -277,31 +289,40 @@ class Tracker(ABC):
     variants: ClassVar[Mapping[str, Variant]] = {}
     presets: ClassVar[tuple[Preset, ...]] = ()
 
-    def evaluations(self, settings: Any) -> int:  # noqa: ANN401 - the tracker's own settings_type
-        """Poses weighed in a frame (of the first frame: in each of its searches)."""
-        return self.layer_count(settings) * settings.particles
+    def evaluations(self, settings: S) -> int:
+        """Poses weighed in a frame; in the first frame: in each of its `start_repeats` searches."""
+        return self.layer_count(settings) * getattr(settings, PARTICLES)
 
     def evaluation_knobs(self, evaluations: int, layers: int) -> dict[str, int]:
-        """Knobs with which about `evaluations` poses are weighed a frame. layers : used where they can be chosen."""
+        """Knobs, by name, with which about so many poses are weighed a frame.
+
+        evaluations : wanted a frame.
+        layers : used where the tracker lets them be chosen.
+        """
         return {"particles": round(evaluations / self.layer_count(self.settings_type()))}
 
     def least_evaluations(self, layers: int) -> int:
-        """Least possible evaluations a frame. layers : as in `evaluation_knobs`."""
+        """Fewest poses that a frame can be searched with.
+
+        layers : as in `evaluation_knobs`.
+        """
         return 2 * self.layer_count(self.settings_type())
 
     @abstractmethod
-    def layer_count(self, settings: Any) -> int:  # noqa: ANN401 - the tracker's own settings_type
+    def layer_count(self, settings: S) -> int:
         """Number of layers of a frame."""
 
     @abstractmethod
     def begin_frame(
-        self,
-        rng: np.random.Generator,
-        previous: FilterState,
-        space: SearchSpace,
-        settings: Any,  # noqa: ANN401
+        self, rng: np.random.Generator, previous: FilterState, space: SearchSpace, settings: S
     ) -> ParticleSet:
-        """The unweighted set that the first layer weighs."""
+        """The unweighted set that the first layer weighs: predicted (Eq. 10) and spread (Eq. 9).
+
+        rng : the only source of random numbers.
+        previous : what the frame before left; its `particles` are None at a run's start without a pose.
+        space : limits, σ0 and structure of the pose vector (mm, radians).
+        settings : of the frame.
+        """
 
     @abstractmethod
     def step_layer(
@@ -311,19 +332,35 @@ class Tracker(ABC):
         layer: int,
         problem: FrameLikelihood,
         space: SearchSpace,
-        settings: Any,  # noqa: ANN401
+        settings: S,
     ) -> tuple[ParticleSet, LayerRecord]:
-        """Weigh the set, then make the next one (in the last layer: return the weighted set itself)."""
+        """Weigh a set and make the next one: the new set, and the record of the layer.
+
+        rng : the only source of random numbers.
+        particles : as the layer before left them; N may change from layer to layer.
+        layer : from 0 in the order they run. In the last one the weighted set itself is returned.
+        problem : log-weights of poses (N, D).
+        space : limits, σ0 and structure of the pose vector (mm, radians).
+        settings : of the layer; a slider may have moved since the last one.
+        """
 
     @abstractmethod
-    def end_frame(self, particles: ParticleSet, space: SearchSpace, settings: Any) -> Estimate:  # noqa: ANN401
-        """The pose that is reported, from the last layer's weighted set."""
+    def end_frame(self, particles: ParticleSet, space: SearchSpace, settings: S) -> Estimate:
+        """The pose that is reported.
 
-    def expectations(self, particles: ParticleSet, space: SearchSpace, settings: Any) -> Array:  # noqa: ANN401
-        """(S, D) expected poses, the likeliest first, from the unweighted set that the first layer will weigh: its mean
-        where the tracker expects no several (of motion clusters, for example).
+        particles : the last layer's weighted set.
+        """
+
+    def expectations(self, particles: ParticleSet, space: SearchSpace, settings: S) -> Array:
+        """(S, D) expected poses, the likeliest first: the set's mean where the tracker expects no several.
+
+        particles : the unweighted set that the first layer will weigh.
         """
         return particles.poses.mean(axis=0)[None]
+
+
+AnyTracker = Tracker[Any]
+"""A tracker of whatever settings, as the catalogue has it."""
 
 
 def generator(seed: int, frame: int, layer: int) -> np.random.Generator:
