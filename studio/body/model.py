@@ -112,9 +112,10 @@ class KinematicTables:
 class BodyModel:
     """A body: parameters in the order of the pose vector, joints parents first, limbs, markers, dimensions.
 
-    dimensions : the named lengths and radii (mm; ratios without unit) that the steps, limbs and markers were
-    built from. definition : the body file's entries, from which a body of other dimensions is built (None:
-    built in code, its dimensions cannot change).
+    dimensions : the named lengths and radii (mm; ratios without unit) that the steps, limbs and markers were built
+        from.
+    definition : the body file's entries, from which a body of other dimensions is built (None: built in code, its
+        dimensions cannot change).
     """
 
     name: str

@@ -88,9 +88,11 @@ class Intrinsics:
 class FoundCameras:
     """The content of a file or folder: cameras with translations in the file's own unit.
 
-    unit : "mm" or "m" where the format or the file says so, else "". sources : the files that were read.
-    unposed : cameras that the file gives no place in the world. sizes_known : False where picture sizes are
-    stand-ins. notes : what was assumed or left out, sentences.
+    unit : "mm" or "m" where the format or the file says so, else "".
+    sources : the files that were read.
+    unposed : cameras that the file gives no place in the world.
+    sizes_known : False where picture sizes are stand-ins.
+    notes : what was assumed or left out, sentences.
     """
 
     cameras: tuple[Camera, ...]

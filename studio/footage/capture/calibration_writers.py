@@ -35,7 +35,12 @@ class WrittenCalibration:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationFormat:
-    """Another tool's format. name : its key. label : for people. suffix : of its files. unit : of the translations.
+    """Another tool's format.
+
+    name : its key.
+    label : for people.
+    suffix : of its files.
+    unit : of the translations.
     file_name : that the tool looks for, {} in it the session's name.
 
     write(cameras, path) -> WrittenCalibration; raises CalibrationError. A format that the studio does not read by

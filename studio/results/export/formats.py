@@ -29,9 +29,12 @@ POINTS = (*FRAMES, "unit", "up", "names")
 class ExportFormat:
     """One format.
 
-    name : as in `--to FILE.name`. opens : a line on what opens it. takes : names of the options that mean something
-    here. write : makes the file; None for a scene's recording, which the room of the scene writes. unit,
-    up : what "auto" stands for. what : "motion", "video", "scene" or "cameras".
+    name : as in `--to FILE.name`.
+    opens : a line on what opens it.
+    takes : names of the options that mean something here.
+    write : makes the file; None for a scene's recording, which the room of the scene writes.
+    unit, up : what "auto" stands for.
+    what : "motion", "video", "scene" or "cameras".
     """
 
     name: str

@@ -22,8 +22,9 @@ INTERPOLATED = "{count} of {all} frames are interpolated: this format cannot say
 class ExportTask:
     """One file to be written.
 
-    options : with "auto" settled. place : the file, in an empty folder of its own; more files may be written beside
-    it. step(words, done, total) : to be called while it is written; raises WorkCancelledError.
+    options : with "auto" settled.
+    place : the file, in an empty folder of its own; more files may be written beside it.
+    step(words, done, total) : to be called while it is written; raises WorkCancelledError.
     """
 
     session: Session
@@ -49,15 +50,19 @@ class ExportTask:
         }
 
     def gaps_in_words(self, words: str) -> tuple[str, ...]:
-        """A note on frames without a pose, if there are any. words : a sentence with {count} of {all} in it."""
+        """A note on frames without a pose, if there are any.
+
+        words : a sentence with {count} of {all} in it.
+        """
         count = int((~self.motion.known).sum())
         return (words.format(count=count, all=len(self.motion.known)),) if count else ()
 
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """files : written, the requested one first. checked : the result of reading back, as text. notes : for users of the
-    file.
+    """files : written, the requested one first.
+    checked : the result of reading back, as text.
+    notes : for users of the file.
     """
 
     files: tuple[Path, ...]

@@ -35,8 +35,8 @@ class Likelihood(Protocol):
 class LossLimit:
     """How far below a run's usual weight a frame is lost (`search.trackers.loss_detection`).
 
-    spread : usual standard deviation of the log weight over well tracked frames. spreads : how many of them below the
-    median is lost. The defaults are for a weighting that was not measured.
+    spread : usual standard deviation of the log weight over well tracked frames.
+    spreads : how many of them below the median is lost. The defaults are for a weighting that was not measured.
     """
 
     spread: float = 0.1
@@ -45,11 +45,13 @@ class LossLimit:
 
 @dataclass(frozen=True, slots=True)
 class Weighting:
-    """One way of weighing poses. edge_kind : the edge map it reads, or "hull" where it carves one
-    (`evidence.pipeline`). reads_pictures : whether it uses the pictures themselves, not only masks and edges.
+    """One way of weighing poses.
 
-    settings_type : its knobs. prepare : (body, cameras, settings of that type) to a `Likelihood`. loss : when a frame
-    is lost.
+    edge_kind : the edge map it reads, or "hull" where it carves one (`evidence.pipeline`).
+    reads_pictures : whether it uses the pictures themselves, not only masks and edges.
+    settings_type : its knobs.
+    prepare : (body, cameras, settings of that type) to a `Likelihood`.
+    loss : when a frame is lost.
     """
 
     name: str

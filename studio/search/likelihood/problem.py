@@ -35,7 +35,10 @@ class Shares:
 
 
 class FrameLikelihood(Protocol):
-    """One frame as a function of poses. stage : WHOLE_BODY, or TRUNK_FIRST where only root and trunk are searched."""
+    """One frame as a function of poses.
+
+    stage : WHOLE_BODY, or TRUNK_FIRST where only root and trunk are searched.
+    """
 
     def log_likelihood(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
         """(N, D) poses to (N,) log-weights; -inf never, NaN never."""

@@ -24,8 +24,11 @@ LOG_BETA_BOUND = 690.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Annealed:
-    """Weights of one layer. beta : exponent used. survival : α reached. log_weights : (N,) logs of normalised
-    π.
+    """Weights of one layer.
+
+    beta : exponent used.
+    survival : α reached.
+    log_weights : (N,) logs of normalised π.
     """
 
     beta: float

@@ -23,8 +23,10 @@ def layer_record(
     free: float = math.nan,
     parents: Indices | None = None,
 ) -> LayerRecord:
-    """The record of a layer. free : share of the particles that no behaviour model moved. parents : as in the record;
-    None: nothing was drawn.
+    """The record of a layer.
+
+    free : share of the particles that no behaviour model moved.
+    parents : as in the record; None: nothing was drawn.
     """
     best = int(np.argmax(weighted.log_weights))
     return LayerRecord(

@@ -55,12 +55,15 @@ class Hierarchy:
 class SearchSpace:
     """The pose vector's limits, noise and structure, and the behaviour model.
 
-    names : D parameter names. lower, upper : (D,) limits, ±inf where unbounded. sigma : (D,) σ0, the standard
-    deviation of the diffusion from one frame to the next (mm, rad). limb : (D,) int, equal numbers belong to
-    one limb and are neighbours (crossover by whole limbs). hierarchy : the body's tree (a swarm's partitions).
-    behaviour : the behaviour model at the footage's rate; None where a run has none. steps : frames
-    since the last one that was tracked (a live run drops some); sigma is for all of them, the model takes each. scale :
-    of the body beside a person (`scale_of`).
+    names : D parameter names.
+    lower, upper : (D,) limits, ±inf where unbounded.
+    sigma : (D,) σ0, the standard deviation of the diffusion from one frame to the next (mm, rad).
+    limb : (D,) int, equal numbers belong to one limb and are neighbours (crossover by whole limbs).
+    hierarchy : the body's tree (a swarm's partitions).
+    behaviour : the behaviour model at the footage's rate; None where a run has none.
+    steps : frames since the last one that was tracked (a live run drops some); sigma is for all of them, the model
+        takes each.
+    scale : of the body beside a person (`scale_of`).
     """
 
     names: tuple[str, ...]
@@ -76,9 +79,10 @@ class SearchSpace:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ParticleSet:
-    """N particles. poses : (N, D). log_weights : (N,) natural logs of normalised weights (equal if
-    unweighted).
+    """N particles.
 
+    poses : (N, D).
+    log_weights : (N,) natural logs of normalised weights (equal if unweighted).
     raw_log_weights : (N,) the problem's own log w of the same poses where they were weighed, else empty.
     extra : arrays that only this particle's tracker reads (velocities of a swarm), kept in checkpoints.
     """
@@ -103,9 +107,9 @@ class FilterState:
 
     particles : the weighted set at the end of the frame; None = start uniformly over the space's limits.
     estimate, previous_estimate : (D,) the last two reported poses (dynamics, Eq. 10); None where there is none yet.
-    memory : the likelihood's state (`search.likelihood.problem.FittedToPoses`), and under names that begin with
-    HIDDEN the occluded areas (`hidden_areas`), with MOVED the limbs' movement (`limb_certainty`); trackers pass them
-    on unread.
+    memory : the likelihood's state (`search.likelihood.problem.FittedToPoses`), and under names that begin with HIDDEN
+        the occluded areas (`hidden_areas`), with MOVED the limbs' movement (`limb_certainty`); trackers pass them on
+        unread.
     """
 
     particles: ParticleSet | None
@@ -124,9 +128,10 @@ def start_of(pose: tuple[float, ...] | None) -> FilterState:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Estimate:
-    """The pose that is reported. pose, mean, mode : (D,). log_weight : the best particle's log w, or that
-    of the refined pose.
+    """The pose that is reported.
 
+    pose, mean, mode : (D,).
+    log_weight : the best particle's log w, or that of the refined pose.
     searched : (D,) what the search reported, where `pose` was refined after it; None where it was not.
     """
 
@@ -141,17 +146,23 @@ class Estimate:
 class LayerRecord:
     """Diagnostics of one layer; the frame loop fills in frame, settings_version and milliseconds.
 
-    frame, layer : layer counts from 0. settings_version : of the settings in use. beta : exponent of Eq. 3.
+    frame, layer : layer counts from 0.
+    settings_version : of the settings in use.
+    beta : exponent of Eq. 3.
     alpha_wanted, alpha_reached : survival rate (Eq. 12). All three are NaN for trackers without them (a swarm).
-    variance_weighed, variance_resampled, variance_diffused : (D,) variance of every parameter over the set as
-    it was weighed, after resampling (before noise), and after noise (Fig. 12 a/d, b/e, c/f). In a frame's
-    last layer nothing is diffused: variance_diffused equals variance_resampled. best, mean : (D,) best
-    particle, weighted mean. best_log_weight : raw log w of the best. poses : (N, D) the set as weighed.
-    log_weights : (N,) raw log w, before β. milliseconds : time of the layer. model_free_share : of a frame's first
-    layer, how many of its particles were moved without the behaviour model; NaN where none guides them.
+    variance_weighed, variance_resampled, variance_diffused : (D,) variance of every parameter over the set as it was
+        weighed, after resampling (before noise), and after noise (Fig. 12 a/d, b/e, c/f). In a frame's last layer
+        nothing is diffused: variance_diffused equals variance_resampled.
+    best, mean : (D,) best particle, weighted mean.
+    best_log_weight : raw log w of the best.
+    poses : (N, D) the set as weighed.
+    log_weights : (N,) raw log w, before β.
+    milliseconds : time of the layer.
+    model_free_share : of a frame's first layer, how many of its particles were moved without the behaviour model; NaN
+        where none guides them.
     parents : (2, N') of each particle of the next layer's set, which particles of this one it was drawn from: the first
-    and, where it was crossed from two, the second, else NO_PARENT; (2, 0) where nothing is drawn. rows : (N,) numbers
-    of `poses` in the set where not all were kept, else (0,).
+        and, where it was crossed from two, the second, else NO_PARENT; (2, 0) where nothing is drawn.
+    rows : (N,) numbers of `poses` in the set where not all were kept, else (0,).
     """
 
     frame: int = -1
