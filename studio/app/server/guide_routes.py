@@ -12,6 +12,7 @@ from markdown_it import MarkdownIt
 from starlette.responses import HTMLResponse
 
 import studio
+from studio.app.server.interfaces_page import INTERFACES, interfaces_page
 from studio.app.server.pages import NAME, html_page
 from studio.app.server.schemas import Answer
 from studio.evidence.settings import EvidenceSettings
@@ -100,7 +101,8 @@ def _headings() -> tuple[GuideHeading, ...]:
             for opening, inline in itertools.pairwise(tokens)
             if opening.type == "heading_open" and opening.tag == "h2"
         ]
-    return (*found, GuideHeading(title="All verbs", page=NAME, address=f"/guide/{VERBS}"))
+    verbs = GuideHeading(title="All verbs", page=NAME, address=f"/guide/{VERBS}")
+    return (*found, verbs, GuideHeading(title="Interfaces", page=NAME, address=f"/guide/{INTERFACES}"))
 
 
 @router.get("/guide")
@@ -109,6 +111,8 @@ def guide(page: str = "") -> HTMLResponse:
     """The guide, and what it refers to: examples for Python, all verbs, how to add one's own, figures."""
     if page == VERBS:
         return html_page("guide.html", "/guide", verbs_page())
+    if page == INTERFACES:
+        return html_page("guide.html", "/guide", interfaces_page())
     if page not in TEXTS:
         raise NotFoundError(f"The guide has no page '{page[:40]}'.", "Begin at /guide.")
     return html_page("guide.html", "/guide", rendered(*TEXTS[page], in_course=page in COURSE))
