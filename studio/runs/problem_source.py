@@ -7,10 +7,11 @@ distances that a refinement needs and the silhouettes that a pose is compared wi
 """
 
 import threading
-from collections import OrderedDict
 from collections.abc import Hashable
 from concurrent.futures import CancelledError, Executor, Future
 from typing import Any, TypeVar
+
+from cachetools import LRUCache
 
 from studio.body.model import BodyModel
 from studio.evidence.backgrounds import Backgrounds
@@ -69,9 +70,9 @@ class ProblemSource:
         self._coming: tuple[Hashable, Future[FrameLikelihood]] | None = None
         self._latest: tuple[int, RunSettings, FrameLikelihood] | None = None
         """Asked for again by every layer of a search; the frame after it is on its way."""
-        self._evidence: OrderedDict[Hashable, FrameEvidence] = OrderedDict()
-        self._problems: OrderedDict[Hashable, FrameLikelihood] = OrderedDict()
-        self._likelihoods: OrderedDict[Hashable, Any] = OrderedDict()
+        self._evidence = LRUCache[Hashable, FrameEvidence](KEPT_FRAMES)
+        self._problems = LRUCache[Hashable, FrameLikelihood](KEPT_FRAMES)
+        self._likelihoods = LRUCache[Hashable, Any](KEPT_LIKELIHOODS)
 
     def problem(self, frame: int, settings: RunSettings) -> FrameLikelihood:
         """The frame as a function of poses. Raises FootageError, NotFoundError."""
@@ -103,7 +104,7 @@ class ProblemSource:
                     WEIGHTINGS[settings.weighting_name].edge_kind,
                     self._views,
                 )
-                found = self._keep(self._evidence, key, maker.evidence(frame), KEPT_FRAMES)
+                found = self._keep(self._evidence, key, maker.evidence(frame))
             return found
 
     def cameras_in(self, frame: int) -> tuple[Camera, ...]:
@@ -142,7 +143,7 @@ class ProblemSource:
                     silhouettes_of(evidence, HALF)
         with self._making, span("maps", frame):
             likelihood = self._likelihood(settings, self.cameras_in(frame))
-            return self._keep(self._problems, key, likelihood.problem(evidence), KEPT_FRAMES)
+            return self._keep(self._problems, key, likelihood.problem(evidence))
 
     def _likelihood(self, settings: RunSettings, cameras: tuple[Camera, ...]) -> Any:  # noqa: ANN401 - as weightings are
         key = (settings.weighting_name, settings.weighting, tuple(camera.name for camera in cameras))
@@ -150,7 +151,7 @@ class ProblemSource:
         if found is None:
             weighting = WEIGHTINGS[settings.weighting_name]
             made = weighting.prepare(self.body, cameras, settings.weighting)
-            found = self._keep(self._likelihoods, key, made, KEPT_LIKELIHOODS)
+            found = self._keep(self._likelihoods, key, made)
         return found
 
     def _prepare(self, frame: int, settings: RunSettings, executor: Executor) -> bool:
@@ -173,18 +174,13 @@ class ProblemSource:
             except CancelledError:
                 return
 
-    def _kept(self, store: OrderedDict[Hashable, T], key: Hashable) -> T | None:
+    def _kept(self, store: LRUCache[Hashable, T], key: Hashable) -> T | None:
         with self._keeping:
-            if key not in store:
-                return None
-            store.move_to_end(key)
-            return store[key]
+            return store.get(key)
 
-    def _keep(self, store: OrderedDict[Hashable, T], key: Hashable, value: T, limit: int) -> T:
+    def _keep(self, store: LRUCache[Hashable, T], key: Hashable, value: T) -> T:
         with self._keeping:
             store[key] = value
-            while len(store) > limit:
-                store.popitem(last=False)
             return value
 
 

@@ -45,7 +45,7 @@ def served(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-        env=os.environ | {"PYTHONPATH": str(Path(launch.__file__).parents[1])},
+        env=os.environ | {"PYTHONPATH": str(Path(launch.__file__).parents[2])},
     )
     assert process.stdout is not None
     line = process.stdout.readline()
@@ -93,7 +93,7 @@ def test_it_ends_whatever_a_thread_waits_for(tmp_path: Path) -> None:
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-        env=os.environ | {"PYTHONPATH": str(Path(launch.__file__).parents[1])},
+        env=os.environ | {"PYTHONPATH": str(Path(launch.__file__).parents[2])},
     )
     try:
         assert process.stdout is not None

@@ -23,7 +23,7 @@ from studio.foundations import kernel_cache
 from studio.foundations.kernel_cache import parts_of
 from studio.sessions.process_lock import ProcessLock
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[2]
 HELPERS = """
 from typing import NamedTuple
 import numpy as np

@@ -10,9 +10,10 @@ import dataclasses
 import os
 import threading
 import time
-from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+
+from cachetools import LRUCache
 
 from studio.app.scene.opened_run import Moment, OpenedRun
 from studio.evidence.volume.alignment import root_parameters
@@ -73,7 +74,7 @@ class FrameVolumes:
         self, opened: OpenedRun, ready: Callable[[], None], failed: Callable[[StudioError], None]
     ) -> None:
         self._opened, self._ready, self._failed = opened, ready, failed
-        self._kept: OrderedDict[tuple[object, ...], FrameVolume | None] = OrderedDict()
+        self._kept = LRUCache[tuple[object, ...], FrameVolume | None](KEPT)
         self._newest: FrameVolume | None = None
         self._requested: _Request | None = None
         self._reported: set[str] = set()
@@ -87,7 +88,6 @@ class FrameVolumes:
         request = self._request_for(frame, moment.pose, settings, blobs=blobs and has_blobs(settings))
         with self._lock:
             if request.key in self._kept:
-                self._kept.move_to_end(request.key)
                 self._newest = self._kept[request.key]
                 return self._newest
             self._requested = request
@@ -147,8 +147,6 @@ class FrameVolumes:
             self._report(problem)
         with self._lock:
             self._kept[request.key] = made
-            while len(self._kept) > KEPT:
-                self._kept.popitem(last=False)
         self._ready()
         took = time.monotonic() - began
         self._stopping.wait(min(LONGEST_PAUSE_SECONDS, max(LEAST_PAUSE_SECONDS, took)))

@@ -5,12 +5,12 @@ them (about 2.5 MB a frame of four 640 × 480 cameras without), and drops the le
 """
 
 import dataclasses
-from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numpy as np
+from cachetools import LRUCache
 
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.frame_evidence import FrameEvidence
@@ -42,9 +42,10 @@ class FootageCache:
         self.place = str(place)
         self.folder = work_folder(self.place) if is_address(place) else Path(place)
         self._brought: dict[str, Session] = {}
-        self._most, self._bytes = most_bytes, 0
-        self._evidence: OrderedDict[Hashable, FrameEvidence] = OrderedDict()
-        self._prepared: OrderedDict[Hashable, Any] = OrderedDict()
+        self._evidence = LRUCache[Hashable, FrameEvidence](
+            most_bytes, lambda evidence: min(_size(evidence), most_bytes)
+        )
+        self._prepared = LRUCache[Hashable, Any](MOST_PREPARED)
         self._open: tuple[Hashable, EvidenceMaker] | None = None
         self._footage: tuple[Path, Footage, Backgrounds] | None = None
 
@@ -75,7 +76,6 @@ class FootageCache:
         made_by = (session.path, tuple(camera.name for camera in cameras), settings, edge_kind, pictures)
         key = (made_by, frame)
         if key in self._evidence:
-            self._evidence.move_to_end(key)
             return self._evidence[key]
         if self._open is None or self._open[0] != made_by:
             footage, backgrounds = self._opened(session)
@@ -85,22 +85,19 @@ class FootageCache:
             seen = dataclasses.replace(
                 seen, views=tuple(dataclasses.replace(view, picture=NO_PICTURE) for view in seen.views)
             )
-        return self._kept(key, seen)
+        self._evidence[key] = seen
+        return seen
 
     def prepared(self, key: Hashable, make: Callable[[], T]) -> T:
         """The result of `make`, computed once a key; only the last few are kept."""
         if key not in self._prepared:
             self._prepared[key] = make()
-            while len(self._prepared) > MOST_PREPARED:
-                self._prepared.popitem(last=False)
-        self._prepared.move_to_end(key)
         return cast("T", self._prepared[key])
 
     def close(self) -> None:
         """Close files and drop everything kept."""
         self._evidence.clear()
         self._prepared.clear()
-        self._bytes = 0
         self._open = None
         if self._footage is not None:
             self._footage[1].close()
@@ -114,13 +111,6 @@ class FootageCache:
             footage = session.footage()
             self._footage = (session.path, footage, Backgrounds(footage))
         return self._footage[1:]
-
-    def _kept(self, key: Hashable, evidence: FrameEvidence) -> FrameEvidence:
-        self._evidence[key] = evidence
-        self._bytes += _size(evidence)
-        while self._bytes > self._most and len(self._evidence) > 1:
-            self._bytes -= _size(self._evidence.popitem(last=False)[1])
-        return evidence
 
 
 def _size(evidence: FrameEvidence) -> int:

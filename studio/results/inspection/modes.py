@@ -7,12 +7,12 @@ Gaussians; the halves of one uniform cloud have 3.5).
 """
 
 import threading
-from collections import OrderedDict
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import scipy
+from cachetools import LRUCache
 
 from studio.body.model import BodyModel
 from studio.foundations.arrays import Array, Indices, Mask
@@ -250,7 +250,7 @@ def _stamp_of(tried: TriedFrame) -> tuple[float, float, int]:
 
 
 _lock = threading.Lock()
-_known: OrderedDict[tuple[Path, int, object], Row] = OrderedDict()
+_known = LRUCache[tuple[Path, int, object], Row](KEPT_FRAMES)
 
 
 def _row_of_frame(run: InspectedRun, number: int, stamp: object, results: ResultsReader) -> Row:
@@ -267,6 +267,4 @@ def _row_of_frame(run: InspectedRun, number: int, stamp: object, results: Result
     row = (number, len(found), found[0].mass, distance, limb)
     with _lock:
         _known[key] = row
-        while len(_known) > KEPT_FRAMES:
-            _known.popitem(last=False)
     return row

@@ -5,12 +5,12 @@ Points are the body's markers, or its limbs' ends where it has none; each belong
 """
 
 import threading
-from collections import OrderedDict
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+from cachetools import LRUCache
 
 from studio.body.forward_kinematics import limb_ends, marker_points
 from studio.body.inverse_kinematics import pose_from_markers
@@ -104,15 +104,12 @@ def true_pose(run: InspectedRun, frame: int) -> Reference | None:
     key = (run.run.folder, frame, points.tobytes())
     with _lock:
         if key in _poses:
-            _poses.move_to_end(key)
             return _poses[key]
     names = tuple(marker.name for marker in run.body.markers)
     pose, residual = pose_from_markers(run.body, names, points, _start(run, frame))
     found = Reference(pose, residual, points)
     with _lock:
         _poses[key] = found
-        while len(_poses) > KEPT_POSES:
-            _poses.popitem(last=False)
     return found
 
 
@@ -127,7 +124,7 @@ def _start(run: InspectedRun, frame: int) -> Array:
 
 
 _lock = threading.Lock()
-_poses: OrderedDict[tuple[Path, int, bytes], Reference] = OrderedDict()
+_poses = LRUCache[tuple[Path, int, bytes], Reference](KEPT_POSES)
 
 
 @lru_cache(maxsize=8)

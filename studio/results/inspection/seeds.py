@@ -9,11 +9,11 @@ Bürkner 2021, "Rank-normalization, folding, and localization", Bayesian Analysi
 """
 
 import threading
-from collections import OrderedDict
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from cachetools import LRUCache
 
 from studio.foundations.arrays import Array
 from studio.foundations.errors import NotFoundError
@@ -78,7 +78,7 @@ class SeedResult:
 
 
 _lock = threading.Lock()
-_kept: OrderedDict[tuple[Path, int, object], tuple[SeedResult, ...]] = OrderedDict()
+_kept = LRUCache[tuple[Path, int, object], tuple[SeedResult, ...]](KEPT)
 
 
 def search_seeds(run: InspectedRun, frame: int, count: int, progress: Progress) -> tuple[SeedResult, ...]:
@@ -100,8 +100,6 @@ def search_seeds(run: InspectedRun, frame: int, count: int, progress: Progress) 
     progress("seeds", count, count)
     with _lock:
         _kept[_key(stored)] = tuple(found)
-        while len(_kept) > KEPT:
-            _kept.popitem(last=False)
     return tuple(found)
 
 

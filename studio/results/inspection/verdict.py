@@ -7,10 +7,11 @@ that is shown. The silhouettes: as the search stored it with the frame, of the p
 
 import math
 import threading
-from collections import OrderedDict
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+
+from cachetools import LRUCache
 
 from studio.body.model import BodyModel
 from studio.foundations.errors import NotFoundError
@@ -99,7 +100,7 @@ class _KnownLimbs:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._runs: OrderedDict[Path, dict[int, tuple[object, tuple[str, ...]]]] = OrderedDict()
+        self._runs = LRUCache[Path, dict[int, tuple[object, tuple[str, ...]]]](KEPT_RUNS)
 
     def limbs(
         self, results: ResultsReader, folder: Path, line: Timeline, body: BodyModel
@@ -122,9 +123,6 @@ class _KnownLimbs:
                 continue
         with self._lock:
             self._runs[folder] = found
-            self._runs.move_to_end(folder)
-            while len(self._runs) > KEPT_RUNS:
-                self._runs.popitem(last=False)
         return {frame: limbs for frame, (_, limbs) in found.items()}
 
 

@@ -25,12 +25,12 @@ than three cameras, any fault of one. Distances in mm are at a person's size (`s
 """
 
 import threading
-from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from cachetools import LRUCache
 
 from studio.body.scale import scale_of
 from studio.foundations.arrays import Array
@@ -475,13 +475,10 @@ def rows(frame: InspectedFrame, selection: Selection) -> Found:
     key = (frame.of.run.folder, frame.number, track, *_stamps(frame))
     with _lock:
         if key in _known:
-            _known.move_to_end(key)
             return _known[key]
     found = _explained(Case(frame, track))
     with _lock:
         _known[key] = found
-        while len(_known) > KEPT:
-            _known.popitem(last=False)
     return found
 
 
@@ -494,7 +491,7 @@ def _stamps(frame: InspectedFrame) -> tuple[object, ...]:
 
 
 _lock = threading.Lock()
-_known: OrderedDict[tuple[object, ...], Found] = OrderedDict()
+_known = LRUCache[tuple[object, ...], Found](KEPT)
 
 
 def _explained(case: Case) -> Found:

@@ -7,13 +7,13 @@ on the way back); masks that they cannot change are taken over from those made b
 
 import os
 import threading
-from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 
 import cv2
 import numpy as np
+from cachetools import LRUCache
 
 from studio.evidence.stroke_cut import StrokeCut
 from studio.evidence.strokes import Stroke
@@ -115,7 +115,7 @@ def make_stroke_masks(
     return kept
 
 
-_cuts: OrderedDict[tuple[object, ...], StrokeCut] = OrderedDict()
+_cuts = LRUCache[tuple[object, ...], StrokeCut](KEPT_CUTS)
 _cuts_lock = threading.Lock()
 
 
@@ -130,9 +130,6 @@ def _begun(
             found = StrokeCut()
             found.begin(footage.picture(camera, first), strokes)
             _cuts[key] = found
-            if len(_cuts) > KEPT_CUTS:
-                _cuts.popitem(last=False)
-        _cuts.move_to_end(key)
         return found.copy()
 
 

@@ -33,7 +33,7 @@ def resampling() -> Any:  # noqa: ANN401
 
 
 def start_repeats(default: int = 2) -> Any:  # noqa: ANN401
-    """The knob `start_repeats`: how many times the first frame is searched, the best of which counts."""
+    """The knob `start_repeats`: how often the first frame is searched, each time from where the last search ended."""
     return new_run_knob(
         default, 1, 20, 1, label="searches of the first frame",
         help="Searches of the first frame, each starting where the one before ended.",

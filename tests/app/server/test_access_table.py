@@ -12,7 +12,7 @@ from websockets.sync.client import connect
 from studio.app.server.access import binding_rule
 from studio.foundations.errors import AccessError
 
-GUIDE = Path(__file__).parents[4] / "web_assets" / "guide" / "guide.md"
+GUIDE = Path(__file__).parents[3] / "web_assets" / "guide" / "guide.md"
 Request = Callable[[Studio], str]
 ROWS: list[tuple[str, str, str, Request]] = []
 

@@ -23,7 +23,7 @@ from studio.results.inspection.views import VIEWS
 from studio.search.settings import knob_table
 from studio.sessions.workspace import Workspace
 
-ROOT = Path(__file__).resolve().parents[4]
+ROOT = Path(__file__).resolve().parents[3]
 GUIDE = ROOT / "web_assets" / "guide"
 STATES = set(re.findall(r'\{ name: "(\w+)"', (ROOT / "web_assets" / "js" / "address.js").read_text()))
 PANELS = set(

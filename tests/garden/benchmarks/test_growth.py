@@ -19,7 +19,7 @@ from studio.garden.benchmarks.growth import (
 )
 from studio.garden.benchmarks.scale_document import document
 
-ROOT = Path(__file__).resolve().parents[4]
+ROOT = Path(__file__).resolve().parents[3]
 USUAL = {"busy": 0.05, "stored": 1e5, "stored_few": 1e4, "footage": 5e3, "cameras": 4.0}
 
 

@@ -42,7 +42,7 @@ from studio.search.trackers.guided_particles import spread_over_clusters
 from studio.search.trackers.tracker import FilterState
 from studio.sessions.process_lock import ProcessLock
 
-SAMPLES = Path(__file__).parents[4] / "sample_sessions"
+SAMPLES = Path(__file__).parents[3] / "sample_sessions"
 FEW = {"most_clusters": 8, "reduced_dimensions": 4, "clustering_patience": 3}
 WALK = Training(("walk",), frames=45, performances=1, smoothings=2, body="human31", clusters=FEW)
 COARSE = {"hull_depth": 5, "blob_starts": 1}

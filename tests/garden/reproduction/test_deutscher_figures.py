@@ -39,7 +39,7 @@ from studio.results.comparison.kept_trials import plain
 from studio.results.comparison.tracked import Tracked
 from studio.results.comparison.trials import Outcome, Scale, Trial
 
-SAMPLES = Path(__file__).parents[4] / "sample_sessions"
+SAMPLES = Path(__file__).parents[3] / "sample_sessions"
 THREE_CAMERAS = (
     "deutscher-fig-9",
     "deutscher-fig-10",

@@ -30,7 +30,7 @@ from studio.results.comparison.findings_document import Making, as_document, fai
 from studio.results.comparison.kept_trials import plain
 from studio.results.comparison.trials import Outcome, Scale
 
-ROOT = Path(__file__).resolve().parents[4]
+ROOT = Path(__file__).resolve().parents[3]
 SOFTWARE, DATE = "0.1.0+12345678", "2025-01-02T03:04:05+00:00"
 
 

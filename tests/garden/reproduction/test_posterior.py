@@ -12,7 +12,7 @@ from studio.results.comparison.footage_cache import FootageCache
 from studio.results.comparison.kept_trials import plain
 from studio.results.comparison.trials import Outcome, Scale
 
-SAMPLES = Path(__file__).parents[4] / "sample_sessions"
+SAMPLES = Path(__file__).parents[3] / "sample_sessions"
 
 
 def test_ranks_of_a_truth_that_is_drawn_like_the_cloud_are_uniform() -> None:

@@ -23,7 +23,7 @@ from studio.sessions.workspace import Workspace
 
 # Each process that is started loads the kernels' compiler; a busy machine takes a minute for one.
 pytestmark = pytest.mark.timeout(900)
-ROOT = Path(__file__).resolve().parents[4]
+ROOT = Path(__file__).resolve().parents[3]
 TWO = Scale((0, 1))
 
 

@@ -9,7 +9,7 @@ from studio.results.comparison.findings import Chart, Number, Table
 from studio.results.comparison.footage_cache import FootageCache
 from studio.results.comparison.trials import Outcome, Trial
 
-SAMPLES = Path(__file__).parents[4] / "sample_sessions"
+SAMPLES = Path(__file__).parents[3] / "sample_sessions"
 
 
 @pytest.mark.slow

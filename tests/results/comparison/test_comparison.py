@@ -25,7 +25,7 @@ from studio.results.comparison.trials import Outcome
 from studio.search.settings import DEFAULT_WEIGHTING
 from studio.sessions.session import Session
 
-ROOT = Path(__file__).resolve().parents[4]
+ROOT = Path(__file__).resolve().parents[3]
 WALK = ROOT / "sample_sessions" / "walk"
 
 

@@ -41,7 +41,7 @@ from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
 
-ROOT = Path(__file__).resolve().parents[4]
+ROOT = Path(__file__).resolve().parents[3]
 WALK = Session(ROOT / "sample_sessions" / "walk")
 GRID = {"survival": ["0.2", "0.5"], "particles": ["20", "40", "60"]}
 

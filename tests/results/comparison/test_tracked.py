@@ -14,7 +14,7 @@ from studio.foundations.progress import heard_by
 from studio.results.comparison.footage_cache import FootageCache
 from studio.results.comparison.tracked import Changed, TrackingTrial, track
 
-SAMPLES = Path(__file__).parents[4] / "sample_sessions"
+SAMPLES = Path(__file__).parents[3] / "sample_sessions"
 SMALL = {"layers": 3, "particles": 20}
 
 

@@ -9,7 +9,7 @@ from studio.evidence.settings import EvidenceSettings
 from studio.results.comparison.footage_cache import NO_PICTURE, FootageCache
 from studio.results.comparison.tracked import TrackingTrial, track
 
-SAMPLES = Path(__file__).parents[4] / "sample_sessions"
+SAMPLES = Path(__file__).parents[3] / "sample_sessions"
 CHANGES = {"layers": 5, "particles": 60, "hull_depth": 6}
 
 

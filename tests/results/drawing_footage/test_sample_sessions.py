@@ -20,7 +20,7 @@ from studio.results.drawing_footage.rooms import room_called
 from studio.results.evaluation.errors import evaluate
 from studio.sessions.session import Session
 
-SAMPLES = Path(__file__).resolve().parents[4] / "sample_sessions"
+SAMPLES = Path(__file__).resolve().parents[3] / "sample_sessions"
 
 
 def test_the_samples_are_a_few_megabytes() -> None:

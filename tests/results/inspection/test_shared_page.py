@@ -132,7 +132,7 @@ def test_the_verb_writes_the_page_and_names_what_is_wrong(run: InspectedRun, tmp
 
 
 def test_installed_pages_are_looked_for_where_the_wheel_has_them() -> None:
-    build = (Path(__file__).resolve().parents[4] / "hatch_build.py").read_text()
+    build = (Path(__file__).resolve().parents[3] / "hatch_build.py").read_text()
     assert f'"web_assets": "studio/{INSTALLED_ASSETS}"' in build
 
 

@@ -32,7 +32,7 @@ from studio.sessions.samples import install_prepared_runs, install_sample
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
 
-OLD = Path(__file__).parents[3] / "old_sessions"
+OLD = Path(__file__).parents[2] / "old_sessions"
 LIMBS = ("right arm", "left leg", "head", "trunk")
 SHARES = st.dictionaries(st.sampled_from(LIMBS), st.floats(0.0, 1.0))
 PLANTED = (

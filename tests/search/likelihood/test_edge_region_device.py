@@ -40,7 +40,7 @@ def simulated(tmp_path_factory):
     simulator = {
         "NUMBA_ENABLE_CUDASIM": "1",
         "NUMBA_DISABLE_JIT": "1",
-        "PYTHONPATH": os.pathsep.join(map(str, (HERE, HERE.parent, HERE.parents[1]))),
+        "PYTHONPATH": os.pathsep.join(map(str, (HERE, HERE.parents[1], HERE.parents[2]))),
     }
     # Words of 64 bits wrap around where masks are packed, on purpose.
     wrapping = "ignore:overflow encountered in scalar:RuntimeWarning"
