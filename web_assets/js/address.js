@@ -5,6 +5,7 @@ import { complain, say } from "./messages.js";
 import { openSession } from "./sessions.js";
 import { get, set, watch } from "./state.js";
 import { playWhenShown } from "./studio/visiting.js";
+import { isSearching } from "./work_states.js";
 
 const SETTLE_MILLISECONDS = 200;
 
@@ -65,7 +66,7 @@ export function held(query = location.search) {
 export function addressOf(changes = {}) {
   const query = new URLSearchParams();
   // A frame that is followed while it is searched is not a place to come back to.
-  const searched = get("follow") && ["tracking", "compiling"].includes(get("work")?.state);
+  const searched = get("follow") && isSearching(get("work"));
   for (const one of HELD) {
     const { name } = one;
     // Layers that play are no layer to come back to.

@@ -5,6 +5,11 @@ import type { components, paths } from "../../build/api";
 
 /** The API's values by name, for example Schemas["SessionView"]. */
 export type Schemas = components["schemas"];
+/** A message of the event socket (events.js). */
+export type Message = Schemas["EventMessage"];
+export type MessageType = Message["type"];
+/** The messages of a type, for example MessageOf<"state">. */
+export type MessageOf<T extends MessageType> = Extract<Message, { type: T }>;
 type Method = "get" | "put" | "post" | "patch" | "delete";
 
 type Pattern<K> = K extends `${infer Before}{${string}}${infer After}`

@@ -10,6 +10,7 @@ import { isWatched } from "./studio/tracking.js";
 import { refreshSessions } from "./sessions.js";
 import { goTo } from "./selection.js";
 import { get, set, watch } from "./state.js";
+import { isSearching } from "./work_states.js";
 
 const SUMMARY_MILLISECONDS = 1500;
 const DETAIL_MILLISECONDS = 80;
@@ -23,7 +24,7 @@ const PATIENCE_MILLISECONDS = 700;
 // the layers so far.
 const AGAIN_MILLISECONDS = 250;
 
-const searching = () => ["tracking", "compiling"].includes(get("work")?.state);
+const searching = () => isSearching(get("work"));
 const isShown = (session, run) => session === get("session") && run === get("run");
 
 let arrived = []; // lines of frames that finished since the summary was last loaded

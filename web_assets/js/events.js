@@ -3,10 +3,16 @@
 import { eventSocket } from "./window.js";
 
 const RETRY_MILLISECONDS = 1500;
+/** @import { Message, MessageOf, MessageType } from "./api_types" */
 /** @type {Map<string, Set<(event: any) => void>>} */
 const listeners = new Map();
 
-/** Call `handler(event)` on every event of a type; returns what stops that. */
+/**
+ * Call `handler(event)` on every event of a type; returns what stops that.
+ * @template {MessageType} T
+ * @param {T} type
+ * @param {(event: MessageOf<T>) => void} handler
+ */
 export function listen(type, handler) {
   const those = listeners.get(type) ?? new Set();
   listeners.set(type, those.add(handler));
@@ -15,12 +21,12 @@ export function listen(type, handler) {
   };
 }
 
-/** @type {Set<(event: any) => void>} */
+/** @type {Set<(event: Message) => void>} */
 const forAll = new Set();
 
 /**
  * Call `handler(event)` on every event, whatever its type.
- * @param {(event: any) => void} handler
+ * @param {(event: Message) => void} handler
  */
 export const listenToAll = (handler) => forAll.add(handler);
 

@@ -8,11 +8,17 @@ import { get, set } from "./state.js";
 const RETRY_MILLISECONDS = 1500;
 const STRANGER_MILLISECONDS = 15000;
 
+/** @import { Message, MessageOf, MessageType } from "./api_types" */
+
+/** @param {Message} event */
 const isHere = (event) => event.session === get("session") && event.run === get("run");
 
 /**
  * Call `handler(event, here)` on every event of a type; here: whether it is of the run that is
  * open.
+ * @template {MessageType} T
+ * @param {T} type
+ * @param {(event: MessageOf<T>, here: boolean) => void} handler
  */
 export const onEvent = (type, handler) => listen(type, (event) => handler(event, isHere(event)));
 

@@ -2,6 +2,7 @@
 // pictures, scene and address follow it; whatever can be clicked changes it here.
 
 import { get, set } from "./state.js";
+import { isSearching } from "./work_states.js";
 
 /** @import { Schemas } from "./api_types" */
 
@@ -79,7 +80,7 @@ export const toggle = (name, value) => select({ [name]: get(name) === value ? nu
 /** Whether the shown frame moves on with a search that is under way. */
 export const followsSearch = () =>
   Boolean(get("follow")) &&
-  ["tracking", "compiling"].includes(get("work")?.state) &&
+  isSearching(get("work")) &&
   get("work").run === get("run") &&
   get("work").session === get("session");
 /** Whether the shown frame has a stored result. */

@@ -21,7 +21,7 @@ import {
   offer,
   spring,
 } from "./elements.js";
-import { listen, startEvents } from "./events.js";
+import { listen, listenToAll, startEvents } from "./events.js";
 import { isGoing } from "./jobs.js";
 import { acceptDrops } from "./dropping.js";
 import { complain } from "./messages.js";
@@ -31,7 +31,7 @@ import { startWorkList } from "./studio/work_list.js";
 import { startTheme } from "./theme.js";
 
 /**
- * @import { Schemas } from "./api_types"
+ * @import { MessageOf, MessageType, Schemas } from "./api_types"
  * @typedef {{ begin?: boolean, dropped?: File[] }} Asked what a step does at once: track; take
  *   files that were dropped
  * @typedef Setup what a step is given
@@ -40,15 +40,16 @@ import { startTheme } from "./theme.js";
  *   cameras before the calibration)
  * @property {HTMLElement} aside the empty element at the right, for pictures (class "pictures" with
  *   `picture`s in it, if it fits)
- * @property {Schemas["Workflow"]["steps"][number]} step this step as the server sees it now
+ * @property {Schemas["Workflow"]["steps"][number] | undefined} step this step as the server sees it
+ *   now
  * @property {() => Promise<any>} refresh load the steps again, after something was made
  * @property {(step: string, asked?: Asked) => Promise<void>} go show another step; `asked`: to do
  *   at once
  * @property {Asked} asked what the step is asked to do at once
  * @property {(shown?: object) => Promise<void>} scene show the 3-D scene in `aside` instead, moved
  *   to what is to be shown
- * @property {(type: string, handler: (event: any) => void) => void} on hear events of this session
- *   while the step is shown
+ * @property {<T extends MessageType>(type: T, handler: (event: MessageOf<T>) => void) => void} on
+ *   hear events of this session while the step is shown
  */
 /**
  * What mounts a step of which something is loaded first, by its `load(session)`.
@@ -56,6 +57,10 @@ import { startTheme } from "./theme.js";
  * @typedef {(place: HTMLElement, setup: Setup, loaded: Awaited<ReturnType<L>>) => () => void} Mount
  */
 
+/** What changes how far a session is. @type {MessageType[]} */
+const CHANGING = ["sessions", "track", "subject", "initialise", "export", "state", "import"];
+/** @typedef {Schemas["Workflow"]["steps"][number]} StepStatus */
+/** @type {Record<StepStatus["step"], { name: string, lead: string }>} */
 const STEPS = {
   footage: {
     name: "Footage",
@@ -78,6 +83,7 @@ const STEPS = {
   check: { name: "Check", lead: "Whether the motion fits the pictures, and how to improve it." },
   export: { name: "Export", lead: "The motion as a file for other programs." },
 };
+/** @type {Record<StepStatus["state"], string>} */
 const STATES = {
   done: "done",
   ready: "to be done",
@@ -92,6 +98,7 @@ const aside = byId("aside");
 const which = byId("which");
 
 let session = "";
+/** @type {StepStatus[]} */
 let steps = [];
 let shown = ""; // the step whose panel is mounted
 let mounting = 0; // rises with every mount, so that a slow one knows that it is too late
@@ -202,7 +209,7 @@ async function go(name, asked = {}) {
   );
   panel.scrollTop = 0;
   drawHead();
-  if (statusOf(name).state === "blocked") return;
+  if (statusOf(name)?.state === "blocked") return;
   try {
     const [[module, loaded], detail] = await Promise.all([
       moduleOf(name).then(async (one) => [one, await one.load?.(session)]),
@@ -387,11 +394,10 @@ async function start() {
     return session && statusOf("footage") ? go("footage", { dropped: files }) : beginForm(files);
   });
   which.onchange = () => open(which.value);
-  for (const type of ["sessions", "track", "subject", "initialise", "export", "state", "import"]) {
-    listen(type, (event) => {
-      if (session && event.session === session && !isGoing(event)) refresh().catch(() => {});
-    });
-  }
+  listenToAll((event) => {
+    if (CHANGING.includes(event.type) && session && event.session === session && !isGoing(event))
+      refresh().catch(() => {});
+  });
   const query = new URLSearchParams(location.search);
   try {
     const names = await drawSessions();

@@ -32,7 +32,7 @@ const millimetres = (value) => (value === null ? "–" : `${value.toFixed(1)} mm
 
 /** @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
 export function mount(place, setup) {
-  const run = setup.detail.runs.find((one) => one.name === setup.step.run) ?? setup.detail.runs[0];
+  const run = setup.detail.runs.find((one) => one.name === setup.step?.run) ?? setup.detail.runs[0];
   const here = runPath(setup.session, run.name);
   const found = element("section", { className: "footage-step" });
   const witness = element("section", { className: "footage-step" });

@@ -12,7 +12,7 @@ let started = false;
 
 /** @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
 export function mount(place, setup) {
-  const run = setup.detail.runs.find((one) => one.name === setup.step.run) ?? setup.detail.runs[0];
+  const run = setup.detail.runs.find((one) => one.name === setup.step?.run) ?? setup.detail.runs[0];
   const which = hint();
   const panel = element("div", { className: "panel export", id: "panel-export" });
   place.append(which, panel);

@@ -25,6 +25,7 @@ import { findJob, followJob, isGoing, timeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
 import { studioPath } from "./sessions.js";
 import { viewWall } from "./setup_views.js";
+import { isBusy } from "./work_states.js";
 
 const PICTURE_MILLISECONDS = 700;
 const POLL_MILLISECONDS = 1500;
@@ -35,7 +36,6 @@ const EFFORTS = [
   ["5000", "thorough · 5000 poses a frame"],
   ["0", "as the settings say"],
 ];
-const BUSY = ["tracking", "compiling", "reannealing"];
 
 /** @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
 export function mount(place, setup) {
@@ -57,7 +57,7 @@ export function mount(place, setup) {
   const path = () => runPath(setup.session, newest().name);
   const isHere = () =>
     work && newest() && work.session === setup.session && work.run === newest().name;
-  const isBusy = () => Boolean(isHere() && BUSY.includes(work.state));
+  const isTracked = () => isHere() && isBusy(work);
 
   async function loadRuns() {
     runs = (await fetchJson(here)).runs;
@@ -88,7 +88,7 @@ export function mount(place, setup) {
         cancel: () => remove(`/api/track-jobs/${identifier}`).catch(complain),
       });
     }
-    if (isBusy())
+    if (isTracked())
       return drawProgress(status, {
         words: workWords(),
         share: work.last > work.first ? work.done / (work.last - work.first) : 0,
@@ -255,7 +255,7 @@ export function mount(place, setup) {
 
   function showNewest() {
     const run = newest();
-    if (!run?.done && !isBusy())
+    if (!run?.done && !isTracked())
       return wall.empty("The outlines will be drawn over the pictures as they are found.");
     wall.show({
       run: run.name,
@@ -265,9 +265,9 @@ export function mount(place, setup) {
   }
 
   setup.on("state", async (event) => {
-    const before = work?.state;
+    const wasBusy = isBusy(work);
     work = event;
-    if (BUSY.includes(before) && !BUSY.includes(event.state)) {
+    if (wasBusy && !isBusy(event)) {
       await loadRuns().catch(complain);
       showNewest();
       setup.refresh().catch(() => {});
@@ -284,10 +284,10 @@ export function mount(place, setup) {
 
   async function poll() {
     if (stopped) return;
-    const was = isBusy();
+    const was = isTracked();
     work = await fetchJson("/api/worker").catch(() => work);
     if (stopped) return;
-    if (was || isBusy()) drawStatus();
+    if (was || isTracked()) drawStatus();
     timer = setTimeout(poll, POLL_MILLISECONDS);
   }
 
@@ -317,7 +317,7 @@ export function mount(place, setup) {
 
   drawForm()
     .then(() => {
-      if (setup.asked.begin && !isBusy()) return trackNow();
+      if (setup.asked.begin && !isTracked()) return trackNow();
       return findAgain();
     })
     .then(poll)

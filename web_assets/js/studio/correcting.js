@@ -8,9 +8,9 @@ import { complain } from "../messages.js";
 import { get, set, watch } from "../state.js";
 import { follow, html, mount, signal, useRef } from "./component.js";
 import { followTrackJob } from "./track_work.js";
+import { isBusy } from "../work_states.js";
 
 const POSE_PATH = "/api/scene/edit";
-const BUSY = ["tracking", "compiling", "reannealing"];
 
 /** The frame that is being corrected, null while none is. */
 const corrected = signal(/** @type {number | null} */ (null));
@@ -114,8 +114,10 @@ function Correcting() {
 }
 
 function canCorrect(run, frame, summary, work) {
-  const isBusy = BUSY.includes(work?.state) && work?.run === run;
-  return run && frame !== null && summary?.frames.length > 0 && !isBusy && corrected.value === null;
+  const isWorkedOn = isBusy(work) && work.run === run;
+  return (
+    run && frame !== null && summary?.frames.length > 0 && !isWorkedOn && corrected.value === null
+  );
 }
 
 const Opener = () => html`<button

@@ -4,8 +4,13 @@
 import { fetchJson, post, runPath } from "../api.js";
 import { complain } from "../messages.js";
 import { get, set } from "../state.js";
+import { isBusy } from "../work_states.js";
 import { signal } from "./component.js";
 
+/** @typedef {import("../work_states.js").Work} Work */
+/** @typedef {Work["state"]} RunState */
+
+/** @type {Record<RunState, string>} */
 const WORDS = {
   idle: "idle",
   compiling: "compiling kernels, once",
@@ -17,8 +22,9 @@ const WORDS = {
   failed: "failed",
   lost: "tracking process lost",
 };
+/** @type {RunState[]} */
 const COUNTED = ["tracking", "paused", "reannealing", "lost"];
-const BUSY = ["tracking", "compiling", "reannealing"];
+/** @type {RunState[]} */
 const CANCELLABLE = ["tracking", "paused", "compiling"];
 
 /** Whether the tracking process has a run open that the page shows. */
@@ -30,9 +36,14 @@ function clock(seconds) {
   return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")}`;
 }
 
-/** How a live run keeps up, in one line. */
-function liveLine(work, word) {
-  const { dropped, incomplete, latency_ms: latency, frames_per_second: rate } = work.live;
+/**
+ * How a live run keeps up, in one line.
+ * @param {Work} work
+ * @param {NonNullable<Work["live"]>} live
+ * @param {string} word
+ */
+function liveLine(work, live, word) {
+  const { dropped, incomplete, latency_ms: latency, frames_per_second: rate } = live;
   const isTracking = work.state === "tracking";
   const parts = [isTracking ? "live" : `${word} (live)`];
   if (isTracking && rate) parts.push(`${rate.toFixed(1)} fps`);
@@ -42,11 +53,11 @@ function liveLine(work, word) {
   );
 }
 
-/** What the tracking process does, in one line. */
+/** What the tracking process does, in one line. @param {Work | null} work */
 function stateLine(work) {
   if (!work) return "idle";
-  const parts = [WORDS[work.state] ?? work.state];
-  if (work.live) return liveLine(work, parts[0]);
+  const parts = [WORDS[work.state]];
+  if (work.live) return liveLine(work, work.live, parts[0]);
   const isTracking = work.state === "tracking";
   if (isTracking && work.frames_per_second) {
     parts[0] += ` ${work.frames_per_second.toPrecision(2)} fps`;
@@ -79,7 +90,7 @@ export function standing(work, session, run, connected, summary) {
   if (connected === false) {
     return { name: "disconnected", words: "disconnected, reconnecting", title: "", share: null };
   }
-  const searches = work && ["tracking", "compiling", "paused", "reannealing"].includes(work.state);
+  const searches = isBusy(work) || work?.state === "paused";
   if (here ? work.state === "idle" : !searches) return storedStanding(session, run, summary);
   const elsewhere =
     work && !here && work.run && work.state === "tracking" ? `${work.session}: ` : "";
@@ -97,7 +108,7 @@ export function standing(work, session, run, connected, summary) {
 export function offers(work, session, run, connected, summary, frame) {
   const here = isOpen(work, session, run);
   const usable = Boolean(run && connected);
-  const busy = here && BUSY.includes(work.state);
+  const busy = here && isBusy(work);
   const tracked = summary?.frames.length ?? 0;
   const complete =
     Boolean(summary) &&

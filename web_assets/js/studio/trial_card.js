@@ -9,6 +9,7 @@ import { besideTrial, shownTrial } from "../selection.js";
 import { follow, html, mount } from "./component.js";
 import { keepAsNewRun, replaceStored } from "./keeping.js";
 import { compareWith, discard, putBack, showTrial } from "./trials.js";
+import { isSearching } from "../work_states.js";
 
 /** @import { Schemas } from "../api_types" */
 
@@ -314,7 +315,7 @@ function TrialCard() {
   const work = follow("work");
   const here = work?.session === follow("session") && work?.run === follow("run");
   // While the run is tracked its next layer takes what was moved.
-  const isTracked = here && ["tracking", "compiling"].includes(work?.state);
+  const isTracked = here && isSearching(work);
   const moved = isTracked ? [] : (follow("moved") ?? []);
   const isTried = frame !== undefined;
   const place = byId("trial");
