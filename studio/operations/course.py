@@ -8,6 +8,7 @@ from studio.foundations.declaring import operation
 from studio.foundations.errors import RunError, StudioError
 from studio.foundations.progress import Progress
 from studio.operations.behaviours import learn
+from studio.operations.jobs.job_runner import JobKind, SessionJob
 from studio.operations.jobs.swept_runs import measure_run
 from studio.operations.jobs.trials import TrialResult, run_jobs
 from studio.operations.progress import Reporting, reporting
@@ -48,6 +49,39 @@ RUNS = (
         "course-behaviour", "particles that know how people walk", tracker="behaviour", behaviour=MODEL
     ),
 )
+
+
+class CourseState(SessionJob):
+    """How the making of the course's runs stands."""
+
+
+COURSE = JobKind(
+    "course",
+    "making of the course's runs",
+    CourseState,
+    changes_session=True,
+    makes_session=True,
+    busy="The course's runs are being made.",
+    page="/guide/course",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class CourseRunLine:
+    """A run of the course. there: whether it is tracked to its end."""
+
+    name: str
+    words: str
+    there: bool
+
+
+@dataclass(frozen=True, slots=True)
+class CourseView:
+    """The course's runs. job: how their making stands, null where it was not begun."""
+
+    session: str
+    runs: list[CourseRunLine]
+    job: CourseState | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,6 +133,19 @@ def make_course(
     jobs = [_job(session, one, model) for one in missing]
     run_jobs(jobs, session.path.parent, on_result, processes, checkpoint=checkpoint)
     return Course(session, tuple(session.run(one.name) for one in RUNS))
+
+
+def course_view(workspace: Workspace, job: CourseState | None) -> CourseView:
+    """The course's runs, and whether they are there. job : how their making stands."""
+    try:
+        session = workspace.session(SAMPLE)
+    except StudioError:
+        session = None
+    lines = [
+        CourseRunLine(one.name, one.words, session is not None and finished(session, one)) for one in RUNS
+    ]
+    beginning = CourseRunLine(BEGINNING_RUN, "an arm of four links", begins(workspace))
+    return CourseView(SAMPLE, [beginning, *lines], job)
 
 
 def finished(session: Session, run: CourseRun) -> bool:

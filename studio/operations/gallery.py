@@ -8,8 +8,10 @@ from pydantic import Field
 
 from studio.foundations.declaring import Terminal, Web, operation
 from studio.foundations.errors import NotFoundError, SessionError
+from studio.foundations.foreign_files import read_file
 from studio.foundations.package import assets_folder
 from studio.foundations.progress import Progress
+from studio.operations.jobs.job_runner import JobKind, SessionJob
 from studio.operations.progress import Reporting, reporting
 from studio.results.drawing_footage.real_data import missing_data, real_footage
 from studio.results.drawing_footage.recipe_file import find_recipe
@@ -17,8 +19,8 @@ from studio.results.drawing_footage.recipes import synthesize
 from studio.sessions.atomic_files import discard
 from studio.sessions.importers.importing import add_footage
 from studio.sessions.manifest import FILE_NAME
-from studio.sessions.samples import install_sample
-from studio.sessions.session import Session
+from studio.sessions.samples import install_sample, sample_folder
+from studio.sessions.session import Session, thumbnail_of
 from studio.sessions.workspace import Workspace, begin_session
 
 CardKind = Literal["sample", "recipe", "elsewhere"]
@@ -142,9 +144,44 @@ class CardStanding:
     missing: str = ""
 
 
+class GalleryState(SessionJob):
+    """How the making of a card's session stands."""
+
+
+GALLERY = JobKind(
+    "gallery",
+    "making of a session",
+    GalleryState,
+    changes_session=True,
+    makes_session=True,
+    at="/api/gallery/{session}",
+    page="/?session={session}",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class CardView:
+    """A card. there: whether its session is in the workspace. missing: why it cannot be made here, "" where it can.
+    data: where footage or motion that is not shipped comes from. commands: that make the session. guide: the page that
+    tells how. picture: whether it has one. job: how its making stands.
+    """
+
+    name: str
+    title: str
+    words: str
+    kind: CardKind
+    there: bool
+    missing: str
+    data: str
+    commands: tuple[str, ...]
+    guide: str
+    picture: bool
+    job: GalleryState | None
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Gallery:
-    """What the gallery has. made : the session of the card that was asked for."""
+    """The gallery's cards. made : the session of the card that was asked for."""
 
     cards: tuple[CardStanding, ...]
     made: Session | None = None
@@ -184,11 +221,10 @@ def gallery(
 
 def card_of(name: str) -> Card:
     """A card by its name. Raises NotFoundError."""
-    found = next((card for card in CARDS if card.name == name), None)
-    if found is None:
-        known = ", ".join(card.name for card in CARDS)
-        raise NotFoundError(f"The gallery has no card '{name[:64]}'.", f"It has {known}.")
-    return found
+    cards = {card.name: card for card in CARDS}
+    if name not in cards:
+        raise NotFoundError(f"The gallery has no card '{name[:64]}'.", f"It has {', '.join(cards)}.")
+    return cards[name]
 
 
 def standing_of(card: Card, workspace: Workspace) -> CardStanding:
@@ -201,6 +237,43 @@ def standing_of(card: Card, workspace: Workspace) -> CardStanding:
             card, there, f"There is no '{card.footage}' in the folder that STUDIO_REAL_DATA names."
         )
     return CardStanding(card, there)
+
+
+def card_view(card: Card, workspace: Workspace, job: GalleryState | None) -> CardView:
+    """A card for a page. job : how its making stands."""
+    standing = standing_of(card, workspace)
+    return CardView(
+        name=card.name,
+        title=card.title,
+        words=card.words,
+        kind=card.kind,
+        there=standing.there,
+        missing=standing.missing,
+        data=card.data,
+        commands=card.commands,
+        guide=card.guide,
+        picture=standing.there or card.kind == "sample" or _shipped_picture(card).is_file(),
+        job=job,
+    )
+
+
+def card_picture(card: Card, workspace: Workspace) -> bytes:
+    """A small picture (JPEG) of a card's session: of one that is there, or of what travels with the studio.
+
+    Raises NotFoundError where it has none.
+    """
+    path = _shipped_picture(card)
+    if standing_of(card, workspace).there:
+        path = workspace.session(card.name).thumbnail()
+    elif card.kind == "sample" and (content := thumbnail_of(Session(sample_folder(card.name)))) is not None:
+        return content
+    if path is None or not path.is_file():
+        raise NotFoundError(f"Card '{card.name}' has no picture.", "Make its session first.")
+    return read_file(path)
+
+
+def _shipped_picture(card: Card) -> Path:
+    return GALLERY_PICTURES / f"{card.name}.jpg"
 
 
 def make_card(card: Card, place: Path, frames: int | None, progress: Progress) -> Session:

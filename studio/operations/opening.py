@@ -14,7 +14,7 @@ from studio.body.catalogue import list_bodies, load_body
 from studio.body.model import BodyModel
 from studio.foundations.declaring import Target, operation
 from studio.foundations.errors import RunError, SessionError
-from studio.results.export.kept_exports import exported_files
+from studio.operations.exports import exported_files
 from studio.runs.setup.workflow import Workflow, run_to_use, workflow_of
 from studio.runs.tracks import Track
 from studio.sessions.session import BODIES_NAME, RUNS_NAME, Session

@@ -17,7 +17,7 @@ import pytest
 
 from studio.footage.capture.calibration_files import read_calibration, write_calibration
 from studio.foundations.errors import CalibrationError, NotFoundError, SessionError
-from studio.results.export.kept_exports import kept_exports
+from studio.operations.exports import kept_exports
 from studio.sessions.file_checksums import NAME, check_files
 from studio.sessions.record_files import RecordFile, renamed
 from studio.sessions.results_store import FILE_NAME, ResultsWriter

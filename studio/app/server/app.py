@@ -66,6 +66,8 @@ from studio.app.server.left_requests import LeftRequests
 from studio.app.server.schemas import ErrorAnswer
 from studio.app.server.viewers_budget import ViewersBudget
 from studio.foundations.package import assets_folder
+from studio.operations.course import COURSE
+from studio.operations.gallery import GALLERY
 from studio.operations.jobs.camera_service import RECORDINGS
 from studio.operations.jobs.comparison_run import COMPARISON
 from studio.operations.jobs.control import StudioControl
@@ -125,7 +127,7 @@ ROUTERS = (
 # As the routers made them: one that is included makes its routes a second time, while the first requests wait.
 ROUTES = [route for router in ROUTERS for route in router.routes]
 JOBS: tuple[JobKind[Any], ...] = (
-    gallery_routes.GALLERY,
+    GALLERY,
     import_routes.IMPORT,
     footage_routes.SYNCHRONY,
     RECORDINGS,
@@ -136,7 +138,7 @@ JOBS: tuple[JobKind[Any], ...] = (
     pose_routes.START_POSE,
     track_routes.TRACK,
     export_routes.EXPORT,
-    course_routes.COURSE,
+    COURSE,
     view_routes.SEEDS,
     COMPARISON,
     LEARNING,

@@ -4,17 +4,17 @@ import html
 import itertools
 import json
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from fastapi import APIRouter
 from markdown_it import MarkdownIt
 from starlette.responses import HTMLResponse
 
 import studio
+from studio.app.server.answers import Router
 from studio.app.server.interfaces_page import INTERFACES, interfaces_page
 from studio.app.server.pages import NAME, html_page
-from studio.app.server.schemas import Answer
 from studio.evidence.settings import EvidenceSettings
 from studio.foundations.declaring import REQUIRED, Knobs, Operation, Parameter, declared
 from studio.foundations.errors import NotFoundError
@@ -30,8 +30,8 @@ from studio.search.trackers.paper_presets import PAPERS
 from studio.search.trackers.recovery_settings import RecoverySettings
 from studio.search.trackers.tracker import Printed
 
-router = APIRouter(tags=["page"], include_in_schema=False)
-contents_router = APIRouter(prefix="/api", tags=["page"])
+router = Router(tags=["page"], include_in_schema=False)
+contents_router = Router(prefix="/api", tags=["page"])
 
 PLACE_OF_KNOBS, PLACE_OF_SUMMARY, PLACE_OF_FINDINGS = "{{knobs}}", "{{reproduction}}", "{{findings}}"
 PLACE_OF_PRINTED = "{{printed}}"
@@ -67,7 +67,8 @@ VERBS = "verbs"
 COLUMNS = ("Name", "What it does", "Range", "Default", "Unit", "Takes effect")
 
 
-class GuideHeading(Answer):
+@dataclass(frozen=True, slots=True)
+class GuideHeading:
     """A heading of the guide. page: the title of the page that it is on. address: of its place there."""
 
     title: str
@@ -75,34 +76,35 @@ class GuideHeading(Answer):
     address: str
 
 
-class GuideContents(Answer):
+@dataclass(frozen=True, slots=True)
+class GuideContents:
     """All pages of the guide with their headings."""
 
-    headings: list[GuideHeading]
+    headings: tuple[GuideHeading, ...]
 
 
 @contents_router.get("/guide-contents")
 def contents() -> GuideContents:
     """What the guide has, for a search."""
-    return GuideContents(headings=list(_headings()))
+    return GuideContents(_headings())
 
 
 @cache
 def _headings() -> tuple[GuideHeading, ...]:
-    found: list[GuideHeading] = []
+    headings: list[GuideHeading] = []
     for name, (file, page) in TEXTS.items():
         address = f"/guide/{name}" if name else "/guide"
-        found.append(GuideHeading(title=page, page=NAME, address=address))
+        headings.append(GuideHeading(page, NAME, address))
         tokens = MarkdownIt("commonmark").parse(
             (assets_folder() / "guide" / file).read_text(encoding="utf-8")
         )
-        found += [
-            GuideHeading(title=inline.content, page=page, address=f"{address}#{anchor_of(inline.content)}")
+        headings += [
+            GuideHeading(inline.content, page, f"{address}#{anchor_of(inline.content)}")
             for opening, inline in itertools.pairwise(tokens)
             if opening.type == "heading_open" and opening.tag == "h2"
         ]
-    verbs = GuideHeading(title="All verbs", page=NAME, address=f"/guide/{VERBS}")
-    return (*found, verbs, GuideHeading(title="Interfaces", page=NAME, address=f"/guide/{INTERFACES}"))
+    made = (("All verbs", VERBS), ("Interfaces", INTERFACES))
+    return (*headings, *(GuideHeading(title, NAME, f"/guide/{page}") for title, page in made))
 
 
 @router.get("/guide")

@@ -2,20 +2,19 @@
 
 import mimetypes
 from pathlib import Path
-from typing import Annotated
 
 import msgspec
-from fastapi import APIRouter, Depends
 from starlette.responses import Response
 
-from studio.app.server.app_state import AppState, app_state
+from studio.app.server.answers import Router
+from studio.app.server.app_state import App
 from studio.app.server.pages import NAME, PLACES, html_page
 from studio.foundations.errors import SessionError, StudioError
 from studio.foundations.foreign_files import LARGEST_RECORD, read_file
 from studio.foundations.typed_decoding import decode_json
 from studio.sessions.atomic_files import write_bytes
 
-router = APIRouter(tags=["page"])
+router = Router(tags=["page"])
 
 DOCUMENT = "document.html"
 """One frame with a bar of places; what is in it is drawn by each page's own module."""
@@ -65,15 +64,13 @@ for _name in (*RAILED, *UNRAILED):
 
 
 @router.get("/api/preferences")
-def preferences(app: Annotated[AppState, Depends(app_state)]) -> dict[str, object]:
+def preferences(app: App) -> dict[str, object]:
     """What the page keeps (theme, speed, folded panels): a free object, `{}` at first."""
     return read_preferences(app.state_folder / PREFERENCES_FILE)
 
 
 @router.patch("/api/preferences")
-def change_preferences(
-    changes: dict[str, object], app: Annotated[AppState, Depends(app_state)]
-) -> dict[str, object]:
+def change_preferences(changes: dict[str, object], app: App) -> dict[str, object]:
     """Set some entries (null removes one) and return all of them; at most 16 KB in all."""
     path = app.state_folder / PREFERENCES_FILE
     merged = read_preferences(path) | changes

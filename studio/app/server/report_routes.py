@@ -1,51 +1,27 @@
 """The papers' experiments: run again in the background; what was found, for the page of reports and as downloads."""
 
-from pathlib import Path
-from typing import Any
+from dataclasses import dataclass
 
-import msgspec
-from fastapi import APIRouter
 from pydantic import Field
 from starlette.responses import FileResponse, Response
 
-from studio.app.server.app_state import App, AppState
-from studio.app.server.schemas import Answer, Request
-from studio.foundations.errors import NotFoundError, SessionError
-from studio.foundations.foreign_files import read_file
-from studio.foundations.typed_decoding import decode_json
+from studio.app.server.answers import Router
+from studio.app.server.app_state import App
+from studio.app.server.schemas import Request
+from studio.foundations.errors import NotFoundError
+from studio.operations.experiments import (
+    ALL,
+    DOWNLOADS,
+    ExperimentLine,
+    Reports,
+    kept_reports,
+    report_file,
+    reproductions_folder,
+)
+from studio.operations.experiments import experiments as known_experiments
 from studio.operations.jobs.job_runner import Job, JobKind, SessionJob
-from studio.results.comparison.findings_document import REPORT, REPRODUCTIONS, RESULTS, SUMMARY
-from studio.results.experiments import ALL
-from studio.results.experiments import experiments as known_experiments
 
-router = APIRouter(tags=["reports"])
-
-DOWNLOADS = {RESULTS: "application/json", SUMMARY: "text/markdown; charset=utf-8", REPORT: "text/html"}
-
-
-class Reports(Answer):
-    """What was reproduced so far. experiments: documents as results.json has them; none before the first command."""
-
-    software: str = ""
-    date: str = ""
-    experiments: list[dict[str, Any]] = Field(default_factory=list[dict[str, Any]])
-
-
-class ExperimentView(Answer):
-    """An experiment that can be run. is_long: with all seeds it takes hours."""
-
-    name: str
-    title: str
-    source: str
-    claim: str
-    is_long: bool
-
-
-class ExperimentList(Answer):
-    """What can be run, in the order of the report, and how the running stands; null before the first."""
-
-    experiments: list[ExperimentView]
-    job: "ReproductionState | None"
+router = Router(tags=["reports"])
 
 
 class ReproductionRequest(Request):
@@ -83,11 +59,18 @@ REPRODUCTION = JobKind(
 )
 
 
+@dataclass(frozen=True, slots=True)
+class ExperimentList:
+    """What can be run, in the order of the report, and how the running stands; null before the first."""
+
+    experiments: tuple[ExperimentLine, ...]
+    job: ReproductionState | None
+
+
 @router.get("/api/reports/experiments")
 def experiments(app: App) -> ExperimentList:
     """The papers' experiments that can be run again, and how the one stands that was begun last."""
-    listed = [ExperimentView.of(one) for one in known_experiments().lines()]
-    return ExperimentList(experiments=listed, job=app.jobs.known(REPRODUCTION, KEY))
+    return ExperimentList(known_experiments().lines(), app.jobs.known(REPRODUCTION, KEY))
 
 
 @router.post("/api/reports/experiments", status_code=202)
@@ -97,7 +80,7 @@ def begin_experiment(request: ReproductionRequest, app: App) -> ReproductionStat
     """
     if request.name != ALL and request.name not in [one.name for one in known_experiments().lines()]:
         raise NotFoundError(f"There is no experiment '{request.name}'.", "Choose one of the list.")
-    folder = _folder(app)
+    folder = reproductions_folder(app.workspace)
 
     def work(job: Job) -> dict[str, object]:
         counts = known_experiments().reproduce(
@@ -111,34 +94,11 @@ def begin_experiment(request: ReproductionRequest, app: App) -> ReproductionStat
 @router.get("/api/reports")
 def reports(app: App) -> Reports:
     """What `studio reproduce` wrote into the workspace."""
-    path = _folder(app) / RESULTS
-    if not path.is_file():
-        return Reports()
-    try:
-        return decode_json(read_file(path), _Results).as_reports()
-    except (msgspec.DecodeError, OSError) as error:
-        raise SessionError(
-            f"'{path}' cannot be read: {error}.", "Run 'studio reproduce' again; what is measured is kept."
-        ) from None
+    return kept_reports(app.workspace)
 
 
 @router.get("/api/reports/{name}", response_class=Response)
-def report_file(name: str, app: App) -> Response:
+def download(name: str, app: App) -> Response:
     """results.json, summary.md or report.html (the whole report in one file) as a download."""
-    path = _folder(app) / name
-    if name not in DOWNLOADS or not path.is_file():
-        raise NotFoundError(f"There is no report '{name[:40]}'.", "Make one: studio reproduce all --quick.")
+    path = report_file(app.workspace, name)
     return FileResponse(path, media_type=DOWNLOADS[name], filename=name)
-
-
-class _Results(msgspec.Struct, frozen=True):
-    software: str = ""
-    date: str = ""
-    experiments: list[dict[str, Any]] = msgspec.field(default_factory=list[dict[str, Any]])
-
-    def as_reports(self) -> Reports:
-        return Reports(software=self.software, date=self.date, experiments=self.experiments)
-
-
-def _folder(app: AppState) -> Path:
-    return app.workspace.root / REPRODUCTIONS

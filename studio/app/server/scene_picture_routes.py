@@ -3,19 +3,19 @@
 from pathlib import Path
 from typing import Literal
 
-from fastapi import APIRouter
 from fastapi.responses import Response
 from pydantic import Field
 
 from studio.app.scene.scene_pictures import Film, png_of
+from studio.app.server.answers import Router
 from studio.app.server.app_state import App, Scene
 from studio.app.server.export_routes import EXPORT, ExportState
 from studio.app.server.schemas import Request
 from studio.foundations.errors import NotFoundError
+from studio.operations.exports import filmed_frames, keep_file
 from studio.operations.jobs.job_runner import Job
-from studio.results.export.kept_exports import keep_file
 
-router = APIRouter(prefix="/api/scene", tags=["scene"])
+router = Router(prefix="/api/scene", tags=["scene"])
 
 MOST_FRAMES = 600
 """Frames of a film: a browser draws a few of them a second."""
@@ -59,15 +59,7 @@ def begin_film(request: FilmRequest, app: App, scene: Scene) -> ExportState:
     frames: tuple[int, ...] = ()
     stem, rate = f"{shown.session}-{run.name}-layers-of-{shown.frame}", request.rate
     if request.of == "frames":
-        with run.results() as results:
-            stored = results.timeline().frames.tolist()
-        first, last = (
-            request.first or 0,
-            request.last if request.last is not None else max(stored, default=-1) + 1,
-        )
-        frames = tuple(frame for frame in stored if first <= frame < last)[:MOST_FRAMES]
-        if not frames:
-            raise NotFoundError(f"There are no frames from {first} to {last}.", "Choose others.")
+        frames = filmed_frames(run, request.first, request.last, MOST_FRAMES)
         stem, rate = f"{shown.session}-{run.name}-{frames[0]}-to-{frames[-1]}", run.record.fps * request.rate
     film = Film(request.kind, rate, frames)
 

@@ -18,12 +18,12 @@ from studio.app.server.schemas import Answer, Number
 from studio.app.server.session_routes import OpenSession
 from studio.foundations.knobs import Knob, changed, knobs_of
 from studio.foundations.progress import unheard
+from studio.operations.exports import keep_file, kept_file
 from studio.operations.jobs.job_runner import Job, JobKind, NumberedJob, Work
 from studio.operations.person import landmarks
 from studio.operations.results import check as check_run
 from studio.operations.results import evaluate, refine, smooth
 from studio.operations.tracking import correct, corrected_run
-from studio.results.export.kept_exports import keep_file, kept_file
 from studio.runs.checking import RunCheck, kept_check
 from studio.runs.correcting import track_backwards
 from studio.runs.refining import REFINED, SMOOTHED, MadeTrack, check_making, jitter

@@ -16,8 +16,8 @@ from studio.app.server.schemas import RunName
 from studio.app.server.session_routes import NewName, OpenSession
 from studio.app.server.subject_routes import SUBJECT
 from studio.app.server.track_routes import TRACK
+from studio.operations.exports import exported_files
 from studio.operations.footage import new_session
-from studio.results.export.kept_exports import exported_files
 from studio.runs.setup.workflow import Workflow, run_to_use, workflow_of
 from studio.search.trackers.catalogue import knobs_for_evaluations
 from studio.sessions.session import Session

@@ -1,4 +1,4 @@
-"""The papers' experiments, as `results.experiments` wants them."""
+"""The papers' experiments, as `operations.experiments` wants them."""
 
 from pathlib import Path
 
@@ -7,7 +7,7 @@ from studio.garden.reproduction import runner
 from studio.garden.reproduction.catalogue import EXPERIMENTS as KNOWN
 from studio.garden.reproduction.catalogue import find_experiments
 from studio.garden.reproduction.plan import scale_of
-from studio.results.experiments import ExperimentLine, TrialCounts
+from studio.operations.experiments import ExperimentLine, TrialCounts
 
 
 class PapersExperiments:

@@ -5,7 +5,9 @@ A new one is one module and one entry here, or a package's entry point (`studio.
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
+from studio.foundations.declaring import Web
 from studio.foundations.errors import ExportError
 from studio.foundations.knobs import knobs_of
 from studio.foundations.registry import Registry
@@ -41,7 +43,7 @@ class ExportFormat:
     title: str
     opens: str
     takes: tuple[str, ...]
-    write: Writer | None
+    write: Annotated[Writer | None, Web(left_out=True)]
     unit: str = ""
     up: str = ""
     what: str = "motion"

@@ -17,9 +17,9 @@ from web_doubles import Studio
 from studio.app.server import report_routes
 from studio.garden.reproduction.papers import PapersExperiments
 from studio.operations.comparison_folders import new_comparison, place_of
+from studio.operations.experiments import TrialCounts
 from studio.results.comparison.candidates import Lineup
 from studio.results.comparison.plan import plan_comparison
-from studio.results.experiments import TrialCounts
 
 WISH = {
     "session": "walk", "trackers": [{"name": "annealed"}, {"name": "annealed:eq13", "settings": {"survival": 0.5}}],

@@ -18,9 +18,9 @@ from studio.foundations.errors import (
     WorkCancelledError,
 )
 from studio.foundations.knobs import knobs_of
+from studio.operations.exports import discard_export, export_into_run, kept_exports, kept_file
 from studio.results.export.exporting import export_run, settled
 from studio.results.export.formats import FORMATS, format_of_file
-from studio.results.export.kept_exports import discard_export, export_into_run, kept_exports, kept_file
 from studio.results.export.naming import joint_names, name_map
 from studio.results.export.options import ExportOptions
 from studio.results.export.task import ExportTask, Written, agreed, apart, turned_apart

@@ -6,8 +6,8 @@ import pytest
 from export_runs import MADE, moving_poses, track_of
 from store_records import layer_of, result_of
 
+from studio.operations.exports import export_into_run, exported_files, kept_exports, stale_export
 from studio.results.export.formats import FORMATS
-from studio.results.export.kept_exports import export_into_run, exported_files, kept_exports, stale_export
 from studio.runs.setup.workflow import StepStatus, export_step
 from studio.runs.tracks import read_track, write_track
 from studio.sessions.results_store import ResultsWriter

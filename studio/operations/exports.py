@@ -3,14 +3,20 @@
 import datetime
 import os
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import msgspec
+from pydantic import FiniteFloat
 
+from studio.footage.capture.calibration_files import CALIBRATION_FORMATS
+from studio.foundations.declaring import Web
 from studio.foundations.errors import NotFoundError, SessionError
+from studio.foundations.knobs import Knob, knobs_of
 from studio.foundations.progress import Progress, unheard
-from studio.results.export.exporting import ExportReport, export_run
-from studio.results.export.formats import ExportFormat
+from studio.results.export.exporting import ExportReport, export_run, settled
+from studio.results.export.formats import FORMATS, ExportFormat, format_of
 from studio.results.export.options import ExportOptions
 from studio.runs.setup.workflow import ExportedFile
 from studio.runs.tracks import BEST, RAW, best_track, read_track, track_digest, track_names
@@ -34,18 +40,84 @@ class KeptExport(msgspec.Struct, frozen=True):
     made: str
     bytes: int
     frames: int
-    fps: float
+    fps: FiniteFloat
     checked: str
     notes: tuple[str, ...]
     options: dict[str, str | int | float | bool]
     track: str = ""
-    content: str = ""
-    schema: int = 1
+    content: Annotated[str, Web(left_out=True)] = ""
+    schema: Annotated[int, Web(left_out=True)] = 1
+
+
+class ExportLine(KeptExport, frozen=True):
+    """A finished export. checked: what reading the file back showed. notes: on gaps, names and axes. stale: why it does
+    not hold its track as it is now.
+    """
+
+    stale: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class RunExports:
+    """A run's exports, newest first, and its tracks and cameras to choose among. best: the track that is written unless
+    another is chosen; note: on better ones that are out of date.
+    """
+
+    exports: tuple[ExportLine, ...]
+    tracks: tuple[str, ...]
+    best: str
+    note: str
+    cameras: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ExportChoices:
+    """What a run can be exported to, and how. calibrations: writers by the ending of their files."""
+
+    formats: tuple[ExportFormat, ...]
+    options: tuple[Knob, ...]
+    calibrations: dict[str, list[str]]
 
 
 _RECORD = RecordFile(
     KeptExport, "the report of an export", "Export it again.", ("There is no such export.", "Export it.")
 )
+
+
+def export_choices() -> ExportChoices:
+    """The formats, what opens them, and the options that they take."""
+    calibrations: dict[str, list[str]] = {}
+    for name, writer in CALIBRATION_FORMATS.items():
+        calibrations.setdefault(writer.suffix, []).append(name)
+    return ExportChoices(tuple(FORMATS.values()), knobs_of(ExportOptions), calibrations)
+
+
+def exports_of(run: StoredRun) -> RunExports:
+    """A run's exports, and what the next one can be made of."""
+    lines = (
+        ExportLine(**msgspec.structs.asdict(kept), stale=stale_export(run, kept))
+        for kept in kept_exports(run)
+    )
+    best, cameras = best_track(run), tuple(camera.name for camera in run.cameras())
+    return RunExports(tuple(lines), track_names(run), best.name, best.note, cameras)
+
+
+def requested_format(name: str, options: Mapping[str, object]) -> ExportFormat:
+    """The format of a request. Raises ExportError, SettingsError for a format or an option that there is not."""
+    form = format_of(name)
+    settled(form, options)
+    return form
+
+
+def filmed_frames(run: StoredRun, first: int | None, last: int | None, most: int) -> tuple[int, ...]:
+    """The stored frames of a run, half open, at most so many. Raises NotFoundError for none."""
+    with run.results() as results:
+        stored = results.timeline().frames.tolist()
+    begin, end = first or 0, max(stored, default=-1) + 1 if last is None else last
+    frames = tuple(frame for frame in stored if begin <= frame < end)[:most]
+    if not frames:
+        raise NotFoundError(f"There are no frames from {begin} to {end}.", "Choose others.")
+    return frames
 
 
 def export_into_run(
@@ -101,15 +173,15 @@ def keep_file(
 
 def kept_exports(run: StoredRun) -> tuple[KeptExport, ...]:
     """The run's exports, newest first; a file of which nothing is known is left out."""
-    found: list[KeptExport] = []
+    exports: list[KeptExport] = []
     for path in (run.folder / FOLDER).glob(f"*{SAID}"):
         try:
             kept = _RECORD.read(path)
         except SessionError:
             continue
         if f"{kept.file}{SAID}" == path.name and (path.parent / kept.file).is_file():
-            found.append(kept)
-    return tuple(sorted(found, key=lambda kept: kept.made, reverse=True))
+            exports.append(kept)
+    return tuple(sorted(exports, key=lambda kept: kept.made, reverse=True))
 
 
 def stale_export(run: StoredRun, kept: KeptExport) -> str:
