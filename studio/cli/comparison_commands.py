@@ -5,11 +5,9 @@ from collections.abc import Mapping
 import click
 
 from studio.cli.deriving import Call, command_of
-from studio.cli.reading import frame_range
+from studio.cli.reading import frame_range, read_assignments, read_grid
 from studio.operations.comparing import USUAL, Compared, SweptGrid, compare, sweep
-from studio.results.comparison.candidates import LINEUPS, VARIANTS, read_assignments
-from studio.results.comparison.comparison_findings import document, table_text
-from studio.results.comparison.sweep import read_grid, sweep_document, sweep_text
+from studio.results.comparison.candidates import LINEUPS, VARIANTS
 
 LABELS = "\n".join(f"  {name}: {variant.help}" for name, variant in VARIANTS.items())
 GROUPS = "\n".join(f"  {name}: {', '.join(members)}" for name, members in LINEUPS.items())
@@ -44,8 +42,7 @@ def compare_command(
     first, last = frame_range(frames)
     names = [one.strip() for one in trackers.split(",") if one.strip()]
     done: Compared = call(trackers=names, first=first, last=last, changes=read_assignments(assignments))
-    folder, text = str(done.kept.folder), table_text(done.comparison)
-    return {**document(done.comparison), "folder": folder, "text": text}
+    return {**done.document, "folder": str(done.kept.folder), "text": done.in_words}
 
 
 VARY = click.option(
@@ -62,5 +59,4 @@ VARY = click.option(
 def sweep_command(call: Call, grid: tuple[str, ...], frames: str) -> Mapping[str, object]:
     first, last = frame_range(frames)
     done: SweptGrid = call(vary=read_grid(grid), first=first, last=last)
-    folder, text = str(done.kept.folder), sweep_text(done.sweep)
-    return {**sweep_document(done.sweep), "folder": folder, "text": text}
+    return {**done.document, "folder": str(done.kept.folder), "text": done.in_words}

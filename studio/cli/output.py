@@ -8,9 +8,8 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Generator, Iterable, Mapping
-from contextlib import contextmanager, suppress
-from pathlib import Path
+from collections.abc import Callable, Generator, Mapping
+from contextlib import contextmanager
 from typing import Any, ParamSpec
 
 import click
@@ -18,13 +17,10 @@ import msgspec
 from rich.console import Console
 
 from studio.foundations.errors import StudioError
-from studio.foundations.foreign_files import read_file
 from studio.foundations.progress import Progress, TimeLeft, left_in_words
 from studio.foundations.registry import Registry
-from studio.foundations.typed_decoding import decode_json
 from studio.foundations.words import printable
 from studio.operations.progress import Display, bar
-from studio.sessions.atomic_files import write_bytes
 
 P = ParamSpec("P")
 
@@ -37,8 +33,6 @@ WRONG_INPUT = 2
 FAULT = 70
 REFUSED_BY_THE_DISK = frozenset((errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOSPC, errno.EDQUOT))
 TRACEBACK_VARIABLE = "STUDIO_TRACEBACK"
-SAID = ".notes-said.json"
-"""In a session's folder: notes that commands have said of it."""
 SECONDS_BETWEEN = 10.0
 """Least between two lines of progress, where no bar can be drawn."""
 
@@ -179,22 +173,6 @@ def note(text: str) -> None:
     messages.print(_plain(text))
 
 
-def notes(lines: Iterable[str], once_in: Path | None = None) -> None:
-    """Lines for the person at the terminal; with a folder (a session's) each but the first time that it is said of what
-    lies there. What cannot be remembered is said again.
-    """
-    said = set[str]()
-    if once_in is not None:
-        with suppress(OSError, StudioError, msgspec.DecodeError):
-            said = set(decode_json(read_file(once_in / SAID), list[str]))
-    new = [line for line in lines if line not in said]
-    for line in new:
-        note(line)
-    if new and once_in is not None:
-        with suppress(StudioError):
-            write_bytes(once_in / SAID, msgspec.json.encode(sorted(said.union(new))))
-
-
 @contextmanager
 def progress(title: str) -> Generator[Progress]:
     """Progress on standard error with the time that is left; yields `report(step in words, done, total)`.
@@ -223,5 +201,5 @@ def progress_lines(title: str, clock: Callable[[], float] = time.monotonic) -> P
     return report
 
 
-shown_progress = Display(progress, notes)
+shown_progress = Display(progress, note)
 """How verbs show what they do in a terminal."""

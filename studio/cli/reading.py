@@ -67,9 +67,41 @@ def chosen_knobs(assignments: Iterable[str]) -> dict[str, str]:
     return changes
 
 
+def read_assignments(assignments: Sequence[str]) -> dict[str, dict[str, str]]:
+    """`NAME.KNOB=VALUE` and `KNOB=VALUE` (for all that have it) as changes by name, those of all under "".
+
+    Raises SettingsError where there is no '='.
+    """
+    changes: dict[str, dict[str, str]] = {}
+    for assignment in assignments:
+        left, equals, value = assignment.partition("=")
+        if not equals or not left.strip():
+            hint = "Write NAME.KNOB=VALUE, like annealed:eq13.adaptive_diffusion=false."
+            raise SettingsError(f"'{assignment}' is not an assignment.", hint)
+        name, _, knob = left.strip().rpartition(".")
+        changes.setdefault(name, {})[knob] = value.strip()
+    return changes
+
+
+def read_grid(assignments: Sequence[str]) -> dict[str, list[str]]:
+    """`KNOB=VALUE,VALUE` words as values by knob. Raises SettingsError."""
+    grid: dict[str, list[str]] = {}
+    for assignment in assignments:
+        name, _, text = assignment.partition("=")
+        values = [word.strip() for word in text.split(",") if word.strip()]
+        if not name.strip() or not values:
+            raise SettingsError(
+                f"'{assignment}' names no values of a knob.", "Write KNOB=VALUE,VALUE, like survival=0.2,0.5."
+            )
+        if name.strip() in grid:
+            raise SettingsError(f"Knob '{name.strip()}' is named twice.", "Give all of its values at once.")
+        grid[name.strip()] = values
+    return grid
+
+
 def _by_name(words: Sequence[str], option: str, read: Callable[[str], T], remedy: str) -> dict[str, T]:
     """NAME=VALUE words by name, each at most once."""
-    found: dict[str, T] = {}
+    values: dict[str, T] = {}
     for word in words:
         name, equals, text = word.rpartition("=")
         try:
@@ -78,7 +110,7 @@ def _by_name(words: Sequence[str], option: str, read: Callable[[str], T], remedy
             value = None
         if value is None:
             raise FootageError(f"'{option} {word}' cannot be understood.", remedy.format(option))
-        if name in found:
+        if name in values:
             raise FootageError(f"'{option}' names camera '{name}' twice.", "Give one value a name.")
-        found[name] = value
-    return found
+        values[name] = value
+    return values

@@ -2,24 +2,22 @@
 
 import shlex
 import sys
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import click
 
 from studio.cli.output import errors_in_words, note, print_result, progress
 from studio.garden.reproduction.catalogue import EXPERIMENTS, find_experiments
 from studio.garden.reproduction.experiment import Experiment
-from studio.garden.reproduction.findings_files import FOOTAGE, number_in_words, read_findings
+from studio.garden.reproduction.findings_files import number_in_words, read_findings, work_folder, work_place
 from studio.garden.reproduction.guide_findings import guide_folder, write_into_guide
 from studio.garden.reproduction.plan import FULL_SEEDS, QUICK_SEEDS, scale_of
 from studio.garden.reproduction.runner import Reproduction, reproduce
 from studio.operations.jobs.cluster import CLUSTER_HELP
 from studio.results.comparison.findings import FAILED
 from studio.results.comparison.findings_document import REPORT, REPRODUCTIONS, SUMMARY, Document
-from studio.results.comparison.trials import Scale
-from studio.sessions.object_stores import folder_of, is_address
-from studio.sessions.remote_sessions import bring_work
-from studio.sessions.workspace import workspace_root
 
 NOT_CONCLUDED = 1
 NOT_RUN = "not run yet"
@@ -46,47 +44,51 @@ JSON_HELP = "Print one JSON object and nothing else on standard output."
 @click.option("--cluster", default="", metavar="ADDRESS", help=CLUSTER_HELP)
 @click.option("--into-guide", is_flag=True, help=INTO_GUIDE_HELP)
 @click.option("--json", "as_json", is_flag=True, help=JSON_HELP)
-def reproduce_command(
-    name: str,
-    out: str | None,
-    quick: bool,
-    seeds: int | None,
-    processes: int | None,
-    cluster: str,
-    into_guide: bool,
-    as_json: bool,
-) -> None:
+def reproduce_command(name: str, as_json: bool, **given: Any) -> None:  # noqa: ANN401 - as Click reads them
     """Rerun the experiment NAME of a paper, `all` of them, or `list` what there is.
 
     Outcomes are kept as they come: the same command goes on where an interrupted one stopped. Writes a report
     (report.html), numbers (JSON, CSV) and charts (CSV) with the verdict on each of the paper's claims. Exit code 1
     says that an experiment could not be concluded; a claim that is not reproduced is a result like any other.
     """
+    wanted = _Wanted(**given)
     with errors_in_words():
-        place = folder_of(out) if out else str(workspace_root() / REPRODUCTIONS)
-        if not is_address(place):
-            place = str(Path(place).expanduser().absolute())
+        place = work_place(wanted.out)
         if name == "list":
-            folder = bring_work(place, FOOTAGE) if is_address(place) else Path(place)
-            print_result(_listed(folder), as_json)
+            print_result(_listed(work_folder(place)), as_json)
             return
-        found = _run(find_experiments(name), place, scale_of(seeds, quick), processes, cluster)
-        concluded = [document for document in found.documents if document["verdict"] != FAILED]
-        for document in concluded if into_guide else ():
+        result = _run(find_experiments(name), place, wanted)
+        concluded = [document for document in result.documents if document["verdict"] != FAILED]
+        for document in concluded if wanted.into_guide else ():
             note(f"The guide: {write_into_guide(guide_folder(), document)}")
-        print_result(_answer(found, place), as_json)
-        if any(document["verdict"] == FAILED for document in found.documents):
+        print_result(_answer(result, place), as_json)
+        if len(concluded) < len(result.documents):
             sys.exit(NOT_CONCLUDED)
 
 
-def _run(
-    experiments: tuple[Experiment, ...], place: str, scale: Scale, processes: int | None, cluster: str
-) -> Reproduction:
+@dataclass(frozen=True, slots=True)
+class _Wanted:
+    """What the options say."""
+
+    out: str | None
+    quick: bool
+    seeds: int | None
+    processes: int | None
+    cluster: str
+    into_guide: bool
+
+
+def _run(experiments: tuple[Experiment, ...], place: str, wanted: _Wanted) -> Reproduction:
     try:
         with progress("reproducing") as report:
-            catalogue = tuple(EXPERIMENTS.values())
             return reproduce(
-                experiments, place, scale, report, catalogue=catalogue, processes=processes, cluster=cluster
+                experiments,
+                place,
+                scale_of(wanted.seeds, wanted.quick),
+                report,
+                catalogue=tuple(EXPERIMENTS.values()),
+                processes=wanted.processes,
+                cluster=wanted.cluster,
             )
     except KeyboardInterrupt:
         typed = shlex.join(["studio", *sys.argv[1:]])
@@ -97,15 +99,15 @@ def _run(
 def _listed(folder: Path) -> Document:
     lines: list[Document] = []
     for experiment in EXPERIMENTS.values():
-        found = read_findings(folder, experiment.name)
+        document = read_findings(folder, experiment.name)
         lines.append(
             {
                 "name": experiment.name,
                 "title": experiment.title,
                 "source": experiment.source,
                 "claim": experiment.claim,
-                "verdict": found["verdict"] if found else None,
-                "firm": found["firm"] if found else None,
+                "verdict": document["verdict"] if document else None,
+                "firm": document["firm"] if document else None,
             }
         )
     text = "\n\n".join(
@@ -116,20 +118,20 @@ def _listed(folder: Path) -> Document:
     return {"experiments": lines, "text": text}
 
 
-def _answer(found: Reproduction, place: str) -> Document:
+def _answer(result: Reproduction, place: str) -> Document:
     lines: list[str] = []
-    for document in found.documents:
+    for document in result.documents:
         lines.append(f"{document['name']}: {_verdict(document)}")
         lines += [f"  {number_in_words(number)}" for number in document["numbers"]]
         lines += [f"  {words}" for words in (document["words"], *document["notes"]) if words]
-    lines.append(f"{found.measured} trials run, {found.kept} kept from before, {found.failed} failed.")
+    lines.append(f"{result.measured} trials run, {result.kept} kept from before, {result.failed} failed.")
     lines.append(f"Report: {place}/{REPORT}")
     return {
         "out": place,
         "report": f"{place}/{REPORT}",
         "summary": f"{place}/{SUMMARY}",
-        "trials": {"measured": found.measured, "kept": found.kept, "failed": found.failed},
-        "experiments": list(found.documents),
+        "trials": {"measured": result.measured, "kept": result.kept, "failed": result.failed},
+        "experiments": list(result.documents),
         "text": "\n".join(lines),
     }
 

@@ -31,6 +31,7 @@ from studio.operations.jobs.process_executor import cores
 from studio.operations.opening import AnySession, keeping_in_place, open_session
 from studio.operations.progress import Reporting, reporting, say
 from studio.results.comparison.candidates import DEFAULT_LAYERS, Lineup
+from studio.results.comparison.comparison_findings import document, table_text
 from studio.results.comparison.kept_comparison import RECORD_NAME, KeptComparison
 from studio.results.comparison.plan import Comparison, Plan, conclude, plan_comparison
 from studio.results.comparison.sweep import (
@@ -40,6 +41,8 @@ from studio.results.comparison.sweep import (
     expected,
     plan_sweep,
     run_name,
+    sweep_document,
+    sweep_text,
 )
 from studio.results.comparison.trials import Outcome
 from studio.runs.behaviour_models import needs_model
@@ -116,6 +119,16 @@ class Compared:
     comparison: Comparison
     kept: KeptComparison
 
+    @property
+    def document(self) -> dict[str, Any]:
+        """Its numbers as plain JSON values."""
+        return document(self.comparison)
+
+    @property
+    def in_words(self) -> str:
+        """Its numbers as a table for a terminal."""
+        return table_text(self.comparison)
+
 
 @operation
 @taking(CompareRequest)
@@ -163,6 +176,16 @@ class SweptGrid:
 
     sweep: Sweep
     kept: KeptComparison
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """Its runs and points as plain JSON values."""
+        return sweep_document(self.sweep)
+
+    @property
+    def in_words(self) -> str:
+        """Its points as a table for a terminal, the best first."""
+        return sweep_text(self.sweep)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,26 +1,32 @@
 """Where a verb reports its progress: a function of one's own, a bar on a terminal, or the caller's display."""
 
 from collections.abc import Callable, Generator, Iterable
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+import msgspec
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 from rich.progress import Progress as Bar
 
+from studio.foundations.errors import StudioError
+from studio.foundations.foreign_files import read_file
 from studio.foundations.progress import Progress, TimeLeft, left_in_words, unheard
+from studio.foundations.typed_decoding import decode_json
 from studio.foundations.words import printable
+from studio.sessions.atomic_files import write_bytes
+
+SAID = ".notes-said.json"
+"""In a session's folder: notes that commands have shown of it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Display:
-    """How a command shows what a verb does. watch : begins a stage of that title. say : shows lines; with a folder
-    (a session's) each but the first time that it is said of what lies there.
-    """
+    """How a command shows what a verb does. watch : begins a stage of that title. say : shows a line."""
 
     watch: Callable[[str], AbstractContextManager[Progress]]
-    say: Callable[[Iterable[str], Path | None], None]
+    say: Callable[[str], None]
 
 
 Reporting = Progress | Display | bool | None
@@ -44,9 +50,25 @@ def reporting(progress: Reporting, title: str) -> Generator[Progress]:
 
 
 def say(progress: Reporting, lines: Iterable[str], once_in: Path | None = None) -> None:
-    """Lines that a display shows while the verb goes on; the verb's answer has them for all others."""
+    """Show lines while the verb goes on, where there is a display; the verb's answer has them for all others.
+
+    once_in : a session's folder; each line is shown the first time only that it is said of what lies there.
+    """
     if isinstance(progress, Display):
-        progress.say(lines, once_in)
+        for line in lines if once_in is None else _new_in(once_in, list(lines)):
+            progress.say(line)
+
+
+def _new_in(folder: Path, lines: list[str]) -> list[str]:
+    """Lines that were not shown of a session before; they are remembered. What cannot be remembered is shown again."""
+    known = set[str]()
+    with suppress(OSError, StudioError, msgspec.DecodeError):
+        known = set(decode_json(read_file(folder / SAID), list[str]))
+    new = [line for line in lines if line not in known]
+    if new:
+        with suppress(StudioError):
+            write_bytes(folder / SAID, msgspec.json.encode(sorted(known.union(new))))
+    return new
 
 
 @contextmanager

@@ -17,9 +17,12 @@ from pathlib import Path
 from studio.foundations.errors import SessionError
 from studio.garden.reproduction.experiment import Experiment
 from studio.garden.reproduction.report_document import report_html
-from studio.results.comparison.findings_document import REPORT, RESULTS, SUMMARY, Document
+from studio.results.comparison.findings_document import REPORT, REPRODUCTIONS, RESULTS, SUMMARY, Document
 from studio.results.comparison.trials import Plain
 from studio.sessions.atomic_files import write_text
+from studio.sessions.object_stores import folder_of, is_address
+from studio.sessions.remote_sessions import bring_work
+from studio.sessions.workspace import workspace_root
 
 FOOTAGE, TRIALS = "footage", "trials"
 FINDINGS = "findings.json"
@@ -28,6 +31,17 @@ NUMBER_COLUMNS = ("name", "ours", "low", "high", "unit", "paper", "better", "see
 MOST_DECIMALS = 6
 
 Rows = Iterable[Sequence[Plain]]
+
+
+def work_place(out: str | None) -> str:
+    """The folder, or address of a store, where everything is kept: by default in the workspace."""
+    place = folder_of(out) if out else str(workspace_root() / REPRODUCTIONS)
+    return place if is_address(place) else str(Path(place).expanduser().absolute())
+
+
+def work_folder(place: str) -> Path:
+    """The folder of a place; of an address a copy on this machine, without footage. Raises StudioError."""
+    return bring_work(place, FOOTAGE) if is_address(place) else Path(place)
 
 
 def write_findings(out: Path, document: Document) -> None:

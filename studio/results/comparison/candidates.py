@@ -102,22 +102,6 @@ def expanded(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def read_assignments(assignments: Sequence[str]) -> dict[str, dict[str, Value]]:
-    """`NAME.KNOB=VALUE` and `KNOB=VALUE` (for all that have it) as changes by name, those of all under "".
-
-    Raises SettingsError where there is no '='.
-    """
-    changes: dict[str, dict[str, Value]] = {}
-    for assignment in assignments:
-        left, equals, value = assignment.partition("=")
-        if not equals or not left.strip():
-            hint = "Write NAME.KNOB=VALUE, like annealed:eq13.adaptive_diffusion=false."
-            raise SettingsError(f"'{assignment}' is not an assignment.", hint)
-        name, _, knob = left.strip().rpartition(".")
-        changes.setdefault(name, {})[knob] = value.strip()
-    return changes
-
-
 def _candidate(name: str, lineup: Lineup) -> Candidate:
     tracker = name.partition(":")[0]
     own = dict(lineup.changes.get(name, {}))

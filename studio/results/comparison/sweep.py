@@ -176,22 +176,6 @@ def point_name(point: Mapping[str, Value]) -> str:
     return ", ".join(f"{name} {value}" for name, value in point.items())
 
 
-def read_grid(assignments: Sequence[str]) -> dict[str, list[str]]:
-    """`KNOB=VALUE,VALUE` words as values by knob. Raises SettingsError."""
-    grid: dict[str, list[str]] = {}
-    for assignment in assignments:
-        name, _, text = assignment.partition("=")
-        found = [word.strip() for word in text.split(",") if word.strip()]
-        if not name.strip() or not found:
-            raise SettingsError(
-                f"'{assignment}' names no values of a knob.", "Write KNOB=VALUE,VALUE, like survival=0.2,0.5."
-            )
-        if name.strip() in grid:
-            raise SettingsError(f"Knob '{name.strip()}' is named twice.", "Give all of its values at once.")
-        grid[name.strip()] = found
-    return grid
-
-
 def sweep_trials(plan: Plan) -> tuple[Trial, ...]:
     """One a point and seed; every point's first seed first, so that an early look shows the whole grid."""
     return tuple(

@@ -2,6 +2,7 @@
 
 import pytest
 
+from studio.cli.reading import read_assignments
 from studio.foundations.errors import SettingsError, StudioError
 from studio.results.comparison.candidates import (
     LINEUPS,
@@ -9,7 +10,6 @@ from studio.results.comparison.candidates import (
     Candidate,
     Lineup,
     candidates,
-    read_assignments,
 )
 from studio.search.settings import changed_settings, default_settings
 from studio.search.trackers.catalogue import TRACKERS

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from studio.cli.reading import read_assignments
 from studio.foundations.errors import RunError, StudioError, TruthError
-from studio.results.comparison.candidates import Lineup, read_assignments
+from studio.results.comparison.candidates import Lineup
 from studio.results.comparison.comparison_findings import document, findings, frames_csv, table_text
 from studio.results.comparison.footage_cache import FootageCache
 from studio.results.comparison.plan import (

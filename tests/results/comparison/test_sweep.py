@@ -10,6 +10,7 @@ import pytest
 from sample_walk import copy_of_walk
 from store_records import result_of
 
+from studio.cli.reading import read_grid
 from studio.foundations.errors import CalibrationError, RunError, SettingsError
 from studio.operations.comparison_folders import (
     bring_back,
@@ -26,7 +27,6 @@ from studio.results.comparison.sweep import (
     conclude_sweep,
     expected,
     plan_sweep,
-    read_grid,
     run_name,
     sweep_csv,
     sweep_document,
