@@ -46,7 +46,7 @@ from studio.sessions.process_lock import ProcessLock
 
 LEARNT = "learnt"
 # Code that affects what is learnt or fitted.
-ROOMS = ("geometry", "motion_files", "body", "behaviour", "synthesis", "training")
+ROOMS = ("foundations/geometry", "body", "search/behaviour", "results/drawing_footage", "runs/learning")
 WAIT_SECONDS = 0.2
 
 
