@@ -1,5 +1,6 @@
 """Notes and bookmarks on frames of a run."""
 
+from dataclasses import dataclass
 from typing import Annotated
 
 from pydantic import Field
@@ -7,6 +8,13 @@ from pydantic import Field
 from studio.foundations.declaring import Terminal, Web, operation
 from studio.operations.opening import RunName, open_run
 from studio.runs.notes import LONGEST, Note, notes_of, remove_note, write_note
+
+
+@dataclass(frozen=True, slots=True)
+class NoteList:
+    """A run's notes, by frame."""
+
+    notes: tuple[Note, ...] = ()
 
 
 @operation

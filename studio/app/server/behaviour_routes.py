@@ -12,7 +12,6 @@ from fastapi import Depends, Query
 from studio.app.server.answers import Router
 from studio.app.server.app_state import App
 from studio.app.server.schemas import Request, RunName
-from studio.app.server.session_routes import TrashEntry, trash_entry
 from studio.operations.behaviour_details import (
     BehaviourDetail,
     Entropies,
@@ -22,6 +21,7 @@ from studio.operations.behaviour_details import (
     walk_of,
 )
 from studio.operations.model_repository import list_models, rename_model, stored_model, throw_away_model
+from studio.operations.trash import TrashEntry, trash_entry
 from studio.runs.behaviour_models import ModelSummary
 
 router = Router(prefix="/api/behaviours", tags=["behaviours"])

@@ -16,7 +16,7 @@ from studio.app.server.answers import Router
 from studio.app.server.app_state import App, AppState, moving
 from studio.app.server.requests import Arguments, body_of
 from studio.app.server.schemas import Request, RunName
-from studio.app.server.session_routes import OpenSession, TrashEntry, trash_entry
+from studio.app.server.session_routes import OpenSession
 from studio.foundations.knobs import Value
 from studio.operations.comparing import (
     MOST_TRACKERS,
@@ -42,6 +42,7 @@ from studio.operations.comparisons import (
 from studio.operations.jobs import commands
 from studio.operations.jobs.comparison_run import COMPARISON, ComparisonState, run_in_background
 from studio.operations.jobs.job_runner import Job
+from studio.operations.trash import TrashEntry, trash_entry
 from studio.operations.trial_runs import run_of_trial
 from studio.results.comparison.candidates import WEIGHTING
 from studio.results.comparison.kept_comparison import FRAMES_NAME, RESULT_NAME, KeptComparison

@@ -2,49 +2,35 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Path, Response
-from pydantic import Field
+from fastapi import Path, Response
 
 from studio.app.server import files
+from studio.app.server.answers import Router
 from studio.app.server.app_state import App, AppState
 from studio.app.server.requests import Arguments, body_of
-from studio.app.server.run_routes import RUN, OpenRun, session_name
-from studio.app.server.schemas import Answer
+from studio.app.server.run_routes import RUN, OpenRun
 from studio.foundations.declaring import LARGEST
+from studio.operations.notes import NoteList
 from studio.operations.notes import note as write
 from studio.operations.notes import notes as read
 from studio.runs.notes import Note
 from studio.sessions.named_rows import as_csv
 from studio.sessions.stored_run import StoredRun
 
-router = APIRouter(prefix="/api", tags=["notes"])
-
-
-class NoteLine(Answer):
-    """text: "" of a bookmark. made: when it was written."""
-
-    frame: int
-    text: str
-    made: str
-
-
-class NoteList(Answer):
-    """A run's notes, by frame."""
-
-    notes: list[NoteLine] = Field(default_factory=list[NoteLine])
+router = Router(prefix="/api", tags=["notes"])
 
 
 @router.get(RUN + "/notes")
 def notes(run: OpenRun) -> NoteList:
     """The notes and bookmarks on its frames."""
-    return _listed(read(run))
+    return NoteList(read(run))
 
 
 @router.get(RUN + "/notes.csv", response_class=Response)
 def notes_csv(run: OpenRun) -> Response:
     """The same as a table: frame, text, made."""
     rows = [[entry.frame, entry.text, entry.made] for entry in read(run)]
-    name = f"{session_name(run)}-{run.name}-notes.csv"
+    name = f"{run.session_name}-{run.name}-notes.csv"
     return files.download(as_csv([["frame", "text", "made"], *rows]), name, files.CSV)
 
 
@@ -56,19 +42,15 @@ def put_note(
     app: App,
 ) -> NoteList:
     """Put a note on a frame, in place of the one it has; without a text a bookmark. `notes` events tell of it."""
-    return _told(app, run, write(run, frame, **arguments))
+    return _published(app, run, write(run, frame, **arguments))
 
 
 @router.delete(RUN + "/frames/{frame}/note")
 def delete_note(run: OpenRun, frame: Annotated[int, Path(le=LARGEST)], app: App) -> NoteList:
     """Take a frame's note away."""
-    return _told(app, run, write(run, frame, remove=True))
+    return _published(app, run, write(run, frame, remove=True))
 
 
-def _told(app: AppState, run: StoredRun, kept: tuple[Note, ...]) -> NoteList:
-    app.events.publish({"type": "notes", "session": session_name(run), "run": run.name})
-    return _listed(kept)
-
-
-def _listed(kept: tuple[Note, ...]) -> NoteList:
-    return NoteList(notes=[NoteLine.of(entry) for entry in kept])
+def _published(app: AppState, run: StoredRun, kept: tuple[Note, ...]) -> NoteList:
+    app.events.publish({"type": "notes", "session": run.session_name, "run": run.name})
+    return NoteList(kept)

@@ -8,12 +8,12 @@ import numpy as np
 from fastapi import APIRouter
 from pydantic import Field
 
+from studio.app.server.answers import Shown
 from studio.app.server.app_state import App, Scene
 from studio.app.server.job_routes import add_job_routes
 from studio.app.server.requests import Arguments, body_of
 from studio.app.server.schemas import Answer, Number, Numbers, Request, RunName
 from studio.app.server.session_routes import OpenSession
-from studio.app.server.session_views import ParameterView, parameter_views
 from studio.app.server.track_routes import TRACK, TrackJobState, begin_job
 from studio.app.server.windows import Window
 from studio.body.dragging import Dragger
@@ -23,6 +23,7 @@ from studio.foundations.arrays import Array
 from studio.foundations.declaring import LARGEST
 from studio.foundations.errors import SettingsError, StudioError
 from studio.operations.jobs.job_runner import Job, JobKind, NumberedJob
+from studio.operations.overview import ParameterView, parameter_views
 from studio.operations.person import initialise
 from studio.runs.new_run import checked_frames
 from studio.runs.setup.pose_search import better_pose
@@ -50,7 +51,7 @@ class PoseView(Answer):
     """
 
     body: str
-    parameters: list[ParameterView]
+    parameters: tuple[Annotated[ParameterView, Shown], ...]
     pose: list[float]
     grips: list[GripView]
     stored: bool = False

@@ -12,16 +12,22 @@ from pydantic import Field
 from studio.app.server import files
 from studio.app.server.answers import Shown
 from studio.app.server.event_encoding import layer_summary
-from studio.app.server.run_errors import evaluation_of
 from studio.app.server.run_routes import RUN, Checked, OpenRun
 from studio.app.server.schemas import Answer, Number, Numbers
 from studio.app.server.session_routes import OpenSession
-from studio.app.server.session_views import ParameterView, describe, parameter_views
 from studio.body.model import BodyModel
 from studio.foundations.errors import NotFoundError, StudioError
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.knobs import Value
-from studio.operations.run_settings import SettingsChange, changes_of, history_of
+from studio.operations.overview import (
+    ParameterView,
+    SettingsChange,
+    changes_of,
+    describe,
+    history_of,
+    parameter_views,
+)
+from studio.operations.run_errors import evaluation_of
 from studio.results.evaluation.errors import Evaluation
 from studio.results.inspection.cloud_outlines import CloudOutline, outline_of
 from studio.results.inspection.reading import InspectedFrame, InspectedRun
@@ -140,7 +146,7 @@ class FrameDetail(Answer):
     finished: bool
     search_layers: int
     searches: int
-    parameters: list[ParameterView]
+    parameters: tuple[Annotated[ParameterView, Shown], ...]
     layers: list[LayerView]
     pose: Numbers | None
     mean: Numbers | None

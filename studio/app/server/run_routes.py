@@ -4,29 +4,30 @@ Commands are posted and answered at once with an identifier; an `acknowledged` e
 event stream. Each names its run, which the process opens first if it is not open.
 """
 
+from dataclasses import dataclass
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Query
+from fastapi import Depends, Query
 from pydantic import Field
 
+from studio.app.server.answers import Router
 from studio.app.server.app_state import App, AppState, moving
 from studio.app.server.event_encoding import message_of, plain
 from studio.app.server.requests import Arguments, body_of
-from studio.app.server.schemas import Answer, Numbers, Request
-from studio.app.server.session_routes import NewName, OpenSession, SessionChange, TrashEntry, trash_entry
-from studio.app.server.session_views import ParameterView, RunLine, parameter_views, run_line
+from studio.app.server.schemas import Request
+from studio.app.server.session_routes import NewName, OpenSession, SessionChange
 from studio.foundations.declaring import LARGEST
 from studio.foundations.errors import RunError
-from studio.foundations.knobs import Value
 from studio.foundations.progress import unheard
 from studio.operations.jobs import commands
-from studio.operations.jobs.search_pace import MOST_SECONDS, SpeedChoice, offered
+from studio.operations.jobs.search_pace import MOST_SECONDS, PaceView, pace_view
+from studio.operations.overview import LogLines, RunDetail, RunLine, RunList, run_line, run_lines, run_log
+from studio.operations.overview import run_detail as detail_of
 from studio.operations.tracking import branch, branched_run, new_run
-from studio.runs.sides import notes_of
-from studio.sessions.run_log import read_log
+from studio.operations.trash import TrashEntry, trash_entry
 from studio.sessions.stored_run import StoredRun
 
-router = APIRouter(prefix="/api", tags=["runs"])
+router = Router(prefix="/api", tags=["runs"])
 
 
 class Frame(Request):
@@ -42,60 +43,18 @@ class ReannealRequest(Request):
     keep: bool = False
 
 
-class Posted(Answer):
+@dataclass(frozen=True, slots=True)
+class Posted:
     """A command handed to the tracking process; an `acknowledged` event with its identifier follows."""
 
     identifier: str
     command: str
 
 
-class RunList(Answer):
-    """The runs of a session, newest first."""
-
-    runs: list[RunLine]
-
-
-class RunDetail(Answer):
-    """A run and its request. settings: at its start; parameters: of its pose vector, as sigma and start_pose."""
-
-    run: RunLine
-    settings: dict[str, Value]
-    parameters: list[ParameterView]
-    sigma: Numbers
-    start_pose: Numbers | None
-    start_source: str
-    software: str
-    fps: float
-    notes: list[str]
-    behaviour: str = ""
-    live: bool = False
-
-
-class LogEntry(Answer):
-    """One line of a run's log. time: seconds since the epoch."""
-
-    level: str
-    time: float
-    text: str
-
-
-class LogLines(Answer):
-    """What the tracking process said, oldest first."""
-
-    lines: list[LogEntry]
-
-
 class PaceRequest(Request):
     """How long each tracked layer takes at least; 0: as fast as it can."""
 
     seconds_a_layer: float = Field(ge=0.0, le=MOST_SECONDS, allow_inf_nan=False)
-
-
-class PaceView(Answer):
-    """The pace that the search has, and what is offered: fast to slow, the present one among them."""
-
-    seconds_a_layer: float
-    choices: list[SpeedChoice]
 
 
 RUN = "/sessions/{session}/runs/{run}"
@@ -119,7 +78,7 @@ Checked = Annotated[
 @router.get("/sessions/{session}/runs")
 def runs(session: OpenSession) -> RunList:
     """The session's runs, newest first."""
-    return RunList(runs=[run_line(run.summary(), session) for run in reversed(session.runs())])
+    return run_lines(session)
 
 
 @router.post("/sessions/{session}/runs", status_code=201)
@@ -154,13 +113,7 @@ def make_branch(
 @router.get(RUN)
 def run_detail(session: OpenSession, run: OpenRun, check: Checked = True) -> RunDetail:
     """What was requested of the run, how far it got, and its body's parameters."""
-    record = run.record
-    return RunDetail.of(
-        record,
-        run=run_line(run.summary(blobs=check), session),
-        parameters=parameter_views(run.body()),
-        notes=list(notes_of(run)),
-    )
+    return detail_of(run, session, check=check)
 
 
 @router.patch(RUN)
@@ -186,7 +139,7 @@ def delete_run(session: OpenSession, run: OpenRun, app: App) -> TrashEntry:
 @router.get(RUN + "/log")
 def log_of(run: OpenRun) -> LogLines:
     """What the tracking process said of this run, oldest first."""
-    return LogLines(lines=[LogEntry.model_validate(line) for line in read_log(run.folder)])
+    return run_log(run)
 
 
 # As the document describes the `state` events.
@@ -211,8 +164,7 @@ def restart_worker(app: App) -> dict[str, object]:
 @router.get("/worker/pace")
 def pace(app: App) -> PaceView:
     """How slowly a search goes that is watched, and the choices that are offered."""
-    seconds = app.control.state.seconds_a_layer
-    return PaceView(seconds_a_layer=seconds, choices=list(offered(seconds)))
+    return pace_view(app.control.state.seconds_a_layer)
 
 
 @router.post("/worker/pace", status_code=202)
@@ -288,15 +240,10 @@ def cancel(run: OpenRun, app: App) -> Posted:
 def check_free(app: AppState, run: StoredRun) -> None:
     """Raise RunError at once where the process would refuse: another run is being tracked, as far as is known here."""
     state = app.control.state
-    if state.state.searches and (state.session, state.run) != (session_name(run), run.name):
+    if state.state.searches and (state.session, state.run) != (run.session_name, run.name):
         raise RunError(
             f"Run '{state.run}' of session '{state.session}' is being tracked.", "Pause it first, or wait."
         )
-
-
-def session_name(run: StoredRun) -> str:
-    """The name of the session that a run lies in, as events carry it."""
-    return run.folder.parent.parent.name
 
 
 def _post_for(app: AppState, run: StoredRun, command: commands.Command) -> Posted:

@@ -12,7 +12,6 @@ from studio.app.server.answers import Shown
 from studio.app.server.app_state import App, AppState
 from studio.app.server.job_routes import add_job_routes
 from studio.app.server.requests import Arguments, body_of
-from studio.app.server.run_errors import evaluation_of
 from studio.app.server.run_routes import RUN, OpenRun
 from studio.app.server.schemas import Answer, Number
 from studio.app.server.session_routes import OpenSession
@@ -23,6 +22,7 @@ from studio.operations.jobs.job_runner import Job, JobKind, NumberedJob, Work
 from studio.operations.person import landmarks
 from studio.operations.results import check as check_run
 from studio.operations.results import evaluate, refine, smooth
+from studio.operations.run_errors import evaluation_of
 from studio.operations.tracking import correct, corrected_run
 from studio.runs.checking import RunCheck, kept_check
 from studio.runs.correcting import track_backwards

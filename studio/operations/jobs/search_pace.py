@@ -22,6 +22,14 @@ class SpeedChoice:
     seconds_a_layer: float
 
 
+@dataclass(frozen=True, slots=True)
+class PaceView:
+    """The pace that the search has, and what is offered: fast to slow, the present one among them."""
+
+    seconds_a_layer: float
+    choices: tuple[SpeedChoice, ...]
+
+
 class SearchPace:
     """Says how long the next layer has to wait. clock : seconds, rising."""
 
@@ -59,6 +67,7 @@ def in_words(seconds: float) -> str:
     return f"{rate} layers/s" if seconds < 1.0 else f"{seconds:.3g} s a layer"
 
 
-def offered(seconds: float = 0.0) -> tuple[SpeedChoice, ...]:
-    """The choices from fast to slow, with the present speed among them if it is another one."""
-    return tuple(SpeedChoice(in_words(speed), speed) for speed in sorted({*SPEEDS, seconds}))
+def pace_view(seconds: float = 0.0) -> PaceView:
+    """A pace, and the choices with it among them."""
+    choices = tuple(SpeedChoice(in_words(speed), speed) for speed in sorted({*SPEEDS, seconds}))
+    return PaceView(seconds, choices)

@@ -9,10 +9,11 @@ from collections.abc import Iterator
 import pytest
 from web_doubles import Studio
 
-from studio.app.server import session_routes, subject_routes
+from studio.app.server import subject_routes
 from studio.app.server.content_policy import PAGE_POLICY
 from studio.app.server.error_responses import error_response, validation_words
 from studio.foundations.errors import FootageError, StudioError, UnforeseenError
+from studio.operations import overview
 from studio.sessions.stored_run import StoredRun
 
 ENTRIES = {"code", "message", "hint", "status"}
@@ -82,7 +83,7 @@ def test_an_unforeseen_fault_is_reported_in_words_and_logged_whole(
     def broken(*_: object) -> None:
         raise ZeroDivisionError("a secret of the code, line 7")
 
-    monkeypatch.setattr(session_routes, "session_line", broken)
+    monkeypatch.setattr(overview, "session_line", broken)
     answer = studio.client.get("/api/sessions")
     assert answer.status_code == 500
     response = answer.json()

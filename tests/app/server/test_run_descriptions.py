@@ -2,7 +2,7 @@
 
 import dataclasses
 
-from studio.app.server.session_views import describe
+from studio.operations.overview import describe
 from studio.search.settings import SettingsEntry, SettingsHistory
 from studio.sessions.stored_run import StoredRun
 

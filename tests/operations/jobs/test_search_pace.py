@@ -10,7 +10,7 @@ from studio.foundations.errors import SettingsError
 from studio.operations.jobs import commands
 from studio.operations.jobs.events import Acknowledged, Event, LayerFinished, StateChanged
 from studio.operations.jobs.process import _loop
-from studio.operations.jobs.search_pace import MOST_SECONDS, SPEEDS, SearchPace, in_words, offered
+from studio.operations.jobs.search_pace import MOST_SECONDS, SPEEDS, SearchPace, in_words, pace_view
 from studio.operations.jobs.tracking_job import TrackingJob
 from studio.runs.new_run import prepare_run
 from studio.runs.pace import Pace
@@ -150,9 +150,18 @@ def test_what_is_no_pace_is_refused_in_words(seconds: float) -> None:
 
 
 def test_the_choices_in_words() -> None:
-    assert [choice.label for choice in offered()] == ["full speed", "10 layers/s", "3 layers/s", "1 layer/s"]
-    assert [choice.seconds_a_layer for choice in offered(1.0)] == list(SPEEDS)
-    assert [choice.label for choice in offered(0.05)][:3] == ["full speed", "20 layers/s", "10 layers/s"]
+    assert [choice.label for choice in pace_view().choices] == [
+        "full speed",
+        "10 layers/s",
+        "3 layers/s",
+        "1 layer/s",
+    ]
+    assert [choice.seconds_a_layer for choice in pace_view(1.0).choices] == list(SPEEDS)
+    assert [choice.label for choice in pace_view(0.05).choices][:3] == [
+        "full speed",
+        "20 layers/s",
+        "10 layers/s",
+    ]
     assert in_words(2.5) == "2.5 s a layer"
-    for choice in offered():
+    for choice in pace_view().choices:
         SearchPace().set(choice.seconds_a_layer)
