@@ -1,20 +1,21 @@
 """Looking into a run: views of its search, why a frame failed, other seeds, runs side by side."""
 
 from collections.abc import Sequence
-from typing import Annotated
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 from pydantic import Field
 
-from studio.foundations.declaring import LARGEST, Terminal, Web, operation
+from studio.foundations.declaring import LARGEST, Terminal, Web, operation, taking
 from studio.foundations.errors import RunError
 from studio.operations.opening import RunName, keeping_in_place, open_run, session_of
 from studio.operations.progress import Reporting, reporting
 from studio.results.inspection.comparing import RunsCompared, compare_stored
 from studio.results.inspection.limbs import disagreements_of, errors_of
-from studio.results.inspection.reading import InspectedRun
+from studio.results.inspection.reading import InspectedRun, TriedFrame
 from studio.results.inspection.seeds import search_seeds
-from studio.results.inspection.tables import Selection, Viewed
-from studio.results.inspection.views import VIEWS, look, look_over
+from studio.results.inspection.tables import FrameFinding, Remedy, Selection, Table, View, Viewed
+from studio.results.inspection.views import VIEWS, look, look_over, view_named
 
 ViewName = Annotated[
     str, Field(description=f"Which: {', '.join(VIEWS)}."), Terminal("--view", metavar="NAME")
@@ -24,13 +25,47 @@ Frame = Annotated[
 ]
 
 
-def inspected(run: RunName) -> InspectedRun:
-    """A run, ready to be looked into. Raises RunError, NotFoundError."""
+@dataclass(frozen=True, slots=True)
+class ViewList:
+    """All views, in the order in which a person looks at them."""
+
+    views: tuple[View, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ViewAnswer:
+    """A view's tables, and the sentences and remedies of `why`.
+
+    frame : null in the answer for a whole run.
+    search_layers, searches : layers of one search of the frame, and how many searches it has; 0 for a whole run.
+    """
+
+    view: str
+    title: str
+    question: str
+    caption: str
+    session: str
+    run: str
+    frame: int | None
+    search_layers: int
+    searches: int
+    notes: tuple[str, ...]
+    tables: tuple[Table, ...]
+    findings: tuple[FrameFinding, ...] = ()
+    remedies: tuple[Remedy, ...] = ()
+
+
+def inspected(run: RunName, tried: TriedFrame | None = None) -> InspectedRun:
+    """A run, ready to be looked into. tried : stands in the place of the stored frame of its number.
+
+    Raises RunError, NotFoundError.
+    """
     stored = open_run(run)
-    return InspectedRun(session_of(stored), stored)
+    return InspectedRun(session_of(stored), stored, tried)
 
 
 @operation
+@taking(Selection)
 @keeping_in_place
 def view(
     run: RunName,
@@ -38,28 +73,37 @@ def view(
     frame: Annotated[
         int | None, Field(ge=0, le=LARGEST, description="The frame; default: the tables of the whole run.")
     ] = None,
-    *,
-    layer: Annotated[
-        int | None, Field(ge=0, le=LARGEST, description="Its index, from 0; default: the last one.")
-    ] = None,
-    parameter: Annotated[str, Field(description="A parameter of the body.")] = "",
-    limb: Annotated[str, Field(description="A limb of the body.")] = "",
-    particle: Annotated[int | None, Field(ge=0, le=LARGEST, description="A particle of the layer.")] = None,
-    camera: Annotated[str, Field(description="A camera.")] = "",
-    track: Annotated[str, Field(description="Whose pose; default: what the search found.")] = "",
-    second: Annotated[str, Field(description="Another parameter, for a plane of the landscape.")] = "",
-    towards: Annotated[
-        str,
-        Field(description="End of a line in the landscape: truth, mean, mode, searched, particle, a track."),
-    ] = "",
+    **selected: Any,  # noqa: ANN401 - of the types that are declared
 ) -> Viewed:
     """Show the inside of a run's search: the tables of a view, of a frame or of the whole run.
 
     Raises NotFoundError for a view, frame, layer or name that is none.
     """
-    selection = Selection(layer, parameter, limb, particle, camera, track, second, towards)
-    opened = inspected(run)
-    return look_over(opened, name, selection) if frame is None else look(opened, frame, name, selection)
+    return _viewed(inspected(run), name, frame, Selection(**selected))
+
+
+def _viewed(run: InspectedRun, name: str, frame: int | None, selection: Selection) -> Viewed:
+    return look_over(run, name, selection) if frame is None else look(run, frame, name, selection)
+
+
+def view_answer(run: InspectedRun, name: str, selection: Selection, frame: int | None = None) -> ViewAnswer:
+    """A view with what a page writes beside it: its question, and a caption of run and frame. Raises NotFoundError."""
+    shown, entry = _viewed(run, name, frame, selection), view_named(name)
+    return ViewAnswer(
+        view=name,
+        title=entry.title,
+        question=entry.question,
+        caption=run.caption(frame),
+        session=run.session.name,
+        run=run.run.name,
+        frame=frame,
+        search_layers=shown.search_layers,
+        searches=shown.searches,
+        notes=shown.notes,
+        tables=shown.tables,
+        findings=shown.findings,
+        remedies=shown.remedies,
+    )
 
 
 @operation
@@ -97,13 +141,19 @@ def seeds(
     frame: Frame,
     *,
     count: Annotated[int, Field(ge=2, le=64, description="How many other seeds.")] = 8,
+    tried: Annotated[
+        TriedFrame | None,
+        Field(description="A trial of the frame, in place of what is stored."),
+        Terminal(left_out=True),
+        Web(left_out=True),
+    ] = None,
     progress: Reporting = None,
 ) -> Viewed:
     """Search a stored frame again with other seeds: spread within and between them. Nothing of the run changes.
 
     Raises NotFoundError for a frame that is not finished.
     """
-    opened = inspected(run)
+    opened = inspected(run, tried)
     with reporting(progress, f"{opened.session.name} / {opened.run.name}: seeds") as report:
         search_seeds(opened, frame, count, report)
     return look(opened, frame, "seeds", Selection())

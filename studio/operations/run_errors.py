@@ -7,6 +7,7 @@ from pathlib import Path
 
 from studio.body.motion_files.trc import MarkerMotion, read_trc
 from studio.foundations.arrays import Array, Indices
+from studio.foundations.errors import NotFoundError
 from studio.results.evaluation.errors import Evaluation, evaluate
 from studio.runs.tracks import RAW, read_track, track_stamp
 from studio.sessions.session import Session
@@ -43,6 +44,17 @@ def evaluation_of(
         if len(_evaluations) > KEPT:
             _evaluations.popitem(last=False)
     return measured
+
+
+def measured(session: Session, run: StoredRun) -> Evaluation:
+    """The errors of all finished frames of a run. Raises NotFoundError without a truth or before the first frame."""
+    errors = evaluation_of(session, run)
+    if errors is None:
+        raise NotFoundError(
+            f"There is nothing to measure run '{run.name}' against, or no frame yet.",
+            "Import the session with a truth/*.trc, and track it.",
+        )
+    return errors
 
 
 def mean_error(session: Session, run: StoredRun, done: int) -> float | None:

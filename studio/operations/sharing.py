@@ -8,11 +8,13 @@ from typing import Annotated
 from pydantic import Field
 
 from studio.foundations.declaring import Terminal, operation
+from studio.foundations.progress import Progress, unheard
 from studio.operations.inspecting import inspected, worst_frame
-from studio.operations.opening import RunName, keeping_in_place
+from studio.operations.opening import RunName, keeping_in_place, open_run
 from studio.operations.progress import Reporting, reporting
 from studio.results.inspection.shared_page import shared_page
 from studio.sessions.atomic_files import write_text, writing
+from studio.sessions.stored_run import StoredRun
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,10 +53,23 @@ def share(
 
     Raises RunError for a run without frames, NotFoundError for a frame or track that is none.
     """
-    opened, place = inspected(run), Path(to)
-    chosen = worst_frame(opened) if frame is None else frame
-    with reporting(progress, f"{opened.session.name} / {opened.run.name}: page") as report:
-        text = shared_page(opened, chosen, track=track, clouds=clouds, progress=report)
+    stored, place = open_run(run), Path(to)
+    with reporting(progress, f"{stored.session_name} / {stored.name}: page") as report:
+        chosen, text = page_text(stored, frame, track, clouds, progress=report)
     with writing("The page", place):
         write_text(place, text)
     return Shared(place, chosen, len(text.encode("utf-8")))
+
+
+def page_text(
+    run: StoredRun,
+    frame: int | None = None,
+    track: str = "",
+    clouds: Sequence[int] = (),
+    *,
+    progress: Progress = unheard,
+) -> tuple[int, str]:
+    """The frame that the page of a run looks into (default: the worst one), and the page. Raises as `share`."""
+    opened = inspected(run)
+    chosen = worst_frame(opened) if frame is None else frame
+    return chosen, shared_page(opened, chosen, track=track, clouds=clouds, progress=progress)

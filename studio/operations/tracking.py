@@ -22,7 +22,7 @@ from studio.foundations.declaring import (
     taking,
 )
 from studio.foundations.errors import RunError, SettingsError, StudioError
-from studio.foundations.progress import Progress
+from studio.foundations.progress import Progress, unheard
 from studio.operations.footage import Cameras, addresses_of
 from studio.operations.jobs.batch import BatchResult, track_to_end
 from studio.operations.jobs.camera_tracking import LiveRecordingRequest, track_cameras
@@ -317,8 +317,21 @@ def correct(
         return f"{done} frames tracked backwards, the others are the old run's."
 
     with _reporting(new, progress, how_far) as report:
-        track_backwards(session_of(stored), new, counted)
+        track_back(new, counted)
     return _tracked(new, None)
+
+
+@keeping_in_place
+def track_back(
+    run: RunName, progress: Progress = unheard, cancelled: Callable[[], bool] | None = None
+) -> int:
+    """Track a corrected run backwards from its corrected frame; how many frames have new poses.
+
+    progress : called after each frame. cancelled : checked before each layer; True stops and keeps the frames done.
+    Raises RunError for a run that was not made for this, or that another process has open.
+    """
+    stored = open_run(run)
+    return track_backwards(session_of(stored), stored, progress, cancelled)
 
 
 @operation

@@ -19,7 +19,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema
 from starlette.responses import Response
 
-from studio.app.server.schemas import Answer, Number, Numbers
+from studio.app.server.schemas import Answer, Number, Numbers, finite
 from studio.foundations.declaring import Web
 from studio.foundations.knobs import Value
 
@@ -83,6 +83,9 @@ def shown_as(kind: Kind) -> Kind:
     if origin in (dict, Mapping):
         return dict[parts[0], shown_as(parts[1])]
     if origin in (Union, types.UnionType):
+        if float in parts:
+            # Numbers of numpy are read before one of the types is chosen.
+            return Annotated[Union[(*parts, None)], BeforeValidator(finite)]
         return Union[tuple(shown_as(part) for part in parts)]  # noqa: UP007 - of parts known only now
     return kind
 

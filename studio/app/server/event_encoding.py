@@ -22,8 +22,7 @@ from studio.operations.jobs.events import (
     SettingsApplied,
     StateChanged,
 )
-from studio.results.inspection.verdict import limbs_off, verdict_on
-from studio.search.trackers.tracker import FrameResult, LayerRecord
+from studio.operations.stored_frames import frame_summary, layer_summary
 
 TYPES: dict[type[Event], str] = {
     StateChanged: "state",
@@ -33,7 +32,6 @@ TYPES: dict[type[Event], str] = {
     SettingsApplied: "settings",
     LogLine: "log",
 }
-QUANTILES = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 def as_json(message: dict[str, object]) -> str:
@@ -63,58 +61,6 @@ def message_of(event: Event) -> dict[str, object]:
     return head | {entry.name: getattr(event, entry.name) for entry in dataclasses.fields(event)[2:]}
 
 
-def layer_summary(record: LayerRecord) -> dict[str, object]:
-    """What the charts need of a layer: all but the particles.
-
-    log_weight_quantiles : minimum, quartiles and maximum of the raw log-weights. effective_share :
-    effective sample size over N at the layer's β.
-    """
-    return {
-        "frame": record.frame,
-        "layer": record.layer,
-        "settings_version": record.settings_version,
-        "beta": record.beta,
-        "alpha_wanted": record.alpha_wanted,
-        "alpha_reached": record.alpha_reached,
-        "model_free_share": record.model_free_share,
-        "variance_weighed": record.variance_weighed,
-        "variance_resampled": record.variance_resampled,
-        "variance_diffused": record.variance_diffused,
-        "best": record.best,
-        "mean": record.mean,
-        "best_log_weight": record.best_log_weight,
-        "log_weight_quantiles": _quantiles(record.log_weights),
-        "effective_share": effective_share(record.log_weights, record.beta),
-        "particles": len(record.poses),
-        "milliseconds": record.milliseconds,
-    }
-
-
-def frame_summary(result: FrameResult) -> dict[str, object]:
-    """What the timeline needs of a frame."""
-    return {
-        "frame": result.frame,
-        "pose": result.estimate.pose,
-        "log_weight": result.estimate.log_weight,
-        "layers": result.layers,
-        "evaluations": result.evaluations,
-        "settings_version": result.settings_version,
-        "milliseconds": result.milliseconds,
-        "tracking": verdict_on(result).tracking,
-        "limbs_off": limbs_off(result),
-    }
-
-
-def effective_share(log_weights: np.ndarray, beta: float) -> float:
-    """(Σ w^β)² ÷ (N Σ w^2β): 1 for equal weights, 1/N when one particle has everything; NaN without
-    particles.
-    """
-    if not log_weights.size or not np.isfinite(beta):
-        return float("nan")
-    scaled = np.exp(beta * (log_weights - log_weights.max()))
-    return float(scaled.sum() ** 2 / (scaled.size * np.square(scaled).sum()))
-
-
 def key_of(message: dict[str, object]) -> tuple[object, ...] | None:
     """Messages of one key replace each other where a watcher is slow; None: keep each."""
     kind = message["type"]
@@ -128,10 +74,6 @@ def key_of(message: dict[str, object]) -> tuple[object, ...] | None:
     if kind == "frame":
         return (kind, message["frame"], message["reannealed"])
     return None
-
-
-def _quantiles(values: np.ndarray) -> list[float]:
-    return np.quantile(values, QUANTILES).tolist() if values.size else []
 
 
 def _plain(value: object) -> object:

@@ -14,12 +14,13 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaMode, JsonSchemaV
 from pydantic_core import core_schema
 
 from studio.app.scene.model import Selection
+from studio.app.server.answers import shown_as
 from studio.app.server.event_encoding import TYPES
-from studio.app.server.result_routes import LayerView
 from studio.app.server.scene_routes import LayersPlayed
 from studio.app.server.schemas import Answer, Number, Numbers
 from studio.operations.jobs.events import Acknowledged, Event, LogLine, SettingsApplied, StateChanged
 from studio.operations.jobs.job_runner import JobKind
+from studio.operations.stored_frames import LayerView
 
 REFERENCE = "#/components/schemas/{model}"
 
@@ -43,15 +44,18 @@ class SceneMoved(Selection):
     layers: LayersPlayed = dataclasses.field(kw_only=True)
 
 
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LayerSaid(LayerView):
-    """A layer without its particles. waited_milliseconds: from the slider that it answers, null where it answers none.
-    search_layers, searches: layers of one search of the frame, and how many searches the frame has.
+    """A layer without its particles.
+
+    waited_milliseconds : from the slider that it answers, null where it answers none.
+    search_layers, searches : layers of one search of the frame, and how many searches the frame has.
     """
 
     session: str
     run: str
     reannealed: bool
-    waited_milliseconds: Number
+    waited_milliseconds: float
     search_layers: int
     searches: int
 
@@ -76,7 +80,7 @@ class FrameSaid(Answer):
 
 MESSAGES: dict[str, type] = {
     **{TYPES[kind]: kind for kind in (StateChanged, Acknowledged, SettingsApplied, LogLine)},
-    "layer": LayerSaid,
+    "layer": shown_as(LayerSaid),
     "frame": FrameSaid,
     "scene": SceneMoved,
     "sessions": Changed,

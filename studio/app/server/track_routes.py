@@ -1,80 +1,51 @@
 """Tracks of a run: listed, made in the background with progress as `track` events, downloaded; runs corrected."""
 
 import asyncio
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Response
-from pydantic import Field
+from fastapi import Response
 
 from studio.app.server import files
-from studio.app.server.answers import Shown
+from studio.app.server.answers import Router, Shown
 from studio.app.server.app_state import App, AppState
 from studio.app.server.job_routes import add_job_routes
 from studio.app.server.requests import Arguments, body_of
 from studio.app.server.run_routes import RUN, OpenRun
 from studio.app.server.schemas import Answer, Number
 from studio.app.server.session_routes import OpenSession
-from studio.foundations.knobs import Knob, changed, knobs_of
-from studio.foundations.progress import unheard
-from studio.operations.exports import keep_file, kept_file
+from studio.foundations.knobs import Knob, knobs_of
 from studio.operations.jobs.job_runner import Job, JobKind, NumberedJob, Work
-from studio.operations.person import landmarks
 from studio.operations.results import check as check_run
-from studio.operations.results import evaluate, refine, smooth
-from studio.operations.run_errors import evaluation_of
-from studio.operations.tracking import correct, corrected_run
-from studio.runs.checking import RunCheck, kept_check
-from studio.runs.correcting import track_backwards
-from studio.runs.refining import REFINED, SMOOTHED, MadeTrack, check_making, jitter
-from studio.runs.tracks import BEST, best_track, read_track, track_named, track_names
+from studio.operations.results import evaluate, read_track, refine, smooth
+from studio.operations.tracking import correct, corrected_run, track_back
+from studio.operations.tracks import (
+    CheckAnswer,
+    LandmarksLine,
+    TrackLine,
+    check_derived,
+    measure_by_landmarks,
+    track_check,
+    track_lines,
+)
+from studio.runs.refining import REFINED, SMOOTHED, MadeTrack
+from studio.runs.tracks import BEST
 from studio.search.trackers.refinement import RefinementSettings
 from studio.search.trackers.smoothing import SmoothingSettings
 from studio.sessions.named_rows import poses_csv
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 
-router = APIRouter(prefix="/api", tags=["tracks"])
-LANDMARKS = "landmarks"
-"""Stem of the file with a network's joints among a run's exports."""
+router = Router(prefix="/api", tags=["tracks"])
 Verb = Literal["refine", "smooth", "correct", "pose", "check", "landmarks"]
-
-
-class TrackLine(Answer):
-    """A track of a run. made_by: verb, what it was made from, settings, and of a smoothed one the frames that were
-    filled and left out; empty for raw. jitter_mm: root mean square second difference of the markers. mean_mm, worst_mm:
-    against the session's truth; mean_angle_deg, mean_direction_deg: the same, of the angles between limbs and of the
-    limbs' directions.
-    """
-
-    name: str
-    frames: int
-    made_by: dict[str, object] = Field(default_factory=dict)
-    jitter_mm: Number = None
-    mean_mm: Number = None
-    mean_angle_deg: Number = None
-    mean_direction_deg: Number = None
-    worst_mm: Number = None
 
 
 class TrackList(Answer):
     """The run's tracks, raw first, those under way, and the knobs of refining and smoothing."""
 
-    tracks: list[TrackLine]
+    tracks: Annotated[tuple[TrackLine, ...], Shown]
     running: list["TrackJobState"]
     refine_settings: list[Annotated[Knob, Shown]]
     smooth_settings: list[Annotated[Knob, Shown]]
-
-
-class LandmarksLine(Answer):
-    """A track against a network's joints. file: of the run's exports, with the joints; seen: share of the frames with
-    all of them; mean_mm: from them; without_offsets_mm: the same without each joint's constant offset.
-    """
-
-    file: str
-    seen: Number
-    mean_mm: Number
-    without_offsets_mm: Number
 
 
 class TrackJobState(NumberedJob):
@@ -97,7 +68,7 @@ class TrackJobState(NumberedJob):
     gain: Number = None
     overlap_before: Number = None
     overlap: Number = None
-    landmarks: LandmarksLine | None = None
+    landmarks: Annotated[LandmarksLine | None, Shown] = None
 
 
 TRACK = JobKind(
@@ -107,48 +78,6 @@ TRACK = JobKind(
     at="/api/track-jobs/{identifier}",
     page="/?session={session}&run={run}",
 )
-
-
-class JumpLine(Answer):
-    """A limb that leaps into a frame. mm: the largest second difference of its markers; usual_mm: the median."""
-
-    frame: int
-    limb: str
-    mm: Number
-    usual_mm: Number
-
-
-class CheckLine(Answer):
-    """What was measured. inside: per looked-at frame and camera, the share of the model's pixels that lie in the mask;
-    covered: of the mask's, under the model. poor: frames whose views have too little of it inside; turned: sudden
-    turns. lost_limbs: limbs that the masks deny in more than one of the frames, with these.
-    """
-
-    cameras: list[str]
-    frames: list[int]
-    inside: list[list[Number]]
-    covered: list[list[Number]]
-    poor: list[int]
-    lost: list[int]
-    doubtful: list[int]
-    turned: list[int]
-    jitter_mm: Number
-    jumps: list[JumpLine] = Field(default_factory=list[JumpLine])
-    lost_limbs: dict[str, list[int]] = Field(default_factory=dict)
-    inside_mean: Number
-    good: bool
-    words: str
-
-
-class CheckAnswer(Answer):
-    """track: the one that is requested; usual: the best, which is exported unless another is chosen; note: on better
-    tracks that are out of date; check: null before.
-    """
-
-    track: str
-    usual: str
-    note: str = ""
-    check: CheckLine | None
 
 
 def begin_job(
@@ -162,10 +91,9 @@ def begin_job(
 @router.get(RUN + "/tracks")
 def tracks(session: OpenSession, run: OpenRun, app: App) -> TrackList:
     """The run's tracks with how much they jitter and, where there is a truth, how far off they are."""
-    lines = [_line(session, run, name) for name in track_names(run)]
     going = [state for state in app.jobs.going(TRACK, session.name) if state.run == run.name]
     return TrackList(
-        tracks=lines,
+        tracks=track_lines(session, run),
         running=going,
         refine_settings=list(knobs_of(RefinementSettings)),
         smooth_settings=list(knobs_of(SmoothingSettings)),
@@ -175,9 +103,9 @@ def tracks(session: OpenSession, run: OpenRun, app: App) -> TrackList:
 @router.get(RUN + "/tracks/{track}/poses.csv", response_class=Response)
 def track_csv(session: OpenSession, run: OpenRun, track: str) -> Response:
     """A track's poses: frame, then one column per parameter in the body's order (radians and mm)."""
-    found = read_track(run, track)
-    name = f"{session.name}-{run.name}-{found.name}-poses.csv"
-    return files.download(poses_csv(run.record.parameters, found.frames, found.poses), name, files.CSV)
+    read = read_track(run, track)
+    name = f"{session.name}-{run.name}-{read.name}-poses.csv"
+    return files.download(poses_csv(run.record.parameters, read.frames, read.poses), name, files.CSV)
 
 
 @router.post(RUN + "/refine", status_code=202)
@@ -188,8 +116,7 @@ async def begin_refining(
     app: App,
 ) -> TrackJobState:
     """Refine a track on the silhouettes. Ask for the state, or wait for `track` events."""
-    changed(RefinementSettings(), arguments["knobs"])
-    _check(run, arguments, REFINED)
+    check_derived(run, REFINED, **arguments)
     return begin_job(
         app,
         "refine",
@@ -207,8 +134,7 @@ async def begin_smoothing(
     app: App,
 ) -> TrackJobState:
     """Smooth a track in time."""
-    changed(SmoothingSettings(), arguments["knobs"])
-    _check(run, arguments, SMOOTHED)
+    check_derived(run, SMOOTHED, **arguments)
     return begin_job(app, "smooth", session, run, lambda _: _answer(smooth(run, **arguments)))
 
 
@@ -219,13 +145,13 @@ async def begin_correction(
     arguments: Annotated[Arguments, body_of(correct, "CorrectionRequest")],
     app: App,
 ) -> TrackJobState:
-    """Make a run that begins anew in a frame. Forwards it is ready to be started; backwards it is tracked here."""
+    """Make a run that begins again in a frame. Forwards it is ready to be started; backwards it is tracked here."""
     made = await asyncio.to_thread(corrected_run, run, **arguments, source="set in the studio")
     app.events.session_changed(session.name, made.name)
 
     def work(job: Job) -> dict[str, Any]:
         if "back_to" in arguments:
-            moved = track_backwards(session, made, job.report, job.cancelled)
+            moved = track_back(made, job.report, job.cancelled)
             return {
                 "made_run": made.name,
                 "moved": moved,
@@ -237,24 +163,6 @@ async def begin_correction(
 
 
 add_job_routes(router, "/track-jobs/{identifier}", TRACK)
-
-
-def _line(session: Session, run: StoredRun, name: str) -> TrackLine:
-    track = read_track(run, name, blobs=False)
-    line = TrackLine(name=name, frames=len(track.frames), made_by=dict(track.made_by))
-    if not len(track.frames):
-        return line
-    line.jitter_mm = jitter(run, track)
-    found = evaluation_of(session, run, name, blobs=False)
-    if found is not None:
-        line.mean_mm, line.worst_mm = found.mean_mm, found.worst_mm
-        line.mean_angle_deg, line.mean_direction_deg = found.mean_angle_deg, found.mean_direction_deg
-    return line
-
-
-def _check(run: StoredRun, arguments: Arguments, usual: str) -> None:
-    """Raises what making the track would, before a job is begun. usual : the name of the track."""
-    check_making(run, arguments.get("source", ""), arguments.get("into", usual), arguments["replace"])
 
 
 def _answer(made: MadeTrack) -> dict[str, Any]:
@@ -271,12 +179,7 @@ def _answer(made: MadeTrack) -> dict[str, Any]:
 @router.get(RUN + "/check")
 def check(run: OpenRun, track: str = "") -> CheckAnswer:
     """What was measured of a track as it is now (empty: the best)."""
-    best = best_track(run)
-    name = best.name if track in ("", BEST) else track
-    read_track(run, name)
-    found = kept_check(run, name)
-    check = None if found is None else _check_line(found)
-    return CheckAnswer(track=name, usual=best.name, note=best.note, check=check)
+    return track_check(run, track)
 
 
 @router.post(RUN + "/check", status_code=202)
@@ -287,8 +190,7 @@ async def begin_check(
     app: App,
 ) -> TrackJobState:
     """Measure a track in every so-many-th frame."""
-    name = await asyncio.to_thread(track_named, run, arguments.get("track", BEST))
-    await asyncio.to_thread(read_track, run, name)
+    name = (await asyncio.to_thread(read_track, run, arguments.get("track", BEST))).name
 
     def work(job: Job) -> dict[str, object]:
         check_run(run, name, every=arguments["every"], progress=job.report_or_stop)
@@ -308,25 +210,9 @@ async def begin_landmarks(
     app: App,
 ) -> TrackJobState:
     """Measure a track against the joints that a network sees of a person, which are kept among the run's exports."""
-    name = await asyncio.to_thread(track_named, run, arguments.get("track", BEST))
-    await asyncio.to_thread(read_track, run, name)
+    name = (await asyncio.to_thread(read_track, run, arguments.get("track", BEST))).name
 
     def work(job: Job) -> dict[str, object]:
-        seen = 0.0
-
-        def write(place: Path) -> int:
-            nonlocal seen
-            made = landmarks(session, place, progress=job.report_or_stop)
-            seen = made.seen
-            return len(made.motion.times)
-
-        kept = keep_file(run, LANDMARKS, "trc", session.manifest.fps, write, "A network's joints")
-        found = evaluate(run, truth=kept_file(run, kept.file), track=name, progress=unheard)
-        line = LandmarksLine.of(found, file=kept.file, seen=seen)
-        return {"track": name, "landmarks": line}
+        return {"track": name, "landmarks": measure_by_landmarks(run, name, progress=job.report_or_stop)}
 
     return begin_job(app, "landmarks", session, run, work)
-
-
-def _check_line(found: RunCheck) -> CheckLine:
-    return CheckLine.of(found, jumps=found.jumps or (), words=found.in_words())

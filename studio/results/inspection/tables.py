@@ -3,7 +3,11 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from studio.foundations.declaring import LARGEST
 
 Cell = bool | int | float | str | None
 """NaN and infinities are None in an answer."""
@@ -140,21 +144,26 @@ class Table:
         return [dict(zip((entry.key for entry in self.columns), row, strict=True)) for row in self.rows]
 
 
+Name = Annotated[str, Field(max_length=64)]
+
+
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """What is selected on the page; each view uses a part of it. "" and None: nothing.
+    """What is selected in a run's search; each view uses a part of it. "" and None: nothing."""
 
-    second : another parameter (landscape of two). towards : what a line through pose space ends at, see `landscape`.
-    """
-
-    layer: int | None = None
-    parameter: str = ""
-    limb: str = ""
-    particle: int | None = None
-    camera: str = ""
-    track: str = ""
-    second: str = ""
-    towards: str = ""
+    layer: Annotated[
+        int | None, Field(ge=0, le=LARGEST, description="Its index, from 0; default: the last one.")
+    ] = None
+    parameter: Annotated[Name, Field(description="A parameter of the body.")] = ""
+    limb: Annotated[Name, Field(description="A limb of the body.")] = ""
+    particle: Annotated[int | None, Field(ge=0, le=LARGEST, description="A particle of the layer.")] = None
+    camera: Annotated[Name, Field(description="A camera.")] = ""
+    track: Annotated[Name, Field(description="Whose pose; default: raw, the search's own.")] = ""
+    second: Annotated[Name, Field(description="Another parameter, for a plane of the landscape.")] = ""
+    towards: Annotated[
+        Name,
+        Field(description="End of a line in the landscape: truth, mean, mode, searched, particle, a track."),
+    ] = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,8 +181,8 @@ class Remedy:
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
-    """One thing that was found about a frame. kind : see `why`. words : a sentence. numbers : what it rests on.
+class FrameFinding:
+    """One thing that a view says of a frame. kind : see `why`. words : a sentence. numbers : what it rests on.
     is_cause : it is the main cause. layer : its index. frame : to look at, where that is another one.
     """
 
@@ -196,7 +205,7 @@ class Viewed:
 
     tables: tuple[Table, ...]
     notes: tuple[str, ...] = ()
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[FrameFinding, ...] = ()
     remedies: tuple[Remedy, ...] = ()
     search_layers: int = 0
     searches: int = 0
@@ -224,5 +233,5 @@ class Found:
 
     rows: Rows
     notes: tuple[str, ...] = ()
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[FrameFinding, ...] = ()
     remedies: tuple[Remedy, ...] = ()

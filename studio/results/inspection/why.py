@@ -47,7 +47,7 @@ from studio.results.inspection.reading import InspectedFrame, no_value
 from studio.results.inspection.reference import body_points, by_limb, refined_pose, true_points
 from studio.results.inspection.retracking import Change, Retracking, more_evaluations
 from studio.results.inspection.schedule import effective_number
-from studio.results.inspection.tables import Finding, Found, Remedy, Row, Selection, View, table
+from studio.results.inspection.tables import Found, FrameFinding, Remedy, Row, Selection, View, table
 from studio.results.inspection.verdict import STATE_WORDS, Verdict, verdict, verdict_on
 from studio.runs.run_footage import filmed_cameras
 from studio.runs.tracks import RAW, best_track, track_stamp
@@ -540,7 +540,7 @@ def _compared_with(case: Case) -> str:
     return f"Compared here: {ours}, with {theirs}."
 
 
-def _first_finding(case: Case) -> Finding:
+def _first_finding(case: Case) -> FrameFinding:
     """Whether the frame fits, in the words of timeline and badge, and how far the limbs are off."""
     numbers, reference = dict(case.errors), _of(case.reference.kind)
     said, mended = _verdict_sentences(case), _mended(case)
@@ -552,21 +552,21 @@ def _first_finding(case: Case) -> Finding:
         if case.verdict.fits and not mended:
             words += f" No limb counts as lost: that begins at a marker {_mm(lost_mm(case.run.body))} off."
         kind = "mended" if mended and case.verdict.fits else "wrong limb"
-        return Finding(kind, " ".join([*said, words]), named[0], numbers=numbers)
+        return FrameFinding(kind, " ".join([*said, words]), named[0], numbers=numbers)
     farthest = _mm(case.errors[worst])
     if case.verdict.fits and case.drifting:
         parts = [f"the {limb} by {_mm(case.errors[limb])}" for limb in case.drifting]
         words = f"No limb is lost. Off from {reference}: {enumerated(parts)}.{mended}"
-        return Finding("drifting", words, worst, numbers=numbers)
+        return FrameFinding("drifting", words, worst, numbers=numbers)
     if case.verdict.fits:
         words = f"The frame fits: no limb is farther than {farthest} from {reference}."
-        return Finding("fits", words, worst, numbers=numbers)
+        return FrameFinding("fits", words, worst, numbers=numbers)
     if case.reference.kind == "truth":
         said.append(f"On average no limb's points are farther than {farthest} from the truth.")
     elif case.verdict.lost:
         said.append(f"No better place is known: {reference} is nowhere farther than {farthest} away.")
     limb = case.verdict.lost[0] if case.verdict.lost else worst
-    return Finding("lost", " ".join(said), limb, numbers=numbers)
+    return FrameFinding("lost", " ".join(said), limb, numbers=numbers)
 
 
 def _verdict_sentences(case: Case) -> list[str]:
@@ -602,7 +602,7 @@ def _mended(case: Case) -> str:
     return f" The refinement after the search put it right: no limb is farther off than {_mm(worst)} now."
 
 
-def _add_camera(case: Case, fault: CameraFault, findings: list[Finding], remedies: list[Remedy]) -> None:
+def _add_camera(case: Case, fault: CameraFault, findings: list[FrameFinding], remedies: list[Remedy]) -> None:
     fit, name = fault.fit, fault.fit.camera
     numbers = {"overlap": fit.overlap, "usual": fault.usual, "shifted": fit.best, "shift_px": fit.distance}
     seen = (
@@ -627,11 +627,11 @@ def _add_camera(case: Case, fault: CameraFault, findings: list[Finding], remedie
             Remedy(f"Look at the masks of camera {name}", "Give it another background, or other masks.", {},
                    "masks")
         )  # fmt: skip
-    findings.append(Finding(fault.kind, words, camera=name, numbers=numbers, is_cause=True))
+    findings.append(FrameFinding(fault.kind, words, camera=name, numbers=numbers, is_cause=True))
 
 
 def _add_search(
-    case: Case, limb: str, findings: list[Finding], remedies: list[Remedy], *, cause_known: bool
+    case: Case, limb: str, findings: list[FrameFinding], remedies: list[Remedy], *, cause_known: bool
 ) -> None:
     """Where and why the search lost the limb."""
     # Refining earlier frames on bad evidence takes long and shows nothing.
@@ -640,7 +640,7 @@ def _add_search(
     if began < case.frame.number:
         first, mm = case.beginning
         words = f"It began in frame {began}, where the {first} was {_mm(mm)} off."
-        findings.append(Finding("began", words, first, numbers={"frame": began, "off": mm}, frame=began))
+        findings.append(FrameFinding("began", words, first, numbers={"frame": began, "off": mm}, frame=began))
     cause = None if cause_known else _cause(case, limb, remedies)
     if cause is not None:
         findings.append(cause)
@@ -657,7 +657,7 @@ def _add_search(
             f"Tracked again from frame {case.stretch[1]} with {_lowered(trial.what)}: the error of what is off goes"
             f" from {_mm(before)} to {_mm(trial.left)}."
         )
-        findings.append(Finding("trial", words, limb, numbers={"before": before, "after": trial.left}))
+        findings.append(FrameFinding("trial", words, limb, numbers={"before": before, "after": trial.left}))
 
 
 TRIED = ("noise", "survival", "particles", "layers", "luck")
@@ -665,7 +665,7 @@ TRIED = ("noise", "survival", "particles", "layers", "luck")
 SAME = ("the same settings and other seeds", dict[str, Value]())
 
 
-def _cause(case: Case, limb: str, remedies: list[Remedy]) -> Finding | None:
+def _cause(case: Case, limb: str, remedies: list[Remedy]) -> FrameFinding | None:
     """The main cause, by the rules in the order of the module's docstring."""
     if case.exchanged:
         remedies.append(
@@ -687,7 +687,7 @@ def _cause(case: Case, limb: str, remedies: list[Remedy]) -> Finding | None:
                     "start pose",
                 )
             )
-        return Finding("exchange", words, limb, is_cause=True)
+        return FrameFinding("exchange", words, limb, is_cause=True)
     began, settings = case.stretch[0], case.settings
     record = case.run.run.record
     deviations, moved, reach, number = case.motion
@@ -702,24 +702,24 @@ def _cause(case: Case, limb: str, remedies: list[Remedy]) -> Finding | None:
             f"The motion is beyond the noise: into frame {number} the {limb} moved {_mm(moved)}, {deviations:.1f} times"
             f" the {_mm(reach)} over which the first layer's particles spread."
         )
-        return Finding("noise", words, limb, numbers={"moved": moved, "reach": reach}, is_cause=True)
+        return FrameFinding("noise", words, limb, numbers={"moved": moved, "reach": reach}, is_cause=True)
     if began <= record.first and case.frame.number - began < LONGEST:
         remedies.append(Remedy("Set the start pose", "Begin the run where the body is.", {}, "start pose"))
         words = f"The start pose was wrong: the {limb} was off from the run's first frame on."
-        return Finding("start", words, limb, is_cause=True)
+        return FrameFinding("start", words, limb, is_cause=True)
     if case.effective < FEW:
         return _few(case, limb, remedies)
     preference = case.preference
     if preference.is_for_the_pose:
         remedies.append(_against(case, preference))
-        return Finding(
+        return FrameFinding(
             "likelihood", _preference_words(case), limb, camera=preference.camera, term=preference.term,
             numbers={"nats": preference.nats, "share": preference.share}, is_cause=True,
         )  # fmt: skip
     return _by_trial(case, limb, remedies)
 
 
-def _few(case: Case, limb: str, remedies: list[Remedy]) -> Finding:
+def _few(case: Case, limb: str, remedies: list[Remedy]) -> FrameFinding:
     """Too few particles carry the weight: by the survival rate, or because there are few."""
     settings, count = case.settings, max(case.frame.size(0), 1)
     wanted = case.frame.layers[0].alpha_wanted
@@ -733,16 +733,16 @@ def _few(case: Case, limb: str, remedies: list[Remedy]) -> Finding:
             f"The survival rate is too low: {wanted:g} of {count} particles survive a layer, whose weight rests on"
             f" {case.effective:.1f} of them, and the cloud collapses onto the first good pose."
         )
-        return Finding("survival", words, limb, numbers=numbers, is_cause=True)
+        return FrameFinding("survival", words, limb, numbers=numbers, is_cause=True)
     remedies.append(_more_particles(settings))
     words = (
         f"There are too few particles: of {count} a layer {case.effective:.1f} carry the weight, which is too few to"
         " look everywhere."
     )
-    return Finding("particles", words, limb, numbers=numbers, is_cause=True)
+    return FrameFinding("particles", words, limb, numbers=numbers, is_cause=True)
 
 
-def _by_trial(case: Case, limb: str, remedies: list[Remedy]) -> Finding:
+def _by_trial(case: Case, limb: str, remedies: list[Remedy]) -> FrameFinding:
     """The cause as what helps: more particles, or more noise."""
     more, noise, layers = (
         _more_particles(case.settings),
@@ -759,7 +759,7 @@ def _by_trial(case: Case, limb: str, remedies: list[Remedy]) -> Finding:
         [trial] = case.trials([(spread.title, layers)])
         if trial.left <= HELPS * before:
             remedies.append(spread)
-            return Finding("layers", _few_layers_words(case, before, trial), limb, is_cause=True)
+            return FrameFinding("layers", _few_layers_words(case, before, trial), limb, is_cause=True)
     [again] = case.trials([SAME])
     if again.left <= HELPS * before:
         words = (
@@ -767,7 +767,9 @@ def _by_trial(case: Case, limb: str, remedies: list[Remedy]) -> Finding:
             f" {_mm(again.left)}. More particles depend less on it."
         )
         remedies.append(more)
-        return Finding("luck", words, limb, numbers={"before": before, "after": again.left}, is_cause=True)
+        return FrameFinding(
+            "luck", words, limb, numbers={"before": before, "after": again.left}, is_cause=True
+        )
     wanted = [(more.title, more.settings)]
     if noise:
         wanted.append((f"{TIMES_NOISE:g} times the noise", noise))
@@ -779,15 +781,15 @@ def _by_trial(case: Case, limb: str, remedies: list[Remedy]) -> Finding:
         tried = f"Tracked again with {' or '.join(_lowered(title) for title in titles)}, {errors} at best."
         if case.preference.is_for_the_reference:
             words = f"{_preference_words(case)} Why it does is unknown. {tried}"
-            return Finding("missed", words, limb, numbers=numbers, is_cause=True)
-        return Finding("unknown", f"The cause is unknown. {tried}", limb, numbers=numbers, is_cause=True)
+            return FrameFinding("missed", words, limb, numbers=numbers, is_cause=True)
+        return FrameFinding("unknown", f"The cause is unknown. {tried}", limb, numbers=numbers, is_cause=True)
     if best.what == more.title:
         remedies.append(more)
         words = f"There are too few particles for this frame: with {_lowered(more.title)} {errors}."
-        return Finding("particles", words, limb, is_cause=True)
+        return FrameFinding("particles", words, limb, is_cause=True)
     remedies.append(Remedy(best.what, "The first layer's particles reach farther then.", best.settings))
     words = f"The search did not look far enough: with {_lowered(best.what)} {errors}."
-    return Finding("noise", words, limb, is_cause=True)
+    return FrameFinding("noise", words, limb, is_cause=True)
 
 
 def _few_layers_words(case: Case, before: float, trial: Trial) -> str:
@@ -818,7 +820,7 @@ def _against(case: Case, preference: Preference) -> Remedy:
     return Remedy(f"Look at camera {preference.camera}", "Its pictures prefer the wrong pose.", {}, "look")
 
 
-def _layer_finding(case: Case, limb: str) -> Finding:
+def _layer_finding(case: Case, limb: str) -> FrameFinding:
     """Where the reference left the cloud."""
     layer, nearest = case.layer_left(limb)
     numbers = {"nearest": nearest}
@@ -829,26 +831,26 @@ def _layer_finding(case: Case, limb: str) -> Finding:
             f"There was a particle near {place}: the nearest {_mm(nearest)} away. There was no second layer to go on"
             " from it."
         )
-        return Finding("near to the end", words, limb, numbers=numbers)
+        return FrameFinding("near to the end", words, limb, numbers=numbers)
     if layer is None:
         words = f"Down to the last layer particles were near {place}: the nearest {_mm(nearest)} away."
-        return Finding("near to the end", words, limb, numbers=numbers)
+        return FrameFinding("near to the end", words, limb, numbers=numbers)
     if layer == 0:
         words = (
             f"The search never looked there: no particle of any layer came within {near} of {place}, the nearest to"
             f" {_mm(nearest)}."
         )
-        return Finding("never near", words, limb, 0, numbers=numbers)
+        return FrameFinding("never near", words, limb, 0, numbers=numbers)
     first = case.frame.layer_in_words(layer)
     words = f"From {first} on no particle was within {near} of {place}; before, there was one."
-    return Finding("left the cloud", words, limb, layer, numbers=numbers)
+    return FrameFinding("left the cloud", words, limb, layer, numbers=numbers)
 
 
-def _preference_finding(case: Case) -> Finding:
+def _preference_finding(case: Case) -> FrameFinding:
     found = case.preference
     numbers = {"nats": found.nats, "share": found.share}
     words = _preference_words(case)
-    return Finding("preference", words, camera=found.camera, term=found.term, numbers=numbers)
+    return FrameFinding("preference", words, camera=found.camera, term=found.term, numbers=numbers)
 
 
 def _preference_words(case: Case) -> str:

@@ -13,9 +13,10 @@ from websockets.sync.client import ClientConnection, connect
 
 from studio.app.scene.model import Selection
 from studio.app.server.api_document import api_document
-from studio.app.server.event_encoding import effective_share, key_of, layer_summary, message_of
+from studio.app.server.event_encoding import key_of, message_of
 from studio.app.server.event_stream import LIMIT, EventStream, Watcher, _send_all
 from studio.operations.jobs.events import Acknowledged, FrameFinished, LayerFinished, LogLine, SettingsApplied
+from studio.operations.stored_frames import effective_share, layer_summary
 from studio.search.trackers.tracker import Estimate, FilterState, FrameResult, LayerRecord
 
 NAN = float("nan")

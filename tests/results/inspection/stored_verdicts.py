@@ -2,7 +2,7 @@
 
 from studio.app.scene.model import LiveSearch
 from studio.app.scene.opened_run import OpenedRun
-from studio.app.server.result_routes import frame_detail, frames
+from studio.operations.stored_frames import frame_detail, frames_summary
 from studio.results.inspection.limbs import limb_rows
 from studio.results.inspection.reading import InspectedRun
 from studio.results.inspection.tables import Selection
@@ -15,7 +15,7 @@ FITTING = ("fits", "mended", "drifting")
 
 def check_that_all_agree(run: InspectedRun, track: str = RAW, why: tuple[int, ...] | None = None) -> None:
     """Timeline, heat map, badge and Why (of frames `why`; None: all) of a run, against one another."""
-    lines = frames(run.session, run.run, track).frames
+    lines = frames_summary(run.session, run.run, track).frames
     assert lines
     heat = limb_rows(run, Selection(track=track))["limbs"]
     scene = OpenedRun(run.session, run.run)

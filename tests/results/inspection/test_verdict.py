@@ -6,6 +6,7 @@ import shutil
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,11 +18,11 @@ from stored_verdicts import check_that_all_agree
 from toy_session import make_session
 from tracked_runs import finish
 
-from studio.app.server import result_routes
+from studio.operations import stored_frames
 from studio.results.inspection import limbs, why
 from studio.results.inspection.limbs import verdicts_on
 from studio.results.inspection.reading import InspectedRun
-from studio.results.inspection.tables import Finding, Selection
+from studio.results.inspection.tables import FrameFinding, Selection
 from studio.results.inspection.verdict import limbs_off, verdict_on
 from studio.results.inspection.why import rows
 from studio.runs.new_run import prepare_run
@@ -168,24 +169,24 @@ def twisted(kind: str) -> Callable[..., object]:
     """What says it, made to say another thing than the others."""
     if kind == "timeline":
         return lambda *given: _changed(
-            result_routes.frames(*given), fits=True, tracking=TRACKED, limbs_off=[]
+            stored_frames.frames_summary(*given), fits=True, tracking=TRACKED, limbs_off=()
         )
     if kind == "badge":
-        return lambda *given: result_routes.frame_detail(*given).model_copy(update={"tracking": TRACKED})
+        return lambda *given: dataclasses.replace(stored_frames.frame_detail(*given), tracking=TRACKED)
     if kind == "heat map":
         return lambda *given: {"limbs": [(*row[:4], False, "") for row in limbs.limb_rows(*given)["limbs"]]}
-    fits = Finding("fits", "The frame fits.")
+    fits = FrameFinding("fits", "The frame fits.")
     return lambda *given: dataclasses.replace(why.rows(*given), findings=(fits,))
 
 
-def _changed(answer: result_routes.FramesSummary, **changes: object) -> result_routes.FramesSummary:
-    lines = [line.model_copy(update=changes) for line in answer.frames]
-    return answer.model_copy(update={"frames": lines})
+def _changed(answer: stored_frames.FramesSummary, **changes: Any) -> stored_frames.FramesSummary:  # noqa: ANN401
+    lines = tuple(dataclasses.replace(line, **changes) for line in answer.frames)
+    return dataclasses.replace(answer, frames=lines)
 
 
 @pytest.mark.parametrize(
     ("kind", "name"),
-    [("timeline", "frames"), ("badge", "frame_detail"), ("heat map", "limb_rows"), ("why", "rows")],
+    [("timeline", "frames_summary"), ("badge", "frame_detail"), ("heat map", "limb_rows"), ("why", "rows")],
 )
 def test_a_contradiction_is_noticed(
     marked: InspectedRun, monkeypatch: pytest.MonkeyPatch, kind: str, name: str

@@ -23,7 +23,7 @@ import { drawBeside } from "./views.js";
 const LOAD_MILLISECONDS = 200;
 /** The runs' numbers, and of which runs they are. */
 const held = signal(
-  /** @type {{ key: string, answer: Schemas["RunsComparedView"] } | null} */ (null),
+  /** @type {{ key: string, answer: Schemas["RunsCompared"] } | null} */ (null),
 );
 /** The shown frame of every run: its pose for the scene, its layers for the chart. */
 const frames = signal(
@@ -221,7 +221,7 @@ function Settings({ runs, rows }) {
   </div>`;
 }
 
-/** @param {{ answer: Schemas["RunsComparedView"] }} properties */
+/** @param {{ answer: Schemas["RunsCompared"] }} properties */
 function Words({ answer: { runs, tables } }) {
   const named = (name) => tables.find((table) => table.name === name);
   const end = () => {
@@ -240,7 +240,7 @@ function Words({ answer: { runs, tables } }) {
   `;
 }
 
-/** The figure of the runs' curves. @param {Schemas["RunsComparedView"]} answer */
+/** The figure of the runs' curves. @param {Schemas["RunsCompared"]} answer */
 function figureOf({ runs, tables }) {
   const named = (name) => tables.find((table) => table.name === name);
   const curves = records(named("curves"));

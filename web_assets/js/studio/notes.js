@@ -8,13 +8,13 @@ import { goTo } from "../selection.js";
 import { get, set, watch } from "../state.js";
 import { follow, html, mount, useEffect, useRef, useSignal } from "./component.js";
 
-/** @typedef {import("../api_types").Schemas["NoteLine"]} NoteLine */
+/** @typedef {import("../api_types").Schemas["Note"]} Note */
 
 // As the timeline draws its frames.
 const PADDING = 6;
 const LONGEST = 2000;
 
-/** What a note says in a line. @param {NoteLine} note */
+/** What a note says in a line. @param {Note} note */
 export const noteWords = (note) => note.text || "bookmark";
 
 /** @param {number} frame */
@@ -52,8 +52,8 @@ async function drop(frame) {
   }
 }
 
-/** @param {number | null} frame @returns {NoteLine | undefined} */
-const noteOn = (frame) => get("notes").find((/** @type {NoteLine} */ note) => note.frame === frame);
+/** @param {number | null} frame @returns {Note | undefined} */
+const noteOn = (frame) => get("notes").find((/** @type {Note} */ note) => note.frame === frame);
 
 /** Put a bookmark on the shown frame, or take one without words away. */
 export function toggleBookmark() {
@@ -69,7 +69,7 @@ let openEditor = () => {};
 
 /** The flags over the timeline. */
 function Flags() {
-  const notes = /** @type {NoteLine[]} */ (follow("notes"));
+  const notes = /** @type {Note[]} */ (follow("notes"));
   const summary = follow("summary");
   if (!summary) return null;
   const span = Math.max(1, summary.last - summary.first - 1);
@@ -93,7 +93,7 @@ function Flags() {
 function NoteOfFrame() {
   const run = follow("run");
   const frame = /** @type {number | null} */ (follow("frame"));
-  const notes = /** @type {NoteLine[]} */ (follow("notes"));
+  const notes = /** @type {Note[]} */ (follow("notes"));
   const open = useSignal(false);
   const field = useRef(/** @type {HTMLTextAreaElement | null} */ (null));
   openEditor = () => {
