@@ -9,11 +9,11 @@ from rich.console import Console
 from rich.table import Table as Drawn
 
 from studio.cli.deriving import Call, command_of
+from studio.foundations.csv_text import as_csv
 from studio.operations.inspecting import compare_runs, inspected, seeds, view, why, worst_frame
 from studio.results.inspection.comparing import RunsCompared
 from studio.results.inspection.tables import Cell, Table, Viewed
 from studio.sessions.atomic_files import write_bytes
-from studio.sessions.named_rows import as_csv
 
 MOST_ROWS = 40
 CSV = click.option(

@@ -8,6 +8,7 @@ import click
 from studio.cli.deriving import Call, command_of
 from studio.cli.footage_commands import spread_figures
 from studio.cli.reading import frame_range
+from studio.foundations.csv_text import poses_csv
 from studio.foundations.errors import RunError
 from studio.operations.opening import Tracked
 from studio.operations.tracking import (
@@ -26,7 +27,6 @@ from studio.operations.tracking import (
 from studio.runs.sides import exchanged_sides, in_words
 from studio.search.trackers.catalogue import TRACKERS
 from studio.search.trackers.tracker import LIMB_LOST, LOST, NO_EVIDENCE, RECOVERED
-from studio.sessions.named_rows import poses_csv
 from studio.sessions.remote_sessions import bring_runs
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun

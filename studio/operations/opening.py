@@ -2,7 +2,7 @@
 
 import functools
 import inspect
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ParamSpec, TypeVar
@@ -13,13 +13,15 @@ from numpy.typing import NDArray
 from studio.body.catalogue import list_bodies, load_body
 from studio.body.model import BodyModel
 from studio.foundations.declaring import Target, operation
-from studio.foundations.errors import RunError, SessionError
-from studio.operations.exports import exported_files
+from studio.foundations.errors import NotFoundError, RunError, SessionError
+from studio.foundations.foreign_files import MANIFEST_NAME
+from studio.results.export.kept_exports import exported_files
 from studio.runs.setup.workflow import Workflow, run_to_use, workflow_of
 from studio.runs.tracks import Track
+from studio.sessions.names import is_name
 from studio.sessions.session import BODIES_NAME, RUNS_NAME, Session
 from studio.sessions.stored_run import RunSummary, StoredRun
-from studio.sessions.work_under_way import working_on
+from studio.sessions.work_under_way import gone, working_on
 from studio.sessions.workspace import Workspace
 
 P = ParamSpec("P")
@@ -139,6 +141,16 @@ def bodies() -> tuple[BodyModel, ...]:
 @keeping_in_place
 def workflow(session: SessionName) -> Workflow:
     """Say how far a session is, step by step from footage to an exported motion, and what is next."""
-    opened = open_session(session)
-    run = run_to_use(opened)
-    return workflow_of(opened, exports=exported_files(run) if run else ())
+    return workflow_now(open_session(session))
+
+
+def workflow_now(session: Session, running: Mapping[str, str] | None = None) -> Workflow:
+    """How far a session is. running : step to the progress of its job, in words."""
+    run = run_to_use(session)
+    return workflow_of(session, running, exported_files(run) if run else ())
+
+
+def moved_meanwhile(workspace: Workspace, name: str) -> NotFoundError | None:
+    """Why whatever was done to a session failed that was renamed or deleted meanwhile; None where it is there."""
+    is_there = not is_name(name) or (workspace.root / name / MANIFEST_NAME).is_file()
+    return None if is_there else gone(f"Session '{name}'")

@@ -6,21 +6,20 @@ is known to be of a frame has one, too.
 """
 
 import csv
-import io
 import math
-from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
 from studio.body.model import BodyModel
-from studio.foundations.arrays import Array, Indices
+from studio.foundations.arrays import Array
+from studio.foundations.csv_text import FRAME, as_csv
 from studio.foundations.errors import BodyError
 from studio.foundations.foreign_files import foreign_file, read_foreign_text
 from studio.foundations.geometry.reach import REACH_HINT, within_reach
 from studio.sessions.atomic_files import write_text
 
-FRAME, FPS = "frame", "fps"
+FPS = "fps"
 SEPARATORS = (",", ";", "\t")
 MOST_TURNS = 2.0
 """No start pose is turned further; degrees are."""
@@ -95,23 +94,6 @@ def read_sigma(path: Path, names: tuple[str, ...], fps: float) -> Array:
 def write_sigma(path: Path, names: tuple[str, ...], sigma: Array, fps: float) -> None:
     """Write standard deviations (rad, mm from frame to frame at `fps`) under their parameters' names."""
     write_text(path, as_csv([[FPS, *names], [repr(float(fps)), *(repr(float(value)) for value in sigma)]]))
-
-
-def poses_csv(names: tuple[str, ...], frames: Indices, poses: Array) -> str:
-    """Poses as CSV text: a column `frame`, then one a parameter. frames : (K,). poses : (K, D) radians and
-    mm."""
-    rows = [
-        [str(int(frame)), *(repr(float(value)) for value in pose)]
-        for frame, pose in zip(frames, poses, strict=True)
-    ]
-    return as_csv([[FRAME, *names], *rows])
-
-
-def as_csv(rows: Iterable[Iterable[object]]) -> str:
-    """Rows as CSV text; a line ends with a line feed."""
-    stream = io.StringIO()
-    csv.writer(stream, lineterminator="\n").writerows(rows)
-    return stream.getvalue()
 
 
 def _read(path: Path) -> tuple[list[str], list[list[float]]]:

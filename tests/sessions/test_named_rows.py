@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from studio.foundations.csv_text import poses_csv
 from studio.foundations.errors import BodyError
-from studio.sessions.named_rows import poses_csv, read_pose, read_sigma, write_pose, write_sigma
+from studio.sessions.named_rows import read_pose, read_sigma, write_pose, write_sigma
 
 NAMES = ("a", "b", "c")
 

@@ -55,7 +55,10 @@ class SearchLook:
 class Pointed:
     """A particle of the layer that is looked at.
 
-    particle : its row in the layer's cloud. log_weight : raw. weight : its share of all weights at the layer's β.
+    particle : its row in the layer's cloud.
+    particles : of the layer.
+    log_weight : raw.
+    weight : its share of all weights at the layer's β.
     line : rows in each layer's cloud that it comes from by first parents, from the first layer of its search to itself.
     """
 

@@ -61,7 +61,6 @@ from studio.app.server.content_policy import PolicyHeaders
 from studio.app.server.error_responses import ErrorsInWords, add_error_handlers, log
 from studio.app.server.event_messages import event_schemas
 from studio.app.server.event_stream import EventStream
-from studio.app.server.layer_outlines import LayerOutlines
 from studio.app.server.left_requests import LeftRequests
 from studio.app.server.schemas import ErrorAnswer
 from studio.app.server.viewers_budget import ViewersBudget
@@ -74,8 +73,8 @@ from studio.operations.jobs.control import StudioControl
 from studio.operations.jobs.events import RunState
 from studio.operations.jobs.job_runner import JobKind
 from studio.operations.jobs.learning_process import LEARNING
-from studio.results.inspection.likelihoods import forget_evaluations, let_evaluations_rest
-from studio.results.overlay_pictures import forget_composers, let_composers_rest
+from studio.operations.kept_looks import forget_looks, let_looks_rest
+from studio.operations.layer_outlines import LayerOutlines
 from studio.sessions.workspace import Workspace
 
 DESCRIPTION = (
@@ -258,8 +257,7 @@ async def _lifespan(app: FastAPI) -> AsyncGenerator[None]:
         await asyncio.to_thread(state.jobs.close)
         await asyncio.to_thread(state.cameras.close)
         await state.events.stop()
-        await asyncio.to_thread(forget_composers)
-        await asyncio.to_thread(forget_evaluations)
+        await asyncio.to_thread(forget_looks)
         ends = (asyncio.to_thread(state.scenes.stop), asyncio.to_thread(state.control.close))
         for problem in await asyncio.gather(*ends, return_exceptions=True):
             if isinstance(problem, BaseException):
@@ -271,5 +269,4 @@ async def _close_unused_scenes(state: AppState) -> None:
     while True:
         await asyncio.sleep(SWEEP_SECONDS)
         await asyncio.to_thread(state.scenes.close_unused, state.events.windows())
-        await asyncio.to_thread(let_composers_rest)
-        await asyncio.to_thread(let_evaluations_rest)
+        await asyncio.to_thread(let_looks_rest)

@@ -1,10 +1,11 @@
 """What the routes need of the storeys below: the tracking process, the scenes, and where things lie."""
 
 from collections.abc import Generator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import Depends, Request
 
@@ -15,16 +16,14 @@ from studio.app.server.calibration_proposals import Proposals
 from studio.app.server.event_stream import EventStream
 from studio.app.server.windows import Window
 from studio.foundations.errors import RunError
-from studio.foundations.foreign_files import MANIFEST_NAME
 from studio.operations.jobs.camera_service import CameraService
 from studio.operations.jobs.commands import Close
 from studio.operations.jobs.control import StudioControl
 from studio.operations.jobs.events import RunState
-from studio.operations.jobs.job_runner import JobKind, JobRunner, SessionJob
-from studio.results.inspection.likelihoods import forget_evaluations
-from studio.results.overlay_pictures import forget_composers
+from studio.operations.jobs.job_runner import JobRunner, keep_in_place
+from studio.operations.kept_looks import forget_looks
 from studio.sessions.session import RUNS_NAME
-from studio.sessions.work_under_way import STATE_NAME, working_on
+from studio.sessions.work_under_way import STATE_NAME
 from studio.sessions.workspace import Workspace
 
 
@@ -50,16 +49,8 @@ class AppState:
 
     def __post_init__(self) -> None:
         """Give all work beside the routes its place, which reports its progress to all watchers."""
-        self.jobs = JobRunner(self.events.publish, self.log_path, self._working)
+        self.jobs = JobRunner(self.events.publish, self.log_path, partial(keep_in_place, self.workspace))
         self.cameras = CameraService(self.jobs)
-
-    def _working(self, kind: JobKind[Any], state: SessionJob) -> AbstractContextManager[None]:
-        """What keeps other processes from moving a job's session, unless that is only being made."""
-        session = self.workspace.root / state.session
-        if not state.session or (kind.makes_session and not (session / MANIFEST_NAME).is_file()):
-            return nullcontext()
-        verb = str(getattr(state, "verb", "") or kind.noun)
-        return working_on(session.resolve(), verb, str(getattr(state, "run", "") or ""))
 
     @property
     def state_folder(self) -> Path:
@@ -114,5 +105,4 @@ def release(app: AppState, session: str, run: str = "") -> None:
         if scene.shown.session == session and (not run or scene.shown.run == run):
             scene.show_run(session if run else "")
     app.events.tried.forget(session, run)
-    forget_composers()
-    forget_evaluations()
+    forget_looks()

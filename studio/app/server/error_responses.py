@@ -18,9 +18,7 @@ from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from studio.foundations.errors import NotFoundError, StudioError, UnforeseenError
-from studio.foundations.foreign_files import MANIFEST_NAME
-from studio.sessions.names import is_name
-from studio.sessions.work_under_way import gone
+from studio.operations.opening import moved_meanwhile
 
 log = logging.getLogger("studio.app.server")
 
@@ -60,11 +58,11 @@ def error_response(error: StudioError, page: bool = False) -> Response:
 
 def validation_words(errors: Sequence[dict[str, Any]]) -> str:
     """What is wrong with a request's parameters or body, as one sentence."""
-    found: list[str] = []
+    wrong: list[str] = []
     for entry in errors[:3]:
         place = ".".join(str(part) for part in entry.get("loc", ()) if part not in ("body", "query", "path"))
-        found.append(f"'{place or 'body'}': {entry.get('msg', 'is not valid')}")
-    return f"The request is not valid: {'; '.join(found)}."
+        wrong.append(f"'{place or 'body'}': {entry.get('msg', 'is not valid')}")
+    return f"The request is not valid: {'; '.join(wrong)}."
 
 
 def add_error_handlers(app: FastAPI) -> None:
@@ -120,10 +118,7 @@ def add_error_handlers(app: FastAPI) -> None:
 
 def _moved_meanwhile(request: Request) -> StudioError | None:
     """Why a request failed whose session was renamed or deleted meanwhile, whatever it then stumbled over."""
-    name = str(request.path_params.get("session", ""))
-    if not is_name(name) or (request.app.state.studio.workspace.root / name / MANIFEST_NAME).is_file():
-        return None
-    return gone(f"Session '{name}'")
+    return moved_meanwhile(request.app.state.studio.workspace, str(request.path_params.get("session", "")))
 
 
 class ErrorsInWords:

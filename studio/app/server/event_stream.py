@@ -14,7 +14,6 @@ from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 
 from studio.app.scene.scene_server import SceneServer
 from studio.app.server.event_encoding import as_json, key_of, message_of
-from studio.app.server.layer_outlines import LayerOutlines
 from studio.app.server.windows import WindowInQuery
 from studio.operations.jobs.control import StudioControl
 from studio.operations.jobs.events import (
@@ -27,6 +26,7 @@ from studio.operations.jobs.events import (
 )
 from studio.operations.jobs.tried_frames import TriedFrames
 from studio.operations.jobs.watchers import Subscription
+from studio.operations.layer_outlines import LayerOutlines
 
 router = APIRouter(tags=["events"])
 

@@ -9,12 +9,12 @@ from studio.app.server.answers import Router
 from studio.app.server.app_state import App, AppState
 from studio.app.server.requests import Arguments, body_of
 from studio.app.server.run_routes import RUN, OpenRun
+from studio.foundations.csv_text import as_csv
 from studio.foundations.declaring import LARGEST
 from studio.operations.notes import NoteList
 from studio.operations.notes import note as write
 from studio.operations.notes import notes as read
 from studio.runs.notes import Note
-from studio.sessions.named_rows import as_csv
 from studio.sessions.stored_run import StoredRun
 
 router = Router(prefix="/api", tags=["notes"])

@@ -12,6 +12,8 @@ from studio.app.server import files
 from studio.app.server.answers import Router, shown_as
 from studio.app.server.run_routes import RUN, Checked, OpenRun
 from studio.app.server.session_routes import OpenSession
+from studio.foundations.csv_text import as_csv
+from studio.foundations.csv_text import poses_csv as csv_of_poses
 from studio.operations.run_errors import Evaluation, measured
 from studio.operations.stored_frames import (
     FrameDetail,
@@ -27,8 +29,6 @@ from studio.operations.stored_frames import (
 from studio.operations.stored_frames import frame_detail as detail_of
 from studio.operations.stored_frames import layer_detail as layer_of
 from studio.runs.tracks import RAW
-from studio.sessions.named_rows import as_csv
-from studio.sessions.named_rows import poses_csv as csv_of_poses
 
 router = Router(prefix="/api", tags=["results"])
 

@@ -4,12 +4,13 @@ import dataclasses
 from typing import Annotated, Literal
 
 import numpy as np
-from fastapi import APIRouter
 from pydantic import Field
 
 from studio.app.scene.model import LayerPlayback, LiveSearch, Selection
+from studio.app.scene.search_view import Pointed
+from studio.app.server.answers import Router
 from studio.app.server.app_state import App, AppState, Scene
-from studio.app.server.schemas import Answer, Number, Request, RunName
+from studio.app.server.schemas import Request, RunName
 from studio.app.server.windows import Window
 from studio.body.reader import parse_body
 from studio.foundations.declaring import LARGEST
@@ -17,7 +18,7 @@ from studio.foundations.errors import SettingsError
 from studio.foundations.geometry.reach import within_reach
 from studio.operations.own_bodies import MOST_TEXT
 
-router = APIRouter(prefix="/api/scene", tags=["scene"])
+router = Router(prefix="/api/scene", tags=["scene"])
 
 CHOSEN = ("limb", "parameter", "particle", "camera")
 
@@ -221,25 +222,10 @@ class Pointer(Request):
     choose: bool = False
 
 
-class PointedParticle(Answer):
-    """The particle at the pointer. particle: a row of the layer's cloud. particles: of the layer. log_weight: raw.
-    weight: its share of all weights. line: the rows that it comes from, by first parents, from its search's first layer
-    on.
-    """
-
-    layer: int
-    particle: int
-    particles: int
-    log_weight: Number
-    weight: Number
-    line: list[int]
-
-
 @router.post("/point")
-def point(request: Pointer, scene: Scene) -> PointedParticle | None:
+def point(request: Pointer, scene: Scene) -> Pointed | None:
     """The particle of the layer that is looked at at the pointer; its line back to the first layer is drawn."""
-    found = scene.point(None if request.at is None else (request.at[0], request.at[1]), request.choose)
-    return None if found is None else PointedParticle.of(found)
+    return scene.point(None if request.at is None else (request.at[0], request.at[1]), request.choose)
 
 
 def report_moves(app: AppState) -> None:

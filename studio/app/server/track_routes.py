@@ -13,6 +13,7 @@ from studio.app.server.requests import Arguments, body_of
 from studio.app.server.run_routes import RUN, OpenRun
 from studio.app.server.schemas import Answer, Number
 from studio.app.server.session_routes import OpenSession
+from studio.foundations.csv_text import poses_csv
 from studio.foundations.knobs import Knob, knobs_of
 from studio.operations.jobs.job_runner import Job, JobKind, NumberedJob, Work
 from studio.operations.results import check as check_run
@@ -31,7 +32,6 @@ from studio.runs.refining import REFINED, SMOOTHED, MadeTrack
 from studio.runs.tracks import BEST
 from studio.search.trackers.refinement import RefinementSettings
 from studio.search.trackers.smoothing import SmoothingSettings
-from studio.sessions.named_rows import poses_csv
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 

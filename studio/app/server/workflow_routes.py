@@ -3,9 +3,10 @@
 import asyncio
 from typing import Annotated
 
-from fastapi import APIRouter, Query
+from fastapi import Query
 from starlette.responses import Response
 
+from studio.app.server.answers import Router
 from studio.app.server.app_state import App, AppState
 from studio.app.server.background_routes import BACKGROUND
 from studio.app.server.export_routes import EXPORT
@@ -18,11 +19,12 @@ from studio.app.server.subject_routes import SUBJECT
 from studio.app.server.track_routes import TRACK
 from studio.operations.exports import exported_files
 from studio.operations.footage import new_session
-from studio.runs.setup.workflow import Workflow, run_to_use, workflow_of
+from studio.operations.opening import workflow_now
+from studio.runs.setup.workflow import Workflow
 from studio.search.trackers.catalogue import knobs_for_evaluations
 from studio.sessions.session import Session
 
-router = APIRouter(tags=["workflow"])
+router = Router(tags=["workflow"])
 
 
 @router.get("/way", include_in_schema=False)
@@ -50,7 +52,7 @@ def evaluations(tracker: str, evaluations: Annotated[int, Query(ge=1, le=1_000_0
 @router.get("/api/sessions/{session}/way")
 async def workflow(session: OpenSession, app: App) -> Workflow:
     """Every step of the guided set-up: done, ready, blocked, stale (and why) or running."""
-    return await asyncio.to_thread(_workflow, session, running_steps(app, session))
+    return await asyncio.to_thread(workflow_now, session, running_steps(app, session))
 
 
 def running_steps(app: AppState, session: Session) -> dict[str, str]:
@@ -67,8 +69,3 @@ def running_steps(app: AppState, session: Session) -> dict[str, str]:
         for step, kind in jobs.items()
         for state in app.jobs.going(kind, session.name)
     }
-
-
-def _workflow(session: Session, running: dict[str, str]) -> Workflow:
-    run = run_to_use(session)
-    return workflow_of(session, running, exported_files(run) if run else ())

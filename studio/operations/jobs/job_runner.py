@@ -25,7 +25,10 @@ from studio.foundations.errors import (
     UnforeseenError,
     WorkCancelledError,
 )
+from studio.foundations.foreign_files import MANIFEST_NAME
 from studio.foundations.progress import TimeLeft
+from studio.sessions.work_under_way import working_on
+from studio.sessions.workspace import Workspace
 
 KEPT = 50
 MOST_AT_ONCE = 8
@@ -373,3 +376,14 @@ class JobRunner:
 
 def _busy(kind: JobKind[State], state: State) -> RunError:
     return RunError(kind.busy.format(**dict(state)), "Wait for it, or cancel it.")
+
+
+def keep_in_place(
+    workspace: Workspace, kind: JobKind[Any], state: SessionJob
+) -> AbstractContextManager[None]:
+    """Entered while a job goes on: other processes do not move its session, unless that is only being made."""
+    session = workspace.root / state.session
+    if not state.session or (kind.makes_session and not (session / MANIFEST_NAME).is_file()):
+        return nullcontext()
+    verb = str(getattr(state, "verb", "") or kind.noun)
+    return working_on(session.resolve(), verb, str(getattr(state, "run", "") or ""))

@@ -2,12 +2,12 @@
 
 from typing import Any
 
+from studio.foundations.csv_text import as_csv
 from studio.foundations.words import counted
 from studio.results.comparison.findings import Chart, Findings, Series, Table
 from studio.results.comparison.plan import Comparison, PairTest, TrackerResult
 from studio.results.comparison.statistics import SignTest, number
 from studio.search.settings import values
-from studio.sessions.named_rows import as_csv
 
 SIGNIFICANT = 0.05
 COLUMNS = (

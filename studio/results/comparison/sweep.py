@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from studio.body.motion_files.trc import read_trc
+from studio.foundations.csv_text import as_csv
 from studio.foundations.errors import RunError, SettingsError, TruthError
 from studio.foundations.knobs import Knob, Value, checked
 from studio.foundations.progress import duration_in_words
@@ -31,7 +32,6 @@ from studio.runs.setup.silhouette_doubts import accepted_doubts
 from studio.search.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, all_knobs, changed_settings, values
 from studio.search.trackers.catalogue import TRACKERS
 from studio.search.trackers.tracker import LIMB_LOST, LOST
-from studio.sessions.named_rows import as_csv
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 

@@ -15,6 +15,7 @@ from studio.body.forward_kinematics import limb_frames, marker_points
 from studio.body.model import BodyModel, kinematic_tables
 from studio.body.motion_files.trc import MarkerMotion
 from studio.foundations.arrays import Array, Bytes
+from studio.foundations.csv_text import poses_csv
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.cones import limb_outlines
 from studio.foundations.geometry.projection import project
@@ -23,7 +24,6 @@ from studio.results.drawing_footage.clips import ClipWriter
 from studio.results.drawing_footage.noise_kernels import add_sensor_noise
 from studio.results.drawing_footage.recipe_file import Recipe
 from studio.sessions.atomic_files import write_text
-from studio.sessions.named_rows import poses_csv
 
 SWING_SHARE, SPEED_SHARE = 0.30, 0.5
 ARM_COLOUR, WALL_COLOUR = (196.0, 186.0, 178.0), (64.0, 62.0, 60.0)

@@ -21,6 +21,7 @@ from studio.body.model import BodyModel
 from studio.body.motion_files.trc import MarkerMotion
 from studio.body.subject import Subject
 from studio.foundations.arrays import Array
+from studio.foundations.csv_text import poses_csv
 from studio.foundations.errors import StudioError
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.progress import Progress
@@ -45,7 +46,7 @@ from studio.results.drawing_footage.renderer import MOMENTS, SurfaceRenderer
 from studio.results.drawing_footage.rooms import room_called
 from studio.results.drawing_footage.wardrobes import dressed
 from studio.sessions.atomic_files import write_text
-from studio.sessions.named_rows import poses_csv, write_pose
+from studio.sessions.named_rows import write_pose
 
 ROUNDED = 0.7
 """Share of a cone's radius by which its rounded end begins before the flat one."""
