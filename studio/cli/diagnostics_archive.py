@@ -32,8 +32,8 @@ from studio.foundations.errors import StudioError
 from studio.foundations.foreign_files import open_file, read_text
 from studio.foundations.package import package_folder
 from studio.foundations.typed_decoding import is_list, is_table
+from studio.operations.overview import run_log
 from studio.sessions.atomic_files import taken, write_bytes
-from studio.sessions.run_log import read_log
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.work_under_way import STATE_NAME
@@ -259,7 +259,7 @@ def _run(run: StoredRun) -> dict[str, object]:
         found["states"] = {state: list(states).count(state) for state in dict.fromkeys(states)}
     except StudioError as error:
         found["problem"] = str(error)
-    found["log"] = [f"{line.level}: {line.text}" for line in read_log(run.folder, RUN_LINES)]
+    found["log"] = [f"{line.level}: {line.text}" for line in run_log(run, RUN_LINES).lines]
     return found
 
 

@@ -9,11 +9,9 @@ from rich.console import Console
 from rich.table import Table as Drawn
 
 from studio.cli.deriving import Call, command_of
-from studio.foundations.csv_text import as_csv
-from studio.operations.inspecting import compare_runs, inspected, seeds, view, why, worst_frame
+from studio.operations.inspecting import compare_runs, inspected, seeds, view, why, worst_frame, write_tables
 from studio.results.inspection.comparing import RunsCompared
 from studio.results.inspection.tables import Cell, Table, Viewed
-from studio.sessions.atomic_files import write_bytes
 
 MOST_ROWS = 40
 CSV = click.option(
@@ -67,15 +65,15 @@ def seeds_command(call: Call) -> dict[str, object]:
 
 @command_of(compare_runs, CSV)
 def compare_runs_command(call: Call, file: Path | None) -> dict[str, object]:
-    found: RunsCompared = call()
-    return _answer(found.tables, (), f"Runs {', '.join(found.runs)}.", file)
+    compared: RunsCompared = call()
+    return _answer(compared.tables, (), f"Runs {', '.join(compared.runs)}.", file)
 
 
 def _answer(
     tables: Sequence[Table], notes: Sequence[str], caption: str, file: Path | None
 ) -> dict[str, object]:
     if file is not None:
-        write_bytes(file, tables_csv(tables, caption).encode())
+        write_tables(tables, caption, file)
     shown = [_drawn(table) for table in tables if table.rows] if file is None else [f"{file}"]
     return {
         "caption": caption,
@@ -83,17 +81,6 @@ def _answer(
         "tables": {table.name: table.records() for table in tables},
         "text": "\n".join([caption, *notes, *shown]),
     }
-
-
-def tables_csv(tables: Sequence[Table], caption: str) -> str:
-    """The tables one after the other: caption and titles as comments, units in the head."""
-    # A line break within, of a run's record, would begin a cell.
-    parts = [f"# {' '.join(caption.split())}\n"]
-    for table in tables:
-        heads = [f"{one.key} [{one.unit}]" if one.unit else one.key for one in table.columns]
-        rows = [["" if cell is None else cell for cell in row] for row in table.for_readers()]
-        parts.append(f"# {table.name}: {table.title}\n{as_csv([heads, *rows])}")
-    return "".join(parts)
 
 
 def _drawn(table: Table) -> str:

@@ -19,13 +19,12 @@ import uvicorn
 from studio.app.server.access import HostRule, binding_rule, new_token
 from studio.foundations.errors import StudioError
 from studio.foundations.foreign_files import read_text
+from studio.operations.gallery import prepare_demo
 from studio.operations.jobs.commands import Open, about
 from studio.operations.jobs.control import StudioControl
 from studio.operations.jobs.send_addresses import VARIABLE, addresses_from_environment
 from studio.sessions.atomic_files import write_text
 from studio.sessions.process_lock import ProcessLock
-from studio.sessions.samples import install_prepared_runs, install_sample
-from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.work_under_way import STATE_NAME
 from studio.sessions.workspace import Workspace
@@ -125,16 +124,6 @@ def demo(workspace_root: Path, port: int = 0, *, announce: Announce = click.echo
         return Opening(prepare_demo(workspace_root).run(DEMO_RUN), DEMO_SHOWS)
 
     serve(workspace_root, port=port, first=first, announce=announce)
-
-
-def prepare_demo(workspace_root: Path) -> Session:
-    """The bundled walk as a session of the workspace with the runs that travel with it, copied there if absent; the
-    planar arm, with which the course begins, beside it.
-    """
-    workspace = Workspace(workspace_root)
-    for sample in ("planar_arm", "walk"):
-        install_prepared_runs(session := install_sample(workspace, sample), sample)
-    return session
 
 
 def printed(full: str, viewers: str, plainly: bool) -> str:

@@ -26,8 +26,8 @@ from studio.foundations.declaring import Terminal
 from studio.foundations.errors import StudioError
 from studio.foundations.numba_in_threads import numba
 from studio.foundations.package import assets_folder
-from studio.operations.jobs.batch import track_to_end
-from studio.runs.new_run import prepare_run
+from studio.foundations.progress import unheard
+from studio.operations.tracking import go_on, new_run
 from studio.runs.problem_source import ProblemSource
 from studio.search.likelihood.edge_region import CPU, DEVICE_MODULE, GPU
 from studio.search.settings import changed_settings, default_settings
@@ -258,6 +258,5 @@ def _card() -> str:
 def _tracked() -> str:
     with tempfile.TemporaryDirectory() as folder:
         session = install_sample(Workspace(Path(folder)), "planar_arm")
-        run = prepare_run(session, last=1, knobs=QUICK)
-        result = track_to_end(session, run, lambda words, done, total: None)
-    return f"in {result.seconds:.1f} s, compiling included"
+        tracked = go_on(new_run(session, last=1, knobs=QUICK, progress=unheard), progress=unheard)
+    return f"in {tracked.seconds:.1f} s, compiling included"

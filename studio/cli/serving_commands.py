@@ -7,7 +7,7 @@ import click
 
 from studio.cli.launch import PORT, Announce, demo, serve
 from studio.cli.output import errors_in_words, print_result
-from studio.sessions.workspace import workspace_root
+from studio.sessions.workspace import Workspace
 
 PORT_HELP = "Port to listen on; 0 takes a free one."
 PREPARING = "The walk is made ready; the first start compiles the kernels once (about half a minute) ..."
@@ -18,9 +18,9 @@ def _announcer(as_json: bool) -> Announce:
     """Prints the lines with the addresses, or the addresses alone as JSON."""
 
     def announce(lines: str) -> None:
-        found: list[str] = re.findall(r"https?://\S+", lines)
+        addresses: list[str] = re.findall(r"https?://\S+", lines)
         print_result(
-            {**dict(zip(("address", "viewers_address"), found, strict=False)), "text": lines}, as_json
+            {**dict(zip(("address", "viewers_address"), addresses, strict=False)), "text": lines}, as_json
         )
 
     return announce
@@ -34,7 +34,7 @@ def demo_command(workspace: Path | None, port: int, as_json: bool) -> None:
     """Watch the search on the bundled walk in the browser: prints the address to open."""
     click.echo(PREPARING, err=True)
     with errors_in_words():
-        demo(workspace or workspace_root(), port=port, announce=_announcer(as_json))
+        demo(workspace or Workspace().root, port=port, announce=_announcer(as_json))
 
 
 @click.command("serve")
@@ -62,7 +62,7 @@ def serve_command(
     """Open the studio on a workspace: prints the address to open, and one for those who may only look."""
     with errors_in_words():
         serve(
-            workspace or workspace_root(),
+            workspace or Workspace().root,
             host=host,
             port=port,
             allow_remote=allow_remote,

@@ -1,5 +1,6 @@
 """What there is and how it stands: `gallery`, `bodies`, `edit-body`, `inspect`, `runs`, `workflow`."""
 
+from collections.abc import Sequence
 from dataclasses import asdict
 
 import click
@@ -11,12 +12,10 @@ from studio.operations.foreign import inspect
 from studio.operations.gallery import Gallery, gallery
 from studio.operations.opening import bodies, workflow
 from studio.operations.own_bodies import EditedBody, edit_body
+from studio.operations.remote import runs_there
 from studio.runs.setup.workflow import Workflow
 from studio.sessions.foreign_sessions import Inspection
-from studio.sessions.object_stores import is_address
-from studio.sessions.remote_sessions import sessions_at
-from studio.sessions.stored_run import damage_in_words
-from studio.sessions.workspace import Workspace
+from studio.sessions.remote_sessions import RemoteSession
 
 MARKS = {"done": "✓", "ready": "·", "blocked": " ", "stale": "!", "running": "…"}
 
@@ -42,23 +41,25 @@ def bodies_command(call: Call) -> dict[str, object]:
 
 @command_of(inspect)
 def inspect_command(call: Call) -> dict[str, object]:
-    found: Inspection = call()
-    lines = [f"{one.place}: {one.what}." for one in found.oddities]
+    inspection: Inspection = call()
+    lines = [f"{one.place}: {one.what}." for one in inspection.oddities]
     said = "nothing is odd" if not lines else counted(len(lines), "oddity", "oddities")
-    lines.append(f"{found.kind}: {counted(found.files, 'file')}, {found.bytes / 1e6:.1f} MB; {said}.")
+    lines.append(
+        f"{inspection.kind}: {counted(inspection.files, 'file')}, {inspection.bytes / 1e6:.1f} MB; {said}."
+    )
     return {
-        EXIT_CODE: 0 if found.harmless else FOUND_FAULTS,
-        "kind": found.kind,
-        "files": found.files,
-        "bytes": found.bytes,
-        "oddities": [asdict(one) for one in found.oddities],
+        EXIT_CODE: 0 if inspection.harmless else FOUND_FAULTS,
+        "kind": inspection.kind,
+        "files": inspection.files,
+        "bytes": inspection.bytes,
+        "oddities": [asdict(one) for one in inspection.oddities],
         "text": "\n".join(lines),
     }
 
 
 @command_of(gallery)
 def gallery_command(call: Call) -> dict[str, object]:
-    found: Gallery = call()
+    there: Gallery = call()
     cards: list[dict[str, object]] = [
         {
             "name": one.card.name,
@@ -69,13 +70,13 @@ def gallery_command(call: Call) -> dict[str, object]:
             "data": one.card.data,
             "commands": list(one.card.commands),
         }
-        for one in found.cards
+        for one in there.cards
     ]
-    if found.made is not None:
-        return {"session": found.made.name, "cards": cards, "text": f"Session '{found.made.name}' is there."}
+    if there.made is not None:
+        return {"session": there.made.name, "cards": cards, "text": f"Session '{there.made.name}' is there."}
     how = {"sample": "bundled", "recipe": "rendered", "elsewhere": "imported"}
     lines: list[str] = []
-    for one in found.cards:
+    for one in there.cards:
         card = one.card
         state = "there" if one.there else (one.missing and "data missing") or how[card.kind]
         lines.append(f"{card.name:18} {state:14} {card.title}. {card.words}")
@@ -85,14 +86,16 @@ def gallery_command(call: Call) -> dict[str, object]:
 
 @command_of(edit_body)
 def edit_body_command(call: Call) -> dict[str, object]:
-    found: EditedBody = call()
+    edited: EditedBody = call()
     return {
-        "body": found.body.name,
-        "title": found.body.title,
-        "dimensions": dict(found.body.dimensions),
-        "notes": list(found.notes),
-        "file": str(found.file or ""),
-        "text": f"Saved as '{found.body.name}' ({found.file})." if found.file else found.text.rstrip("\n"),
+        "body": edited.body.name,
+        "title": edited.body.title,
+        "dimensions": dict(edited.body.dimensions),
+        "notes": list(edited.notes),
+        "file": str(edited.file or ""),
+        "text": f"Saved as '{edited.body.name}' ({edited.file})."
+        if edited.file
+        else edited.text.rstrip("\n"),
     }
 
 
@@ -101,17 +104,12 @@ def edit_body_command(call: Call) -> dict[str, object]:
 @command
 def runs_command(session: str | None) -> dict[str, object]:
     """List the runs of a session, or of all sessions in the workspace; at an address those of a store."""
-    if session and is_address(session):
-        return _runs_at(session)
-    workspace = Workspace()
-    if session:
-        opened = workspace.resolve(session)
-        found = [(opened.name, run.summary()) for run in opened.runs()]
-    else:
-        found = [(entry.name, run) for entry in workspace.sessions() for run in entry.runs]
+    there = runs_there(session)
+    if there.stored is not None:
+        return _stored(there.place, there.stored)
     entries: list[dict[str, object]] = [
         {
-            "session": name,
+            "session": run.session,
             "run": run.name,
             "tracker": run.tracker,
             "weighting": run.weighting,
@@ -122,37 +120,36 @@ def runs_command(session: str | None) -> dict[str, object]:
             "status": run.status,
             "damaged": list(run.damaged),
         }
-        for name, run in found
+        for run in there.runs
     ]
     lines = [
-        f"{entry['session']:18} {entry['run']:12} {entry['tracker']:14} {entry['weighting']:14} "
-        f"{entry['done']:>5} of {run.last - run.first} frames  {entry['status']}"
-        + (f"  {damage_in_words(run.damaged)}" if run.damaged else "")
-        for entry, (_, run) in zip(entries, found, strict=True)
+        f"{run.session:18} {run.name:12} {run.tracker:14} {run.weighting:14} "
+        f"{run.done:>5} of {run.last - run.first} frames  {run.status}"
+        + (f"  {run.damage}" if run.damage else "")
+        for run in there.runs
     ]
-    return {"workspace": str(workspace.root), "runs": entries, "text": "\n".join(lines) or "No runs yet."}
+    return {"workspace": there.place, "runs": entries, "text": "\n".join(lines) or "No runs yet."}
 
 
-def _runs_at(address: str) -> dict[str, object]:
-    found = sessions_at(address)
+def _stored(address: str, sessions: Sequence[RemoteSession]) -> dict[str, object]:
     lines = [
         f"{one.name:18} {one.bytes / 1e6:10.1f} MB  {', '.join(one.runs) if one.whole else 'half written'}"
-        for one in found
+        for one in sessions
     ]
     return {
         "address": address,
-        "sessions": [asdict(one) for one in found],
+        "sessions": [asdict(one) for one in sessions],
         "text": "\n".join(lines) or "No sessions there.",
     }
 
 
 @command_of(workflow)
 def workflow_command(call: Call) -> dict[str, object]:
-    found: Workflow = call()
+    now: Workflow = call()
     lines = [
         f"{MARKS[step.state]} {step.step:12} {step.words}{f'  ({step.why})' if step.why else ''}"
-        for step in found.steps
+        for step in now.steps
     ]
-    said = f"Next: {found.next}." if found.next else "Nothing is left to be done."
-    steps = [asdict(step) for step in found.steps]
-    return {"steps": steps, "next": found.next, "text": "\n".join((*lines, said))}
+    said = f"Next: {now.next}." if now.next else "Nothing is left to be done."
+    steps = [asdict(step) for step in now.steps]
+    return {"steps": steps, "next": now.next, "text": "\n".join((*lines, said))}

@@ -22,12 +22,11 @@ from studio.operations.tracking import (
     new_run,
     replay,
     resume_live,
+    run_to_go_on,
     track,
 )
-from studio.runs.sides import exchanged_sides, in_words
 from studio.search.trackers.catalogue import TRACKERS
 from studio.search.trackers.tracker import LIMB_LOST, LOST, NO_EVIDENCE, RECOVERED
-from studio.sessions.remote_sessions import bring_runs
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 
@@ -49,8 +48,7 @@ def track_command(call: Call, frames: str, poses: Path | None, resume: str | Non
     if poses:
         _check_place(poses)
     if resume:
-        bring_runs(session, resume)
-        run = session.run(resume)
+        run = run_to_go_on(session, resume)
     else:
         first, last = frame_range(frames)
         run = call.do(new_run, **{**call.given, "first": first, "last": last})
@@ -76,9 +74,9 @@ def track_command(call: Call, frames: str, poses: Path | None, resume: str | Non
         f"{session.name} / {run.name}: {record.frame_count} frames in {done.seconds:.1f} s, "
         f"seed {record.seed}{_in_words(went)}"
     )
-    if exchanged := exchanged_sides(run):
-        text += f"\n{in_words(exchanged)}"
-        result["exchanged"] = list(exchanged)
+    if done.exchanged:
+        text += f"\n{done.sides_in_words}"
+        result["exchanged"] = list(done.exchanged)
     if record.behaviour:
         result["behaviour"] = record.behaviour
     if TRACKERS[record.tracker].scales_likelihood:
@@ -105,21 +103,21 @@ def live_command(call: Call, resume: str | None, again: str | None) -> dict[str,
     done: TrackedLive = (
         call.do(resume_live, run=session.run(resume), send=call.given["send"]) if resume else call()
     )
-    found, run = done.summary, done.run
+    summary, run = done.summary, done.run
     result: dict[str, object] = {
         **_which(run),
-        "frames": len(found.tracked),
-        "dropped": list(found.dropped),
-        "dropped_share": round(found.dropped_share, 4),
-        "incomplete": list(found.incomplete),
-        "frames_per_second": round(found.frames_per_second, 2),
+        "frames": len(summary.tracked),
+        "dropped": list(summary.dropped),
+        "dropped_share": round(summary.dropped_share, 4),
+        "incomplete": list(summary.incomplete),
+        "frames_per_second": round(summary.frames_per_second, 2),
         "footage_frames_per_second": run.record.fps,
         "latency_ms": {
-            name: round(found.latency(share), 1)
+            name: round(summary.latency(share), 1)
             for name, share in (("median", 0.5), ("p95", 0.95), ("worst", 1.0))
         },
     }
-    text = f"{done.session.name} / {run.name}: {live_words(found)}"
+    text = f"{done.session.name} / {run.name}: {live_words(summary)}"
     if done.standing is not None:
         standing = done.standing
         result |= {"sets": standing.sets, "ended": standing.ended, **spread_figures(standing.spreads)}
@@ -132,18 +130,18 @@ def live_command(call: Call, resume: str | None, again: str | None) -> dict[str,
 
 
 def _replayed(session: Session, done: Replayed) -> dict[str, object]:
-    found, of = done.compared, done.of.name
+    compared, of = done.compared, done.of.name
     verdict = (
-        f"all {found.frames} frames of '{of}' again, bit for bit"
-        if not found.different
-        else f"{len(found.different)} of {found.frames} frames of '{of}' came out otherwise"
+        f"all {compared.frames} frames of '{of}' again, bit for bit"
+        if not compared.different
+        else f"{len(compared.different)} of {compared.frames} frames of '{of}' came out otherwise"
     )
     return {
         "session": session.name,
         "run": done.run.name,
         "replayed": of,
-        "frames": found.frames,
-        "different": list(found.different),
+        "frames": compared.frames,
+        "different": list(compared.different),
         "text": f"{session.name} / {done.run.name}: {verdict}",
     }
 

@@ -19,8 +19,8 @@ from studio.results.drawing_footage.recipes import synthesize
 from studio.sessions.atomic_files import discard
 from studio.sessions.importers.importing import add_footage
 from studio.sessions.manifest import FILE_NAME
-from studio.sessions.samples import install_sample, sample_folder
-from studio.sessions.session import Session, thumbnail_of
+from studio.sessions.samples import install_prepared_runs, install_sample
+from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace, begin_session
 
 CardKind = Literal["sample", "recipe", "elsewhere"]
@@ -301,3 +301,13 @@ def _imported(card: Card, place: Path, progress: Progress) -> Session:
     except BaseException:
         discard(place)
         raise
+
+
+def prepare_demo(workspace_root: Path) -> Session:
+    """The bundled walk as a session of the workspace with the runs that travel with it, copied there if absent; the
+    planar arm, with which the course begins, beside it.
+    """
+    workspace = Workspace(workspace_root)
+    for sample in ("planar_arm", "walk"):
+        install_prepared_runs(session := install_sample(workspace, sample), sample)
+    return session

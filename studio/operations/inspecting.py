@@ -2,10 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import Field
 
+from studio.foundations.csv_text import as_csv
 from studio.foundations.declaring import LARGEST, Terminal, Web, operation, taking
 from studio.foundations.errors import RunError
 from studio.operations.opening import RunName, keeping_in_place, open_run, session_of
@@ -16,6 +18,7 @@ from studio.results.inspection.reading import InspectedRun, TriedFrame
 from studio.results.inspection.seeds import search_seeds
 from studio.results.inspection.tables import FrameFinding, Remedy, Selection, Table, View, Viewed
 from studio.results.inspection.views import VIEWS, look, look_over, view_named
+from studio.sessions.atomic_files import write_bytes
 
 ViewName = Annotated[
     str, Field(description=f"Which: {', '.join(VIEWS)}."), Terminal("--view", metavar="NAME")
@@ -173,3 +176,19 @@ def compare_runs(
     Raises RunError.
     """
     return compare_stored([inspected(run) for run in runs])
+
+
+def write_tables(tables: Sequence[Table], caption: str, file: Path) -> None:
+    """Write tables to a CSV file. Raises SessionError where that is not possible."""
+    write_bytes(file, tables_csv(tables, caption).encode())
+
+
+def tables_csv(tables: Sequence[Table], caption: str) -> str:
+    """The tables one after the other: caption and titles as comments, units in the head."""
+    # A line break within, of a run's record, would begin a cell.
+    parts = [f"# {' '.join(caption.split())}\n"]
+    for table in tables:
+        heads = [f"{one.key} [{one.unit}]" if one.unit else one.key for one in table.columns]
+        rows = [["" if cell is None else cell for cell in row] for row in table.for_readers()]
+        parts.append(f"# {table.name}: {table.title}\n{as_csv([heads, *rows])}")
+    return "".join(parts)

@@ -17,6 +17,7 @@ from studio.foundations.errors import NotFoundError, RunError, SessionError
 from studio.foundations.foreign_files import MANIFEST_NAME
 from studio.results.export.kept_exports import exported_files
 from studio.runs.setup.workflow import Workflow, run_to_use, workflow_of
+from studio.runs.sides import in_words
 from studio.runs.tracks import Track
 from studio.sessions.names import is_name
 from studio.sessions.session import BODIES_NAME, RUNS_NAME, Session
@@ -37,8 +38,13 @@ AnySession = Annotated[Session | str | Path, Target("session", remote=True)]
 class Tracked:
     """A run that was tracked. Goes wherever a run is wanted.
 
-    run : on disk. track : frames (K,), poses (K, D) rad and mm, confidence (K,), states. names : D parameters. notes :
-    on what was filled in. seconds, evaluations_per_frame : of the search. likelihood_scale : β of the last layer.
+    run : on disk.
+    track : frames (K,), poses (K, D) rad and mm, confidence (K,), states.
+    names : D parameters.
+    notes : on what was filled in.
+    seconds, evaluations_per_frame : of the search.
+    likelihood_scale : β of the last layer.
+    exchanged : left and right that were put right in the track "sides", in words.
     """
 
     run: StoredRun
@@ -48,6 +54,12 @@ class Tracked:
     seconds: float
     evaluations_per_frame: int
     likelihood_scale: float = float("nan")
+    exchanged: tuple[str, ...] = ()
+
+    @property
+    def sides_in_words(self) -> str:
+        """What was exchanged, as a sentence; "" if nothing."""
+        return in_words(self.exchanged) if self.exchanged else ""
 
     def to_xarray(self, frames: Iterable[int] | None = None) -> Any:  # noqa: ANN401 - xarray.Dataset
         """The particles with layers as a dimension (`StoredRun.to_xarray`). Raises StudioError without xarray."""

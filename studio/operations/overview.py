@@ -351,9 +351,9 @@ def run_detail(run: StoredRun, session: Session, *, check: bool) -> RunDetail:
     )
 
 
-def run_log(run: StoredRun) -> LogLines:
-    """The log of a run, oldest first."""
-    return LogLines(tuple(read_log(run.folder)))
+def run_log(run: StoredRun, last: int = 200) -> LogLines:
+    """The last lines of a run's log, oldest first. Raises SessionError."""
+    return LogLines(read_log(run.folder, last))
 
 
 def camera_view(camera: Camera, source: CameraSource) -> CameraView:

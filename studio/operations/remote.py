@@ -23,13 +23,40 @@ from studio.runs.new_run import prepare_run
 from studio.sessions import remote_sessions
 from studio.sessions.names import checked_name
 from studio.sessions.object_stores import above, folder_of, is_address
-from studio.sessions.remote_sessions import sessions_at
+from studio.sessions.remote_sessions import RemoteSession, sessions_at
 from studio.sessions.session import Session
+from studio.sessions.stored_run import RunSummary
 from studio.sessions.workspace import Workspace
 
 Address = Annotated[
     str, Field(description="Where in a store, such as s3://BUCKET/sessions/NAME."), Web(left_out=True)
 ]
+
+
+@dataclass(frozen=True, slots=True)
+class RunsThere:
+    """Runs of this machine, or of an object store.
+
+    place : the workspace's folder, or the address.
+    runs : of the workspace's sessions.
+    stored : sessions at the address, None where it was none.
+    """
+
+    place: str
+    runs: tuple[RunSummary, ...] = ()
+    stored: tuple[RemoteSession, ...] | None = None
+
+
+def runs_there(place: str | None = None) -> RunsThere:
+    """The runs of a session, or of the whole workspace; at an address the sessions of a store. Raises NotFoundError."""
+    if place and is_address(place):
+        return RunsThere(place, stored=sessions_at(place))
+    workspace = Workspace()
+    if place:
+        runs = tuple(run.summary() for run in workspace.resolve(place).runs())
+    else:
+        runs = tuple(run for entry in workspace.sessions() for run in entry.runs)
+    return RunsThere(str(workspace.root), runs)
 
 
 @operation

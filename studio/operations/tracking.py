@@ -4,7 +4,7 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Concatenate, ParamSpec, TypeVar
+from typing import Annotated, Any, Concatenate, ParamSpec, TypeVar
 
 from pydantic import Field
 
@@ -46,11 +46,12 @@ from studio.runs.live.live_replay import Comparison, prepare_replay
 from studio.runs.live.live_request import last_of
 from studio.runs.live.live_summary import LiveSummary, in_words, summary_of
 from studio.runs.new_run import DESPITE, Numbers, Pose, given_pose, own_knobs, prepare_run
+from studio.runs.sides import exchanged_sides
 from studio.runs.tracks import pose_in_track, read_track
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.trackers.catalogue import TRACKERS
 from studio.sessions.names import free_name
-from studio.sessions.remote_sessions import address_of, free_run_name_at, put_run
+from studio.sessions.remote_sessions import address_of, bring_runs, free_run_name_at, put_run
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
@@ -93,6 +94,12 @@ def track(session: AnySession, *, progress: Reporting = None, **options: object)
     return go_on(new_run(session, progress=progress, **options), progress=progress)  # pyright: ignore[reportArgumentType]
 
 
+def run_to_go_on(session: Session, name: str) -> StoredRun:
+    """A run of a session by its name; of a copy of a remote session it is brought first. Raises NotFoundError."""
+    bring_runs(session, name)
+    return session.run(name)
+
+
 @operation
 @keeping_in_place
 def go_on(run: RunName, *, progress: Reporting = None) -> Tracked:
@@ -131,7 +138,7 @@ def _reporting(run: StoredRun, progress: Reporting, how_far: Callable[[], str]) 
 SendTo = Annotated[
     Sequence[str],
     Field(
-        description="Where the poses are sent as they are found: osc://HOST:PORT (VMC) or ws://HOST:PORT (JSON to who"
+        description="Where the poses are sent as they are tracked: osc://HOST:PORT (VMC) or ws://HOST:PORT (JSON to who"
         " connects there); without a host this machine."
     ),
     Terminal("--send", "ADDRESS"),
@@ -150,43 +157,58 @@ class TrackedLive:
     standing: SetStanding | None = None
 
 
-@operation
-def live(
-    session: SessionName,
-    *,
-    tracker: Annotated[str, Field(description="What searches."), OneOf(TRACKERS)] = "behaviour",
-    weighting: Annotated[str, Field(description="What tells poses apart."), OneOf(WEIGHTINGS)] = "blobs",
-    body: Body = "",
-    behaviour: Model = "",
-    first: Annotated[int, Field(ge=0, description="The frame that comes first."), Terminal("--from")] = 0,
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LiveRequest:
+    """What a live run is made of."""
+
+    tracker: Annotated[str, Field(description="What searches."), OneOf(TRACKERS)] = "behaviour"
+    weighting: Annotated[str, Field(description="What tells poses apart."), OneOf(WEIGHTINGS)] = "blobs"
+    body: Body = ""
+    behaviour: Model = ""
+    first: Annotated[int, Field(ge=0, description="The frame that comes first."), Terminal("--from")] = 0
     seconds: Annotated[
         float | None, Field(gt=0, le=86400, description="Track for so long; default: to the footage's end.")
-    ] = None,
+    ] = None
     repeat: Annotated[
         bool, Field(description="Go forth and back through the footage; needs a time to end.")
-    ] = False,
-    seed: Seed = 0,
+    ] = False
+    seed: Seed = 0
     knobs: Annotated[
         Values, Field(description="Any other knob."), Knobs(own_knobs, others=True, with_defaults=False)
-    ] = None,
-    name: Annotated[str, Field(description="Of the run; default: numbered.")] = "",
-    allow_inconsistent: AllowInconsistent = False,
-    cameras: Annotated[Cameras, Web(left_out=True)] = (),
+    ] = None
+    name: Annotated[str, Field(description="Of the run; default: numbered.")] = ""
+    allow_inconsistent: AllowInconsistent = False
+    cameras: Annotated[Cameras, Web(left_out=True)] = ()
     into: Annotated[
         str | Path | None,
         Field(description="With cameras: the session that keeps what they saw."),
         Terminal(kind=str, metavar="SESSION"),
-    ] = None,
+    ] = None
     keep_start: Annotated[
         bool,
         Field(
-            description="With cameras: the person begins in the session's start pose; else it is sought in the first"
-            " pictures."
+            description="With cameras: the person begins in the session's start pose; else it is searched for in the"
+            " first pictures."
         ),
         Terminal("--keep-start/--seek-start"),
-    ] = True,
-    send: Annotated[SendTo, Web(left_out=True)] = (),
+    ] = True
+    send: Annotated[SendTo, Web(left_out=True)] = ()
+
+    def of_run(self) -> dict[str, Any]:
+        """What `prepare_run` takes of it."""
+        return {name: getattr(self, name) for name in OF_RUN} | {"live": True}
+
+
+OF_RUN = ("tracker", "weighting", "body", "behaviour", "seed", "knobs", "name", "allow_inconsistent")
+
+
+@operation
+@taking(LiveRequest)
+def live(
+    session: SessionName,
+    *,
     progress: Reporting = None,
+    **options: Any,  # noqa: ANN401 - of the types that are declared
 ) -> TrackedLive:
     """Track a session as its pictures come: at the footage's own rate, dropping frames rather than falling behind.
 
@@ -196,38 +218,33 @@ def live(
 
     Raises StudioError.
     """
-    send_to = _send_addresses(send)
-    opened = open_session(session)
-    options = {
-        "tracker": tracker,
-        "weighting": weighting,
-        "body": body,
-        "behaviour": behaviour,
-        "seed": seed,
-        "knobs": knobs,
-        "name": name,
-        "allow_inconsistent": allow_inconsistent,
-        "live": True,
-    }
-    if cameras:
-        if repeat or first:
+    request, opened = LiveRequest(**options), open_session(session)
+    send_to = _send_addresses(request.send)
+    if request.cameras:
+        if request.repeat or request.first:
             raise RunError(
                 "Live cameras have no footage to begin in, repeat or go on with.", "Leave that out."
             )
-        request = LiveRecordingRequest(_place(opened, into), seconds, keep_start=keep_start, send_to=send_to)
-        with reporting(progress, request.into.name) as report:
-            found = track_cameras(opened, addresses_of(cameras), request, options, report)
-        _say_notes(found.run, progress)
-        say(progress, [notice.in_words for notice in found.standing.notices])
-        return TrackedLive(found.session, found.run, found.summary, found.standing)
-    if into or not keep_start:
+        recording = LiveRecordingRequest(
+            _place(opened, request.into), request.seconds, keep_start=request.keep_start, send_to=send_to
+        )
+        with reporting(progress, recording.into.name) as report:
+            done = track_cameras(opened, addresses_of(request.cameras), recording, request.of_run(), report)
+        _say_notes(done.run, progress)
+        say(progress, [notice.in_words for notice in done.standing.notices])
+        return TrackedLive(done.session, done.run, done.summary, done.standing)
+    if request.into or not request.keep_start:
         raise RunError("--into and --seek-start are for live cameras.", "Give them with --camera.")
-    if repeat and seconds is None:
+    if request.repeat and request.seconds is None:
         raise RunError("Footage that repeats has no end.", "Say how long with --seconds.")
     with reporting(progress, f"{opened.name}: getting ready") as report:
-        last = last_of(opened, first, seconds, repeat)
-        run = prepare_run(opened, **options, first=first, last=last, ping_pong=repeat, progress=report)  # pyright: ignore[reportArgumentType]
-    return resume_live(run, send=send, progress=progress)
+        span: dict[str, Any] = {
+            "first": request.first,
+            "last": last_of(opened, request.first, request.seconds, request.repeat),
+            "ping_pong": request.repeat,
+        }
+        run = prepare_run(opened, **request.of_run(), **span, progress=report)
+    return resume_live(run, send=request.send, progress=progress)
 
 
 @operation
@@ -418,6 +435,7 @@ def _tracked(run: StoredRun, result: BatchResult | None) -> Tracked:
         result.seconds if result else float("nan"),
         result.evaluations_per_frame if result else 0,
         result.last_beta if result else float("nan"),
+        exchanged_sides(fresh),
     )
 
 
@@ -425,16 +443,16 @@ def _send_addresses(send: Sequence[str]) -> tuple[SendAddress, ...] | None:
     return tuple(map(send_address, send)) or None
 
 
-def live_words(found: LiveSummary) -> str:
+def live_words(run: LiveSummary) -> str:
     """How a live run went, for a person."""
-    if not found.tracked:
+    if not run.tracked:
         return "nothing was tracked."
-    words = f"{len(found.tracked)} frames tracked, {found.frames_per_second:.1f} a second"
-    if found.dropped:
-        words += f"; {len(found.dropped)} dropped ({found.dropped_share:.1%}): {in_words(found.dropped)}"
+    words = f"{len(run.tracked)} frames tracked, {run.frames_per_second:.1f} a second"
+    if run.dropped:
+        words += f"; {len(run.dropped)} dropped ({run.dropped_share:.1%}): {in_words(run.dropped)}"
     else:
         words += "; none dropped"
-    if found.incomplete:
-        words += f"; {len(found.incomplete)} sets of pictures incomplete: {in_words(found.incomplete)}"
-    latency = " / ".join(f"{found.latency(share):.0f}" for share in (0.5, 0.95, 1.0))
+    if run.incomplete:
+        words += f"; {len(run.incomplete)} sets of pictures incomplete: {in_words(run.incomplete)}"
+    latency = " / ".join(f"{run.latency(share):.0f}" for share in (0.5, 0.95, 1.0))
     return f"{words}; picture to pose {latency} ms (median / 95 % / worst)"

@@ -47,6 +47,11 @@ class RunSummary:
     status: str
     damaged: tuple[int, ...] = ()
 
+    @property
+    def damage(self) -> str:
+        """The damaged frames and the remedy, as a sentence; "" if there are none."""
+        return damage_in_words(self.damaged)
+
 
 def damage_in_words(frames: Sequence[int]) -> str:
     """The damaged frames and the remedy, as a sentence; "" if there are none."""

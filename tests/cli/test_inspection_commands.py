@@ -7,8 +7,8 @@ from pathlib import Path
 
 from click.testing import CliRunner
 
-from studio.cli.inspection_commands import tables_csv
 from studio.cli.main import main
+from studio.operations.inspecting import tables_csv
 from studio.sessions.session import Session
 
 

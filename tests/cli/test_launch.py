@@ -17,8 +17,9 @@ import pytest
 
 from studio.body.motion_files.trc import read_trc
 from studio.cli import launch
-from studio.cli.launch import RedactedFormatter, address, prepare_demo, serve
+from studio.cli.launch import RedactedFormatter, address, serve
 from studio.foundations.errors import AccessError, StudioError
+from studio.operations.gallery import prepare_demo
 from studio.operations.jobs.commands import Open
 from studio.results.evaluation.errors import evaluate
 from studio.runs.tracks import RAW, read_track

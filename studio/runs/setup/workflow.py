@@ -35,7 +35,7 @@ from studio.sessions.footage_changes import stale_runs
 from studio.sessions.provenance import changed_inputs, origin_of
 from studio.sessions.run_record import CAMERAS_NAME
 from studio.sessions.session import START_POSE_NAME, SUBJECT_NAME, Session
-from studio.sessions.stored_run import StoredRun, damage_in_words
+from studio.sessions.stored_run import StoredRun
 
 StepName = Literal[
     "footage", "calibration", "background", "subject", "start-pose", "track", "check", "export"
@@ -283,7 +283,7 @@ def track_step(session: Session) -> StepStatus:
         before, summary = f"{newest.name} {ended}: {run.name} is used.", run.summary()
     words = f"{run.name}: {summary.done} of {counted(run.record.frame_count, 'frame')}"
     if summary.damaged:
-        return StepStatus("track", "stale", words, damage_in_words(summary.damaged), run=run.name)
+        return StepStatus("track", "stale", words, summary.damage, run=run.name)
     changed = run_changes(session, run)
     if changed:
         why = f"{run.name} was tracked before {enumerated(changed)} changed: track again."

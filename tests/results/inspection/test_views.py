@@ -11,8 +11,8 @@ from planted_runs import LAYERS, PARTICLES
 from scipy import stats
 
 from studio.body.forward_kinematics import marker_points
-from studio.cli.inspection_commands import tables_csv
 from studio.foundations.errors import NotFoundError, RunError, WorkCancelledError
+from studio.operations.inspecting import tables_csv
 from studio.results.inspection.clouds import density, weighted_quantiles
 from studio.results.inspection.comparing import compare_stored
 from studio.results.inspection.genealogy import first_lines, living
