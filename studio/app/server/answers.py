@@ -46,7 +46,7 @@ class Router(APIRouter):
         if isinstance(response_model, DefaultPlaceholder):
             returned = get_type_hints(endpoint, include_extras=True).get("return")
             if not (isinstance(returned, type) and issubclass(returned, Response)):
-                response_model = shown_as(returned)
+                response_model = None if returned is types.NoneType else shown_as(returned)
         super().add_api_route(path, endpoint, response_model=response_model, **more)
 
 
