@@ -295,7 +295,7 @@ def frame_detail(session: Session, run: StoredRun, frame: int) -> FrameDetail:
         evaluations=result.evaluations if result else sum(len(layer.poses) for layer in layers),
         milliseconds=result.milliseconds if result else sum(layer.milliseconds for layer in layers),
         settings_version=layers[-1].settings_version,
-        tracking=verdict_on(result).tracking if result else None,
+        tracking=tracking_of(result) if result else None,
         searched=estimate and estimate.searched,
         disagreement=dict(result.disagreement) if result else {},
         limbs_lost=limbs_off(result, run.body()) if result else (),
@@ -398,9 +398,14 @@ def frame_summary(result: FrameResult) -> dict[str, object]:
         "evaluations": result.evaluations,
         "settings_version": result.settings_version,
         "milliseconds": result.milliseconds,
-        "tracking": verdict_on(result).tracking,
+        "tracking": tracking_of(result),
         "limbs_off": limbs_off(result),
     }
+
+
+def tracking_of(result: FrameResult) -> str:
+    """What is said of a stored frame: one of TRACKING_STATES."""
+    return verdict_on(result).tracking
 
 
 def effective_share(log_weights: Array, beta: float) -> float:

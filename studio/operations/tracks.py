@@ -15,7 +15,7 @@ from studio.results.export.kept_exports import keep_file, kept_file
 from studio.runs.checking import RunCheck, kept_check
 from studio.runs.jumps import Jump
 from studio.runs.refining import REFINED, check_making, jitter
-from studio.runs.tracks import BEST, best_track, read_track, track_names
+from studio.runs.tracks import BEST, RAW, best_track, read_track, track_names, track_stamp
 from studio.search.trackers.refinement import RefinementSettings
 from studio.search.trackers.smoothing import SmoothingSettings
 from studio.sessions.session import Session
@@ -124,6 +124,15 @@ def _line(session: Session, run: StoredRun, name: str) -> TrackLine:
         mean_direction_deg=errors and errors.mean_direction_deg,
         worst_mm=errors and errors.worst_mm,
     )
+
+
+def shown_track(run: StoredRun, track: str) -> tuple[str, int]:
+    """The track shown when `track` is requested, raw where there is no such one, and a number that changes when it is
+    made again.
+    """
+    if track == RAW or track not in track_names(run):
+        return RAW, 0
+    return track, track_stamp(run, track)
 
 
 def check_derived(

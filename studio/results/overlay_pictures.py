@@ -22,11 +22,11 @@ from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.frame_evidence import ViewEvidence
 from studio.evidence.pipeline import EvidenceMaker
 from studio.footage.capture.footage import Footage
-from studio.footage.capture.video import give_back_freed_memory
 from studio.foundations.arrays import Array, Bytes, Indices
 from studio.foundations.errors import NotFoundError, StudioError
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.projection import project
+from studio.foundations.memory import give_back_freed_memory
 from studio.runs.drawing.colour_tokens import colour_tokens
 from studio.runs.drawing.marker_lines import marker_links
 from studio.runs.drawing.overlay_drawing import NO_MARKS, OVERLAYS, ViewMarks, draw_view, upright

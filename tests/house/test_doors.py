@@ -30,12 +30,10 @@ def functions_taken(door: str) -> dict[str, set[str]]:
 STILL: dict[str, int] = {
     "studio/app/scene/body_view.py": 1,
     "studio/app/scene/controller.py": 1,
-    "studio/app/scene/frame_volume.py": 1,
-    "studio/app/scene/opened_run.py": 5,
+    "studio/app/scene/opened_run.py": 1,
     "studio/app/scene/pose_refining.py": 1,
     "studio/app/scene/recording.py": 1,
     "studio/app/scene/scene_pictures.py": 1,
-    "studio/app/scene/window_scenes.py": 1,
     "studio/app/server/alignment_routes.py": 5,
     "studio/app/server/background_routes.py": 18,
     "studio/app/server/calibration_proposals.py": 13,

@@ -19,9 +19,9 @@ from studio.app.scene.opened_run import Moment, OpenedRun
 from studio.evidence.volume.alignment import root_parameters
 from studio.evidence.volume.blob_model import BlobMixture, BlobModel
 from studio.evidence.volume.hull import Hull
-from studio.footage.capture.video import give_back_freed_memory
 from studio.foundations.arrays import Array
 from studio.foundations.errors import StudioError
+from studio.foundations.memory import give_back_freed_memory
 from studio.foundations.numba_in_threads import numba
 from studio.runs.problem_source import ProblemSource
 from studio.search.likelihood.blob_settings import BlobSettings

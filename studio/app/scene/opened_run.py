@@ -15,9 +15,11 @@ from studio.body.motion_files.trc import MarkerMotion, read_trc
 from studio.foundations.arrays import Array, Indices
 from studio.foundations.errors import NotFoundError, SessionError, StudioError
 from studio.foundations.geometry.camera import Camera
-from studio.results.inspection.verdict import verdict_on
+from studio.operations.results import list_tracks, read_track
+from studio.operations.stored_frames import tracking_of
+from studio.operations.tracks import shown_track
 from studio.runs.moved_knobs import settings_with_moved
-from studio.runs.tracks import RAW, Track, read_track, track_names, track_stamp
+from studio.runs.tracks import RAW, Track
 from studio.search.settings import RunSettings, default_settings
 from studio.search.trackers.tracker import FrameResult, LayerRecord
 from studio.sessions.results_store import ResultsReader
@@ -29,11 +31,15 @@ _KEPT_FRAMES = 8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Moment:
-    """The content of the scene at a frame (None while there is none). pose : (D,) drawn as the body.
+    """The content of the scene at a frame (None while there is none).
 
-    beside : (D,) the stored result while a re-annealed one, or another track's, is shown. records : the layers whose
-    clouds are drawn. layer_count : how many layers the frame takes. truth : (M, 3) mm. tracking : the tracking
-    state of a stored frame, "" unknown. edited : whether the pose is being edited and is no result.
+    pose : (D,) drawn as the body.
+    beside : (D,) the stored result while a re-annealed one, or another track's, is shown.
+    records : the layers whose clouds are drawn.
+    layer_count : how many layers the frame takes.
+    truth : (M, 3) mm.
+    tracking : the tracking state of a stored frame, "" unknown.
+    edited : whether the pose is being edited and is no result.
     """
 
     frame: int | None
@@ -97,12 +103,12 @@ class OpenedRun:
         if self.results is None:
             return []
         try:
-            found = self.results.layers(frame)
+            layers = self.results.layers(frame)
         except NotFoundError:
             return []
         if self.result(frame) is not None:
-            _keep(self._layers, frame, found)
-        return found
+            _keep(self._layers, frame, layers)
+        return layers
 
     def forget_from(self, frame: int) -> None:
         """Forget a frame and all later ones, so that they are read again."""
@@ -116,29 +122,27 @@ class OpenedRun:
         """
         if self.results is None:
             return np.zeros(0, dtype=np.int64), np.zeros((0, len(self.body.parameters)))
-        found = self._read_track(track)
-        if found is None:
+        derived = self._read_track(track)
+        if derived is None:
             return self.results.poses(between, blobs=False)
-        first, after = np.searchsorted(found.frames, (between[0], between[1] + 1))
-        return found.frames[first:after], found.poses[first:after]
+        first, after = np.searchsorted(derived.frames, (between[0], between[1] + 1))
+        return derived.frames[first:after], derived.poses[first:after]
 
     def tracks(self) -> tuple[str, ...]:
         """The run's tracks, raw first."""
-        return (RAW,) if self.run is None else track_names(self.run)
+        return (RAW,) if self.run is None else list_tracks(self.run)
 
     def track_key(self, track: str) -> tuple[str, int]:
         """The track shown when `track` is requested, and a number that changes when it is made again."""
-        if self.run is None or track == RAW or track not in self.tracks():
-            return RAW, 0
-        return track, track_stamp(self.run, track)
+        return (RAW, 0) if self.run is None else shown_track(self.run, track)
 
     def pose_in(self, track: str, frame: int) -> Array | None:
         """(D,) the pose of a derived track at a frame; None in a gap of it, or where there is no such track."""
-        found = self._read_track(track)
-        if found is None:
+        derived = self._read_track(track)
+        if derived is None:
             return None
-        row = int(np.searchsorted(found.frames, frame))
-        return found.poses[row] if row < len(found.frames) and found.frames[row] == frame else None
+        row = int(np.searchsorted(derived.frames, frame))
+        return derived.poses[row] if row < len(derived.frames) and derived.frames[row] == frame else None
 
     def _read_track(self, track: str) -> Track | None:
         """A derived track, read again when it was made again; None where there is none or it cannot be read."""
@@ -214,8 +218,8 @@ class OpenedRun:
         pose, made = stored.estimate.pose, self.pose_in(track, frame)
         count = _at_least(stored.layers, records)
         if made is None:
-            return Moment(frame, pose, None, records, count, truth, verdict_on(stored).tracking)
-        return Moment(frame, made, pose, records, count, truth, verdict_on(stored).tracking)
+            return Moment(frame, pose, None, records, count, truth, tracking_of(stored))
+        return Moment(frame, made, pose, records, count, truth, tracking_of(stored))
 
     def close(self) -> None:
         """Release the files."""

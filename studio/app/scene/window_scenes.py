@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from studio.app.scene.model import LayerPlayback, Selection
 from studio.app.scene.scene_server import SceneServer
-from studio.footage.capture.video import give_back_freed_memory
 from studio.foundations.errors import StudioError
+from studio.foundations.memory import give_back_freed_memory
 from studio.operations.jobs.control import StudioControl
 from studio.sessions.workspace import Workspace
 

@@ -24,9 +24,10 @@ import numpy as np
 
 from studio.footage.capture.footage_source import CameraSource, FootageSource
 from studio.footage.capture.pictures import NumberedReader, PictureReader, has_picture, read_picture
-from studio.footage.capture.video import VideoReader, give_back_freed_memory
+from studio.footage.capture.video import VideoReader
 from studio.foundations.arrays import Bytes
 from studio.foundations.errors import FootageError, NotFoundError
+from studio.foundations.memory import give_back_freed_memory
 
 EXCLUSIONS = "exclusions"
 """Folder of a session with a painted picture a camera."""

@@ -17,9 +17,6 @@ it does seldom where few objects are made (`video` reads that of one frame of ea
 by a thread for that thread.
 """
 
-import ctypes
-import gc
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -509,20 +506,3 @@ def _cut(path: Path, frame: int, count: int) -> FootageError:
         f"'{path.name}' ends at frame {frame}{had}.",
         "Put the original file back, or import the session again.",
     )
-
-
-_LIBC = ctypes.CDLL(None) if sys.platform == "linux" else None
-
-
-OF_LATE = 1
-"""Generation up to which objects are young."""
-
-
-def give_back_freed_memory(*, of_late: bool = False) -> None:
-    """Collect garbage and return freed memory to the system (under glibc); takes 0.2 s in a server with many objects,
-    milliseconds where only recent ones are collected.
-    """
-    gc.collect(OF_LATE if of_late else 2)
-    trim = getattr(_LIBC, "malloc_trim", None)
-    if trim is not None:
-        trim(0)

@@ -9,7 +9,7 @@ import pytest
 from toy_session import make_session
 
 from studio.footage.capture import footage
-from studio.footage.capture.video import give_back_freed_memory
+from studio.foundations.memory import give_back_freed_memory
 from studio.results.overlay_pictures import compose_view, forget_composers, let_composers_rest
 
 MEASURED = """
