@@ -141,10 +141,10 @@ def forgetful_card(patch: pytest.MonkeyPatch, folder: Path) -> None:
 
 
 def broken_search(patch: pytest.MonkeyPatch, folder: Path) -> None:
-    def fail(*_: object) -> None:
+    def fail(*_: object, **__: object) -> None:
         raise RunError("The kernels cannot be compiled.", "Install numba again.")
 
-    patch.setattr(examination, "track_to_end", fail)
+    patch.setattr(examination, "go_on", fail)
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from studio.app.server.import_routes import IMPORT, ImportState
 from studio.body.subject import DEFAULT_BODY
 from studio.foundations.errors import NotFoundError
 from studio.operations.jobs.commands import Close
+from studio.operations.jobs.job_runner import keep_in_place
 from studio.search.settings import DEFAULT_WEIGHTING
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -141,13 +142,12 @@ def test_a_run_is_renamed_and_deleted(studio: Studio, tracked: StoredRun) -> Non
 
 
 def test_a_job_of_a_session_that_was_moved_before_it_began_says_so(studio: Studio) -> None:
-    known = studio.app.state.studio
     with (
         pytest.raises(NotFoundError, match="'gone' was renamed or deleted meanwhile"),
-        known._working(ALIGNMENT, AlignmentJob(session="gone")),
+        keep_in_place(studio.workspace, ALIGNMENT, AlignmentJob(session="gone")),
     ):
         pass
     # One that makes its session finds none.
-    with known._working(IMPORT, ImportState(session="gone", name="gone")):
+    with keep_in_place(studio.workspace, IMPORT, ImportState(session="gone", name="gone")):
         pass
     assert not (studio.workspace.root / "gone").exists()
