@@ -19,8 +19,8 @@ from studio.results.drawing_footage.recipes import synthesize
 from studio.sessions.atomic_files import discard
 from studio.sessions.importers.importing import add_footage
 from studio.sessions.manifest import FILE_NAME
-from studio.sessions.samples import install_prepared_runs, install_sample
-from studio.sessions.session import Session
+from studio.sessions.samples import install_prepared_runs, install_sample, sample_folder
+from studio.sessions.session import Session, thumbnail_of
 from studio.sessions.workspace import Workspace, begin_session
 
 CardKind = Literal["sample", "recipe", "elsewhere"]

@@ -15,7 +15,7 @@ from studio.body.model import BodyModel
 from studio.foundations.declaring import Target, operation
 from studio.foundations.errors import NotFoundError, RunError, SessionError
 from studio.foundations.foreign_files import MANIFEST_NAME
-from studio.results.export.kept_exports import exported_files
+from studio.operations.exports import exported_files
 from studio.runs.setup.workflow import Workflow, run_to_use, workflow_of
 from studio.runs.sides import in_words
 from studio.runs.tracks import Track

@@ -7,11 +7,11 @@ from typing import Any
 
 from studio.foundations.knobs import changed
 from studio.foundations.progress import Progress, unheard
+from studio.operations.exports import keep_file, kept_file
 from studio.operations.opening import session_of
 from studio.operations.person import landmarks
 from studio.operations.results import evaluate
 from studio.operations.run_errors import evaluation_of
-from studio.results.export.kept_exports import keep_file, kept_file
 from studio.runs.checking import RunCheck, kept_check
 from studio.runs.jumps import Jump
 from studio.runs.refining import REFINED, check_making, jitter

@@ -17,7 +17,6 @@ from studio.app.server.schemas import RunName
 from studio.app.server.session_routes import NewName, OpenSession
 from studio.app.server.subject_routes import SUBJECT
 from studio.app.server.track_routes import TRACK
-from studio.operations.exports import exported_files
 from studio.operations.footage import new_session
 from studio.operations.opening import workflow_now
 from studio.runs.setup.workflow import Workflow
