@@ -43,6 +43,8 @@ STILL: dict[str, int] = {
     "studio/app/server/camera_routes.py": 4,
     "studio/app/server/footage_routes.py": 5,
     "studio/app/server/import_routes.py": 5,
+    "studio/app/server/picture_routes.py": 3,
+    "studio/app/server/pose_routes.py": 3,
     "studio/app/server/safe_paths.py": 3,
     "studio/app/server/stroke_routes.py": 6,
     "studio/app/server/subject_routes.py": 5,
