@@ -66,13 +66,13 @@ def learn_command(call: Call) -> dict[str, object]:
 
 @command_of(models)
 def models_command(call: Call) -> dict[str, object]:
-    found: tuple[ModelSummary, ...] = call()
+    summaries: tuple[ModelSummary, ...] = call()
     result = [
         asdict(model)
         | {"entropy_train": _or_none(model.entropy_train), "entropy_test": _or_none(model.entropy_test)}
-        for model in found
+        for model in summaries
     ]
-    lines = [_line(model) for model in found]
+    lines = [_line(model) for model in summaries]
     return {"models": result, "text": "\n".join(lines) or "No models yet; 'studio learn' makes them."}
 
 

@@ -29,7 +29,7 @@ SEEDS_HELP = f"Seeds of every setting; default {FULL_SEEDS}, with --quick {QUICK
 QUICK_HELP = "A look in minutes: fewer seeds, frames and settings."
 PROCESSES_HELP = "How many at once; default: one a core."
 INTO_GUIDE_HELP = (
-    "Write what was found into the guide of this checkout, thinned, with the commits that measured it "
+    "Write the findings into the guide of this checkout, thinned, with the commits that measured it "
     "(web_assets/guide/reproduction)."
 )
 JSON_HELP = "Print one JSON object and nothing else on standard output."

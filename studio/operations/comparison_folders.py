@@ -107,12 +107,12 @@ def unfinished_like(session: Session, plan: Plan) -> KeptComparison | None:
 def runs_of(session: Session, kept: KeptComparison) -> dict[str, StoredRun]:
     """The runs that were made for a comparison's trials, by the notes that say so (`KeptComparison.note_of`)."""
     begin = kept.note_of("")
-    found: dict[str, StoredRun] = {}
+    runs: dict[str, StoredRun] = {}
     for run in session.runs():
         # One that cannot be read is none of them.
         with contextlib.suppress(StudioError):
-            found |= {note: run for note in run.record.notes if note.startswith(begin)}
-    return found
+            runs |= {note: run for note in run.record.notes if note.startswith(begin)}
+    return runs
 
 
 def throw_away(workspace: Workspace, session: Session, kept: KeptComparison) -> Path:

@@ -148,12 +148,12 @@ def batch(
     if not places:
         raise RunError("A batch without sessions tracks nothing.", "Name sessions, folders or addresses.")
     jobs = [_job(place, name, options) for place in dict.fromkeys(places)]
-    found: dict[str, BatchLine] = {}
+    lines: dict[str, BatchLine] = {}
 
     def on_result(job: TrialJob, result: TrialResult) -> None:
         run = Swept(**result.measured) if result.measured is not None else None
-        found[job.key] = BatchLine(job.label, job.footage[0], run, result.failure)
-        report(job.label, len(found), len(jobs))
+        lines[job.key] = BatchLine(job.label, job.footage[0], run, result.failure)
+        report(job.label, len(lines), len(jobs))
 
     with (
         chosen_executor(cluster, places[0]) as executor,
@@ -161,7 +161,7 @@ def batch(
     ):
         say(progress, [executor.in_words] if executor else [])
         run_jobs(jobs, above(places[0]), on_result, processes, executor=executor)
-    return Batch(tuple(found[job.key] for job in jobs))
+    return Batch(tuple(lines[job.key] for job in jobs))
 
 
 def _places(session: str | Path) -> list[str]:
@@ -169,12 +169,12 @@ def _places(session: str | Path) -> list[str]:
     place = folder_of(str(session))
     if not is_address(place):
         return [str(open_session(place).path)]
-    found = sessions_at(place)
-    broken = next((one for one in found if not one.whole), None)
-    if broken is not None or not found:
+    below = sessions_at(place)
+    broken = next((one for one in below if not one.whole), None)
+    if broken is not None or not below:
         # Says what is wrong with it.
         remote_sessions.remote_session(broken.address if broken else place)
-    return [one.address for one in found]
+    return [one.address for one in below]
 
 
 def _job(place: str, name: str, options: dict[str, Any]) -> TrialJob:

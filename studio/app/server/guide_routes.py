@@ -162,10 +162,10 @@ def _course_link(page: str, shown: str) -> str:
 @cache
 def verbs_page() -> dict[str, str]:
     """The page on what each verb does and takes, in Python, on the command line and over HTTP."""
-    found = {name: getattr(studio, name) for name in dir(studio) if name != "StudioError"}
+    verbs = {name: getattr(studio, name) for name in dir(studio) if name != "StudioError"}
     contents = ['<a href="/guide">Guide</a>', '<a href="/guide/python">Examples</a>']
-    contents += [f'<a href="#{name}">{name}</a>' for name in found]
-    parts = [_verb(name, declared(function)) for name, function in found.items()]
+    contents += [f'<a href="#{name}">{name}</a>' for name in verbs]
+    parts = [_verb(name, declared(function)) for name, function in verbs.items()]
     content = "\n".join(["<h1>Verbs</h1>", f"<p>{VERBS_WORDS}</p>", *parts])
     return {"title": f"Verbs · {NAME}", "contents": "".join(contents), "content": content}
 
@@ -224,8 +224,8 @@ def printed_and_run() -> str:
 
 def _what_is_run(entry: Printed, knobs: Mapping[str, Knob]) -> str:
     """The knobs that are set, by the words on screen, and what no knob says."""
-    found = [f"{knobs[name].label} {_value_in_words(value)}" for name, value in entry.sets.items()]
-    return "; ".join([*([entry.runs] if entry.runs else []), *found])
+    knobs_set = [f"{knobs[name].label} {_value_in_words(value)}" for name, value in entry.sets.items()]
+    return "; ".join([*([entry.runs] if entry.runs else []), *knobs_set])
 
 
 def _value_in_words(value: Value) -> str:
@@ -237,11 +237,13 @@ def _value_in_words(value: Value) -> str:
 def before_and_after() -> str:
     """A row an experiment: its verdict and numbers of BEFORE, those of today with seeds, day and commit, and why."""
     before = json.loads((assets_folder() / "guide" / REPRODUCTION / BEFORE).read_text(encoding="utf-8"))
-    found = findings_of_the_guide()
+    findings = findings_of_the_guide()
     rows: list[str] = []
-    measured_first = sorted(dict.fromkeys((*before["rows"], *found)), key=lambda name: name not in found)
+    measured_first = sorted(
+        dict.fromkeys((*before["rows"], *findings)), key=lambda name: name not in findings
+    )
     for name in measured_first:
-        was, now = before["rows"].get(name), found.get(name)
+        was, now = before["rows"].get(name), findings.get(name)
         known = now or was
         head = f"{html.escape(known['title'])}<br><code>{name}</code><br>{html.escape(known['source'])}"
         old = "new" if was is None else _verdict(was["verdict"], was["numbers"])

@@ -25,7 +25,7 @@ PLACES = {
 
 
 def html_page(file: str, address: str, own: Mapping[str, str]) -> HTMLResponse:
-    """The page at an address, read anew each time. own : what is put in beside the parts, not escaped."""
+    """The page at an address, read again each time. own : what is put in beside the parts, not escaped."""
     return HTMLResponse(page_text(file, address, own), headers={"cache-control": "no-cache"})
 
 
@@ -37,8 +37,8 @@ def page_text(file: str, address: str, own: Mapping[str, str]) -> str:
         for path in (assets_folder() / PARTS).glob("*.html")
     }
     own = {"places": navigation(address), "access": "view" if VIEWING.get() else "all"} | dict(own)
-    text = PLACE.sub(lambda found: parts.get(found[1], found[0]), text)
-    return PLACE.sub(lambda found: own[found[1]], text)
+    text = PLACE.sub(lambda place: parts.get(place[1], place[0]), text)
+    return PLACE.sub(lambda place: own[place[1]], text)
 
 
 def navigation(address: str) -> str:

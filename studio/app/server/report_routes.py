@@ -1,4 +1,4 @@
-"""The papers' experiments: run again in the background; what was found, for the page of reports and as downloads."""
+"""The papers' experiments: run again in the background; their results, for the page of reports and as downloads."""
 
 from dataclasses import dataclass
 
@@ -35,7 +35,7 @@ class ReproductionRequest(Request):
 
 
 class ReproductionState(SessionJob):
-    """How an experiment stands that is run again. measured, kept, failed: trials run now, found stored, and failed."""
+    """How an experiment stands that is run again. measured, kept, failed: trials run now, stored before, and failed."""
 
     name: str
     quick: bool
