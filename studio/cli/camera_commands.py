@@ -1,10 +1,10 @@
 """Cameras: `calibrate`, `board`, `align`, `level`."""
 
+from dataclasses import asdict
+
 import click
 
 from studio.cli.deriving import Call, command_of
-from studio.footage.calibration.lens_verdict import verdict
-from studio.footage.calibration.report import report_of
 from studio.foundations.errors import CalibrationError
 from studio.operations.cameras import (
     Alignment,
@@ -21,25 +21,9 @@ from studio.operations.cameras import (
 @command_of(calibrate)
 def calibrate_command(call: Call) -> dict[str, object]:
     distances = {_pair(names): mm for names, mm in call.given.get("distances_mm", {}).items()}
-    found: Calibration = call(distances_mm=distances)
-    lines: list[str] = []
-    for lens in found.solved.lenses.values():
-        lines.append(verdict(lens))
-        lines += [f"  left out {each.picture}: {each.dropped}" for each in lens.residuals if each.dropped]
-    rig = found.solved.rig
-    if rig is not None:
-        for camera in rig.cameras:
-            x, y, z = camera.centre
-            lines.append(
-                f"Camera {camera.name}: at ({x:.0f}, {y:.0f}, {z:.0f}) mm, residual {rig.rms[camera.name]:.2f} px"
-                f" over {rig.views[camera.name]} boards."
-            )
-        lines.append(f"Floor: {found.solved.floor or 'not set'}.")
-    return {
-        **report_of(found.solved),
-        "written": [str(path) for path in found.files],
-        "text": "\n".join([*lines, *(f"Wrote {path}" for path in found.files)]),
-    }
+    made: Calibration = call(distances_mm=distances)
+    lines = [*made.in_words(), *(f"Wrote {path}" for path in made.files)]
+    return {**made.report, "written": [str(path) for path in made.files], "text": "\n".join(lines)}
 
 
 def _pair(text: str) -> tuple[str, str]:
@@ -73,41 +57,37 @@ def align_command(call: Call, undo: bool) -> dict[str, object]:
         call.do(unalign)
         text = "The session uses the calibration again that its cameras were turned from."
         return {"session": name, "changed": True, "text": text}
-    found: Alignment = call()
-    if found.changed:
+    aligned: Alignment = call()
+    if aligned.changed:
         said = "The session uses the turned cameras from now on; the calibration before is kept (--undo)."
-    elif not found.needed:
+    elif not aligned.needed:
         said = "The cameras agree: nothing was changed."
-    elif not found.better:
+    elif not aligned.better:
         said = "Turning cameras does not explain it: nothing was changed. Look at masks and calibration."
     else:
         said = ""
-    cameras = [
-        {"camera": one, "before_px": before, "after_px": found.after[one], "turn_degrees": found.turns[one]}
-        for one, before in found.before.items()
-    ]
     return {
         "session": name,
-        "changed": found.changed,
-        "frames": list(found.found.found.frames),
-        "cameras": cameras,
-        "text": "\n".join([*found.found.in_words(), *([said] if said else [])]),
+        "changed": aligned.changed,
+        "frames": list(aligned.frames),
+        "cameras": [asdict(one) for one in aligned.cameras],
+        "text": "\n".join([*aligned.found.in_words(), *([said] if said else [])]),
     }
 
 
 @command_of(level)
 def level_command(call: Call) -> dict[str, object]:
-    found: Levelled = call()
-    done = "The world was turned" if found.changed else "The world would be turned"
+    levelled: Levelled = call()
+    done = "The world was turned" if levelled.changed else "The world would be turned"
     said = (
-        f"{done} by {found.tilted:.1f} degrees, its old origin lies {found.lowered:.0f} mm above the floor: by"
-        f" {found.how}."
+        f"{done} by {levelled.tilted:.1f} degrees, its old origin lies {levelled.lowered:.0f} mm above the floor: by"
+        f" {levelled.how}."
     )
-    kept = " The calibration before is kept." if found.changed else ""
+    kept = " The calibration before is kept." if levelled.changed else ""
     return {
-        "session": found.session.name,
-        "changed": found.changed,
-        "tilted_degrees": found.tilted,
-        "lowered_mm": found.lowered,
+        "session": levelled.session.name,
+        "changed": levelled.changed,
+        "tilted_degrees": levelled.tilted,
+        "lowered_mm": levelled.lowered,
         "text": said + kept,
     }

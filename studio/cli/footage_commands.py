@@ -5,18 +5,17 @@ from collections.abc import Mapping
 from studio.cli.deriving import Call, command_of
 from studio.cli.output import note
 from studio.footage.capture.live_cameras import SpreadFigures
-from studio.footage.capture.synchrony import Synchrony, in_words
-from studio.footage.capture.timestamps import TimedOffsets
+from studio.footage.capture.synchrony import Synchrony
 from studio.operations.footage import (
     Synchronised,
     add_footage,
+    footage_state,
     import_footage,
     new_session,
     record,
     synchronise,
     synthesize,
 )
-from studio.sessions.footage_changes import stale_runs
 from studio.sessions.session import Session
 
 
@@ -66,28 +65,29 @@ def synthesize_command(call: Call) -> dict[str, object]:
 
 @command_of(record)
 def record_command(call: Call) -> dict[str, object]:
-    found = call()
-    footage = found.session.manifest.footage
+    recorded = call()
+    footage = recorded.session.manifest.footage
     result: dict[str, object] = {
-        "session": found.session.name,
+        "session": recorded.session.name,
         "frames": footage.frame_count,
         "fps": footage.fps,
         "offsets": {camera.name: camera.offset for camera in footage.cameras},
-        **spread_figures(found.spread),
-        "warnings": list(found.warnings),
+        **spread_figures(recorded.spread),
+        "warnings": list(recorded.warnings),
     }
-    if found.standing is not None:
+    if recorded.standing is not None:
         result["cameras"] = {
             name: {
                 "pictures": one.pictures,
                 "repeated": one.repeated,
                 "left_out": one.left_out,
-                "missed": found.standing.missed[name],
+                "missed": recorded.standing.missed[name],
             }
-            for name, one in found.standing.figures.items()
+            for name, one in recorded.standing.figures.items()
         }
-    words = f"{found.session.name}: {footage.frame_count} frames of {len(footage.cameras)} cameras at {footage.fps:g}"
-    return {**result, "text": f"{words} a second; {found.spread.in_words}"}
+    count, many = footage.frame_count, len(footage.cameras)
+    words = f"{recorded.session.name}: {count} frames of {many} cameras at {footage.fps:g}"
+    return {**result, "text": f"{words} a second; {recorded.spread.in_words}"}
 
 
 def spread_figures(spread: SpreadFigures) -> dict[str, object]:
@@ -107,19 +107,16 @@ def synchronise_command(call: Call) -> Mapping[str, object]:
         "frames": footage.frame_count,
         "offsets": {camera.name: camera.offset for camera in footage.cameras},
         "rotations": {camera.name: camera.turned for camera in footage.cameras},
-        "stale_runs": list(stale_runs(done.session)),
+        "stale_runs": list(footage_state(done.session).stale_runs),
     }
-    words: list[str] = []
-    found = done.found
-    if isinstance(found, Synchrony):
+    words = done.in_words()
+    if isinstance(done.found, Synchrony):
         names = ("offsets", "confidence", "within", "sure")
-        answer["estimate"] = {name: getattr(found, name) for name in names} | {"notes": list(found.notes)}
-        words.append(in_words(found))
-    elif isinstance(found, TimedOffsets):
-        answer["recorded"] = {"offsets": found.offsets, "apart": found.apart}
-        words += [f"{name}: {offset:+d} frames" for name, offset in found.offsets.items()]
-        words.append(f"At most {found.apart:.2f} frames apart at {found.fps:.2f} frames a second.")
-        words += found.notes
+        answer["estimate"] = {name: getattr(done.found, name) for name in names} | {
+            "notes": list(done.found.notes)
+        }
+    elif done.found is not None:
+        answer["recorded"] = {"offsets": done.found.offsets, "apart": done.found.apart}
     if done.change is None:
         note("Nothing was changed; write it with --apply, or by hand with --offset CAMERA=FRAMES.")
     else:

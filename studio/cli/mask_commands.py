@@ -1,6 +1,6 @@
 """`studio background`."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -8,14 +8,18 @@ import msgspec
 
 from studio.cli.deriving import Call, command_of
 from studio.cli.reading import frame_numbers
-from studio.footage.capture.naming import match_names
 from studio.foundations.errors import FootageError, NotFoundError
 from studio.foundations.words import sentence
-from studio.operations.masks import background, exclude_region, mask_quality
+from studio.operations.masks import (
+    background,
+    exclude_region,
+    give_plates,
+    mask_knobs,
+    mask_quality,
+    mask_settings,
+)
 from studio.runs.setup.background_setup import SOURCES
 from studio.runs.setup.mask_quality import MaskQuality
-from studio.runs.setup.session_settings import session_settings
-from studio.sessions.background_files import read_evidence, set_backgrounds
 from studio.sessions.session import Session
 
 UNUSED = "unused"
@@ -64,7 +68,7 @@ def background_command(
 ) -> dict[str, object]:
     session: Session = call.given["session"]
     if plates:
-        session = set_backgrounds(session, _files(session, plates))
+        session = _with_plates(session, plates)
     for word in exclude:
         if word != UNUSED:
             exclude_region(session, *_region(word))
@@ -77,58 +81,49 @@ def background_command(
     if source is not None:
         call(session=session, source=source, exclude_unused=UNUSED in exclude)
         session = Session(session.path)
-    comparable = len(session.manifest.footage.cameras) > 1 and session.is_calibrated
-    if quality or pictures or (comparable if source is not None else not plates and not exclude):
+    if quality or pictures or (session.is_comparable if source is not None else not plates and not exclude):
         return _answer(session, call.do(mask_quality, frames=frame_numbers(frames), pictures=pictures))
     return _answer(session, None)
 
 
-def _answer(session: Session, found: MaskQuality | None) -> dict[str, object]:
-    knobs = msgspec.to_builtins(session_settings(session).evidence)
-    if found is None:
+def _answer(session: Session, measured: MaskQuality | None) -> dict[str, object]:
+    knobs = msgspec.to_builtins(mask_settings(session))
+    if measured is None:
         return {"session": session.name, "settings": knobs, "text": f"Background of {session.name} is set."}
     lines = [
         f"{view.camera:12} agreement {view.agreement:.2f}  (covered {view.covered:.2f}, inside {view.inside:.2f})"
-        f"  {view.in_words()}".rstrip()
-        for view in found.views
+        f"  {view.note}".rstrip()
+        for view in measured.views
     ]
-    if not all(view.usable for view in found.views) and not _has_own_masks(session):
+    if not all(view.usable for view in measured.views) and not _has_own_masks(session):
         lines.append(
             f"Masks that agree so little are of no use. 'studio background {session.name} --source best' tries every"
             " source and takes the one under which the views agree."
         )
-    contrast = found.contrast
+    contrast = measured.contrast
     if contrast is not None and contrast.low:
-        lines.append(f"{sentence(contrast.in_words())}. {contrast.remedy()}")
+        lines.append(f"{sentence(contrast.words)}. {contrast.remedy}")
         lines.append(f"'studio background {session.name} --quality --pictures FOLDER' draws where.")
-    elif found.agreeing and not found.usable:
-        lines.append(f"The views agree, but {found.why_not_confirmed()}: look at the masks yourself.")
-    if found.subjects > 1:
+    elif measured.agreeing and not measured.usable:
+        lines.append(f"The views agree, but {measured.unconfirmed}: look at the masks yourself.")
+    if measured.subjects > 1:
         lines.append(
-            f"{found.subjects} subjects are in view: say which one with --subject-at X,Y"
+            f"{measured.subjects} subjects are in view: say which one with --subject-at X,Y"
             f" ('studio subjects {session.name}' says where they stand)."
         )
-    lines += [f"The calibration is in doubt: {finding}" for finding in found.doubts]
-    names = ("camera", "agreement", "covered", "inside", "denied", "usable")
+    lines += [f"The calibration is in doubt: {finding}" for finding in measured.doubts]
+    names = ("camera", "agreement", "covered", "inside", "denied", "usable", "note")
     return {
         "session": session.name,
-        "frames": list(found.frames),
-        "cameras": [
-            {name: getattr(view, name) for name in names} | {"note": view.in_words()} for view in found.views
-        ],
-        "usable": found.usable,
-        "contrast": None
-        if contrast is None
-        else {
-            "low": contrast.low,
-            "words": contrast.in_words(),
-            "remedy": contrast.remedy(),
-            "pose": contrast.pose,
-        }
+        "frames": list(measured.frames),
+        "cameras": [{name: getattr(view, name) for name in names} for view in measured.views],
+        "usable": measured.usable,
+        "contrast": contrast
+        and {name: getattr(contrast, name) for name in ("low", "words", "remedy", "pose")}
         | {"cameras": [msgspec.to_builtins(view) for view in contrast.views]},
-        "subjects": found.subjects,
-        "doubts": [msgspec.to_builtins(finding) for finding in found.doubts],
-        "hull_litres": list(found.hull_litres),
+        "subjects": measured.subjects,
+        "doubts": [msgspec.to_builtins(finding) for finding in measured.doubts],
+        "hull_litres": list(measured.hull_litres),
         "settings": knobs,
         "text": "\n".join(lines),
     }
@@ -136,22 +131,19 @@ def _answer(session: Session, found: MaskQuality | None) -> dict[str, object]:
 
 def _has_own_masks(session: Session) -> bool:
     """Whether masks were made or given, which trying other sources would replace."""
-    model = read_evidence(session).knobs.get("background_model", "auto")
+    model = mask_knobs(session).knobs.get("background_model", "auto")
     given = any(source.masks for source in session.manifest.footage.cameras)
     return model == "mask" or (model == "auto" and given)
 
 
-def _files(session: Session, words: Sequence[str]) -> Mapping[str, Path]:
-    """CAMERA=FILE words, or one folder, as files by camera."""
-    cameras = [source.name for source in session.manifest.footage.cameras]
-    if len(words) == 1 and Path(words[0]).is_dir():
-        found = {path.stem: path for path in sorted(Path(words[0]).iterdir()) if path.is_file()}
-        matched = match_names(list(found), cameras, "plates", NotFoundError)
-        return {match.camera: found[match.footage] for match in matched}
+def _with_plates(session: Session, words: Sequence[str]) -> Session:
+    """The session with CAMERA=FILE words, or the files of one folder, as pictures or clips of the empty room."""
+    if len(words) == 1 and (folder := Path(words[0])).is_dir():
+        return give_plates(session, {}, [path for path in sorted(folder.iterdir()) if path.is_file()])
     parted = [word.partition("=") for word in words]
     if any(not camera or not equals or not path for camera, equals, path in parted):
         raise NotFoundError("The plates cannot be understood.", "Write CAMERA=FILE, or one folder.")
-    return {camera: Path(path) for camera, _, path in parted}
+    return give_plates(session, {camera: Path(path) for camera, _, path in parted})
 
 
 def _region(word: str) -> tuple[str, Path | list[tuple[float, ...]] | None]:

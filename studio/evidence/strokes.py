@@ -1,13 +1,14 @@
 """Brush strokes over a camera's picture: inside the subject, or outside."""
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import Annotated, Literal
 
 import cv2
 import msgspec
 import numpy as np
 
 from studio.foundations.arrays import Bytes
+from studio.foundations.declaring import Web
 
 StrokeKind = Literal["inside", "outside"]
 
@@ -17,7 +18,7 @@ class Stroke(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     at least one, (x, y) pixels of the picture as the footage gives it, (0, 0) the middle of the first one.
     """
 
-    camera: str
+    camera: Annotated[str, Web(left_out=True)]
     frame: int
     kind: StrokeKind
     width: float

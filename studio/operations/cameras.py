@@ -1,10 +1,10 @@
 """Cameras: solved from footage of a printed board, and turned until the silhouettes agree."""
 
 import contextlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -12,18 +12,28 @@ from studio.footage.calibration.board_pdf import PAGES, usual_board, write_board
 from studio.footage.calibration.boards import Board, board_from_text
 from studio.footage.calibration.findings import Finding
 from studio.footage.calibration.floor import read_clicks
+from studio.footage.calibration.lens_verdict import verdict
+from studio.footage.calibration.report import report_of
 from studio.footage.calibration.verbs import Calibrated
-from studio.foundations.declaring import Target, Terminal, Web, operation
+from studio.foundations.declaring import Target, Terminal, Web, operation, taking
 from studio.foundations.errors import SettingsError, StudioError
 from studio.foundations.geometry.camera import Camera
 from studio.operations.opening import SessionName, keeping_in_place, open_session
 from studio.operations.progress import Reporting, reporting, say
+from studio.results.overlay_pictures import forget_composers
 from studio.runs.setup.aligning import SessionAlignment, align_cameras
 from studio.runs.setup.levelling import level_by_clicks, level_by_run, level_by_silhouettes, use_level_world
 from studio.runs.setup.mask_quality import measure_masks
 from studio.runs.setup.silhouette_doubts import MEASURED
-from studio.runs.setup.turned_cameras import alignment_words, remember_alignment, turn_back, turn_cameras
-from studio.sessions.board_calibration import keep_boards, place_of_boards, solve_boards
+from studio.runs.setup.turned_cameras import (
+    alignment_words,
+    remember_alignment,
+    turn_back,
+    turn_cameras,
+    turned_from,
+)
+from studio.sessions.board_calibration import BoardOptions, keep_boards, place_of_boards, solve_boards
+from studio.sessions.calibration_changes import CalibrationChange
 from studio.sessions.provenance import origin_of
 from studio.sessions.session import Session
 
@@ -54,8 +64,31 @@ class Calibration:
         """What the checks say, what blocks first."""
         return self.solved.findings
 
+    @property
+    def report(self) -> dict[str, object]:
+        """Everything a person wants to know of it, as plain values (lengths mm, angles degrees)."""
+        return report_of(self.solved)
+
+    def in_words(self) -> list[str]:
+        """Lens by lens and camera by camera, then the floor."""
+        lines: list[str] = []
+        for lens in self.solved.lenses.values():
+            lines.append(verdict(lens))
+            lines += [f"  left out {each.picture}: {each.dropped}" for each in lens.residuals if each.dropped]
+        rig = self.solved.rig
+        if rig is None:
+            return lines
+        for camera in rig.cameras:
+            x, y, z = camera.centre
+            lines.append(
+                f"Camera {camera.name}: at ({x:.0f}, {y:.0f}, {z:.0f}) mm, residual {rig.rms[camera.name]:.2f} px"
+                f" over {rig.views[camera.name]} boards."
+            )
+        return [*lines, f"Floor: {self.solved.floor or 'not set'}."]
+
 
 @operation
+@taking(BoardOptions)
 @keeping_in_place
 def calibrate(
     source: Annotated[
@@ -71,45 +104,6 @@ def calibrate(
         Web(kind=str),
     ],
     *,
-    intrinsics: Annotated[
-        str | Path | None,
-        Field(
-            description="Board footage for the lenses, a video or folder each; or a calibration file that has them."
-        ),
-        Terminal(kind=Path),
-    ] = None,
-    extrinsics: Annotated[
-        str | Path | None,
-        Field(description="Board footage of all cameras at once, in step."),
-        Terminal(kind=Path),
-    ] = None,
-    floor: Annotated[
-        str | None,
-        Field(
-            description="frame:N with the board on the floor, a folder of pictures of that, or a .json of clicked"
-            " points."
-        ),
-        Terminal(metavar="HOW"),
-    ] = None,
-    thickness_mm: Annotated[
-        float, Field(ge=0, le=200, description="Of the board's plate, mm."), Terminal("--thickness")
-    ] = 0.0,
-    distances_mm: Annotated[
-        Mapping[tuple[str, str], float] | None,
-        Field(max_length=64, description="A measured distance between two lenses, to check the scale."),
-        Terminal("--distance", "A,B=MM", kind=Mapping[str, float]),
-    ] = None,
-    offsets: Annotated[
-        Mapping[str, int] | None,
-        Field(
-            max_length=64,
-            description="The camera's frame of the common board footage that the others' frame 0 belongs to.",
-        ),
-        Terminal("--offset", "CAMERA=FRAMES"),
-    ] = None,
-    refine_lenses: Annotated[
-        bool, Field(description="Let the lenses move a little in the last adjustment."), Terminal("--refine")
-    ] = False,
     to: Annotated[
         str | Path | None,
         Field(
@@ -122,6 +116,7 @@ def calibrate(
     ] = False,
     anyway: Annotated[bool, Field(description="Write it even if a check says that it is wrong.")] = False,
     progress: Reporting = None,
+    **options: Any,  # noqa: ANN401 - of the types that are declared
 ) -> Calibration:
     """Solve cameras from footage of a printed board: lenses, places, floor.
 
@@ -131,25 +126,16 @@ def calibrate(
 
     Raises CalibrationError where something blocks: nothing but the report is written then.
     """
-    pattern = board_from_text(board, thickness_mm) if isinstance(board, str) else board
+    wanted = BoardOptions(**options)
+    pattern = board_from_text(board, wanted.thickness_mm) if isinstance(board, str) else board
     place = place_of_boards(source.path if isinstance(source, Session) else source)
     target = place.target(_path(to), replace=replace)
     with reporting(progress, "Calibrating") as report:
-        found = solve_boards(
-            place,
-            pattern,
-            intrinsics=_path(intrinsics),
-            extrinsics=_path(extrinsics),
-            floor=floor,
-            offsets=offsets,
-            distances_mm=distances_mm,
-            refine_lenses=refine_lenses,
-            progress=report,
-        )
-    kept = keep_boards(place, found, target, anyway=anyway)
-    say(progress, (*kept.notes, *map(_in_words, found.findings)))
+        solved = solve_boards(place, pattern, wanted, report)
+    kept = keep_boards(place, solved, target, anyway=anyway)
+    say(progress, (*kept.notes, *map(_in_words, solved.findings)))
     kept.check()
-    return Calibration(found, kept.files, kept.notes)
+    return Calibration(solved, kept.files, kept.notes)
 
 
 @operation
@@ -178,6 +164,18 @@ def board(
 
 
 @dataclass(frozen=True, slots=True)
+class AlignmentLine:
+    """One camera. before_px, after_px : by which the silhouettes miss, as it stands and turned (median, none where
+    nothing shows). turn_degrees : by which it would be turned.
+    """
+
+    camera: str
+    before_px: float
+    after_px: float
+    turn_degrees: float
+
+
+@dataclass(frozen=True, slots=True)
 class Alignment:
     """What the silhouettes say of the cameras, by name.
 
@@ -196,6 +194,19 @@ class Alignment:
     changed: bool
     words: str
     notes: tuple[str, ...] = ()
+
+    @property
+    def cameras(self) -> tuple[AlignmentLine, ...]:
+        """The same camera by camera."""
+        return tuple(
+            AlignmentLine(name, before, self.after[name], self.turns[name])
+            for name, before in self.before.items()
+        )
+
+    @property
+    def frames(self) -> tuple[int, ...]:
+        """Those that were looked at."""
+        return tuple(self.found.found.frames)
 
 
 @operation
@@ -222,23 +233,57 @@ def align(
     """
     opened = open_session(session)
     with reporting(progress, f"{opened.name}: cameras") as report:
-        found = align_cameras(opened, frames, progress=report)
-    remember_alignment(opened, found)
-    words, notes = alignment_words(found), ()
-    changed = keep and found.needed and found.better
+        aligned = align_cameras(opened, frames, progress=report)
+    remember_alignment(opened, aligned)
+    words, notes = alignment_words(aligned), ()
+    changed = keep and aligned.needed and aligned.better
     if changed:
-        change = turn_cameras(opened, found)
+        change = use_turned(opened, aligned)
         opened, notes = change.session, change.notes
         say(progress, notes)
         _measure_masks_again(opened, progress)
-    each = found.found
+    each = aligned.found
     before, after, turns = (
-        dict(zip(found.names, map(float, values), strict=True))
+        dict(zip(aligned.names, map(float, values), strict=True))
         for values in (each.before, each.after, each.turns)
     )
     return Alignment(
-        opened, found, before, after, turns, found.needed, found.better, changed, words, tuple(notes)
+        opened, aligned, before, after, turns, aligned.needed, aligned.better, changed, words, tuple(notes)
     )
+
+
+@dataclass(frozen=True, slots=True)
+class CamerasInUse:
+    """possible : there are several calibrated cameras, which can be compared. turned : the cameras in use were turned
+    from an earlier calibration, which can be had back.
+    """
+
+    session: str
+    possible: bool
+    turned: bool
+
+
+def cameras_in_use(session: Session) -> CamerasInUse:
+    """Whether a session's cameras can be compared, and whether they were turned."""
+    return CamerasInUse(session.name, session.is_comparable, bool(turned_from(session)))
+
+
+def use_turned(session: Session, aligned: SessionAlignment) -> CalibrationChange:
+    """Let the session use the turned cameras; the calibration before is kept. Raises SessionError while a run is being
+    tracked, CalibrationError where the calibration is another one than that which was measured.
+    """
+    change = turn_cameras(session, aligned)
+    forget_composers()
+    return change
+
+
+def use_unturned(session: Session) -> CalibrationChange:
+    """Let the session use the calibration again that its cameras were turned from. Raises NotFoundError, SessionError
+    while a run is being tracked.
+    """
+    change = turn_back(session)
+    forget_composers()
+    return change
 
 
 @operation
@@ -248,7 +293,7 @@ def unalign(session: SessionName, *, progress: Reporting = None) -> Session:
 
     Raises NotFoundError where they were not.
     """
-    change = turn_back(open_session(session))
+    change = use_unturned(open_session(session))
     say(progress, change.notes)
     _measure_masks_again(change.session, progress)
     return change.session
@@ -298,18 +343,20 @@ def level(
     """
     opened = open_session(session)
     if clicks is not None:
-        found = level_by_clicks(opened, read_clicks(Path(clicks)))
+        levelled = level_by_clicks(opened, read_clicks(Path(clicks)))
     elif run:
-        found = level_by_run(opened, opened.run(run))
+        levelled = level_by_run(opened, opened.run(run))
     else:
         with reporting(progress, f"{opened.name}: floor") as report:
-            found = level_by_silhouettes(opened, progress=report)
+            levelled = level_by_silhouettes(opened, progress=report)
     if not keep:
-        return Levelled(opened, found.tilted, found.lowered, found.how, changed=False)
-    change = use_level_world(opened, found)
+        return Levelled(opened, levelled.tilted, levelled.lowered, levelled.how, changed=False)
+    change = use_level_world(opened, levelled)
     say(progress, change.notes)
     _measure_masks_again(change.session, progress)
-    return Levelled(change.session, found.tilted, found.lowered, found.how, changed=True, notes=change.notes)
+    return Levelled(
+        change.session, levelled.tilted, levelled.lowered, levelled.how, changed=True, notes=change.notes
+    )
 
 
 def _measure_masks_again(session: Session, progress: Reporting) -> None:

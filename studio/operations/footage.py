@@ -6,24 +6,28 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, FiniteFloat
 
 from studio.footage.capture.camera_addresses import CameraAddress, address_from_text, check_names
-from studio.footage.capture.synchrony import MOST_SECONDS, Synchrony
+from studio.footage.capture.synchrony import MOST_SECONDS, Synchrony, in_words
 from studio.footage.capture.timestamps import TimedOffsets
 from studio.foundations.declaring import Body, Target, Terminal, Web, operation, taking
 from studio.foundations.errors import FootageError, SessionError
-from studio.foundations.progress import Progress
+from studio.foundations.progress import Progress, unheard
+from studio.foundations.records import extended
 from studio.operations.jobs.camera_readers import CameraReaders
 from studio.operations.jobs.stream_recording import RecordingStanding, StreamRecording, recording_folder
 from studio.operations.opening import SessionName, keeping_in_place, open_session
 from studio.operations.progress import Reporting, reporting, say
 from studio.results.drawing_footage.recipes import synthesize as synthesize_recipe
+from studio.results.overlay_pictures import forget_composers
+from studio.sessions.archives import FOOTAGE_PARTS, only_archive, unpacked, unwrapped
 from studio.sessions.footage_changes import (
     FootageChange,
     change_footage,
     pair_by_time,
     recorded_offsets,
+    stale_runs,
     synchrony_of,
 )
 from studio.sessions.importers.importing import (
@@ -90,9 +94,9 @@ def import_footage(
     """
     with reporting(progress, "Importing") as report:
         place = Workspace().place_for(into)
-        found = import_source(Path(source), place, ImportOptions(**options), progress=report)
-    _say_found(found, progress)
-    return found.session
+        imported = import_source(Path(source), place, ImportOptions(**options), progress=report)
+    _say(imported, progress)
+    return imported.session
 
 
 @operation
@@ -111,12 +115,13 @@ def add_footage(
     """
     with reporting(progress, "Adding") as report:
         added = add_to_session(open_session(session), Path(source), ImportOptions(**options), progress=report)
-    _say_found(added, progress)
+    forget_composers()
+    _say(added, progress)
     return added
 
 
-def _say_found(found: ImportReport, progress: Reporting) -> None:
-    say(progress, (*found.notes, *(f"Warning: {warning}" for warning in found.warnings)))
+def _say(imported: ImportReport, progress: Reporting) -> None:
+    say(progress, (*imported.notes, *(f"Warning: {warning}" for warning in imported.warnings)))
 
 
 @operation
@@ -140,6 +145,60 @@ def synthesize(
     return Session(place)
 
 
+@dataclass(frozen=True, slots=True)
+class FootageCamera:
+    """One camera's footage. offset : the file's frame that is frame 0 of the session. turned : degrees clockwise.
+    width, height : pixels.
+    """
+
+    name: str
+    kind: str
+    offset: int
+    turned: int
+    width: int
+    height: int
+    frame_count: int
+    has_masks: bool
+    has_background: bool
+
+
+@dataclass(frozen=True, slots=True)
+class FootageState:
+    """How a session's cameras are put together. frame_count : frames that all have. stale_runs : those made before the
+    footage was last changed. notes : what the change that was just made means.
+    """
+
+    session: str
+    layout: str
+    fps: FiniteFloat
+    frame_count: int
+    cameras: tuple[FootageCamera, ...]
+    stale_runs: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def footage_state(session: Session, notes: tuple[str, ...] = ()) -> FootageState:
+    """How a session's cameras are put together now. notes : on a change just made."""
+    source = session.manifest.footage
+    cameras = tuple(
+        extended(FootageCamera, one, has_masks=bool(one.masks), has_background=bool(one.background))
+        for one in source.cameras
+    )
+    layout = session.manifest.layout
+    return FootageState(
+        session.name, layout, source.fps, source.frame_count, cameras, stale_runs(session), notes
+    )
+
+
+def unpacked_upload(folder: Path, parts: Sequence[str] = FOOTAGE_PARTS, progress: Progress = unheard) -> Path:
+    """What was uploaded: out of its archive, and without the folders that only wrap it. parts : patterns of what lies
+    in the folder that is meant. Raises SessionError for an archive that is none.
+    """
+    if only_archive(folder):
+        progress("unpacking", 0, 1)
+    return unwrapped(unpacked(folder), parts)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Synchronised:
     """How far the cameras began apart. session : as it is now. found : by motion or by recorded times, None for
@@ -149,6 +208,18 @@ class Synchronised:
     session: Session
     found: Synchrony | TimedOffsets | None = None
     change: FootageChange | None = None
+
+    def in_words(self) -> list[str]:
+        """What was estimated or read, lines."""
+        if isinstance(self.found, Synchrony):
+            return [in_words(self.found)]
+        if self.found is None:
+            return []
+        return [
+            *(f"{name}: {offset:+d} frames" for name, offset in self.found.offsets.items()),
+            f"At most {self.found.apart:.2f} frames apart at {self.found.fps:.2f} frames a second.",
+            *self.found.notes,
+        ]
 
 
 @operation
@@ -333,9 +404,9 @@ def _kept(
 ) -> Recorded:
     """The session of a recording."""
     with reporting(progress, f"{place.name}: importing") as report:
-        found, spread = import_recording(
+        imported, spread = import_recording(
             folder, place, calibration, standing.notes if standing else (), report
         )
-    notes = (*found.notes, *found.warnings)
+    notes = (*imported.notes, *imported.warnings)
     say(progress, notes)
-    return Recorded(found.session, spread, notes, found.warnings, standing)
+    return Recorded(imported.session, spread, notes, imported.warnings, standing)

@@ -1,24 +1,52 @@
 """Masks of a session: what they are made of, and how far the views agree."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
+import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
 
-from studio.footage.capture.pictures import painted_picture, png_of
+from studio.evidence.settings import EvidenceSettings
+from studio.footage.capture.footage import EXCLUSIONS
+from studio.footage.capture.naming import match_names
+from studio.footage.capture.pictures import is_picture, painted_picture, png_of
 from studio.foundations.declaring import Knobs, Terminal, Values, Web, operation
+from studio.foundations.errors import FootageError, NotFoundError
 from studio.foundations.foreign_files import read_file
+from studio.foundations.knobs import Knob, Value, knobs_of
 from studio.operations.opening import SessionName, keeping_in_place, open_session
 from studio.operations.progress import Reporting, reporting, say
-from studio.runs.setup.background_setup import BackgroundSetup, BackgroundSource, set_up_background
+from studio.results.overlay_pictures import forget_composers
+from studio.runs.setup.background_setup import (
+    MASK_SOURCES,
+    SOURCES,
+    BackgroundSetup,
+    BackgroundSource,
+    set_up_background,
+)
 from studio.runs.setup.contrast import draw_contrast
 from studio.runs.setup.mask_quality import MaskQuality, measure_masks
-from studio.sessions.background_files import polygon_exclusion, set_backgrounds, set_exclusion
+from studio.runs.setup.mask_quality import mask_quality as quality_with
+from studio.runs.setup.session_settings import session_settings
+from studio.runs.setup.stroke_masks import unpainted_cameras
+from studio.search.settings import values
+from studio.sessions.background_files import (
+    given_masks_of,
+    home_of_masks,
+    polygon_exclusion,
+    read_evidence,
+    set_backgrounds,
+    set_exclusion,
+    write_evidence,
+)
+from studio.sessions.provenance import origin_of
 from studio.sessions.session import Session
-from studio.sessions.stroke_files import strokes_of_file
+from studio.sessions.stroke_files import read_strokes, strokes_of_file
+from studio.sessions.work_under_way import one_at_a_time
 
 
 @operation
@@ -94,21 +122,24 @@ def background(
     """
     opened = open_session(session)
     if plates:
-        opened = set_backgrounds(opened, {camera: Path(path) for camera, path in plates.items()})
+        opened = give_plates(opened, {camera: Path(path) for camera, path in plates.items()})
     for camera, region in (exclude or {}).items():
         exclude_region(opened, camera, region)
     with reporting(progress, f"{opened.name}: background") as report:
-        made = set_up_background(
-            opened,
-            source,
-            knobs=knobs,  # pyright: ignore[reportArgumentType]
-            tune=tune,
-            exclude_unused=exclude_unused,
-            strokes=None if strokes is None else strokes_of_file(opened, Path(strokes)),
-            run=run,
-            subject_at=subject_at,
-            progress=report,
-        )
+        try:
+            made = set_up_background(
+                opened,
+                source,
+                knobs=knobs,  # pyright: ignore[reportArgumentType]
+                tune=tune,
+                exclude_unused=exclude_unused,
+                strokes=None if strokes is None else strokes_of_file(opened, Path(strokes)),
+                run=run,
+                subject_at=subject_at,
+                progress=report,
+            )
+        finally:
+            forget_composers()
     say(progress, made.notes)
     return made
 
@@ -121,6 +152,12 @@ def mask_quality(
         Sequence[int], Field(max_length=24, description="To look at; default: five, evenly spread.")
     ] = (),
     *,
+    knobs: Annotated[
+        Values,
+        Field(max_length=64, description="Knobs to try in place of the session's."),
+        Knobs(others=True),
+    ] = None,
+    keep: Annotated[bool, Field(description="Remember what comes of the session's own knobs.")] = True,
     pictures: Annotated[
         str | Path | None,
         Field(description="Folder for a picture a camera, in which is outlined what is like the background."),
@@ -133,20 +170,205 @@ def mask_quality(
     the silhouettes say against the calibration.
 
     Without frames it is remembered; then a fault that makes results wrong keeps tracking from beginning.
+
+    Raises RunError for a single camera, SettingsError for a knob.
     """
     opened = open_session(session)
     with reporting(progress, f"{opened.name}: masks") as report:
-        found = measure_masks(opened, frames, report)
-    if pictures is not None and found.contrast is not None:
-        say(progress, [f"Picture {path}" for path in draw_contrast(opened, found.contrast, Path(pictures))])
-    return found
+        if keep and knobs is None:
+            measured = measure_masks(opened, frames, report)
+        else:
+            measured = quality_with(opened, mask_settings(opened, knobs), frames, progress=report)
+    if pictures is not None and measured.contrast is not None:
+        say(
+            progress, [f"Picture {path}" for path in draw_contrast(opened, measured.contrast, Path(pictures))]
+        )
+    return measured
 
 
-def exclude_region(session: Session, camera: str, region: ArrayLike | str | Path | None) -> None:
-    """Let a region of a camera's pictures not count, as `background` takes it."""
-    if region is None:
-        set_exclusion(session, camera, b"")
+def mask_settings(session: Session, knobs: Mapping[str, object] | None = None) -> EvidenceSettings:
+    """The settings that a session's masks are made with, these knobs changed. Raises SettingsError."""
+    return session_settings(session, changes=knobs).evidence
+
+
+@dataclass(frozen=True, slots=True)
+class MaskKnobs:
+    """Knobs of the masks that the session's new runs begin with, by flat name."""
+
+    knobs: dict[str, Value]
+
+
+def mask_knobs(session: Session) -> MaskKnobs:
+    """The session's own knobs of masks."""
+    return MaskKnobs(read_evidence(session).knobs)
+
+
+def keep_mask_knobs(session: Session, knobs: Mapping[str, Value]) -> MaskKnobs:
+    """Let new runs of a session begin with these knobs alone; runs that are there keep theirs. Raises SettingsError."""
+    mask_settings(session, knobs)
+    with one_at_a_time(session.path):
+        write_evidence(session, msgspec.structs.replace(read_evidence(session), knobs=dict(knobs)))
+    return mask_knobs(session)
+
+
+@dataclass(frozen=True, slots=True)
+class Exclusion:
+    """What does not count of a camera. pixels : how many."""
+
+    camera: str
+    pixels: int
+
+
+def exclude_region(session: Session, camera: str, region: ArrayLike | str | Path | bytes | None) -> Exclusion:
+    """Let a region of a camera's pictures not count, as `background` takes it, or as the bytes of a painted picture
+    (none: nothing any more). Raises NotFoundError, FootageError.
+    """
+    if region is None or isinstance(region, bytes):
+        pixels = set_exclusion(session, camera, region or b"")
     elif isinstance(region, str | Path):
-        set_exclusion(session, camera, png_of(painted_picture(read_file(Path(region)))))
+        pixels = set_exclusion(session, camera, png_of(painted_picture(read_file(Path(region)))))
     else:
-        polygon_exclusion(session, camera, np.asarray(region, dtype=np.float64))
+        pixels = polygon_exclusion(session, camera, np.asarray(region, dtype=np.float64))
+    forget_composers()
+    return Exclusion(camera, pixels)
+
+
+def excluded_picture(session: Session, camera: str) -> bytes:
+    """PNG: white where nothing of a camera's pictures counts, as stored. Raises NotFoundError where all does."""
+    path = _exclusion_of(session, session.camera_source(camera).name)
+    if not path.exists():
+        raise NotFoundError(f"Nothing of camera '{camera[:64]}' is excluded.", "Paint something.")
+    return read_file(path)
+
+
+def _exclusion_of(session: Session, camera: str) -> Path:
+    return session.path / EXCLUSIONS / f"{camera}.png"
+
+
+def give_plates(session: Session, plates: Mapping[str, Path], files: Iterable[Path] = ()) -> Session:
+    """The session with pictures or clips of the empty room in use: `plates` by camera, and `files`, which are matched
+    to the other cameras by their names. They are copied. Raises NotFoundError, FootageError.
+    """
+    rest = {path.stem: path for path in files}
+    if rest:
+        cameras = [one.name for one in session.manifest.footage.cameras if one.name not in plates]
+        matches = match_names(list(rest), cameras, "backgrounds", FootageError)
+        plates = {**plates, **{match.camera: rest[match.footage] for match in matches}}
+    try:
+        return set_backgrounds(session, plates)
+    finally:
+        forget_composers()
+
+
+@dataclass(frozen=True, slots=True)
+class BackgroundCamera:
+    """One camera. given : what the studio was given of its empty room. file : its name. masks : whether it has some.
+    excluded : whether regions of it do not count. width, height : pixels.
+    """
+
+    name: str
+    given: Literal["", "plate", "clip"]
+    file: str
+    masks: bool
+    excluded: bool
+    width: int
+    height: int
+
+
+@dataclass(frozen=True, slots=True)
+class SourceLine:
+    """What a session's masks can be made of. lacking : what is to be done first, "" where it is possible now. has_knobs
+    : whether knobs of the masks change what becomes of it.
+    """
+
+    name: BackgroundSource
+    label: str
+    help: str
+    lacking: str
+    has_knobs: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Background:
+    """A session's background. source : what it is made of, "masks" where masks came with the footage. possible : what
+    it can be made of now; sources : all. knobs : of masks; settings : their values in use; own : those the session has
+    said. measured : how far the views agreed when that was last measured, in words.
+    """
+
+    session: str
+    source: BackgroundSource
+    possible: tuple[BackgroundSource, ...]
+    sources: tuple[SourceLine, ...]
+    frame_count: int
+    cameras: tuple[BackgroundCamera, ...]
+    knobs: tuple[Knob, ...]
+    settings: dict[str, Value]
+    own: dict[str, Value]
+    measured: str
+
+
+def background_of(session: Session) -> Background:
+    """What a session's masks are made of, and with which knobs."""
+    evidence, settings = read_evidence(session), session_settings(session)
+    knobs, known = knobs_of(settings.evidence), origin_of(session, "background")
+    now = values(settings)
+    cameras = tuple(
+        BackgroundCamera(
+            source.name,
+            "" if not given else "plate" if is_picture(Path(given)) else "clip",
+            given.rpartition("/")[2],
+            bool(source.masks),
+            _exclusion_of(session, source.name).exists(),
+            source.width,
+            source.height,
+        )
+        for source in session.manifest.footage.cameras
+        for given in [evidence.given.get(source.name, source.background)]
+    )
+    possible = _possible_sources(session, cameras)
+    return Background(
+        session.name,
+        _source_in_use(session, settings.evidence.background_model, bool(evidence.given), cameras),
+        possible,
+        tuple(
+            SourceLine(name, one.label, one.help, "" if name in possible else one.lacking, one.has_knobs)
+            for name, one in MASK_SOURCES.items()
+        ),
+        session.manifest.frame_count,
+        cameras,
+        knobs,
+        {entry.name: now[entry.name] for entry in knobs},
+        evidence.knobs,
+        known.words if known is not None else "",
+    )
+
+
+def _possible_sources(session: Session, cameras: Sequence[BackgroundCamera]) -> tuple[BackgroundSource, ...]:
+    needs = {
+        "plate": all(one.given == "plate" for one in cameras),
+        "clip": all(one.given == "clip" for one in cameras),
+        "person": session.is_calibrated,
+        "strokes": not unpainted_cameras(session, read_strokes(session)),
+        "masks": all(given_masks_of(session).values()),
+        "best": session.is_comparable,
+        "subject": session.is_comparable,
+    }
+    return tuple(name for name in SOURCES if cameras and needs.get(name, True))
+
+
+def _source_in_use(
+    session: Session, model: str, cleaned: bool, cameras: Sequence[BackgroundCamera]
+) -> BackgroundSource:
+    if model == "mask" or (model == "auto" and cameras and all(one.masks for one in cameras)):
+        homes = {home_of_masks(source) for source in session.manifest.footage.cameras}
+        made: list[BackgroundSource] = [
+            name for name, one in MASK_SOURCES.items() if one.home and homes == {one.home}
+        ]
+        return made[0] if made else "masks"
+    if model == MASK_SOURCES["threshold"].model:
+        return "threshold"
+    if cleaned or model == MASK_SOURCES["combined"].model:
+        return "combined"
+    if model == MASK_SOURCES["median"].model or not cameras or not all(one.given for one in cameras):
+        return "median"
+    return "clip" if cameras[0].given == "clip" else "plate"

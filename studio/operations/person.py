@@ -8,15 +8,17 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, FiniteFloat
 
 from studio.body.model import BodyModel
 from studio.body.motion_files.trc import MarkerMotion, write_trc
 from studio.body.subject import Subject
+from studio.body.upright import LimbDrawing, limb_drawings
+from studio.foundations.arrays import Array
 from studio.foundations.declaring import Body, Model, OneOf, Seed, Terminal, Web, operation, taking
 from studio.operations.opening import SessionName, keeping_in_place, open_session
 from studio.operations.progress import Reporting, reporting, say
-from studio.runs.new_run import checked_frames
+from studio.results.overlay_pictures import forget_composers
 from studio.runs.setup.initialising import WEIGHTING, InitialPose, keep_pose
 from studio.runs.setup.initialising import initialise as initialise_session
 from studio.runs.setup.person_landmarks import person_landmarks
@@ -31,6 +33,8 @@ from studio.runs.setup.subject_fitting import (
 )
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.sessions.atomic_files import check_writable
+from studio.sessions.provenance import origin_of
+from studio.sessions.session import SUBJECT_NAME, Session
 
 
 @operation
@@ -60,15 +64,64 @@ def subject(
     """
     opened = open_session(session)
     if height_mm is None and not lengths_mm:
-        found, notes = (choose_body(opened, body) if body else opened).body_with_notes()
+        tree, notes = (choose_body(opened, body) if body else opened).body_with_notes()
     else:
         wanted = Subject(
             body=body or opened.manifest.body, height_mm=height_mm, lengths_mm=dict(lengths_mm or {})
         )
         choose_subject(opened, wanted)
-        found, notes = body_of_choice(opened, wanted)
+        tree, notes = body_of_choice(opened, wanted)
+    forget_composers()
     say(progress, notes)
-    return found
+    return tree
+
+
+@dataclass(frozen=True, slots=True)
+class SubjectInUse:
+    """A session's person. dimensions : mm (ratios without unit), by the body's own names. source : of proportions.
+    saved : whether the session has a subject at all. fitted : whether it was fitted to the footage.
+    """
+
+    body: str
+    height_mm: float | None
+    dimensions: dict[str, FiniteFloat]
+    notes: tuple[str, ...]
+    source: str
+    limbs: list[LimbDrawing]
+    saved: bool
+    fitted: bool
+
+
+def subject_in_use(session: Session, height_mm: float | None = None, body: str = "") -> SubjectInUse:
+    """Every dimension of a session's body as a run would have it, and its limbs as it stands upright.
+
+    height_mm, body : as if the person were so tall, or it were this body. Raises BodyError.
+    """
+    known = session.subject()
+    if height_mm is None and not body:
+        tree, notes = session.body_with_notes()
+    else:
+        known = Subject(body=body or session.manifest.body, height_mm=height_mm)
+        tree, notes = body_of_choice(session, known)
+    return SubjectInUse(
+        tree.name,
+        known.height_mm if known else None,
+        dict(tree.dimensions),
+        tuple(notes),
+        tree.definition.source if tree.definition else "",
+        limb_drawings(tree),
+        (session.path / SUBJECT_NAME).exists(),
+        origin_of(session, "subject") is not None,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FitSoFar:
+    """What a fit under way has: poses (F, D) of a body in F frames."""
+
+    body: BodyModel
+    frames: tuple[int, ...]
+    poses: Array
 
 
 @operation
@@ -88,7 +141,7 @@ def fit_subject(
     progress: Reporting = None,
     shown: Annotated[
         Shown | None,
-        Field(description="Called with the body, the frames and the poses found so far."),
+        Field(description="Called with the body, the frames and their poses so far."),
         Terminal(left_out=True),
         Web(left_out=True),
     ] = None,
@@ -106,10 +159,17 @@ def fit_subject(
         check_writable(opened.path if into is None else Path(into).absolute().parent)
     with reporting(progress, f"{opened.name}: subject") as report:
         watched = {} if shown is None else {"shown": shown}
-        found = fit_session_subject(opened, FitRequest(**options), progress=report, **watched)
+        fitted = fit_session_subject(opened, FitRequest(**options), progress=report, **watched)
     if into is not None:
-        return dataclasses.replace(found, file=keep_subject(opened, found, Path(into)))
-    return dataclasses.replace(found, file=keep_fitted(opened, found)) if keep else found
+        return dataclasses.replace(fitted, file=keep_subject(opened, fitted, Path(into)))
+    return keep_fit(opened, fitted) if keep else fitted
+
+
+def keep_fit(session: Session, fitted: FittedSubject) -> FittedSubject:
+    """Make a fitted subject the session's own; the old one stays beside it as subject-before.toml."""
+    kept = dataclasses.replace(fitted, file=keep_fitted(session, fitted))
+    forget_composers()
+    return kept
 
 
 @operation
@@ -117,7 +177,7 @@ def fit_subject(
 def initialise(
     session: SessionName,
     frame: Annotated[
-        int, Field(ge=0, description="Where the start pose is sought."), Terminal("--frame")
+        int, Field(ge=0, description="Where the start pose is searched."), Terminal("--frame")
     ] = 0,
     *,
     body: Body = "",
@@ -137,22 +197,22 @@ def initialise(
     Raises RunError where nothing is to be seen in the frame.
     """
     opened = open_session(session)
-    checked_frames(opened, frame, frame + 1)
+    opened.checked_frames(frame, frame + 1)
     tree, notes = opened.body_with_notes(body or None)
     say(progress, notes, opened.path)
     with reporting(progress, f"{opened.name}: frame {frame}") as report:
-        found = initialise_session(
+        pose = initialise_session(
             opened, frame, body=tree, behaviour=behaviour, weighting=weighting, seed=seed, progress=report
         )
     if keep:
-        found = dataclasses.replace(found, file=keep_pose(opened, found, replace))
-    say(progress, [found.note] if found.note else [])
-    return found
+        pose = dataclasses.replace(pose, file=keep_pose(opened, pose, replace))
+    say(progress, [pose.note] if pose.note else [])
+    return pose
 
 
 @dataclass(frozen=True, slots=True)
 class Landmarks:
-    """What the network sees of a person. file : the TRC file. seen : share of the frames with all of its joints."""
+    """Where a network sees a person's joints. file : the TRC. seen : share of the frames with all of its joints."""
 
     file: Path
     motion: MarkerMotion

@@ -6,10 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import Field
+import numpy as np
+from pydantic import Field, FiniteFloat
 
 from studio.foundations.declaring import Terminal, Web, operation
 from studio.foundations.errors import SessionError
+from studio.foundations.geometry.projection import project
 from studio.operations.opening import SessionName, keeping_in_place, open_session
 from studio.operations.progress import Reporting, reporting, say
 from studio.runs.setup.subject_masks import SeenSubject, seen_subjects
@@ -32,6 +34,40 @@ class Subjects:
     notes: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class SubjectInView(SeenSubject):
+    """A subject in view. points : where its middle is seen, by camera, as shares of the picture's width and height."""
+
+    points: dict[str, tuple[FiniteFloat, FiniteFloat]]
+
+
+@dataclass(frozen=True, slots=True)
+class SubjectsInView:
+    """Who is in view in a frame, the largest first."""
+
+    frame: int
+    subjects: tuple[SubjectInView, ...]
+
+
+def subjects_in_view(session: Session, frame: int = 0) -> SubjectsInView:
+    """Who is in view in a frame, by the masks' hull. Raises FootageError, NotFoundError."""
+    seen = seen_subjects(session, frame)
+    return SubjectsInView(
+        frame, tuple(SubjectInView(one.at, one.litres, one.height, _points(session, one)) for one in seen)
+    )
+
+
+def _points(session: Session, subject: SeenSubject) -> dict[str, tuple[float, float]]:
+    x, y = (1000.0 * value for value in subject.at)
+    points: dict[str, tuple[float, float]] = {}
+    for camera in session.cameras():
+        pixels, depths = project(camera, np.array([[x, y, 500.0 * subject.height]]))
+        u, v = (float(value) for value in pixels[0])
+        if depths[0] > 0.0 and 0.0 <= u < camera.width and 0.0 <= v < camera.height:
+            points[camera.name] = (u / camera.width, v / camera.height)
+    return points
+
+
 @operation
 @keeping_in_place
 def subjects(
@@ -41,7 +77,7 @@ def subjects(
         Sequence[tuple[float, float]],
         Field(
             max_length=16,
-            description="Where somebody stands in the first frame who is to have a session: x and y on the floor in"
+            description="Where one who is to have a session stands in the first frame: x and y on the floor in"
             " metres. Without any, who is in view is listed.",
         ),
         Terminal(metavar="X,Y"),
@@ -57,7 +93,7 @@ def subjects(
     The masks in use are cut by the pieces of their visual hull, followed over time. Give each session its subject's
     measures, then let `together` share the masks by bodies, which parts those who touch.
 
-    Raises FootageError where nobody stands at a place; then nothing is made.
+    Raises FootageError where no subject stands at a place; then nothing is made.
     """
     opened = open_session(session)
     if not at:
@@ -107,9 +143,9 @@ def together(
 def _numbered(session: Session, count: int) -> list[Path]:
     """Folders beside a session's, named after it."""
     taken = {path.name for path in session.path.parent.iterdir()}
-    found: list[Path] = []
+    places: list[Path] = []
     for _ in range(count):
-        name = free_name(f"{session.name}-{len(found) + 1}", taken)
+        name = free_name(f"{session.name}-{len(places) + 1}", taken)
         taken.add(name)
-        found.append(session.path.with_name(name))
-    return found
+        places.append(session.path.with_name(name))
+    return places

@@ -169,7 +169,7 @@ def prepare_run(
     own_start = given is None and not live
     tree, notes = session.body_with_notes(body or None, measures)
     of = session.start_pose_frame(tree.name) if own_start else 0
-    first, last = checked_frames(session, _first(session, first, last, of), last, endless=ping_pong)
+    first, last = session.checked_frames(_first(session, first, last, of), last, endless=ping_pong)
     if not 0 <= seed < 2**63:
         raise RunError(f"The seed {seed} cannot be used.", "Give a whole number of 0 or more.")
     notes = (*([note] if note else []), *notes, *(f"{DESPITE}{doubt}" for doubt in doubts))
@@ -248,23 +248,6 @@ def _first(session: Session, first: int | None, last: int | None, of: int) -> in
             "Give the first frame, too, or find a start pose in an earlier frame.",
         )
     return of
-
-
-def checked_frames(
-    session: Session, first: int, last: int | None, *, endless: bool = False
-) -> tuple[int, int]:
-    """The frames of a run, half open. endless : the last may lie behind the footage's end. Raises RunError if any lies
-    outside the footage, or there are none.
-    """
-    session.cameras()  # report missing footage or calibration first
-    count = session.manifest.frame_count
-    end = count if last is None else last
-    if not 0 <= first < (min(end, count) if endless else end) <= count:
-        raise RunError(
-            f"Frames {first}:{end} do not lie in the footage of '{session.name}'.",
-            f"It has frames 0:{count} (the last one not included).",
-        )
-    return first, end
 
 
 def start_of(

@@ -96,7 +96,7 @@ def use_cleaned(session: Session, contents: Mapping[str, Bytes]) -> Session:
     given = {source.name: source.background for source in session.manifest.footage.cameras}
     names: dict[str, str] = {}
     for camera, picture in contents.items():
-        place = folder / f"{_source(session, camera).name}-clean.png"
+        place = folder / f"{session.camera_source(camera).name}-clean.png"
         atomic_files.write_bytes(place, png_of(picture))
         names[camera] = place.relative_to(session.path).as_posix()
     write_evidence(session, msgspec.structs.replace(read_evidence(session), given=given))
@@ -115,7 +115,7 @@ def set_backgrounds(session: Session, files: Mapping[str, Path]) -> Session:
     for one of another size.
     """
     for camera, path in files.items():
-        source = _source(session, camera)
+        source = session.camera_source(camera)
         if not path.is_file():
             raise NotFoundError(f"There is no file '{path}'.", "Give a picture or a video of the empty room.")
         size = (source.width, source.height)
@@ -297,7 +297,7 @@ def set_exclusion(session: Session, camera: str, content: bytes) -> int:
 
     Raises FootageError for an unreadable picture, or one of another size than the footage.
     """
-    source = _source(session, camera)
+    source = session.camera_source(camera)
     path = session.path / EXCLUSIONS / f"{camera}.png"
     if not content:
         path.unlink(missing_ok=True)
@@ -320,25 +320,9 @@ def set_exclusion(session: Session, camera: str, content: bytes) -> int:
 
 def polygon_exclusion(session: Session, camera: str, corners: Array) -> int:
     """Add a polygon (K, 2) of pixels to the excluded regions. Returns the pixels of all. Raises NotFoundError."""
-    source = _source(session, camera)
+    source = session.camera_source(camera)
     path = session.path / EXCLUSIONS / f"{camera}.png"
     painted = np.zeros((source.height, source.width), np.uint8)
     if path.exists():
         painted = painted_picture(read_file(path))
     return set_exclusion(session, camera, png_of(with_polygon(painted, corners)))
-
-
-def exclusion_path(session: Session, camera: str) -> Path | None:
-    """The painted picture of a camera, if there is one. Raises NotFoundError for a camera that is not there."""
-    path = session.path / EXCLUSIONS / f"{_source(session, camera).name}.png"
-    return path if path.exists() else None
-
-
-def _source(session: Session, camera: str) -> CameraSource:
-    """The footage of a camera. Raises NotFoundError."""
-    sources = {source.name: source for source in session.manifest.footage.cameras}
-    if camera not in sources:
-        raise NotFoundError(
-            f"Session '{session.name}' has no camera '{camera[:64]}'.", f"It has {', '.join(sources)}."
-        )
-    return sources[camera]

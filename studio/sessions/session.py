@@ -20,7 +20,8 @@ from studio.body.model import BodyModel
 from studio.body.subject import Subject, fit_subject, read_subject
 from studio.footage.capture.calibration_files import calibration_text, read_calibration
 from studio.footage.capture.footage import Footage, open_footage
-from studio.foundations.errors import NotFoundError, SessionError, StudioError
+from studio.footage.capture.footage_source import CameraSource
+from studio.foundations.errors import NotFoundError, RunError, SessionError, StudioError
 from studio.foundations.foreign_files import check_links, read_file
 from studio.foundations.geometry.camera import Camera
 from studio.sessions import atomic_files
@@ -107,6 +108,20 @@ class Session:
         """Whether there is a calibration; a session may begin without."""
         return (self.path / CAMERAS_PATH).is_file()
 
+    @property
+    def is_comparable(self) -> bool:
+        """Whether two cameras or more are calibrated, so that views can be compared."""
+        return self.is_calibrated and len(self.manifest.footage.cameras) > 1
+
+    def camera_source(self, camera: str) -> CameraSource:
+        """The footage of a camera. Raises NotFoundError."""
+        sources = {source.name: source for source in self.manifest.footage.cameras}
+        if camera not in sources:
+            raise NotFoundError(
+                f"Session '{self.name}' has no camera '{camera[:64]}'.", f"It has {', '.join(sources)}."
+            )
+        return sources[camera]
+
     def cameras(self) -> tuple[Camera, ...]:
         """The calibrated cameras in the order of the footage. Raises CalibrationError; SessionError without any."""
         self._check_begun()
@@ -119,6 +134,20 @@ class Session:
                 "Import the session again with a calibration that names it.",
             )
         return tuple(by_name[source.name] for source in sources)
+
+    def checked_frames(self, first: int, last: int | None, *, endless: bool = False) -> tuple[int, int]:
+        """The frames of a run, half open. endless : the last may lie behind the footage's end. Raises RunError if any
+        lies outside the footage, or there are none.
+        """
+        self.cameras()  # report missing footage or calibration first
+        count = self.manifest.frame_count
+        end = count if last is None else last
+        if not 0 <= first < (min(end, count) if endless else end) <= count:
+            raise RunError(
+                f"Frames {first}:{end} do not lie in the footage of '{self.name}'.",
+                f"It has frames 0:{count} (the last one not included).",
+            )
+        return first, end
 
     def _check_footage(self) -> None:
         if not self.has_footage:

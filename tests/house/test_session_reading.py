@@ -36,7 +36,6 @@ OPENS_ITSELF = {
     "studio/sessions/samples.py": "the package's own samples",
     "studio/app/scene/scene_pictures.py": "an export, in a folder made for it",
     "studio/cli/self_check.py": "a database of its own, in a temporary folder",
-    "studio/app/server/camera_routes.py": "cameras, not files",
     "studio/operations/jobs/camera_service.py": "cameras, not files",
     "studio/app/server/guide_routes.py": "the package's own guide",
     "studio/app/server/pages.py": "the package's own pages",

@@ -41,16 +41,16 @@ def contrast_of(session: Session, *, posed: bool) -> Contrast:
 def test_limbs_of_a_known_pose_are_named_with_their_cameras(alike: Session) -> None:
     found = contrast_of(alike, posed=True)
     assert set(found.alike) == {"left forearm", "right forearm"}
-    assert found.in_words() == "forearms and background are alike in cam1 to cam4"
-    assert "source person" in found.remedy()
-    assert "source best" in found.remedy()
+    assert found.words == "forearms and background are alike in cam1 to cam4"
+    assert "source person" in found.remedy
+    assert "source best" in found.remedy
 
 
 def test_a_subject_of_another_colour_is_not_named_whatever_its_shadow(apart: Session) -> None:
     for posed in (True, False):
         found = contrast_of(apart, posed=posed)
         assert not found.low, found
-        assert (found.in_words(), found.remedy()) == ("", "")
+        assert (found.words, found.remedy) == ("", "")
 
 
 def test_without_a_pose_the_hull_says_where_the_subject_is(alike: Session) -> None:
@@ -120,6 +120,5 @@ def test_one_camera_of_four_is_made_up_for() -> None:
     assert not Contrast(views, "told", 0.025).low
     more = (dataclasses.replace(views[1], limbs={"shin": 0.3}), *views[2:])
     assert (
-        Contrast((views[0], *more), "told", 0.025).in_words()
-        == "shin and background are alike in cam1 and cam2"
+        Contrast((views[0], *more), "told", 0.025).words == "shin and background are alike in cam1 and cam2"
     )

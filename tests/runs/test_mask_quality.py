@@ -57,7 +57,7 @@ def test_good_masks_agree_in_every_view() -> None:
         assert view.covered > 0.97
         assert view.inside > 0.93
         assert view.denied == 0.0
-        assert view.in_words() == ""
+        assert view.note == ""
     exact = 4.0 / 3.0 * np.pi * RADIUS**3 * 1e-6
     assert exact < found.hull_litres[0] < 1.5 * exact
 
@@ -87,7 +87,7 @@ def test_a_bystander_in_one_view_is_reported_for_that_view_only() -> None:
     own = np.count_nonzero(ball_mask(cameras[1]))
     assert found.views[1].covered == pytest.approx(own / (own + 4000), abs=0.03)
     assert not found.views[1].usable
-    assert "seen by no other camera" in found.views[1].in_words()
+    assert "seen by no other camera" in found.views[1].note
     assert all(view.usable for view in found.views if view.camera != "c1")
 
 
@@ -100,7 +100,7 @@ def test_a_hole_is_blamed_on_the_camera_that_has_it() -> None:
     blame = [view.denied for view in found.views]
     assert blame[2] > 0.2
     assert max(blame[:2] + blame[3:]) < 0.02
-    assert "holes" in found.views[2].in_words()
+    assert "holes" in found.views[2].note
     assert min(view.covered for view in found.views if view.camera != "c2") < 0.9
 
 
@@ -108,7 +108,7 @@ def test_empty_masks_are_reported() -> None:
     cameras = ring()
     found = judged([np.zeros((240, 320), np.uint8) for _ in cameras], cameras)
     assert not found.usable
-    assert "empty" in found.views[0].in_words()
+    assert "empty" in found.views[0].note
 
 
 def test_footage_without_frames_has_no_quality(tmp_path: Path) -> None:

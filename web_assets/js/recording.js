@@ -28,7 +28,7 @@ const PREVIEW_HEIGHT = 270;
 const EXAMPLES = "http://10.0.0.7:8080/video · rtsp://… · /dev/video0";
 const STATES = { connecting: "calm", running: "good", stopped: "bad", ended: "calm" };
 
-/** @typedef {import("./api_types").Schemas["CamerasView"]} View */
+/** @typedef {import("./api_types").Schemas["CamerasStanding"]} View */
 /** @type {View | null} */
 let view = null;
 let looking = 0;

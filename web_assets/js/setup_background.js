@@ -15,7 +15,7 @@ import { uploadFiles } from "./uploading.js";
 
 /** @import { Schemas } from "./api_types" */
 /** @typedef {Schemas["BackgroundAnswer"]} Background */
-/** @typedef {Schemas["SubjectsAnswer"]["subjects"][number]} Subject */
+/** @typedef {Schemas["SubjectsInView"]["subjects"][number]} Subject */
 /** @typedef {ReturnType<typeof modelOf>} Model */
 
 const PREVIEW_MILLISECONDS = 180;

@@ -73,7 +73,7 @@ export function shownMasks(setup, count) {
 /** @typedef {ReturnType<typeof shownMasks>} Shown */
 /** @typedef {Schemas["BackgroundAnswer"]["cameras"][number]} Camera */
 /**
- * @typedef {{ shown: Shown, cameras: Camera[], quality: Schemas["MaskQualityAnswer"] | null,
+ * @typedef {{ shown: Shown, cameras: Camera[], quality: Schemas["MaskQuality"] | null,
  *   exclude: (camera: string) => void, paint: (camera: string) => void }} MaskProperties
  *   `exclude` opens the brush for what does not count, `paint` that for strokes
  */

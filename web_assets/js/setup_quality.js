@@ -8,7 +8,7 @@ import { html } from "./studio/component.js";
 import { Action, Made } from "./studio/parts.js";
 
 /** @import { Schemas } from "./api_types" */
-/** @typedef {Schemas["MaskQualityAnswer"]} Quality */
+/** @typedef {Schemas["MaskQuality"]} Quality */
 /** @typedef {Quality["cameras"][number]} Line */
 
 const USABLE = 0.9;
@@ -142,12 +142,12 @@ function AlikePicture({ setup, view }) {
 
 /**
  * How the sources compare (job `choice`): agreement and edges by camera, the used ones marked.
- * @param {{ choice: Schemas["SourceChoiceAnswer"] }} properties
+ * @param {{ choice: Schemas["SourceChoice"] }} properties
  */
 export function SourceTable({ choice }) {
   const cameras = Object.keys(choice.by_camera);
   const isMixed = new Set(Object.values(choice.by_camera)).size > 1;
-  const row = (/** @type {Schemas["SourceTriedLine"]} */ line, /** @type {string} */ name) =>
+  const row = (/** @type {Schemas["SourceTried"]} */ line, /** @type {string} */ name) =>
     html`<tr key=${name}>
       <th scope="row">${name}</th>
       ${cameras.map(

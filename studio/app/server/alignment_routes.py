@@ -1,37 +1,31 @@
 """Whether the cameras agree on the silhouettes: measured in the background (`alignment` events), turned, and back."""
 
 import asyncio
-from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Annotated
 
-from fastapi import APIRouter
 from pydantic import Field
 
+from studio.app.server.answers import Router, Shown
 from studio.app.server.app_state import App, AppState, release
 from studio.app.server.requests import Arguments, body_of
-from studio.app.server.schemas import Answer, Number
 from studio.app.server.session_routes import OpenSession
 from studio.foundations.errors import NotFoundError, RunError
-from studio.operations.cameras import Alignment, align
+from studio.foundations.records import extended
+from studio.operations.cameras import (
+    AlignmentLine,
+    CamerasInUse,
+    align,
+    cameras_in_use,
+    use_turned,
+    use_unturned,
+)
 from studio.operations.jobs.job_runner import Job, JobKind, SessionJob
-from studio.results.overlay_pictures import forget_composers
 from studio.runs.setup.aligning import SessionAlignment
-from studio.runs.setup.turned_cameras import is_of, turn_back, turn_cameras, turned_from
 from studio.sessions.calibration_changes import CalibrationChange
 from studio.sessions.session import Session
 
-router = APIRouter(prefix="/api/sessions/{session}/alignment", tags=["calibration"])
-
-
-class AlignmentLine(Answer):
-    """One camera. before_px, after_px: by which the silhouettes miss, as it stands and turned (median, null where
-    nothing shows); turn_degrees: by which it would be turned.
-    """
-
-    camera: str
-    before_px: Number
-    after_px: Number
-    turn_degrees: Number
+router = Router(prefix="/api/sessions/{session}/alignment", tags=["calibration"])
 
 
 class AlignmentJob(SessionJob):
@@ -39,7 +33,7 @@ class AlignmentJob(SessionJob):
     explains them; words: a sentence; kept: the session uses the turned cameras.
     """
 
-    cameras: list[AlignmentLine] = Field(default_factory=list[AlignmentLine])
+    cameras: Annotated[tuple[AlignmentLine, ...], Shown] = ()
     frames: list[int] = Field(default_factory=list[int])
     needed: bool = False
     better: bool = False
@@ -55,17 +49,14 @@ ALIGNMENT = JobKind(
 )
 
 
-class AlignmentAnswer(Answer):
-    """possible: there are several calibrated cameras. job: under way, or the last one with the calibration in use.
-    turned: the cameras in use were turned from an earlier calibration, which can be had back. notes: what a change just
-    made means for what is there.
+@dataclass(frozen=True, slots=True)
+class AlignmentAnswer(CamerasInUse):
+    """Whether the cameras can be compared, and whether they were turned. job : under way, or the last one with the
+    calibration in use. notes : what a change just made means for what is there.
     """
 
-    session: str
-    possible: bool
     job: AlignmentJob | None
-    turned: bool
-    notes: list[str] = Field(default_factory=list)
+    notes: tuple[str, ...]
 
 
 @router.get("")
@@ -90,7 +81,7 @@ async def begin(
     def work(job: Job) -> dict[str, object]:
         aligned = align(session, **arguments, keep=False, progress=job.report_or_stop)
         job.found = aligned.found
-        return _result(aligned)
+        return ALIGNMENT.entries(aligned)
 
     return app.jobs.begin(ALIGNMENT, AlignmentJob(session=session.name), work)
 
@@ -107,11 +98,11 @@ async def keep(session: OpenSession, app: App) -> AlignmentAnswer:
     """Use the turned cameras from now on; the calibration before is kept, what becomes stale is said. Refused while a
     run of the session is being tracked, or where the calibration is another one than that which was measured.
     """
-    found = _found(session, app)
-    if found is None:
+    aligned = _aligned(session, app)
+    if aligned is None:
         raise NotFoundError(f"The cameras of '{session.name}' were not compared.", "Measure first.")
     release(app, session.name)
-    change = await asyncio.to_thread(turn_cameras, session, found)
+    change = await asyncio.to_thread(use_turned, session, aligned)
     app.jobs.change(ALIGNMENT, session.name, kept=True)
     return _changed(change, app)
 
@@ -120,45 +111,27 @@ async def keep(session: OpenSession, app: App) -> AlignmentAnswer:
 async def undo(session: OpenSession, app: App) -> AlignmentAnswer:
     """Use the calibration again that the cameras in use were turned from."""
     release(app, session.name)
-    change = await asyncio.to_thread(turn_back, session)
+    change = await asyncio.to_thread(use_unturned, session)
     if app.jobs.known(ALIGNMENT, session.name) is not None:
         app.jobs.change(ALIGNMENT, session.name, kept=False)
     return _changed(change, app)
 
 
 def _changed(change: CalibrationChange, app: AppState) -> AlignmentAnswer:
-    forget_composers()
     app.events.session_changed(change.session.name)
     return _answer(change.session, app, change.notes)
 
 
-def _answer(session: Session, app: AppState, notes: Sequence[str] = ()) -> AlignmentAnswer:
-    turned = bool(turned_from(session))
-    job = app.jobs.known(ALIGNMENT, session.name)
-    if job is not None and job.state == "done" and not (job.kept and turned):
-        found = _found(session, app)
-        job = job if found is not None and is_of(session, found) else None
-    possible = session.is_calibrated and len(session.manifest.footage.cameras) > 1
-    return AlignmentAnswer(session=session.name, possible=possible, job=job, turned=turned, notes=list(notes))
+def _answer(session: Session, app: AppState, notes: tuple[str, ...] = ()) -> AlignmentAnswer:
+    cameras, job = cameras_in_use(session), app.jobs.known(ALIGNMENT, session.name)
+    if job is not None and job.state == "done" and not (job.kept and cameras.turned):
+        aligned = _aligned(session, app)
+        job = job if aligned is not None and aligned.is_of(session) else None
+    return extended(AlignmentAnswer, cameras, job=job, notes=notes)
 
 
-def _found(session: Session, app: AppState) -> SessionAlignment | None:
+def _aligned(session: Session, app: AppState) -> SessionAlignment | None:
     if app.jobs.known(ALIGNMENT, session.name) is None:
         return None
-    found = app.jobs.found(ALIGNMENT, session.name)
-    return found if isinstance(found, SessionAlignment) else None
-
-
-def _result(aligned: Alignment) -> dict[str, object]:
-    return {
-        "cameras": [
-            AlignmentLine(
-                camera=name, before_px=before, after_px=aligned.after[name], turn_degrees=aligned.turns[name]
-            )
-            for name, before in aligned.before.items()
-        ],
-        "frames": list(aligned.found.found.frames),
-        "needed": aligned.needed,
-        "better": aligned.better,
-        "words": aligned.words,
-    }
+    aligned = app.jobs.found(ALIGNMENT, session.name)
+    return aligned if isinstance(aligned, SessionAlignment) else None

@@ -1,10 +1,12 @@
 """Schemas of answers made from the records that verbs return, as bodies of requests are made from their parameters.
 
 A route returns the record itself; its annotation says which. Numbers that are not finite are null, arrays are lists. A
-property whose annotation has a Field is an entry as well; one that is marked `Web(left_out=True)` is none.
+property whose annotation has a Field is an entry as well, which its docstring describes; one that is marked
+`Web(left_out=True)` is none.
 """
 
 import dataclasses
+import inspect
 import types
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
@@ -78,8 +80,9 @@ def shown_as(kind: Kind) -> Kind:
             return kind
         return Annotated[(shown_as(parts[0]), *kind.__metadata__)]
     if origin in (tuple, list, Sequence, frozenset, set):
-        many = parts[-1] is Ellipsis or origin is not tuple
-        return list[shown_as(parts[0])] if many else tuple[tuple(shown_as(part) for part in parts)]
+        if origin is not tuple:
+            return list[shown_as(parts[0])]
+        return tuple[tuple(part if part is Ellipsis else shown_as(part) for part in parts)]
     if origin in (dict, Mapping):
         return dict[parts[0], shown_as(parts[1])]
     if origin in (Union, types.UnionType):
@@ -129,18 +132,16 @@ def _is_left_out(kind: Kind) -> bool:
 
 
 def _properties(record: type[object]) -> list[tuple[str, Kind]]:
-    """Name and type of a record's properties whose annotation has a Field."""
+    """Name and type of a record's properties whose annotation has a Field; their docstrings describe them."""
     of_class = {name: one for base in reversed(record.__mro__) for name, one in vars(base).items()}
-    results = {
-        name: get_type_hints(one.fget, include_extras=True).get("return")
-        for name, one in of_class.items()
-        if isinstance(one, property) and one.fget is not None
-    }
-    return [
-        (name, result)
-        for name, result in results.items()
-        if any(isinstance(mark, FieldInfo) for mark in getattr(result, "__metadata__", ()))
-    ]
+    shown: list[tuple[str, Kind]] = []
+    for name, one in of_class.items():
+        if not isinstance(one, property) or one.fget is None:
+            continue
+        result = get_type_hints(one.fget, include_extras=True).get("return")
+        if any(isinstance(mark, FieldInfo) for mark in getattr(result, "__metadata__", ())):
+            shown.append((name, Annotated[result, Field(description=inspect.getdoc(one))]))
+    return shown
 
 
 def _default(entry: Any) -> object:  # noqa: ANN401 - a field of a dataclass or of a struct

@@ -12,10 +12,10 @@ from fastapi import Depends, Request
 from studio.app.scene.scene_server import SceneServer
 from studio.app.scene.window_scenes import WindowScenes
 from studio.app.server.access import VIEWING
-from studio.app.server.calibration_proposals import Proposals
 from studio.app.server.event_stream import EventStream
 from studio.app.server.windows import Window
 from studio.foundations.errors import RunError
+from studio.operations.calibration_proposals import Proposals
 from studio.operations.jobs.camera_service import CameraService
 from studio.operations.jobs.commands import Close
 from studio.operations.jobs.control import StudioControl

@@ -4,68 +4,89 @@ Everything but `apply` leaves the session as it is.
 """
 
 import asyncio
-import io
 import tempfile
-import zipfile
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal
 from urllib.parse import quote
 
-import cv2
-from fastapi import APIRouter, Query, Response
+from fastapi import Depends, Query, Response
+from pydantic import Field
 
 from studio.app.server import files
+from studio.app.server.answers import Router
 from studio.app.server.app_state import App, AppState, release
-from studio.app.server.calibration_proposals import (
+from studio.app.server.safe_paths import FootagePlace, PlaceName, place_of
+from studio.app.server.schemas import Request
+from studio.app.server.session_routes import OpenSession
+from studio.footage.calibration.floor import Click
+from studio.foundations.errors import CalibrationError
+from studio.foundations.foreign_files import read_file as content_of
+from studio.operations.calibration_proposals import (
     Proposal,
-    backdrop,
+    apply_proposal,
     proposal_in_use,
-    proposal_of_file,
+    propose_earlier,
+    propose_file,
     with_floor,
 )
-from studio.app.server.calibration_views import (
-    ApplyRequest,
-    CalibrationFileRequest,
+from studio.operations.calibration_views import (
     CalibrationView,
-    FloorRequest,
     ProposalView,
+    WorldPicture,
+    calibration_file,
     calibration_view,
+    draw_coverage,
+    draw_world,
     proposal_view,
 )
-from studio.app.server.safe_paths import FootagePlace, chosen_file, place_of
-from studio.app.server.session_routes import OpenSession
-from studio.footage.calibration.board_pdf import usual_board, write_board_pdf
-from studio.footage.calibration.boards import board_from_text
-from studio.footage.calibration.coverage import coverage_picture
-from studio.footage.calibration.floor import Click
-from studio.footage.calibration.intrinsics import Lens
-from studio.footage.calibration.world_picture import world_picture
-from studio.footage.capture.calibration_files import (
-    CALIBRATION_FORMATS,
-    export_calibration,
-    find_calibrations,
-    read_calibration,
-)
-from studio.foundations.declaring import LARGEST
-from studio.foundations.errors import CalibrationError, NotFoundError
-from studio.foundations.foreign_files import read_file as content_of
-from studio.foundations.geometry.camera import Camera
+from studio.operations.cameras import board as make_board
 from studio.runs.drawing.overlay_drawing import encode_jpeg
-from studio.sessions.calibration_changes import earlier_calibration, replace_calibration
-from studio.sessions.session import CAMERAS_PATH, Session
+from studio.sessions.importers.importing import Unit, Up
+from studio.sessions.session import Session
 
-router = APIRouter(prefix="/api", tags=["calibration"])
+router = Router(prefix="/api", tags=["calibration"])
 
 
 HERE = "/sessions/{session}/calibration"
 CURRENT = "current"
+Pixel = tuple[float, float]
+
+
+class CalibrationFileRequest(FootagePlace):
+    """A calibration to look at. Nothing is changed by it. file: which one of a folder or upload that holds several;
+    earlier: one that the session used before, instead of a path.
+    """
+
+    file: PlaceName = ""
+    earlier: str = Field("", max_length=64)
+    unit: Unit = ""
+    up: Up = "z"
+
+
+class PointRequest(Request):
+    """A point clicked in two cameras or more. world: where it is known to lie, mm; for all points or for none."""
+
+    pixels: dict[str, Pixel] = Field(min_length=2, max_length=64)
+    world: tuple[float, float, float] | None = None
+
+
+class FloorRequest(Request):
+    """Points of the floor: the first is the origin, the second lies on X. proposal: "" for the calibration in use."""
+
+    proposal: str = Field("", max_length=64)
+    points: list[PointRequest] = Field(min_length=3, max_length=64)
+
+
+class ApplyRequest(Request):
+    """anyway: also if a finding says that results would be wrong."""
+
+    anyway: bool = False
 
 
 @router.get(HERE)
 def calibration(session: OpenSession) -> CalibrationView:
     """The calibration in use with what speaks against it, and those before it."""
-    return calibration_view(session, ())
+    return calibration_view(session)
 
 
 @router.post(HERE + "/proposals", status_code=201)
@@ -77,15 +98,15 @@ async def read_file(session: OpenSession, request: CalibrationFileRequest, app: 
 @router.get(HERE + "/proposals/{identifier}")
 def proposal(session: OpenSession, identifier: str, app: App) -> ProposalView:
     """A calibration that was read or solved and is not in use yet."""
-    return proposal_view(_found(session, identifier, app))
+    return proposal_view(_proposal(session, identifier, app))
 
 
 @router.post(HERE + "/floor", status_code=201)
 def set_floor(session: OpenSession, request: FloorRequest, app: App) -> ProposalView:
     """The same cameras in the world that clicked points make: a new proposal with each point in space."""
-    base = _found(session, request.proposal or CURRENT, app)
+    base = _proposal(session, request.proposal or CURRENT, app)
     points = [Click(point.pixels, point.world) for point in request.points]
-    return proposal_view(app.proposals.keep(with_floor(session, base, points)))
+    return proposal_view(app.proposals.keep(with_floor(base, points)))
 
 
 @router.post(HERE + "/proposals/{identifier}/apply")
@@ -93,9 +114,11 @@ def apply(session: OpenSession, identifier: str, request: ApplyRequest, app: App
     """Use a proposal from now on; the calibration before is kept, and what becomes stale is said. 422 with the first
     finding that blocks, unless `anyway`; refused while a run of the session is being tracked.
     """
-    new = _found(session, identifier, app).checked_new(request.anyway)
+    proposal = _proposal(session, identifier, app)
+    if not request.anyway:
+        proposal.check()
     release(app, session.name)
-    change = replace_calibration(session, new)
+    change = apply_proposal(session, proposal)
     app.events.session_changed(session.name)
     return calibration_view(change.session, change.notes)
 
@@ -106,46 +129,19 @@ async def view(
     identifier: str,
     camera: str,
     app: App,
-    height: Annotated[int, Query(ge=64, le=2160)] = 720,
-    frame: Annotated[int, Query(ge=0, le=LARGEST)] = 0,
-    board: bool = True,
-    axes: bool = True,
+    how: Annotated[WorldPicture, Depends(WorldPicture)],
 ) -> Response:
     """Floor, axes and a pole drawn on a camera's picture, upright; identifier "current" for the one in use. board:
     show the board's footage where the proposal has some; axes: false leaves the picture bare.
     """
-    found = _found(session, identifier, app)
-    placed = _camera(found, camera)
-    picture = await asyncio.to_thread(backdrop, session, found, camera, board, frame)
-    points: list[list[float]] = found.clicked.points.tolist() if found.clicked is not None else []
-    drawn = world_picture(picture, placed, points, height, bare=not axes)
+    drawn = await asyncio.to_thread(draw_world, session, _proposal(session, identifier, app), camera, how)
     return files.picture(encode_jpeg(drawn))
 
 
 @router.get(HERE + "/proposals/{identifier}/coverage/{camera}.png", response_class=Response)
 def coverage(session: OpenSession, identifier: str, camera: str, app: App) -> Response:
     """Where in the picture the board's corners were seen: used ones white, those left out red."""
-    found = _found(session, identifier, app)
-    lenses: Mapping[str, Lens] = found.calibrated.lenses if found.calibrated is not None else {}
-    name = camera if camera in lenses else _camera(found, camera).name
-    kept = session.path / CAMERAS_PATH.with_name(f"cameras.coverage-{name}.png")
-    if found.calibrated is None and identifier == CURRENT and kept.is_file():
-        content = content_of(kept)
-    elif found.calibrated is not None and name in lenses:
-        lens = lenses[name]
-        dropped = {residual.frame for residual in lens.residuals if residual.dropped}
-        seen = found.calibrated.sightings.get(name, ())
-        picture = coverage_picture(
-            lens.coverage,
-            [sighting for sighting in seen if sighting.frame not in dropped],
-            [sighting for sighting in seen if sighting.frame in dropped],
-        )
-        content = bytes(cv2.imencode(".png", picture)[1])
-    else:
-        raise NotFoundError(
-            f"Camera '{name}' was not calibrated from a board here.", "Calibrate it from boards."
-        )
-    return files.picture(content, "png")
+    return files.picture(draw_coverage(session, _proposal(session, identifier, app), camera), "png")
 
 
 @router.get(HERE + "/export", response_class=Response)
@@ -153,13 +149,8 @@ def export(session: OpenSession, form: Annotated[str, Query(alias="format", max_
     """The calibration in use for another tool; several files as a zip. What the format cannot hold is named in the
     header x-studio-notes (percent-encoded lines).
     """
-    cameras = proposal_in_use(session).cameras
-    with tempfile.TemporaryDirectory() as folder:
-        writer = CALIBRATION_FORMATS[form]
-        place = Path(folder) / (writer.file_name.format(session.name) + writer.suffix)
-        written = export_calibration(cameras, place, form)
-        name, content = _packed(written.files, f"{session.name}-{form}.zip")
-    return files.download(content, name, files.BINARY, x_studio_notes=quote("\n".join(written.notes)))
+    made = calibration_file(session, form)
+    return files.download(made.content, made.name, files.BINARY, x_studio_notes=quote("\n".join(made.notes)))
 
 
 @router.get("/calibration-boards.pdf", response_class=Response)
@@ -169,10 +160,9 @@ def board_pdf(
     board: Annotated[str, Query(max_length=120, description="Empty: one that fills the page.")] = "",
 ) -> Response:
     """A board to print in true size; its text form is in the file's name, and in the header x-studio-board."""
-    made = board_from_text(board) if board else usual_board(kind, page)
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder) / "board.pdf"
-        write_board_pdf(made, place, page)
+        made = make_board(place, kind=kind, board=board, page=page)
         content = content_of(place)
     plain = made.text.replace(":", "-").replace(",", "-")
     return files.download(content, f"{plain}.pdf", "application/pdf", x_studio_board=made.text)
@@ -180,33 +170,12 @@ def board_pdf(
 
 def _read(session: Session, request: CalibrationFileRequest, app: AppState) -> Proposal:
     if request.earlier:
-        path = earlier_calibration(session, request.earlier) / CAMERAS_PATH.name
-    elif not request.path and request.upload is None:
+        return propose_earlier(session, request.earlier, request.unit, request.up)
+    if not request.path and request.upload is None:
         raise CalibrationError("No calibration was named.", "Choose a file.")
-    else:
-        place = place_of(app, FootagePlace(path=request.path, upload=request.upload))
-        path = chosen_file(place, request.file, find_calibrations(place) if place.is_dir() else ())
-    return proposal_of_file(session, read_calibration(path, request.unit, request.up))
+    place = place_of(app, FootagePlace(path=request.path, upload=request.upload))
+    return propose_file(session, place, request.file, request.unit, request.up)
 
 
-def _found(session: Session, identifier: str, app: AppState) -> Proposal:
+def _proposal(session: Session, identifier: str, app: AppState) -> Proposal:
     return proposal_in_use(session) if identifier == CURRENT else app.proposals.find(session.name, identifier)
-
-
-def _camera(found: Proposal, name: str) -> Camera:
-    for camera in found.cameras:
-        if camera.name == name:
-            return camera
-    names = ", ".join(camera.name for camera in found.cameras)
-    raise NotFoundError(f"There is no calibrated camera '{name[:64]}'.", f"There are {names}.")
-
-
-def _packed(files: tuple[Path, ...], name: str) -> tuple[str, bytes]:
-    """The only file itself, or all in a zip of that name."""
-    if len(files) == 1:
-        return files[0].name, content_of(files[0])
-    packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
-        for path in files:
-            archive.write(path, path.name)
-    return name, packed.getvalue()

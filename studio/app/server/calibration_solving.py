@@ -5,27 +5,29 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from fastapi import APIRouter
 from pydantic import Field
 
+from studio.app.server.answers import Router
 from studio.app.server.app_state import App, AppState
-from studio.app.server.calibration_proposals import Proposal, level_proposal, proposal_of_boards
 from studio.app.server.job_routes import add_job_routes
 from studio.app.server.requests import Arguments, body_of
 from studio.app.server.safe_paths import FootagePlace, place_of
 from studio.app.server.schemas import Number, Request
 from studio.app.server.session_routes import OpenSession
-from studio.footage.calibration.board_footage_reading import find_board_footage, list_footage
-from studio.footage.calibration.boards import Board, board_from_text
-from studio.footage.calibration.verbs import calibrate as solve
-from studio.foundations.progress import Progress, TimeLeft
+from studio.foundations.progress import TimeLeft
+from studio.operations.calibration_proposals import (
+    BoardFootage,
+    Proposal,
+    checked_board,
+    propose_boards,
+    propose_level,
+)
 from studio.operations.cameras import calibrate, level
 from studio.operations.jobs.job_runner import Job, JobKind, NumberedJob
-from studio.runs.setup.levelling import level_by_run, level_by_silhouettes
-from studio.sessions.board_calibration import footage_sizes, how_taken
+from studio.sessions.board_calibration import BoardOptions
 from studio.sessions.session import Session
 
-router = APIRouter(prefix="/api", tags=["calibration"])
+router = Router(prefix="/api", tags=["calibration"])
 
 
 class DistanceRequest(Request):
@@ -80,23 +82,6 @@ FOOTAGE: dict[str, Any] = {
 """Where the board's footage lies, for a body."""
 
 
-class _Folders:
-    """Where the board's footage lies. recordings : how many there are to be looked through."""
-
-    def __init__(self, app: AppState, session: Session, request: Mapping[str, Any]) -> None:
-        self.lenses = place_of(app, request["intrinsics"]) if request["intrinsics"] else None
-        self.common = place_of(app, request["extrinsics"]) if request["extrinsics"] else None
-        if self.lenses is None and self.common is None:
-            whole = place_of(app, request["footage"]) if request["footage"] else session.path
-            self.lenses, self.common = find_board_footage(whole)
-        lying = place_of(app, request["floor_footage"]) if request["floor_footage"] else None
-        self.floor = str(lying) if lying is not None else request["floor"] or None
-        places = [
-            place for place in (self.lenses, self.common, lying) if place is not None and place.is_dir()
-        ]
-        self.recordings = sum(len(list_footage(place)) for place in places)
-
-
 @router.post("/sessions/{session}/calibration/solve", status_code=202)
 async def begin_solving(
     session: OpenSession,
@@ -106,14 +91,16 @@ async def begin_solving(
     """Begin to solve lenses and places from board footage. Nothing is changed: what comes of it is a proposal. Ask for
     its state, or wait for `calibration` events.
     """
-    board = board_from_text(arguments["board"], arguments["thickness_mm"])
-    how_taken(session, arguments["offsets"])
-    folders = await asyncio.to_thread(_Folders, app, session, arguments.more)
+    more = arguments.more
+    distances = {(each.first, each.second): each.mm for each in more["distances"]}
+    given = dict(arguments)
+    text, options = given.pop("board"), BoardOptions(**given, distances_mm=distances)
+    board = checked_board(session, text, options)
+    footage = await asyncio.to_thread(_footage, app, session, more)
 
     def work(job: Job) -> dict[str, object]:
-        proposal = _solved(session, arguments, board, folders, _Progress(job, folders.recordings).report)
-        app.proposals.keep(proposal)
-        return {"proposal": proposal.identifier, "share": 1.0}
+        report = _Progress(job, footage.recordings).report
+        return _kept(app, propose_boards(session, footage, board, options, report))
 
     return app.jobs.begin(CALIBRATION, SolveState(session=session.name), work)
 
@@ -127,17 +114,10 @@ def begin_levelling(
     """Begin to find the vertical and the floor for the calibration in use: by a run's feet, else by the silhouettes.
     Nothing is changed: what comes of it is a proposal. Ask for its state, or wait for `calibration` events.
     """
-    run = session.run(arguments["run"]) if arguments.get("run") else None
+    run = session.run(arguments["run"]).name if arguments.get("run") else ""
 
     def work(job: Job) -> dict[str, object]:
-        found = (
-            level_by_silhouettes(session, progress=job.report_or_stop)
-            if run is None
-            else level_by_run(session, run)
-        )
-        proposal = level_proposal(session, found)
-        app.proposals.keep(proposal)
-        return {"proposal": proposal.identifier, "share": 1.0}
+        return _kept(app, propose_level(session, run, job.report_or_stop))
 
     return app.jobs.begin(CALIBRATION, SolveState(session=session.name), work)
 
@@ -164,23 +144,15 @@ class _Progress:
         self._job.report_or_stop(step, done, total, share=share, seconds_left=left)
 
 
-def _solved(
-    session: Session, arguments: Arguments, board: Board, folders: _Folders, progress: Progress
-) -> Proposal:
-    """What comes of the footage, to be looked at. Raises CalibrationError, FootageError, WorkCancelledError."""
-    taken = how_taken(session, arguments["offsets"])
-    found = solve(
-        board,
-        intrinsics=folders.lenses,
-        extrinsics=folders.common,
-        floor=folders.floor,
-        names=tuple(taken.sizes),
-        footage_sizes=footage_sizes(session),
-        distances_mm={(each.first, each.second): each.mm for each in arguments.more["distances"]},
-        refine_lenses=arguments["refine_lenses"],
-        taken=taken,
-        progress=progress,
-    )
-    lying = Path(folders.floor) if folders.floor and arguments.more["floor_footage"] else None
-    seen, moment = (lying, "frame:0") if lying is not None else (folders.common, arguments.more["floor"])
-    return proposal_of_boards(session, found, seen, moment, taken)
+def _footage(app: AppState, session: Session, request: Mapping[str, Any]) -> BoardFootage:
+    """Where a request's footage lies. Raises PathRefused, NotFoundError, CalibrationError."""
+
+    def place(name: str) -> Path | None:
+        return place_of(app, request[name]) if request[name] else None
+
+    named = BoardFootage(place("intrinsics"), place("extrinsics"), place("floor_footage"), request["floor"])
+    return named.completed(place("footage") or session.path)
+
+
+def _kept(app: AppState, proposal: Proposal) -> dict[str, object]:
+    return {"proposal": app.proposals.keep(proposal).identifier, "share": 1.0}

@@ -8,33 +8,28 @@ import asyncio
 from pathlib import Path
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Query
+from fastapi import Query
 from fastapi import Request as HttpRequest
 from fastapi.responses import Response
 from pydantic import Field
 
 from studio.app.server import files
+from studio.app.server.answers import Router
 from studio.app.server.app_state import App, AppState
 from studio.app.server.requests import Arguments, body_of
 from studio.app.server.safe_paths import folder_to_import
-from studio.app.server.schemas import Answer, Number, Request, RunName
-from studio.footage.capture.camera_addresses import CameraAddress, camera_address, without_own
-from studio.footage.capture.live_cameras import CameraStanding
-from studio.footage.capture.stream_files import preview_jpeg
+from studio.app.server.schemas import Request, RunName
+from studio.footage.capture.camera_addresses import CameraAddress, camera_address
 from studio.foundations.errors import NotFoundError
-from studio.operations.jobs.camera_service import RecordingState
+from studio.operations.jobs.camera_service import CamerasStanding, RecordingState
 from studio.operations.jobs.camera_tracking import LiveRecordingRequest
 from studio.operations.jobs.commands import Start, about
 from studio.operations.tracking import live
 from studio.sessions.names import PathRefused
-from studio.sessions.recordings import calibration_given
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 
-router = APIRouter(prefix="/api", tags=["cameras"])
-
-
-Knob = bool | int | float | str
+router = Router(prefix="/api", tags=["cameras"])
 
 
 class CameraRequest(Request):
@@ -52,26 +47,6 @@ class CamerasRequest(Request):
     cameras: list[CameraRequest] = Field(max_length=16)
 
 
-class SpreadView(Answer):
-    """How far apart the pictures of the last sets came, ms. apart: sets of more than half a frame, of `sets`."""
-
-    median: Number
-    most: Number
-    worst: Number
-    apart: int
-    sets: int
-    lagging: str
-
-
-class CamerasView(Answer):
-    """The cameras that are open, and the last recording."""
-
-    cameras: tuple[CameraStanding, ...]
-    spread: SpreadView
-    fps: float
-    recording: RecordingState | None
-
-
 OF_RUN = ("tracker", "weighting", "body", "behaviour", "seed", "knobs")
 TRACKED = ("seconds", "keep_start", *OF_RUN)
 RECORDED: dict[str, Any] = {
@@ -85,19 +60,19 @@ RECORDED: dict[str, Any] = {
 
 
 @router.get("/cameras")
-def cameras(app: App) -> CamerasView:
+def cameras(app: App) -> CamerasStanding:
     """The cameras that are open: state, rate, age of the last picture, how far apart their pictures come."""
-    return _view(app)
+    return app.cameras.standing
 
 
 @router.post("/cameras/preview")
-async def preview(request: CamerasRequest, http: HttpRequest, app: App) -> CamerasView:
+async def preview(request: CamerasRequest, http: HttpRequest, app: App) -> CamerasStanding:
     """Open these cameras instead of those before. They close when they are not read for a while."""
     server = http.scope.get("server") or ("", 0)
     ports = {int(server[1] or 0), *(scene.port for scene in app.scenes.open_scenes().values())}
     addresses = [_address(one, app) for one in request.cameras]
-    await asyncio.to_thread(_open, app, addresses, ports)
-    return _view(app)
+    await asyncio.to_thread(app.cameras.open, addresses, ports)
+    return app.cameras.standing
 
 
 @router.get("/cameras/{name}.jpg", response_class=Response)
@@ -107,17 +82,16 @@ def picture(
     height: Annotated[int | None, Query(ge=16, le=4320, description="Empty: as it came.")] = None,
 ) -> Response:
     """A camera's last picture (JPEG)."""
-    shot = app.cameras.newest(name)
-    return files.picture(preview_jpeg(shot, height))
+    return files.picture(app.cameras.picture(name, height))
 
 
 @router.get("/recordings")
 def recording(app: App) -> RecordingState:
     """The recording that is under way, or the last one."""
-    found = app.cameras.standing.recording
-    if found is None:
+    last = app.cameras.standing.recording
+    if last is None:
         raise NotFoundError("Nothing was recorded yet.", "Begin a recording.")
-    return found
+    return last
 
 
 @router.post("/recordings", status_code=202)
@@ -128,8 +102,7 @@ async def begin(
     base = app.workspace.session(arguments.more["calibration"])
     place = app.workspace.place_for(arguments.more["name"])
     if not arguments.more["track"]:
-        calibration = calibration_given(base.path)
-        return await asyncio.to_thread(app.cameras.record, place, calibration, arguments.get("seconds"))
+        return await asyncio.to_thread(app.cameras.record, base, place, arguments.get("seconds"))
     run_options = {name: arguments[name] for name in arguments if name in OF_RUN} | {"live": True}
 
     def track(session: Session, run: StoredRun) -> None:
@@ -143,10 +116,10 @@ async def begin(
 @router.post("/recordings/stop", status_code=202)
 def stop(app: App) -> RecordingState:
     """End the recording; it becomes a session in the background."""
-    found = app.cameras.stop()
-    if found is None:
+    stopped = app.cameras.stop()
+    if stopped is None:
         raise NotFoundError("Nothing is being recorded.", "Begin a recording.")
-    return found
+    return stopped
 
 
 def _address(camera: CameraRequest, app: AppState) -> CameraAddress:
@@ -162,17 +135,3 @@ def _address(camera: CameraRequest, app: AppState) -> CameraAddress:
         )
     folder = folder_to_import(str(path.parent), app.footage_roots)
     return camera_address(camera.name, str(folder / path.name), replays=True)
-
-
-def _open(app: AppState, addresses: list[CameraAddress], ports: set[int]) -> None:
-    app.cameras.open([without_own(address, ports) for address in addresses])
-
-
-def _view(app: AppState) -> CamerasView:
-    standing = app.cameras.standing
-    return CamerasView(
-        cameras=standing.cameras,
-        spread=SpreadView.model_validate(standing.spreads),
-        fps=standing.fps,
-        recording=standing.recording,
-    )

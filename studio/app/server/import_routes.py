@@ -8,31 +8,31 @@ of it was read.
 
 import asyncio
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Query
+from fastapi import Query
 from pydantic import Field
 
+from studio.app.server.answers import Router, Shown
 from studio.app.server.app_state import App, AppState, release
 from studio.app.server.job_routes import add_job_routes
 from studio.app.server.requests import Arguments, MaybeName, body_of
 from studio.app.server.safe_paths import folder_to_import
-from studio.app.server.schemas import Answer, Request, RunName
+from studio.app.server.schemas import Request, RunName
 from studio.app.server.session_routes import NewName, OpenSession
 from studio.app.server.upload_routes import forget, upload_folder
 from studio.footage.capture.naming import CameraMatch
 from studio.foundations.progress import Progress
-from studio.operations.footage import add_footage, import_footage
+from studio.operations.footage import add_footage, import_footage, unpacked_upload
 from studio.operations.jobs.job_runner import Job, JobKind, NumberedJob
-from studio.results.overlay_pictures import forget_composers
-from studio.sessions.archives import FOOTAGE_PARTS, only_archive, unpacked, unwrapped
 from studio.sessions.importers.importing import ImportReport
 from studio.sessions.names import PathRefused, relative_path
 from studio.sessions.samples import install_sample
 from studio.sessions.session import Session
 
-router = APIRouter(prefix="/api", tags=["importing"])
+router = Router(prefix="/api", tags=["importing"])
 
 
 class ImportState(NumberedJob):
@@ -41,7 +41,7 @@ class ImportState(NumberedJob):
     name: str
     notes: list[str] = Field(default_factory=list)
     warnings: list[str] = Field(default_factory=list)
-    matching: list[CameraMatch] = Field(default_factory=list[CameraMatch])
+    matching: Annotated[tuple[CameraMatch, ...], Shown] = ()
     layout: str = ""
 
 
@@ -56,7 +56,8 @@ IMPORT = JobKind(
 )
 
 
-class FolderView(Answer):
+@dataclass(frozen=True, slots=True)
+class FolderView:
     """Folders of the server's machine that footage may be imported from."""
 
     path: str
@@ -108,9 +109,7 @@ async def begin_adding(
     release(app, session.name)
 
     def take(folder: Path, progress: Progress) -> ImportReport:
-        added = add_footage(session, folder, **_reading(arguments), progress=progress)
-        forget_composers()
-        return added
+        return add_footage(session, folder, **_reading(arguments), progress=progress)
 
     return await begin_taking(app, session.name, arguments, take)
 
@@ -128,7 +127,7 @@ async def begin_taking(app: AppState, name: str, arguments: Arguments, take: Tak
         place = upload_folder(app, upload)
 
     def work(job: Job) -> dict[str, object]:
-        folder = _unpacked(place, job) if upload else place
+        folder = unpacked_upload(place, progress=job.report) if upload else place
         taken = take(folder, job.report_or_stop)
         said = taken.manifest if isinstance(taken, Session) else taken
         if upload:
@@ -138,7 +137,7 @@ async def begin_taking(app: AppState, name: str, arguments: Arguments, take: Tak
             "notes": [note.replace(f"'{upload}'", "what was uploaded") for note in said.notes],
             "warnings": list(said.warnings),
             "layout": said.layout,
-            "matching": list(said.matching),
+            "matching": said.matching,
         }
 
     return app.jobs.begin(IMPORT, ImportState(session=name, name=name, step="reading"), work)
@@ -161,23 +160,14 @@ def folders(
 ) -> FolderView:
     """Folders inside a folder, for choosing one to import; only where footage may be taken from."""
     if not path.strip():
-        return FolderView(path="", parent=None, folders=[str(root) for root in app.footage_roots])
+        return FolderView("", None, [str(root) for root in app.footage_roots])
     place = folder_to_import(path, app.footage_roots)
     try:
-        found = sorted(entry.name for entry in place.iterdir() if entry.is_dir() and entry.name[:1] != ".")
+        names = sorted(entry.name for entry in place.iterdir() if entry.is_dir() and entry.name[:1] != ".")
     except PermissionError:
         raise PathRefused(f"'{place}' may not be read.", "Check the folder's permissions.") from None
     inside = any(place.parent.is_relative_to(root) for root in app.footage_roots)
-    return FolderView(
-        path=str(place), parent=str(place.parent) if inside else "", folders=found[:FOLDERS_SHOWN]
-    )
-
-
-def _unpacked(folder: Path, job: Job) -> Path:
-    """The uploaded folder itself: out of its archive, and without the folders that only wrap it."""
-    if only_archive(folder):
-        job.change(step="unpacking")
-    return unwrapped(unpacked(folder), FOOTAGE_PARTS)
+    return FolderView(str(place), str(place.parent) if inside else "", names[:FOLDERS_SHOWN])
 
 
 def _reading(arguments: Arguments) -> dict[str, Any]:

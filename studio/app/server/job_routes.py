@@ -1,44 +1,48 @@
 """Work in the background: the list of all of it, and of every kind the addresses of its state and to stop it."""
 
+from dataclasses import dataclass
 from string import Formatter
 from typing import Annotated
 from urllib.parse import quote
 
 from fastapi import APIRouter, Query
-from pydantic import Field
+from pydantic import Field, FiniteFloat
 
+from studio.app.server.answers import Router
 from studio.app.server.app_state import App
-from studio.app.server.schemas import Answer, Number
+from studio.foundations.records import extended
 from studio.operations.jobs.job_runner import Job, JobKind, SessionJob, State
 
-router = APIRouter(prefix="/api", tags=["jobs"])
+router = Router(prefix="/api", tags=["jobs"])
 
 
-class JobLine(Answer):
-    """A job that is under way, or over since the studio was started. kind: type of its events. noun: what it is called.
-    at: the address of its whole state, "" where the page has it. page: where what came of it is shown.
+@dataclass(frozen=True, slots=True)
+class JobLine:
+    """A job that is under way, or over since the studio was started. kind : type of its events. noun : what it is
+    called. at : the address of its whole state, "" where the page has it. page : where what came of it is shown.
     """
 
     kind: str
-    key: str = Field(description="By which it is stopped.")
+    key: Annotated[str, Field(description="By which it is stopped.")]
     noun: str
     session: str
-    name: str = Field("", description="Of what it makes, where that has one.")
-    run: str = ""
-    verb: str = ""
-    began: float
+    name: Annotated[str, Field(description="Of what it makes, where that has one.")]
+    run: str
+    verb: str
+    began: FiniteFloat
     state: str
     step: str
     done: int
     total: int
-    seconds_left: Number
+    seconds_left: float | None
     message: str
     hint: str
     at: str
     page: str
 
 
-class JobList(Answer):
+@dataclass(frozen=True, slots=True)
+class JobList:
     """All work in the background, the oldest first."""
 
     jobs: list[JobLine]
@@ -53,7 +57,7 @@ def jobs(
     """What is under way, and what is over since the studio was started: how a page that was loaded again, or another
     one, finds it.
     """
-    return JobList(jobs=[_line(job) for job in app.jobs.jobs(session, kind)])
+    return JobList([_line(job) for job in app.jobs.jobs(session, kind)])
 
 
 @router.delete("/jobs/{kind}/{key:path}", status_code=202)
@@ -66,7 +70,8 @@ def _line(job: Job) -> JobLine:
     state, kind = job.state, job.kind
     fields = dict(state)
     fields["run"] = fields.get("made_run") or fields.get("run")
-    return JobLine.of(
+    return extended(
+        JobLine,
         state,
         kind=kind.event,
         noun=kind.noun,

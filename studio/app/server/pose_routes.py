@@ -2,62 +2,40 @@
 
 import asyncio
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
-import numpy as np
-from fastapi import APIRouter
-from pydantic import Field
+from pydantic import Field, FiniteFloat
 
-from studio.app.server.answers import Shown
+from studio.app.server.answers import Router
 from studio.app.server.app_state import App, Scene
 from studio.app.server.job_routes import add_job_routes
 from studio.app.server.requests import Arguments, body_of
-from studio.app.server.schemas import Answer, Number, Numbers, Request, RunName
+from studio.app.server.schemas import Number, Numbers, Request, RunName
 from studio.app.server.session_routes import OpenSession
 from studio.app.server.track_routes import TRACK, TrackJobState, begin_job
 from studio.app.server.windows import Window
-from studio.body.dragging import Dragger
-from studio.body.mirroring import Mirror, has_sides
+from studio.body.mirroring import Mirror
 from studio.body.model import BodyModel, checked_pose
 from studio.foundations.arrays import Array
 from studio.foundations.declaring import LARGEST
 from studio.foundations.errors import SettingsError, StudioError
 from studio.operations.jobs.job_runner import Job, JobKind, NumberedJob
-from studio.operations.overview import ParameterView, parameter_views
 from studio.operations.person import initialise
-from studio.runs.new_run import checked_frames
-from studio.runs.setup.pose_search import better_pose
-from studio.runs.setup.start_pose_file import keep_start_pose
+from studio.operations.poses import (
+    PoseSearch,
+    PoseView,
+    dragged_pose,
+    improve_pose,
+    pose_view,
+    set_start_pose,
+)
+from studio.operations.poses import start_pose as start_pose_of
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 
-router = APIRouter(prefix="/api", tags=["poses"])
-
-
-class GripView(Answer):
-    """A limb's end that can be dragged. place: where it is in the pose, mm."""
-
-    name: str
-    side: str
-    place: list[float]
-
-
-class PoseView(Answer):
-    """A pose of the session's body: radians and mm in the order of `parameters`.
-
-    stored: whether it is the session's start pose (else the rest pose); frame: that it is of. left_mm: after a drag,
-    how far the limb's end still is from where it was dragged.
-    """
-
-    body: str
-    parameters: tuple[Annotated[ParameterView, Shown], ...]
-    pose: list[float]
-    grips: list[GripView]
-    stored: bool = False
-    frame: int = 0
-    left_mm: Number = None
-    has_sides: bool = Field(False, description="Whether it can be mirrored.")
+router = Router(prefix="/api", tags=["poses"])
 
 
 class StartPoseRequest(Request):
@@ -70,7 +48,7 @@ class StartPoseRequest(Request):
 
 
 class PoseRequest(Request):
-    """A pose, of the session's body or of a run's (which then also says with what weighting it is judged)."""
+    """A pose, of the session's body or of a run's (which then also gives the likelihood)."""
 
     pose: list[float]
     run: RunName | None = None
@@ -91,7 +69,7 @@ class MirrorRequest(PoseRequest):
 
 class BetterPoseRequest(PoseRequest):
     """A short search around the pose in a frame, then local refinement. keep: what is better becomes the session's
-    start pose, whoever still waits for it.
+    start pose, whether or not a page still waits for it.
     """
 
     frame: int = Field(0, ge=0, le=LARGEST)
@@ -110,16 +88,17 @@ class EditRequest(Request):
     pose: list[float] | None = None
 
 
-class EditState(Answer):
-    """What is being edited in the scene; all null while nothing is. moved: whether it is another pose than it was.
-    steps: changes that can be undone.
+@dataclass(frozen=True, slots=True)
+class EditState:
+    """What is being edited in the scene; all null while nothing is. moved : whether it is another pose than it was.
+    steps : changes that can be undone.
     """
 
     editing: bool = False
     session: str | None = None
     run: str | None = None
     frame: int | None = None
-    pose: list[float] | None = None
+    pose: list[FiniteFloat] | None = None
     moved: bool = False
     steps: int = 0
 
@@ -160,61 +139,45 @@ START_POSE = JobKind(
 @router.get(SESSION + "/start-pose")
 def start_pose(session: OpenSession) -> PoseView:
     """The session's start pose, or its body's rest pose while it has none."""
-    body = session.body()
-    own = session.start_pose(body)
-    pose = body.neutral if own is None else own
-    return _view(body, pose, stored=own is not None, frame=session.start_pose_frame())
+    return start_pose_of(session)
 
 
 @router.put(SESSION + "/start-pose")
 def put_start_pose(session: OpenSession, request: StartPoseRequest, app: App) -> PoseView:
     """Make a pose the session's start pose; the one it had stays beside it."""
-    body = session.body()
-    pose = checked_pose(body, request.pose, SettingsError)
-    keep_start_pose(session, body, pose, request.frame)
+    kept = set_start_pose(session, request.pose, request.frame)
     app.events.session_changed(session.name)
-    return _view(body, pose, stored=True, frame=session.start_pose_frame())
+    return kept
 
 
 @router.post(SESSION + "/pose/drag")
 def drag(session: OpenSession, request: DragRequest) -> PoseView:
     """The pose with a limb's end at a place; the rest of the body follows where it must."""
-    body = _body(session, request)[0]
-    found = Dragger(body).dragged(
-        checked_pose(body, request.pose, SettingsError), request.limb, np.array(request.target)
-    )
-    return _view(body, found.pose, left_mm=found.left_mm)
+    body, pose, _ = _posed(session, request)
+    return dragged_pose(body, pose, request.limb, request.target)
 
 
 @router.post(SESSION + "/pose/mirror")
 def mirror(session: OpenSession, request: MirrorRequest) -> PoseView:
     """The pose with left and right exchanged."""
-    body = _body(session, request)[0]
-    found = Mirror(body)
-    pose = checked_pose(body, request.pose, SettingsError)
-    return _view(body, found.mirrored(pose) if request.how == "in place" else found.turned_round(pose))
+    body, pose, _ = _posed(session, request)
+    other = Mirror(body)
+    turned = other.mirrored(pose) if request.how == "in place" else other.turned_round(pose)
+    return pose_view(body, turned)
 
 
 @router.post(SESSION + "/pose/refine", status_code=202)
 async def begin_refining_pose(session: OpenSession, request: BetterPoseRequest, app: App) -> TrackJobState:
     """Begin a short search around the pose, with the weighting in use. `track` events report it."""
-    checked_frames(session, request.frame, request.frame + 1)
-    body, run = _body(session, request)
-    pose = checked_pose(body, request.pose, SettingsError)
+    session.checked_frames(request.frame, request.frame + 1)
+    _, pose, run = _posed(session, request)
+    search = PoseSearch(request.frame, pose, run, request.seed, request.keep)
 
     def work(job: Job) -> dict[str, object]:
-        found = better_pose(
-            session,
-            request.frame,
-            pose,
-            run=run,
-            seed=request.seed,
-            progress=job.report_or_stop,
-        )
-        if request.keep and run is None and found.gain > 0.0:
-            keep_start_pose(session, body, found.pose, request.frame)
+        better = improve_pose(session, search, job.report_or_stop)
+        if request.keep and run is None and better.gain > 0.0:
             app.events.session_changed(session.name)
-        return TRACK.entries(found, pose=found.pose.tolist())
+        return TRACK.entries(better, pose=better.pose.tolist())
 
     return begin_job(app, "pose", session, run, work)
 
@@ -222,18 +185,11 @@ async def begin_refining_pose(session: OpenSession, request: BetterPoseRequest, 
 @router.get("/scene/edit")
 def editing(scene: Scene) -> EditState:
     """What is being edited in the asking window's scene, with the pose as it is now."""
-    found = scene.poses.editing
-    if found is None:
+    edited = scene.poses.editing
+    if edited is None:
         return EditState()
-    return EditState(
-        editing=True,
-        session=found.session,
-        run=found.run or None,
-        frame=found.frame,
-        pose=[float(value) for value in found.pose],
-        moved=found.moved,
-        steps=found.steps,
-    )
+    pose = [float(value) for value in edited.pose]
+    return EditState(True, edited.session, edited.run or None, edited.frame, pose, edited.moved, edited.steps)
 
 
 @router.post("/scene/edit", status_code=202)
@@ -248,7 +204,7 @@ def edit(request: EditRequest, app: App, scene: Scene) -> None:
     if request.pose is not None:
         checked_pose(run.body() if run else session.body(), request.pose, SettingsError)
     if request.frame is not None:
-        checked_frames(session, request.frame, request.frame + 1)
+        session.checked_frames(request.frame, request.frame + 1)
     scene.poses.edit(session.name, run.name if run else "", request.frame, request.pose)
 
 
@@ -264,30 +220,11 @@ def leave(scene: Scene) -> None:
     scene.poses.leave()
 
 
-def _body(session: Session, request: PoseRequest) -> tuple[BodyModel, StoredRun | None]:
+def _posed(session: Session, request: PoseRequest) -> tuple[BodyModel, Array, StoredRun | None]:
+    """The body and (D,) pose of a request, and the run that they are of. Raises SettingsError, NotFoundError."""
     run = session.run(request.run) if request.run else None
-    return (run.body() if run else session.body()), run
-
-
-def _view(
-    body: BodyModel, pose: Array, *, stored: bool = False, frame: int = 0, left_mm: float | None = None
-) -> PoseView:
-    dragger = Dragger(body)
-    places = dragger.points(pose)
-    grips = [
-        GripView(name=grip.name, side=grip.side, place=place.tolist())
-        for grip, place in zip(dragger.grips, places, strict=True)
-    ]
-    return PoseView(
-        body=body.name,
-        parameters=parameter_views(body),
-        pose=pose.tolist(),
-        grips=grips,
-        stored=stored,
-        frame=frame,
-        left_mm=left_mm,
-        has_sides=has_sides(body),
-    )
+    body = run.body() if run else session.body()
+    return body, checked_pose(body, request.pose, SettingsError), run
 
 
 @router.post("/sessions/{session}/initialise", status_code=202)
@@ -299,18 +236,17 @@ async def begin_initialisation(
 ) -> InitialisationState:
     """Begin to look for the pose in a frame. Ask for its state, or wait for `initialise` events."""
     frame = arguments["frame"]
-    checked_frames(session, frame, frame + 1)
+    session.checked_frames(frame, frame + 1)
     await asyncio.to_thread(session.body, arguments.get("body"))
     if "weighting" in arguments:
         WEIGHTINGS[arguments["weighting"]]
 
     def work(job: Job) -> dict[str, object]:
-        found = initialise(session, **arguments, progress=job.report_or_stop)
-        with suppress(StudioError):  # without room for a scene the pose is found all the same
+        first = initialise(session, **arguments, progress=job.report_or_stop)
+        with suppress(StudioError):  # without room for a scene the pose is kept all the same
             scene = app.scenes.scene(window)
-            scene.poses.propose(session.name, found.pose.tolist(), found.source, found.frame)
-        file = found.file.name if found.file else ""
-        return START_POSE.entries(found, parameters=found.names, file=file)
+            scene.poses.propose(session.name, first.pose.tolist(), first.source, first.frame)
+        return START_POSE.entries(first, parameters=first.names, file=first.file.name if first.file else "")
 
     state = InitialisationState(session=session.name, frame=frame)
     return app.jobs.begin(START_POSE, state, work)

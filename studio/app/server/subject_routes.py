@@ -1,8 +1,7 @@
 """The person in front of the cameras: by height, and fitted to the footage in the background (`subject` events)."""
 
 import asyncio
-from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated
 
 from fastapi import Query, Response
 from pydantic import Field
@@ -13,72 +12,36 @@ from studio.app.server.app_state import App, AppState
 from studio.app.server.job_routes import add_job_routes
 from studio.app.server.picture_routes import Height
 from studio.app.server.requests import Arguments, body_of
-from studio.app.server.schemas import Answer, Number, Numbers
+from studio.app.server.schemas import Numbers
 from studio.app.server.session_routes import OpenSession
 from studio.body.model import BodyModel
-from studio.body.subject import SHORTEST_MM, TALLEST_MM, Subject
+from studio.body.subject import SHORTEST_MM, TALLEST_MM
 from studio.body.upright import LimbDrawing, limb_drawings
 from studio.foundations.arrays import Array
 from studio.foundations.errors import BodyError, NotFoundError
 from studio.foundations.progress import unheard
 from studio.operations.jobs.job_runner import Job, JobKind, NumberedJob
-from studio.operations.person import fit_subject
+from studio.operations.person import FitSoFar, SubjectInUse, fit_subject, subject_in_use
+from studio.operations.person import keep_fit as keep_fitted
 from studio.operations.person import subject as write_subject
-from studio.results.overlay_pictures import compose_view, forget_composers
-from studio.runs.drawing.overlay_drawing import encode_jpeg
-from studio.runs.setup.subject_choice import body_of_choice, keep_fitted
-from studio.runs.setup.subject_fitting import FittedSubject
-from studio.sessions.provenance import origin_of
-from studio.sessions.session import SUBJECT_NAME, Session
+from studio.operations.pictures import View, fit_picture
+from studio.runs.setup.subject_fitting import FittedSize, FittedSubject
+from studio.sessions.session import Session
 
 router = Router(prefix="/api", tags=["subject"])
-
-
-class SubjectAnswer(Answer):
-    """A session's person. dimensions: mm (ratios without unit), by the body's own names. source: of proportions.
-    saved: whether the session has a subject at all; fitted: whether it was fitted to the footage.
-    """
-
-    body: str
-    height_mm: Number
-    dimensions: dict[str, float]
-    notes: list[str]
-    source: str
-    limbs: list[Annotated[LimbDrawing, Shown]]
-    saved: bool = False
-    fitted: bool = False
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FitSoFar:
-    """What a fit under way has: poses (F, D) of a body in F frames."""
-
-    body: BodyModel
-    frames: tuple[int, ...]
-    poses: Array
-
-
-class SizeLine(Answer):
-    """A group of dimensions, mm. deviation: one standard deviation of `after`."""
-
-    name: str
-    kind: Literal["length", "radius"]
-    before: Number
-    after: Number
-    deviation: Number
 
 
 class FitSubjectState(NumberedJob):
     """How a fit stands. frames: those with a pose so far, which have pictures; looks: rises whenever these are other
     ones. overlap: f_s of each frame's silhouettes.
-    limbs: of the body that was found. file: what it was kept as, "" where it is not.
+    limbs: of the fitted body. file: what it was kept as, "" where it is not.
     """
 
     body: str = ""
     frames: list[int] = Field(default_factory=list[int])
     looks: int = 0
     poses_from: str = ""
-    sizes: list[SizeLine] = Field(default_factory=list[SizeLine])
+    sizes: Annotated[tuple[FittedSize, ...], Shown] = ()
     overlap_before: Numbers | None = None
     overlap: Numbers | None = None
     limbs: list[Annotated[LimbDrawing, Shown]] = Field(default_factory=list[LimbDrawing])
@@ -100,26 +63,11 @@ def subject(
     session: OpenSession,
     height_mm: Annotated[float | None, Query(description="As if the person were so tall.")] = None,
     body: Annotated[str, Query(max_length=64, description="As if it were this kinematic tree.")] = "",
-) -> SubjectAnswer:
+) -> SubjectInUse:
     """The session's person: every dimension of the body as a run would have it, and its limbs as it stands upright;
     with a height or body as a preview, nothing is written.
     """
-    known = session.subject()
-    if height_mm is None and not body:
-        tree, notes = session.body_with_notes()
-    else:
-        known = Subject(body=body or session.manifest.body, height_mm=height_mm)
-        tree, notes = body_of_choice(session, known)
-    return SubjectAnswer(
-        body=tree.name,
-        height_mm=known.height_mm if known else None,
-        dimensions=dict(tree.dimensions),
-        notes=list(notes),
-        source=tree.definition.source if tree.definition else "",
-        limbs=limb_drawings(tree),
-        saved=(session.path / SUBJECT_NAME).exists(),
-        fitted=origin_of(session, "subject") is not None,
-    )
+    return subject_in_use(session, height_mm, body)
 
 
 @router.put("/sessions/{session}/subject")
@@ -143,7 +91,7 @@ def set_subject(
         ),
     ],
     app: App,
-) -> SubjectAnswer:
+) -> SubjectInUse:
     """Write down a height (and measured lengths); everything else follows by published proportions. A body that is
     named becomes the session's; without a height, as with animals, in its file's size.
     """
@@ -151,7 +99,6 @@ def set_subject(
         raise BodyError("Neither a height nor a body is given.", "Give one of them.")
     write_subject(session, **arguments, **arguments.more, progress=unheard)
     app.jobs.forget(SUBJECT, session.name)
-    forget_composers()
     app.events.session_changed(session.name)
     return subject(Session(session.path))
 
@@ -170,12 +117,10 @@ async def begin_fit(
                 frames=frames, looks=job.state.looks + 1 if isinstance(job.state, FitSubjectState) else 0
             )
 
-        found = fit_subject(session, **arguments, progress=job.report_or_stop, shown=show)
-        forget_composers()
-        job.found = found
-        file = found.file.name if found.file else ""
-        body, limbs = found.body.name, limb_drawings(found.body)
-        return SUBJECT.entries(found, body=body, limbs=limbs, file=file)
+        fitted = fit_subject(session, **arguments, progress=job.report_or_stop, shown=show)
+        job.found = fitted
+        file = fitted.file.name if fitted.file else ""
+        return SUBJECT.entries(fitted, body=fitted.body.name, limbs=limb_drawings(fitted.body), file=file)
 
     return app.jobs.begin(SUBJECT, FitSubjectState(session=session.name), work)
 
@@ -186,36 +131,27 @@ add_job_routes(router, "/subject-fits/{identifier}", SUBJECT)
 @router.post("/subject-fits/{identifier}/keep")
 def keep_fit(identifier: str, app: App) -> FitSubjectState:
     """Keep what a fit found as the session's subject; the old one stays beside it."""
-    found = _found(identifier, app)
+    fitted = _fitted(identifier, app)
     state = app.jobs.state(SUBJECT, identifier)
-    place = keep_fitted(app.workspace.session(state.session), found)
-    forget_composers()
-    state = app.jobs.change(SUBJECT, identifier, file=place.name)
+    kept = keep_fitted(app.workspace.session(state.session), fitted)
+    state = app.jobs.change(SUBJECT, identifier, file=kept.file.name if kept.file else "")
     app.events.session_changed(state.session)
     return state
 
 
 @router.get("/subject-fits/{identifier}/frames/{frame}/views/{camera}.jpg", response_class=Response)
 def fitted_picture(identifier: str, frame: int, camera: str, app: App, height: Height = None) -> Response:
-    """The body that was found, or that is so far, over what a camera saw in a frame that was looked at."""
-    found = app.jobs.found(SUBJECT, identifier)
-    if not isinstance(found, FitSoFar):
-        found = _found(identifier, app)
-    if frame not in found.frames:
-        listed = ", ".join(map(str, found.frames))
-        raise NotFoundError(f"Frame {frame} was not looked at in this fit.", f"These were: {listed}.")
+    """The fitted body, or the one that is so far, over what a camera saw in a frame that was looked at."""
+    known = app.jobs.found(SUBJECT, identifier)
+    fit = known if isinstance(known, FitSoFar) else _fitted(identifier, app)
     session = app.workspace.session(app.jobs.state(SUBJECT, identifier).session)
-    pose = found.poses[found.frames.index(frame)]
-    picture = compose_view(
-        session, None, frame, camera, ("outline", "mask"), pose, height=height, body=found.body
-    )
-    return files.picture(encode_jpeg(picture))
+    return files.picture(fit_picture(session, fit, View(frame, camera, height=height)))
 
 
-def _found(identifier: str, app: AppState) -> FittedSubject:
-    """What a fit found. Raises NotFoundError."""
-    found = app.jobs.found(SUBJECT, identifier)
-    if not isinstance(found, FittedSubject):
+def _fitted(identifier: str, app: AppState) -> FittedSubject:
+    """What a fit gave. Raises NotFoundError."""
+    fitted = app.jobs.found(SUBJECT, identifier)
+    if not isinstance(fitted, FittedSubject):
         state = app.jobs.state(SUBJECT, identifier).state
         raise NotFoundError(f"This fit found no subject: it is {state}.", "Begin a new one.")
-    return found
+    return fitted

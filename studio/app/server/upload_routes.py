@@ -9,21 +9,23 @@ import asyncio
 import secrets
 import shutil
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Request
+from fastapi import Query, Request
 
+from studio.app.server.answers import Router
 from studio.app.server.app_state import App, AppState
 from studio.app.server.error_responses import TooLargeError
-from studio.app.server.schemas import Answer
 from studio.foundations.errors import NotFoundError, SessionError, StudioError
 from studio.sessions.names import inside, place_in, relative_path
 
-router = APIRouter(prefix="/api/uploads", tags=["importing"])
+router = Router(prefix="/api/uploads", tags=["importing"])
 
 
-class UploadState(Answer):
+@dataclass(frozen=True, slots=True)
+class UploadState:
     """An unfinished upload: its files with the bytes received of each."""
 
     identifier: str
@@ -32,8 +34,9 @@ class UploadState(Answer):
     limit: int
 
 
-class FileState(Answer):
-    """One file of an upload. received: its bytes; total: bytes of the whole upload."""
+@dataclass(frozen=True, slots=True)
+class FileState:
+    """One file of an upload. received : its bytes. total : bytes of the whole upload."""
 
     path: str
     received: int
@@ -124,7 +127,7 @@ async def receive(
             received += len(chunk)
             files[name] = received
     files[name] = received
-    return FileState(path=name, received=received, total=others + received)
+    return FileState(name, received, others + received)
 
 
 def _prepare(folder: Path, place: Path, offset: int, files: int) -> None:
@@ -159,4 +162,4 @@ def _files(app: AppState, folder: Path) -> dict[str, int]:
 
 def _state(app: AppState, folder: Path) -> UploadState:
     files = dict(_files(app, folder))
-    return UploadState(identifier=folder.name, files=files, total=sum(files.values()), limit=LIMIT)
+    return UploadState(folder.name, files, sum(files.values()), LIMIT)

@@ -10,10 +10,12 @@ pairs must agree. An estimate is shown to a person; nothing here applies it.
 import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Annotated
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from studio.footage.capture.footage_source import FootageSource
 from studio.footage.capture.naming import listed
@@ -51,7 +53,7 @@ class PairLag:
     within: int
 
     @property
-    def sure(self) -> bool:
+    def sure(self) -> Annotated[bool, Field()]:
         """Whether the peak stands out and is narrow."""
         return self.peak >= SURE_PEAK and self.ratio >= SURE_RATIO and self.within <= SURE_WITHIN
 

@@ -3,22 +3,28 @@
 import contextlib
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from studio.footage.capture.camera_addresses import CameraAddress
-from studio.footage.capture.camera_streams import Shot
+from pydantic import Field, FiniteFloat
+
+from studio.footage.capture.camera_addresses import CameraAddress, without_own
 from studio.footage.capture.live_cameras import CameraStanding, SpreadFigures
+from studio.footage.capture.stream_files import preview_jpeg
 from studio.foundations.errors import NotFoundError, RunError, StudioError
 from studio.foundations.words import counted
 from studio.operations.jobs.camera_readers import CameraReaders
 from studio.operations.jobs.camera_tracking import LiveRecordingRequest, discard_recording, open_recording
 from studio.operations.jobs.job_runner import Job, JobKind, JobRunner, SessionJob
-from studio.operations.jobs.stream_recording import StreamRecording, recording_folder
+from studio.operations.jobs.stream_recording import (
+    RecordingStanding,
+    StreamRecording,
+    recording_folder,
+)
 from studio.runs.new_run import prepare_run
-from studio.sessions.recordings import check_cameras, import_recording
+from studio.sessions.recordings import calibration_given, check_cameras, import_recording
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 
@@ -56,8 +62,8 @@ class CamerasStanding:
     """cameras : those that are open, spreads : of their pictures. recording : the last one, None before the first."""
 
     cameras: tuple[CameraStanding, ...]
-    spreads: SpreadFigures
-    fps: float
+    spreads: Annotated[SpreadFigures, Field(serialization_alias="spread")]
+    fps: FiniteFloat
     recording: RecordingState | None
 
 
@@ -76,10 +82,14 @@ class CameraService:
         self._stop = threading.Event()
         self._after = 0.0
 
-    def open(self, addresses: Sequence[CameraAddress]) -> None:
-        """Look at these cameras instead of those before. Raises RunError while they are recorded, FootageError."""
+    def open(self, addresses: Sequence[CameraAddress], own_ports: Collection[int] = ()) -> None:
+        """Look at these cameras instead of those before. own_ports : the studio's, where none of them is.
+
+        Raises RunError while cameras are recorded, FootageError.
+        """
         self._jobs.check_free(RECORDINGS)
-        readers = CameraReaders(addresses) if addresses else None
+        kept_off = [without_own(address, own_ports) for address in addresses]
+        readers = CameraReaders(kept_off) if kept_off else None
         with self._lock:
             before, self._readers = self._readers, readers
         if before is not None:
@@ -95,29 +105,36 @@ class CameraService:
             nan = float("nan")
             return CamerasStanding((), SpreadFigures(nan, nan, nan, 0, 0, ""), 0.0, recording)
         if recording is None or not recording.state.is_going:
-            found = readers.cameras.newest_set(self._after)
-            if found is not None:
-                self._after = max(shot.came for shot in found.shots.values())
+            newest = readers.cameras.newest_set(self._after)
+            if newest is not None:
+                self._after = max(shot.came for shot in newest.shots.values())
         cameras = readers.cameras
         return CamerasStanding(cameras.standings, cameras.spreads, cameras.fps, recording)
 
-    def newest(self, name: str) -> Shot:
-        """A camera's last picture. Raises NotFoundError."""
+    def picture(self, name: str, height: int | None = None) -> bytes:
+        """A camera's last picture as JPEG, at most so many pixels high. Raises NotFoundError."""
         self._keep_open()
         for camera in self._readers.cameras.cameras if self._readers else ():
             if camera.name == name and camera.newest is not None:
-                return camera.newest
+                return preview_jpeg(camera.newest, height)
         raise NotFoundError(f"Camera '{name[:40]}' shows no picture.", "Add it, and wait until it runs.")
 
-    def record(self, place: Path, calibration: Path, seconds: float | None) -> RecordingState:
-        """Record the cameras into a session at `place`. Raises RunError, FootageError."""
+    def record(self, base: Session, place: Path, seconds: float | None) -> RecordingState:
+        """Record the cameras into a session at `place`, with the calibration of another one.
+
+        Raises RunError, FootageError.
+        """
+        calibration = calibration_given(base.path)
         readers = self._free_readers(place)
         check_cameras(calibration, readers.cameras.names)
         folder = recording_folder(place)
-        return self._begin(
-            RecordingState(kind="record", session=place.name, limit=seconds),
-            lambda job: self._record(job, readers, folder, place, calibration, seconds),
-        )
+
+        def work(job: Job) -> dict[str, object]:
+            standing = self._record(job, readers, folder, seconds)
+            report, spreads = import_recording(folder, place, calibration, standing.notes)
+            return {"step": "", "words": spreads.in_words, "notes": report.warnings}
+
+        return self._begin(RecordingState(kind="record", session=place.name, limit=seconds), work)
 
     def track(
         self, base: Session, request: LiveRecordingRequest, wanted: Mapping[str, Any], on_run: OnRun
@@ -157,14 +174,9 @@ class CameraService:
         return self._jobs.begin(RECORDINGS, first.model_copy(update={"step": GETTING_READY}), guarded)
 
     def _record(
-        self,
-        job: Job,
-        readers: CameraReaders,
-        folder: Path,
-        place: Path,
-        calibration: Path,
-        seconds: float | None,
-    ) -> dict[str, object]:
+        self, job: Job, readers: CameraReaders, folder: Path, seconds: float | None
+    ) -> RecordingStanding:
+        """Record until it is to end; how it went."""
         readers.await_pictures()
         recording = StreamRecording(readers, folder, readers.await_rate())
         try:
@@ -177,8 +189,7 @@ class CameraService:
         finally:
             standing = recording.close()
         job.change(step=IMPORTING, seconds=standing.seconds, words=standing.in_words)
-        report, spreads = import_recording(folder, place, calibration, standing.notes)
-        return {"step": "", "words": spreads.in_words, "notes": report.warnings}
+        return standing
 
     def _track(
         self,

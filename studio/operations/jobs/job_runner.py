@@ -160,7 +160,9 @@ class Job:
         with self._lock:
             # Validated, so that numbers that are none become null.
             self.state = self.kind.states.model_validate({**dict(self.state), **changes})
-            self._publish({"type": self.kind.event, "run": "", **self.state.model_dump(mode="json")})
+            self._publish(
+                {"type": self.kind.event, "run": "", **self.state.model_dump(mode="json", by_alias=True)}
+            )
 
     def report(self, step: str, done: int, total: int, **more: object) -> None:
         """Tell how far the work is: at once for a new step and for its end, else as often as is read.

@@ -9,7 +9,7 @@ from studio.operations.jobs.batch import track_to_end
 from studio.results.comparison.footage_cache import FootageCache
 from studio.results.comparison.sweep import measured_run
 from studio.results.comparison.trials import ALLOW_INCONSISTENT, kept_as
-from studio.runs.new_run import checked_frames, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.setup.session_settings import session_settings
 from studio.search.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, values
 from studio.sessions.names import free_name
@@ -39,8 +39,8 @@ def measure_run_of_batch(arguments: Mapping[str, Any], cache: FootageCache) -> d
     """The same of a session that whoever asks has not opened: what is left out is the session's own."""
     session = cache.session(arguments["footage"])
     about, first = session.manifest, arguments["first"]
-    first, last = checked_frames(
-        session, session.start_pose_frame() if first is None else first, arguments["last"]
+    first, last = session.checked_frames(
+        session.start_pose_frame() if first is None else first, arguments["last"]
     )
     filled = {
         "first": first,

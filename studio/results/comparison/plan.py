@@ -21,7 +21,7 @@ from studio.results.comparison.statistics import SignTest, sign_test
 from studio.results.comparison.tracked import Tracked, TrackingTrial, tracking_trial
 from studio.results.comparison.trials import Outcome, Trial
 from studio.runs.behaviour_models import ChosenModel, chosen_model, needs_model
-from studio.runs.new_run import checked_frames, start_of
+from studio.runs.new_run import start_of
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.settings import DEFAULT_WEIGHTING
 from studio.search.trackers.frame_refinement import FrameRefinementSettings
@@ -150,7 +150,7 @@ def plan_comparison(
         )
     weighting = WEIGHTINGS[lineup.weighting or session.manifest.weighting or DEFAULT_WEIGHTING].name
     check_seeds(seeds)
-    begin, end = checked_frames(session, first, last)
+    begin, end = session.checked_frames(first, last)
     model = session.body(body or None)
     start_of(session, model, None)
     taking_part = candidates(replace(lineup, weighting=weighting))

@@ -25,7 +25,6 @@ from studio.results.comparison.statistics import bootstrap_interval
 from studio.results.comparison.trials import ALLOW_INCONSISTENT, Outcome, Trial
 from studio.results.evaluation.errors import evaluate
 from studio.runs.behaviour_models import chosen_model, needs_model
-from studio.runs.new_run import checked_frames
 from studio.runs.pace import stored_pace
 from studio.runs.setup.session_settings import session_settings
 from studio.runs.setup.silhouette_doubts import accepted_doubts
@@ -163,7 +162,7 @@ def plan_sweep(
         points.append(Candidate(point_name(point), tracker, weighting, evaluations, {**fixed, **point}))
     model = session.body(body or None)
     first = session.start_pose_frame(model.name) if first is None else first
-    begin, end = checked_frames(session, first, last)
+    begin, end = session.checked_frames(first, last)
     guided = next((one.settings() for one in points if needs_model(tracker, one.settings().tracker)), None)
     chosen = chosen_model(session, model, guided, behaviour) if guided else None
     evaluations = max(one.evaluations for one in points)

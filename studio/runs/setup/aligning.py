@@ -21,6 +21,8 @@ WORTHWHILE = 3.0
 """Pixels by which tangents miss (the worst camera's median) from which aligning is advised."""
 BETTER = 0.8
 """An alignment that leaves the worst camera more than this share of its former miss explains nothing."""
+SAME_DEGREES, SAME_MM = 1e-3, 0.1
+"""Files keep cameras to fewer digits than memory."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,6 +41,18 @@ class SessionAlignment:
     def better(self) -> bool:
         """Whether turning the cameras explains most of the misses."""
         return bool(np.nanmax(self.found.after) < BETTER * np.nanmax(self.found.before))
+
+    def is_of(self, session: Session) -> bool:
+        """Whether the cameras in use are those that were measured: they differ from the turned ones by the turns."""
+        now, measured = session.cameras(), self.found
+        if tuple(camera.name for camera in now) != self.names:
+            return False
+        for camera, turned, angle in zip(now, measured.cameras, measured.turns, strict=True):
+            cosine = (np.trace(turned.rotation @ camera.rotation.T) - 1.0) / 2.0
+            apart = float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+            if abs(apart - angle) > SAME_DEGREES or np.linalg.norm(camera.centre - turned.centre) > SAME_MM:
+                return False
+        return True
 
     def in_words(self) -> tuple[str, ...]:
         """One line a camera."""

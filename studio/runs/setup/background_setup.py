@@ -267,7 +267,7 @@ def _tells_too_little(quality: MaskQuality) -> bool:
 def _tried_besides(made: BackgroundSetup, quality: MaskQuality, best: BackgroundSetup) -> BackgroundSetup:
     """What "best" made after a source of low contrast, and why it was tried. quality : of the source's masks."""
     assert quality.contrast is not None
-    note = f"{sentence(quality.contrast.in_words())}: every source was tried besides {made.source}."
+    note = f"{sentence(quality.contrast.words)}: every source was tried besides {made.source}."
     return dataclasses.replace(best, notes=(*made.notes, note, *best.notes))
 
 
@@ -480,7 +480,7 @@ def frames_in_words(frames: Sequence[int]) -> str:
 
 def _agreement(session: Session, own: Mapping[str, Knob], progress: Progress) -> MaskQuality | None:
     """How far the views agree with masks that need no tuning; None where there is one view, or no calibration."""
-    if len(session.manifest.footage.cameras) < 2 or not session.is_calibrated:
+    if not session.is_comparable:
         return None
     frames = spread_frames(session.manifest.frame_count, TRIED_FRAMES)
     return mask_quality(session, _settings(session, own), frames, blame=False, progress=progress)
@@ -614,7 +614,7 @@ def _check_subject(session: Session, source: str, place: Place | None) -> None:
         return
     if not all(math.isfinite(value) for value in place):
         raise FootageError("A place has two finite numbers.", "Give x and y on the floor in metres.")
-    if len(session.manifest.footage.cameras) < 2 or not session.is_calibrated:
+    if not session.is_comparable:
         raise FootageError(
             "Only two calibrated cameras or more can tell where somebody stands.",
             "Calibrate the cameras, or exclude the others by hand (--exclude).",
@@ -633,7 +633,7 @@ def _check_source(session: Session, source: str, strokes: Sequence[Stroke]) -> N
         raise FootageError(f"No masks came with the footage of camera {bare}.", "Choose another source.")
     if source == "strokes":
         check_all_cameras(session, strokes)
-    if source == "best" and (len(session.manifest.footage.cameras) < 2 or not session.is_calibrated):
+    if source == "best" and not session.is_comparable:
         raise FootageError(
             "Sources are compared by the agreement of two calibrated cameras or more.",
             "Calibrate the cameras, or choose a source yourself.",

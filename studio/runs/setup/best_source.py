@@ -11,8 +11,10 @@ the worst score rises.
 import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from studio.foundations.arrays import Bytes
 from studio.foundations.errors import FootageError
@@ -53,12 +55,12 @@ class SourceTried:
     note: str = ""
 
     @property
-    def scores(self) -> dict[str, float]:
-        """By camera, 0 to 1."""
+    def scores(self) -> Annotated[dict[str, float], Field()]:
+        """Agreement times border by camera, 0 to 1."""
         return {name: round(share * self.borders[name], 4) for name, share in self.agreements.items()}
 
     @property
-    def worst(self) -> float:
+    def worst(self) -> Annotated[float, Field()]:
         """The score of the worst camera."""
         return min(self.scores.values(), default=0.0)
 

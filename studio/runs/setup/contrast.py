@@ -18,10 +18,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from studio.body.dimensions import follows_height
 from studio.body.forward_kinematics import limb_ends
@@ -129,11 +131,12 @@ class Contrast:
             )
 
     @property
-    def low(self) -> bool:
+    def low(self) -> Annotated[bool, Field()]:
         """Whether the subject, or a limb of it, is hard to tell from its background."""
         return bool(self.alike)
 
-    def in_words(self) -> str:
+    @property
+    def words(self) -> Annotated[str, Field()]:
         """What is alike and where: "forearms and background are alike in cam1 to cam4"; "" where nothing is."""
         by_cameras: dict[tuple[str, ...], list[str]] = {}
         for name, cameras in _both_sides(self.alike, [view.camera for view in self.views]).items():
@@ -144,7 +147,8 @@ class Contrast:
             for cameras, limbs in by_cameras.items()
         )
 
-    def remedy(self) -> str:
+    @property
+    def remedy(self) -> Annotated[str, Field()]:
         """What may help, a sentence; "" where nothing needs help."""
         if not self.low:
             return ""
@@ -248,7 +252,7 @@ def contrast_notes(session: Session, settings: EvidenceSettings, known: KnownPos
         return ()
     if found is None or not found.low:
         return ()
-    return (f"{sentence(found.in_words())}: they may be lost. {found.remedy()}",)
+    return (f"{sentence(found.words)}: they may be lost. {found.remedy}",)
 
 
 def _by_difference(settings: EvidenceSettings, footage: Footage, cameras: Sequence[Camera]) -> bool:

@@ -12,9 +12,11 @@ Agreement says nothing of what all masks lack. So the contrast of subject and ba
 import dataclasses
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from studio.body.scale import scale_of
 from studio.evidence.frame_evidence import ViewEvidence
@@ -75,16 +77,17 @@ class ViewQuality:
     border: float = float("nan")
 
     @property
-    def agreement(self) -> float:
+    def agreement(self) -> Annotated[float, Field()]:
         """The smaller of covered and inside."""
         return min(self.covered, self.inside)
 
     @property
-    def usable(self) -> bool:
+    def usable(self) -> Annotated[bool, Field()]:
         """Whether the masks agree well enough with the other views."""
         return self.agreement >= USABLE and self.filled <= MOST_FILLED
 
-    def in_words(self) -> str:
+    @property
+    def note(self) -> Annotated[str, Field()]:
         """What the user should check, "" if the masks are good."""
         if np.isnan(self.agreement):
             return "The mask, or the hull that all views allow, is empty: check the masks of all cameras."
@@ -113,7 +116,7 @@ class MaskQuality:
     """
 
     frames: tuple[int, ...]
-    views: tuple[ViewQuality, ...]
+    views: Annotated[tuple[ViewQuality, ...], Field(serialization_alias="cameras")]
     hull_litres: tuple[float, ...]
     doubts: tuple[Finding, ...] = ()
     subjects: int = 0
@@ -125,16 +128,17 @@ class MaskQuality:
         return all(view.usable for view in self.views) and self.subjects < 2 and not blocking(self.doubts)
 
     @property
-    def usable(self) -> bool:
+    def usable(self) -> Annotated[bool, Field()]:
         """Whether they agree, and something else confirms them: for what all of them lack they agree about, too."""
-        return self.agreeing and not self.why_not_confirmed()
+        return self.agreeing and not self.unconfirmed
 
-    def why_not_confirmed(self) -> str:
+    @property
+    def unconfirmed(self) -> Annotated[str, Field()]:
         """Why agreement does not prove the masks, "" where it does: low contrast; without contrast, borders that lie on
         no edges of the pictures.
         """
         if self.contrast is not None:
-            return self.contrast.in_words()
+            return self.contrast.words
         faint = [view.camera for view in self.views if not view.border >= LEAST_BORDER]
         if not faint:
             return ""
@@ -143,7 +147,7 @@ class MaskQuality:
         return f"the masks' borders lie on no edges of the pictures of {enumerated(faint)}"
 
     @property
-    def worst(self) -> str:
+    def worst(self) -> Annotated[str, Field()]:
         """The camera to check first, "" where all are usable: one that removes what the others see causes their poor
         agreement; else the one that agrees least.
         """
@@ -168,7 +172,7 @@ class MaskQuality:
         if self.usable:
             return f"every view agrees by {least:.2f} or more"
         if self.agreeing:
-            return f"every view agrees by {least:.2f} or more, but {self.why_not_confirmed()}"
+            return f"every view agrees by {least:.2f} or more, but {self.unconfirmed}"
         # Rounded down: what is below the mark never reads like it.
         least = np.floor(1000.0 * least) / 1000.0
         return f"least agreement {least:.3f}, below the mark of {USABLE:g}: check camera {self.worst}"

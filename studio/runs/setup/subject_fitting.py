@@ -9,7 +9,7 @@ result is a subject with all dimensions, so that every later run of the session 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 import numpy as np
@@ -88,7 +88,7 @@ class FittedSize:
     """One group of dimensions, mm: before, after, and the standard deviation of that (`ShapeRefiner.refine`)."""
 
     name: str
-    kind: str
+    kind: Literal["length", "radius"]
     dimensions: tuple[str, ...]
     before: float
     after: float

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from pydantic import FiniteFloat
 
 from studio.body.scale import scale_of
 from studio.evidence.backgrounds import Backgrounds
@@ -53,7 +54,7 @@ CARVED_SIDE = 240
 CARVED = HullSettings(hull_depth=7, hull_edge_share=0.5, hull_least_views=2)
 MM = 1000.0
 
-Place = tuple[float, float]
+Place = tuple[FiniteFloat, FiniteFloat]
 """x and y on the floor, metres."""
 
 

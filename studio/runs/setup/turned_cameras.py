@@ -22,8 +22,6 @@ from studio.sessions.work_under_way import one_at_a_time
 
 RECORD_PATH = CAMERAS_PATH.with_name("cameras.alignment.json")
 PART = "alignment"
-SAME_DEGREES, SAME_MM = 1e-3, 0.1
-"""Files keep cameras to fewer digits than memory."""
 
 
 class Turned(msgspec.Struct, frozen=True):
@@ -72,7 +70,7 @@ def turn_cameras(session: Session, aligned: SessionAlignment) -> CalibrationChan
     calibration has changed since the alignment.
     """
     with one_at_a_time(session.path):
-        if not is_of(session, aligned):
+        if not aligned.is_of(session):
             raise CalibrationError(
                 f"The calibration of session '{session.name}' has changed since it was measured.",
                 "Measure the cameras again.",
@@ -107,19 +105,6 @@ def turn_back(session: Session) -> CalibrationChange:
                 "Choose one of the earlier calibrations in step Calibration.",
             )
         return restore_calibration(session, found.before, found.source)
-
-
-def is_of(session: Session, aligned: SessionAlignment) -> bool:
-    """Whether the cameras in use are those that were measured: they differ from the turned ones by the found turns."""
-    now, found = session.cameras(), aligned.found
-    if tuple(camera.name for camera in now) != aligned.names:
-        return False
-    for camera, turned, angle in zip(now, found.cameras, found.turns, strict=True):
-        cosine = (np.trace(turned.rotation @ camera.rotation.T) - 1.0) / 2.0
-        apart = float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
-        if abs(apart - angle) > SAME_DEGREES or np.linalg.norm(camera.centre - turned.centre) > SAME_MM:
-            return False
-    return True
 
 
 def _turned(session: Session) -> Turned | None:

@@ -51,7 +51,8 @@ class Track:
     more: list[Place] = dataclasses.field(default_factory=list)
 
     @property
-    def whole(self) -> Annotated[bool, Field(description="Whether nothing lacks.")]:
+    def whole(self) -> Annotated[bool, Field()]:
+        """Whether nothing lacks."""
         return bool(np.isfinite(self.poses).all())
 
     @property

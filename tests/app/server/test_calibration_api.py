@@ -14,11 +14,11 @@ from nudged_camera import make_nudged_session, true_cameras
 from waiting import PATIENCE
 from web_doubles import Studio
 
-from studio.app.server import calibration_solving
 from studio.footage.calibration.extrinsics import moved_cameras
 from studio.footage.capture.calibration_files import export_calibration, read_calibration, write_calibration
 from studio.foundations.geometry.projection import project
 from studio.foundations.geometry.rigid import rigid
+from studio.operations import calibration_proposals
 from studio.sessions.session import CAMERAS_PATH, Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import begin_session
@@ -290,12 +290,13 @@ def test_solving_can_be_stopped_and_failures_are_in_words(
     assert other["state"] == "failed"
     assert "found in no picture" in other["message"]
 
-    def waits(*_: object, progress: object, **__: object) -> None:
+    def waits(*given: object) -> None:
+        progress = given[-1]
         assert callable(progress)
         while True:
             progress("Looking for the board, camera cam1", 1, 10)
 
-    monkeypatch.setattr(calibration_solving, "calibrate", waits)
+    monkeypatch.setattr(calibration_proposals, "solve_boards", waits)
     begun = fresh.client.post(f"{FRESH}/solve", json={"board": BOARD.text, "footage": here}).json()
     assert fresh.client.delete(f"/api/calibrations/{begun['identifier']}").status_code == 202
     deadline = time.monotonic() + PATIENCE

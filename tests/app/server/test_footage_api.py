@@ -10,9 +10,9 @@ import pytest
 from waiting import PATIENCE
 from web_doubles import Studio
 
-from studio.app.server import footage_routes
 from studio.footage.capture.synchrony import PairLag, Synchrony
 from studio.foundations.errors import FootageError
+from studio.operations import footage
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 
@@ -94,7 +94,7 @@ def test_an_estimate_is_shown_and_not_applied(studio: Studio, monkeypatch: pytes
         report("motion in cam1", 2, 4)
         return FOUND
 
-    monkeypatch.setattr(footage_routes, "synchrony_of", estimate)
+    monkeypatch.setattr(footage, "synchrony_of", estimate)
     assert studio.client.get(SYNCHRONY).json() is None
     assert studio.client.post(SYNCHRONY, json={"within": 2.0}).status_code == 202
     response = ended(studio)
@@ -128,7 +128,7 @@ def test_an_estimate_can_be_stopped(studio: Studio, monkeypatch: pytest.MonkeyPa
         report("motion in cam1", 2, 4)
         raise FootageError("not stopped", "")
 
-    monkeypatch.setattr(footage_routes, "synchrony_of", estimate)
+    monkeypatch.setattr(footage, "synchrony_of", estimate)
     studio.client.post(SYNCHRONY)
     assert begun.wait(PATIENCE)
     studio.client.delete(SYNCHRONY)
