@@ -237,6 +237,8 @@ def parts_of(value: object, within: tuple[FunctionType, ...] = ()) -> Iterator[b
         yield from parts_of(
             (value.__defaults__, *(one.cell_contents for one in value.__closure__ or ())), within
         )
+        # What is kept names its functions by their modules.
+        yield value.__module__.encode()
         yield from _parts_of_code(value.__code__, value, (*within, value))
     elif isinstance(value, tuple | list):
         for one in value:

@@ -85,15 +85,19 @@ def compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[s
 def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., ModuleType]:
     """Makes the two modules in a folder and loads the kernels."""
 
-    def made(folder: str, helpers: str = HELPERS, kernels: str = KERNELS) -> ModuleType:
+    def made(
+        folder: str, helpers: str = HELPERS, kernels: str = KERNELS, name: str = "kernels"
+    ) -> ModuleType:
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "helpers.py").write_text(helpers)
-        (tmp_path / folder / "kernels.py").write_text(kernels)
+        module = tmp_path / folder / f"{name.replace('.', '/')}.py"
+        module.parent.mkdir(exist_ok=True)
+        module.write_text(kernels)
         with monkeypatch.context() as patched:
             patched.syspath_prepend(tmp_path / folder)
-            for name in ("helpers", "kernels"):
-                patched.delitem(sys.modules, name, raising=False)
-            return importlib.import_module("kernels")
+            for loaded in ("helpers", name):
+                patched.delitem(sys.modules, loaded, raising=False)
+            return importlib.import_module(name)
 
     return made
 
@@ -111,6 +115,20 @@ def test_another_checkout_finds_what_one_compiled(
     moved = "# A line more, and a comment.\n" + KERNELS
     assert answer(checkout("two", kernels=moved)) == 227.0
     assert not compiled
+
+
+def test_a_kernel_whose_module_was_moved_is_another(
+    compiled: list[str],
+    checkout: Callable[..., ModuleType],
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    answer(checkout("one"))
+    compiled.clear()
+    monkeypatch.delitem(sys.modules, "kernels")
+    assert answer(checkout("two", name="elsewhere.kernels")) == 227.0
+    assert sorted(compiled) == ["later", "total"]
+    assert not caplog.records
 
 
 @pytest.mark.parametrize(
