@@ -7,11 +7,13 @@ neither is one whose file was replaced by hand since.
 
 import hashlib
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from pathlib import Path
 
 import msgspec
 
 from studio.footage.capture.footage import EXCLUSIONS
+from studio.foundations.errors import SessionError
 from studio.foundations.foreign_files import read_file
 from studio.sessions.background_files import EVIDENCE_NAME
 from studio.sessions.record_files import RecordFile
@@ -73,6 +75,13 @@ def note(
     origin = Origin(_own(session, part), digests(session, INPUTS[part]), words, good, stops)
     with one_at_a_time(session.path):
         _write(session, {**_read(session).parts, part: origin})
+
+
+def remember(session: Session, part: str, words: str, good: bool, stops: tuple[str, ...] = ()) -> None:
+    """Note what was measured, if the disk can be written: a measurement is said also where it cannot be kept."""
+    _read(session)  # raises where it is damaged
+    with suppress(SessionError):
+        note(session, part, words, good, stops)
 
 
 def origin_of(session: Session, part: str) -> Origin | None:

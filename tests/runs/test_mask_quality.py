@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from toy_session import facing_camera, make_session, side_camera
 
-from studio.foundations.errors import FootageError
+from studio.foundations.errors import FootageError, SessionError
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.projection import project
 from studio.results.drawing_footage.cameras import placed_camera
@@ -17,6 +17,7 @@ from studio.runs.setup import mask_quality as quality
 from studio.runs.setup.initialising import initialise
 from studio.runs.setup.person_hull import spread_frames
 from studio.sessions.manifest import write_manifest
+from studio.sessions.provenance import origin_of
 from studio.sessions.session import Session
 
 CENTRE, RADIUS = np.array([0.0, 0.0, 900.0]), 350.0
@@ -119,6 +120,19 @@ def test_footage_without_frames_has_no_quality(tmp_path: Path) -> None:
     write_manifest(session.path, empty)
     with pytest.raises(FootageError, match="'toy' has no frame whose masks could be measured"):
         quality.measure_masks(Session(session.path))
+
+
+def test_what_a_disk_cannot_keep_is_measured_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = make_session(tmp_path / "toy", 3, cameras=(facing_camera(), side_camera()))
+
+    def refused(*_: object) -> None:
+        raise SessionError("The disk cannot be written.", "")
+
+    monkeypatch.setattr("studio.sessions.record_files.write_bytes", refused)
+    assert len(quality.measure_masks(session).views) == 2
+    assert origin_of(session, quality.MEASURED) is None
 
 
 def test_frames_are_spread_over_the_footage() -> None:

@@ -44,7 +44,7 @@ from studio.runs.setup.person_hull import (
 from studio.runs.setup.session_settings import masks_of, session_settings
 from studio.runs.setup.silhouette_doubts import MEASURED, height_of, person_alone, silhouette_doubts
 from studio.runs.setup.subject_masks import count_subjects
-from studio.sessions.provenance import changed_inputs, note, origin_of
+from studio.sessions.provenance import changed_inputs, origin_of, remember
 from studio.sessions.session import Session
 
 FRAMES = 5
@@ -255,7 +255,7 @@ def measure_masks(session: Session, frames: Sequence[int] = (), progress: Progre
     if frames:
         return found
     stops = tuple(str(finding) for finding in blocking(found.doubts))
-    note(session, MEASURED, found.in_words(), found.usable, stops)
+    remember(session, MEASURED, found.in_words(), found.usable, stops)
     return found
 
 
@@ -274,7 +274,7 @@ def look_before_the_first_run(session: Session, progress: Progress = unheard) ->
     except StudioError:
         return True
     if stops := blocking(doubts):
-        note(session, MEASURED, _doubted(stops[0]), False, tuple(map(str, stops)))
+        remember(session, MEASURED, _doubted(stops[0]), False, tuple(map(str, stops)))
     return True
 
 

@@ -16,7 +16,7 @@ from studio.foundations.typed_decoding import decode_json
 from studio.runs.setup.aligning import SessionAlignment, keep_alignment
 from studio.sessions.atomic_files import write_bytes
 from studio.sessions.calibration_changes import CalibrationChange, earlier_calibration, restore_calibration
-from studio.sessions.provenance import changed_inputs, note, origin_of
+from studio.sessions.provenance import changed_inputs, note, origin_of, remember
 from studio.sessions.session import CAMERAS_PATH, Session
 from studio.sessions.work_under_way import one_at_a_time
 
@@ -36,7 +36,7 @@ class Turned(msgspec.Struct, frozen=True):
 
 def remember_alignment(session: Session, aligned: SessionAlignment) -> None:
     """Store how far the silhouettes miss with the calibration in use, for the guided set-up."""
-    note(session, PART, _missed(aligned, aligned.found.before), not aligned.needed)
+    remember(session, PART, _missed(aligned, aligned.found.before), not aligned.needed)
 
 
 def alignment_words(aligned: SessionAlignment) -> str:
