@@ -28,7 +28,10 @@ PARTIAL_PREFIX = ".partial-"
 def check_writable(folder: Path) -> None:
     """Raise SessionError where nothing can be written into a folder: before work whose result would be lost."""
     if not os.access(folder, os.W_OK):
-        raise SessionError(f"The folder '{folder}' cannot be written.", "Check the folder's permissions.")
+        raise SessionError(
+            f"The folder '{folder}' cannot be written.",
+            "Check the folder's permissions, or give another place for what is made.",
+        )
 
 
 def write_bytes(path: Path, content: bytes) -> None:

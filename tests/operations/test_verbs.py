@@ -2,6 +2,7 @@
 
 import ast
 import importlib
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -15,7 +16,10 @@ from toy_session import BODY, HEIGHT, WIDTH, true_poses
 import studio
 from studio import extending
 from studio.body.catalogue import load_body
+from studio.body.subject import Subject
+from studio.operations import person
 from studio.operations.progress import reporting as shown_in
+from studio.runs.setup.subject_fitting import FittedSubject
 from studio.sessions.session import Session
 
 FEW = {"particles": 20, "layers": 2}
@@ -150,6 +154,29 @@ def test_exclusions_are_painted_and_taken_back(session_on_disk: Session) -> None
     assert place.exists()
     studio.background("toy", "median", exclude={"front": None}, tune=False)
     assert not place.exists()
+
+
+def test_a_fit_that_no_disk_would_keep_is_refused_before_it_begins(
+    session_on_disk: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun = list[Session]()
+
+    def fit(session: Session, *_: object, **__: object) -> FittedSubject:
+        begun.append(session)
+        subject, none = Subject(body="planar_arm4"), np.zeros(0)
+        return FittedSubject(subject, session.body(), (), (0,), np.zeros((1, 4)), none, none, "", 1)
+
+    monkeypatch.setattr(person, "fit_session_subject", fit)
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    monkeypatch.setattr(os, "access", lambda place, _mode: Path(place) == elsewhere)
+    with pytest.raises(studio.StudioError, match=r"'.*toy' cannot be written") as refusal:
+        studio.fit_subject("toy")
+    assert "another place" in refusal.value.hint
+    assert not begun
+    assert studio.fit_subject("toy", keep=False).file is None
+    assert studio.fit_subject("toy", into=elsewhere / "subject.toml").file == elsewhere / "subject.toml"
+    assert not (session_on_disk.path / "subject.toml").exists()
 
 
 def test_a_height_in_metres_is_refused(session_on_disk: Session) -> None:
