@@ -3,6 +3,7 @@
 import dataclasses
 from pathlib import Path
 
+import cv2
 import msgspec
 import numpy as np
 import pytest
@@ -14,8 +15,10 @@ from studio.foundations.geometry.projection import project
 from studio.results.drawing_footage.cameras import placed_camera
 from studio.runs.problem_source import ProblemSource
 from studio.runs.setup import mask_quality as quality
+from studio.runs.setup.background_setup import set_up_background
 from studio.runs.setup.initialising import initialise
 from studio.runs.setup.person_hull import spread_frames
+from studio.runs.setup.subject_masks import seen_subjects
 from studio.sessions.manifest import write_manifest
 from studio.sessions.provenance import origin_of
 from studio.sessions.session import Session
@@ -120,6 +123,28 @@ def test_footage_without_frames_has_no_quality(tmp_path: Path) -> None:
     write_manifest(session.path, empty)
     with pytest.raises(FootageError, match="'toy' has no frame whose masks could be measured"):
         quality.measure_masks(Session(session.path))
+
+
+def test_more_cameras_than_a_hull_takes_are_refused_before_a_picture_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cameras = tuple(dataclasses.replace(facing_camera(), name=f"c{number}") for number in range(33))
+    session = make_session(tmp_path / "toy", 1, cameras=cameras)
+
+    def read(*_: object) -> None:
+        raise AssertionError("a picture is read")
+
+    monkeypatch.setattr(cv2, "imdecode", read)
+    for verb in (
+        lambda: quality.measure_masks(session),
+        lambda: initialise(session, 0),
+        lambda: seen_subjects(session),
+        lambda: set_up_background(session, "median"),
+        lambda: set_up_background(session, "best", tune=False),
+    ):
+        with pytest.raises(FootageError, match="from 33 cameras") as refusal:
+            verb()
+        assert "1 to 32" in refusal.value.hint
 
 
 def test_what_a_disk_cannot_keep_is_measured_all_the_same(

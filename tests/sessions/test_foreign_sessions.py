@@ -20,7 +20,9 @@ from studio.runs.moved_knobs import FILE_NAME as MOVED_NAME
 from studio.sessions import atomic_files, file_checksums, foreign_sessions
 from studio.sessions.file_checksums import check_files
 from studio.sessions.foreign_sessions import inspect_place
+from studio.sessions.object_stores import Store
 from studio.sessions.process_lock import ProcessLock
+from studio.sessions.remote_sessions import upload
 from studio.sessions.results_codec import LARGEST_BLOB, unpack
 from studio.sessions.results_store import ResultsReader, ResultsWriter
 from studio.sessions.run_log import append_to_log, read_log
@@ -123,6 +125,33 @@ def test_a_lock_and_a_store_are_not_made_elsewhere(taken: Session) -> None:
             use()
         (run.folder / name).unlink()
     assert [entry.name for entry in outside.iterdir()] == ["secret"]
+
+
+@pytest.mark.parametrize("what", ["calibration/more", "runs/done/exports", "truth"])
+def test_nothing_of_elsewhere_is_uploaded(taken: Session, what: str) -> None:
+    linked(taken.path / what, taken.path.parent / "outside")
+    address = f"memory://uploads/{what.replace('/', '-')}"
+    with pytest.raises(SessionError, match="leads by a link out"):
+        upload(taken, address)
+    assert not any("secret" in name for name in Store(address).listed())
+
+
+def test_a_run_that_is_a_link_deletes_nothing_elsewhere(taken: Session) -> None:
+    other = make_session(taken.path.parent / "other", frames=2)
+    there = other.new_run(record_of(other, "done")).folder
+    before = sorted(there.rglob("*"))
+    linked(taken.path / "runs" / "done", there)
+    workspace = Workspace(taken.path.parent)
+    with pytest.raises(StudioError):
+        workspace.trash_run("taken", "done")
+    linked(taken.path / "runs", there.parent)
+    for change in (
+        lambda: workspace.trash_run("taken", "done"),
+        lambda: workspace.rename_run("taken", "done", "mine"),
+    ):
+        with pytest.raises(StudioError):
+            change()
+    assert sorted(there.rglob("*")) == before
 
 
 ENDLESS = (

@@ -27,6 +27,7 @@ from studio.evidence.masks import PackedMask, reduced, uncleaned
 from studio.evidence.pipeline import EvidenceMaker, RawMask
 from studio.evidence.settings import EvidenceSettings
 from studio.evidence.strokes import Stroke
+from studio.evidence.volume.reconstruction import MOST_VIEWS, check_views
 from studio.footage.capture.footage import Footage
 from studio.footage.capture.footage_source import FootageSource
 from studio.footage.capture.pictures import is_picture, png_of
@@ -225,6 +226,8 @@ def set_up_background(
     """
     _check_source(session, source, read_strokes(session) if strokes is None else strokes)
     _check_subject(session, source, subject_at)
+    if (tune or source == "best") and len(session.manifest.footage.cameras) > MOST_VIEWS:
+        check_views(session.cameras())
     chosen = dict(knobs or {})
     session_settings(session, changes=chosen)
     manifest, evidence = session.manifest, read_evidence(session)

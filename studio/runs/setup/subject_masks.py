@@ -29,7 +29,7 @@ from studio.evidence.volume.hull_subjects import (
     labels_at,
     subjects_of,
 )
-from studio.evidence.volume.reconstruction import Reconstructor
+from studio.evidence.volume.reconstruction import Reconstructor, check_views
 from studio.evidence.volume.tracking_space import box_of
 from studio.footage.capture.footage import HIDDEN, thresholded_mask, turned_picture
 from studio.footage.capture.pictures import read_picture
@@ -118,6 +118,7 @@ class _Carver:
                 f"Session '{session.name}' has one camera: it cannot tell where somebody stands.",
                 "Exclude the others by hand (--exclude), or paint strokes.",
             )
+        check_views(self.cameras)
         self.small = tuple(camera.reduced(CARVED_SIDE) for camera in self.cameras)
         self.scale = scale_of(session.body())
         self._box = box_of(self.cameras, scale=self.scale)
