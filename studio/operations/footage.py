@@ -307,6 +307,7 @@ class Recorded:
 
 
 @operation
+@keeping_in_place
 def record(
     cameras: Cameras,
     into: Into,

@@ -2,7 +2,8 @@
 
 import functools
 import inspect
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ParamSpec, TypeVar
@@ -95,24 +96,41 @@ def open_session(session: AnySession, *, remote: bool = False) -> Session:
 
 
 def keeping_in_place(function: Callable[P, R]) -> Callable[P, R]:
-    """Let the session, or the run, that a verb is about (its first parameter) stay where it is while the verb goes on,
-    whatever other processes do. What is no session of this machine is left to the verb.
+    """Let the sessions and runs that a verb is about (those that it takes as such, else its first parameter) stay where
+    they are while the verb goes on, whatever other processes do. What is no session of this machine is left to the
+    verb.
     """
-    about_run = next(iter(inspect.signature(function).parameters)) == "run"
+    signature = inspect.signature(function)
+    about = [name for name, one in signature.parameters.items() if _is_target(one)] or [
+        *signature.parameters
+    ][:1]
 
     @functools.wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> R:
-        about: Any = args[0]
-        try:
-            folder = open_run(about).folder if about_run else open_session(about).path
-        except SessionError:
-            return function(*args, **kwargs)
-        session, run = (folder.parent.parent, folder.name) if about_run else (folder, "")
-        with working_on(session, function.__name__, run):
+        given = signature.bind_partial(*args, **kwargs).arguments
+        with ExitStack() as kept:
+            for name in about:
+                if (value := given.get(name)) is not None:
+                    for session, run in _places_of(value, name):
+                        kept.enter_context(working_on(session, function.__name__, run))
             return function(*args, **kwargs)
 
     call.__dict__["keeps_in_place"] = True
     return call
+
+
+def _is_target(parameter: inspect.Parameter) -> bool:
+    return any(isinstance(one, Target) for one in getattr(parameter.annotation, "__metadata__", ()))
+
+
+def _places_of(value: Any, name: str) -> Iterator[tuple[Path, str]]:  # noqa: ANN401 - SessionName or RunName
+    """The folder of the session, and the run's name, if it is one of this machine."""
+    with suppress(SessionError):
+        if name == "run":
+            folder = open_run(value).folder
+            yield folder.parent.parent, folder.name
+        else:
+            yield open_session(value).path, ""
 
 
 def list_sessions() -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from studio.body.reader import parse_body
 from studio.body.writing import body_text
 from studio.foundations.declaring import Target, Terminal, Web, operation, taking
 from studio.foundations.errors import BodyError
-from studio.operations.opening import SessionName, open_session
+from studio.operations.opening import SessionName, keeping_in_place, open_session
 from studio.operations.progress import Reporting, say
 from studio.sessions.atomic_files import write_text, writing
 from studio.sessions.names import checked_name
@@ -86,6 +86,7 @@ class BodyChanges:
 
 
 @operation
+@keeping_in_place
 @taking(BodyChanges)
 def edit_body(
     body: Annotated[

@@ -12,6 +12,7 @@ from studio.app.server import app, guide_routes
 from studio.app.server.requests import MADE
 from studio.cli.main import load
 from studio.foundations.declaring import REQUIRED, Knobs, Operation, Parameter, declared
+from studio.operations.opening import _is_target
 
 NAMED = {
     "import_footage": "import",
@@ -57,7 +58,7 @@ def test_a_session_stays_where_it_is_while_a_verb_works_on_it() -> None:
     about = {
         name
         for name in VERBS
-        if next(iter(inspect.signature(getattr(studio, name)).parameters), "") in ("session", "run")
+        if any(map(_is_target, inspect.signature(getattr(studio, name)).parameters.values()))
     }
     keeping = {name for name in about if getattr(getattr(studio, name), "keeps_in_place", False)}
     assert about - keeping == set(LEFT_WHERE_IT_IS)

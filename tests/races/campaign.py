@@ -325,9 +325,11 @@ def _runs_wrong(
         summary = run.summary()
         if summary.damaged:
             yield f"run '{run.name}' has damaged frames"
-        # The server may still have it open.
-        if summary.status != "tracking" and (summary.status == "finished") != (
-            summary.done == run.record.last - run.record.first
+        # The server may still have it open; what is tracked on a clock leaves frames out.
+        if (
+            summary.status != "tracking"
+            and not run.record.live
+            and (summary.status == "finished") != (summary.done == run.record.last - run.record.first)
         ):
             yield f"run '{run.name}' is {summary.status} with {summary.done} frames"
         # A kill between the two steps of renaming leaves the old name, which is read nowhere but in the trash.

@@ -1,5 +1,6 @@
 """A served workspace with a small session for each group, and processes beside it that do as a command line does."""
 
+import contextlib
 import multiprocessing
 import os
 import shutil
@@ -15,8 +16,9 @@ import cv2
 import msgspec
 from faults.process_kinds import Served, server, until
 from faults.stage import DONE, TOY, Place, build_source, frames_of
+from toy_footage import write_video
 
-from races.verbs import FRAMES, PYTHON, Given, build
+from races.verbs import CLIP, FRAMES, PYTHON, Given, build
 from studio.foundations.errors import StudioError, UnforeseenError
 from studio.results.export.exporting import export_run
 from studio.results.export.formats import FORMATS
@@ -129,6 +131,9 @@ class Stage:
         verify(first.session)
         write_note(first.run(DONE), FRAMES - 1, MARK)
         self.frames = frames_of(first.run(DONE))
+        with contextlib.closing(session.footage()) as footage:
+            pictures = [footage.picture("front", frame) for frame in range(FRAMES)]
+        write_video(self.folder / CLIP, pictures, fps=30)
         self.root.mkdir(parents=True)
         shutil.copytree(first.folder / "source", self.root / SOURCE)
         self.others = [OtherProcess(self.root) for _ in range(PROCESSES)]

@@ -14,6 +14,7 @@ import studio
 from studio.body.forward_kinematics import limb_ends
 from studio.footage.calibration.silhouette_alignment import AlignedCameras
 from studio.footage.capture.calibration_files import read_calibration
+from studio.foundations.errors import StudioError
 from studio.foundations.geometry.projection import project
 from studio.foundations.geometry.rotations import rotation_from_vector
 from studio.runs.notes import notes_of
@@ -28,6 +29,7 @@ from studio.sessions.workspace import Workspace
 FRAMES = 7
 """So many show enough to align two cameras by."""
 POSE = [float(value) for value in true_poses()[0] + 0.02]
+CLIP = "front.mp4"
 ONE_TRIAL = {"seeds": 1, "last": 1}
 """Of a comparison, that it takes no longer than the start of its process."""
 
@@ -51,6 +53,11 @@ class Given:
     def session(self) -> Path:
         """The session's folder."""
         return self.root / self.name
+
+    @property
+    def clip(self) -> Path:
+        """A video of the camera `front`, outside the workspace."""
+        return self.out.parent / CLIP
 
     @property
     def run(self) -> str:
@@ -165,6 +172,34 @@ def _paint(given: Given) -> object:
     return studio.background(given.name, "strokes", strokes=file, tune=False)
 
 
+def _live(given: Given) -> None:
+    """Seven pictures as they come, and the same again without the clock."""
+    name = given.called("live")
+    studio.live(given.name, tracker="annealed", weighting="edge-region", knobs=QUICK, name=name)
+    studio.replay(f"{given.name}/{name}", name=given.called("replayed"))
+
+
+def _batch(given: Given) -> None:
+    """What fails in it is said of its session."""
+    name = given.called("batched")
+    done = studio.batch([given.name], name=name, knobs=QUICK, fit_shape=False, processes=1)
+    for line in done.lines:
+        if line.failure:
+            raise StudioError(f"{line.session}: {line.failure}", "")
+
+
+def _edit_body(given: Given) -> object:
+    sizes = {"link_1_length": 120.0 + given.place}
+    return studio.edit_body(
+        "planar_arm4", session=given.name, sizes=sizes, save_as=given.called("arm"), replace=True
+    )
+
+
+def _record(given: Given) -> object:
+    """A replayed clip, with the session's calibration."""
+    return studio.record({"front": str(given.clip)}, given.called("taken"), given.name, fps=30.0)
+
+
 PYTHON: Mapping[str, Callable[[Given], object]] = {
     "refine": lambda at: studio.refine(at.run, into=at.called("refined")),
     "smooth": lambda at: studio.smooth(at.run, into=at.called("smoothed")),
@@ -176,6 +211,10 @@ PYTHON: Mapping[str, Callable[[Given], object]] = {
     "go on": lambda at: studio.go_on(f"{at.name}/{NEW}"),
     "branch": lambda at: studio.branch(at.run, 2, knobs={"survival": 0.4}, name=at.called("branched")),
     "correct": lambda at: studio.correct(at.run, 2, POSE, name=at.called("corrected")),
+    "live": _live,
+    "batch": _batch,
+    "edit the body": _edit_body,
+    "record": _record,
     "note": lambda at: studio.note(at.run, at.place, at.called("note")),
     "subject": lambda at: studio.subject(at.name, lengths_mm={}, body="planar_arm4"),
     "fit the subject": lambda at: studio.fit_subject(at.name, count=1, lengths=False),
@@ -349,7 +388,7 @@ TRACKING = {
 """Verbs that the server's tracking process has a part in."""
 ALONE = ("Too few silhouettes", "The cameras' pictures are not level", "Camera front has")
 """Begin what a verb is refused with where nothing else goes on."""
-SLOW = {"fit the subject", "initialise", "compare", "sweep"}
+SLOW = {"fit the subject", "initialise", "compare", "sweep", "batch", "live", "record"}
 """Verbs that take seconds."""
 
 
@@ -371,6 +410,12 @@ LEFT: Mapping[str, Callable[[There, Given], object]] = {
     "go on": lambda there, at: any(run.record.name == NEW and _finished(run) for run in there.runs),
     "branch": lambda there, at: there.any_run(at.called("branched")),
     "correct": lambda there, at: there.any_run(at.called("corrected")),
+    "live": lambda there, at: there.any_run(at.called("live")) and there.any_run(at.called("replayed")),
+    "batch": lambda there, at: there.any_run(at.called("batched")),
+    "edit the body": lambda there, at: there.any_session(
+        lambda one: (one.path / "bodies" / f"{at.called('arm')}.toml").is_file()
+    ),
+    "record": lambda there, at: there.any_session(lambda one: one.name == at.called("taken")),
     "note": lambda there, at: any(
         at.called("note") in [note.text for note in notes_of(run)] for run in there.runs
     ),

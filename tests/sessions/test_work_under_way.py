@@ -6,12 +6,14 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import msgspec
+import numpy as np
 import pytest
+from toy_footage import write_video
 from toy_session import make_session, true_poses
 
 import studio
 from studio.foundations.errors import NotFoundError, RunError, SessionError
-from studio.operations import subjects
+from studio.operations import footage, own_bodies, subjects
 from studio.operations.comparison_folders import new_comparison, place_of
 from studio.results.comparison.sweep import plan_sweep
 from studio.results.verifying import verify
@@ -350,3 +352,27 @@ def test_sessions_that_are_tracked_together_all_stay_where_they_are(
     monkeypatch.setattr(subjects, "track_together", lambda *_: workspace.rename("other", "new"))
     with pytest.raises(RunError, match="Session 'other' stays as it is while 'together' works on it"):
         studio.together("toy", ["other"])
+
+
+def test_a_session_that_a_verb_takes_beside_its_own_stays_where_it_is(
+    workspace: Workspace, session: Session, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    clip = write_video(tmp_path / "front.mp4", [np.zeros((120, 160, 3), np.uint8)] * 4, fps=30)
+    for room, step, verb, work in (
+        (
+            own_bodies,
+            "edited",
+            "edit_body",
+            lambda: studio.edit_body("planar_arm4", session="toy", save_as="arm"),
+        ),
+        (
+            footage,
+            "check_cameras",
+            "record",
+            lambda: studio.record({"front": str(clip)}, "take", "toy", fps=30.0),
+        ),
+    ):
+        monkeypatch.setattr(room, step, lambda *_, **__: workspace.rename("toy", "new"))
+        with pytest.raises(RunError, match=f"Session 'toy' stays as it is while '{verb}' works on it"):
+            work()
+    assert [one.name for one in workspace.sessions()] == ["toy"]
