@@ -86,8 +86,8 @@ class BodyChanges:
 
 
 @operation
-@keeping_in_place
 @taking(BodyChanges)
+@keeping_in_place
 def edit_body(
     body: Annotated[
         str,

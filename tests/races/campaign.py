@@ -24,6 +24,7 @@ from races.stage import GONE, MARK, Outcome, Stage
 from races.verbs import ALONE, LEFT, OVERWRITES, PYTHON, SERVED, SLOW, TRACKING, Given, There, plain
 from studio.foundations.errors import StudioError
 from studio.foundations.foreign_files import MANIFEST_NAME
+from studio.operations.jobs.stream_recording import recording_folder
 from studio.results.verifying import verify
 from studio.runs.notes import notes_of
 from studio.sessions.atomic_files import PARTIAL_PREFIX, discard
@@ -47,6 +48,7 @@ CAUSELESS = re.compile(
     r"No such file|Errno|Traceback|fault of the studio|disk space|disk I/O|unable to open", re.I
 )
 """Words of a refusal that name no cause, or a false one."""
+RECORDED = recording_folder(Path("taken")).name.removeprefix("taken")
 SEARCHING = ("tracking", "compiling", "starting", "preparing")
 
 
@@ -276,7 +278,9 @@ def _judged(
     thrown = [path for path in trash if not (path / MANIFEST_NAME).is_file()]
     places = [path for path in (*folders, *trash) if path not in thrown]
     for path in folders:
-        if not (path / MANIFEST_NAME).is_file():
+        # What was recorded until a kill is there to be made a session of.
+        recorded = killed and path.name.endswith(RECORDED)
+        if not recorded and not (path / MANIFEST_NAME).is_file():
             yield f"the folder '{path.name}' is no session"
     for path in thrown:
         if not (path / RECORD_NAME).is_file():

@@ -57,6 +57,12 @@ class FootageCache:
                 self._brought[address] = remote_session(address)
             return self._brought[address]
         path = Path(name) if Path(name).is_absolute() else self.folder / name
+        if path == Path(name) and not (path / "session.json").is_file():
+            raise SessionError(
+                f"There is no session at '{path}'.",
+                "Where it was renamed meanwhile, do this again under its new name; other machines reach it by an"
+                " address alone.",
+            )
         if not (path / "session.json").is_file():
             raise SessionError(
                 f"The footage '{name}' is not in '{self.folder}'.", f"Make it: studio synthesize {name}."

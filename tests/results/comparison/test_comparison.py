@@ -10,7 +10,7 @@ import pytest
 from scipy import stats
 
 from studio.cli.reading import read_assignments
-from studio.foundations.errors import RunError, StudioError, TruthError
+from studio.foundations.errors import RunError, SessionError, StudioError, TruthError
 from studio.results.comparison.candidates import Lineup
 from studio.results.comparison.comparison_findings import document, findings, frames_csv, table_text
 from studio.results.comparison.footage_cache import FootageCache
@@ -129,6 +129,16 @@ def test_csv_and_text_agree(concluded: Comparison) -> None:
     text = table_text(concluded)
     assert "annealed:eq13" in text
     assert "21.1" in text or "21.2" in text
+
+
+def test_a_session_that_is_not_there_is_no_recipe_to_be_rendered(tmp_path: Path) -> None:
+    cache = FootageCache(tmp_path)
+    with pytest.raises(SessionError, match="There is no session at") as refusal:
+        cache.session(str(tmp_path / "toy"))
+    assert "renamed" in refusal.value.hint
+    with pytest.raises(SessionError, match="'walk' is not in") as refusal:
+        cache.session("walk")
+    assert "synthesize walk" in refusal.value.hint
 
 
 def test_a_session_without_truth_is_refused(session_on_disk: Session) -> None:
