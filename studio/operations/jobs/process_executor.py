@@ -38,6 +38,8 @@ ONE_CORE: Mapping[str, str] = dict.fromkeys(
 )
 PATIENCE = 5.0
 """How long a process that hung up may take to end, s."""
+UNGUARDED = 76
+"""Exit code of a process that would have started processes while it was being started itself."""
 
 
 class ProcessLostError(RunError):
@@ -165,7 +167,7 @@ class _Seat:
         self._starting = threading.Lock()
 
     def run(self, content: bytes, unwanted: Callable[[], bool]) -> object:
-        """What a task returns. Raises what it raises, ProcessLostError."""
+        """What a task returns. Raises what it raises, ProcessLostError, RunError where no process can run it."""
         with self._starting:
             if unwanted():
                 raise ProcessLostError("The task was cancelled.")
@@ -178,7 +180,7 @@ class _Seat:
                     break
                 self._on_report(*answer)
         except (EOFError, OSError, pickle.UnpicklingError):
-            raise ProcessLostError(f"The process that ran it {self._died()}.") from None
+            raise self._lost() from None
         if kind == "raised":
             raise answer
         return answer
@@ -199,25 +201,33 @@ class _Seat:
             self._pipe = self._process = None
 
     def _start(self) -> Connection:
+        if getattr(multiprocessing.current_process(), "_inheriting", False):
+            # A process that another one's script started: it runs that script, which starts processes, from its
+            # beginning.
+            os._exit(UNGUARDED)
         context = multiprocessing.get_context("spawn")
-        self._pipe, theirs = context.Pipe()
+        ours, theirs = context.Pipe()
         process = context.Process(
             target=_run_tasks, args=(theirs, self._niceness), name="studio-task", daemon=True
         )
-        with _environment(self._environment):
+        # Only the process itself may hold the other end: then the pipe ends when the process does.
+        with theirs, _environment(self._environment):
             process.start()
-        self._process = process
-        # Only the process itself may hold this end: then the pipe ends when the process does.
-        theirs.close()
-        return self._pipe
+        self._process, self._pipe = process, ours
+        return ours
 
-    def _died(self) -> str:
-        """How the process ended, in words."""
+    def _lost(self) -> RunError:
+        """That the process ended, and how."""
         assert self._process is not None
         self._process.join(PATIENCE)
-        words = ending(self._process.exitcode)
+        code = self._process.exitcode
         self.end()
-        return words
+        if code == UNGUARDED:
+            return RunError(
+                "Its process runs this script again from the beginning, as Python's do.",
+                "Put what the script does under \"if __name__ == '__main__':\".",
+            )
+        return ProcessLostError(f"The process that ran it {ending(code)}.")
 
 
 def ending(exit_code: int | None) -> str:

@@ -2,10 +2,13 @@
 
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
+from multiprocessing.context import SpawnProcess
 from pathlib import Path
 
 import pytest
@@ -87,6 +90,37 @@ def test_a_lost_process_fails_its_own_task_and_is_said(one: ProcessExecutor, tmp
     assert isinstance(problem, ProcessLostError)
     assert problem.message == "The process that ran it ended by signal 9, SIGKILL."
     assert after.result(PATIENCE) != before.result(PATIENCE)
+
+
+SCRIPT = """
+from studio.operations.jobs.process_executor import ProcessExecutor
+
+with ProcessExecutor(1) as one:
+    problem = one.submit(abs, -1).exception()
+print(type(problem).__name__, problem)
+"""
+
+
+@pytest.mark.slow
+def test_a_script_that_its_processes_would_run_again_is_told_so(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(SCRIPT)
+    ended = subprocess.run(
+        [sys.executable, str(script)], capture_output=True, text=True, check=True, timeout=PATIENCE
+    )
+    assert "RunError Its process runs this script again" in ended.stdout
+    assert "if __name__ == '__main__':" in ended.stdout
+
+
+def test_a_process_that_cannot_be_started_is_waited_for_by_no_task(
+    one: ProcessExecutor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(_: object) -> None:
+        raise BlockingIOError("Resource temporarily unavailable")
+
+    monkeypatch.setattr(SpawnProcess, "start", refuse)
+    for _ in range(2):
+        assert isinstance(one.submit(identifier).exception(PATIENCE), BlockingIOError)
 
 
 @pytest.mark.slow
