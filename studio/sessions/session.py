@@ -368,11 +368,15 @@ def check_unchanged(session: Session, *names: str) -> None:
     now = _described_now(session)
     changed = [name for name in names if _differs(name, now, session.manifest)]
     if changed:
-        what = changed[0].removesuffix("_changed").replace("_", " ")
-        raise SessionError(
-            f"The {what} of session '{session.name}' was changed by other work meanwhile.",
-            "Do this again: it then begins from what there is now.",
-        )
+        raise changed_meanwhile(session, changed[0].removesuffix("_changed").replace("_", " "))
+
+
+def changed_meanwhile(session: Session, what: str) -> SessionError:
+    """The error for a change of what others have changed since it was read."""
+    return SessionError(
+        f"The {what} of session '{session.name}' was changed by other work meanwhile.",
+        "Do this again: it then begins from what there is now.",
+    )
 
 
 def _described_now(session: Session) -> SessionManifest:

@@ -222,6 +222,7 @@ PYTHON: Mapping[str, Callable[[Given], object]] = {
     "background": lambda at: studio.background(at.name, "masks", tune=False),
     "add footage": lambda at: studio.add_footage(at.name, at.source, replace=True, fps=60.0),
     "import": lambda at: studio.import_footage(at.source, at.called("imported"), fps=60.0),
+    "import again": lambda at: studio.import_footage(at.session, at.called("again")),
     "calibrate": _calibrate,
     "align": lambda at: studio.align(at.name),
     "turn the cameras": lambda at: turn_the_cameras(studio.open_session(at.name), 0.1),
@@ -426,6 +427,7 @@ LEFT: Mapping[str, Callable[[There, Given], object]] = {
     "turn": lambda there, at: there.any_session(lambda one: one.manifest.footage.cameras[0].turned == 180),
     "synchronise": lambda there, at: LEFT["turn"](there, at),
     "import": lambda there, at: there.any_session(lambda one: one.name == at.called("imported")),
+    "import again": lambda there, at: there.any_session(lambda one: one.name == at.called("again")),
     "level": lambda there, at: LEFT["calibrate"](there, at),
     "calibrate": lambda there, at: there.any_session(
         lambda one: list((one.path / "calibration" / EARLIER).glob("*"))

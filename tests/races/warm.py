@@ -13,7 +13,7 @@ from studio.foundations.errors import StudioError
 from studio.foundations.numba_in_threads import _helpers
 from studio.sessions.workspace import VARIABLE
 
-WITH_PROCESSES = {"add footage", "import", "compare", "sweep", "batch", "live", "record"}
+WITH_PROCESSES = {"add footage", "import", "import again", "compare", "sweep", "batch", "live", "record"}
 """Verbs that have processes or threads beside them, which a fork would share or miss."""
 
 

@@ -12,13 +12,14 @@ from toy_footage import write_video
 from toy_session import make_session, true_poses
 
 import studio
-from studio.foundations.errors import NotFoundError, RunError, SessionError
+from studio.foundations.errors import FootageError, NotFoundError, RunError, SessionError
 from studio.operations import footage, own_bodies, subjects
 from studio.operations.comparison_folders import new_comparison, place_of
 from studio.results.comparison.sweep import plan_sweep
 from studio.results.verifying import verify
 from studio.runs.new_run import prepare_run
 from studio.runs.notes import notes_of, write_note
+from studio.runs.setup import background_setup
 from studio.runs.setup.initialising import InitialPose, keep_pose
 from studio.sessions import atomic_files, calibration_changes, work_under_way
 from studio.sessions import workspace as workspace_module
@@ -376,3 +377,16 @@ def test_a_session_that_a_verb_takes_beside_its_own_stays_where_it_is(
         with pytest.raises(RunError, match=f"Session 'toy' stays as it is while '{verb}' works on it"):
             work()
     assert [one.name for one in workspace.sessions()] == ["toy"]
+
+
+def test_masks_that_cannot_be_set_up_take_back_nothing_of_others(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def turned_meanwhile(*_: object) -> None:
+        change_footage(Session(session.path), rotations={"front": 180})
+        raise FootageError("Nothing is to be seen.", "")
+
+    monkeypatch.setattr(background_setup, "_set_up", turned_meanwhile)
+    with pytest.raises(FootageError, match="Nothing is to be seen"):
+        background_setup.set_up_background(session, "masks")
+    assert Session(session.path).manifest.footage.cameras[0].turned == 180

@@ -14,7 +14,7 @@ import dataclasses
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -32,7 +32,7 @@ from studio.footage.capture.footage import Footage
 from studio.footage.capture.footage_source import FootageSource
 from studio.footage.capture.pictures import is_picture, png_of
 from studio.foundations.arrays import Bytes
-from studio.foundations.errors import FootageError, RunError, StudioError, WorkCancelledError
+from studio.foundations.errors import FootageError, RunError, SessionError, StudioError, WorkCancelledError
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.progress import Progress, unheard
 from studio.foundations.words import sentence
@@ -66,7 +66,7 @@ from studio.sessions.background_files import (
     write_evidence,
 )
 from studio.sessions.manifest import SessionManifest
-from studio.sessions.session import Session, described_anew
+from studio.sessions.session import Session, changed_meanwhile, described_anew
 from studio.sessions.stroke_files import read_strokes, restore_strokes, stored_strokes, write_strokes
 
 BackgroundSource = Literal[
@@ -251,7 +251,8 @@ def set_up_background(
     except BaseException:
         if strokes is not None:
             restore_strokes(session, had_strokes)
-        _with_footage(session, manifest.footage)
+        with suppress(SessionError):
+            _with_footage(session, manifest.footage)
         if had_evidence:
             write_evidence(session, evidence)
         else:
@@ -396,9 +397,19 @@ class _SetUp:
 
 
 def _with_footage(session: Session, footage: FootageSource) -> Session:
-    """The session as it is now, with its footage described so."""
+    """The session as it is now, with its footage described so. Raises SessionError where others have changed more of
+    that than its masks and backgrounds: theirs stays.
+    """
     now = Session(session.path)
+    if _filmed(now.manifest.footage) != _filmed(footage):
+        raise changed_meanwhile(session, "footage")
     return described_anew(now, msgspec.structs.replace(now.manifest, footage=footage))
+
+
+def _filmed(footage: FootageSource) -> FootageSource:
+    """Without what is set up here."""
+    cameras = tuple(dataclasses.replace(one, masks="", background="") for one in footage.cameras)
+    return dataclasses.replace(footage, cameras=cameras)
 
 
 def _set_up_best(session: Session, wanted: _Wanted, progress: Progress) -> BackgroundSetup:
