@@ -14,7 +14,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from studio.app.server.access import VIEWERS_POSTS, VIEWING, AccessGuard, binding_rule
-from studio.app.server.viewers_budget import REST, ViewersBudget
+from studio.app.server.viewers_budget import MOST_SOCKETS, PICTURES_AT_ONCE, REST, ViewersBudget
 from studio.foundations.errors import AccessError
 from studio.sessions.stored_run import StoredRun
 
@@ -75,6 +75,35 @@ def test_viewers_compute_one_after_another_and_rest_while_a_run_is_tracked() -> 
     assert most == 1
     # A rest of six times as long: no time is expected here but the order of sizes.
     assert all(after - before > 0.05 * REST for before, after in pairwise(ends))
+
+
+def test_viewers_share_a_number_of_pictures_and_of_sockets() -> None:
+    async def asked(kind: str, path: str, count: int) -> tuple[int, int]:
+        """How many go on at once, and how many are turned away."""
+        within, answered, go = 0, 0, asyncio.Event()
+
+        async def app(_scope: Scope, _receive: Receive, _send: Send) -> None:
+            nonlocal within
+            within += 1
+            await go.wait()
+
+        async def send(_: object) -> None:
+            nonlocal answered
+            answered += 1
+
+        budget = ViewersBudget(app, tracking=lambda: True)
+        VIEWING.set(True)
+        scope = {"type": kind, "path": path}
+        waiting = [asyncio.ensure_future(budget(scope, never, send)) for _ in range(count)]
+        await asyncio.sleep(0.05)
+        at_once = within
+        go.set()
+        await asyncio.gather(*waiting)
+        return at_once, answered
+
+    picture = "/api/sessions/take1/frames/0/views/cam1.jpg"
+    assert asyncio.run(asked("http", picture, PICTURES_AT_ONCE + 2)) == (PICTURES_AT_ONCE, 0)
+    assert asyncio.run(asked("websocket", "/api/events", MOST_SOCKETS + 2)) == (MOST_SOCKETS, 2)
 
 
 async def never(*_: object) -> NoReturn:
