@@ -37,7 +37,7 @@ def check_writable(folder: Path) -> None:
 def write_bytes(path: Path, content: bytes) -> None:
     """Write `content` to `path`, atomically. Raises SessionError; then the old file is unchanged."""
     check_inside(path.parent)
-    with writing("The file", path):
+    with writing("The file", path), _folder(path.parent) as folder:
         handle, temporary = tempfile.mkstemp(prefix=PARTIAL_PREFIX, dir=path.parent)
         try:
             with os.fdopen(handle, "wb") as stream:
@@ -48,9 +48,23 @@ def write_bytes(path: Path, content: bytes) -> None:
             os.replace(temporary, path)
         except BaseException:
             with contextlib.suppress(OSError):
-                os.unlink(temporary)
+                # Its folder may have been moved meanwhile.
+                os.unlink(temporary if folder is None else os.path.basename(temporary), dir_fd=folder)
             raise
     sync_folder(path.parent)
+
+
+@contextlib.contextmanager
+def _folder(path: Path) -> Generator[int | None]:
+    """A folder's descriptor, which stays when the folder is moved; None where the system has none."""
+    if os.unlink not in os.supports_dir_fd:
+        yield None
+        return
+    folder = os.open(path, os.O_RDONLY)
+    try:
+        yield folder
+    finally:
+        os.close(folder)
 
 
 def write_text(path: Path, content: str) -> None:

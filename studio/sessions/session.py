@@ -283,19 +283,27 @@ class Session:
         check_links(path)
         return StoredRun(path)
 
-    def new_run(self, record: RunRecord, body_text: str = "", behaviour: Path | None = None) -> StoredRun:
+    def new_run(
+        self,
+        record: RunRecord,
+        body_text: str = "",
+        behaviour: Path | None = None,
+        calibration: bytes | None = None,
+    ) -> StoredRun:
         """Make the folder of a run: its record, the calibration's and the body file's snapshot, an empty
         store.
 
-        It is made atomically. `runs.new_run.prepare_run` fills in the record. body_text : content of
-        the body's file, "" to keep none. behaviour : the file of its behaviour model, to be copied.
-        Raises SessionError if the name is taken, or the disk is full.
+        It is made atomically. `runs.new_run.prepare_run` fills in the record. body_text : content of the body's file,
+        "" to keep none. behaviour : the file of its behaviour model, to be copied. calibration : of another run; by
+        default the session's, of the cameras that have footage. Raises SessionError if the name is taken, or the disk
+        is full.
         """
         place = self.path / RUNS_NAME / checked_name(record.name, "run")
         if place.exists():
             raise NameTakenError(f"Session '{self.name}' has a run '{record.name}'.", "Choose another name.")
         with writing("The run", place), atomic_files.made_whole(place, parents=False) as folder:
-            atomic_files.write_bytes(folder / CAMERAS_NAME, self.calibration_of_footage())
+            content = self.calibration_of_footage() if calibration is None else calibration
+            atomic_files.write_bytes(folder / CAMERAS_NAME, content)
             if body_text:
                 (folder / BODY_FOLDER).mkdir()
                 name = Path(record.body).stem

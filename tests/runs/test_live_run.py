@@ -13,6 +13,7 @@ from studio.runs.problem_source import ProblemSource
 from studio.runs.run_footage import footage_of
 from studio.search.settings import changed_settings
 from studio.search.trackers.recovery_settings import INITIALISE, SPREAD
+from studio.sessions.file_checksums import check_files
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 
@@ -174,3 +175,14 @@ def test_a_replay_names_what_it_replays(session_on_disk: Session) -> None:
     made = prepare_replay(session_on_disk, run)
     assert "'live' tracked live" in made.record.notes[-1]
     assert made.record.live
+
+
+def test_a_replay_has_the_calibration_of_what_it_replays_and_is_no_damage(session_on_disk: Session) -> None:
+    run = live_run(session_on_disk)
+    with driving(session_on_disk, run) as drive:
+        drive.to_end(3.0 * FRAME)
+    cameras = session_on_disk.path / "calibration" / "cameras.toml"
+    cameras.write_text(cameras.read_text() + "# Solved again.\n")
+    made = prepare_replay(session_on_disk, run)
+    assert (made.folder / "cameras.toml").read_bytes() == (run.folder / "cameras.toml").read_bytes()
+    assert check_files(made.folder).damaged == {}

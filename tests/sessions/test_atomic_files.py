@@ -98,6 +98,22 @@ def test_what_the_disk_refuses_is_said_in_words(
     assert (tmp_path / "a.json").read_text() == "old"
 
 
+def test_nothing_is_left_in_a_folder_that_is_moved_while_a_file_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "toy").mkdir()
+    replace = os.replace
+
+    def moved(*places: str | Path) -> None:
+        (tmp_path / "toy").rename(tmp_path / "new")
+        replace(*places)
+
+    monkeypatch.setattr(os, "replace", moved)
+    with pytest.raises(SessionError, match="its folder is no longer there"):
+        atomic_files.write_text(tmp_path / "toy" / "a.json", "words")
+    assert not list((tmp_path / "new").iterdir())
+
+
 def test_what_cannot_be_copied_is_named(tmp_path: Path) -> None:
     with pytest.raises(SessionError, match=r"'.*a' cannot be read \(No such file"):
         atomic_files.copy_file(tmp_path / "a", tmp_path / "b")

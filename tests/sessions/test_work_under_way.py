@@ -32,6 +32,7 @@ from studio.sessions.calibration_changes import (
     restore_calibration,
 )
 from studio.sessions.footage_changes import change_footage
+from studio.sessions.importers import importing
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session, described_anew
 from studio.sessions.stored_run import StoredRun
@@ -390,3 +391,16 @@ def test_masks_that_cannot_be_set_up_take_back_nothing_of_others(
     with pytest.raises(FootageError, match="Nothing is to be seen"):
         background_setup.set_up_background(session, "masks")
     assert Session(session.path).manifest.footage.cameras[0].turned == 180
+
+
+def test_a_session_that_is_imported_from_stays_where_it_is(
+    workspace: Workspace, session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make_session(workspace.root / "other", 3)
+    monkeypatch.setattr(importing, "_plan", lambda *_, **__: workspace.rename("toy", "new"))
+    for work in (
+        lambda: studio.import_footage(session.path, "again"),
+        lambda: studio.add_footage("other", session.path, replace=True),
+    ):
+        with pytest.raises(RunError, match="Session 'toy' stays as it is while 'import' works on it"):
+            work()

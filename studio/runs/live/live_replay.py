@@ -11,12 +11,11 @@ import msgspec
 import numpy as np
 
 from studio.foundations.errors import RunError
-from studio.foundations.foreign_files import read_text
+from studio.foundations.foreign_files import read_file, read_text
 from studio.runs.live.live_problems import LiveProblems
 from studio.runs.live.live_run import LiveRun
 from studio.runs.problem_source import ProblemSource
 from studio.search.settings import RunSettings, SettingsHistory, settings_from_values
-from studio.sessions import atomic_files
 from studio.sessions.manifest import now
 from studio.sessions.run_record import BEHAVIOUR_NAME, CAMERAS_NAME
 from studio.sessions.session import Session, free_run_name
@@ -47,10 +46,9 @@ def prepare_replay(session: Session, run: StoredRun, name: str = "") -> StoredRu
         notes=(*record.notes, f"The frames that '{run.name}' tracked live, without the clock."),
     )
     text = read_text(bodies[0]) if bodies else ""
-    made = session.new_run(following, text, run.folder / BEHAVIOUR_NAME if record.behaviour else None)
+    behaviour = run.folder / BEHAVIOUR_NAME if record.behaviour else None
     # The session's calibration may have changed since.
-    atomic_files.write_text(made.folder / CAMERAS_NAME, read_text(run.folder / CAMERAS_NAME))
-    return made
+    return session.new_run(following, text, behaviour, read_file(run.folder / CAMERAS_NAME))
 
 
 def replay(source: StoredRun, into: StoredRun, problems: ProblemSource) -> Iterator[int]:

@@ -4,6 +4,7 @@ import datetime
 import math
 import shutil
 from collections.abc import Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -21,7 +22,7 @@ from studio.footage.capture.pictures import check_picture, list_pictures
 from studio.footage.capture.video import probe_video
 from studio.foundations.declaring import Terminal, Web
 from studio.foundations.errors import CalibrationError, FootageError, SessionError
-from studio.foundations.foreign_files import leads_out
+from studio.foundations.foreign_files import MANIFEST_NAME, leads_out
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.progress import Progress, unheard
 from studio.sessions.archives import FOOTAGE_PARTS, folder_of, is_archive
@@ -57,7 +58,7 @@ from studio.sessions.names import free_name
 from studio.sessions.provenance import adopt
 from studio.sessions.session import CAMERAS_PATH, THUMBNAIL_NAME, Session, check_unchanged, described_anew
 from studio.sessions.stroke_files import OUTDATED, STROKES_NAME
-from studio.sessions.work_under_way import check_alone, one_at_a_time
+from studio.sessions.work_under_way import check_alone, one_at_a_time, working_on
 
 OWN_PARTS = ("videos", "pictures", "masks", "background")
 PERSON_PARTS = ("calibration", "subject.toml", "start_pose.csv", "sigma.csv", "truth", "bodies")
@@ -186,8 +187,9 @@ def import_source(
     _check_request(source, options)
     if into.exists():
         raise taken(into)
+    source = source.resolve()
     try:
-        with folder_of(source.resolve(), FOOTAGE_PARTS, into) as opened:
+        with _staying(source, into), folder_of(source, FOOTAGE_PARTS, into) as opened:
             plan = _plan(opened, options)
             assert plan.calibration is not None
             read = read_calibration(plan.calibration, options.unit, options.up)
@@ -224,6 +226,12 @@ def import_source(
     return ImportReport(Session(into), manifest.matching, manifest.notes, manifest.warnings, plan.layout)
 
 
+def _staying(source: Path, into: Path) -> AbstractContextManager[None]:
+    """Inside, a source that is a session beside the one that is made or added to stays where it is."""
+    beside = source.parent == into.parent.resolve() and (source / MANIFEST_NAME).is_file()
+    return working_on(source, "import") if beside else nullcontext()
+
+
 def add_footage(
     session: Session,
     source: Path,
@@ -242,7 +250,8 @@ def add_footage(
     _check_request(source, options)
     session.check_idle()
     check_alone(session.path)
-    with folder_of(source.resolve(), FOOTAGE_PARTS, session.path / "take") as folder:
+    source = source.resolve()
+    with _staying(source, session.path), folder_of(source, FOOTAGE_PARTS, session.path / "take") as folder:
         return _added(session, folder, options, progress)
 
 
