@@ -204,6 +204,7 @@ OF_RUN = ("tracker", "weighting", "body", "behaviour", "seed", "knobs", "name", 
 
 @operation
 @taking(LiveRequest)
+@keeping_in_place
 def live(
     session: SessionName,
     *,

@@ -49,7 +49,6 @@ LEFT_WHERE_IT_IS = {
     "notes": "reads a record",
     "note": "writes a record, in its turn",
     **dict.fromkeys(("track", "branch", "correct"), "of verbs that keep theirs in place"),
-    "live": "whose run is being tracked",
 }
 """Verbs on a session or a run during which that may be renamed or deleted, and why."""
 
