@@ -205,7 +205,7 @@ const tipOfLayer = (/** @type {At} */ at) => (points) =>
  * Of frames that are searched several times over the rows of the last search, whose result is the
  * frame's; `step`: its layers counted from 0.
  */
-export function lastSearches(rows) {
+function lastSearches(rows) {
   return [...grouped(rows, "frame").values()].flatMap((own) => {
     const search = Math.max(...own.map((row) => row.search));
     const its = own.filter((row) => row.search === search);

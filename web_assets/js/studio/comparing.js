@@ -22,9 +22,7 @@ import { drawBeside } from "./views.js";
 
 const LOAD_MILLISECONDS = 200;
 /** The runs' numbers, and of which runs they are. */
-const held = signal(
-  /** @type {{ key: string, answer: Schemas["RunsCompared"] } | null} */ (null),
-);
+const held = signal(/** @type {{ key: string, answer: Schemas["RunsCompared"] } | null} */ (null));
 /** The shown frame of every run: its pose for the scene, its layers for the chart. */
 const frames = signal(
   /** @type {{ key: string, runs: { run: string, pose: number[] | null, layers: any[] }[] } | null} */ (

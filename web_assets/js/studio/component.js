@@ -12,7 +12,6 @@ import { signal } from "../../vendor/signals.js";
 
 export { Fragment } from "../../vendor/preact.js";
 export {
-  useCallback,
   useEffect,
   useLayoutEffect,
   useMemo,
@@ -24,8 +23,6 @@ export {
   computed,
   effect,
   signal,
-  untracked,
-  useComputed,
   useSignal,
   useSignalEffect,
 } from "../../vendor/signals.js";

@@ -7,7 +7,8 @@ import { importForm } from "./importing.js";
 import { complain } from "../messages.js";
 import { newRunForm } from "./new_run.js";
 import { lacks, openSession, refreshSessions, setupPath } from "../sessions.js";
-import { follow, html, mount, useLayoutEffect, useState } from "./component.js";
+import { follow, html, mount, useLayoutEffect } from "./component.js";
+import { Action } from "./parts.js";
 
 const go = (address) => {
   location.href = address;
@@ -23,19 +24,6 @@ async function addSample() {
   }
 }
 
-/** A button that does something; while it is being done it cannot be pressed again. */
-function Action({ label, act, kind = "" }) {
-  const [isBusy, setBusy] = useState(false);
-  const press = async () => {
-    setBusy(true);
-    await act();
-    setBusy(false);
-  };
-  return html`<button type="button" class=${kind} disabled=${isBusy} onClick=${press}>
-    ${label}
-  </button>`;
-}
-
 /** A heading, what it means and what can be done, in the middle of the scene. */
 const Card = ({ heading, text, children = null }) => html`<div class="card">
   <h2>${heading}</h2>
@@ -48,9 +36,9 @@ const FirstSteps = () => html`<${Card}
   text="Import the footage of your cameras, or start with the bundled walk."
 >
   <div class="group">
-    <${Action} label="Open the sample" act=${addSample} kind="primary" />
-    <${Action} label="From my own cameras" act=${() => go("/way?new")} />
-    <${Action} label="Import footage" act=${() => importForm()} />
+    <${Action} act=${addSample} kind="primary">Open the sample</${Action}>
+    <${Action} act=${() => go("/way?new")}>From my own cameras</${Action}>
+    <${Action} act=${() => importForm()}>Import footage</${Action}>
   </div>
 <//>`;
 
@@ -60,10 +48,9 @@ const ProcessLost = ({ work }) => html`<${Card}
 >
   <div class="group">
     <${Action}
-      label="Resume"
       kind="primary"
       act=${() => post(`${runPath(work.session, work.run)}/start`).catch(complain)}
-    />
+    >Resume</${Action}>
   </div>
 <//>`;
 
@@ -127,9 +114,9 @@ function Invitation() {
     ${
       entry.next_step
         ? html`${`${entry.name}: ${lacks(entry)}.`}
-            <${Action} label="Guided set-up" kind="primary small" act=${() => go(setupPath(entry))} />`
+            <${Action} kind="primary small" act=${() => go(setupPath(entry))}>Guided set-up</${Action}>`
         : html`No run yet. Set a start pose under “Pose” if the session has none, then
-            <${Action} label="New run" kind="primary small" act=${() => newRunForm(entry)} />`
+            <${Action} kind="primary small" act=${() => newRunForm(entry)}>New run</${Action}>`
     }
   </div>`;
 }

@@ -15,7 +15,7 @@ const PADDING = 6;
 const LONGEST = 2000;
 
 /** What a note says in a line. @param {Note} note */
-export const noteWords = (note) => note.text || "bookmark";
+const noteWords = (note) => note.text || "bookmark";
 
 /** @param {number} frame */
 const pathOf = (frame) =>
