@@ -78,7 +78,11 @@ def test_arrows_between_rooms_are_few_and_none_leads_up() -> None:
     public = {"", "extending"}
     assert {room for room, other in arrows if other in public} == {"app"}
     assert not {("body", "footage"), ("footage", "body")} & arrows
-    up = {(room, other) for room, other in arrows if other not in public and ROOMS.index(other) > ROOMS.index(room)}
+    up = {
+        (room, other)
+        for room, other in arrows
+        if other not in public and ROOMS.index(other) > ROOMS.index(room)
+    }
     assert up == set()
 
 

@@ -21,6 +21,7 @@ from studio.search.trackers.catalogue import TRACKERS
 from studio.sessions.stored_run import StoredRun
 
 GUIDE_PAGES = (
+    "interfaces",
     "python",
     "verbs",
     "commands",
