@@ -8,6 +8,7 @@ import socket
 import threading
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType, MappingProxyType
 from typing import NamedTuple
@@ -16,7 +17,7 @@ from urllib.parse import urlencode
 import click
 import uvicorn
 
-from studio.app.server.access import HostRule, binding_rule, new_token
+from studio.app.server.access import HostRule, Tokens, binding_rule, new_token
 from studio.foundations.errors import StudioError
 from studio.foundations.foreign_files import read_text
 from studio.operations.gallery import prepare_demo
@@ -72,33 +73,48 @@ class WorkspaceServedError(StudioError):
     status, code = 409, "served"
 
 
+@dataclass(frozen=True, slots=True)
+class Listening:
+    """Where the studio listens.
+
+    port : 0 takes a free one.
+    allow_remote : hosts beyond this machine's loopback are allowed.
+    name : the host name of a proxy with TLS before the studio, which is served at https://NAME/ then.
+    """
+
+    host: str = "127.0.0.1"
+    port: int = PORT
+    allow_remote: bool = False
+    name: str = ""
+
+
 def serve(
     workspace_root: Path,
-    host: str = "127.0.0.1",
-    port: int = PORT,
-    allow_remote: bool = False,
+    listening: Listening | None = None,
     *,
     first: Callable[[], Opening] | None = None,
-    name: str = "",
     send_poses: Sequence[str] = (),
     announce: Announce = click.echo,
 ) -> None:
     """Serve the studio on a workspace until Ctrl-C.
 
-    port : 0 takes a free one. first : what the printed address shows; its run is opened and made ready at once.
-    announce : called once with the addresses (`printed`). name : the host name of a proxy with TLS before the studio,
-    which is served at https://NAME/ then. send_poses : addresses (`operations.jobs.send_addresses`) to which live
-    runs send their poses. Raises StudioError for one that is none, a host that needs `allow_remote`, a port that is
-    taken, or a workspace that cannot be written.
+    first : what the printed address shows; its run is opened and made ready at once.
+    send_poses : addresses (`operations.jobs.send_addresses`) to which live runs send their poses.
+    announce : called once with the addresses (`printed`).
+
+    Raises StudioError for an address that is none, a host that needs `allow_remote`, a port that is taken, or a
+    workspace that cannot be written.
     """
-    hosts = binding_rule(host, allow_remote, name)
+    listening = listening or Listening()
+    host, name = listening.host, listening.name
+    hosts = binding_rule(host, listening.allow_remote, name)
     if send_poses:
         os.environ[VARIABLE] = ",".join(send_poses)
         addresses_from_environment()
     workspace = Workspace(workspace_root)
     log_path = _log_to_file(workspace.root / STATE_NAME)
-    token, viewers_token = new_token(), new_token()
-    with _alone_on(workspace.root) as show_address, _listening(host, port) as listener:
+    tokens = Tokens(new_token(), new_token())
+    with _alone_on(workspace.root) as show_address, _listening(host, listening.port) as listener:
         show_address(f"http://{_named(host)}:{listener.getsockname()[1]}")
         control = StudioControl(workspace)
         try:
@@ -107,11 +123,11 @@ def serve(
             opening = None if first is None else first()
             if opening is not None:
                 control.send(Open(**about(opening.run.folder), warm=True))
-            app = _app(workspace, control, (token, viewers_token), hosts, log_path)
+            app = _app(workspace, control, tokens, hosts, log_path)
             at = f"https://{name}" if name else f"http://{_named(host)}:{listener.getsockname()[1]}"
             place: Mapping[str, str] = {} if opening is None else opening.query
-            shown = (address(at, key, place) for key in (token, viewers_token))
-            announce(printed(*shown, plainly=allow_remote and not name))
+            shown = (address(at, key, place) for key in tokens)
+            announce(printed(*shown, plainly=listening.allow_remote and not name))
             _serve_until_stopped(app, listener)
         finally:
             control.close()
@@ -123,7 +139,7 @@ def demo(workspace_root: Path, port: int = 0, *, announce: Announce = click.echo
     def first() -> Opening:
         return Opening(prepare_demo(workspace_root).run(DEMO_RUN), DEMO_SHOWS)
 
-    serve(workspace_root, port=port, first=first, announce=announce)
+    serve(workspace_root, Listening(port=port), first=first, announce=announce)
 
 
 def printed(full: str, viewers: str, plainly: bool) -> str:
@@ -178,7 +194,7 @@ def _alone_on(root: Path) -> Generator[Callable[[str], None]]:
 
 
 def _app(
-    workspace: Workspace, control: StudioControl, tokens: tuple[str, str], hosts: HostRule, log_path: Path
+    workspace: Workspace, control: StudioControl, tokens: Tokens, hosts: HostRule, log_path: Path
 ) -> object:
     """The server, which takes a second and more to load."""
     from studio.app.scene.window_scenes import WindowScenes  # noqa: PLC0415
@@ -189,8 +205,7 @@ def _app(
         workspace,
         control,
         WindowScenes(workspace, control),
-        tokens[0],
-        viewers_token=tokens[1],
+        tokens,
         hosts=hosts,
         footage_roots=default_footage_roots(workspace.root),
         log_path=log_path,

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from studio.cli.launch import PORT, Announce, demo, serve
+from studio.cli.launch import PORT, Announce, Listening, demo, serve
 from studio.cli.output import errors_in_words, print_result
 from studio.sessions.workspace import Workspace
 
@@ -63,10 +63,7 @@ def serve_command(
     with errors_in_words():
         serve(
             workspace or Workspace().root,
-            host=host,
-            port=port,
-            allow_remote=allow_remote,
-            name=name,
+            Listening(host, port, allow_remote, name),
             send_poses=send,
             announce=_announcer(as_json),
         )

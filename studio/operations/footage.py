@@ -222,27 +222,35 @@ class Synchronised:
         ]
 
 
-@operation
-@keeping_in_place
-def synchronise(
-    session: SessionName,
-    *,
-    offsets: Offsets = None,
-    rotations: Rotations = None,
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SynchronyRequest:
+    """Offsets and turns by hand, or how they are estimated or read."""
+
+    offsets: Offsets = None
+    rotations: Rotations = None
     timestamps: Annotated[
         str | Path | None,
         Field(description="A recorder's times of the frames (timestamps.csv), instead of an estimate."),
         Terminal(kind=Path),
-    ] = None,
+    ] = None
     by_time: Annotated[
         bool,
         Field(description="Pair frames by their times, not by number: drift, lost frames. Written at once."),
-    ] = False,
+    ] = False
     within: Annotated[
         float, Field(gt=0, le=600, description="Largest offset that is looked for, seconds.")
-    ] = MOST_SECONDS,
-    apply: Annotated[bool, Field(description="Write what was estimated or read into the session.")] = False,
+    ] = MOST_SECONDS
+    apply: Annotated[bool, Field(description="Write what was estimated or read into the session.")] = False
+
+
+@operation
+@taking(SynchronyRequest)
+@keeping_in_place
+def synchronise(
+    session: SessionName,
+    *,
     progress: Reporting = None,
+    **options: Any,  # noqa: ANN401 - of the types that are declared
 ) -> Synchronised:
     """Say by how many frames the cameras of a session began apart.
 
@@ -251,32 +259,32 @@ def synchronise(
 
     Raises FootageError, also for an estimate that is to be applied and cannot be trusted.
     """
-    opened = open_session(session)
-    if offsets or rotations:
-        if apply or timestamps is not None:
+    opened, request = open_session(session), SynchronyRequest(**options)
+    if request.offsets or request.rotations:
+        if request.apply or request.timestamps is not None:
             raise FootageError(
                 "Offsets cannot be given by hand and estimated or read at once.",
                 "Leave out --apply and --timestamps.",
             )
-        change = change_footage(opened, offsets, rotations)
+        change = change_footage(opened, request.offsets, request.rotations)
         return Synchronised(change.session, None, change)
-    if by_time:
-        place = Path(timestamps) if timestamps is not None else None
+    if request.by_time:
+        place = Path(request.timestamps) if request.timestamps is not None else None
         with reporting(progress, "Reading times") as report:
             change = pair_by_time(opened, place, report)
         return Synchronised(change.session, None, change)
-    if timestamps is not None:
-        found = recorded_offsets(opened, Path(timestamps))
+    if request.timestamps is not None:
+        found = recorded_offsets(opened, Path(request.timestamps))
     else:
         with reporting(progress, "Estimating") as report:
-            found = synchrony_of(opened, report, within)
-        if apply and not found.sure:
+            found = synchrony_of(opened, report, request.within)
+        if request.apply and not found.sure:
             say(progress, found.notes)
             raise FootageError(
                 "The estimate is not reliable enough to be applied.",
                 "Give the offsets by hand with --offset CAMERA=FRAMES.",
             )
-    if not apply:
+    if not request.apply:
         return Synchronised(opened, found)
     change = change_footage(opened, found.offsets)
     return Synchronised(change.session, found, change)

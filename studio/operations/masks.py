@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 import numpy as np
@@ -14,7 +14,7 @@ from studio.evidence.settings import EvidenceSettings
 from studio.footage.capture.footage import EXCLUSIONS
 from studio.footage.capture.naming import match_names
 from studio.footage.capture.pictures import is_picture, painted_picture, png_of
-from studio.foundations.declaring import Knobs, Terminal, Values, Web, operation
+from studio.foundations.declaring import Knobs, Terminal, Values, Web, operation, taking
 from studio.foundations.errors import FootageError, NotFoundError
 from studio.foundations.foreign_files import read_file
 from studio.foundations.knobs import Knob, Value, knobs_of
@@ -49,20 +49,16 @@ from studio.sessions.stroke_files import read_strokes, strokes_of_file
 from studio.sessions.work_under_way import one_at_a_time
 
 
-@operation
-@keeping_in_place
-def background(
-    session: SessionName,
-    source: Annotated[
-        BackgroundSource, Field(description="Background to use from now on."), Terminal("--source")
-    ],
-    *,
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MaskRequest:
+    """How a session's masks are set up, beside their source."""
+
     plates: Annotated[
         Mapping[str, str | Path] | None,
         Field(description="By camera: a picture or clip of the empty room."),
         Terminal(left_out=True),
         Web(left_out=True),
-    ] = None,
+    ] = None
     exclude: Annotated[
         Mapping[str, ArrayLike | str | Path | None] | None,
         Field(
@@ -71,28 +67,26 @@ def background(
         ),
         Terminal(left_out=True),
         Web(left_out=True),
-    ] = None,
+    ] = None
     strokes: Annotated[
         str | Path | None,
         Field(description="File of brush strokes (JSON), in place of the session's."),
         Web(left_out=True),
-    ] = None,
+    ] = None
     run: Annotated[
         str,
         Field(max_length=64, description="A tracked run: its model's projection helps to carry strokes."),
-    ] = "",
+    ] = ""
     knobs: Annotated[
         Values,
         Field(max_length=64, description="Knobs of the masks, by name."),
         Knobs(others=True),
         Web("knobs"),
-    ] = None,
-    tune: Annotated[
-        bool, Field(description="Try knobs, keep those under which the views agree best.")
-    ] = True,
+    ] = None
+    tune: Annotated[bool, Field(description="Try knobs, keep those under which the views agree best.")] = True
     exclude_unused: Annotated[
         bool, Field(description="What no view's hull comes near does not count."), Terminal(left_out=True)
-    ] = False,
+    ] = False
     subject_at: Annotated[
         tuple[float, float] | None,
         Field(
@@ -100,8 +94,20 @@ def background(
             " metres. The others are cut out of the masks."
         ),
         Terminal(metavar="X,Y"),
-    ] = None,
+    ] = None
+
+
+@operation
+@taking(MaskRequest)
+@keeping_in_place
+def background(
+    session: SessionName,
+    source: Annotated[
+        BackgroundSource, Field(description="Background to use from now on."), Terminal("--source")
+    ],
+    *,
     progress: Reporting = None,
+    **options: Any,  # noqa: ANN401 - of the types that are declared
 ) -> BackgroundSetup:
     """Choose where a session's masks come from, what does not count, and (on the command line) see how good they are.
 
@@ -120,22 +126,23 @@ def background(
 
     Raises FootageError for a source that is not there, SettingsError for a knob; then nothing is changed.
     """
-    opened = open_session(session)
-    if plates:
-        opened = give_plates(opened, {camera: Path(path) for camera, path in plates.items()})
-    for camera, region in (exclude or {}).items():
+    opened, request = open_session(session), MaskRequest(**options)
+    if request.plates:
+        opened = give_plates(opened, {camera: Path(path) for camera, path in request.plates.items()})
+    for camera, region in (request.exclude or {}).items():
         exclude_region(opened, camera, region)
+    strokes = None if request.strokes is None else strokes_of_file(opened, Path(request.strokes))
     with reporting(progress, f"{opened.name}: background") as report:
         try:
             made = set_up_background(
                 opened,
                 source,
-                knobs=knobs,  # pyright: ignore[reportArgumentType]
-                tune=tune,
-                exclude_unused=exclude_unused,
-                strokes=None if strokes is None else strokes_of_file(opened, Path(strokes)),
-                run=run,
-                subject_at=subject_at,
+                knobs=request.knobs,  # pyright: ignore[reportArgumentType]
+                tune=request.tune,
+                exclude_unused=request.exclude_unused,
+                strokes=strokes,
+                run=request.run,
+                subject_at=request.subject_at,
                 progress=report,
             )
         finally:

@@ -172,7 +172,22 @@ def keep_fit(session: Session, fitted: FittedSubject) -> FittedSubject:
     return kept
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StartPoseRequest:
+    """How a start pose is searched, and what becomes of it."""
+
+    body: Body = ""
+    behaviour: Annotated[Model, Field(description="Its prototypes are poses to try.")] = ""
+    weighting: Annotated[str, Field(description="What tells poses apart."), OneOf(WEIGHTINGS)] = WEIGHTING
+    seed: Seed = 0
+    keep: Annotated[bool, Field(description="Write the pose down.")] = True
+    replace: Annotated[
+        bool, Field(description="Make it the session's start pose; the old one stays beside it.")
+    ] = False
+
+
 @operation
+@taking(StartPoseRequest)
 @keeping_in_place
 def initialise(
     session: SessionName,
@@ -180,15 +195,8 @@ def initialise(
         int, Field(ge=0, description="Where the start pose is searched."), Terminal("--frame")
     ] = 0,
     *,
-    body: Body = "",
-    behaviour: Annotated[Model, Field(description="Its prototypes are poses to try.")] = "",
-    weighting: Annotated[str, Field(description="What tells poses apart."), OneOf(WEIGHTINGS)] = WEIGHTING,
-    seed: Seed = 0,
-    keep: Annotated[bool, Field(description="Write the pose down.")] = True,
-    replace: Annotated[
-        bool, Field(description="Make it the session's start pose; the old one stays beside it.")
-    ] = False,
     progress: Reporting = None,
+    **options: Any,  # noqa: ANN401 - of the types that are declared
 ) -> InitialPose:
     """Find the pose in a frame of a session with nothing given but the body's dimensions, and write it down.
 
@@ -196,16 +204,22 @@ def initialise(
 
     Raises RunError where nothing is to be seen in the frame.
     """
-    opened = open_session(session)
+    opened, request = open_session(session), StartPoseRequest(**options)
     opened.checked_frames(frame, frame + 1)
-    tree, notes = opened.body_with_notes(body or None)
+    tree, notes = opened.body_with_notes(request.body or None)
     say(progress, notes, opened.path)
     with reporting(progress, f"{opened.name}: frame {frame}") as report:
         pose = initialise_session(
-            opened, frame, body=tree, behaviour=behaviour, weighting=weighting, seed=seed, progress=report
+            opened,
+            frame,
+            body=tree,
+            behaviour=request.behaviour,
+            weighting=request.weighting,
+            seed=request.seed,
+            progress=report,
         )
-    if keep:
-        pose = dataclasses.replace(pose, file=keep_pose(opened, pose, replace))
+    if request.keep:
+        pose = dataclasses.replace(pose, file=keep_pose(opened, pose, request.replace))
     say(progress, [pose.note] if pose.note else [])
     return pose
 

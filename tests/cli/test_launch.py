@@ -17,7 +17,7 @@ import pytest
 
 from studio.body.motion_files.trc import read_trc
 from studio.cli import launch
-from studio.cli.launch import RedactedFormatter, address, serve
+from studio.cli.launch import Listening, RedactedFormatter, address, serve
 from studio.foundations.errors import AccessError, StudioError
 from studio.operations.gallery import prepare_demo
 from studio.operations.jobs.commands import Open
@@ -29,9 +29,9 @@ from studio.sessions.workspace import Workspace
 SERVE = """
 import sys
 from pathlib import Path
-from studio.cli.launch import serve
+from studio.cli.launch import Listening, serve
 if __name__ == "__main__":
-    serve(Path(sys.argv[1]), port=0, announce=lambda text: print(text, flush=True))
+    serve(Path(sys.argv[1]), Listening(port=0), announce=lambda text: print(text, flush=True))
     print("closed", flush=True)
 """
 
@@ -139,7 +139,7 @@ def test_lines_of_the_log_lose_their_token() -> None:
 def test_another_host_needs_permission_before_anything_starts(tmp_path: Path) -> None:
     before = multiprocessing.active_children()
     with pytest.raises(AccessError, match=r"0\.0\.0\.0"):
-        serve(tmp_path / "w", host="0.0.0.0", port=0)
+        serve(tmp_path / "w", Listening("0.0.0.0", 0))
     assert not (tmp_path / "w").exists()
     assert multiprocessing.active_children() == before
 
@@ -150,7 +150,7 @@ def test_a_port_that_is_taken_is_named(tmp_path: Path) -> None:
         taken.listen(1)
         port = taken.getsockname()[1]
         with pytest.raises(StudioError, match=str(port)) as refused:
-            serve(tmp_path / "w", port=port)
+            serve(tmp_path / "w", Listening(port=port))
     assert "--port" in refused.value.hint
 
 
@@ -159,13 +159,13 @@ def test_a_workspace_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     closed = tmp_path / "closed"
     closed.mkdir(mode=0o500)
     with pytest.raises(StudioError, match="closed"):
-        serve(closed / "w", port=0)
+        serve(closed / "w", Listening(port=0))
 
 
 def test_a_workspace_that_is_a_file_is_named(tmp_path: Path) -> None:
     (tmp_path / "w").write_text("a file")
     with pytest.raises(StudioError, match="w") as refused:
-        serve(tmp_path / "w", port=0)
+        serve(tmp_path / "w", Listening(port=0))
     assert "--workspace" in refused.value.hint
 
 
@@ -274,7 +274,7 @@ def test_a_second_server_on_a_workspace_is_refused_with_the_first_ones_address(
     process, printed = served
     base = printed.partition("/?")[0]
     with pytest.raises(StudioError, match=re.escape(f"is served already, at {base}.")) as refused:
-        serve(tmp_path / "workspace", port=0)
+        serve(tmp_path / "workspace", Listening(port=0))
     assert "--workspace" in refused.value.hint
     assert "token" not in str(refused.value)
     assert launch.served_at(tmp_path / "workspace") == base

@@ -183,9 +183,9 @@ def two_at_once(trial: Trial) -> None:
 SERVE = """
 import sys
 from pathlib import Path
-from studio.cli.launch import serve
+from studio.cli.launch import Listening, serve
 if __name__ == "__main__":
-    serve(Path(sys.argv[1]), port=0, announce=lambda text: print(text, flush=True))
+    serve(Path(sys.argv[1]), Listening(port=0), announce=lambda text: print(text, flush=True))
 """
 RUN = f"/api/sessions/{TOY}/runs/{NEW}"
 

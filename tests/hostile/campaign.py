@@ -25,16 +25,17 @@ from click.testing import CliRunner
 from fastapi.testclient import TestClient
 from fsspec.config import conf as fsspec_config
 from fuzz.api import LONG, left_to_ask
-from studio.reproductions import experiments
 
 # Not under its own name here: the doubles are the server's tests'.
 from web_doubles import TOKEN, RecordingControl, RecordingScenes
 
 from hostile.commands import SESSION_COMMANDS
 from hostile.makers import MAKERS, NAME, RUN, SECRET, make_nothing, make_outside, make_plain
+from studio.app.server.access import Tokens
 from studio.app.server.api_document import api_document
 from studio.app.server.app import build_app
 from studio.cli.main import load, main
+from studio.operations.experiments import experiments
 from studio.sessions.workspace import Workspace
 
 AS_IT_IS = "as it is"
@@ -80,7 +81,7 @@ def campaign(
     for command in SESSION_COMMANDS:
         load(command)
     importlib.import_module("fpdf")
-    experiments()
+    experiments().lines()
     # What is here already is no growth: a child's collector leaves its pages shared.
     gc.freeze()
     with tempfile.TemporaryDirectory(prefix="hostile-") as folder:
@@ -216,7 +217,7 @@ def requests_of(document: dict, part: int | None = None) -> Iterator[tuple[str, 
 
 def _ask(workspace: Path, _: Path, say: Say, part: int | None) -> None:
     scenes = RecordingScenes()
-    app = build_app(Workspace(workspace), RecordingControl(), scenes, TOKEN)
+    app = build_app(Workspace(workspace), RecordingControl(), scenes, Tokens(TOKEN))
     with TestClient(app, base_url="http://127.0.0.1", raise_server_exceptions=False) as client:
         headers = {"authorization": f"Bearer {TOKEN}"}
         for method, path in requests_of(DOCUMENT, part):

@@ -21,7 +21,7 @@ def tried(*options: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-W", "ignore", "-m", "hostile", *options],
         env=os.environ
-        | {"PYTHONPATH": os.pathsep.join([str(tests.parent), str(tests), str(tests / "server")])},
+        | {"PYTHONPATH": os.pathsep.join([str(tests.parent), str(tests), str(tests / "app" / "server")])},
         capture_output=True,
         text=True,
         check=False,

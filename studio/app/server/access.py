@@ -26,6 +26,7 @@ import socket
 from contextvars import ContextVar
 from dataclasses import dataclass
 from http.cookies import CookieError, SimpleCookie
+from typing import NamedTuple
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
 from starlette.datastructures import Headers
@@ -64,6 +65,17 @@ class ReadOnlyError(AccessError, code="read-only"):
 def new_token() -> str:
     """256 random bits as text that may stand in an address."""
     return secrets.token_urlsafe(32)
+
+
+class Tokens(NamedTuple):
+    """What lets a browser in.
+
+    owner : all of it.
+    viewers : one that may only look; "" lets none in.
+    """
+
+    owner: str
+    viewers: str = ""
 
 
 @dataclass(frozen=True, slots=True)

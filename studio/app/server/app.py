@@ -54,7 +54,7 @@ from studio.app.server import (
     view_routes,
     workflow_routes,
 )
-from studio.app.server.access import AccessGuard, HostRule, binding_rule
+from studio.app.server.access import AccessGuard, HostRule, Tokens, binding_rule
 from studio.app.server.app_state import AppState
 from studio.app.server.body_limit import BodyLimit
 from studio.app.server.content_policy import PolicyHeaders
@@ -194,18 +194,17 @@ def build_app(
     workspace: Workspace,
     control: StudioControl,
     scenes: WindowScenes,
-    token: str,
+    tokens: Tokens,
     *,
-    viewers_token: str = "",
     hosts: HostRule | None = None,
     footage_roots: tuple[Path, ...] = (),
     log_path: Path | None = None,
 ) -> FastAPI:
     """The application. It ends `scenes` and `control` when it stops.
 
-    token : what lets a browser in. viewers_token : what lets one in that may only look. hosts : the Host headers that
-    are answered (default: this machine's loopback). footage_roots : folders from which footage may be imported by
-    path. log_path : named in answers to unforeseen errors.
+    hosts : the Host headers that are answered (default: this machine's loopback).
+    footage_roots : folders from which footage may be imported by path.
+    log_path : named in answers to unforeseen errors.
     """
     state = AppState(
         workspace,
@@ -233,8 +232,8 @@ def build_app(
     app.add_middleware(ViewersBudget, tracking=lambda: control.state.state is RunState.TRACKING)
     app.add_middleware(
         AccessGuard,
-        token=token,
-        viewers_token=viewers_token,
+        token=tokens.owner,
+        viewers_token=tokens.viewers,
         hosts=hosts or binding_rule("127.0.0.1", False),
     )
     app.add_middleware(PolicyHeaders)

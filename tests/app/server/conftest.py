@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from web_doubles import TOKEN, VIEWERS_TOKEN, RecordingControl, RecordingScenes, Studio, let_in, serving
 
+from studio.app.server.access import Tokens
 from studio.app.server.app import build_app
 from studio.footage.capture.calibration_files import write_calibration
 from studio.foundations.geometry.camera import Camera
@@ -151,8 +152,7 @@ def studio(
         workspace,
         control,
         scenes,
-        TOKEN,
-        viewers_token=VIEWERS_TOKEN,
+        Tokens(TOKEN, VIEWERS_TOKEN),
         footage_roots=(source.parent.resolve(),),
         log_path=log_path,
     )

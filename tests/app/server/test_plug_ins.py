@@ -17,6 +17,7 @@ from web_doubles import TOKEN, cookie_header, let_in, serving
 from websockets.sync.client import connect
 
 from studio.app.scene.window_scenes import WindowScenes
+from studio.app.server.access import Tokens
 from studio.app.server.app import build_app
 from studio.app.server.guide_routes import rendered
 from studio.body.catalogue import list_bodies, load_body
@@ -116,7 +117,9 @@ def page(installed: Path, toy_root: Path, tmp_path: Path) -> Iterator[Page]:
     """A page before the whole studio."""
     workspace = Workspace(toy_root)
     control = StudioControl(workspace)
-    app = build_app(workspace, control, WindowScenes(workspace, control), TOKEN, log_path=tmp_path / "log")
+    app = build_app(
+        workspace, control, WindowScenes(workspace, control), Tokens(TOKEN), log_path=tmp_path / "log"
+    )
     with serving(app) as base, let_in(base, TOKEN) as client:
         headers = {"cookie": cookie_header(client)}
         with connect(

@@ -11,6 +11,7 @@ from web_doubles import TOKEN, cookie_header, let_in, serving
 from websockets.sync.client import ClientConnection, connect
 
 from studio.app.scene.window_scenes import WindowScenes
+from studio.app.server.access import Tokens
 from studio.app.server.app import build_app
 from studio.operations.jobs.control import StudioControl
 from studio.sessions.workspace import Workspace
@@ -43,7 +44,9 @@ class Page:
 def page(workspace: Workspace, tmp_path: Path) -> Iterator[Page]:
     """A page in front of the whole studio."""
     control = StudioControl(workspace)
-    app = build_app(workspace, control, WindowScenes(workspace, control), TOKEN, log_path=tmp_path / "log")
+    app = build_app(
+        workspace, control, WindowScenes(workspace, control), Tokens(TOKEN), log_path=tmp_path / "log"
+    )
     with serving(app) as base, let_in(base, TOKEN) as client:
         socket = connect(
             base.replace("http", "ws") + "/api/events",

@@ -26,6 +26,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from studio.app.scene.guarded_server import GuardedServer
+from studio.app.server.access import Tokens
 from studio.app.server.app import build_app
 from studio.foundations.package import assets_folder
 from studio.sessions.workspace import Workspace
@@ -53,7 +54,7 @@ def relayed(tmp_path: Path, inner: GuardedServer) -> Iterator[Studio]:
     """The application in front of the real viser server."""
     workspace, control = Workspace(tmp_path), RecordingControl()
     scenes = RecordingScenes(RecordingStage(inner.get_port(), inner.relay_headers()))
-    app = build_app(workspace, control, scenes, TOKEN, viewers_token=VIEWERS_TOKEN)
+    app = build_app(workspace, control, scenes, Tokens(TOKEN, VIEWERS_TOKEN))
     with serving(app) as base, let_in(base, TOKEN) as client:
         yield Studio(base, client, control, scenes, workspace, app, tmp_path / "log")
 

@@ -19,6 +19,7 @@ from studio.app.scene.model import select
 from studio.app.scene.scene_server import SceneServer
 from studio.app.scene.window_scenes import TooManyScenesError, WindowScenes
 from studio.app.server import app as web_app
+from studio.app.server.access import Tokens
 from studio.app.server.app import build_app
 from studio.operations.jobs.events import SettingsApplied
 from studio.runs.new_run import prepare_run
@@ -80,7 +81,7 @@ def windows(
 ) -> Iterator[Windows]:
     monkeypatch.setattr(web_app, "SWEEP_SECONDS", 0.05)
     scenes = WindowScenes(workspace, control)
-    with serving(build_app(workspace, control, scenes, TOKEN)) as base, let_in(base, TOKEN) as client:
+    with serving(build_app(workspace, control, scenes, Tokens(TOKEN))) as base, let_in(base, TOKEN) as client:
         yield Windows(base, client, scenes, control)
 
 
@@ -214,7 +215,7 @@ def test_a_window_that_is_gone_frees_its_scene_and_one_that_is_loaded_again_find
 
 def test_the_number_of_scenes_is_bounded(workspace: Workspace, control: RecordingControl) -> None:
     scenes = WindowScenes(workspace, control, most=3)
-    with serving(build_app(workspace, control, scenes, TOKEN)) as base, let_in(base, TOKEN) as client:
+    with serving(build_app(workspace, control, scenes, Tokens(TOKEN))) as base, let_in(base, TOKEN) as client:
         made = Windows(base, client, scenes, control)
         for name in "abc":
             made.show(name, session="take1")

@@ -13,7 +13,7 @@ from studio.app.scene.scene_server import SceneServer
 from studio.garden.benchmarks.light_viewer import LightViewer
 from studio.garden.benchmarks.live import run_live_benchmark, track_watched
 from studio.operations.jobs.control import StudioControl
-from studio.operations.jobs.events import nothing_open
+from studio.operations.jobs.events import RunState, nothing_open
 from studio.operations.jobs.live_tracking import replay_live
 from studio.runs.live.live_replay import compare, prepare_replay
 from studio.runs.live.live_summary import LiveStanding
@@ -33,16 +33,16 @@ def test_a_light_viewer_connects() -> None:
 
 
 def test_pictures_come_less_often_while_a_live_run_is_tracked() -> None:
-    state = dataclasses.replace(nothing_open(), state="tracking")
+    state = dataclasses.replace(nothing_open(), state=RunState.TRACKING)
     live = dataclasses.replace(state, live=LiveStanding(3, 0.01, 24.2, 29.8))
     assert picture_pause(state) == PICTURE_SECONDS
     assert picture_pause(live) == LIVE_PICTURE_SECONDS > PICTURE_SECONDS
-    assert picture_pause(dataclasses.replace(live, state="paused")) == PICTURE_SECONDS
-    assert picture_pause(dataclasses.replace(state, state="reannealing")) == LIVE_PICTURE_SECONDS
+    assert picture_pause(dataclasses.replace(live, state=RunState.PAUSED)) == PICTURE_SECONDS
+    assert picture_pause(dataclasses.replace(state, state=RunState.REANNEALING)) == LIVE_PICTURE_SECONDS
 
 
 def test_the_panel_shows_a_live_runs_rate() -> None:
-    state = dataclasses.replace(nothing_open(), session="toy", run="live", state="tracking")
+    state = dataclasses.replace(nothing_open(), session="toy", run="live", state=RunState.TRACKING)
     state = dataclasses.replace(state, live=LiveStanding(3, 0.01, 24.2, 29.8))
     assert "live · 29.8 fps · latency 24 ms · 3 dropped" in search_html(state)
     assert "The disk is full." in search_html(dataclasses.replace(state, message="The disk is full."))

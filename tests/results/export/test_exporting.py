@@ -18,6 +18,7 @@ from studio.foundations.errors import (
     WorkCancelledError,
 )
 from studio.foundations.knobs import knobs_of
+from studio.foundations.registry import PlugInError
 from studio.operations.exports import discard_export, export_into_run, kept_exports, kept_file
 from studio.results.export.exporting import export_run, settled
 from studio.results.export.formats import FORMATS, format_of_file
@@ -115,8 +116,10 @@ def test_a_place_that_cannot_be_written(arm, tmp_path: Path) -> None:
         export_run(*arm, FORMATS["csv"], {"track": MADE}, tmp_path / "file" / "arm.csv")
 
 
-def test_the_scene_needs_its_recorder(arm, tmp_path: Path) -> None:
-    with pytest.raises(ExportError, match="Scene recording cannot be written here"):
+def test_the_scene_needs_its_recorder(arm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A studio that was not installed, only put on the path, has nothing plugged in."""
+    monkeypatch.setattr("studio.foundations.registry.metadata.entry_points", lambda **which: ())
+    with pytest.raises(PlugInError, match="No installed package gives 'scene-recorder'"):
         export_run(*arm, FORMATS["viser"], {"track": MADE}, tmp_path / "arm.viser")
 
 
