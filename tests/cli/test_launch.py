@@ -221,7 +221,7 @@ def test_the_demo_opens_on_a_frame_that_is_searched_already(
     evaluations; a run that is there already is left alone.
     """
     openings: list[launch.Opening] = []
-    monkeypatch.setattr(launch, "serve", lambda root, first, **_: openings.append(first()))
+    monkeypatch.setattr(launch, "serve", lambda root, listening, *, first, **_: openings.append(first()))
     launch.demo(tmp_path)
     session = Workspace(tmp_path).session("walk")
     (mark := session.run("ten-layers").folder / "mine.txt").write_text("mine")
