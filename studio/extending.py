@@ -9,7 +9,7 @@ import importlib
 _NAMES = {
     "studio.body.forward_kinematics": ("joint_frames", "limb_ends", "marker_points"),
     "studio.body.model": ("BodyModel",),
-    "studio.evidence.frame_evidence": ("FrameEvidence",),
+    "studio.evidence.frame_evidence": ("FrameEvidence", "ViewEvidence"),
     "studio.footage.capture.calibration_parts": ("FoundCameras",),
     "studio.footage.capture.calibration_writers": ("CalibrationFormat", "WrittenCalibration"),
     "studio.foundations.errors": ("CalibrationError", "ExportError", "RunError", "StudioError"),

@@ -5,6 +5,7 @@ from studio.body.forward_kinematics import limb_ends as limb_ends
 from studio.body.forward_kinematics import marker_points as marker_points
 from studio.body.model import BodyModel as BodyModel
 from studio.evidence.frame_evidence import FrameEvidence as FrameEvidence
+from studio.evidence.frame_evidence import ViewEvidence as ViewEvidence
 from studio.footage.capture.calibration_parts import FoundCameras as FoundCameras
 from studio.footage.capture.calibration_writers import CalibrationFormat as CalibrationFormat
 from studio.footage.capture.calibration_writers import WrittenCalibration as WrittenCalibration

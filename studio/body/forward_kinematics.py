@@ -18,7 +18,9 @@ from studio.foundations.numba_in_threads import KERNEL, njit
 def joint_frames(body: BodyModel, poses: ArrayLike) -> Array:
     """world_from_joint of every joint, (N, F, 3, 4) mm.
 
-    poses : (N, D) radians and mm; one pose (D,) counts as N = 1. Raises BodyError when D is not the body's.
+    poses : (N, D) radians and mm; one pose (D,) counts as N = 1.
+
+    Raises BodyError when D is not the body's.
     """
     poses = checked_poses(body, poses)
     tables = kinematic_tables(body)
@@ -42,14 +44,20 @@ def limb_frames(body: BodyModel, poses: ArrayLike) -> Array:
 
 
 def limb_ends(body: BodyModel, poses: ArrayLike) -> Array:
-    """World points of the drawn limbs' axes at z = 0 and z = length, (N, L, 2, 3) mm."""
+    """World points of the drawn limbs' axes at z = 0 and z = length, (N, L, 2, 3) mm.
+
+    poses : (N, D) radians and mm.
+    """
     frames = limb_frames(body, poses)
     along = frames[..., 2] * kinematic_tables(body).limb_shape[:, :1]
     return np.stack([frames[..., 3], frames[..., 3] + along], axis=2)
 
 
 def marker_points(body: BodyModel, poses: ArrayLike) -> Array:
-    """World points of the markers in the body's order, (N, M, 3) mm."""
+    """World points of the markers in the body's order, (N, M, 3) mm.
+
+    poses : (N, D) radians and mm.
+    """
     joints = np.array([marker.joint for marker in body.markers], dtype=np.int64)
     offsets = np.array([marker.offset for marker in body.markers]).reshape(-1, 3)
     frames = joint_frames(body, poses)[:, joints]

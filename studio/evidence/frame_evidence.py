@@ -13,12 +13,13 @@ EDGE_KINDS = ("proximity", "bodytrack", "none", "hull")
 class ViewEvidence:
     """One camera's evidence.
 
-    picture : (H, W, 3) uint8 BGR. mask : (H, W) uint8, 0 background, 255 foreground.
+    picture : (H, W, 3) uint8 BGR.
+    mask : (H, W) uint8, 0 background, 255 foreground.
     edges : (H, W) uint8 edge proximity map, 255 = on an edge (Eq. 14's p = edges / 255).
-    background : the camera's empty view where the hull is to be carved from pixels; None: from the mask. A view
-    with a background may have a mask of zeros, where none is needed.
-    hidden : (H, W) uint8, above 0 where the mask says nothing of the body, for somebody else is in front of it; None:
-    nowhere.
+    background : the camera's empty view where the hull is to be carved from pixels; None: from the mask. A view with a
+        background may have a mask of zeros, where none is needed.
+    hidden : (H, W) uint8, above 0 where the mask says nothing of the body, since another subject is in front of it;
+        None: nowhere.
     """
 
     camera: str

@@ -9,7 +9,8 @@ class names with its `code`, or has of its base.
 class StudioError(Exception):
     """A one-sentence cause and a one-sentence remedy.
 
-    message : what is wrong and where, one sentence. hint : what to do, one sentence.
+    message : what is wrong and where, one sentence.
+    hint : what to do, one sentence.
     """
 
     status = 400

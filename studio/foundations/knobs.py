@@ -56,7 +56,17 @@ def knob(
     takes_effect: str = "next layer",
     help: str,
 ) -> Any:  # noqa: ANN401 - a dataclass field stands where its value's type is annotated
-    """A dataclass field that carries its own range, unit, help and moment of effect."""
+    """A dataclass field that carries its own range, unit, help and moment of effect.
+
+    default : its type is the knob's.
+    low, high : inclusive range of a number; None: no bound.
+    step : of the slider.
+    label : words on screen; default: the field's name.
+    unit : such as "mm", shown behind the value.
+    choices : allowed words of a text.
+    takes_effect : "next layer", "next frame" or "new run".
+    help : one sentence, for the slider, the option and the guide.
+    """
     declared = Knob("", label, type(default), default, low, high, step, unit, choices, takes_effect, help)
     return field(default=default, metadata={"knob": declared})
 

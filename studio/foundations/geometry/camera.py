@@ -12,7 +12,8 @@ class Camera:
     """A camera with all its parameters.
 
     width, height : picture size, pixels; the origin is the centre of the top-left pixel.
-    matrix : (3, 3) intrinsic matrix, pixels (may hold a skew at [0, 1]). distortion : (5,) k1 k2 p1 p2 k3.
+    matrix : (3, 3) intrinsic matrix, pixels (may hold a skew at [0, 1]).
+    distortion : (5,) k1 k2 p1 p2 k3.
     rotation, translation : camera_from_world, (3, 3) and (3,) mm: x_camera = rotation @ x_world + translation.
     quarter_turns : clockwise turns by 90 degrees that *show* the picture upright (display only).
     """

@@ -12,8 +12,10 @@ from studio.foundations.geometry.camera import Camera
 def project(camera: Camera, points: Array) -> tuple[Array, Array]:
     """Pixels and depths of world points.
 
-    points : (..., 3) world, mm. Returns pixels (..., 2) and depths (...) along the optical axis, mm; points with
-    depth <= 0 lie behind the camera and their pixels are NaN.
+    points : (..., 3) world, mm.
+
+    Returns pixels (..., 2) and depths (...) along the optical axis, mm; points with depth <= 0 lie behind the camera
+    and their pixels are NaN.
     """
     seen = points @ camera.rotation.T + camera.translation
     depth = seen[..., 2]
