@@ -5,9 +5,12 @@ whatever reads or changes a session, a run, footage or what was made of them is 
 """
 
 import ast
+import inspect
 
 import pytest
 from test_house_rules import ROOT
+
+import studio
 
 BEHIND = ("studio.sessions.", "studio.runs.", "studio.footage.", "studio.results.")
 OF_VALUES = ("studio.sessions.names", "studio.runs.drawing.")
@@ -50,3 +53,30 @@ STILL: dict[str, int] = {
 def test_doors_take_no_functions_from_behind_the_verbs(door: str) -> None:
     taken = {name: len(names) for name, names in functions_taken(door).items()}
     assert taken == {name: count for name, count in STILL.items() if name.startswith(f"studio/{door}/")}
+
+
+MOST_PARAMETERS = 7
+
+
+@pytest.mark.parametrize("room", ["operations", "app", "cli"])
+def test_no_function_of_verbs_and_doors_declares_many_parameters(room: str) -> None:
+    """What a verb takes beyond that is a request of its own (`taking`)."""
+    many: list[str] = []
+    for path in sorted((ROOT / "studio" / room).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                names = [one.arg for one in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)]
+                if len(names) - (names[:1] in (["self"], ["cls"])) > MOST_PARAMETERS:
+                    many.append(f"{path.name}: {node.name}")
+    assert many == []
+
+
+def test_verbs_take_booleans_by_name_alone() -> None:
+    by_place = [
+        f"studio.{name}({parameter.name})"
+        for name in dir(studio)
+        if name != "StudioError"
+        for parameter in inspect.signature(getattr(studio, name)).parameters.values()
+        if isinstance(parameter.default, bool) and parameter.kind is not parameter.KEYWORD_ONLY
+    ]
+    assert by_place == []
