@@ -4,11 +4,11 @@ import ast
 import functools
 import gc
 import importlib
-import importlib.metadata
 import re
-from pathlib import Path
 
 import click
+
+from studio.foundations.package import package_folder, software_version
 
 # A command's module is imported when the command is called, so that no other waits for it: here is the module in this
 # room, and the function whose docstring says what the command does.
@@ -68,7 +68,6 @@ COMMANDS = {
     "diagnostics": ("doctor_commands", "cli.diagnostics_archive.diagnostics"),
     "bench": ("bench_commands", "cli.bench_commands.bench_command"),
 }
-ROOT = Path(__file__).parents[1]
 NO_MEMORY = re.compile(r"failed to map segment|cannot allocate memory", re.IGNORECASE)
 """What the system's loader says of a library that does not fit."""
 
@@ -99,7 +98,7 @@ def summary(name: str) -> str:
 
 @functools.cache
 def _docstrings(module: str) -> dict[str, str]:
-    tree = ast.parse((ROOT / f"{module.replace('.', '/')}.py").read_text("utf-8"))
+    tree = ast.parse((package_folder() / f"{module.replace('.', '/')}.py").read_text("utf-8"))
     return {one.name: ast.get_docstring(one) or "" for one in tree.body if isinstance(one, ast.FunctionDef)}
 
 
@@ -120,7 +119,7 @@ class _Commands(click.Group):
 @click.group(
     cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110}
 )
-@click.version_option(importlib.metadata.version("capture-studio"), prog_name="studio")
+@click.version_option(software_version(), prog_name="studio")
 def main() -> None:
     """Recover the motion of an articulated body from calibrated cameras, and watch the search do it.
 

@@ -2,7 +2,7 @@
 
 `TrackingRun.step_layer` (`tracking_run.py`) is the loop; `problem_source.py` makes pictures, masks and maps of each
 frame ready, `frame_loop.FrameSearch` searches it, `FrameRefiner` puts the pose onto the silhouettes and draws limbs
-anew that they deny, `RunWatch` says how the frame stands. Before its first frame a run fits the body's radii, hands,
+again that they deny, `RunWatch` says how the frame stands. Before its first frame a run fits the body's radii, hands,
 feet and head to what its first thirty frames show (`setup/shape_on_the_way.py`); after its last one exchanged sides
 are corrected in a track beside what was tracked (`sides.py`). Where a kernel has to be compiled, another process
 compiles what follows the first layer (`compiling_beside.py`).
