@@ -70,9 +70,9 @@ def __getattr__(name: str) -> object:
     """A verb, imported on first use."""
     if name not in _MODULE_OF:
         raise AttributeError(f"module 'studio' has no attribute '{name}'")
-    found = getattr(importlib.import_module(_MODULE_OF[name]), name)
-    globals()[name] = found
-    return found
+    verb = getattr(importlib.import_module(_MODULE_OF[name]), name)
+    globals()[name] = verb
+    return verb
 
 
 def __dir__() -> list[str]:

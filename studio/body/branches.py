@@ -60,7 +60,7 @@ class _Branch:
 
 def _joint_branches(body: BodyModel) -> list[list[_Branch]]:
     """Equivalent branches of each joint with three angles, parents first."""
-    found: list[list[_Branch]] = []
+    branches: list[list[_Branch]] = []
     for index, joint in enumerate(body.joints):
         ball = _ball(joint)
         if ball is None:
@@ -68,8 +68,8 @@ def _joint_branches(body: BodyModel) -> list[list[_Branch]]:
         hinges = [_hinge(child) for child in body.joints if child.parent == index]
         bends = [parameter for parameter in hinges if parameter >= 0]
         choices = [(True, False), (False, True), (True, True)] if bends else [(True, False)]
-        found.append([_Branch(ball, bends, over, turned) for over, turned in choices])
-    return found
+        branches.append([_Branch(ball, bends, over, turned) for over, turned in choices])
+    return branches
 
 
 def _ball(joint: Joint) -> tuple[int, ...] | None:

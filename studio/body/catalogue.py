@@ -22,11 +22,11 @@ def list_bodies(extra_folders: tuple[Path, ...] = ()) -> tuple[str, ...]:
 
 def body_files(folder: Path) -> tuple[Path, ...]:
     """The files of a folder that are bodies by their names, sorted; of several of one name, TOML goes first."""
-    found: dict[str, Path] = {}
+    files: dict[str, Path] = {}
     for suffix in (SUFFIX, *ROBOT_SUFFIXES):
         for path in folder.glob(f"*{suffix}"):
-            found.setdefault(path.stem, path)
-    return tuple(sorted(found.values()))
+            files.setdefault(path.stem, path)
+    return tuple(sorted(files.values()))
 
 
 def load_body(name_or_path: str, extra_folders: tuple[Path, ...] = ()) -> BodyModel:

@@ -75,11 +75,11 @@ class Dragger:
 
     def grip(self, name: str) -> Grip:
         """The grip of a name. Raises BodyError."""
-        found = next((grip for grip in self.grips if grip.name == name), None)
-        if found is None:
+        match = next((grip for grip in self.grips if grip.name == name), None)
+        if match is None:
             listed = ", ".join(grip.name for grip in self.grips)
             raise BodyError(f"Body '{self.body.name}' has no limb '{name[:64]}'.", f"Its limbs: {listed}.")
-        return found
+        return match
 
     def dragged(self, pose: Array, name: str, target: Array) -> Dragged:
         """The pose (D,) with the grip at `target` (3,) mm, or as near as limits allow. Raises BodyError for an unknown
@@ -94,15 +94,15 @@ class Dragger:
                 "Give a finite pose in the order of its parameters, and x, y, z in mm.",
             )
         start = np.clip(within_limits(self.body, given), self._lower, self._upper)
-        found = self._pulled(start, start, grip, goal)
-        if not self._reached(found, grip, goal):
+        fitted = self._pulled(start, start, grip, goal)
+        if not self._reached(fitted, grip, goal):
             bent = self._pulled(self._bent(start, grip), start, grip, goal)
-            found = bent if self._left(bent, grip, goal) < self._left(found, grip, goal) else found
-        if not self._reached(found, grip, goal):
+            fitted = bent if self._left(bent, grip, goal) < self._left(fitted, grip, goal) else fitted
+        if not self._reached(fitted, grip, goal):
             everything = np.arange(len(start))
-            found = self._fitted(found, start, everything, self._whole_pull(), grip, goal, self._ends)
-            found = self._pulled(found, found, grip, goal)
-        return Dragged(found, self._left(found, grip, goal))
+            fitted = self._fitted(fitted, start, everything, self._whole_pull(), grip, goal, self._ends)
+            fitted = self._pulled(fitted, fitted, grip, goal)
+        return Dragged(fitted, self._left(fitted, grip, goal))
 
     def root_frame(self, pose: Array) -> Array | None:
         """(3, 4) world from root, mm; None for a body that is fixed to the world."""
@@ -181,7 +181,7 @@ class Dragger:
             ends = limb_ends(self.body, poses)[:, limbs, 1]
             return ((ends - places) * weights).reshape(len(poses), -1)
 
-        found, _ = fitted_parameters(
+        fitted, _ = fitted_parameters(
             pose,
             free,
             scale,
@@ -193,16 +193,18 @@ class Dragger:
             most=MOST_STEPS,
             tolerance=1e-6,
         )
-        found[free] = np.clip(found[free], lower, upper)
-        return found
+        fitted[free] = np.clip(fitted[free], lower, upper)
+        return fitted
 
     def _chain(self, joint: int) -> Indices:
         """The parameters that move a joint's frame, root's left out, from the root outwards."""
-        found: list[int] = []
+        parameters: list[int] = []
         while joint >= 0:
-            found = [place for place in _moved_by(self.body, joint) if not self._root[place]] + found
+            parameters = [
+                place for place in _moved_by(self.body, joint) if not self._root[place]
+            ] + parameters
             joint = self.body.joints[joint].parent
-        return np.array(found, dtype=np.int64)
+        return np.array(parameters, dtype=np.int64)
 
 
 def _moved_by(body: BodyModel, joint: int) -> list[int]:

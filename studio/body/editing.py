@@ -68,10 +68,10 @@ def edited(
         definition = _with_marker(definition, text)
     if title:
         definition = msgspec.structs.replace(definition, title=title)
-    found = _checked(definition, body.name)
+    definition_now = _checked(definition, body.name)
     if mirror:
-        found = _mirrored(found, mirror, notes)
-    return BodyEdit(found, tuple(notes))
+        definition_now = _mirrored(definition_now, mirror, notes)
+    return BodyEdit(definition_now, tuple(notes))
 
 
 def _checked(definition: BodyDefinition, name: str) -> BodyModel:
@@ -171,16 +171,16 @@ def _limited(entry: ParameterEntry, changes: Mapping[str, float], notes: list[st
 
 
 def _with_marker(definition: BodyDefinition, text: str) -> BodyDefinition:
-    found = MARKER.fullmatch(text.strip())
+    match = MARKER.fullmatch(text.strip())
     try:
-        at = tuple(float(found[part]) for part in (3, 4, 5)) if found else ()
+        at = tuple(float(match[part]) for part in (3, 4, 5)) if match else ()
     except ValueError:
         at = ()
-    if found is None or len(at) != 3:
+    if match is None or len(at) != 3:
         _fail(f"Marker '{text[:80]}'", "cannot be understood", "Write NAME=JOINT,X,Y,Z with three mm.")
     if not all(abs(value) <= LONGEST_MM for value in at):
-        _fail(f"Marker '{found[1]}'", "is too far off", f"Give mm up to {LONGEST_MM:g}.")
-    marker = MarkerEntry(found[1].strip(), found[2].strip(), at)
+        _fail(f"Marker '{match[1]}'", "is too far off", f"Give mm up to {LONGEST_MM:g}.")
+    marker = MarkerEntry(match[1].strip(), match[2].strip(), at)
     kept = tuple(marker if one.name == marker.name else one for one in definition.markers)
     return msgspec.structs.replace(definition, markers=kept if marker in kept else (*kept, marker))
 

@@ -99,16 +99,16 @@ class _MarkerProblem:
         """Poses to fit whole: the start, then the best of those with a fitted root."""
         if not len(self.moves):
             return [self.start, self.body.neutral]
-        found: list[tuple[float, Array]] = []
+        candidates: list[tuple[float, Array]] = []
         for base in (self.start, self.body.neutral):
             for turn in range(HEADINGS):
                 pose = base.copy()
                 if len(self.turns):
                     pose[self.turns[0]] += turn * 2.0 * math.pi / HEADINGS
                 pose = self.fitted(self.centred(np.clip(pose, self.lower, self.upper)), self.root)
-                found.append((self.error(pose), pose))
-        found.sort(key=lambda entry: entry[0])
-        return [self.start, *(pose for _, pose in found[:FULL_FITS])]
+                candidates.append((self.error(pose), pose))
+        candidates.sort(key=lambda entry: entry[0])
+        return [self.start, *(pose for _, pose in candidates[:FULL_FITS])]
 
     def shaken(self, rng: np.random.Generator, pose: Array) -> Array:
         """The pose with random changes to the angles below the root."""

@@ -78,13 +78,13 @@ class MarkerDistances:
 
     def rigid(self) -> dict[str, float]:
         """All pairs whose distance no pose changes and some dimension sets, mm."""
-        found: dict[str, float] = {}
+        lengths: dict[str, float] = {}
         for one, two in itertools.combinations(self.markers, 2):
             pair = f"{one}_{two}"
             length = float(self.distances([pair], self.start)[0])
             if length > 0.0 and self.change_by_pose(pair) < SAME:
-                found[pair] = length
-        return found
+                lengths[pair] = length
+        return lengths
 
     def distances(self, pairs: list[str], values: Array) -> Array:
         """(K,) mm of the pairs with these dimensions (mm, as `names`)."""

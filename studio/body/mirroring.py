@@ -120,9 +120,9 @@ class Mirror:
         """The pose with its root where the limbs are nearest to `target`; an asymmetric body is fitted as a whole."""
         best, least = pose, math.inf
         for begin in self._beginnings(pose):
-            found, cost = self._fitted(begin, target, self._root)
+            fitted, cost = self._fitted(begin, target, self._root)
             if cost < least:
-                best, least = found, cost
+                best, least = fitted, cost
         best = within_limits(self.body, best)
         if whole or math.sqrt(least / len(target)) > UNEVEN:
             best = self._fitted(best, target, np.arange(len(best)))[0]
@@ -158,13 +158,13 @@ class Mirror:
 
     def _beginnings(self, pose: Array) -> list[Array]:
         """The pose, and the pose with half a turn about each of the root's axes."""
-        found = [pose]
+        poses = [pose]
         for place in map(int, self._root):
             if self.body.parameters[place].kind == "angle":
                 turned = pose.copy()
                 turned[place] += math.pi
-                found.append(turned)
-        return found
+                poses.append(turned)
+        return poses
 
     def _signs(self) -> Array:
         """(D,) ±1: how a parameter follows its twin."""
@@ -187,11 +187,11 @@ class Mirror:
 def name_twins(names: list[str]) -> Indices:
     """Each name's place, or that of the one that says left where it says right."""
     places = {name: at for at, name in enumerate(names)}
-    found: list[int] = []
+    twins: list[int] = []
     for at, name in enumerate(names):
         other = name.replace("left", "right") if "left" in name else name.replace("right", "left", 1)
-        found.append(places.get(other, at))
-    return np.array(found, dtype=np.int64)
+        twins.append(places.get(other, at))
+    return np.array(twins, dtype=np.int64)
 
 
 def _parameter_twins(body: BodyModel) -> Indices:
@@ -200,11 +200,11 @@ def _parameter_twins(body: BodyModel) -> Indices:
     for at, entry in enumerate(body.parameters):
         groups.setdefault(entry.limb, []).append(at)
     names = list(groups)
-    found = np.arange(len(body.parameters))
+    twins = np.arange(len(body.parameters))
     for name, other in zip(names, name_twins(names).tolist(), strict=True):
         if len(groups[name]) == len(groups[names[other]]):
-            found[groups[name]] = groups[names[other]]
-    return found
+            twins[groups[name]] = groups[names[other]]
+    return twins
 
 
 def _parameters_of(body: BodyModel, joint: int) -> Indices:

@@ -164,8 +164,8 @@ def _floating(root: ElementTree.Element, path: Path) -> tuple[str, str]:
     joints = root.findall("joint")
 
     def end(joint: ElementTree.Element, which: str) -> str:
-        found = joint.find(which)
-        return found.get("link", "") if found is not None else ""
+        element = joint.find(which)
+        return element.get("link", "") if element is not None else ""
 
     for joint in joints:
         if joint.get("type") != "floating":
@@ -222,7 +222,7 @@ def _prepare_spec(spec: Any, path: Path, notes: list[str]) -> None:  # noqa: ANN
 
 def _speeds(root: ElementTree.Element) -> dict[str, float]:
     """The velocity limits of a URDF's joints, rad/s or m/s."""
-    found: dict[str, float] = {}
+    speeds: dict[str, float] = {}
     for joint in root.findall("joint"):
         limit = joint.find("limit")
         try:
@@ -230,8 +230,8 @@ def _speeds(root: ElementTree.Element) -> dict[str, float]:
         except ValueError:
             continue
         if math.isfinite(speed) and speed > 0.0:
-            found[joint.get("name", "")] = speed
-    return found
+            speeds[joint.get("name", "")] = speed
+    return speeds
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -612,11 +612,11 @@ class _Robot:
         used = self.names.setdefault("parameter" if kind == "dimension" else kind, {WORLD})
         wanted = _words(name) if kind in ("joint", "limb", "marker") else _words(name).replace(" ", "_")
         wanted = wanted or kind
-        found, number = wanted, 2
-        while found in used:
-            found, number = f"{wanted}_{number}", number + 1
-        used.add(found)
-        return found
+        free, number = wanted, 2
+        while free in used:
+            free, number = f"{wanted}_{number}", number + 1
+        used.add(free)
+        return free
 
 
 def fitted_cone(points: Array) -> _Part | None:
@@ -693,13 +693,13 @@ def _placed(position: Array, rotation: Array) -> list[StepEntry]:
 
 
 def _moves(position: Array) -> list[StepEntry]:
-    found = [(axis, _rounded(float(value), ROUND_MM)) for axis, value in zip("xyz", position, strict=True)]
-    return [StepEntry(value, move=_axis(axis)) for axis, value in found if value]
+    moves = [(axis, _rounded(float(value), ROUND_MM)) for axis, value in zip("xyz", position, strict=True)]
+    return [StepEntry(value, move=_axis(axis)) for axis, value in moves if value]
 
 
 def _fixed_turns(turns: Any) -> list[StepEntry]:  # noqa: ANN401 - pairs of an axis and degrees
-    found = [(axis, _rounded(float(angle), ROUND_DEGREES)) for axis, angle in turns]
-    return [StepEntry(angle, turn=_axis(axis)) for axis, angle in found if angle]
+    turned = [(axis, _rounded(float(angle), ROUND_DEGREES)) for axis, angle in turns]
+    return [StepEntry(angle, turn=_axis(axis)) for axis, angle in turned if angle]
 
 
 def _driven(axis: Array, word: str, drive: _Drive) -> list[StepEntry]:

@@ -80,20 +80,20 @@ def shape_space(
     kinds = dimension_kinds(body.definition) if body.definition else {}
     ends = end_lengths(body.definition) if body.definition else frozenset[str]()
     chosen = {"length": bool(lengths), "radius": radii}
-    found: dict[tuple[str, str], list[str]] = {}
+    by_size: dict[tuple[str, str], list[str]] = {}
     for name, kind in kinds.items():
         if lengths == "ends" and kind == "length" and name not in ends:
             continue
         if chosen[kind] and body.dimensions[name] > 0.0 and name not in SMALL:
-            found.setdefault((_group_name(name, symmetric), kind), []).append(name)
-    if not found:
+            by_size.setdefault((_group_name(name, symmetric), kind), []).append(name)
+    if not by_size:
         raise BodyError(
             f"Body '{body.name}' has no dimensions that could be fitted.",
             "Give its lengths and radii in the body file as named dimensions.",
         )
     groups = tuple(
         ShapeGroup(name, "length" if kind == "length" else "radius", tuple(dimensions))
-        for (name, kind), dimensions in found.items()
+        for (name, kind), dimensions in by_size.items()
     )
     return ShapeSpace(body, groups)
 
@@ -117,8 +117,8 @@ def dimension_kinds(definition: BodyDefinition) -> dict[str, str]:
 def end_lengths(definition: BodyDefinition) -> frozenset[str]:
     """Lengths of limbs at the ends of the body: hands, feet, head."""
     parents = {joint.parent for joint in definition.joints}
-    found = {_name(limb.length) for limb in definition.limbs if limb.joint not in parents}
-    return frozenset(found & definition.dimensions.keys())
+    ends = {_name(limb.length) for limb in definition.limbs if limb.joint not in parents}
+    return frozenset(ends & definition.dimensions.keys())
 
 
 def _name(value: float | str) -> str:

@@ -51,7 +51,7 @@ def unit_of(entry: Any) -> str:  # noqa: ANN401 - a DimensionEntry
 
 def _plain(entry: Any) -> dict[str, Any]:  # noqa: ANN401 - any struct of the definition
     """A struct as a table, without what is as it would be if left out."""
-    found: dict[str, Any] = {}
+    entries: dict[str, Any] = {}
     for one in msgspec.structs.fields(entry):
         value = getattr(entry, one.name)
         default = one.default if one.default is not msgspec.NODEFAULT else None
@@ -59,10 +59,10 @@ def _plain(entry: Any) -> dict[str, Any]:  # noqa: ANN401 - any struct of the de
             default = one.default_factory()
         if value is None or (not one.required and value == default):
             continue
-        found[one.name] = value
-    if "by" in found:  # of a step, which reads: move, by
-        found["by"] = found.pop("by")
-    return found
+        entries[one.name] = value
+    if "by" in entries:  # of a step, which reads: move, by
+        entries["by"] = entries.pop("by")
+    return entries
 
 
 def _toml(value: Any) -> str:  # noqa: ANN401 - of a body file

@@ -71,7 +71,7 @@ def align_command(call: Call, undo: bool) -> dict[str, object]:
         "changed": aligned.changed,
         "frames": list(aligned.frames),
         "cameras": [asdict(one) for one in aligned.cameras],
-        "text": "\n".join([*aligned.found.in_words(), *([said] if said else [])]),
+        "text": "\n".join([*aligned.alignment.in_words(), *([said] if said else [])]),
     }
 
 

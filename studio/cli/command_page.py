@@ -22,7 +22,7 @@ def command_page() -> str:
         usage = " ".join(["studio", name, *command.collect_usage_pieces(inner)])
         parts.append(f"## {name}\n\n`{usage}`\n\n{_paragraphs(command.help or '')}\n")
         listed = [entry for entry in command.params if isinstance(entry, click.Option)]
-        rows = [found for entry in listed if (found := entry.get_help_record(inner))]
+        rows = [record for entry in listed if (record := entry.get_help_record(inner))]
         if rows:
             parts.append("| option | what it does |\n|---|---|")
             parts += [f"| `{_cell(option)}` | {_cell(help_text)} |" for option, help_text in rows]

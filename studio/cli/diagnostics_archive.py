@@ -120,9 +120,9 @@ class Redaction:
         """The text without names, addresses, secrets and words that are not the studio's own."""
         text = ADDRESS.sub(GONE, text)
         if self._names is not None:
-            text = self._names.sub(lambda found: self.numbers[found[0]], text)
-        text = SECRET.sub(lambda found: found[0] if _all_known(found[0]) else GONE, text)
-        return WORD.sub(lambda found: found[0] if _is_known(found[0]) else GONE, text)
+            text = self._names.sub(lambda match: self.numbers[match[0]], text)
+        text = SECRET.sub(lambda match: match[0] if _all_known(match[0]) else GONE, text)
+        return WORD.sub(lambda match: match[0] if _is_known(match[0]) else GONE, text)
 
 
 def _user() -> str:
@@ -146,10 +146,10 @@ def _all_known(text: str) -> bool:
 def vocabulary() -> frozenset[str]:
     """Every word, lower case, of the studio's source, the system's messages and Python's own names."""
     texts: Iterable[str] = (read_text(path) for path in sorted(package_folder().rglob("*.py")))
-    found = {word for text in texts for word in WORD.findall(text.lower())}
+    known = {word for text in texts for word in WORD.findall(text.lower())}
     for other in (*map(os.strerror, errno.errorcode), *dir(builtins), README, PACKAGE):
-        found.update(WORD.findall(other.lower()))
-    return frozenset(found)
+        known.update(WORD.findall(other.lower()))
+    return frozenset(known)
 
 
 def _json(value: object, words: Callable[[str], str]) -> str:
@@ -240,10 +240,10 @@ def _sources(session: Session) -> list[dict[str, object]]:
 
 def _run(run: StoredRun) -> dict[str, object]:
     """What there is to know of a run but what it found. What cannot be read says why."""
-    found: dict[str, object] = {"run": run.name}
+    about: dict[str, object] = {"run": run.name}
     try:
         record, summary = run.record, run.summary(blobs=False)
-        found |= {
+        about |= {
             "software": record.software,
             "status": summary.status,
             "frames": [summary.first, summary.last, summary.done],
@@ -256,11 +256,11 @@ def _run(run: StoredRun) -> dict[str, object]:
         }
         with run.results() as results:
             states = results.timeline().tracking
-        found["states"] = {state: list(states).count(state) for state in dict.fromkeys(states)}
+        about["states"] = {state: list(states).count(state) for state in dict.fromkeys(states)}
     except StudioError as error:
-        found["problem"] = str(error)
-    found["log"] = [f"{line.level}: {line.text}" for line in run_log(run, RUN_LINES).lines]
-    return found
+        about["problem"] = str(error)
+    about["log"] = [f"{line.level}: {line.text}" for line in run_log(run, RUN_LINES).lines]
+    return about
 
 
 def _tail(path: Path) -> str:

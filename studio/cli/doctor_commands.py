@@ -10,12 +10,12 @@ from studio.cli.self_check import doctor
 
 @command_of(doctor)
 def doctor_command(call: Call) -> dict[str, object]:
-    found = call()
-    lines = [f"{'ok   ' if one.good else 'FAULT'} {one.name:18} {one.found}" for one in found]
-    lines += [f"remedy for {one.name}: {one.remedy}" for one in found if not one.good]
+    checks = call()
+    lines = [f"{'ok   ' if one.good else 'FAULT'} {one.name:18} {one.found}" for one in checks]
+    lines += [f"remedy for {one.name}: {one.remedy}" for one in checks if not one.good]
     return {
-        EXIT_CODE: 0 if all(one.good for one in found) else FOUND_FAULTS,
-        "checks": [asdict(one) for one in found],
+        EXIT_CODE: 0 if all(one.good for one in checks) else FOUND_FAULTS,
+        "checks": [asdict(one) for one in checks],
         "text": "\n".join(lines),
     }
 

@@ -110,13 +110,13 @@ def synchronise_command(call: Call) -> Mapping[str, object]:
         "stale_runs": list(footage_state(done.session).stale_runs),
     }
     words = done.in_words()
-    if isinstance(done.found, Synchrony):
+    if isinstance(done.synchrony, Synchrony):
         names = ("offsets", "confidence", "within", "sure")
-        answer["estimate"] = {name: getattr(done.found, name) for name in names} | {
-            "notes": list(done.found.notes)
+        answer["estimate"] = {name: getattr(done.synchrony, name) for name in names} | {
+            "notes": list(done.synchrony.notes)
         }
-    elif done.found is not None:
-        answer["recorded"] = {"offsets": done.found.offsets, "apart": done.found.apart}
+    elif done.synchrony is not None:
+        answer["recorded"] = {"offsets": done.synchrony.offsets, "apart": done.found.apart}
     if done.change is None:
         note("Nothing was changed; write it with --apply, or by hand with --offset CAMERA=FRAMES.")
     else:

@@ -61,25 +61,29 @@ def _made(call: Call, made: MadeTrack, more: dict[str, object], words: str) -> d
 
 @command_of(check)
 def check_command(call: Call) -> dict[str, object]:
-    run, found = call.given["run"], call()
-    damage, result = run.damage(), msgspec.to_builtins(found)
+    run, checked = call.given["run"], call()
+    damage, result = run.damage(), msgspec.to_builtins(checked)
     return {
         "session": run.session_name,
         "run": run.name,
-        "good": found.good and not damage,
+        "good": checked.good and not damage,
         "damage": damage,
-        "inside_mean": found.inside_mean,
-        "poor": list(found.poor),
+        "inside_mean": checked.inside_mean,
+        "poor": list(checked.poor),
         **{name: value for name, value in result.items() if name not in ("schema", "stamp", "count")},
-        "text": f"{run.session_name} / {run.name}, track '{found.track}': {found.in_words()}. {damage}".rstrip(),
+        "text": f"{run.session_name} / {run.name}, track '{checked.track}': {checked.in_words()}. {damage}".rstrip(),
     }
 
 
 @command_of(evaluate)
 def evaluate_command(call: Call) -> Mapping[str, object]:
     track = track_named(call.given["run"], call.given["track"])
-    found = call()
-    return {**as_document(found), "track": track, "text": f"track                {track}\n{in_words(found)}"}
+    evaluation = call()
+    return {
+        **as_document(evaluation),
+        "track": track,
+        "text": f"track                {track}\n{in_words(evaluation)}",
+    }
 
 
 @command_of(
@@ -124,28 +128,28 @@ def share_command(call: Call) -> dict[str, object]:
 @command_of(verify)
 def verify_command(call: Call) -> dict[str, object]:
     done: Verified = call()
-    found = done.found
+    verification = done.verification
     return {
-        EXIT_CODE: FOUND_FAULTS if found.faults else 0,
+        EXIT_CODE: FOUND_FAULTS if verification.faults else 0,
         "session": call.given["session"].name,
-        **{name: value for name, value in asdict(found).items() if name != "faults"},
-        "faults": [asdict(fault) for fault in found.faults],
+        **{name: value for name, value in asdict(verification).items() if name != "faults"},
+        "faults": [asdict(fault) for fault in verification.faults],
         "repaired": [asdict(entry) for entry in done.repaired],
-        "text": "\n".join([_verified(found), *map(_repaired, done.repaired)]),
+        "text": "\n".join([_verified(verification), *map(_repaired, done.repaired)]),
     }
 
 
-def _verified(found: Verification) -> str:
-    parts = [f"{counted(found.files, 'file')} and {counted(found.frames, 'frame')} read"]
-    parts.append(f"{len(found.faults)} damaged" if found.faults else "all as written")
-    if found.unchecked:
-        parts.append(f"{counted(found.unchecked, 'frame')} from before there were checksums")
-    if found.written_again:
-        parts.append(f"{counted(len(found.written_again), 'file')} written again since the last time")
-    if found.new:
-        parts.append(f"{counted(found.new, 'file')} noted for the first time")
-    if found.left:
-        parts.append(f"{counted(len(found.left), 'unfinished part')} left behind")
+def _verified(verification: Verification) -> str:
+    parts = [f"{counted(verification.files, 'file')} and {counted(verification.frames, 'frame')} read"]
+    parts.append(f"{len(verification.faults)} damaged" if verification.faults else "all as written")
+    if verification.unchecked:
+        parts.append(f"{counted(verification.unchecked, 'frame')} from before there were checksums")
+    if verification.written_again:
+        parts.append(f"{counted(len(verification.written_again), 'file')} written again since the last time")
+    if verification.new:
+        parts.append(f"{counted(verification.new, 'file')} noted for the first time")
+    if verification.left:
+        parts.append(f"{counted(len(verification.left), 'unfinished part')} left behind")
     return f"{', '.join(parts)}."
 
 

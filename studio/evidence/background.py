@@ -94,11 +94,11 @@ class GaussianBackground:
         """(3,) factor on each colour of the background, from the median pixel (people cover less than
         half)."""
         ratios, counts = gain_ratios(picture, self._samples)
-        found, (least, most) = np.ones(3, np.float32), GAIN_RANGE
+        gains, (least, most) = np.ones(3, np.float32), GAIN_RANGE
         for channel, count in enumerate(counts):
             if count >= GAIN_LEAST_PIXELS:
-                found[channel] = min(max(_median(ratios[channel, :count]), least), most)
-        return found
+                gains[channel] = min(max(_median(ratios[channel, :count]), least), most)
+        return gains
 
 
 def _median(values: Floats) -> np.float32:
@@ -257,10 +257,10 @@ def differing_pixels(
         for k in range(3 * width):
             far[k] = np.uint8(abs(np.float32(seen[k]) - gains[k] * np.float32(about[k])) >= least)
         for part in range(parts):
-            found = np.uint64(0)
+            flags = np.uint64(0)
             for i in range(WORDS):
-                found |= words[WORDS * part + i]
-            if found == 0:
+                flags |= words[WORDS * part + i]
+            if flags == 0:
                 continue
             for x in range(part * PART, min(part * PART + PART, width)):
                 k = 3 * x

@@ -53,11 +53,11 @@ class Backgrounds:
         Raises FootageError if there is too little to fit it to.
         """
         with self._locks[camera]:
-            found = self._fitted.get((camera, kind))
-            if found is None:
-                found = self._fit(camera, kind)
-                self._fitted[camera, kind] = found
-            return found
+            model = self._fitted.get((camera, kind))
+            if model is None:
+                model = self._fit(camera, kind)
+                self._fitted[camera, kind] = model
+            return model
 
     def release(self, camera: str) -> None:
         """Drop the models of one camera; they are fitted again when needed."""
@@ -91,21 +91,21 @@ class Backgrounds:
         Raises FootageError if there is too little to fit it to.
         """
         with self._locks[camera]:
-            found = self._yuv.get((camera, least_noise))
-            if found is None:
+            background = self._yuv.get((camera, least_noise))
+            if background is None:
                 path = self._footage.background_path(camera)
                 if path is not None:
-                    found = learn_background(self._plate(camera, path, CLIP_FRAMES), least_noise)
+                    background = learn_background(self._plate(camera, path, CLIP_FRAMES), least_noise)
                 else:
                     frames = self._spread(camera, MEDIAN_FRAMES)
                     median = gaussian_from_median(frames)
-                    found = independent_background(
+                    background = independent_background(
                         median.mean.astype(np.float32), median.variance, least_noise, len(frames)
                     )
                 for old in [key for key in self._yuv if key[0] == camera]:
                     del self._yuv[old]
-                self._yuv[camera, least_noise] = found
-            return found
+                self._yuv[camera, least_noise] = background
+            return background
 
     def _fit(self, camera: str, kind: FittedKind) -> BackgroundModel:
         path = self._footage.background_path(camera)

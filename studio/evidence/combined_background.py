@@ -154,7 +154,7 @@ def _regions(unsure: Bytes, rim: int, factor: float) -> list[Region]:
     reach = _fewer(OPENED, factor)
     opened = cv2.morphologyEx(unsure, cv2.MORPH_OPEN, disc(reach))
     count, labels, boxes, _ = cv2.connectedComponentsWithStats(opened)
-    found: list[Region] = []
+    regions: list[Region] = []
     for label in range(1, count):
         left, top, width, height, area = (int(value) for value in boxes[label])
         if area >= SMALLEST_REGION / factor**2:
@@ -163,8 +163,8 @@ def _regions(unsure: Bytes, rim: int, factor: float) -> list[Region]:
             # Opening rounds corners off: unsure pixels within its reach belong to the region too.
             square = np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)
             grown = cv2.dilate((labels[y, x] == label).astype(np.uint8), square)
-            found.append((y, x, (grown > 0) & (unsure[y, x] > 0)))
-    return found
+            regions.append((y, x, (grown > 0) & (unsure[y, x] > 0)))
+    return regions
 
 
 def _goes_on_better(plate: Floats, footage: Floats, region: Region, unsure: Bytes, reach: int) -> bool:
@@ -203,8 +203,8 @@ def background_nearby(frames: Bytes, mean: Floats, unsure: Bytes, factor: float 
         for reach in (_fewer(reach, factor) for reach in reversed(REACHES)):
             window = (2 * reach + 1, 2 * reach + 1)
             near = np.asarray(cv2.boxFilter(known, -1, window), dtype=np.float32)
-            found = np.asarray(cv2.boxFilter(empty, -1, window), dtype=np.float32) / np.maximum(near, 1e-6)
-            np.copyto(share, found, where=near > ENOUGH_KNOWN)
+            blurred = np.asarray(cv2.boxFilter(empty, -1, window), dtype=np.float32) / np.maximum(near, 1e-6)
+            np.copyto(share, blurred, where=near > ENOUGH_KNOWN)
     return shares
 
 
@@ -223,7 +223,7 @@ def agreeing_frames(
     total, squares = np.empty(3), np.empty(3)
     for y in range(height):
         for x in range(width):
-            found = 0
+            agreeing_count = 0
             total[:] = 0.0
             squares[:] = 0.0
             for k in range(count):
@@ -231,16 +231,16 @@ def agreeing_frames(
                 for c in range(3):
                     agrees &= low[y, x, c] <= frames[k, y, x, c] <= high[y, x, c]
                 if agrees:
-                    found += 1
+                    agreeing_count += 1
                     for c in range(3):
                         value = float(frames[k, y, x, c])
                         total[c] += value
                         squares[c] += value * value
-            agreeing[y, x] = found
-            for c in range(3 if found else 0):
-                middle = total[c] / found
+            agreeing[y, x] = agreeing_count
+            for c in range(3 if agreeing_count else 0):
+                middle = total[c] / agreeing_count
                 mean[y, x, c] = middle
-                deviation[y, x, c] = np.sqrt(max(squares[c] / found - middle * middle, 0.0))
+                deviation[y, x, c] = np.sqrt(max(squares[c] / agreeing_count - middle * middle, 0.0))
     return mean, deviation, agreeing
 
 
@@ -315,19 +315,19 @@ def fill_finely(
                 for c in range(3):
                     values[k, c] = frames[k, row, x, c]
             if kind == 0:
-                found = 0
+                taken = 0
                 total[:] = 0.0
                 for k in range(count):
                     agrees = True
                     for c in range(3):
                         agrees &= fitted[0, c] <= values[k, c] <= fitted[2, c]
                     if agrees:
-                        found += 1
+                        taken += 1
                         for c in range(3):
                             total[c] += values[k, c]
-                if found >= fewest:
+                if taken >= fewest:
                     for c in range(3):
-                        out[y, x, c] = np.uint8(total[c] / found + 0.5)
+                        out[y, x, c] = np.uint8(total[c] / taken + 0.5)
                     continue
             if kind == 2:
                 for c in range(3):

@@ -133,23 +133,23 @@ def signed_of(inside: Bytes, within: Floats, beyond: Floats) -> Floats:
     """
     half = np.float32(0.5)
     for y in range(inside.shape[0]):
-        here, one, found = inside[y], within[y], beyond[y]
+        here, one, signed = inside[y], within[y], beyond[y]
         for x in range(inside.shape[1]):
-            found[x] = half - one[x] if here[x] else found[x] - half
+            signed[x] = half - one[x] if here[x] else signed[x] - half
     return beyond
 
 
 @njit(**EXACT)
 def slopes_at(points: Indices, values: Floats) -> Array:
     """(K, 2) directions in which values (H, W) rise most at points (K, 2); 0 where they do not."""
-    found = np.empty((len(points), 2))
+    slopes = np.empty((len(points), 2))
     for k in range(len(points)):
         x, y = points[k]
         across = np.float64(values[y, x + 1] - values[y, x - 1])
         along = np.float64(values[y + 1, x] - values[y - 1, x])
         length = max(np.sqrt(across * across + along * along), 1e-9)
-        found[k, 0], found[k, 1] = across / length, along / length
-    return found
+        slopes[k, 0], slopes[k, 1] = across / length, along / length
+    return slopes
 
 
 def _distances(mask: NDArray[np.uint8]) -> Floats:
@@ -158,8 +158,8 @@ def _distances(mask: NDArray[np.uint8]) -> Floats:
     OpenCV's last bits depend on the mask's memory address, and a descent amplifies them to millimetres. Squared
     distances between pixels are whole numbers, so the exact values are restored by rounding.
     """
-    found = cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    return np.sqrt(np.rint(found * found))
+    distances = cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    return np.sqrt(np.rint(distances * distances))
 
 
 def _stepped_distances(mask: NDArray[np.uint8]) -> Floats:

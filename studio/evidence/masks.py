@@ -28,9 +28,9 @@ def cleaned(mask: Bytes, settings: EvidenceSettings) -> Bytes:
         part = _morphed(part, cv2.MORPH_CLOSE, settings.mask_closing)
     if settings.mask_fill_holes or settings.mask_min_component or settings.mask_keep_components:
         part = _pieces(part, settings)
-    found = np.zeros_like(mask)
-    found[rows, columns] = part
-    return found
+    kept = np.zeros_like(mask)
+    kept[rows, columns] = part
+    return kept
 
 
 def reduced(mask: Bytes, camera: Camera) -> Bytes:

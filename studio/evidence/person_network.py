@@ -163,26 +163,26 @@ class PersonNetwork:
             crop,
         )
 
-    def found(self, picture: Bytes, quarter_turns: int = 0) -> list[Sighting]:
+    def find(self, picture: Bytes, quarter_turns: int = 0) -> list[Sighting]:
         """The persons of a picture (H, W, 3), at most four, the most certain first; each looked at in its own crop.
 
         quarter_turns : as of the camera; the tried crops are upright in the picture turned by them.
         """
         crops = _tried(picture.shape[1], picture.shape[0], -0.5 * math.pi * quarter_turns)
         first = [seen for seen in (self.look(picture, crop) for crop in crops) if seen.presence >= PRESENT]
-        found: list[Sighting] = []
+        persons: list[Sighting] = []
         # How much of a crop the person fills tells a crop around him from one that cuts him off.
         for seen in sorted(first, key=lambda one: -one.presence * float((one.logits > 0.0).mean())):
-            if len(found) == MOST_FOUND:
+            if len(persons) == MOST_FOUND:
                 break
-            if any(_same(seen, other) for other in found):
+            if any(_same(seen, other) for other in persons):
                 continue
             first_look = self.look(picture, self.look(picture, seen.next_crop).next_crop)
             seen = self.look(picture, first_look.next_crop)
             sure = seen.is_person() and min(first_look.presence, seen.presence) >= FOUND
-            if sure and not any(_same(seen, other) for other in found):
-                found.append(seen)
-        return found
+            if sure and not any(_same(seen, other) for other in persons):
+                persons.append(seen)
+        return persons
 
 
 def _tried(width: int, height: int, angle: float) -> Iterator[Crop]:

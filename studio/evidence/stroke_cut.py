@@ -134,8 +134,8 @@ class StrokeCut:
             odds, moved = 0.5 * (odds + _of_place(projected)), moved | projected
         odds = odds + self._of_colour(small[part], part)
         out = np.zeros(size[::-1], np.uint8)
-        found = _graph_cut(small[part], odds, marks[part])
-        out[part] = _connected(found, moved, marks[part])
+        foreground = _graph_cut(small[part], odds, marks[part])
+        out[part] = _connected(foreground, moved, marks[part])
         return self._refined(picture, out, strokes)
 
     def learn(self, picture: Bytes, mask: Bytes, is_key: bool) -> None:
@@ -325,7 +325,7 @@ def _histograms(
 
     known : pixels that count. stroked : shares under strokes, which make up STROKED of the whole.
     """
-    found: list[Floats] = []
+    histograms: list[Floats] = []
     for is_inside, strokes in zip((True, False), stroked, strict=True):
         chosen = (mask > 0) == is_inside
         if known is not None:
@@ -333,8 +333,8 @@ def _histograms(
         shares = _shares(cells[chosen])
         if strokes is not None:
             shares = (1.0 - STROKED) * shares + STROKED * strokes
-        found.append(_blurred(np.asarray(shares, np.float32).reshape(BINS, BINS, BINS)))
-    return found[0], found[1]
+        histograms.append(_blurred(np.asarray(shares, np.float32).reshape(BINS, BINS, BINS)))
+    return histograms[0], histograms[1]
 
 
 def _shares(cells: NDArray[np.int32]) -> Floats:

@@ -49,13 +49,13 @@ class YuvBackground:
         mean = self.mean.astype(np.float64)
         in_shadow = seen[..., 0] < (1.0 - 0.5 * shadow) * mean[..., 0]
         shift = np.where(in_shadow, shadow * mean[..., 0], 0.0)
-        found = self._squared(seen - mean + shift[..., None] * np.array([1.0, 0.0, 0.0]))
+        squared = self._squared(seen - mean + shift[..., None] * np.array([1.0, 0.0, 0.0]))
         if deepest > 0.0:
             left = np.maximum(seen[..., 0] / np.maximum(mean[..., 0], 1.0), 1.0 - deepest)
-            found = np.where(
-                in_shadow, np.minimum(found, self._squared(seen - left[..., None] * mean)), found
+            squared = np.where(
+                in_shadow, np.minimum(squared, self._squared(seen - left[..., None] * mean)), squared
             )
-        return found
+        return squared
 
     def _squared(self, away: Array) -> Array:
         return np.einsum("hwi,hwij,hwj->hw", away, self.precision, away)

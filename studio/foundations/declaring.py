@@ -132,8 +132,8 @@ class Parameter:
     @property
     def web(self) -> Web:
         """How HTTP takes it."""
-        found = self.mark(Web) or Web(left_out=any(kind is Path for kind in alternatives(self.kind)))
-        return Web(left_out=True) if self.target else found
+        declared = self.mark(Web) or Web(left_out=any(kind is Path for kind in alternatives(self.kind)))
+        return Web(left_out=True) if self.target else declared
 
     @property
     def target(self) -> str:
@@ -149,16 +149,16 @@ class Parameter:
     @property
     def number_range(self) -> dict[str, Any]:
         """Least and greatest number, as ranges of the command line have them; {} where there are none."""
-        found: dict[str, Any] = {}
+        limits: dict[str, Any] = {}
         for mark in self.marks:
             if isinstance(mark, Ge | Gt):
-                found |= {
+                limits |= {
                     "min": mark.ge if isinstance(mark, Ge) else mark.gt,
                     "min_open": isinstance(mark, Gt),
                 }
             if isinstance(mark, Le) and mark.le != LARGEST:
-                found["max"] = mark.le
-        return found
+                limits["max"] = mark.le
+        return limits
 
     @property
     def is_plain(self) -> bool:
@@ -181,7 +181,7 @@ class Operation:
     def parameters(self) -> dict[str, Parameter]:
         """All but `progress`, in order."""
         hints = get_type_hints(self.function, include_extras=True)
-        found: dict[str, Parameter] = {}
+        parameters: dict[str, Parameter] = {}
         for name, entry in inspect.signature(self.function).parameters.items():
             if name == PROGRESS:
                 continue
@@ -192,10 +192,10 @@ class Operation:
                 else FieldInfo.from_annotation(hints[name])
             )
             any_name = entry.kind is entry.VAR_KEYWORD
-            found[name] = Parameter(
+            parameters[name] = Parameter(
                 name, info.annotation, entry.default, info, tuple(info.metadata), any_name
             )
-        return found
+        return parameters
 
     @cached_property
     def about(self) -> str:
@@ -211,18 +211,18 @@ class Operation:
 
     def checked(self, given: dict[str, Any]) -> dict[str, Any]:
         """Arguments by name, those of plain types read as these. Raises SettingsError."""
-        found = dict(given)
+        values = dict(given)
         for name, reader in self._readers.items():
             if name not in given:
                 continue
             try:
-                found[name] = reader.validate_python(_without_numpy(given[name]))
+                values[name] = reader.validate_python(_without_numpy(given[name]))
             except ValidationError as error:
                 raise SettingsError(
                     f"{self.name}: '{name}' cannot be {given[name]!r:.80}: {error.errors()[0]['msg']}.",
                     self.parameters[name].help or f"help(studio.{self.name}) says what it takes.",
                 ) from None
-        return found
+        return values
 
 
 def operation(function: Callable[P, R]) -> Callable[P, R]:

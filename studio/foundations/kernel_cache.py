@@ -91,14 +91,14 @@ class KernelCache:
             place = self.path(sig, target_context.codegen())
         except UnkeyedError:
             return None
-        found = _rebuilt(place, target_context)
-        if found is None and self._take_turn(place):
-            found = _rebuilt(place, target_context)  # by the process that had its turn before
-            if found is not None:
+        compiled = _rebuilt(place, target_context)
+        if compiled is None and self._take_turn(place):
+            compiled = _rebuilt(place, target_context)  # by the process that had its turn before
+            if compiled is not None:
                 self._give_up_turn(place)
-        if found is None:
+        if compiled is None:
             _compiling()
-        return found
+        return compiled
 
     def save_overload(self, sig: Signature | tuple[Type, ...], data: CompileResult) -> None:
         try:
@@ -330,8 +330,8 @@ def _forget_unused(room: Path) -> None:
     kept: list[tuple[int, int, Path]] = []
     for place in room.glob("*.kernel"):
         with contextlib.suppress(OSError):  # another process removed it
-            found = place.stat()
-            kept.append((found.st_mtime_ns, found.st_size, place))
+            about = place.stat()
+            kept.append((about.st_mtime_ns, about.st_size, place))
     size = 0
     for _, bytes_here, place in sorted(kept, reverse=True):
         size += bytes_here

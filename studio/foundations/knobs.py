@@ -97,13 +97,13 @@ def _knobs_of_class(settings_type: type[Any]) -> tuple[Knob, ...]:
     names = dict.fromkeys(
         name for owner in settings_type.__mro__ for name in inspect.get_annotations(owner) if name in fields
     )
-    found: list[Knob] = []
+    knobs: list[Knob] = []
     for entry in map(fields.__getitem__, names):
         declared = entry.metadata.get("knob")
         if declared is not None:
             label = declared.label or entry.name.replace("_", " ")
-            found.append(dataclasses.replace(declared, name=entry.name, label=label, group=group))
-    return tuple(found)
+            knobs.append(dataclasses.replace(declared, name=entry.name, label=label, group=group))
+    return tuple(knobs)
 
 
 LONGEST_SHOWN = 80

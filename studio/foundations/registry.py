@@ -85,9 +85,9 @@ class Registry(Mapping[str, Member], Generic[Member]):
     @cached_property
     def packages(self) -> tuple[str, ...]:
         """The packages that add members, with their versions."""
-        found = metadata.entry_points(group=self.group)
+        points = metadata.entry_points(group=self.group)
         used = {
-            f"{point.dist.name} {point.dist.version}" for point in found if point.dist and point.name in self
+            f"{point.dist.name} {point.dist.version}" for point in points if point.dist and point.name in self
         }
         return tuple(sorted(used))
 
@@ -96,8 +96,8 @@ class Registry(Mapping[str, Member], Generic[Member]):
         """The members of packages, and what is wrong with the others, by name."""
         added: dict[str, Member] = {}
         problems: dict[str, PlugInError] = {}
-        found = metadata.entry_points(group=self.group)
-        for point in sorted(found, key=lambda point: (point.name, _package(point))):
+        points = metadata.entry_points(group=self.group)
+        for point in sorted(points, key=lambda point: (point.name, _package(point))):
             try:
                 if point.name in self._own or point.name in added:
                     raise StudioError(f"there is a {self.kind} of that name already")

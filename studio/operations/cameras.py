@@ -185,7 +185,7 @@ class Alignment:
     """
 
     session: Session
-    found: SessionAlignment
+    alignment: SessionAlignment
     before: dict[str, float]
     after: dict[str, float]
     turns: dict[str, float]
@@ -206,7 +206,7 @@ class Alignment:
     @property
     def frames(self) -> tuple[int, ...]:
         """Those that were looked at."""
-        return tuple(self.found.found.frames)
+        return tuple(self.alignment.aligned.frames)
 
 
 @operation
@@ -242,7 +242,7 @@ def align(
         opened, notes = change.session, change.notes
         say(progress, notes)
         _measure_masks_again(opened, progress)
-    each = aligned.found
+    each = aligned.aligned
     before, after, turns = (
         dict(zip(aligned.names, map(float, values), strict=True))
         for values in (each.before, each.after, each.turns)

@@ -206,19 +206,19 @@ class Synchronised:
     """
 
     session: Session
-    found: Synchrony | TimedOffsets | None = None
+    synchrony: Synchrony | TimedOffsets | None = None
     change: FootageChange | None = None
 
     def in_words(self) -> list[str]:
         """What was estimated or read, lines."""
-        if isinstance(self.found, Synchrony):
-            return [in_words(self.found)]
-        if self.found is None:
+        if isinstance(self.synchrony, Synchrony):
+            return [in_words(self.synchrony)]
+        if self.synchrony is None:
             return []
         return [
-            *(f"{name}: {offset:+d} frames" for name, offset in self.found.offsets.items()),
-            f"At most {self.found.apart:.2f} frames apart at {self.found.fps:.2f} frames a second.",
-            *self.found.notes,
+            *(f"{name}: {offset:+d} frames" for name, offset in self.synchrony.offsets.items()),
+            f"At most {self.synchrony.apart:.2f} frames apart at {self.synchrony.fps:.2f} frames a second.",
+            *self.synchrony.notes,
         ]
 
 
@@ -274,20 +274,20 @@ def synchronise(
             change = pair_by_time(opened, place, report)
         return Synchronised(change.session, None, change)
     if request.timestamps is not None:
-        found = recorded_offsets(opened, Path(request.timestamps))
+        synchrony = recorded_offsets(opened, Path(request.timestamps))
     else:
         with reporting(progress, "Estimating") as report:
-            found = synchrony_of(opened, report, request.within)
-        if request.apply and not found.sure:
-            say(progress, found.notes)
+            synchrony = synchrony_of(opened, report, request.within)
+        if request.apply and not synchrony.sure:
+            say(progress, synchrony.notes)
             raise FootageError(
                 "The estimate is not reliable enough to be applied.",
                 "Give the offsets by hand with --offset CAMERA=FRAMES.",
             )
     if not request.apply:
-        return Synchronised(opened, found)
-    change = change_footage(opened, found.offsets)
-    return Synchronised(change.session, found, change)
+        return Synchronised(opened, synchrony)
+    change = change_footage(opened, synchrony.offsets)
+    return Synchronised(change.session, synchrony, change)
 
 
 Cameras = Annotated[

@@ -205,13 +205,13 @@ def evaluate(
         )
     elif not align and path.suffix.lower() in ANY_WORLD:
         align = RIGID if motion.unit else SIMILARITY
-    found = evaluate_poses(
+    evaluation = evaluate_poses(
         chosen.poses, chosen.frames, stored.body(), motion, stored.record.fps, align or UNALIGNED
     )
-    if found.alignment == UNALIGNED and found.mean_mm > lost_mm(stored.body()):
+    if evaluation.alignment == UNALIGNED and evaluation.mean_mm > lost_mm(stored.body()):
         meant = meant_axes(chosen.poses, chosen.frames, stored.body(), motion, stored.record.fps)
         say(progress, [meant.replace("FILE", f"'{path.name}'")] if meant else [])
-    return found
+    return evaluation
 
 
 @operation
@@ -245,7 +245,7 @@ def export_run(
 class Verified:
     """found : what was read, and what is wrong after repairs. repaired : runs that were."""
 
-    found: Verification
+    verification: Verification
     repaired: tuple[Repair, ...] = ()
 
 
@@ -271,13 +271,16 @@ def verify(
     opened = open_session(session)
     repaired: tuple[Repair, ...] = ()
     with reporting(progress, f"{opened.name}: verifying") as report:
-        found = verify_session(opened, report)
-        if mend and any(fault.run for fault in found.faults):
-            repaired = repair(opened, found.faults, report)
-            found = verify_session(opened, report)
-        if mend and found.left:
+        verification = verify_session(opened, report)
+        if mend and any(fault.run for fault in verification.faults):
+            repaired = repair(opened, verification.faults, report)
+            verification = verify_session(opened, report)
+        if mend and verification.left:
             remove_left_behind(opened)
-    say(progress, [f"damaged: {fault.place}: {fault.what}. {fault.remedy}" for fault in found.faults])
+    say(progress, [f"damaged: {fault.place}: {fault.what}. {fault.remedy}" for fault in verification.faults])
     done = "removed" if mend else "to be removed by --repair"
-    say(progress, [f"left behind by something that was broken off, {done}: {place}" for place in found.left])
-    return Verified(found, repaired)
+    say(
+        progress,
+        [f"left behind by something that was broken off, {done}: {place}" for place in verification.left],
+    )
+    return Verified(verification, repaired)

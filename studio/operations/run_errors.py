@@ -66,8 +66,8 @@ def mean_error(session: Session, run: StoredRun, done: int) -> float | None:
 def _poses_of(run: StoredRun, track: str, blobs: bool) -> tuple[Indices, Array]:
     """The frames (K,) of a track and its poses (K, D)."""
     if track != RAW:
-        found = read_track(run, track)
-        return found.frames, found.poses
+        poses = read_track(run, track)
+        return poses.frames, poses.poses
     with run.results() as results:
         return results.poses(blobs=blobs)
 

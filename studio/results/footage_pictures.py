@@ -18,14 +18,14 @@ def bare_picture(session: Session, camera: str, frame: int, height: int | None =
     Raises NotFoundError for an unknown camera or frame, FootageError.
     """
     source = session.manifest.footage
-    found = [entry for entry in source.cameras if entry.name == camera]
-    if not found or not 0 <= frame < source.frame_count:
+    entries = [entry for entry in source.cameras if entry.name == camera]
+    if not entries or not 0 <= frame < source.frame_count:
         names = ", ".join(entry.name for entry in source.cameras) or "no camera"
         raise NotFoundError(
             f"Session '{session.name}' has no frame {frame} of camera '{camera[:64]}'.",
             f"It has {source.frame_count} frames of {names}.",
         )
-    one = dataclasses.replace(source, cameras=(found[0],))
+    one = dataclasses.replace(source, cameras=(entries[0],))
     with closing(open_footage(one, session.path)) as footage:
         picture = footage.picture(camera, frame)
     if height is None or height >= picture.shape[0]:

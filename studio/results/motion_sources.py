@@ -43,15 +43,15 @@ def read_sources(
     names = [name for source in sources for name in expand(source)]
     if not names:
         raise StudioError("There is no recording to learn from.", "Name motion files or runs.")
-    found: list[Recording] = []
+    recordings: list[Recording] = []
     for number, name in enumerate(names, start=1):
         words = f"{Path(name).name} ({number} of {len(names)})"
 
         def report(_step: str, done: int, total: int, words: str = words) -> None:
             progress(words, done, total)
 
-        found.append(read_source(name, body, skeleton, fps=fps, workspace=workspace, progress=report))
-    return tuple(found)
+        recordings.append(read_source(name, body, skeleton, fps=fps, workspace=workspace, progress=report))
+    return tuple(recordings)
 
 
 def read_source(
@@ -94,12 +94,12 @@ def expand(source: str | Path) -> tuple[str, ...]:
         return (str(source),)
     if (path / SESSION_FILE).is_file():
         raise _runs_of(path)
-    found = tuple(str(entry) for entry in sorted(path.iterdir()) if entry.suffix.lower() in MOTION_FILES)
-    if not found:
+    files = tuple(str(entry) for entry in sorted(path.iterdir()) if entry.suffix.lower() in MOTION_FILES)
+    if not files:
         raise StudioError(
             f"Folder '{path.name}' holds no motion.", f"Motion files end in {', '.join(MOTION_FILES)}."
         )
-    return found
+    return files
 
 
 def recipe_recording(

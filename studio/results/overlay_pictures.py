@@ -40,7 +40,7 @@ from studio.search.trackers.tracker import LayerRecord
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 
-Found = TypeVar("Found")
+Answer = TypeVar("Answer")
 
 REST_SECONDS = 20.0
 _NEED_EVIDENCE = {"mask", "edges", "cost"}
@@ -312,7 +312,7 @@ def _truth_of(session: Session) -> MarkerMotion | None:
         return None
 
 
-def _or_none(find: Callable[[], Found]) -> Found | None:
+def _or_none(find: Callable[[], Answer]) -> Answer | None:
     try:
         return find()
     except NotFoundError:

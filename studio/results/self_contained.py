@@ -71,11 +71,11 @@ def self_contained_page(
 
 def modules_of(*entries: str) -> dict[str, str]:
     """By name the addresses (`data:`) of modules and of all that they import, which then import by these names."""
-    found: dict[str, str] = {}
+    modules: dict[str, str] = {}
     waiting = list(entries)
     while waiting:
         name = waiting.pop()
-        if name in found:
+        if name in modules:
             continue
         needed: list[str] = []
 
@@ -84,9 +84,9 @@ def modules_of(*entries: str) -> dict[str, str]:
             return f'{match[1]}"{needed[-1]}"'
 
         source = _IMPORT.sub(named, _text(name))
-        found[name] = _address("text/javascript", source.encode("utf-8"))
+        modules[name] = _address("text/javascript", source.encode("utf-8"))
         waiting += needed
-    return found
+    return modules
 
 
 def _resolved(importer: str, path: str) -> str:

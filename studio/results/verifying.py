@@ -82,10 +82,10 @@ def verify(session: Session, progress: Progress = unheard) -> Verification:
         [(session.path, ""), *((run.folder, f"runs/{run.name}/") for run in runs)]
     ):
         progress(f"checking {prefix or session.name}", done, len(runs) + 1)
-        found = check_files(folder)
-        files, new = files + found.count, new + len(found.new)
-        again += [prefix + name for name in found.written_again]
-        faults += [Fault(prefix + name, what, COPY) for name, what in sorted(found.damaged.items())]
+        checked = check_files(folder)
+        files, new = files + checked.count, new + len(checked.new)
+        again += [prefix + name for name in checked.written_again]
+        faults += [Fault(prefix + name, what, COPY) for name, what in sorted(checked.damaged.items())]
     for done, run in enumerate(runs):
         progress(f"checking run {run.name}", done, len(runs))
         count, without, wrong = _verify_results(run)
@@ -98,9 +98,9 @@ def left_behind(session: Session) -> tuple[Path, ...]:
     """Unfinished files and folders in a session and beside it, in which nothing has changed for an hour: an import, a
     mask or a copy that was killed.
     """
-    found = [*session.path.parent.glob(f"{PARTIAL_PREFIX}*"), *session.path.rglob(f"{PARTIAL_PREFIX}*")]
+    partial = [*session.path.parent.glob(f"{PARTIAL_PREFIX}*"), *session.path.rglob(f"{PARTIAL_PREFIX}*")]
     before = time.time() - UNTOUCHED_SECONDS
-    return tuple(sorted(path for path in found if not path.is_symlink() and _newest(path) < before))
+    return tuple(sorted(path for path in partial if not path.is_symlink() and _newest(path) < before))
 
 
 def remove_left_behind(session: Session) -> None:

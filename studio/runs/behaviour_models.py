@@ -70,14 +70,14 @@ def model_folders(session: Session) -> tuple[Path, ...]:
 
 def models_in(folders: Sequence[Path]) -> tuple[ModelSummary, ...]:
     """The models in some folders by name; of two with one name, the first folder's."""
-    found: dict[str, ModelSummary] = {}
+    models: dict[str, ModelSummary] = {}
     for folder in folders:
         for path in sorted(folder.glob(f"*{SUFFIX}")):
             # A file deleted meanwhile is skipped.
             with contextlib.suppress(FileNotFoundError):
                 about = path.stat()
-                found.setdefault(path.stem, _line(path, about.st_mtime_ns, about.st_size))
-    return tuple(found[name] for name in sorted(found))
+                models.setdefault(path.stem, _line(path, about.st_mtime_ns, about.st_size))
+    return tuple(models[name] for name in sorted(models))
 
 
 def model_path(folders: Sequence[Path], name_or_path: str) -> Path:

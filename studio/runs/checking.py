@@ -206,8 +206,8 @@ def check_run(
         count=len(chosen.frames),
         cameras=tuple(camera.name for camera in cameras),
         frames=tuple(int(chosen.frames[row]) for row in rows),
-        inside=tuple(found[0] for found in shares),
-        covered=tuple(found[1] for found in shares),
+        inside=tuple(shown[0] for shown in shares),
+        covered=tuple(shown[1] for shown in shares),
         lost=_frames_where(chosen, np.isin(np.array(chosen.states), LOST)),
         doubtful=_frames_where(chosen, chosen.confidence < DOUBTFUL),
         turned=sudden_turns(body, chosen, run.record.fps),
@@ -228,8 +228,8 @@ def kept_check(run: StoredRun, track: str) -> RunCheck | None:
     if not path.is_file():
         return None
     check = _RECORD.read(path)
-    found = read_track(run, track)
-    same = (check.stamp, check.count) == (track_stamp(run, track), len(found.frames))
+    stored = read_track(run, track)
+    same = (check.stamp, check.count) == (track_stamp(run, track), len(stored.frames))
     return check if same and check.denied is not None else None
 
 
@@ -313,5 +313,5 @@ def _settings(run: StoredRun) -> RunSettings:
     """The run's latest settings."""
     with run.results() as results:
         history = results.settings_history()
-    found = history[-1].values if history else run.record.settings
-    return settings_from_values(run.record.tracker, run.record.weighting, found)
+    values = history[-1].values if history else run.record.settings
+    return settings_from_values(run.record.tracker, run.record.weighting, values)

@@ -34,13 +34,13 @@ def hierarchy_of(body: BodyModel) -> Hierarchy:
 
 def _joints(body: BodyModel) -> Indices:
     """(D,) the first joint that each parameter moves."""
-    found = {
+    joints = {
         step.parameter: number
         for number, joint in reversed(list(enumerate(body.joints)))
         for step in joint.steps
         if step.parameter >= 0
     }
-    return np.array([found[row] for row in range(len(body.parameters))], dtype=np.int64)
+    return np.array([joints[row] for row in range(len(body.parameters))], dtype=np.int64)
 
 
 def _limbs(body: BodyModel) -> tuple[str, ...]:
@@ -84,10 +84,10 @@ def _carries(body: BodyModel, limb: str, joint: Indices) -> bool:
 
 
 def _ancestors(body: BodyModel, number: int) -> set[int]:
-    found: set[int] = set()
+    ancestors: set[int] = set()
     while (number := body.joints[number].parent) >= 0:
-        found.add(number)
-    return found
+        ancestors.add(number)
+    return ancestors
 
 
 def _pairs(body: BodyModel, depth: Indices) -> Indices:

@@ -49,14 +49,14 @@ def jumps_of(body: BodyModel, track: Track) -> tuple[Jump, ...]:
         return ()
     points = marker_points(body, track.poses)
     limbs, least = marker_limbs(body), LEAST_MM * scale_of(body)
-    found: dict[int, list[Jump]] = {}
+    by_frame: dict[int, list[Jump]] = {}
     for limb in dict.fromkeys(limbs):
         own = points[:, [at for at, name in enumerate(limbs) if name == limb]]
         for jump in _limb_jumps(limb, track.frames, own, least):
-            found.setdefault(jump.frame, []).append(jump)
+            by_frame.setdefault(jump.frame, []).append(jump)
     several = len(set(limbs)) > 2
     result: list[Jump] = []
-    for _, jumps in sorted(found.items()):
+    for _, jumps in sorted(by_frame.items()):
         if several and len(jumps) == len(set(limbs)):
             far = max(jumps, key=lambda jump: jump.mm)
             jumps = [msgspec.structs.replace(far, limb=WHOLE)]

@@ -93,16 +93,16 @@ class LimbsElsewhere:
 
     def lost(self, pose: Array, changed: Sequence[Bytes]) -> tuple[str, ...]:
         """The limbs that are probably elsewhere, of those with a joint of their own within them."""
-        found = self.of(pose, changed)
-        bending = [name for name in found if np.count_nonzero(self._names == name) > 1]
+        limbs = self.of(pose, changed)
+        bending = [name for name in limbs if np.count_nonzero(self._names == name) > 1]
         lost = {
             name
             for name in bending
-            if found[name].explained < LEAST_EXPLAINED and found[name].unexplained > SOME_UNEXPLAINED
+            if limbs[name].explained < LEAST_EXPLAINED and limbs[name].unexplained > SOME_UNEXPLAINED
         }
-        by_place = [name for name in bending if found[name].unexplained > MOST_UNEXPLAINED]
+        by_place = [name for name in bending if limbs[name].unexplained > MOST_UNEXPLAINED]
         if by_place and not lost:
-            lost.add(min(by_place, key=lambda name: found[name].explained))
+            lost.add(min(by_place, key=lambda name: limbs[name].explained))
         return tuple(name for name in bending if name in lost)
 
     def _grid(self, ends: Array) -> Array:

@@ -181,9 +181,9 @@ def prepare_run(
         notes = (*notes, f"The run begins in frame {first}, the session's start pose is of frame {of}.")
     if start is None and not _limited(tree):
         path = str(model.path) if model else ""
-        found = _found(session, first, tree, path, seed, progress)
-        start, source = within_limits(tree, found.pose), found.source
-        notes = (*notes, *([found.note] if found.note else []))
+        begin = _found(session, first, tree, path, seed, progress)
+        start, source = within_limits(tree, begin.pose), begin.source
+        notes = (*notes, *([begin.note] if begin.note else []))
     if is_first and start is not None:
         notes = (
             *notes,

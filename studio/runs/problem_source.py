@@ -90,12 +90,12 @@ class ProblemSource:
     def evidence(self, frame: int, settings: RunSettings) -> FrameEvidence:
         """The frame's evidence for the settings' likelihood. Raises FootageError, NotFoundError."""
         key = evidence_key(frame, settings)
-        found = self._kept(self._evidence, key)
-        if found is not None:
-            return found
+        evidence = self._kept(self._evidence, key)
+        if evidence is not None:
+            return evidence
         with self._making:
-            found = self._kept(self._evidence, key)
-            if found is None:
+            evidence = self._kept(self._evidence, key)
+            if evidence is None:
                 maker = EvidenceMaker(
                     self.cameras_in(frame),
                     self.footage,
@@ -104,8 +104,8 @@ class ProblemSource:
                     WEIGHTINGS[settings.weighting_name].edge_kind,
                     self._views,
                 )
-                found = self._keep(self._evidence, key, maker.evidence(frame))
-            return found
+                evidence = self._keep(self._evidence, key, maker.evidence(frame))
+            return evidence
 
     def cameras_in(self, frame: int) -> tuple[Camera, ...]:
         """The cameras that have a picture of the frame; the others are left out of evidence and weight."""
@@ -125,9 +125,9 @@ class ProblemSource:
             self.footage.close()
 
     def _problem(self, frame: int, settings: RunSettings, key: Hashable) -> FrameLikelihood:
-        found = self._kept(self._problems, key)
-        if found is not None:
-            return found
+        problem = self._kept(self._problems, key)
+        if problem is not None:
+            return problem
         with span("prepare", frame):
             return self._made(frame, settings, key)
 
@@ -147,12 +147,12 @@ class ProblemSource:
 
     def _likelihood(self, settings: RunSettings, cameras: tuple[Camera, ...]) -> Any:  # noqa: ANN401 - as weightings are
         key = (settings.weighting_name, settings.weighting, tuple(camera.name for camera in cameras))
-        found = self._kept(self._likelihoods, key)
-        if found is None:
+        likelihood = self._kept(self._likelihoods, key)
+        if likelihood is None:
             weighting = WEIGHTINGS[settings.weighting_name]
             made = weighting.prepare(self.body, cameras, settings.weighting)
-            found = self._keep(self._likelihoods, key, made)
-        return found
+            likelihood = self._keep(self._likelihoods, key, made)
+        return likelihood
 
     def _prepare(self, frame: int, settings: RunSettings, executor: Executor) -> bool:
         """Begin to prepare a frame; whether it is ready or on its way."""

@@ -146,10 +146,10 @@ class _Work:
         evidence = self._problems.evidence(frame, settings)
         refiner = self._refiner_of(tuple(view.camera for view in evidence.views))
         silhouettes = self._silhouettes(refiner, frame, pose, evidence)
-        found = refiner.refine(pose, silhouettes, self._problems.problem(frame, settings))
+        refined = refiner.refine(pose, silhouettes, self._problems.problem(frame, settings))
         sight = self._onlooker.looking(evidence)
-        kept = sight(found.pose).overlap < self._knobs.refinement_least_overlap
-        self._keep(row, pose if kept else found.pose, sight)
+        kept = sight(refined.pose).overlap < self._knobs.refinement_least_overlap
+        self._keep(row, pose if kept else refined.pose, sight)
         self._count_read()
 
     def refine_together(self, rows: NDArray[np.int64]) -> None:

@@ -81,16 +81,16 @@ def refine_run(
         with closing(ProblemSource(session, run.body(), run.cameras())) as problems:
             put_sides_right(run, problems, lambda _: progress(step, 0, total))
         track = read_track(run, best_track(run, (SIDES,)).name)
-    found = refined_frames(session, run, track, knobs, lambda done: progress(step, done, total))
-    moved = int(np.count_nonzero((found.poses != track.poses).any(axis=1)))
+    refined = refined_frames(session, run, track, knobs, lambda done: progress(step, done, total))
+    moved = int(np.count_nonzero((refined.poses != track.poses).any(axis=1)))
     made_by = {"verb": "refine", **_origin(track), **asdict(knobs), "moved": moved}
-    made = Track(into, track.frames, found.poses, found.agreement, track.states, made_by)
+    made = Track(into, track.frames, refined.poses, refined.agreement, track.states, made_by)
     write_track(run, made, replace=replace)
     return MadeTrack(
         made,
         moved,
-        found.agreement_before,
-        found.agreement_after,
+        refined.agreement_before,
+        refined.agreement_after,
         jitter_before=jitter(run, track),
         jitter_after=jitter(run, made),
     )
@@ -114,7 +114,7 @@ def smooth_run(
     chosen = source or best_track(run, (SIDES,) if into == REFINED else (REFINED, SIDES)).name
     track = _begun(run, chosen, into, replace)
     body, record = run.body(), run.record
-    found = smooth(
+    smoothed = smooth(
         track.frames,
         track.poses,
         track.confidence,
@@ -124,10 +124,10 @@ def smooth_run(
         record.fps,
         knobs,
     )
-    filled = tuple(found.frames[found.filled].tolist())
-    left_out = tuple(found.left_out.tolist())
+    filled = tuple(smoothed.frames[smoothed.filled].tolist())
+    left_out = tuple(smoothed.left_out.tolist())
     made_by = {"verb": "smooth", **_origin(track), **asdict(knobs), "filled": filled, "left_out": left_out}
-    made = Track(into, found.frames, found.poses, *_standing(track, found), made_by)
+    made = Track(into, smoothed.frames, smoothed.poses, *_standing(track, smoothed), made_by)
     write_track(run, made, replace=replace)
     before, after = jitter(run, track), jitter(run, made)
     return MadeTrack(made, filled=filled, left_out=left_out, jitter_before=before, jitter_after=after)
@@ -181,10 +181,10 @@ def _origin(track: Track) -> dict[str, str]:
     return {SOURCE: track.name, SOURCE_DIGEST: track_digest(track)}
 
 
-def _standing(track: Track, found: Smoothed) -> tuple[Array, tuple[str, ...]]:
+def _standing(track: Track, smoothed: Smoothed) -> tuple[Array, tuple[str, ...]]:
     """Confidence and states of the smoothed frames; confidence 0 where they were filled."""
     own = {frame: at for at, frame in enumerate(track.frames.tolist())}
-    rows = [own.get(frame, -1) for frame in found.frames.tolist()]
+    rows = [own.get(frame, -1) for frame in smoothed.frames.tolist()]
     confidence = np.array([track.confidence[at] if at >= 0 else 0.0 for at in rows])
     states = tuple(track.states[at] if at >= 0 else "" for at in rows)
-    return np.where(found.filled, 0.0, confidence), states
+    return np.where(smoothed.filled, 0.0, confidence), states

@@ -233,7 +233,7 @@ class RunWatch:
             # The best comes first, where a swarm looks for the pose to start from.
             weights = problem.log_likelihood(spread)
             return unweighted(spread[np.argsort(-weights, kind="stable")])
-        found = seek(
+        best = seek(
             problem,
             space,
             body,
@@ -245,7 +245,7 @@ class RunWatch:
             prototypes=prototypes,
             known=None if carried.estimate is None else carried.estimate[None],
         )
-        return ParticleSet(found.pose[None], np.zeros(1))
+        return ParticleSet(best.pose[None], np.zeros(1))
 
 
 def _seeking(settings: RunSettings) -> RunSettings:

@@ -60,19 +60,19 @@ def put_sides_right(
             memory = results.result(frame).carried.memory
             return known_silhouettes(body, cameras, evidence(frame), poses[frame], memory)
 
-        found, changes = with_sides_right(
+        corrected, changes = with_sides_right(
             body, cameras, track.frames, track.poses, run.record.fps, silhouettes_of
         )
     words = tuple(change.words for change in changes)
     if not words:
         drop_track(run, SIDES)
         return ()
-    changed = np.flatnonzero((found != track.poses).any(axis=1))
+    changed = np.flatnonzero((corrected != track.poses).any(axis=1))
     confidence, onlooker = track.confidence.copy(), Onlooker(body, cameras)
     for row in changed.tolist():
-        confidence[row] = onlooker.sight(evidence(int(track.frames[row])), found[row]).overlap
+        confidence[row] = onlooker.sight(evidence(int(track.frames[row])), corrected[row]).overlap
     made_by = {"verb": SIDES, SOURCE: RAW, SOURCE_DIGEST: track_digest(track), EXCHANGED: words}
-    write_track(run, Track(SIDES, track.frames, found, confidence, track.states, made_by), replace=True)
+    write_track(run, Track(SIDES, track.frames, corrected, confidence, track.states, made_by), replace=True)
     return words
 
 

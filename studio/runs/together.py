@@ -150,16 +150,16 @@ class _Work:
             chosen = varied_frames(body.body, frames[rows], poses[number][rows], FITTED_FRAMES)
             seen: list[FrameEvidence] = []
             for frame in chosen:
-                at = [found[int(np.searchsorted(frames, frame))] for found in poses]
+                at = [shape[int(np.searchsorted(frames, frame))] for shape in poses]
                 part = self._parted(frame, self.masks(frame), at)[number]
                 seen.append(self._evidence(frame, self._seeing(frame), part))
             if any(len(one.views) < len(self._cameras) for one in seen):
                 continue
-            found = fitted_shape(
+            shape = fitted_shape(
                 body.body, self._cameras, seen, poses[number][np.searchsorted(frames, chosen)]
             )
-            if found.overlap[1] >= max(LEAST_OVERLAP, found.overlap[0]):
-                body.body = found.body
+            if shape.overlap[1] >= max(LEAST_OVERLAP, shape.overlap[0]):
+                body.body = shape.body
 
     def _seeing(self, frame: int) -> tuple[Camera, ...]:
         absent = self._whole.footage.absent(frame)

@@ -256,16 +256,16 @@ class TrackingRun:
         held = self._held_in(search.frame, settings)
         problem = search.problem or self.problems.problem(search.frame, held)
         notes = (*search_notes(layers), *(problem.notes if isinstance(problem, BaseFrameLikelihood) else ()))
-        found = dataclasses.replace(search.result(settings.tracker), notes=notes)
+        result = dataclasses.replace(search.result(settings.tracker), notes=notes)
         if self._refiner is not None and self._seen is not None and settings.refinement.refine_frames:
             evidence = self._seen.evidence(search.frame, held)
             with span("refine", search.frame):
-                found = self._refiner.refined(
-                    found, partial(silhouettes_by_camera, evidence), problem, settings.refinement
+                result = self._refiner.refined(
+                    result, partial(silhouettes_by_camera, evidence), problem, settings.refinement
                 )
         carried, sought = self.carried_into(search.frame), self._watch.is_sought(search.frame)
         with span("conclude", search.frame):
-            return self._watch.judged(found, carried, problem, sought)
+            return self._watch.judged(result, carried, problem, sought)
 
     def _store(
         self, result: FrameResult, settings: RunSettings, came: tuple[float, float] | None = None

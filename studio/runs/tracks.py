@@ -61,8 +61,8 @@ class Track:
 
 def track_names(run: StoredRun) -> tuple[str, ...]:
     """The run's tracks, raw first, the others by name."""
-    found = (path.stem for path in (run.folder / FOLDER).glob(f"*{ENDING}"))
-    return (RAW, *sorted(name for name in found if is_name(name) and name != RAW))
+    stems = (path.stem for path in (run.folder / FOLDER).glob(f"*{ENDING}"))
+    return (RAW, *sorted(name for name in stems if is_name(name) and name != RAW))
 
 
 @dataclass(frozen=True, slots=True)

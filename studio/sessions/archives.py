@@ -92,8 +92,8 @@ def unpack(archive: Path, folder: Path, limits: ArchiveLimits | None = None) -> 
     """
     allowed = limits or ArchiveLimits()
     words = ("an archive that can be unpacked", "Pack the folder again.")
-    with foreign_file(archive, ArchiveError, *words), _entries(archive) as found:
-        entries = _checked(found, allowed)
+    with foreign_file(archive, ArchiveError, *words), _entries(archive) as listed_entries:
+        entries = _checked(listed_entries, allowed)
         most = min(allowed.total, max(allowed.free, int(archive.stat().st_size * allowed.ratio)))
         most = min(most, shutil.disk_usage(folder).free - GIGABYTE)
         written = 0
@@ -112,8 +112,8 @@ def check_archive(archive: Path, limits: ArchiveLimits) -> tuple[int, int]:
     PathRefused.
     """
     words = ("an archive that can be unpacked", "Pack the folder again.")
-    with foreign_file(archive, ArchiveError, *words), _entries(archive) as found:
-        entries = [entry for entry in _checked(found, limits) if not entry.is_folder]
+    with foreign_file(archive, ArchiveError, *words), _entries(archive) as listed_entries:
+        entries = [entry for entry in _checked(listed_entries, limits) if not entry.is_folder]
         size = sum(entry.claimed for entry in entries)
         if size > max(limits.free, int(archive.stat().st_size * limits.ratio)):
             raise _too_much(max(entries, key=lambda entry: entry.claimed))
@@ -190,12 +190,12 @@ def _tar_entry(tar: tarfile.TarFile, member: tarfile.TarInfo) -> _Entry:
     return _Entry(name, member.isdir(), mode, False, member.size, content)
 
 
-def _checked(found: Iterator[_Entry], limits: ArchiveLimits) -> list[_Entry]:
+def _checked(listed_entries: Iterator[_Entry], limits: ArchiveLimits) -> list[_Entry]:
     """All entries. A tar's index is spread over the file, so it is refused as soon as it claims too much."""
     entries: list[_Entry] = []
     seen: set[str] = set()
     claimed = 0
-    for entry in found:
+    for entry in listed_entries:
         entries.append(entry)
         claimed += entry.claimed
         if len(entries) > limits.entries:

@@ -206,8 +206,8 @@ def mask_name(source: CameraSource, frame: int) -> str:
 
 def made_folders(session: Session, home: str) -> list[Path]:
     """The folders of masks of one of HOMES, the newest last."""
-    found = [path for path in (session.path / home).glob("*") if path.name.isdigit()]
-    return sorted(found, key=lambda path: int(path.name))
+    folders = [path for path in (session.path / home).glob("*") if path.name.isdigit()]
+    return sorted(folders, key=lambda path: int(path.name))
 
 
 @contextlib.contextmanager

@@ -157,8 +157,8 @@ def earlier_calibrations(session: Session) -> tuple[str, ...]:
     folder = session.path / CAMERAS_PATH.parent / EARLIER
     if not folder.is_dir():
         return ()
-    found = [path.name for path in folder.iterdir() if (path / CAMERAS_PATH.name).is_file()]
-    return tuple(sorted((name for name in found if name[0] != "."), reverse=True))
+    names = [path.name for path in folder.iterdir() if (path / CAMERAS_PATH.name).is_file()]
+    return tuple(sorted((name for name in names if name[0] != "."), reverse=True))
 
 
 def earlier_calibration(session: Session, name: str) -> Path:

@@ -108,7 +108,7 @@ def check_files(folder: Path, *, note: bool = True) -> CheckedFiles:
             if path.suffix.lower() in BOUNDED and path.stat().st_size > LARGEST:
                 damaged[name] = f"is larger than the {LARGEST >> 20} MB that such a file can have"
                 continue
-            found = _noted(path)
+            current = _noted(path)
         except FileNotFoundError:
             # Removed since the folder was listed, by other work in it.
             continue
@@ -118,13 +118,13 @@ def check_files(folder: Path, *, note: bool = True) -> CheckedFiles:
         before = known.get(name)
         if before is None:
             new.append(name)
-        elif found.digest != before.digest:
-            if found.time == before.time or name.startswith(WRITTEN_ONCE):
+        elif current.digest != before.digest:
+            if current.time == before.time or name.startswith(WRITTEN_ONCE):
                 damaged[name] = "is not what was written"
-                found = before
+                current = before
             else:
                 again.append(name)
-        now[name] = found
+        now[name] = current
     for name in known.keys() - now.keys() - damaged.keys():
         if name.startswith(WRITTEN_ONCE):
             damaged[name] = "is gone"

@@ -88,13 +88,15 @@ def _archive(place: Path) -> Inspection:
 
 def _inspected(folder: Path) -> Inspection:
     session = None
-    found: list[Oddity] = []
+    oddities: list[Oddity] = []
     is_session = os.path.lexists(folder / MANIFEST_NAME)
     if is_session:
         try:
             session = Session(folder)
         except StudioError as error:
-            found.append(Oddity(MANIFEST_NAME, f"the session cannot be opened: {error.message.rstrip('.')}"))
+            oddities.append(
+                Oddity(MANIFEST_NAME, f"the session cannot be opened: {error.message.rstrip('.')}")
+            )
     elsewhere = _footage_of(session)
     files = size = 0
     for path in _entries(folder):
@@ -106,15 +108,15 @@ def _inspected(folder: Path) -> Inspection:
             continue
         files, size = files + 1, size + (status.st_size if stat.S_ISREG(status.st_mode) else 0)
         if files > MOST_FILES:
-            found.append(Oddity(".", f"more than {MOST_FILES} files"))
+            oddities.append(Oddity(".", f"more than {MOST_FILES} files"))
             break
         with contextlib.suppress(StopIteration, FileNotFoundError):
-            found.append(next(_oddities(folder, path, name, status, elsewhere)))
+            oddities.append(next(_oddities(folder, path, name, status, elsewhere)))
     for name, place in elsewhere.items():
         if Path(place).is_absolute():
-            found.append(Oddity(name, f"its footage lies elsewhere, at '{place}'", footage=True))
+            oddities.append(Oddity(name, f"its footage lies elsewhere, at '{place}'", footage=True))
     kind = "session" if is_session else "footage"
-    return Inspection(kind, files, size, tuple(sorted(found, key=lambda one: one.place)))
+    return Inspection(kind, files, size, tuple(sorted(oddities, key=lambda one: one.place)))
 
 
 def _footage_of(session: Session | None) -> dict[str, str]:

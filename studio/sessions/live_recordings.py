@@ -96,15 +96,17 @@ class SetWriter:
         """Whether sets after the first one are awaited."""
         return (self.folder / LIVE / GO_NAME).exists()
 
-    def put(self, frame: int, found: PictureSet) -> None:
+    def put(self, frame: int, pictures: PictureSet) -> None:
         """Store a set. Raises FootageError for a picture of another size, OSError if it cannot be written."""
-        for name, shot in found.shots.items():
+        for name, shot in pictures.shots.items():
             source = self._cameras[name]
             check_size(source, shot.pixels.shape[1], shot.pixels.shape[0])
             picture_path(self.folder / source.path, frame).write_bytes(jpeg_of(shot))
-        arrivals = ";".join(f"{name}={shot.came:.6f}" for name, shot in found.shots.items())
-        spread = f"{1e3 * found.spread:.3f}"
-        self._line((frame, f"{found.moment:.6f}", spread, found.lagging, ";".join(found.left_out), arrivals))
+        arrivals = ";".join(f"{name}={shot.came:.6f}" for name, shot in pictures.shots.items())
+        spread = f"{1e3 * pictures.spread:.3f}"
+        self._line(
+            (frame, f"{pictures.moment:.6f}", spread, pictures.lagging, ";".join(pictures.left_out), arrivals)
+        )
 
     def end(self, why: str) -> None:
         """End the recording. Never raises: the disk may be the reason."""

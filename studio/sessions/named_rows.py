@@ -40,7 +40,9 @@ def read_pose(path: Path, names: tuple[str, ...], frame: int | None = None) -> A
                 "Keep one row, the start pose.",
             )
         column = header.index(FRAME)
-        row = next((found for found in rows if frame is not None and found[column] == frame), rows[0])
+        row = next(
+            (candidate for candidate in rows if frame is not None and candidate[column] == frame), rows[0]
+        )
     return _ordered(path, header, row, names)
 
 

@@ -91,15 +91,15 @@ class Store:
         with self._talking():
             self._files.invalidate_cache()
             try:
-                found: Mapping[str, Mapping[str, Any]] = self._files.find(self._root, detail=True)
+                files: Mapping[str, Mapping[str, Any]] = self._files.find(self._root, detail=True)
             except FileNotFoundError:
                 return {}
         start = len(self._root.rstrip("/")) + 1
         # A store may list the folder itself, as an empty file of its name.
-        names = {path: path[start:] for path in found if path[start:] and not path.endswith("/")}
+        names = {path: path[start:] for path in files if path[start:] and not path.endswith("/")}
         names = {path: name for path, name in names.items() if f"/{PARTIAL_PREFIX}" not in f"/{name}"}
         return {
-            str(relative_path(name)): Listed(int(found[path].get("size") or 0), _stamp(found[path]))
+            str(relative_path(name)): Listed(int(files[path].get("size") or 0), _stamp(files[path]))
             for path, name in names.items()
         }
 
@@ -108,12 +108,14 @@ class Store:
         with self._talking():
             self._files.invalidate_cache()
             try:
-                found: Iterable[Mapping[str, Any]] = self._files.ls(self._root, detail=True)
+                inside: Iterable[Mapping[str, Any]] = self._files.ls(self._root, detail=True)
             except FileNotFoundError:
                 raise NotFoundError(f"There is nothing at '{self.address}'.", "Check the address.") from None
             return tuple(
                 sorted(
-                    PurePosixPath(one["name"].rstrip("/")).name for one in found if one["type"] == "directory"
+                    PurePosixPath(one["name"].rstrip("/")).name
+                    for one in inside
+                    if one["type"] == "directory"
                 )
             )
 

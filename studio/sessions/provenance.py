@@ -86,17 +86,17 @@ def remember(session: Session, part: str, words: str, good: bool, stops: tuple[s
 
 def origin_of(session: Session, part: str) -> Origin | None:
     """The provenance of a part; None if it was given, or its file has changed since."""
-    found = _read(session).parts.get(part)
-    return found if found is not None and found.content == _own(session, part) else None
+    origin = _read(session).parts.get(part)
+    return origin if origin is not None and origin.content == _own(session, part) else None
 
 
 def changed_inputs(session: Session, part: str, among: Iterable[str] = ALL_INPUTS) -> tuple[str, ...]:
     """The inputs of a part that have changed since: some of INPUTS[part], in order. among : the inputs to compare."""
-    found = origin_of(session, part)
-    if found is None:
+    origin = origin_of(session, part)
+    if origin is None:
         return ()
     now = digests(session, [name for name in INPUTS[part] if name in among])
-    return tuple(name for name in now if found.inputs.get(name, "") != now[name])
+    return tuple(name for name in now if origin.inputs.get(name, "") != now[name])
 
 
 def adopt(session: Session) -> None:

@@ -95,10 +95,10 @@ def import_recording(
         ),
     )
     shutil.rmtree(folder, ignore_errors=True)
-    found = ImportReport(
+    imported = ImportReport(
         described, report.matching, (*report.notes, spread_note), (*report.warnings, *notes), report.layout
     )
-    return found, spreads
+    return imported, spreads
 
 
 def spreads_of(path: Path, session: Session) -> SpreadFigures:

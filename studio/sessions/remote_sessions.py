@@ -243,7 +243,7 @@ def sessions_at(address: str) -> tuple[RemoteSession, ...]:
     if MANIFEST in files:
         return (_described(store.address, files),)
     names = store.folders()
-    found = [
+    sessions = [
         _described(
             below(store.address, name),
             {
@@ -254,7 +254,7 @@ def sessions_at(address: str) -> tuple[RemoteSession, ...]:
         )
         for name in names
     ]
-    return tuple(one for one in found if one.whole or one.bytes)
+    return tuple(one for one in sessions if one.whole or one.bytes)
 
 
 def upload_unless_there(session: Session, address: str) -> None:

@@ -264,8 +264,8 @@ class Sums:
 
     def __init__(self, text: str) -> None:
         try:
-            found = json.loads(text)
-            self._sums: dict[str, object] = found if isinstance(found, dict) else {}
+            stored = json.loads(text)
+            self._sums: dict[str, object] = stored if isinstance(stored, dict) else {}
         except ValueError:
             self._sums = {}
 
@@ -281,13 +281,11 @@ class Sums:
         """The layers that are missing, surplus or damaged."""
         sums = self._sums.get("layers")
         known: dict[str, Any] = sums if is_table(sums) else {}
-        found = {str(layer): checksum([blob]) for layer, blob in blobs.items()}
-        return sorted(
-            int(layer) for layer in known.keys() | found.keys() if known.get(layer) != found.get(layer)
-        )
+        now = {str(layer): checksum([blob]) for layer, blob in blobs.items()}
+        return sorted(int(layer) for layer in known.keys() | now.keys() if known.get(layer) != now.get(layer))
 
 
-class Found:
+class CheckedStore:
     """What is known of a store: which frames were found whole, and which damaged. Every method is one step of a
     dictionary, so threads may share it.
     """
@@ -329,17 +327,17 @@ class Verified:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._stores: OrderedDict[Path, Found] = OrderedDict()
+        self._stores: OrderedDict[Path, CheckedStore] = OrderedDict()
         self._reading: dict[Path, threading.Lock] = {}
 
-    def of(self, path: Path) -> Found:
+    def of(self, path: Path) -> CheckedStore:
         """What is known of a store until it is forgotten."""
         with self._lock:
-            found = self._stores.setdefault(path, Found())
+            entries = self._stores.setdefault(path, CheckedStore())
             self._stores.move_to_end(path)
             if len(self._stores) > STORES_REMEMBERED:
                 self._reading.pop(self._stores.popitem(last=False)[0], None)
-            return found
+            return entries
 
     def reading(self, path: Path) -> threading.Lock:
         """Held by who reads a whole store to check it: whoever comes later finds it checked."""

@@ -29,7 +29,7 @@ from studio.sessions.results_codec import (
     PARTIAL,
     SETTINGS,
     VERIFIED,
-    Found,
+    CheckedStore,
     Sums,
     unpack,
     unpack_layer,
@@ -105,7 +105,7 @@ class _Stand:
 
     stored: object
     rewritten: object
-    of: tuple[bool, Found, dict[int, tuple[int, str]]] | None
+    of: tuple[bool, CheckedStore, dict[int, tuple[int, str]]] | None
     last: int
     rows: list[Row]
     damaged: dict[int, str]
@@ -297,8 +297,8 @@ class ResultsReader:
                     for frame, text in sums.items()
                     if not parts[frame] and not known.holds(frame, text)
                 }
-                found = self._check_blobs(known, due) if blobs else _known_damage(known, due)
-            damaged = {frame: part for frame, part in sorted((parts | found).items()) if part}
+                wrong = self._check_blobs(known, due) if blobs else _known_damage(known, due)
+            damaged = {frame: part for frame, part in sorted((parts | wrong).items()) if part}
             self._known = _Stand(
                 stored,
                 rewritten,
@@ -306,11 +306,11 @@ class ResultsReader:
                 last=max((before.last, *sums, *by_frame)),
                 rows=[*before.rows, *(row for frame, row in by_frame.items() if frame not in damaged)],
                 damaged=before.damaged | damaged,
-                due=before.due | {frame: text for frame, text in due.items() if frame not in found},
+                due=before.due | {frame: text for frame, text in due.items() if frame not in wrong},
             )
             return self._known
 
-    def _check_blobs(self, known: Found, due: Mapping[int, str]) -> dict[int, str]:
+    def _check_blobs(self, known: CheckedStore, due: Mapping[int, str]) -> dict[int, str]:
         """The damaged blobs of some frames, as text; "" of those that are intact. Some frames are read at a time."""
         parts: dict[int, str] = {}
         for _, group in groupby(sorted(due), key=lambda frame: frame // READ_TOGETHER):
@@ -416,13 +416,15 @@ class ResultsReader:
         wrong = self.damaged_settings()
         if wrong:
             raise self._damaged_version(wrong[0])
-        found: list[SettingsEntry] = []
+        history: list[SettingsEntry] = []
         for version, frame, layer, text in rows:
             try:
-                found.append(SettingsEntry(version, frame, layer, decode_json(text.encode(), dict[str, Any])))
+                history.append(
+                    SettingsEntry(version, frame, layer, decode_json(text.encode(), dict[str, Any]))
+                )
             except (DecodeError, AttributeError):  # stores without checksums; a damaged text may be a number
                 raise self._damaged_version(version) from None
-        return found
+        return history
 
     def _damaged_version(self, version: int) -> SessionError:
         return SessionError(
@@ -433,9 +435,9 @@ class ResultsReader:
     def damaged_settings(self) -> list[int]:
         """The versions of the settings that are lost or damaged."""
         with self._snapshot():
-            found = self._query('SELECT version, frame, layer, "values" FROM settings')
+            entries = self._query('SELECT version, frame, layer, "values" FROM settings')
             sums = self._sums(SETTINGS)
-        rows = {row[0]: row for row in found}
+        rows = {row[0]: row for row in entries}
         return sorted(
             version
             for version, text in sums.items()
@@ -596,7 +598,7 @@ def time_from(text: str) -> TimeTaken | None:
         return None
 
 
-def _damage(known: Found, frame: int, text: str, row: Row | None) -> str:
+def _damage(known: CheckedStore, frame: int, text: str, row: Row | None) -> str:
     """What of a frame's numbers does not match its checksums, as text; "" if all do or did before."""
     if row is None:
         return LOST
@@ -607,7 +609,7 @@ def _damage(known: Found, frame: int, text: str, row: Row | None) -> str:
     return ""
 
 
-def _known_damage(known: Found, due: Mapping[int, str]) -> dict[int, str]:
+def _known_damage(known: CheckedStore, due: Mapping[int, str]) -> dict[int, str]:
     """The damage of some frames that was found before, as text."""
     damage = known.damage()
     return {

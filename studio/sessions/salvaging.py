@@ -29,10 +29,10 @@ def faults_of_database(run_folder: Path) -> list[str]:
         mode = "ro" if os.access(run_folder, os.W_OK) else "immutable"
         with contextlib.closing(open_database(path, mode)) as connection:
             check_tables(connection, path)
-            found = [str(row[0]) for row in connection.execute("PRAGMA integrity_check(20)")]
+            faults = [str(row[0]) for row in connection.execute("PRAGMA integrity_check(20)")]
     except UNREADABLE as error:
         return [str(error)]
-    return [] if found == ["ok"] else found
+    return [] if faults == ["ok"] else faults
 
 
 def salvage(run_folder: Path, first: int, last: int) -> list[int]:
@@ -82,15 +82,17 @@ def _copy(broken: sqlite3.Connection, whole: sqlite3.Connection, first: int, las
     _put(whole, "checksums", sums or [])
     there: list[int] = []
     for frame in range(first, last):
-        found = {table: _rows(broken, f"SELECT * FROM {table} WHERE frame = {frame}") for table in OF_A_FRAME}
+        by_table = {
+            table: _rows(broken, f"SELECT * FROM {table} WHERE frame = {frame}") for table in OF_A_FRAME
+        }
         of_it = _rows(broken, f"SELECT * FROM checksums WHERE what = '{FRAME}' AND number = {frame}")
-        if any(rows is None for rows in (*found.values(), of_it)):
+        if any(rows is None for rows in (*by_table.values(), of_it)):
             _put(whole, "checksums", [(FRAME, frame, GIVEN_UP)])
         else:
-            for table, rows in found.items():
+            for table, rows in by_table.items():
                 _put(whole, table, rows or [])
             _put(whole, "checksums", of_it or [])
-        if found["frames"] or of_it:
+        if by_table["frames"] or of_it:
             there.append(frame)
     lost: list[int] = []
     for frame in range(first, last):

@@ -244,8 +244,8 @@ class Session:
     @property
     def truth_path(self) -> Path | None:
         """The TRC file with the true motion, None without one."""
-        found = sorted((self.path / "truth").glob("*.trc"))
-        return found[0] if found else None
+        files = sorted((self.path / "truth").glob("*.trc"))
+        return files[0] if files else None
 
     def thumbnail(self) -> Path | None:
         """A small picture of the session (JPEG), made on first use; None if the footage cannot be
@@ -269,8 +269,8 @@ class Session:
     def runs(self) -> tuple[StoredRun, ...]:
         """The session's runs, oldest first."""
         folder = self.path / RUNS_NAME
-        found = [StoredRun(path) for path in folder.iterdir() if _is_run(path)] if folder.is_dir() else []
-        return tuple(sorted(found, key=lambda run: (run.folder / "run.json").stat().st_mtime_ns))
+        runs = [StoredRun(path) for path in folder.iterdir() if _is_run(path)] if folder.is_dir() else []
+        return tuple(sorted(runs, key=lambda run: (run.folder / "run.json").stat().st_mtime_ns))
 
     def run(self, name: str) -> StoredRun:
         """The run of that name. Raises NotFoundError, NameRefused."""

@@ -232,8 +232,8 @@ class Workspace:
     def trashed(self) -> tuple[str, ...]:
         """The content of the trash, oldest first; sessions in it can be given to `restore`."""
         folder = self.root / TRASH_NAME
-        found = [path for path in folder.iterdir() if path.is_dir()] if folder.is_dir() else []
-        return tuple(path.name for path in sorted(found, key=lambda path: path.stat().st_ctime_ns))
+        folders = [path for path in folder.iterdir() if path.is_dir()] if folder.is_dir() else []
+        return tuple(path.name for path in sorted(folders, key=lambda path: path.stat().st_ctime_ns))
 
     def restore(self, trashed_name: str) -> Session:
         """Bring a session back under its own name, or one like it if that is taken. Raises NotFoundError."""
@@ -317,7 +317,7 @@ def _summed_up(folder: Path) -> SessionSummary:
 
 def _run_summaries(folder: Path) -> tuple[tuple[RunSummary, ...], tuple[str, ...]]:
     """Runs by creation time, damaged results in the status; and what is said of those whose record cannot be read."""
-    found: list[RunSummary] = []
+    summaries: list[RunSummary] = []
     unread: list[str] = []
     for path in _named_folders(folder, RECORD_NAME):
         try:
@@ -326,10 +326,10 @@ def _run_summaries(folder: Path) -> tuple[tuple[RunSummary, ...], tuple[str, ...
             unread.append(f"Run '{path.name}' is left out: {error}")
             continue
         try:
-            found.append(run.summary(blobs=False))
+            summaries.append(run.summary(blobs=False))
         except Exception:  # whatever a foreign store holds, the others are listed
-            found.append(dataclasses.replace(run.empty_summary(), status="damaged"))
-    return tuple(sorted(found, key=lambda run: (run.created, run.name))), tuple(unread)
+            summaries.append(dataclasses.replace(run.empty_summary(), status="damaged"))
+    return tuple(sorted(summaries, key=lambda run: (run.created, run.name))), tuple(unread)
 
 
 def _named_folders(parent: Path, marker: str) -> Iterator[Path]:

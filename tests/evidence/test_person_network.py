@@ -33,7 +33,7 @@ def test_a_person_is_found_and_cut_out(walk: Rendered, network: PersonNetwork, t
     camera = walk.cameras[2].name
     picture = np.ascontiguousarray(np.rot90(walk.pictures[camera, 0], turns))
     true = np.rot90(walk.masks[camera, 0], turns)
-    found = network.found(picture, turns)
+    found = network.find(picture, turns)
     assert found
     mask = found[0].mask(picture)
     assert mask.shape == picture.shape[:2]
@@ -43,4 +43,4 @@ def test_a_person_is_found_and_cut_out(walk: Rendered, network: PersonNetwork, t
 
 @pytest.mark.slow
 def test_nobody_is_found_in_an_empty_room(walk: Rendered, network: PersonNetwork) -> None:
-    assert network.found(walk.empty[walk.cameras[2].name]) == []
+    assert network.find(walk.empty[walk.cameras[2].name]) == []

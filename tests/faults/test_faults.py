@@ -9,7 +9,7 @@ from faults.campaign import campaign, plant, table
 from faults.kinds import KINDS
 from faults.process_kinds import SERVER_KINDS
 from faults.stage import Stage
-from studio.sessions.results_codec import Found, Sums
+from studio.sessions.results_codec import CheckedStore, Sums
 
 SHORT = [kind for kind in KINDS if kind not in SERVER_KINDS] + ["camera gone", "server killed"]
 # Servers take some seconds to start: seed 1 starts one, and the command line goes on.
@@ -44,7 +44,7 @@ def test_a_store_that_trusts_the_disk_is_found_out(stage: Stage, monkeypatch: py
     monkeypatch.setattr(Sums, "fits", lambda *_: True)
     monkeypatch.setattr(Sums, "row_fits", lambda *_: True)
     monkeypatch.setattr(Sums, "wrong_layers", lambda *_: [])
-    monkeypatch.setattr(Found, "holds", lambda *_: True)
+    monkeypatch.setattr(CheckedStore, "holds", lambda *_: True)
     trial = plant(stage, "flipped bit in a frame", 0)
     assert any("is not named" in text for text in trial.wrong)
 

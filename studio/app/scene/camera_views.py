@@ -161,10 +161,10 @@ class CameraViews:
         camera = client.camera
         before = (camera.position, camera.look_at, camera.up_direction, np.array(camera.fov))
         if self._through is None:
-            found = self._free.pop(client.client_id, None)
-            if found is None:
+            eye = self._free.pop(client.client_id, None)
+            if eye is None:
                 return
-            position, look_at, up, fov = found
+            position, look_at, up, fov = eye
         else:
             self._free.setdefault(client.client_id, before)
             plane = self.views[self._through].plane

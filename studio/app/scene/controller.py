@@ -276,7 +276,7 @@ class SceneController:
         model = self.show_run(model, session, "")
         if model.subject is None or len(model.subject.body.parameters) != len(pose):
             return model
-        return show_frame(edit_pose(model, lambda edit: begun(edit, pose, found=text)), frame)
+        return show_frame(edit_pose(model, lambda edit: begun(edit, pose, confidence=text)), frame)
 
     def begin_edit(
         self, model: Model, session: str, run: str, frame: int | None, pose: Array | None
@@ -351,23 +351,23 @@ class SceneController:
             opened.span[0] if frame is None else frame,
             edit.pose,
             progress=lambda share: self.post(self._refining_at, share),
-            done=lambda search, found: self.post(self._refined, search, found),
+            done=lambda search, better: self.post(self._refined, search, better),
         )
         return self._refining_at(model, 0.0)
 
     def _refining_at(self, model: Model, share: float) -> Model:
         return edit_pose(model, lambda edit: replace(edit, refining=share)) if self._refining else model
 
-    def _refined(self, model: Model, search: PoseRefining, found: BetterPose | StudioError) -> Model:
+    def _refined(self, model: Model, search: PoseRefining, better: BetterPose | StudioError) -> Model:
         if search is not self._refining:
             return model
         self._refining = None
         model = edit_pose(model, lambda edit: replace(edit, refining=None))
-        if isinstance(found, StudioError):
-            self.refused(found)
+        if isinstance(better, StudioError):
+            self.refused(better)
             return model
-        notify(self._server, "Refined", outcome(found))
-        return edit_pose(model, lambda edit: moved(edit, found.pose))
+        notify(self._server, "Refined", outcome(better))
+        return edit_pose(model, lambda edit: moved(edit, better.pose))
 
     def _open(self, model: Model, session: str, run: str) -> Model:
         """Open a session or run, unless it is shown already. If that fails nothing is open."""
@@ -388,37 +388,37 @@ class SceneController:
         if not (place.has_footage and place.is_calibrated):
             # Nothing to place in the room yet: the guided set-up shows the next step.
             return opened(model, session, "", None)
-        found = self.opened = OpenedRun(place, place.run(run) if run else None)
+        current = self.opened = OpenedRun(place, place.run(run) if run else None)
         self.views = SceneViews(
             self._server,
-            found,
+            current,
             clicked=lambda camera, twice: self.post(camera_clicked, camera, twice),
             limb_clicked=lambda limb, at: self.post(self._click_limb, limb, at),
             volume_made=lambda: self.post(lambda model: replace(model)),
             failed=lambda problem: self.post(self._fail, problem),
         )
         self.views.look_at_person(move_viewers=self._is_leading and not same_place)
-        subject = subject_of(found)
+        subject = subject_of(current)
         self.handles = PoseHandles(self._server, subject.dragger, self.post)
-        if found.results is not None and not found.results.is_checked():
-            threading.Thread(target=self._check, args=(found,), name="scene-check", daemon=True).start()
-        if found.truth_problem:
-            notify(self._server, "The truth cannot be shown", found.truth_problem, bad=True)
+        if current.results is not None and not current.results.is_checked():
+            threading.Thread(target=self._check, args=(current,), name="scene-check", daemon=True).start()
+        if current.truth_problem:
+            notify(self._server, "The truth cannot be shown", current.truth_problem, bad=True)
         return opened(
-            model, session, run, subject, found.frames(), found.settings(), edit_of(found.start_pose())
+            model, session, run, subject, current.frames(), current.settings(), edit_of(current.start_pose())
         )
 
-    def _check(self, found: OpenedRun) -> None:
+    def _check(self, opened: OpenedRun) -> None:
         """Read all that is stored, beside the scene's thread, and leave out what is damaged."""
         with suppress(StudioError):
-            self.post(self._leave_out, found, found.damaged_frames())
+            self.post(self._leave_out, opened, opened.damaged_frames())
 
-    def _leave_out(self, model: Model, found: OpenedRun, damaged: set[int]) -> Model:
+    def _leave_out(self, model: Model, opened: OpenedRun, damaged: set[int]) -> Model:
         """Leave out the frames that were found damaged after their run was opened."""
-        if found is not self.opened or not damaged.intersection(model.frames):
+        if opened is not self.opened or not damaged.intersection(model.frames):
             return model
         model = replace(model, frames=tuple(frame for frame in model.frames if frame not in damaged))
-        found.forget_from(min(damaged))
+        opened.forget_from(min(damaged))
         return show_frame(model, model.selection.frame)
 
     def _close(self) -> None:
@@ -499,15 +499,15 @@ class SceneController:
         self, model: Model, at: tuple[float, float] | None, choose: bool, answer: Future[Pointed | None]
     ) -> Model:
         """Draw the line of the particle at `at` (shares of the view; None: the pointer left), or choose it."""
-        found = None if at is None else self._pointed(model, at)
-        answer.set_result(found)
+        pointed = None if at is None else self._pointed(model, at)
+        answer.set_result(pointed)
         if not choose:
-            return point_at(model, None if found is None else found.particle)
-        if found is None:
+            return point_at(model, None if pointed is None else pointed.particle)
+        if pointed is None:
             return model
         model = stop_layers(model)
-        same = found.particle == model.selection.particle
-        return select(model, layer=found.layer, particle=None if same else found.particle)
+        same = pointed.particle == model.selection.particle
+        return select(model, layer=pointed.layer, particle=None if same else pointed.particle)
 
     def _pointed(self, model: Model, at: tuple[float, float]) -> Pointed | None:
         if self.views is None or not model.is_looking_at_layers:
@@ -839,11 +839,11 @@ def is_annealed_again(model: Model) -> bool:
     return model.live.reannealed or (model.knobs is not None and bool(model.knobs.requested))
 
 
-def subject_of(found: OpenedRun) -> Subject:
+def subject_of(opened: OpenedRun) -> Subject:
     """The model's subject for an opened session or run."""
     try:
-        mirror = Mirror(found.body)
+        mirror = Mirror(opened.body)
     except BodyError:
         mirror = None
-    names = tuple(camera.name for camera in found.cameras)
-    return Subject(found.body, names, found.span, found.fps, Dragger(found.body), mirror)
+    names = tuple(camera.name for camera in opened.cameras)
+    return Subject(opened.body, names, opened.span, opened.fps, Dragger(opened.body), mirror)

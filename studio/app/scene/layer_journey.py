@@ -47,21 +47,21 @@ class Journeys:
 
     def places(self, record: LayerRecord) -> Array:
         """(N, L, 2, 3) metres: both ends of the drawn limbs of a layer's particles."""
-        found = self._places.get(record.layer)
-        if found is None or found[0] is not record:
+        stored = self._places.get(record.layer)
+        if stored is None or stored[0] is not record:
             ends = limb_ends(self._body, np.ascontiguousarray(record.poses, dtype=np.float64))
-            found = self._places[record.layer] = record, ends * METRES_PER_MM
-        return found[1]
+            stored = self._places[record.layer] = record, ends * METRES_PER_MM
+        return stored[1]
 
     def to(self, record: LayerRecord, before: LayerRecord | None) -> Journey:
         """The journey to a layer from the one before it (None: there is none)."""
         if self._kept is None or self._kept[0] != (before, record):
             end = self.places(record)
             if before is None:
-                found = Journey(end, end, np.zeros((0, *end.shape[1:])))
+                way = Journey(end, end, np.zeros((0, *end.shape[1:])))
             else:
-                found = journey(self.places(before), end, parent_rows(before, record))
-            self._kept = (before, record), found
+                way = journey(self.places(before), end, parent_rows(before, record))
+            self._kept = (before, record), way
         return self._kept[1]
 
 

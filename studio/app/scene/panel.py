@@ -123,8 +123,8 @@ def mark_html(model: Model, moment: Moment | None, tokens: ColourTokens) -> str:
     """The tracking state of the shown frame, unless it was simply tracked, in the colour of its mark on the timeline;
     for a found start pose its confidence.
     """
-    if model.edit is not None and model.edit.found:
-        title, words, colour = "start pose", model.edit.found, tokens["good"]
+    if model.edit is not None and model.edit.confidence:
+        title, words, colour = "start pose", model.edit.confidence, tokens["good"]
     elif moment is not None and moment.tracking in MARKS:
         token, words = MARKS[moment.tracking]
         title, colour = moment.tracking, tokens[token]

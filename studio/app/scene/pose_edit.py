@@ -21,7 +21,7 @@ class PoseEdit:
     active : whether it is edited now; otherwise editing can be resumed. frame : of the run being corrected, None: the
     start pose. past : earlier poses, newest last. source : of the last change; consecutive changes from one source are
     undone together. grip : the limb that carries the gizmo, "" none. held : the limb being dragged, "" the root.
-    refining : progress of the search around the pose, 0 to 1. found : confidence of an automatically found pose, as
+    refining : progress of the search around the pose, 0 to 1. confidence : of a pose that was searched for, as
     text.
     """
 
@@ -35,7 +35,7 @@ class PoseEdit:
     grip: str = ""
     held: str | None = None
     refining: float | None = None
-    found: str = ""
+    confidence: str = ""
 
     @property
     def is_moved(self) -> bool:
@@ -48,19 +48,21 @@ def edit_of(pose: Array) -> PoseEdit:
     return PoseEdit(pose, pose, pose)
 
 
-def begun(edit: PoseEdit, pose: Array | None = None, frame: int | None = None, found: str = "") -> PoseEdit:
+def begun(
+    edit: PoseEdit, pose: Array | None = None, frame: int | None = None, confidence: str = ""
+) -> PoseEdit:
     """Edit the start pose, or the corrected pose of a frame. pose : (D,) to start from; None: the current one."""
     if not edit.active or frame != edit.frame:
         first = pose if frame is not None else edit.start if edit.frame is not None else None
         if first is not None:
             edit = replace(edit_of(first), start=edit.start, grip=edit.grip)
-    edit = replace(edit, active=True, frame=frame, found=found)
+    edit = replace(edit, active=True, frame=frame, confidence=confidence)
     return edit if pose is None else moved(edit, pose)
 
 
 def ended(edit: PoseEdit) -> PoseEdit:
     """Stop editing; the pose is kept until another session or run is opened."""
-    return replace(edit, active=False, held=None, refining=None, found="")
+    return replace(edit, active=False, held=None, refining=None, confidence="")
 
 
 def moved(edit: PoseEdit, pose: Array, source: str = "") -> PoseEdit:

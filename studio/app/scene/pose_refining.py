@@ -40,7 +40,7 @@ class PoseRefining:
 
         def search() -> None:
             try:
-                found = better_pose(
+                result = better_pose(
                     session,
                     frame,
                     pose,
@@ -48,12 +48,12 @@ class PoseRefining:
                     progress=report,
                 )
             except StudioError as problem:
-                found = problem
+                result = problem
             except Exception:
                 _LOG.exception("refining a pose failed")
-                found = StudioError("The search around the pose failed.", "See the studio's log.")
+                result = StudioError("The search around the pose failed.", "See the studio's log.")
             if not self._stopping.is_set():
-                done(self, found)
+                done(self, result)
 
         threading.Thread(target=search, name="pose-refining", daemon=True).start()
 
@@ -62,10 +62,12 @@ class PoseRefining:
         self._stopping.set()
 
 
-def outcome(found: BetterPose) -> str:
+def outcome(better: BetterPose) -> str:
     """The result of a search as text."""
-    if found.gain <= 0.0:
+    if better.gain <= 0.0:
         return "No better pose was found nearby."
-    if math.isfinite(found.overlap_before) and math.isfinite(found.overlap):
-        return f"Overlap with the masks {100.0 * found.overlap_before:.0f} % → {100.0 * found.overlap:.0f} %."
+    if math.isfinite(better.overlap_before) and math.isfinite(better.overlap):
+        return (
+            f"Overlap with the masks {100.0 * better.overlap_before:.0f} % → {100.0 * better.overlap:.0f} %."
+        )
     return "A better pose was found nearby."

@@ -78,9 +78,9 @@ def read_recording(path: Path) -> Recording:
         size = int.from_bytes(content[:LENGTH], "little")
         inner = zstandard.ZstdDecompressor().decompress(content[LENGTH:], max_output_size=size)
         end = LENGTH + int.from_bytes(inner[:LENGTH], "little")
-        found = msgspec.msgpack.decode(inner[LENGTH:end])
-        messages = [(float(at), message) for at, message in found["messages"]]
-        return Recording(float(found["durationSeconds"]), messages)
+        recorded = msgspec.msgpack.decode(inner[LENGTH:end])
+        messages = [(float(at), message) for at, message in recorded["messages"]]
+        return Recording(float(recorded["durationSeconds"]), messages)
     except (
         OSError,
         IndexError,

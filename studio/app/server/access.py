@@ -129,10 +129,10 @@ def _binding_rule(host: str, allow_remote: bool) -> HostRule:
 
 def host_name(header: str) -> str:
     """The name or address in a Host header, lower case, without port and brackets; "" if it is malformed."""
-    found = HOST.fullmatch(header)
-    if found is None or int(found["port"] or 0) > LAST_PORT:
+    match = HOST.fullmatch(header)
+    if match is None or int(match["port"] or 0) > LAST_PORT:
         return ""
-    return (found["name"] or found["address"]).lower()
+    return (match["name"] or match["address"]).lower()
 
 
 def same_origin(origin: str, host: str) -> bool:
@@ -246,8 +246,8 @@ class AccessGuard:
         except CookieError:
             return None
         for key in self._keys:
-            found = jar.get(key.cookie_name)
-            if found is not None and key.is_cookie(found.value):
+            cookie = jar.get(key.cookie_name)
+            if cookie is not None and key.is_cookie(cookie.value):
                 return key
         return None
 

@@ -80,7 +80,7 @@ async def begin(
 
     def work(job: Job) -> dict[str, object]:
         aligned = align(session, **arguments, keep=False, progress=job.report_or_stop)
-        job.found = aligned.found
+        job.result = aligned.alignment
         return ALIGNMENT.entries(aligned)
 
     return app.jobs.begin(ALIGNMENT, AlignmentJob(session=session.name), work)
@@ -133,5 +133,5 @@ def _answer(session: Session, app: AppState, notes: tuple[str, ...] = ()) -> Ali
 def _aligned(session: Session, app: AppState) -> SessionAlignment | None:
     if app.jobs.known(ALIGNMENT, session.name) is None:
         return None
-    aligned = app.jobs.found(ALIGNMENT, session.name)
+    aligned = app.jobs.result(ALIGNMENT, session.name)
     return aligned if isinstance(aligned, SessionAlignment) else None

@@ -91,8 +91,8 @@ async def times(session: OpenSession, request: Request) -> TimedOffsets:
         path = Path(folder) / TIMESTAMP_NAMES[0]
         path.write_bytes(content)
         read = await asyncio.to_thread(synchronise, session, timestamps=path, progress=False)
-    assert isinstance(read.found, TimedOffsets)
-    return read.found
+    assert isinstance(read.synchrony, TimedOffsets)
+    return read.synchrony
 
 
 @router.post("/sessions/{session}/synchrony", status_code=202)
@@ -109,7 +109,7 @@ async def begin_synchrony(
         return known
 
     def work(job: Job) -> dict[str, object]:
-        estimate = synchronise(session, **arguments, progress=job.report_or_stop).found
+        estimate = synchronise(session, **arguments, progress=job.report_or_stop).synchrony
         return SYNCHRONY.entries(estimate, spread=getattr(estimate, "within", {}))
 
     return app.jobs.begin(SYNCHRONY, SynchronyState(session=session.name, step="reading"), work)

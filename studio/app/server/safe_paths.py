@@ -31,8 +31,8 @@ def default_footage_roots(workspace: Path) -> tuple[Path, ...]:
     """Folders that footage may be imported from: the person's own, where the studio was started (and beside
     it), what is mounted, and those in STUDIO_FOOTAGE_ROOTS."""
     named = [Path(part) for part in os.environ.get(ROOTS_VARIABLE, "").split(os.pathsep) if part.strip()]
-    found = [Path.home(), Path.cwd(), Path.cwd().parent, workspace, *map(Path, MOUNTS), *named]
-    kept = [path.expanduser().resolve() for path in found if path.expanduser().is_dir()]
+    folders = [Path.home(), Path.cwd(), Path.cwd().parent, workspace, *map(Path, MOUNTS), *named]
+    kept = [path.expanduser().resolve() for path in folders if path.expanduser().is_dir()]
     return tuple(path for path in dict.fromkeys(kept) if path != Path(path.anchor))
 
 

@@ -141,10 +141,10 @@ async def _inwards(browser: WebSocket, inner: ClientConnection, viewing: bool) -
 def _kind(content: bytes | None) -> str:
     """The type of a message of viser's client, "" for what is none."""
     try:
-        found: object = msgspec.msgpack.decode(content or b"", type=dict[str, object]).get("type")
+        kind: object = msgspec.msgpack.decode(content or b"", type=dict[str, object]).get("type")
     except msgspec.DecodeError:
         return ""
-    return found if isinstance(found, str) else ""
+    return kind if isinstance(kind, str) else ""
 
 
 async def _outwards(browser: WebSocket, inner: ClientConnection) -> None:

@@ -148,8 +148,8 @@ def _search(app: AppState, trial: str) -> LiveSearch | None:
         return None
     session, _, rest = trial.partition("/")
     run, _, name = rest.partition("/")
-    found = app.events.tried.tried(app.workspace.session(session).run(run), session, name)
-    return LiveSearch(found.number, True, found.layers, found.result)
+    tried = app.events.tried.tried(app.workspace.session(session).run(run), session, name)
+    return LiveSearch(tried.number, True, tried.layers, tried.result)
 
 
 class LayerPlaying(Request):

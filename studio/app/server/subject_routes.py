@@ -112,13 +112,13 @@ async def begin_fit(
 
     def work(job: Job) -> dict[str, object]:
         def show(body: BodyModel, frames: tuple[int, ...], poses: Array) -> None:
-            job.found = FitSoFar(body, frames, poses)
+            job.result = FitSoFar(body, frames, poses)
             job.change(
                 frames=frames, looks=job.state.looks + 1 if isinstance(job.state, FitSubjectState) else 0
             )
 
         fitted = fit_subject(session, **arguments, progress=job.report_or_stop, shown=show)
-        job.found = fitted
+        job.result = fitted
         file = fitted.file.name if fitted.file else ""
         return SUBJECT.entries(fitted, body=fitted.body.name, limbs=limb_drawings(fitted.body), file=file)
 
@@ -142,7 +142,7 @@ def keep_fit(identifier: str, app: App) -> FitSubjectState:
 @router.get("/subject-fits/{identifier}/frames/{frame}/views/{camera}.jpg", response_class=Response)
 def fitted_picture(identifier: str, frame: int, camera: str, app: App, height: Height = None) -> Response:
     """The fitted body, or the one that is so far, over what a camera saw in a frame that was looked at."""
-    known = app.jobs.found(SUBJECT, identifier)
+    known = app.jobs.result(SUBJECT, identifier)
     fit = known if isinstance(known, FitSoFar) else _fitted(identifier, app)
     session = app.workspace.session(app.jobs.state(SUBJECT, identifier).session)
     return files.picture(fit_picture(session, fit, View(frame, camera, height=height)))
@@ -150,7 +150,7 @@ def fitted_picture(identifier: str, frame: int, camera: str, app: App, height: H
 
 def _fitted(identifier: str, app: AppState) -> FittedSubject:
     """What a fit gave. Raises NotFoundError."""
-    fitted = app.jobs.found(SUBJECT, identifier)
+    fitted = app.jobs.result(SUBJECT, identifier)
     if not isinstance(fitted, FittedSubject):
         state = app.jobs.state(SUBJECT, identifier).state
         raise NotFoundError(f"This fit found no subject: it is {state}.", "Begin a new one.")

@@ -80,38 +80,38 @@ def read_bvh(path: Path, unit_mm: float = CMU_UNIT) -> RecordedMotion:
 
     Raises StudioError naming file, line and remedy.
     """
-    found = read_bvh_file(path)
-    offsets = _fixed_offsets(path, found)
+    content = read_bvh_file(path)
+    offsets = _fixed_offsets(path, content)
     motion = moved_skeleton(
-        found.names,
-        found.parents,
+        content.names,
+        content.parents,
         offsets,
-        found.turns,
-        found.offsets[0] + found.moves[:, 0],
-        fps=found.fps,
+        content.turns,
+        content.offsets[0] + content.moves[:, 0],
+        fps=content.fps,
         source=path.name,
         axes=UP_FROM_Y_UP,
         scale=unit_mm,
     )
-    return replace(motion, notes=found.notes)
+    return replace(motion, notes=content.notes)
 
 
-def _fixed_offsets(path: Path, found: BvhFile) -> Array:
+def _fixed_offsets(path: Path, content: BvhFile) -> Array:
     """(J, 3) the offsets of joints that keep their distance. Position channels stand in the offset's place (Blender,
     MotionBuilder); some programs write what is added to it, zeros throughout. Raises StudioError for bones that
     stretch.
     """
-    offsets = found.offsets.copy()
-    reach = max(1.0, float(np.abs(found.offsets).max()))
-    for joint in range(1, len(found.names)):
-        axes = found.moved[joint]
+    offsets = content.offsets.copy()
+    reach = max(1.0, float(np.abs(content.offsets).max()))
+    for joint in range(1, len(content.names)):
+        axes = content.moved[joint]
         if not axes.any():
             continue
-        places = found.moves[:, joint, axes]
+        places = content.moves[:, joint, axes]
         middle = np.median(places, axis=0)
         if np.abs(places - middle).max() > STRETCH * reach:
             raise StudioError(
-                f"'{path.name}': the position channels of joint '{found.names[joint]}' move it by up to"
+                f"'{path.name}': the position channels of joint '{content.names[joint]}' move it by up to"
                 f" {float(np.abs(places - middle).max()):.3g} against its parent: its bone stretches.",
                 "Export with fixed bone lengths.",
             )
@@ -154,41 +154,41 @@ def read_bvh_file(path: Path) -> BvhFile:
 
 def _read_hierarchy(path: Path, lines: list[str]) -> tuple[_Hierarchy, int]:
     """The joints, and the number of the line "MOTION" (from 0)."""
-    found, open_joints, pending, is_end = _Hierarchy(), list[int](), "", False
+    hierarchy, open_joints, pending, is_end = _Hierarchy(), list[int](), "", False
     for index, text in _pieces(lines):
         words = text.split()
         head, line = (words[0] if words else ""), index + 1
         if head == "MOTION":
-            if open_joints or not found.names:
+            if open_joints or not hierarchy.names:
                 raise at_line(path, line, "the hierarchy is not complete before MOTION", REMEDY)
-            return found, index
+            return hierarchy, index
         if head in ("ROOT", "JOINT", "End"):
-            if (head == "ROOT") != (not found.names) or len(words) < 2:
+            if (head == "ROOT") != (not hierarchy.names) or len(words) < 2:
                 raise at_line(path, line, f"'{text.strip()}' does not belong here", REMEDY)
             is_end = head == "End"
             pending = (
-                _free_name(f"{found.names[open_joints[-1]]}_end", found.names)
+                _free_name(f"{hierarchy.names[open_joints[-1]]}_end", hierarchy.names)
                 if is_end
                 else " ".join(words[1:])
             )
         elif head == "{" and pending:
-            if pending in found.names:
+            if pending in hierarchy.names:
                 raise at_line(path, line, f"there is a second joint '{pending}'", "Rename one of them.")
-            found.parents.append(open_joints[-1] if open_joints else -1)
-            open_joints.append(len(found.names))
-            found.names.append(pending)
-            found.is_end.append(is_end)
-            found.offsets.append([])
-            found.channels.append([])
+            hierarchy.parents.append(open_joints[-1] if open_joints else -1)
+            open_joints.append(len(hierarchy.names))
+            hierarchy.names.append(pending)
+            hierarchy.is_end.append(is_end)
+            hierarchy.offsets.append([])
+            hierarchy.channels.append([])
             pending = ""
         elif head == "}" and open_joints:
-            if not found.offsets[open_joints[-1]]:
-                raise at_line(path, line, f"joint '{found.names[open_joints[-1]]}' has no OFFSET", REMEDY)
+            if not hierarchy.offsets[open_joints[-1]]:
+                raise at_line(path, line, f"joint '{hierarchy.names[open_joints[-1]]}' has no OFFSET", REMEDY)
             open_joints.pop()
         elif head == "OFFSET" and open_joints and len(words) == 4:
-            found.offsets[open_joints[-1]] = numbers(path, line, words[1:])
+            hierarchy.offsets[open_joints[-1]] = numbers(path, line, words[1:])
         elif head == "CHANNELS" and open_joints:
-            found.channels[open_joints[-1]] = _channels(path, line, words)
+            hierarchy.channels[open_joints[-1]] = _channels(path, line, words)
         elif head not in ("HIERARCHY", ""):
             raise at_line(path, line, f"'{text.strip()[:40]}' is not understood", REMEDY)
     raise StudioError(f"'{path.name}' has no MOTION.", "Give a BVH file with its frames.")

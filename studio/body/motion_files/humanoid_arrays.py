@@ -39,9 +39,9 @@ def read_humanoid_arrays(path: Path) -> RecordedMotion:
         "local_translation_m": ((count, 3), offsets.shape),
         "parent_indices": ((count,), parents.shape),
     }
-    for name, (wanted, found) in shapes.items():
-        if wanted != found or 0 in found:
-            raise _wrong(path, name, f"has shape {found}, not {wanted}")
+    for name, (wanted, shape) in shapes.items():
+        if wanted != shape or 0 in shape:
+            raise _wrong(path, name, f"has shape {shape}, not {wanted}")
     if any(parent >= joint or (parent < 0) != (joint == 0) for joint, parent in enumerate(parents)):
         raise _wrong(path, "parent_indices", "must name earlier joints, and -1 for the first alone")
     sizes = np.linalg.norm(turns, axis=-1)
@@ -79,11 +79,11 @@ def _repetitions(turns: Array, root: Array) -> int:
 def _entries(path: Path) -> dict[str, NDArray[np.generic]]:
     remedy = "Give the arrays as numpy.savez writes them."
     with foreign_file(path, StudioError, "an .npz file of plain arrays", remedy):
-        found = read_archive(path)
+        arrays = read_archive(path)
     for name in ENTRIES:
-        if name not in found:
+        if name not in arrays:
             raise _wrong(path, name, "is missing")
-    return found
+    return arrays
 
 
 def _wrong(path: Path, entry: str, what: str) -> StudioError:

@@ -42,7 +42,7 @@ MEDIAPIPE = (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Found:
+class _Tracks:
     """What an array file holds. frames : (K,) numbers of the frames, or seconds where timed. places : (K, M, 3) in the
     file's unit, "" where it names none.
     """
@@ -74,8 +74,8 @@ def read_points_npy(path: Path, fps: float) -> MarkerMotion:
         if values.shape[1] < len(MEDIAPIPE):
             raise ValueError(f"{values.shape[1]} points, not MediaPipe's {len(MEDIAPIPE)} of a body")
         places = np.asarray(values[:, : len(MEDIAPIPE)], dtype=np.float64)
-        found = _Found(MEDIAPIPE, np.arange(len(places), dtype=np.float64), places)
-    return _motion(path, found, fps)
+        tracks = _Tracks(MEDIAPIPE, np.arange(len(places), dtype=np.float64), places)
+    return _motion(path, tracks, fps)
 
 
 def read_points_mat(path: Path, fps: float) -> MarkerMotion:
@@ -84,9 +84,9 @@ def read_points_mat(path: Path, fps: float) -> MarkerMotion:
     return _motion(path, isolated(TruthError, _points_mat, path), fps)
 
 
-def _motion(path: Path, found: _Found, fps: float) -> MarkerMotion:
+def _motion(path: Path, tracks: _Tracks, fps: float) -> MarkerMotion:
     """A row for each frame from 0 on."""
-    moments = found.frames * fps if found.timed else found.frames
+    moments = tracks.frames * fps if tracks.timed else tracks.frames
     known = np.isfinite(moments)
     rows = np.round(np.where(known, moments, -1.0)).astype(np.int64)
     if not len(rows) or rows.min() < 0 or rows.max() > LAST_FRAME:
@@ -95,43 +95,43 @@ def _motion(path: Path, found: _Found, fps: float) -> MarkerMotion:
             f"Number the frames as the footage has them, up to {LAST_FRAME}.",
         )
     count = int(rows.max()) + 1
-    if count * len(found.names) > MOST_NUMBERS:
+    if count * len(tracks.names) > MOST_NUMBERS:
         raise TruthError(
-            f"'{path.name}' has {len(found.names)} points and {count} frames.", "These are too many to hold."
+            f"'{path.name}' has {len(tracks.names)} points and {count} frames.", "These are too many to hold."
         )
-    if len(set(found.names)) < len(found.names):
+    if len(set(tracks.names)) < len(tracks.names):
         raise TruthError(f"'{path.name}' names a point twice.", "Give each point its own name.")
-    whole = np.asarray(np.isfinite(found.places).all(axis=2))
-    positions = np.full((count, len(found.names), 3), np.nan)
-    positions[rows] = np.where(whole[..., None], found.places, np.nan)
+    whole = np.asarray(np.isfinite(tracks.places).all(axis=2))
+    positions = np.full((count, len(tracks.names), 3), np.nan)
+    positions[rows] = np.where(whole[..., None], tracks.places, np.nan)
     positions, notes = without_zeros(path, positions)
-    places = positions * MM_PER_UNIT[found.unit or "mm"]
+    places = positions * MM_PER_UNIT[tracks.unit or "mm"]
     motion = MarkerMotion(
-        found.names, np.arange(count) / fps, places, found.unit, fps, (*found.notes, *notes)
+        tracks.names, np.arange(count) / fps, places, tracks.unit, fps, (*tracks.notes, *notes)
     )
     check_reach(path, motion, TruthError)
     return motion
 
 
-def _points_h5(path: Path) -> _Found:
+def _points_h5(path: Path) -> _Tracks:
     h5 = load_extra("h5py", EXTRA)
     with (
         foreign_file(path, TruthError, "an HDF5 file of points", "Export it again, or as CSV."),
         h5.File(path, "r") as file,
     ):
         readers = (_sleap, _deeplabcut, _nwb)
-        found = next((one for reader in readers if (one := reader(h5, file)) is not None), None)
-        if found is None:
+        tracks = next((one for reader in readers if (one := reader(h5, file)) is not None), None)
+        if tracks is None:
             raise TruthError(
                 f"'{path.name}' is no HDF5 file of points that is known.",
                 "DeepLabCut's (after triangulation), SLEAP's analysis file and NWB with ndx-pose are read.",
             )
-        if found.places.ndim != 3 or found.places.shape[1:] != (len(found.names), 3):
+        if tracks.places.ndim != 3 or tracks.places.shape[1:] != (len(tracks.names), 3):
             raise TruthError(
                 f"'{path.name}' holds pixels or several bodies, not one body's places in space.",
                 "Give the points after triangulation, of one individual.",
             )
-        return found
+        return tracks
 
 
 def _entry(h5: Any, place: Any, name: str) -> Any:  # noqa: ANN401 - a group or data set, None without
@@ -157,7 +157,7 @@ def _texts(values: Any) -> tuple[str, ...]:  # noqa: ANN401
     return tuple(one.decode("utf-8", "replace") if isinstance(one, bytes) else str(one) for one in flat)
 
 
-def _sleap(h5: Any, file: Any) -> _Found | None:  # noqa: ANN401
+def _sleap(h5: Any, file: Any) -> _Tracks | None:  # noqa: ANN401
     """SLEAP's analysis file: tracks (individuals, 3, points, frames)."""
     tracks, names = _values(h5, file, "tracks"), _values(h5, file, "node_names")
     if tracks is None:
@@ -165,12 +165,12 @@ def _sleap(h5: Any, file: Any) -> _Found | None:  # noqa: ANN401
     if names is None:
         raise ValueError("its points have no names (node_names)")
     if tracks.ndim != 4 or len(tracks) != 1:
-        return _Found(_texts(names), np.zeros(0), np.zeros(0))
+        return _Tracks(_texts(names), np.zeros(0), np.zeros(0))
     places = np.asarray(tracks[0], dtype=np.float64).transpose(2, 1, 0)
-    return _Found(_texts(names), np.arange(len(places), dtype=np.float64), places)
+    return _Tracks(_texts(names), np.arange(len(places), dtype=np.float64), places)
 
 
-def _deeplabcut(h5: Any, file: Any) -> _Found | None:  # noqa: ANN401
+def _deeplabcut(h5: Any, file: Any) -> _Tracks | None:  # noqa: ANN401
     """A pandas table with columns scorer, (individuals), bodyparts, coords."""
     for key in file:
         group = _entry(h5, file, key)
@@ -208,7 +208,7 @@ def _pickled(text: Any) -> list[Sequence[str]]:  # noqa: ANN401
     return [[str(level) for level in one] for one in columns]
 
 
-def _of_columns(columns: Sequence[Sequence[str]], index: Any, values: Array) -> _Found:  # noqa: ANN401
+def _of_columns(columns: Sequence[Sequence[str]], index: Any, values: Array) -> _Tracks:  # noqa: ANN401
     """columns : scorer, (individual), point, axis each, of the values (K, columns)."""
     if len(columns) != values.shape[1]:
         raise ValueError(f"{len(columns)} columns and {values.shape[1]} numbers a row")
@@ -229,10 +229,10 @@ def _of_columns(columns: Sequence[Sequence[str]], index: Any, values: Array) -> 
             places[:, names.index(column[-2]), "xyz".index(column[-1])] = numbers
     numbered = index.dtype.kind in "iuf"
     frames = np.asarray(index, dtype=np.float64) if numbered else np.arange(len(values), dtype=np.float64)
-    return _Found(names, frames, places)
+    return _Tracks(names, frames, places)
 
 
-def _nwb(h5: Any, file: Any) -> _Found | None:  # noqa: ANN401
+def _nwb(h5: Any, file: Any) -> _Tracks | None:  # noqa: ANN401
     """The first pose estimate of ndx-pose with three coordinates a point."""
     modules = _entry(h5, file, "processing")
     for module in [] if modules is None else [_entry(h5, modules, name) for name in modules]:
@@ -258,19 +258,19 @@ def _nwb(h5: Any, file: Any) -> _Found | None:  # noqa: ANN401
             stacked = np.stack(places, axis=1) * conversion
             unit = UNIT_WORDS.get(unit, unit)
             known = unit if unit in MM_PER_UNIT else ""
-            return _Found(tuple(series), np.asarray(times, dtype=np.float64), stacked, known, timed=True)
+            return _Tracks(tuple(series), np.asarray(times, dtype=np.float64), stacked, known, timed=True)
     return None
 
 
-def _points_mat(path: Path) -> _Found:
+def _points_mat(path: Path) -> _Tracks:
     with foreign_file(
         path, TruthError, "a MATLAB file of points", "Save it as version 7: save(file, '-v7', …)."
     ):
         wanted = ["labelData", "skeleton", "pred", "data_3D", "framesToLabel"]
         content: Any = io.BytesIO(read_file(path, LARGEST, TruthError))
-        found = scipy.io.loadmat(content, simplify_cells=True, variable_names=wanted)
-        if "labelData" in found:
-            labels = found["labelData"]
+        variables = scipy.io.loadmat(content, simplify_cells=True, variable_names=wanted)
+        if "labelData" in variables:
+            labels = variables["labelData"]
             label = (
                 labels if is_table(labels) else np.atleast_1d(np.asarray(labels, dtype=object)).tolist()[0]
             )
@@ -278,24 +278,24 @@ def _points_mat(path: Path) -> _Found:
                 raise ValueError("labelData without data_3d and data_frame")
             frames = np.array(label["data_frame"], dtype=np.float64).ravel()
             places = np.array(label["data_3d"], dtype=np.float64).reshape(len(frames), -1, 3)
-            made = _Found((), frames, places)
-        elif "data_3D" in found and "framesToLabel" in found:
-            frames = np.array(found["framesToLabel"], dtype=np.float64).ravel() - 1.0
-            places = np.array(found["data_3D"], dtype=np.float64).reshape(len(frames), -1, 3)
-            made = _Found((), frames, places)
-        elif "pred" in found:
-            places = np.array(found["pred"], dtype=np.float64)
+            made = _Tracks((), frames, places)
+        elif "data_3D" in variables and "framesToLabel" in variables:
+            frames = np.array(variables["framesToLabel"], dtype=np.float64).ravel() - 1.0
+            places = np.array(variables["data_3D"], dtype=np.float64).reshape(len(frames), -1, 3)
+            made = _Tracks((), frames, places)
+        elif "pred" in variables:
+            places = np.array(variables["pred"], dtype=np.float64)
             if places.ndim != 3 or places.shape[1] != 3:
                 raise ValueError(f"pred of shape {places.shape}, not rows, 3 and points")
             note = (f"'{path.name}' numbers no frames: its rows were counted from 0.",)
             rows = np.arange(len(places), dtype=np.float64)
-            made = _Found((), rows, places.transpose(0, 2, 1), notes=note)
+            made = _Tracks((), rows, places.transpose(0, 2, 1), notes=note)
         else:
             raise TruthError(
                 f"'{path.name}' holds no points of label3d (labelData, data_3D) or DANNCE (pred).",
                 "Give the file with the labelled or predicted points.",
             )
-        return replace(made, names=_names_of(found.get("skeleton"), made.places.shape[1]))
+        return replace(made, names=_names_of(variables.get("skeleton"), made.places.shape[1]))
 
 
 def _names_of(skeleton: Any, count: int) -> tuple[str, ...]:  # noqa: ANN401

@@ -76,7 +76,7 @@ def read_points(path: Path, fps: float) -> MarkerMotion:
 
 def _motion(path: Path, rows: Iterable[Sequence[str]], fps: float) -> MarkerMotion:
     columns: _Columns | None = None
-    found: dict[tuple[int, str], tuple[float, float, float]] = {}
+    positions: dict[tuple[int, str], tuple[float, float, float]] = {}
     names: dict[str, None] = {}
     width = counted = 0
     for number, row in enumerate(rows, 1):
@@ -101,16 +101,16 @@ def _motion(path: Path, rows: Iterable[Sequence[str]], fps: float) -> MarkerMoti
             point = name if columns.point < 0 else cells[columns.point]
             if not point:
                 raise TruthError(f"'{path.name}' line {number} names no point.", "Name each row's point.")
-            if (frame, point) in found:
+            if (frame, point) in positions:
                 raise TruthError(
                     f"'{path.name}' line {number} gives point '{point}' of frame {frame} a second time.",
                     "Keep one row of a point in a frame.",
                 )
             names.setdefault(point)
-            found[frame, point] = _place(path, number, point, [cells[at] for at in axes])
-    if columns is None or not found:
+            positions[frame, point] = _place(path, number, point, [cells[at] for at in axes])
+    if columns is None or not positions:
         raise TruthError(f"'{path.name}' has no rows of points.", SHAPE)
-    motion = _filled(path, found, tuple(names), columns.unit, fps)
+    motion = _filled(path, positions, tuple(names), columns.unit, fps)
     if columns.place >= 0:
         return motion
     note = f"'{path.name}' has no column of frames: its rows were counted from 0."
@@ -119,12 +119,12 @@ def _motion(path: Path, rows: Iterable[Sequence[str]], fps: float) -> MarkerMoti
 
 def _filled(
     path: Path,
-    found: Mapping[tuple[int, str], tuple[float, float, float]],
+    by_frame: Mapping[tuple[int, str], tuple[float, float, float]],
     names: tuple[str, ...],
     unit: str,
     fps: float,
 ) -> MarkerMotion:
-    count = 1 + max(frame for frame, _ in found)
+    count = 1 + max(frame for frame, _ in by_frame)
     if count * len(names) > MOST_NUMBERS:
         raise TruthError(
             f"'{path.name}' has {len(names)} points and {count} frames.",
@@ -132,7 +132,7 @@ def _filled(
         )
     at = {name: index for index, name in enumerate(names)}
     positions = np.full((count, len(names), 3), np.nan)
-    for (frame, name), place in found.items():
+    for (frame, name), place in by_frame.items():
         positions[frame, at[name]] = place
     positions, notes = without_zeros(path, positions)
     places = positions * MM_PER_UNIT[unit or "mm"]
@@ -150,28 +150,28 @@ def _columns(path: Path, header: Sequence[str]) -> _Columns:
     point = next((names.index(name) for name in POINT if name in names), -1)
     if place < 0 and point >= 0:
         raise TruthError(f"'{path.name}' has no column of frames or times.", SHAPE)
-    found: dict[str, dict[str, tuple[int, str]]] = {}
+    by_owner: dict[str, dict[str, tuple[int, str]]] = {}
     for column, name in enumerate(header):
         parts = COORDINATE.fullmatch(name)
         if parts is None:
             continue
         owner, axis, unit = parts[1] or "", parts[2].lower(), (parts[3] or "").lower()
         if not owner if point >= 0 else owner:
-            found.setdefault(owner, {})[axis] = column, unit
-    if not found:
+            by_owner.setdefault(owner, {})[axis] = column, unit
+    if not by_owner:
         raise TruthError(f"'{path.name}' has no columns of coordinates.", SHAPE)
-    for owner, axes in found.items():
+    for owner, axes in by_owner.items():
         if len(axes) != 3:
             lacking = ", ".join(axis for axis in "xyz" if axis not in axes)
             of_point = f" of point '{owner}'" if owner else ""
             raise TruthError(f"'{path.name}' has no column {lacking}{of_point}.", SHAPE)
-    units = {unit for axes in found.values() for _, unit in axes.values()}
+    units = {unit for axes in by_owner.values() for _, unit in axes.values()}
     if len(units) > 1:
         raise TruthError(
             f"'{path.name}' has coordinates in {', '.join(sorted(unit or 'no unit' for unit in units))}.",
             "Give all coordinates in one unit.",
         )
-    places = {owner: (axes["x"][0], axes["y"][0], axes["z"][0]) for owner, axes in found.items()}
+    places = {owner: (axes["x"][0], axes["y"][0], axes["z"][0]) for owner, axes in by_owner.items()}
     return _Columns(place, place >= 0 and names[place] in TIME, point, places, units.pop())
 
 

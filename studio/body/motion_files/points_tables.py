@@ -32,7 +32,7 @@ def own_form(path: Path, rows: Rows) -> Rows:
     if first is None:
         return rows
     key = first[0].lower().strip("\ufeff")
-    reader = next((found for start, found in PROGRAMS.items() if key.startswith(start)), None)
+    reader = next((candidate for start, candidate in PROGRAMS.items() if key.startswith(start)), None)
     return rows if reader is None else reader(path, [list(row) for row in rows if any(row)])
 
 

@@ -103,12 +103,12 @@ def root_candidates(body: BodyModel, hull: Hull, pose: Array, *, upright: bool =
     root = next(index for index, joint in enumerate(body.joints) if joint.parent < 0)
     frame = joint_frames(body, pose)[0, root]
     turns = _headings(seen, own) if upright else _axis_turns(seen, own)
-    found: list[Array] = []
+    poses: list[Array] = []
     for turn in turns:
         origin = turn @ (frame[:, 3] - own.mean) + seen.mean
         target = np.column_stack([turn @ frame[:, :3], origin])
-        found.append(with_root_at(body, root, parameters, pose, target))
-    return np.stack(found)
+        poses.append(with_root_at(body, root, parameters, pose, target))
+    return np.stack(poses)
 
 
 def _headings(seen: Axes, own: Axes) -> list[Array]:

@@ -120,17 +120,17 @@ def fit_blobs(
                 origins.append(start)
     colours = np.column_stack([coloured.colour, coloured.colour_variance])
     rules = np.array([iterations, STILL, PRIOR_SHARE, LEAST_COLOUR_VARIANCE, SMALLEST_VARIANCE])
-    found, labels = [np.empty_like(state) for state in begun], [voxels.no_labels() for _ in begun]
+    fitted, labels = [np.empty_like(state) for state in begun], [voxels.no_labels() for _ in begun]
     likelihoods = np.array(
         [
             fit(voxels.rows, voxels.shares, voxels.extents, state, colours, rules, best, own)
-            for state, best, own in zip(begun, found, labels, strict=True)
+            for state, best, own in zip(begun, fitted, labels, strict=True)
         ]
     )
     best = int(np.argmax(likelihoods))
     likelihood = float(likelihoods[best])
     margin = likelihood - self_likelihood(coloured)
-    mixture = _mixture_of(found[best], voxels.centre)
+    mixture = _mixture_of(fitted[best], voxels.centre)
     return Fitted(mixture, labels[best], likelihood, likelihoods, origins[best], margin)
 
 

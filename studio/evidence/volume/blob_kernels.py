@@ -248,12 +248,12 @@ def fit(
         assign(voxels, factors, labels, distances)
         changed = count_changes(labels, before)
         gather(voxels, volumes, extents, labels, sums)
-        found = likelihood_of(state, sums, colours)
-        if step > 0 and found <= likelihood:
+        improved = likelihood_of(state, sums, colours)
+        if step > 0 and improved <= likelihood:
             break
         best[:] = state
         best_labels[:] = labels
-        likelihood = found
+        likelihood = improved
         if changed <= rules[1] * count:
             break
         update(predicted, sums, rules[2], rules[3], state)

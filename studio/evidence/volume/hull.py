@@ -60,13 +60,13 @@ class Hull:
         cells = np.floor((flat - self.box.corner) / self.smallest_edge).astype(np.int64)
         inside = ((cells >= 0) & (cells < count)).all(axis=1)
         cells = np.clip(cells, 0, count - 1)
-        found = np.zeros(len(flat), dtype=np.bool_)
+        inside_hull = np.zeros(len(flat), dtype=np.bool_)
         for edge in np.unique(self.edges):
             side = max(1, round(edge / self.smallest_edge))
             own = self.centres[self.edges == edge] - self.box.corner
             kept = _codes(np.floor(own / edge).astype(np.int64))
-            found |= np.isin(_codes(cells // side), kept)
-        return (found & inside).reshape(np.shape(points)[:-1])
+            inside_hull |= np.isin(_codes(cells // side), kept)
+        return (inside_hull & inside).reshape(np.shape(points)[:-1])
 
 
 def _codes(cells: NDArray[np.int64]) -> NDArray[np.int64]:

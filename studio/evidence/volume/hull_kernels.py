@@ -95,15 +95,15 @@ def find_distances(
         p01, p02, p12 = gaussians[6, at], gaussians[7, at], gaussians[8, at]
         in_shadow = y < (one - np.float32(0.5) * shadow) * my
         dy, du, dv = y - ((one - shadow) * my if in_shadow else my), u - mu, v - mv
-        found = dy * dy * p00 + du * du * p11 + dv * dv * p22
-        found += np.float32(2.0) * (dy * (du * p01 + dv * p02) + du * dv * p12)
+        squared = dy * dy * p00 + du * du * p11 + dv * dv * p22
+        squared += np.float32(2.0) * (dy * (du * p01 + dv * p02) + du * dv * p12)
         if in_shadow and deepest > np.float32(0.0):
             left = max(y / max(my, one), one - deepest)
             dy, du, dv = y - left * my, u - left * mu, v - left * mv
             darker = dy * dy * p00 + du * du * p11 + dv * dv * p22
             darker += np.float32(2.0) * (dy * (du * p01 + dv * p02) + du * dv * p12)
-            found = min(found, darker)
-        distances[at] = found
+            squared = min(squared, darker)
+        distances[at] = squared
 
 
 @njit(**EXACT_INLINED)
@@ -127,16 +127,16 @@ def look_at_mask(seen, view, rules, place, lane):
     left, top, right, bottom = max(left, 0), max(top, 0), min(right, width - 1), min(bottom, height - 1)
     start = seen.starts[1, view]
     upper, lower = start + top * (width + 1), start + (bottom + 1) * (width + 1)
-    found = sums[lower + right + 1] - sums[lower + left] - sums[upper + right + 1] + sums[upper + left]
+    foreground = sums[lower + right + 1] - sums[lower + left] - sums[upper + right + 1] + sums[upper + left]
     pixels = (right - left + 1) * (bottom - top + 1)
     if rules.last:
         if u < -0.5 or v < -0.5 or u >= width - 0.5 or v >= height - 0.5:
             return UNSEEN
-        return FOREGROUND if found > 0 and found >= rules.edge_share * pixels else BACKGROUND
-    place[SHARE * LANES + lane] = found / pixels
-    if found == 0 and not partly:
+        return FOREGROUND if foreground > 0 and foreground >= rules.edge_share * pixels else BACKGROUND
+    place[SHARE * LANES + lane] = foreground / pixels
+    if foreground == 0 and not partly:
         return BACKGROUND
-    return FOREGROUND if found == pixels and not partly else EDGE
+    return FOREGROUND if foreground == pixels and not partly else EDGE
 
 
 @njit(**EXACT_INLINED)

@@ -92,7 +92,7 @@ def children(
     limits : (2, 3) least and greatest index in the children's grid that lies in the tracking space.
     """
     most = 8 * np.count_nonzero(verdicts == SPLIT)
-    found, inherited = np.empty((most, 3), np.int32), np.empty((most, 3), np.uint32)
+    cells, inherited = np.empty((most, 3), np.int32), np.empty((most, 3), np.uint32)
     count = 0
     for index in range(len(nodes)):
         if verdicts[index] != SPLIT:
@@ -105,10 +105,10 @@ def children(
                 continue
             if x > limits[1, 0] or y > limits[1, 1] or z > limits[1, 2]:
                 continue
-            found[count, 0], found[count, 1], found[count, 2] = x, y, z
+            cells[count, 0], cells[count, 1], cells[count, 2] = x, y, z
             inherited[count] = states[index]
             count += 1
-    return found[:count], inherited[:count]
+    return cells[:count], inherited[:count]
 
 
 @njit(**KERNEL)

@@ -20,12 +20,12 @@ def piece_numbers(hull: Hull) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     lower += 1 - lower.min(axis=0)
     filled = np.zeros((lower + sides[:, None]).max(axis=0) + 1, dtype=np.bool_)
     fill_cubes(lower, sides, filled)
-    found = labels_of(filled)[lower[:, 0], lower[:, 1], lower[:, 2]].astype(np.int64) - 1
-    volumes = np.bincount(found, weights=hull.volumes()).astype(np.float64)
+    pieces = labels_of(filled)[lower[:, 0], lower[:, 1], lower[:, 2]].astype(np.int64) - 1
+    volumes = np.bincount(pieces, weights=hull.volumes()).astype(np.float64)
     order = np.argsort(-volumes, kind="stable").astype(np.int64)
     rank = np.empty(len(order), dtype=np.int64)
     rank[order] = np.arange(len(order))
-    return rank[found], volumes[order]
+    return rank[pieces], volumes[order]
 
 
 @njit(**KERNEL)

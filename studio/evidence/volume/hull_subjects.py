@@ -87,14 +87,14 @@ def subjects_of(
     sizes = [float(volumes[numbers == piece].sum()) for piece in kept]
     large = [piece for piece, size in zip(kept, sizes, strict=True) if size >= LEAST_PIECE * max(sizes)]
     labels = np.full(len(numbers), NOBODY, dtype=np.int64)
-    found: list[HullSubject] = []
+    subjects: list[HullSubject] = []
     for label, piece in enumerate(large):
         own = numbers == piece
         labels[own] = label
         part = chosen_voxels(hull, own)
         middle = (part.centres[:, :2] * part.weights()[:, None]).sum(axis=0)
-        found.append(HullSubject(middle, part.volume(), part.top()))
-    return labels, found
+        subjects.append(HullSubject(middle, part.volume(), part.top()))
+    return labels, subjects
 
 
 def labels_at(
@@ -123,20 +123,20 @@ def labels_at(
             if len(near) > 1
             else near[0]
         )
-    found = np.full(len(labels), NOBODY, dtype=np.int64)
+    owners = np.full(len(labels), NOBODY, dtype=np.int64)
     count = len(places)
     for label in range(len(subjects)):
         own = labels == label
         at = [number for number, one in enumerate(chosen) if one == label]
         if not at:
-            found[own] = count
+            owners[own] = count
             count += 1
         elif len(at) == 1:
-            found[own] = at[0]
+            owners[own] = at[0]
         else:
             distances = np.linalg.norm(hull.centres[own][:, None, :2] - places[at], axis=2)
-            found[own] = np.array(at)[distances.argmin(axis=1)]
-    return found, count
+            owners[own] = np.array(at)[distances.argmin(axis=1)]
+    return owners, count
 
 
 class HullFollower:
@@ -152,9 +152,9 @@ class HullFollower:
         A piece is whose voxels were nearest in the frame before, moved on as they moved then; one that several share
         (they touch) is parted between them, voxel by voxel. Who is not seen stays where he was.
         """
-        found = np.full(len(hull.centres), NOBODY, dtype=np.int64)
+        owners = np.full(len(hull.centres), NOBODY, dtype=np.int64)
         if hull.empty:
-            return found
+            return owners
         numbers, kept = real_pieces(hull, masks, cameras)
         volumes = hull.volumes()
         moved = [subject.velocity for subject in self._subjects]
@@ -163,7 +163,7 @@ class HullFollower:
                 [one.apart(hull.centres, to) for one, to in zip(self._subjects, moved, strict=True)]
             )
             guess = np.where(apart.min(axis=0) <= self._reach, apart.argmin(axis=0), NOBODY)
-            found[:] = NOBODY
+            owners[:] = NOBODY
             for piece in kept:
                 own = np.flatnonzero((numbers == piece) & (guess != NOBODY))
                 if not len(own):
@@ -171,18 +171,18 @@ class HullFollower:
                 shares = np.bincount(guess[own], weights=volumes[own])
                 most = int(shares.argmax())
                 if shares[most] >= NEARLY_ALL * shares.sum():
-                    found[numbers == piece] = most
+                    owners[numbers == piece] = most
                 else:
-                    found[own] = guess[own]
+                    owners[own] = guess[own]
             moved = [
-                np.median(hull.centres[found == label, :2], axis=0) - subject.middle
-                if (found == label).any()
+                np.median(hull.centres[owners == label, :2], axis=0) - subject.middle
+                if (owners == label).any()
                 else np.zeros(2)
                 for label, subject in enumerate(self._subjects)
             ]
         for label, subject in enumerate(self._subjects):
-            subject.keep(hull.centres[found == label], moved[label])
-        return found
+            subject.keep(hull.centres[owners == label], moved[label])
+        return owners
 
 
 class _Followed:
@@ -198,9 +198,9 @@ class _Followed:
     def apart(self, centres: Array, moved: Array) -> Array:
         """(K,) mm of places (K, 3) from its voxels, moved on by (2,) mm over the floor; inf out of its reach."""
         there = centres - np.array([*moved, 0.0])
-        found = np.asarray(self._tree.query(there)[0], dtype=np.float64)
+        distances = np.asarray(self._tree.query(there)[0], dtype=np.float64)
         away = np.linalg.norm(there[:, :2] - self.middle, axis=1)
-        return np.where(away <= self._farthest, found, np.inf)
+        return np.where(away <= self._farthest, distances, np.inf)
 
     def keep(self, centres: Array, moved: Array) -> None:
         """Learn the voxels of the next frame, if there are any."""

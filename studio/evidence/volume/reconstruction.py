@@ -231,11 +231,11 @@ def grid_within(box: Box, depth: int) -> Nodes:
 
 def radical_inverses(count: int) -> Array:
     """(count,) radical inverses of 0, 1, 2 … in base 2: evenly spread for any count."""
-    numbers, found, digit = np.arange(count), np.zeros(count), 0.5
+    numbers, inverses, digit = np.arange(count), np.zeros(count), 0.5
     while numbers.any():
-        found += digit * (numbers & 1)
+        inverses += digit * (numbers & 1)
         numbers, digit = numbers >> 1, 0.5 * digit
-    return found
+    return inverses
 
 
 def _starts(lengths: IntArray) -> IntArray:

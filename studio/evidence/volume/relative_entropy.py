@@ -80,11 +80,11 @@ class DivergenceOfPoses:
     def __call__(self, poses: Array) -> Array:
         """(N, D) poses to (N,) divergences D(F||G), nats. Raises BodyError for poses that are not the body's."""
         frames = joint_frames(self.body, poses)
-        found = np.empty(len(frames))
+        divergences = np.empty(len(frames))
         _pose_divergences(
-            frames, self.joint, self.offset, self.spread, self.share, self.means, self.precisions, found
+            frames, self.joint, self.offset, self.spread, self.share, self.means, self.precisions, divergences
         )
-        return found + self.constant
+        return divergences + self.constant
 
 
 @njit(**KERNEL)
@@ -96,7 +96,7 @@ def _pose_divergences(
     share: Array,
     means: Array,
     precisions: Array,
-    found: Array,
+    out: Array,
 ) -> None:
     """Σ α ½ (tr(Σg⁻¹ Σf) + (μg - μf)ᵀ Σg⁻¹ (μg - μf)) of frames (N, F, 3, 4) into found (N,): the trace is
     Σ λ_k u_kᵀ Σg⁻¹ u_k over the bone's axes u_k.
@@ -117,4 +117,4 @@ def _pose_divergences(
                 form = xx * x * x + yy * y * y + zz * z * z + xy * x * y + xz * x * z + yz * y * z
                 terms += spread[b, k] * form
             total += 0.5 * share[b] * terms
-        found[n] = total
+        out[n] = total

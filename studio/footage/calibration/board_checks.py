@@ -31,11 +31,11 @@ def board_findings(
     backwards = mirrored_sightings(sightings)
     if backwards:
         return backwards
-    found = explained(
+    findings = explained(
         cameras, lambda tried: board_disagreement(tried, board, sightings), GOOD_PX, "board's pictures"
     )
-    if found:
-        return found
+    if findings:
+        return findings
     size = square_size(cameras, board, sightings)
     if size is None or abs(size / board.square_mm - 1.0) <= SIZE_TOLERANCE:
         return ()
@@ -44,14 +44,14 @@ def board_findings(
 
 def mirrored_sightings(sightings: Sequence[Sighting]) -> tuple[Finding, ...]:
     """Cameras whose ChArUco boards could be read in the mirrored picture only."""
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for name in sorted({sighting.camera for sighting in sightings}):
         mine = [sighting.mirrored for sighting in sightings if sighting.camera == name]
         if 2 * sum(mine) > len(mine):
             message = f"The pictures of camera {name} are mirrored: its markers are read in the mirrored picture only."
             remedy = "Switch mirroring off in the camera's program, or flip the footage."
-            found.append(Finding("mirrored-video", "blocks", message, remedy, (name,)))
-    return tuple(found)
+            findings.append(Finding("mirrored-video", "blocks", message, remedy, (name,)))
+    return tuple(findings)
 
 
 def mirrored_cameras(
@@ -157,7 +157,7 @@ def _shared(
 ) -> list[tuple[int, int, list[tuple[Sighting, Sighting]]]]:
     """Pairs of cameras with the frames that both saw, with four common corners or more."""
     seen = {(sighting.camera, sighting.frame): sighting for sighting in sightings}
-    found: list[tuple[int, int, list[tuple[Sighting, Sighting]]]] = []
+    shared: list[tuple[int, int, list[tuple[Sighting, Sighting]]]] = []
     for one, two in combinations(range(len(cameras)), 2):
         names = cameras[one].name, cameras[two].name
         frames = sorted({frame for name, frame in seen if name == names[0] and (names[1], frame) in seen})
@@ -165,8 +165,8 @@ def _shared(
         couples = [couple for couple in couples if len(np.intersect1d(couple[0].ids, couple[1].ids)) >= 4]
         if couples:
             step = max(1, len(couples) // MOST_FRAMES)
-            found.append((one, two, couples[::step]))
-    return found
+            shared.append((one, two, couples[::step]))
+    return shared
 
 
 def _two_views(

@@ -77,9 +77,9 @@ def list_footage(folder: Path) -> tuple[BoardFootage, ...]:
     if videos:
         return tuple(BoardFootage(path.stem, path, ()) for path in videos)
     folders = [(path, list_pictures(path)) for path in entries if path.is_dir()]
-    found = [BoardFootage(path.name, None, pictures) for path, pictures in folders if pictures]
-    if found:
-        return tuple(found)
+    footage = [BoardFootage(path.name, None, pictures) for path, pictures in folders if pictures]
+    if footage:
+        return tuple(footage)
     single = [path for path in entries if path.is_file() and is_picture(path)]
     if not single:
         raise CalibrationError(
@@ -92,8 +92,8 @@ def list_footage(folder: Path) -> tuple[BoardFootage, ...]:
 def by_camera(footage: Sequence[BoardFootage], names: Sequence[str]) -> dict[str, BoardFootage]:
     """Camera name → its footage. Raises CalibrationError if names cannot be matched one to one."""
     matches = match_names([entry.name for entry in footage], names, "board recordings", CalibrationError)
-    found = {match.camera: entry for match, entry in zip(matches, footage, strict=True)}
-    return {name: found[name] for name in names if name in found}
+    matched = {match.camera: entry for match, entry in zip(matches, footage, strict=True)}
+    return {name: matched[name] for name in names if name in matched}
 
 
 def plain_names(names: Sequence[str]) -> tuple[str, ...]:
@@ -142,10 +142,10 @@ def look_together(
         )
     frames = first + frames_in_step([least - first], RIG_FRAMES)
     frames = np.union1d(frames, [frame for frame in also if first <= frame < least]).astype(np.int64)
-    found: list[Seen] = []
+    seen: list[Seen] = []
     for camera, entry in footage.items():
-        found += _examined(finder, camera, entry, counts[camera], frames, progress, taken, begins[camera])
-    return found
+        seen += _examined(finder, camera, entry, counts[camera], frames, progress, taken, begins[camera])
+    return seen
 
 
 def frame_count(footage: BoardFootage) -> int:
@@ -201,14 +201,14 @@ def _examined(
     taken: HowTaken,
     begin: int = 0,
 ) -> list[Seen]:
-    found: list[Seen] = []
+    seen: list[Seen] = []
     for done, (frame, name, raw) in enumerate(_pictures(footage, count, frames + begin)):
         progress(f"Looking for the board, camera {camera}", done, len(frames))
         picture = taken.upright(camera, raw)
         sighting = finder.find(picture, camera, frame - begin, name)
         if sighting is not None:
-            found.append(Seen(sighting, sharpness(picture, sighting)))
-    return found
+            seen.append(Seen(sighting, sharpness(picture, sighting)))
+    return seen
 
 
 def footage_picture(footage: BoardFootage, frame: int) -> Bytes:

@@ -61,11 +61,11 @@ def _marker(board: Board, number: int, corner: Array) -> Array:
     cells = dictionary.markerSize + 2
     bits = cv2.aruco.generateImageMarker(dictionary, number, cells, borderBits=1) < 128
     side = board.marker_mm / cells
-    found: list[tuple[float, float, float, float]] = []
+    rectangles: list[tuple[float, float, float, float]] = []
     for row in range(cells):
         for first, last in runs_of(bits[row]):
-            found.append((corner[0] + first * side, corner[1] + row * side, (last - first) * side, side))
-    return np.array(found)
+            rectangles.append((corner[0] + first * side, corner[1] + row * side, (last - first) * side, side))
+    return np.array(rectangles)
 
 
 PAGES = {"a4": (297.0, 210.0), "a3": (420.0, 297.0), "letter": (279.4, 215.9)}

@@ -78,13 +78,13 @@ def views_by_camera(
     board: Board, sightings: Sequence[Sighting], lenses: Mapping[str, Lens]
 ) -> dict[str, dict[int, BoardView]]:
     """Camera → frame → view."""
-    found: dict[str, dict[int, BoardView]] = {name: {} for name in lenses}
+    views: dict[str, dict[int, BoardView]] = {name: {} for name in lenses}
     for sighting in sightings:
         if sighting.camera in lenses:
             view = view_of(board, sighting, lenses[sighting.camera])
             if view is not None:
-                found[sighting.camera][sighting.frame] = view
-    return found
+                views[sighting.camera][sighting.frame] = view
+    return views
 
 
 def pair_pose(first: str, second: str, views: Mapping[str, Mapping[int, BoardView]]) -> PairPose | None:

@@ -171,8 +171,8 @@ class Sighting:
 
 def of_camera(sightings: Iterable[Sighting], camera: str) -> tuple[Sighting, ...]:
     """Those of one camera, by frame."""
-    found = [sighting for sighting in sightings if sighting.camera == camera]
-    return tuple(sorted(found, key=lambda sighting: sighting.frame))
+    own = [sighting for sighting in sightings if sighting.camera == camera]
+    return tuple(sorted(own, key=lambda sighting: sighting.frame))
 
 
 def rays_of(camera: Camera, pixels: Array) -> Array:

@@ -63,9 +63,9 @@ def carried(points: Array, own: Sequence[Camera], others: Sequence[Camera]) -> t
             f"The two calibrations place the points {missed:.0f} pixels apart.",
             "Check that both are of these cameras, in the same place, with pictures of the same size.",
         )
-    found = np.full_like(flat, np.nan)
-    found[np.flatnonzero(there)[enough]] = placed[enough]
-    return found.reshape(points.shape), missed
+    positions = np.full_like(flat, np.nan)
+    positions[np.flatnonzero(there)[enough]] = placed[enough]
+    return positions.reshape(points.shape), missed
 
 
 def _triangulated(cameras: Sequence[Camera], pixels: Sequence[Array], seen: NDArray[np.bool_]) -> Array:

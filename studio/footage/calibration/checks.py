@@ -33,13 +33,13 @@ def check_calibration(
     distances_mm : measured distances between two cameras' lenses. Each argument adds checks.
     """
     sizes = {sighting.camera: sighting.size for sighting in sightings} | dict(footage_sizes or {})
-    found = [*size_findings(cameras, sizes), *rig_findings(cameras)]
+    findings = [*size_findings(cameras, sizes), *rig_findings(cameras)]
     # Where sizes or rotations are wrong, views disagree for that reason; nothing more is to be learnt from them.
-    if not any(finding.code in FIRST_CAUSES for finding in found):
+    if not any(finding.code in FIRST_CAUSES for finding in findings):
         if board is not None and sightings:
-            found += board_findings(cameras, board, sightings)
-        if masks and not blocking(found):
-            found += silhouette_findings(cameras, masks, height_mm, board, scale)
-        if not any(finding.code in ("scale", "square-size") for finding in found):
-            found += distance_findings(cameras, distances_mm or {}, board)
-    return tuple(sorted(found, key=lambda finding: finding.severity != "blocks"))
+            findings += board_findings(cameras, board, sightings)
+        if masks and not blocking(findings):
+            findings += silhouette_findings(cameras, masks, height_mm, board, scale)
+        if not any(finding.code in ("scale", "square-size") for finding in findings):
+            findings += distance_findings(cameras, distances_mm or {}, board)
+    return tuple(sorted(findings, key=lambda finding: finding.severity != "blocks"))

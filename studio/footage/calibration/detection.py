@@ -42,13 +42,13 @@ class BoardFinder:
         grey = picture
         if picture.ndim == 3:
             grey = np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
-        found, mirrored = self._corners(grey), False
-        if found is None and self._mirrored_too:
-            found, mirrored = self._corners(np.ascontiguousarray(grey[:, ::-1])), True
-        if found is None:
+        corners, mirrored = self._corners(grey), False
+        if corners is None and self._mirrored_too:
+            corners, mirrored = self._corners(np.ascontiguousarray(grey[:, ::-1])), True
+        if corners is None:
             return None
         size = (int(grey.shape[1]), int(grey.shape[0]))
-        return Sighting(camera, frame, name or f"frame {frame}", size, *found, mirrored=mirrored)
+        return Sighting(camera, frame, name or f"frame {frame}", size, *corners, mirrored=mirrored)
 
     def _corners(self, grey: Bytes) -> tuple[Indices, Array] | None:
         if self._charuco is not None:

@@ -249,8 +249,8 @@ def moved(rig: Rig, new_from_old: Array) -> Rig:
 def moved_cameras(cameras: Sequence[Camera], new_from_old: Array) -> tuple[Camera, ...]:
     """Cameras in another world: (3, 4) new_from_old."""
     back = inverse(new_from_old)
-    found: list[Camera] = []
+    moved: list[Camera] = []
     for camera in cameras:
         pose = compose(rigid(camera.rotation, camera.translation), back)
-        found.append(replace(camera, rotation=pose[:, :3].copy(), translation=pose[:, 3].copy()))
-    return tuple(found)
+        moved.append(replace(camera, rotation=pose[:, :3].copy(), translation=pose[:, 3].copy()))
+    return tuple(moved)

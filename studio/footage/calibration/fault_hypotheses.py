@@ -73,12 +73,12 @@ def _exchanged(one: Camera, two: Camera) -> tuple[Camera, Camera]:
 
 def hypotheses(cameras: Sequence[Camera]) -> tuple[Hypothesis, ...]:
     """The faults to try: one camera's, all cameras', exchanges of two."""
-    found: list[Hypothesis] = []
+    faults: list[Hypothesis] = []
     for code, change, words, remedy in _CHANGES:
         everything = tuple(change(camera) for camera in cameras)
         for number, camera in enumerate(cameras):
             right = (*cameras[:number], everything[number], *cameras[number + 1 :])
-            found.append(
+            faults.append(
                 Hypothesis(
                     code,
                     right,
@@ -87,12 +87,12 @@ def hypotheses(cameras: Sequence[Camera]) -> tuple[Hypothesis, ...]:
                     remedy.replace("CAMERA", camera.name),
                 )
             )
-        found.append(Hypothesis(code, everything, (), words.format("all cameras"), remedy))
+        faults.append(Hypothesis(code, everything, (), words.format("all cameras"), remedy))
     for one, two in combinations(range(len(cameras)), 2):
         right = list(cameras)
         right[one], right[two] = _exchanged(cameras[one], cameras[two])
         names = (cameras[one].name, cameras[two].name)
-        found.append(
+        faults.append(
             Hypothesis(
                 "swapped-cameras",
                 tuple(right),
@@ -101,7 +101,7 @@ def hypotheses(cameras: Sequence[Camera]) -> tuple[Hypothesis, ...]:
                 "Give each footage the calibration of its own camera.",
             )
         )
-    return tuple(found)
+    return tuple(faults)
 
 
 Change = Callable[[Camera], Camera]

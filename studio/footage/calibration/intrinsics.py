@@ -194,9 +194,9 @@ def _best_start(board: Board, sightings: Sequence[Sighting], size: tuple[int, in
     """The least residual over a few guesses of the focal length; the first that is good is enough."""
     best: _Solution | None = None
     for guess in FOCAL_GUESSES:
-        found = _solved(board, sightings, size, flags, guess * max(size))
-        if best is None or found.rms < best.rms:
-            best = found
+        solution = _solved(board, sightings, size, flags, guess * max(size))
+        if best is None or solution.rms < best.rms:
+            best = solution
         if best.rms < size[0] / 1000.0:
             break
     if best is None:
@@ -238,11 +238,11 @@ def lenses_of_file(path: Path, names: Sequence[str]) -> dict[str, Lens]:
     """Camera → lens, matched by name; pictures, residuals and coverage are unknown. Raises CalibrationError."""
     read = {entry.name: entry for entry in read_intrinsics(path)}
     matches = match_names(list(names), list(read), "recordings", CalibrationError)
-    found: dict[str, Lens] = {}
+    lenses: dict[str, Lens] = {}
     for match in matches:
         entry = read[match.camera]
         size = (entry.width, entry.height)
-        found[match.footage] = Lens(
+        lenses[match.footage] = Lens(
             match.footage,
             size,
             entry.matrix,
@@ -254,4 +254,4 @@ def lenses_of_file(path: Path, names: Sequence[str]) -> dict[str, Lens]:
             (),
             coverage_of((), size),
         )
-    return found
+    return lenses

@@ -22,8 +22,8 @@ UNLIKE_FOCAL = (0.35, 6.0)
 
 def lens_findings(lens: Lens) -> tuple[Finding, ...]:
     """Findings on a lens; none for a reliable one, or one read from a file."""
-    found = _doubts(lens) if lens.residuals else ()
-    return tuple(sorted(found, key=lambda finding: finding.severity != "blocks"))
+    findings = _doubts(lens) if lens.residuals else ()
+    return tuple(sorted(findings, key=lambda finding: finding.severity != "blocks"))
 
 
 def verdict(lens: Lens) -> str:

@@ -69,14 +69,14 @@ def aligned_cameras(cameras: Sequence[Camera], outlines: Outlines) -> AlignedCam
         robust = ROBUST_PIXELS * np.sqrt(2.0 * (np.sqrt(1.0 + (missed / ROBUST_PIXELS) ** 2) - 1.0))
         return np.concatenate([robust * np.sign(missed), PULL * flat / TURN_SPREAD])
 
-    found = least_squares(
+    solution = least_squares(
         residuals,
         start.ravel(),
         x_scale=TURN_SPREAD,
         diff_step=1e-6,  # pyright: ignore[reportArgumentType] - one number for all
         max_nfev=60,
     )
-    turns = np.asarray(found.x, dtype=np.float64).reshape(-1, 3)
+    turns = np.asarray(solution.x, dtype=np.float64).reshape(-1, 3)
     return AlignedCameras(
         cameras=turned(cameras, turns),
         turns=np.degrees(np.linalg.norm(turns, axis=1)),
@@ -88,11 +88,13 @@ def aligned_cameras(cameras: Sequence[Camera], outlines: Outlines) -> AlignedCam
 
 def turned(cameras: Sequence[Camera], turns: Array) -> tuple[Camera, ...]:
     """Cameras turned about their own centres by rotation vectors (V, 3), radians, in their own frames."""
-    found: list[Camera] = []
+    cameras_turned: list[Camera] = []
     for camera, turn in zip(cameras, turns, strict=True):
         rotation = rotation_from_vector(turn) @ camera.rotation
-        found.append(dataclasses.replace(camera, rotation=rotation, translation=-rotation @ camera.centre))
-    return tuple(found)
+        cameras_turned.append(
+            dataclasses.replace(camera, rotation=rotation, translation=-rotation @ camera.centre)
+        )
+    return tuple(cameras_turned)
 
 
 def _rays_in_cameras(cameras: Sequence[Camera], outlines: Outlines) -> list[dict[str, Array]]:
@@ -146,10 +148,10 @@ def _tangents(one: Camera, two: Camera, first: Array, second: Array) -> tuple[fl
 def _of_cameras(cameras: Sequence[Camera], rays: Sequence[Mapping[str, Array]], turns: Array) -> Array:
     """(V,) median of the misses of the pairs with each camera, pixels."""
     missed, pairs = _misses(cameras, rays, turns)
-    found = np.full(len(cameras), np.nan)
+    medians = np.full(len(cameras), np.nan)
     for number in range(len(cameras)):
         own = np.abs(missed[(pairs == number).any(axis=1)])
         own = own[np.isfinite(own)]
         if len(own):
-            found[number] = float(np.median(own))
-    return found
+            medians[number] = float(np.median(own))
+    return medians

@@ -47,16 +47,16 @@ def silhouette_findings(
     the body beside a person, where it is another one (`scale_of`).
     """
     outlines = outlines_of(cameras, masks)
-    found = explained(
+    findings = explained(
         cameras, lambda tried: silhouette_disagreement(tried, outlines), GOOD, "silhouettes", LEAST
     )
-    if found:
-        return found
+    if findings:
+        return findings
     return stature_findings(postures(cameras, masks), height_mm, board, scale)
 
 
 def stature_findings(
-    found: Sequence[Posture],
+    standing: Sequence[Posture],
     height_mm: float | None = None,
     board: Board | None = None,
     scale: float = 1.0,
@@ -70,23 +70,23 @@ def stature_findings(
         if height_mm is None
         else (height_mm, f"the height given ({height_mm:.0f} mm)")
     )
-    extents = [posture.reach_mm / known for posture in found]
+    extents = [posture.reach_mm / known for posture in standing]
     if extents and (max(extents) < ANY_POSTURE[0] or min(extents) > ANY_POSTURE[1]):
         unit = unit_finding(float(np.median(extents)), "the person's size", POSTURE_TOLERANCE)
         return (unit,) if unit is not None else ()
-    seen = standing_height(found)
+    seen = standing_height(standing)
     least, most = HUMAN if height_mm is None else (1.0 - HEIGHT_TOLERANCE, 1.0 + HEIGHT_TOLERANCE)
     if seen is None or least <= seen / known <= most:
         return ()
     # The seen height is never above the true one: a person tall enough in any frame is not too small.
-    if seen < known and max(posture.height_mm for posture in found) >= least * known:
+    if seen < known and max(posture.height_mm for posture in standing) >= least * known:
         return ()
     return (height_finding(seen, known, words, board),)
 
 
 def outlines_of(cameras: Sequence[Camera], masks: Masks) -> dict[int, dict[str, Array]]:
     """Frame → camera → (K, 2) convex outline, pixels; without those that the picture's edge cuts."""
-    found: dict[int, dict[str, Array]] = {}
+    outlines: dict[int, dict[str, Array]] = {}
     for frame, views in masks.items():
         for camera in cameras:
             mask = views.get(camera.name)
@@ -98,8 +98,8 @@ def outlines_of(cameras: Sequence[Camera], masks: Masks) -> dict[int, dict[str, 
                 continue
             rows, columns = np.nonzero(mask)
             hull = cv2.convexHull(np.column_stack([columns, rows]).astype(np.int32))
-            found.setdefault(frame, {})[camera.name] = hull[:, 0].astype(np.float64)
-    return found
+            outlines.setdefault(frame, {})[camera.name] = hull[:, 0].astype(np.float64)
+    return outlines
 
 
 def silhouette_disagreement(cameras: Sequence[Camera], outlines: Mapping[int, Mapping[str, Array]]) -> float:

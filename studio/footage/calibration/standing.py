@@ -67,15 +67,15 @@ class Posture:
 
 def postures(cameras: Sequence[Camera], masks: Mapping[int, Mapping[str, Bytes]]) -> tuple[Posture, ...]:
     """Of the frames (frame → camera → mask) in which there is one."""
-    found = (posture(cameras, views) for views in masks.values())
-    return tuple(one for one in found if one is not None)
+    measured = (posture(cameras, views) for views in masks.values())
+    return tuple(one for one in measured if one is not None)
 
 
-def standing_height(found: Sequence[Posture]) -> float | None:
+def standing_height(measured: Sequence[Posture]) -> float | None:
     """The height of a person who stands in several of the frames and is as tall in each, mm; None if that is not
     certain.
     """
-    heights = [one.height_mm for one in found if one.stands]
+    heights = [one.height_mm for one in measured if one.stands]
     if len(heights) < LEAST_FRAMES:
         return None
     middle = float(np.median(heights))
@@ -131,9 +131,9 @@ def _covered(camera: Camera, mask: Bytes, points: Array, *, outside: bool) -> ND
     pixels, depth = project(camera, points)
     columns, rows = np.nan_to_num(np.round(pixels), nan=-1.0).astype(np.int64).T
     inside = (depth > 0) & (columns >= 0) & (rows >= 0) & (columns < mask.shape[1]) & (rows < mask.shape[0])
-    found = np.full(len(points), outside) & (depth > 0)
-    found[inside] = mask[rows[inside], columns[inside]] > 0
-    return found
+    covered = np.full(len(points), outside) & (depth > 0)
+    covered[inside] = mask[rows[inside], columns[inside]] > 0
+    return covered
 
 
 def _shape(points: Array, cell: float, unseen: float) -> Posture:

@@ -90,8 +90,8 @@ def calibrate(
         return solved(board)
     except _NotFound as problem:
         meant = _meant_board(board, (intrinsics, extrinsics), problem, taken)
-    found = solved(meant)
-    return replace(found, findings=_sorted([*found.findings, _meant_finding(board, meant)]))
+    solution = solved(meant)
+    return replace(solution, findings=_sorted([*solution.findings, _meant_finding(board, meant)]))
 
 
 def _solved(
@@ -221,7 +221,7 @@ class _Solving:
         """Camera → the sightings for its lens; cameras without any are left out only if their footage is missing."""
         if folder is None:
             return {name: of_camera(together, name) for name in self.names}
-        found: dict[str, tuple[Sighting, ...]] = {}
+        chosen: dict[str, tuple[Sighting, ...]] = {}
         for name, entry in by_camera(list_footage(folder), self.names).items():
             finder = BoardFinder(self.board, thorough=entry.video is None)
             seen = look_for_lens(finder, name, entry, self.progress, self.taken)
@@ -231,11 +231,11 @@ class _Solving:
                     "Check the board's kind and numbers (inner corners for a chessboard), light and sharpness. Tried as"
                     " well: columns and rows exchanged, and ,legacy (OpenCV before 4.6).",
                 )
-            found[name] = tuple(chosen_for_lens(seen)[0])
-        return found
+            chosen[name] = tuple(chosen_for_lens(seen)[0])
+        return chosen
 
     def lenses(self, used: Mapping[str, tuple[Sighting, ...]]) -> dict[str, Lens]:
-        found: dict[str, Lens] = {}
+        solved: dict[str, Lens] = {}
         for number, (name, sightings) in enumerate(used.items()):
             self.progress(f"Solving the lens of camera {name}", number, len(used))
             if not sightings:
@@ -243,8 +243,8 @@ class _Solving:
                     f"The board {self.board.text} is found in no picture of camera {name}.",
                     "Check the board's kind and numbers, or show it to this camera.",
                 )
-            found[name] = solve_lens(self.board, sightings)
-        return found
+            solved[name] = solve_lens(self.board, sightings)
+        return solved
 
     def placed(
         self, together: Sequence[Sighting], lenses: Mapping[str, Lens], refine: bool
@@ -304,8 +304,8 @@ class _Solving:
             finder = BoardFinder(self.board)
             footage = by_camera(list_footage(path), [camera.name for camera in rig.cameras])
             for name, entry in footage.items():
-                found = look_for_lens(finder, name, entry, self.progress, self.taken)
-                seen += [max(found, key=lambda each: each.sharpness).sighting] if found else []
+                looks = look_for_lens(finder, name, entry, self.progress, self.taken)
+                seen += [max(looks, key=lambda each: each.sharpness).sighting] if looks else []
             pose = board_on_floor(rig, self.board, seen, lenses)
             words = f"board on the floor in '{path.name}', {len(seen)} cameras"
         return floor_from_board(pose, self.board.thickness_mm), words

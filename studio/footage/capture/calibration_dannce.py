@@ -41,12 +41,12 @@ class _Params:
 
 def dannce_files(folder: Path) -> tuple[Path, ...]:
     """The files of a folder that are named after single cameras, in natural order."""
-    found = [
+    files = [
         path
         for path in folder.iterdir()
         if path.suffix.lower() == DANNCE_SUFFIX and path.is_file() and ONE_CAMERA.search(path.stem)
     ]
-    return tuple(sorted(found, key=lambda path: natural_key(path.name)))
+    return tuple(sorted(files, key=lambda path: natural_key(path.name)))
 
 
 def is_label3d(path: Path) -> bool:
@@ -73,10 +73,12 @@ def _params_of(path: Path) -> list[_Params]:
         # SciPy's stubs take paths alone; it reads streams as well.
         content: Any = io.BytesIO(read_file(path, LARGEST_FILE, CalibrationError))
         wanted = ["params", "camnames", *ENTRIES]
-        found = scipy.io.loadmat(content, simplify_cells=True, variable_names=wanted)
-        several = "params" in found
-        entries = np.atleast_1d(np.asarray(found["params"], dtype=object)).tolist() if several else [found]
-        given: list[Any] = np.atleast_1d(found["camnames"]).tolist() if "camnames" in found else []
+        variables = scipy.io.loadmat(content, simplify_cells=True, variable_names=wanted)
+        several = "params" in variables
+        entries = (
+            np.atleast_1d(np.asarray(variables["params"], dtype=object)).tolist() if several else [variables]
+        )
+        given: list[Any] = np.atleast_1d(variables["camnames"]).tolist() if "camnames" in variables else []
         if not several:
             named = ONE_CAMERA.search(path.stem)
             given = [named[1] if named else path.stem]

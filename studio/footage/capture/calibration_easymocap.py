@@ -73,14 +73,14 @@ def _lens(inner: Storage, name: str, sized: bool) -> Intrinsics:
 def _camera(outer: Storage, lens: Intrinsics) -> Camera:
     """A lens at its place; Rot_x and R_x must agree."""
     where = f"{outer.where}, camera {lens.name}"
-    found: list[Array] = []
+    rotations: list[Array] = []
     if outer.first(f"Rot_{lens.name}"):
-        found.append(check_rotation(outer.shaped(f"Rot_{lens.name}", 3, 3), where))
+        rotations.append(check_rotation(outer.shaped(f"Rot_{lens.name}", 3, 3), where))
     if outer.first(f"R_{lens.name}"):
-        found.append(rotation_from_vector(outer.shaped(f"R_{lens.name}", 3)))
-    if float(np.abs(found[0] - found[-1]).max()) > ROTATIONS_AGREE:
+        rotations.append(rotation_from_vector(outer.shaped(f"R_{lens.name}", 3)))
+    if float(np.abs(rotations[0] - rotations[-1]).max()) > ROTATIONS_AGREE:
         raise CalibrationError(
             f"{where}: rotation matrix and rotation vector disagree.", "Export the files again."
         )
     # Six decimals in the file: the vector is a rotation exactly, the matrix nearly.
-    return lens.placed(found[-1], outer.shaped(f"T_{lens.name}", 3))
+    return lens.placed(rotations[-1], outer.shaped(f"T_{lens.name}", 3))

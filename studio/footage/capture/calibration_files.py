@@ -101,14 +101,14 @@ def find_calibrations(folder: Path) -> tuple[Path, ...]:
     canonical = folder / "cameras.toml"
     if is_canonical(canonical):
         return (canonical,)
-    found = [
+    files = [
         path for path in folder.iterdir() if path.suffix.lower() == ".toml" and looks_like_calibration(path)
     ]
     if any(folder.glob(f"*{BOUGUET_SUFFIX}")):
-        found.append(folder)
-    if not found:
-        found = _of_other_tools(folder)
-    return tuple(sorted(found, key=lambda path: natural_key(path.name)))
+        files.append(folder)
+    if not files:
+        files = _of_other_tools(folder)
+    return tuple(sorted(files, key=lambda path: natural_key(path.name)))
 
 
 def read_calibration(path: Path, unit: str = "", up: str = "z") -> Calibration:
@@ -124,19 +124,27 @@ def read_calibration(path: Path, unit: str = "", up: str = "z") -> Calibration:
 
 
 def _calibration(path: Path, unit: str, up: str) -> Calibration:
-    found = _read(path)
-    if not found.cameras:
+    content = _read(path)
+    if not content.cameras:
         raise CalibrationError(
             f"'{path.name}' places no camera in the world.", "Calibrate the extrinsics and export again."
         )
-    notes = tuple(f"Camera {lens.name} has no place in the world and is left out." for lens in found.unposed)
+    notes = tuple(
+        f"Camera {lens.name} has no place in the world and is left out." for lens in content.unposed
+    )
     calibration = Calibration(
-        path.name, found.cameras, "", found.sources, found.sizes_known, found.crops, (*found.notes, *notes)
+        path.name,
+        content.cameras,
+        "",
+        content.sources,
+        content.sizes_known,
+        content.crops,
+        (*content.notes, *notes),
     )
     if unit:
         mm_of(unit)
     calibration = with_up(calibration, up)
-    return _finished(calibration, found.unit, unit, turned=is_canonical(path) and up == "z")
+    return _finished(calibration, content.unit, unit, turned=is_canonical(path) and up == "z")
 
 
 def with_up(calibration: Calibration, up: str) -> Calibration:
@@ -161,12 +169,12 @@ def read_intrinsics(path: Path) -> tuple[Intrinsics, ...]:
     Raises CalibrationError as `read_calibration` does.
     """
     with foreign_file(path, CalibrationError, *CALIBRATION):
-        found = _read(path)
+        content = _read(path)
     posed = [
         Intrinsics(camera.name, camera.width, camera.height, camera.matrix, camera.distortion)
-        for camera in found.cameras
+        for camera in content.cameras
     ]
-    lenses = sorted([*posed, *found.unposed], key=lambda lens: natural_key(lens.name))
+    lenses = sorted([*posed, *content.unposed], key=lambda lens: natural_key(lens.name))
     if not lenses:
         raise CalibrationError(f"'{path.name}' holds no camera.", "Export the calibration again.")
     return tuple(lenses)
@@ -180,14 +188,14 @@ def export_calibration(cameras: tuple[Camera, ...], path: Path, writer: str) -> 
 def _of_other_tools(folder: Path) -> list[Path]:
     """Qualisys files, those of added formats, EasyMocap's pair, OpenCV files (which together are one calibration)."""
     files = [path for path in folder.iterdir() if path.is_file()]
-    found = [path for path in files if is_qualisys(path) or added_reader(path)]
+    calibrations = [path for path in files if is_qualisys(path) or added_reader(path)]
     if is_easymocap(folder):
-        return [*found, folder / INTRINSICS]
+        return [*calibrations, folder / INTRINSICS]
     if dannce_files(folder) or opencap_files(folder):
-        return [*found, folder]
-    found += [path for path in files if is_label3d(path)]
+        return [*calibrations, folder]
+    calibrations += [path for path in files if is_label3d(path)]
     opened = opencv_files(folder)
-    return [*found, *((folder,) if len(opened) > 1 else opened)]
+    return [*calibrations, *((folder,) if len(opened) > 1 else opened)]
 
 
 def _read(path: Path) -> FoundCameras:
@@ -263,8 +271,8 @@ def mm_of(unit: str) -> float:
     """Millimetres in a unit: one of UNITS, or board=MM. Raises CalibrationError."""
     if unit in UNITS:
         return UNITS[unit]
-    found = re.fullmatch(r"board=([0-9]+(?:\.[0-9]+)?)(?:mm)?", unit)
-    length = float(found[1]) if found else 0.0
+    match = re.fullmatch(r"board=([0-9]+(?:\.[0-9]+)?)(?:mm)?", unit)
+    length = float(match[1]) if match else 0.0
     if not 1e-3 <= length <= 1e5:
         raise CalibrationError(
             f"'{unit}' is no unit of a calibration.",

@@ -27,8 +27,8 @@ REMEDY = "Of pickles only OpenCap's cameras are read: convert it where you trust
 def opencap_files(folder: Path) -> tuple[Path, ...]:
     """The pickles of cameras in the folders of a folder `Videos`, in natural order; none of another folder."""
     places = folder.glob(f"*/{FILE_NAME}") if folder.name == "Videos" else ()
-    found = [path for path in places if path.is_file()]
-    return tuple(sorted(found, key=lambda path: natural_key(path.parent.name)))
+    files = [path for path in places if path.is_file()]
+    return tuple(sorted(files, key=lambda path: natural_key(path.parent.name)))
 
 
 def read_opencap(path: Path) -> FoundCameras:

@@ -32,10 +32,10 @@ BOARDS = "extrinsic_parameters"
 
 def opencv_files(folder: Path) -> tuple[Path, ...]:
     """The files of a folder that hold a camera matrix by one of the samples' names, in natural order."""
-    found = [
+    files = [
         path for path in folder.iterdir() if path.suffix.lower() in STORAGE_SUFFIXES and _is_camera(path)
     ]
-    return tuple(sorted(found, key=lambda path: natural_key(path.name)))
+    return tuple(sorted(files, key=lambda path: natural_key(path.name)))
 
 
 def read_opencv(path: Path) -> FoundCameras:

@@ -33,9 +33,9 @@ def is_qualisys(path: Path) -> bool:
 def read_qualisys(path: Path) -> FoundCameras:
     """The active cameras of a file. Raises CalibrationError naming file, camera and entry."""
     where = f"'{path.name}'"
-    found = list(_document(path, where).iter("camera"))
+    elements = list(_document(path, where).iter("camera"))
     video = [
-        entry for entry in found if entry.get("active", "1") != "0" and entry.find("intrinsic") is not None
+        entry for entry in elements if entry.get("active", "1") != "0" and entry.find("intrinsic") is not None
     ]
     if not video:
         raise CalibrationError(
@@ -80,7 +80,7 @@ def _camera(where: str, name: str, entry: Element) -> Camera:
 
 def _lens(where: str, name: str, entry: Element) -> Intrinsics:
     intrinsic = entry.find("intrinsic")
-    view = next((found for tag in VIEWS if (found := entry.find(tag)) is not None), None)
+    view = next((element for tag in VIEWS if (element := entry.find(tag)) is not None), None)
     if intrinsic is None or view is None:
         raise CalibrationError(f"{where} has no 'intrinsic' or 'fov_video'.", "Export it from QTM again.")
     left, top, right, bottom = _numbers(where, view, "left", "top", "right", "bottom")

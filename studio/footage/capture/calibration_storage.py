@@ -62,10 +62,10 @@ class Storage:
         if isinstance(entry, dict) and {"rows", "cols", "dt", "data"} & set(entry):
             values = self._matrix(name, entry)
         else:
-            found = _numbers(entry)
-            if found is None:
+            content = _numbers(entry)
+            if content is None:
                 raise CalibrationError(f"{self.where} has no numbers in '{name}'.", "Export the file again.")
-            values = found if isinstance(entry, list) else found.reshape(())
+            values = content if isinstance(entry, list) else content.reshape(())
         if not np.all(np.isfinite(values)):
             raise CalibrationError(
                 f"{self.where}: '{name}' holds a number that is not finite.", "Calibrate again."
@@ -242,11 +242,11 @@ Line = tuple[int, int, str]
 
 def _logical_lines(lines: list[str]) -> list[Line]:
     """The lines of the first document; a list that goes over several is one line."""
-    found: list[Line] = []
+    logical: list[Line] = []
     opened, parts, begun = 0, list[str](), (0, 0)
     for number, raw in enumerate(lines[1:], 2):
         if not opened and raw.startswith(("---", "...")):
-            if found:
+            if logical:
                 break
             continue
         text, change = _without_comment(raw, number)
@@ -259,11 +259,11 @@ def _logical_lines(lines: list[str]) -> list[Line]:
         if opened < 0:
             raise ValueError(f"line {number} closes a bracket that is not open")
         if not opened:
-            found.append((*begun, " ".join(parts)))
+            logical.append((*begun, " ".join(parts)))
             parts = []
     if opened:
         raise ValueError(f"the list of line {begun[0]} is not closed")
-    return found
+    return logical
 
 
 def _without_comment(line: str, number: int) -> tuple[str, int]:

@@ -90,19 +90,19 @@ def machine_of(address: CameraAddress) -> tuple[str, int]:
     parts = urlsplit(address.url)
     port = parts.port or USUAL_PORTS[parts.scheme.lower()]
     try:
-        found = socket.getaddrinfo(parts.hostname, port, type=socket.SOCK_STREAM)
+        places = socket.getaddrinfo(parts.hostname, port, type=socket.SOCK_STREAM)
     except OSError:
         raise FootageError(
             f"Camera {address.name}: there is no machine '{parts.hostname}'.", "Check the address."
         ) from None
-    for _, _, _, _, place in found:
+    for _, _, _, _, place in places:
         machine = str(place[0]).partition("%")[0]
         if machine in CLOUD_SECRETS or (port in own_ports and _is_this_machine(machine)):
             raise FootageError(
                 f"Camera {address.name}: '{parts.hostname}:{port}' is no camera.",
                 "Give the camera's own address.",
             )
-    return str(found[0][4][0]), port
+    return str(places[0][4][0]), port
 
 
 def check_names(addresses: Collection[CameraAddress]) -> None:

@@ -111,8 +111,8 @@ class Footage:
 
     def masks(self, frame: int) -> dict[str, Bytes] | None:
         """The masks that came with the data by camera, or None if no camera has any."""
-        found = {name: kept.read(self._checked(frame)) for name, kept in self._masks.items()}
-        return found or None
+        masks = {name: kept.read(self._checked(frame)) for name, kept in self._masks.items()}
+        return masks or None
 
     def has_masks(self, camera: str) -> bool:
         """Whether masks came with a camera's pictures."""
@@ -269,9 +269,9 @@ class _Kept:
 
     def read(self, index: int) -> Bytes:
         with self._lock:
-            found = _PICTURES.get(self._number, index)
-            if found is not None:
-                return found
+            kept = _PICTURES.get(self._number, index)
+            if kept is not None:
+                return kept
             self.read_count += 1
             picture = turned_picture(self._reader.read(self._camera.file_frame(index)), self._camera.turned)
             height, width = picture.shape[:2]
@@ -312,10 +312,10 @@ class _KeptPictures:
 
     def get(self, reader: int, index: int) -> Bytes | None:
         with self._lock:
-            found = self._kept.get((reader, index))
-            if found is not None:
+            picture = self._kept.get((reader, index))
+            if picture is not None:
                 self._kept.move_to_end((reader, index))
-            return found
+            return picture
 
     def put(self, reader: int, index: int, picture: Bytes, room: int) -> None:
         """room : how many pictures of this reader are kept at most."""

@@ -68,7 +68,7 @@ def drifts(times: Mapping[str, Array], fps: float) -> tuple[Drift, ...]:
     since = {name: moments[:count] - moments[0] for name, moments in times.items()}
     lost = {name: _lost(moments) for name, moments in since.items()}
     common = _common(since, lost)
-    found: list[Drift] = []
+    drifting: list[Drift] = []
     for name, moments in since.items():
         late = (moments - common) * fps
         off = np.flatnonzero(np.abs(late) > APART)
@@ -77,8 +77,8 @@ def drifts(times: Mapping[str, Array], fps: float) -> tuple[Drift, ...]:
             continue
         most = float(late[np.argmax(np.abs(late))]) if apart else 0.0
         rates = (_rate(moments, fps), _rate(common, fps))
-        found.append(Drift(name, int(off[0]) if apart else -1, most, *rates, lost[name]))
-    return tuple(found)
+        drifting.append(Drift(name, int(off[0]) if apart else -1, most, *rates, lost[name]))
+    return tuple(drifting)
 
 
 def _rate(moments: Array, fps: float) -> float:
@@ -94,7 +94,7 @@ def paired_by_time(times: Mapping[str, Array], fps: float) -> tuple[dict[str, St
     since = {name: moments - moments[0] for name, moments in times.items()}
     count = 1 + int(np.floor(min(float(moments[-1]) for moments in since.values()) * fps + APART - 1e-6))
     wanted = np.arange(count) / fps
-    found: dict[str, Steps] = {}
+    steps: dict[str, Steps] = {}
     for name, moments in since.items():
         after = np.clip(np.searchsorted(moments, wanted), 1, max(1, len(moments) - 1))
         before = after - 1
@@ -106,8 +106,8 @@ def paired_by_time(times: Mapping[str, Array], fps: float) -> tuple[dict[str, St
         )
         further = nearest - np.arange(count)
         changes = np.flatnonzero(np.diff(further, prepend=0))
-        found[name] = tuple((int(frame), int(further[frame])) for frame in changes)
-    return found, count
+        steps[name] = tuple((int(frame), int(further[frame])) for frame in changes)
+    return steps, count
 
 
 def _lost(moments: Array) -> tuple[tuple[int, int], ...]:

@@ -89,14 +89,14 @@ def whole_picture(half: Bytes, below: bool, height: int) -> Bytes:
     """(height, W, 3) uint8 of a field (height / 2, W, 3): its own lines where they are, those between as the mean of
     their neighbours. below : whether it is that of the lines 1, 3, 5 …
     """
-    found = np.empty((height, *half.shape[1:]), np.uint8)
+    whole = np.empty((height, *half.shape[1:]), np.uint8)
     start = int(below)
-    found[start::2] = half
+    whole[start::2] = half
     means = ((half[:-1].astype(np.uint16) + half[1:] + 1) // 2).astype(np.uint8)
-    found[start + 1 : start + 2 * len(half) - 1 : 2] = means
-    found[:start] = half[0]
-    found[start + 2 * len(half) - 1 :] = half[-1]
-    return found
+    whole[start + 1 : start + 2 * len(half) - 1 : 2] = means
+    whole[:start] = half[0]
+    whole[start + 2 * len(half) - 1 :] = half[-1]
+    return whole
 
 
 def times_of_fields(times: Array, count: int) -> Array:

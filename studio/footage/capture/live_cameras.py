@@ -341,15 +341,15 @@ class LiveCameras:
         )
         recent = {camera.name: camera.recent for camera in self.cameras if camera.name not in left_out}
         frame_seconds = 1.0 / (fps or self.fps)
-        found = paired(recent, left_out, frame_seconds, after)
-        if found is None:
+        newest = paired(recent, left_out, frame_seconds, after)
+        if newest is None:
             return None
-        first = min(shot.came for shot in found.shots.values())
-        if found.lagging and self._clock() - first < NEXT_BY * frame_seconds:
+        first = min(shot.came for shot in newest.shots.values())
+        if newest.lagging and self._clock() - first < NEXT_BY * frame_seconds:
             # The next picture of the camera that was first may lie nearer.
             return None
-        self._spreads.append((found.spread, found.lagging))
-        return found
+        self._spreads.append((newest.spread, newest.lagging))
+        return newest
 
     def wait(self, seconds: float) -> None:
         """Return when a picture comes, or after so many seconds."""

@@ -95,8 +95,8 @@ def _parts(chunks: Iterator[bytes], wait: Callable[[float], bool], boundary: byt
                 end = _end_of_header(buffer, mark)
                 if end is None:
                     break
-                found = LENGTH.search(buffer, 0, end)
-                length = int(found[1]) if found else None
+                header = LENGTH.search(buffer, 0, end)
+                length = int(header[1]) if header else None
                 if length is not None and length > LARGEST_PICTURE:
                     raise ValueError(f"it announces a picture of {length / 1e6:.0f} MB")
                 del buffer[:end]

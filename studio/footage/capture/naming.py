@@ -32,13 +32,13 @@ def natural_key(name: str) -> tuple[tuple[int, int, str], ...]:
 
 def words(name: str) -> tuple[str, ...]:
     """The words and numbers of a name in their normal form: cam_01 and Camera1 both give ("cam", "1")."""
-    found: list[str] = []
+    tokens: list[str] = []
     for part in re.findall(r"\d+|[a-z]+", name.lower()):
         if part.isdigit():
-            found.append(str(int(part)))
+            tokens.append(str(int(part)))
         else:
-            found.append("cam" if part in CAMERA_WORDS else part)
-    return tuple(found)
+            tokens.append("cam" if part in CAMERA_WORDS else part)
+    return tuple(tokens)
 
 
 def match_names(
@@ -57,9 +57,11 @@ def match_names(
         ("same number", lambda a, b: _numbers(a) == _numbers(b) != ()),
     )
     for how, fits in rules:
-        found = _one_to_one(footage, cameras, fits)
-        if found is not None:
-            return tuple(CameraMatch(name, camera, how) for name, camera in zip(footage, found, strict=True))
+        matched = _one_to_one(footage, cameras, fits)
+        if matched is not None:
+            return tuple(
+                CameraMatch(name, camera, how) for name, camera in zip(footage, matched, strict=True)
+            )
     raise wrong(
         f"The {what} ({listed(footage)}) cannot be matched one to one with the calibrated cameras"
         f" ({listed(cameras)}).",
@@ -76,13 +78,13 @@ def _one_to_one(
     footage: Sequence[str], cameras: Sequence[str], fits: Callable[[str, str], bool]
 ) -> list[str] | None:
     """The camera of each name if every name fits exactly one camera and no camera is taken twice."""
-    found: list[str] = []
+    matched: list[str] = []
     for name in footage:
         fitting = [camera for camera in cameras if fits(name, camera)]
-        if len(fitting) != 1 or fitting[0] in found:
+        if len(fitting) != 1 or fitting[0] in matched:
             return None
-        found.append(fitting[0])
-    return found
+        matched.append(fitting[0])
+    return matched
 
 
 def _contains(long: tuple[str, ...], short: tuple[str, ...]) -> bool:

@@ -40,12 +40,12 @@ class PicturesMeasure:
 
 def list_pictures(folder: Path) -> tuple[Path, ...]:
     """The pictures of a folder in natural order of their names; hidden files are passed over."""
-    found = [
+    pictures = [
         path
         for path in folder.iterdir()
         if path.suffix.lower() in PICTURE_SUFFIXES and not path.name.startswith(".") and path.is_file()
     ]
-    return tuple(sorted(found, key=lambda path: natural_key(path.name)))
+    return tuple(sorted(pictures, key=lambda path: natural_key(path.name)))
 
 
 def is_picture(path: Path) -> bool:
@@ -148,10 +148,10 @@ class PictureReader:
 
 def _missing_numbers(paths: tuple[Path, ...]) -> tuple[int, ...]:
     """Numbers skipped in the last number of the file names, where these are otherwise evenly spaced."""
-    found = [re.findall(r"\d+", path.stem) for path in paths]
-    if len(paths) < 3 or not all(found):
+    digit_groups = [re.findall(r"\d+", path.stem) for path in paths]
+    if len(paths) < 3 or not all(digit_groups):
         return ()
-    numbers = np.array([int(digits[-1]) for digits in found])
+    numbers = np.array([int(digits[-1]) for digits in digit_groups])
     steps = np.diff(numbers)
     stride = int(np.median(steps))
     if stride <= 0 or np.all(steps == stride):

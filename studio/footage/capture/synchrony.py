@@ -238,13 +238,13 @@ def _along_best_pairs(
     return placed, confidence, within, links
 
 
-def in_words(found: Synchrony) -> str:
+def in_words(synchrony: Synchrony) -> str:
     """One line a camera: its offset and reliability; then the notes."""
     lines = [
-        f"{name}: {offset:+d} frames, give or take {found.within[name]}"
-        f" (peak {found.confidence[name]:.2f} times the next best)"
-        for name, offset in found.offsets.items()
+        f"{name}: {offset:+d} frames, give or take {synchrony.within[name]}"
+        f" (peak {synchrony.confidence[name]:.2f} times the next best)"
+        for name, offset in synchrony.offsets.items()
     ]
-    if not found.sure:
-        lines.append(f"Not reliable for {listed(found.offsets)}: check by eye before you apply it.")
-    return "\n".join([*lines, *found.notes])
+    if not synchrony.sure:
+        lines.append(f"Not reliable for {listed(synchrony.offsets)}: check by eye before you apply it.")
+    return "\n".join([*lines, *synchrony.notes])

@@ -58,15 +58,15 @@ def read_timestamps(path: Path) -> dict[str, Array]:
         # The older file counts frames from the stream's begin, not the video's.
         numbered = () if path.name == OLDER_NAME else rows.fieldnames or ()
         index_column = next((name for name in INDEX_COLUMNS if name in numbered), "")
-        found: dict[str, list[tuple[int, float]]] = {}
+        by_camera: dict[str, list[tuple[int, float]]] = {}
         for number, row in enumerate(rows, 2):
             camera = (row[columns[0]] or "").strip()
             moment = _number(path, number, row[columns[1]])
             index = round(_number(path, number, row[index_column])) if index_column else -1
-            found.setdefault(camera, []).append((index, moment))
-    if not found:
+            by_camera.setdefault(camera, []).append((index, moment))
+    if not by_camera:
         raise FootageError(f"'{path.name}' holds no times.", "Copy it again, or give the offsets by hand.")
-    return {name: _times(path, name, found[name]) for name in sorted(found, key=natural_key)}
+    return {name: _times(path, name, by_camera[name]) for name in sorted(by_camera, key=natural_key)}
 
 
 def offsets_from_times(times: dict[str, Array]) -> TimedOffsets:
@@ -124,13 +124,13 @@ def _apart(times: dict[str, Array], offsets: dict[str, int]) -> float:
 
 
 def _column(path: Path, given: Sequence[str], names: tuple[str, ...]) -> str:
-    found = next((name for name in names if name in given), "")
-    if not found:
+    column = next((name for name in names if name in given), "")
+    if not column:
         raise FootageError(
             f"'{path.name}' has no column '{names[0]}' but {listed(given)}.",
             "Caliscope writes the columns cam_id and frame_time.",
         )
-    return found
+    return column
 
 
 def _number(path: Path, line: int, text: str | None) -> float:

@@ -118,12 +118,12 @@ class JobKind(Generic[SomeState]):
     at: str = ""
     page: str = ""
 
-    def entries(self, found: object, **own: object) -> dict[str, object]:
+    def entries(self, record: object, **own: object) -> dict[str, object]:
         """What goes into the state of what was found, by the names of the entries. own : those that differ, or that it
         lacks.
         """
         names = self.states.model_fields.keys() - SessionJob.model_fields.keys() - own.keys()
-        return {name: getattr(found, name) for name in names if hasattr(found, name)} | own
+        return {name: getattr(record, name) for name in names if hasattr(record, name)} | own
 
 
 During = Callable[[JobKind[Any], SessionJob], AbstractContextManager[None]]
@@ -137,7 +137,7 @@ class Job:
 
     def __init__(self, kind: JobKind[State], state: State, publish: Publish) -> None:
         self.state: SessionJob = state
-        self.found: object = None
+        self.result: object = None
         self.closing = False
         self.began = time.time()
         self.kind, self._publish = kind, publish
@@ -341,9 +341,9 @@ class JobRunner:
         jobs = list(self._jobs.get(kind.event, {}).values())
         return cast("State", jobs[-1].state) if jobs else None
 
-    def found(self, kind: JobKind[State], key: str) -> object:
+    def result(self, kind: JobKind[State], key: str) -> object:
         """What a job found, None where it found nothing (yet). Raises NotFoundError."""
-        return self._job(kind, key).found
+        return self._job(kind, key).result
 
     def going(self, kind: JobKind[State], session: str | None = None) -> list[State]:
         """Those that are not over, of a session or of all, the oldest first."""

@@ -143,8 +143,8 @@ class SetRecording:
                     self._stopping.wait(LOOK_SECONDS / 4)
                     continue
                 self._go()
-            found, states = self._cameras.newest_set(self._came, self._fps), self._watch()
-            if found is None:
+            pictures, states = self._cameras.newest_set(self._came, self._fps), self._watch()
+            if pictures is None:
                 if all(state == "ended" for state in states):
                     return "all replayed videos are over"
                 if "running" in states:
@@ -154,11 +154,11 @@ class SetRecording:
                 self._cameras.wait(LOOK_SECONDS)
                 continue
             heard = self._clock()
-            frame = self._number(found)
+            frame = self._number(pictures)
             if frame >= self._last:
                 return "its time was over"
-            self._writer.put(frame, found)
-            self._frame, self._came = frame, max(shot.came for shot in found.shots.values())
+            self._writer.put(frame, pictures)
+            self._frame, self._came = frame, max(shot.came for shot in pictures.shots.values())
             self._sets += 1
             self._first_there.set()
         return "it was stopped"
@@ -178,8 +178,8 @@ class SetRecording:
         self._went = self._came = self._clock()
         self._readers.release()
 
-    def _number(self, found: PictureSet) -> int:
+    def _number(self, pictures: PictureSet) -> int:
         """The set's number, which tells its time: a set that never became complete has none."""
         if self._went is None:
             return 0
-        return max(self._frame + 1, 1 + round((found.moment - self._went) * self._fps))
+        return max(self._frame + 1, 1 + round((pictures.moment - self._went) * self._fps))

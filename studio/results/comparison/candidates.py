@@ -90,8 +90,8 @@ def candidates(lineup: Lineup) -> tuple[Candidate, ...]:
 
 def expanded(names: Sequence[str]) -> tuple[str, ...]:
     """The names with those of LINEUPS expanded. Raises SettingsError for an unknown one."""
-    found = [one for name in names for one in LINEUPS.get(name, (name,))]
-    for name in found:
+    members = [one for name in names for one in LINEUPS.get(name, (name,))]
+    for name in members:
         tracker, colon, label = name.partition(":")
         if tracker not in TRACKERS:
             known = ", ".join((*sorted(TRACKERS), *VARIANTS, *LINEUPS))
@@ -99,7 +99,7 @@ def expanded(names: Sequence[str]) -> tuple[str, ...]:
         if colon and not LABEL.fullmatch(label):
             hint = "After the colon write letters, digits, - and _, like annealed:eq13."
             raise SettingsError(f"'{name}' is not a tracker's name.", hint)
-    return tuple(found)
+    return tuple(members)
 
 
 def _candidate(name: str, lineup: Lineup) -> Candidate:

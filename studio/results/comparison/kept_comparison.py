@@ -134,12 +134,12 @@ class KeptComparison:
         ended = msgspec.structs.replace(self.record(), ended=how, problem=problem)
         RECORD.write(self.folder / RECORD_NAME, ended)
 
-    def finish(self, found: Comparison | Sweep) -> None:
+    def finish(self, measured: Comparison | Sweep) -> None:
         """Write the result, the frames first, so that both exist once there is a result."""
-        if isinstance(found, Sweep):
-            frames, result = sweep_csv(found), sweep_document(found)
+        if isinstance(measured, Sweep):
+            frames, result = sweep_csv(measured), sweep_document(measured)
         else:
-            frames, result = frames_csv(found), result_of(found)
+            frames, result = frames_csv(measured), result_of(measured)
         atomic_files.write_text(self.folder / FRAMES_NAME, frames)
         atomic_files.write_bytes(self.folder / RESULT_NAME, msgspec.json.encode(result) + b"\n")
 

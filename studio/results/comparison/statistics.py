@@ -144,8 +144,8 @@ def overall(verdicts: Iterable[str]) -> str:
     """The verdict of the hardest of several claims: the first of HARDEST_FIRST that one of them has; "answered" where
     nothing is compared.
     """
-    found = set(verdicts)
-    return next((verdict for verdict in HARDEST_FIRST if verdict in found), "answered")
+    given = set(verdicts)
+    return next((verdict for verdict in HARDEST_FIRST if verdict in given), "answered")
 
 
 def firmness(seeds: int) -> str:
@@ -166,7 +166,7 @@ def _interval(samples: tuple[Array, ...], statistic: Statistic, level: float) ->
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             # Samples whose resamples hardly differ (a median, a maximum) have no acceleration: use percentiles.
             warnings.simplefilter("ignore")
-            found = scipy.stats.bootstrap(
+            interval = scipy.stats.bootstrap(
                 samples,
                 statistic,
                 n_resamples=RESAMPLES,
@@ -175,8 +175,8 @@ def _interval(samples: tuple[Array, ...], statistic: Statistic, level: float) ->
                 paired=len(samples) > 1,
                 rng=np.random.default_rng(SEED),
             ).confidence_interval
-        if math.isfinite(found.low) and math.isfinite(found.high):
-            return float(found.low), float(found.high)
+        if math.isfinite(interval.low) and math.isfinite(interval.high):
+            return float(interval.low), float(interval.high)
     return math.nan, math.nan
 
 

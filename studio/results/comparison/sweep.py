@@ -210,14 +210,14 @@ def measured_run(session: Session, run: StoredRun) -> Swept:
         if math.isfinite(share)
     }
     weights = dict(zip(line.frames.tolist(), line.log_weights.tolist(), strict=True))
-    found = None
+    evaluation = None
     if session.truth_path is not None:
         try:
             truth = read_trc(session.truth_path)
-            found = evaluate(poses, numbers, run.body(), truth, session.manifest.fps)
+            evaluation = evaluate(poses, numbers, run.body(), truth, session.manifest.fps)
         except TruthError:
-            found = None
-    errors = dict(zip(found.frames, found.per_frame_mm, strict=True)) if found else {}
+            evaluation = None
+    errors = dict(zip(evaluation.frames, evaluation.per_frame_mm, strict=True)) if evaluation else {}
     if errors:
         worst_frame = max(errors, key=lambda frame: errors[frame])
     else:
@@ -226,9 +226,9 @@ def measured_run(session: Session, run: StoredRun) -> Swept:
     return Swept(
         run=run.name,
         worst_frame=worst_frame,
-        error=round(found.mean_mm, 4) if found else None,
-        worst=round(found.worst_mm, 3) if found else None,
-        limb_lost=found.lost_frames if found else None,
+        error=round(evaluation.mean_mm, 4) if evaluation else None,
+        worst=round(evaluation.worst_mm, 3) if evaluation else None,
+        limb_lost=evaluation.lost_frames if evaluation else None,
         overlap=round(float(np.mean(list(overlaps.values()))), 5) if overlaps else None,
         search_lost=sum(state in (LOST, LIMB_LOST) for state in line.tracking),
         evaluations=int(np.median(line.evaluations)),
@@ -370,8 +370,8 @@ def _points_table(sweep: Sweep) -> dict[str, Any]:
     for place, candidate in enumerate(sweep.plan.candidates):
         point = [candidate.changes[name] for name in sweep.plan.vary]
         for one in sweep.measures:
-            found = [getattr(run, one.key) for run in sweep.of_point(place)]
-            known = [float(value) for value in found if value is not None]
+            values = [getattr(run, one.key) for run in sweep.of_point(place)]
+            known = [float(value) for value in values if value is not None]
             rows.append([*point, one.key, *(_mean(known) if known else (None, None, None))])
     return {"name": "points", "title": "Points of the grid", "columns": columns, "rows": rows}
 
@@ -385,8 +385,8 @@ def _mean(numbers: list[float]) -> tuple[float, float, float]:
     return round(float(np.mean(numbers)), 6), round(low, 6), round(high, 6)
 
 
-def _cell(found: Sequence[float | None]) -> str:
-    known = [value for value in found if value is not None]
+def _cell(values: Sequence[float | None]) -> str:
+    known = [value for value in values if value is not None]
     return f"{np.mean(known):.4g}" if known else ""
 
 
@@ -394,13 +394,13 @@ def _values(declared: Mapping[str, Knob], name: str, wanted: Sequence[object]) -
     """A knob's values as its own type. Raises SettingsError for an unknown knob, and one out of range or twice."""
     if name not in declared:
         raise SettingsError(f"There is no setting '{name}'.", f"Known: {', '.join(sorted(declared))}.")
-    found = tuple(checked(declared[name], value) for value in wanted)
-    if not found:
+    values = tuple(checked(declared[name], value) for value in wanted)
+    if not values:
         raise SettingsError(f"Knob '{name}' has no values.", "Give it two or more.")
-    for value in found:
-        if found.count(value) > 1:
+    for value in values:
+        if values.count(value) > 1:
             raise SettingsError(f"Knob '{name}' has the value {value} twice.", "Give each value once.")
-    return found
+    return values
 
 
 def _check_size(

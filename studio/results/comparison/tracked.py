@@ -187,11 +187,11 @@ def track(
             return known_silhouettes(body, seen_with, evidence(frame), poses[row], following.memories[row])
 
         poses = with_sides_right(body, seen_with, np.array(frames), poses, rate, silhouettes_of)[0]
-    found = measured(session, body, poses, np.array(frames), evaluations, seconds)
+    figures = measured(session, body, poses, np.array(frames), evaluations, seconds)
     by_frame = dict(zip(frames, named, strict=True))
     impossible = int((~HardPriors(body).hold(poses, limbs_apart=True)).sum())
-    named_of = [by_frame[frame] for frame in found.frames]
-    return dataclasses.replace(found, named=named_of, impossible_frames=impossible)
+    named_of = [by_frame[frame] for frame in figures.frames]
+    return dataclasses.replace(figures, named=named_of, impossible_frames=impossible)
 
 
 def measured(
@@ -205,15 +205,15 @@ def measured(
     """The errors of poses (K, D) of frames (K,) of a session with truth."""
     assert session.truth_path is not None
     truth = read_trc(session.truth_path)
-    found = evaluate(poses, frames, body, truth, session.manifest.fps)
+    evaluation = evaluate(poses, frames, body, truth, session.manifest.fps)
     return Tracked(
-        frames=[int(frame) for frame in found.frames],
-        per_frame_mm=[round(value, 3) for value in found.per_frame_mm],
-        lost=[list(limbs) for limbs in found.lost_by_frame],
-        mean_mm=round(found.mean_mm, 4),
-        worst_mm=round(found.worst_mm, 3),
-        lost_frames=found.lost_frames,
-        lost_limbs=list(found.lost_limbs),
+        frames=[int(frame) for frame in evaluation.frames],
+        per_frame_mm=[round(value, 3) for value in evaluation.per_frame_mm],
+        lost=[list(limbs) for limbs in evaluation.lost_by_frame],
+        mean_mm=round(evaluation.mean_mm, 4),
+        worst_mm=round(evaluation.worst_mm, 3),
+        lost_frames=evaluation.lost_frames,
+        lost_limbs=list(evaluation.lost_limbs),
         evaluations=evaluations,
         seconds=round(seconds, 4),
     )

@@ -78,20 +78,20 @@ def clutter_before(
     count: int, cameras: tuple[Camera, ...], points: Array, way: Array, seed: int
 ) -> tuple[Block, ...]:
     """The same for any body. points : (F, K, 3) that stay clear of the objects, mm. way : (F, 2) its middle's path."""
-    rng, found = np.random.default_rng((seed, 9)), list[Block]()
+    rng, blocks = np.random.default_rng((seed, 9)), list[Block]()
     for number in range(count):
         camera = cameras[number % len(cameras)]
         for _ in range(TRIES):
             block = _thing(rng, way[rng.integers(len(way))], camera.centre, post=number % 2 == 0)
             if _is_free(block, points):
-                found.append(block)
+                blocks.append(block)
                 break
         else:
             raise StudioError(
                 f"There is no room for {count} things in front of the person.",
                 "Give fewer in damage.clutter, or choose a motion that needs less room.",
             )
-    return tuple(found)
+    return tuple(blocks)
 
 
 def _thing(rng: np.random.Generator, person: Array, camera: Array, *, post: bool) -> Block:

@@ -117,14 +117,14 @@ def body_distance(px, py, pz, pieces, labels, active, count):
 @njit(error_model="numpy", fastmath=True)
 def nearest_piece(px, py, pz, pieces, active, count):
     """The piece whose own surface is closest: its material is used."""
-    best, found = FAR, -1
+    best, nearest = FAR, -1
     for index in range(count):
         if beyond(px, py, pz, pieces[active[index]], best):
             continue
         distance = piece_distance(px, py, pz, pieces[active[index]])
         if distance < best:
-            best, found = distance, active[index]
-    return found
+            best, nearest = distance, active[index]
+    return nearest
 
 
 @njit(error_model="numpy", fastmath=True)

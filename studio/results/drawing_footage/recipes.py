@@ -177,7 +177,7 @@ def people_beside(
     """Who else is in a recipe's room: their recipes and motions. Raises StudioError, also where they do not move over
     the same frames.
     """
-    found: list[tuple[Recipe, PersonMotion]] = []
+    people: list[tuple[Recipe, PersonMotion]] = []
     for name in recipe.beside:
         path = named_recipe(name, recipe_folder)
         person = read_recipe(path)
@@ -188,8 +188,8 @@ def people_beside(
                 "Give both recipes the same frames and fps.",
             )
         skeleton, _ = recipe_person(person, path.parent, np.random.default_rng(person.seed))
-        found.append((person, first_frames(recipe_motion(person, path.parent, skeleton), frames)))
-    return found
+        people.append((person, first_frames(recipe_motion(person, path.parent, skeleton), frames)))
+    return people
 
 
 def _write_beside(person: Recipe, motion: PersonMotion, folder: Path) -> None:

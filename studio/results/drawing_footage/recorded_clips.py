@@ -81,7 +81,7 @@ def from_local(motion: PersonMotion, local: dict[str, Array]) -> PersonMotion:
 
 def _changed(local: dict[str, Array], fps: float, size: float, rng: np.random.Generator) -> dict[str, Array]:
     """The local turns with slow changes of about `size` radians; joints that hardly move change less."""
-    found: dict[str, Array] = {}
+    changed: dict[str, Array] = {}
     for name, turn in local.items():
         slow = smooth_noise(rng, len(turn), 3, fps, TURN_PERIOD_S)
         noise = np.sqrt(1.0 - LASTING**2) * slow + LASTING * rng.standard_normal(3)
@@ -90,10 +90,10 @@ def _changed(local: dict[str, Array], fps: float, size: float, rng: np.random.Ge
         share = STILL_SHARE + (1.0 - STILL_SHARE) * min(spread / FULL_SPREAD, 1.0)
         noise = size * LESS.get(name, 1.0) * share * noise
         if name in HINGES:
-            found[name] = turn @ axis_turn(1, _bend_change(turn, noise[:, 1]))
+            changed[name] = turn @ axis_turn(1, _bend_change(turn, noise[:, 1]))
         else:
-            found[name] = turn @ Rotation.from_rotvec(noise).as_matrix()
-    return found
+            changed[name] = turn @ Rotation.from_rotvec(noise).as_matrix()
+    return changed
 
 
 def _bend_change(turn: Array, change: Array) -> Array:

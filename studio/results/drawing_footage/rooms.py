@@ -208,15 +208,15 @@ def drawn_room(seed: int) -> Room:
 
 def _walls(rng: np.random.Generator, half: tuple[float, float], height: float) -> list[Block]:
     """Panels over the walls, some of them patterned."""
-    found: list[Block] = []
+    blocks: list[Block] = []
     for axis in (0, 1):
         for sign in (-1.0, 1.0):
             colour = _colour(rng, 0.35, 0.78, 0.06)
             pattern = int(rng.choice([PLAIN, PLAIN, GRAIN, TILES]))
             centre, size = [0.0, 0.0, 0.5 * height], [half[0] - 20, half[1] - 20, 0.5 * height - 40]
             centre[axis], size[axis] = sign * (half[axis] - 2.0), 2.0
-            found.append(Block(_three(centre), _three(size), colour, pattern, _darker(colour, 0.85)))
-    return found
+            blocks.append(Block(_three(centre), _three(size), colour, pattern, _darker(colour, 0.85)))
+    return blocks
 
 
 def _furniture(rng: np.random.Generator, half: tuple[float, float]) -> Block:

@@ -36,7 +36,7 @@ MATERIALS = ("skin", "shirt", "trousers", "shoes", "hair", "stripes")
 
 def dressed(wardrobe: str, colours: Mapping[str, tuple[float, float, float]]) -> NDArray[np.float64]:
     """(6, 3) a wardrobe with other colours for some of the MATERIALS."""
-    found = WARDROBES[wardrobe].copy()
+    palette = WARDROBES[wardrobe].copy()
     for material, colour in colours.items():
-        found[MATERIALS.index(material)] = colour
-    return found
+        palette[MATERIALS.index(material)] = colour
+    return palette

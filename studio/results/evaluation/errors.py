@@ -54,13 +54,15 @@ def _turn(spread: Array, target: Array) -> tuple[Array, float]:
     return (left * signs) @ right, float(np.sum(stretches * signs))
 
 
-def laid_on(truth_points: Array, found: Array, seen: NDArray[np.bool_], how: str) -> tuple[Array, str]:
+def laid_on(
+    truth_points: Array, tracked_points: Array, seen: NDArray[np.bool_], how: str
+) -> tuple[Array, str]:
     """True points of another world (K, M, 3) laid on the found ones by one motion for all frames, and what it was.
 
     seen : (K, M) points that count. how : RIGID, or SIMILARITY, which scales as well. Raises TruthError for fewer than
     three points, or points on a line.
     """
-    points, goal = truth_points[seen], found[seen]
+    points, goal = truth_points[seen], tracked_points[seen]
     middle, to = points.mean(axis=0), goal.mean(axis=0)
     extents = np.linalg.svd(points - middle, compute_uv=False)
     if len(points) < FEWEST_POINTS or extents[1] <= ON_A_LINE * extents[0]:
@@ -71,7 +73,7 @@ def laid_on(truth_points: Array, found: Array, seen: NDArray[np.bool_], how: str
     turn, stretched = _turn(points - middle, goal - to)
     scale = stretched / float(np.sum((points - middle) ** 2)) if how == SIMILARITY else 1.0
     scaled = f", scaled by {scale:.4g}" if how == SIMILARITY else ""
-    words = f"{how}, one motion for {len(found)} frames, fitted to {len(points)} points{scaled}"
+    words = f"{how}, one motion for {len(tracked_points)} frames, fitted to {len(points)} points{scaled}"
     return scale * (truth_points - middle) @ turn.T + to, words
 
 
@@ -139,12 +141,12 @@ def evaluate(
     """
     names, of_body, of_truth, unmatched = _common_markers(body, truth)
     numbers, kept, truth_points = _common_frames(np.asarray(frames), truth, of_truth, fps)
-    found = marker_points(body, np.asarray(poses, dtype=float)[kept])[:, of_body]
+    tracked_points = marker_points(body, np.asarray(poses, dtype=float)[kept])[:, of_body]
     seen = np.asarray(np.isfinite(truth_points).all(axis=2))
     words = UNALIGNED
     if align != UNALIGNED:
-        truth_points, words = laid_on(truth_points, found, seen, align)
-    distances = np.where(seen, np.linalg.norm(found - truth_points, axis=2), np.nan)
+        truth_points, words = laid_on(truth_points, tracked_points, seen, align)
+    distances = np.where(seen, np.linalg.norm(tracked_points - truth_points, axis=2), np.nan)
     per_frame = np.nanmean(distances, axis=1)
     threshold = lost_mm(body)
     lost = np.nan_to_num(distances) > threshold
@@ -167,13 +169,13 @@ def evaluate(
             if np.isfinite(distances[:, index]).any()
         },
         per_frame_mm=tuple(float(value) for value in per_frame),
-        root_aligned_mm=_root_aligned(found, truth_points, seen),
-        procrustes_mm=_procrustes(found, truth_points, seen),
+        root_aligned_mm=_root_aligned(tracked_points, truth_points, seen),
+        procrustes_mm=_procrustes(tracked_points, truth_points, seen),
         unmatched_markers=unmatched,
         lost_threshold_mm=threshold,
         alignment=words,
-        **_degrees_off(found, truth_points, marker_links(body, names), names),
-        **_constant_part(found - truth_points, names),
+        **_degrees_off(tracked_points, truth_points, marker_links(body, names), names),
+        **_constant_part(tracked_points - truth_points, names),
     )
 
 
@@ -190,14 +192,14 @@ def meant_axes(poses: Array, frames: Indices, body: BodyModel, truth: MarkerMoti
     """
     _, of_body, of_truth, _ = _common_markers(body, truth)
     _, kept, goal = _common_frames(np.asarray(frames), truth, of_truth, fps)
-    found = marker_points(body, np.asarray(poses, dtype=float)[kept])[:, of_body]
+    tracked_points = marker_points(body, np.asarray(poses, dtype=float)[kept])[:, of_body]
     seen = np.asarray(np.isfinite(goal).all(axis=2))
-    found, goal = found[seen], goal[seen]
-    off = float(np.linalg.norm(found - goal, axis=1).mean())
-    if off < NEAR * float(np.linalg.norm(found - found.mean(axis=0), axis=1).mean()):
+    tracked_points, goal = tracked_points[seen], goal[seen]
+    off = float(np.linalg.norm(tracked_points - goal, axis=1).mean())
+    if off < NEAR * float(np.linalg.norm(tracked_points - tracked_points.mean(axis=0), axis=1).mean()):
         return ""
     tries = {
-        (unit, number): float(np.linalg.norm(found - unit * goal @ turn.T, axis=1).mean())
+        (unit, number): float(np.linalg.norm(tracked_points - unit * goal @ turn.T, axis=1).mean())
         for unit in OTHER_UNITS
         for number, turn in enumerate(QUARTER_TURNS)
     }
@@ -218,14 +220,14 @@ def meant_axes(poses: Array, frames: Indices, body: BodyModel, truth: MarkerMoti
 
 def _quarter_turns() -> tuple[Array, ...]:
     """All 24 rotations that lay axes on axes."""
-    found: list[Array] = []
+    turns: list[Array] = []
     for order in itertools.permutations(range(3)):
         for signs in itertools.product((1.0, -1.0), repeat=3):
             turn = np.zeros((3, 3))
             turn[range(3), order] = signs
             if np.linalg.det(turn) > 0.0:
-                found.append(turn)
-    return tuple(found)
+                turns.append(turn)
+    return tuple(turns)
 
 
 QUARTER_TURNS = _quarter_turns()
@@ -248,7 +250,7 @@ def _constant_part(off: Array, names: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _degrees_off(
-    found: Array, truth_points: Array, links: list[tuple[int, int]], names: tuple[str, ...]
+    tracked_points: Array, truth_points: Array, links: list[tuple[int, int]], names: tuple[str, ...]
 ) -> dict[str, Any]:
     """The fields in degrees of `Evaluation`. found, truth_points : (K, M, 3), NaN where missing. links : (upper, lower)
     pairs of markers, a limb each; joints lie where two of them meet.
@@ -256,13 +258,16 @@ def _degrees_off(
     directions: dict[str, float] = {}
     angles: dict[str, float] = {}
     for upper, lower in links:
-        off = _between(found[:, lower] - found[:, upper], truth_points[:, lower] - truth_points[:, upper])
+        off = _between(
+            tracked_points[:, lower] - tracked_points[:, upper],
+            truth_points[:, lower] - truth_points[:, upper],
+        )
         _keep_mean(directions, f"{names[upper]}_{names[lower]}", off)
         onward = [other for start, other in links if start == lower]
         for other in onward:
             bent = [
                 _between(points[:, lower] - points[:, upper], points[:, other] - points[:, lower])
-                for points in (found, truth_points)
+                for points in (tracked_points, truth_points)
             ]
             joint = names[lower] if len(onward) == 1 else f"{names[lower]} to {names[other]}"
             _keep_mean(angles, joint, np.abs(bent[0] - bent[1]))
@@ -378,21 +383,21 @@ def _common_frames(
     return frames[kept], kept, truth_points[some]
 
 
-def _root_aligned(found: Array, truth_points: Array, seen: NDArray[np.bool_]) -> float:
+def _root_aligned(tracked_points: Array, truth_points: Array, seen: NDArray[np.bool_]) -> float:
     """Mean over frames of the markers' mean distance, mm, the root (the first marker seen, in the body's
     order) laid on the true one.
     """
     means: list[float] = []
-    for points, goal, there in zip(found, truth_points, seen, strict=True):
+    for points, goal, there in zip(tracked_points, truth_points, seen, strict=True):
         laid = moved_to_root(points[there], goal[there], 0)
         means.append(float(np.linalg.norm(laid - goal[there], axis=1).mean()))
     return float(np.mean(means))
 
 
-def _procrustes(found: Array, truth_points: Array, seen: NDArray[np.bool_]) -> float | None:
+def _procrustes(tracked_points: Array, truth_points: Array, seen: NDArray[np.bool_]) -> float | None:
     """Mean over frames of the markers' mean distance, mm, after the best similarity of each frame."""
     means: list[float] = []
-    for points, goal, there in zip(found, truth_points, seen, strict=True):
+    for points, goal, there in zip(tracked_points, truth_points, seen, strict=True):
         if there.sum() >= FEWEST_POINTS:
             laid = similarity_aligned(points[there], goal[there])
             means.append(float(np.linalg.norm(laid - goal[there], axis=1).mean()))

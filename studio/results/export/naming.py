@@ -83,26 +83,26 @@ class Points:
 @cache
 def name_map(name: str) -> NameMap:
     """A map by its name. Raises ExportError for one that there is not."""
-    found = Path(str(files("studio.results.export") / "name_maps" / f"{name}.toml"))
-    if not name.isalnum() or not found.is_file():
+    file = Path(str(files("studio.results.export") / "name_maps" / f"{name}.toml"))
+    if not name.isalnum() or not file.is_file():
         raise ExportError(
             f"There is no map of names '{name[:40]}'.", "Choose own, halpe26, mixamo or opensim."
         )
-    return decode_toml(read_file(found), NameMap)
+    return decode_toml(read_file(file), NameMap)
 
 
 def points_of(body: BodyModel, names: str) -> Points:
     """The points of a body under the names of a map ("own": its markers). Raises ExportError if it has none."""
     if names == OWN:
-        found = {
+        points = {
             marker.name: (marker.joint, np.asarray(marker.offset, dtype=float)) for marker in body.markers
         }
         missing: list[str] = []
     else:
         places = name_map(names).points
-        found = {name: place for name, entries in places.items() if (place := _place(body, entries))}
-        missing = [name for name in places if name not in found]
-    if not found:
+        points = {name: place for name, entries in places.items() if (place := _place(body, entries))}
+        missing = [name for name in places if name not in points]
+    if not points:
         raise ExportError(
             f"Body '{body.name}' has none of the points of '{names}'.", "Export with the body's own names."
         )
@@ -110,8 +110,8 @@ def points_of(body: BodyModel, names: str) -> Points:
     if missing:
         title = name_map(names).title
         note = f"Body '{body.name}' has no {enumerated(missing)}: these points of {title} are left out."
-    joints = np.array([joint for joint, _ in found.values()], dtype=np.int64)
-    return Points(tuple(found), joints, np.array([offset for _, offset in found.values()]), note)
+    joints = np.array([joint for joint, _ in points.values()], dtype=np.int64)
+    return Points(tuple(points), joints, np.array([offset for _, offset in points.values()]), note)
 
 
 def joint_names(own: tuple[str, ...], names: str) -> tuple[tuple[str, ...], str]:

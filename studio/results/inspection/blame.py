@@ -21,7 +21,7 @@ from studio.results.inspection.likelihoods import (
 )
 from studio.results.inspection.reading import InspectedFrame
 from studio.results.inspection.reference import true_pose
-from studio.results.inspection.tables import Found, Row, Selection, View, table
+from studio.results.inspection.tables import Row, Selection, View, ViewResult, table
 from studio.runs.tracks import RAW, best_track, pose_in_track
 from studio.search.likelihood.edge_region import EdgeRegionSettings
 from studio.search.likelihood.overlay import sample_points
@@ -132,12 +132,12 @@ def pulls_at(frame: InspectedFrame, evaluation: FrameEvaluation, pose: Array) ->
     """What cameras and terms add at the pose, and (D, V, T) the slope of each, nats a deviation σ0 of the parameter."""
     sigma = np.array(frame.of.run.record.sigma)
     steps = np.diag(STEP * sigma)
-    found = evaluation.shares(np.concatenate([pose[None], pose + steps, pose - steps]))
-    ahead, behind = found.values[1 : len(pose) + 1], found.values[len(pose) + 1 :]
-    return found, (ahead - behind) / (2.0 * STEP)
+    shares = evaluation.shares(np.concatenate([pose[None], pose + steps, pose - steps]))
+    ahead, behind = shares.values[1 : len(pose) + 1], shares.values[len(pose) + 1 :]
+    return shares, (ahead - behind) / (2.0 * STEP)
 
 
-def rows(frame: InspectedFrame, selection: Selection) -> Found:
+def rows(frame: InspectedFrame, selection: Selection) -> ViewResult:
     """The tables of view `blame`."""
     run, evaluation = frame.of, evaluation_of(frame)
     pose, reference = judged_pose(frame, selection.track), reference_pose(frame, selection.track)
@@ -158,7 +158,7 @@ def rows(frame: InspectedFrame, selection: Selection) -> Found:
                 if selection.limb in ("", limb) or limb == WHOLE_BODY
             ]
     _, pulls = pulls_at(frame, evaluation, pose)
-    return Found(
+    return ViewResult(
         {
             "matrix": matrix,
             "left_out": _left_out(shares, here, there),
@@ -204,18 +204,18 @@ def _areas(frame: InspectedFrame, evaluation: FrameEvaluation, pose: Array) -> l
     """Areas (mm² at the body) in which pose and silhouettes disagree by more than clothes explain."""
     silhouettes = silhouettes_by_camera(evaluation.evidence)
     cameras = tuple(camera for camera in frame.of.run.cameras() if camera.name in silhouettes)
-    found = Agreement(frame.of.body, cameras).of(pose, [silhouettes[camera.name] for camera in cameras])
-    groups, own = np.array(found.limbs), scale_of(frame.of.body) ** 2
+    agreement = Agreement(frame.of.body, cameras).of(pose, [silhouettes[camera.name] for camera in cameras])
+    groups, own = np.array(agreement.limbs), scale_of(frame.of.body) ** 2
     return [
         (
             camera.name,
             limb,
-            own * float(found.outside[view, groups == limb].sum()),
-            own * float(found.bare[view, groups == limb].sum()),
-            own * float(found.area[view, groups == limb].sum()),
+            own * float(agreement.outside[view, groups == limb].sum()),
+            own * float(agreement.bare[view, groups == limb].sum()),
+            own * float(agreement.area[view, groups == limb].sum()),
         )
         for view, camera in enumerate(cameras)
-        for limb in dict.fromkeys(found.limbs)
+        for limb in dict.fromkeys(agreement.limbs)
     ]
 
 

@@ -67,7 +67,7 @@ def view_fits(
     views = {view.camera: view for view in evidence.views}
     seen = tuple(camera for camera in cameras if camera.name in views)
     corners = OutlineProjector.of_body(body, seen).corners(pose[None])[0][0]
-    found: list[ViewFit] = []
+    fits: list[ViewFit] = []
     for camera, quads in zip(seen, corners, strict=True):
         mask = views[camera.name].mask
         factor = ROWS / mask.shape[0]
@@ -77,8 +77,8 @@ def view_fits(
         )
         quads = quads[np.isfinite(quads).all(axis=(1, 2))] * factor
         if len(quads):
-            found.append(_fit(camera.name, np.asarray(small, dtype=np.float32), quads, 1.0 / factor))
-    return found
+            fits.append(_fit(camera.name, np.asarray(small, dtype=np.float32), quads, 1.0 / factor))
+    return fits
 
 
 def _fit(name: str, mask: Floats, quads: Array, pixels: float) -> ViewFit:

@@ -71,7 +71,7 @@ def compare_stored(runs: Sequence[InspectedRun]) -> RunsCompared:
 
 
 def _curve(name: str, run: InspectedRun) -> list[Row]:
-    errors, shares, found = errors_of(run), disagreements_of(run), summaries(run)
+    errors, shares, by_frame = errors_of(run), disagreements_of(run), summaries(run)
     with run.run.results() as results:
         line = results.timeline()
     table: list[Row] = []
@@ -88,7 +88,7 @@ def _curve(name: str, run: InspectedRun) -> list[Row]:
                 limb,
                 max(share.values()) if share else None,
                 no_value(float(line.log_weights[at])),
-                no_value(float(found[number].effective[-1])) if number in found else None,
+                no_value(float(by_frame[number].effective[-1])) if number in by_frame else None,
                 float(line.milliseconds[at]),
             )
         )
@@ -104,8 +104,8 @@ def _worst(name: str, curve: list[Row]) -> Row:
         error, share, weight = (float("-inf") if row[at] is None else float(str(row[at])) for at in (3, 5, 6))
         return error, share, -weight
 
-    found = max(curve, key=badness)
-    return (name, found[1], found[2], found[4], found[5])
+    worst = max(curve, key=badness)
+    return (name, worst[1], worst[2], worst[4], worst[5])
 
 
 def _differing(runs: Sequence[InspectedRun]) -> list[Row]:

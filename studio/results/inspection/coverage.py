@@ -13,7 +13,7 @@ from studio.results.inspection.limbs import errors_of
 from studio.results.inspection.over_frames import spread_by_limb, summaries
 from studio.results.inspection.reading import InspectedFrame, InspectedRun, no_value
 from studio.results.inspection.reference import limbs_of_points
-from studio.results.inspection.tables import Found, Row, Selection, View, table
+from studio.results.inspection.tables import Row, Selection, View, ViewResult, table
 
 VIEW = View(
     "coverage",
@@ -60,18 +60,18 @@ FEWEST = 4
 NO_TRUTH = "The session has no truth: there is no error to compare the spread with."
 
 
-def of_frame(frame: InspectedFrame, selection: Selection) -> Found:
+def of_frame(frame: InspectedFrame, selection: Selection) -> ViewResult:
     """No tables of one frame."""
-    return Found({}, ("Coverage is of a whole run.",))
+    return ViewResult({}, ("Coverage is of a whole run.",))
 
 
-def over_run(run: InspectedRun, selection: Selection) -> Found:
+def over_run(run: InspectedRun, selection: Selection) -> ViewResult:
     """The tables of view `coverage`."""
-    found, errors = summaries(run), errors_of(run, selection.track)
+    by_frame, errors = summaries(run), errors_of(run, selection.track)
     limbs = list(dict.fromkeys(limbs_of_points(run.body)))
     frames: list[Row] = []
     pairs: dict[str, list[tuple[float, float]]] = {limb: [] for limb in limbs}
-    for frame, entry in found.items():
+    for frame, entry in by_frame.items():
         for limb, spread in spread_by_limb(run, entry).items():
             error = errors.get(frame, {}).get(limb, float("nan"))
             frames.append((frame, limb, spread, no_value(error)))
@@ -79,12 +79,14 @@ def over_run(run: InspectedRun, selection: Selection) -> Found:
                 pairs[limb].append((spread, error))
     if selection.limb in limbs:
         limbs = [selection.limb]
-    return Found(
+    return ViewResult(
         {
             "frames": frames,
             "correlation": [_correlated(limb, pairs[limb]) for limb in limbs],
             "pit": [
-                row for limb in limbs for row in _ranks(run, limb, [entry.ranks for entry in found.values()])
+                row
+                for limb in limbs
+                for row in _ranks(run, limb, [entry.ranks for entry in by_frame.values()])
             ],
         },
         () if errors else (NO_TRUTH,),
@@ -96,8 +98,8 @@ def _correlated(limb: str, pairs: list[tuple[float, float]]) -> Row:
     if len(pairs) < FEWEST or len({pair[0] for pair in pairs}) < 2:
         return (limb, len(pairs), None, None)
     table = np.array(pairs)
-    found = scipy.stats.spearmanr(table[:, 0], table[:, 1])
-    return (limb, len(pairs), no_value(float(found.statistic)), no_value(float(found.pvalue)))
+    correlation = scipy.stats.spearmanr(table[:, 0], table[:, 1])
+    return (limb, len(pairs), no_value(float(correlation.statistic)), no_value(float(correlation.pvalue)))
 
 
 def _ranks(run: InspectedRun, limb: str, ranks: list[np.ndarray]) -> list[Row]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from studio.foundations.arrays import Array, Indices, Mask
 from studio.results.inspection.reading import InspectedFrame
-from studio.results.inspection.tables import Found, Row, Selection, View, table
+from studio.results.inspection.tables import Row, Selection, View, ViewResult, table
 from studio.search.trackers.tracker import NO_PARENT
 
 VIEW = View(
@@ -76,7 +76,7 @@ def children_of(frame: InspectedFrame, layer: int) -> Indices:
     return np.bincount(drawn[drawn != NO_PARENT], minlength=frame.size(layer))
 
 
-def rows(frame: InspectedFrame, selection: Selection) -> Found:
+def rows(frame: InspectedFrame, selection: Selection) -> ViewResult:
     """The tables of view `genealogy`."""
     layers, count = frame.layers, len(frame.layers)
     parents, sizes = [record.parents for record in layers], [frame.size(at) for at in range(count)]
@@ -120,7 +120,7 @@ def rows(frame: InspectedFrame, selection: Selection) -> Found:
                 int((second != NO_PARENT).sum()),
             )
         )
-    return Found({"particles": particles, "ancestors": summary}, tuple(notes))
+    return ViewResult({"particles": particles, "ancestors": summary}, tuple(notes))
 
 
 def spread_out(frame: InspectedFrame, layer: int) -> tuple[Array, Array]:

@@ -21,7 +21,7 @@ from studio.results.inspection.likelihoods import (
 from studio.results.inspection.modes import modes_of
 from studio.results.inspection.reading import InspectedFrame, no_value
 from studio.results.inspection.reference import true_pose
-from studio.results.inspection.tables import Found, Row, Selection, View, table
+from studio.results.inspection.tables import Row, Selection, View, ViewResult, table
 
 VIEW = View(
     "landscape",
@@ -156,12 +156,12 @@ def _end(frame: InspectedFrame, towards: str, selection: Selection, layer: int) 
             raise NotFoundError(f"Frame {frame.number} has no truth.", "Select a parameter or another pose.")
         return truth.pose
     if towards == SECOND_MODE:
-        found = modes_of(frame.of.body, frame.layers[layer].poses, frame.weights(layer))
-        if len(found) < 2:
+        modes = modes_of(frame.of.body, frame.layers[layer].poses, frame.weights(layer))
+        if len(modes) < 2:
             raise NotFoundError(
                 f"Layer {layer + 1} of frame {frame.number} has one mode.", "Select another layer."
             )
-        return found[1].pose
+        return modes[1].pose
     return named_pose(frame, towards, selection.particle, layer)
 
 
@@ -171,7 +171,7 @@ def _least_settled(frame: InspectedFrame) -> int:
     return int(np.argmax(left))
 
 
-def rows(frame: InspectedFrame, selection: Selection) -> Found:
+def rows(frame: InspectedFrame, selection: Selection) -> ViewResult:
     """The tables of view `landscape`."""
     run, evaluation = frame.of, evaluation_of(frame)
     line = line_of(frame, selection)
@@ -192,7 +192,7 @@ def rows(frame: InspectedFrame, selection: Selection) -> Found:
     scale = np.where(sigma > 0.0, sigma, 1.0)
     across = None if second is None else record.poses[:, second]
     ends = line.poses[[0, -1]] if line.parameter is not None else np.stack([line.base, line.base + line.away])
-    return Found(
+    return ViewResult(
         {
             "slice": [
                 (float(place), line.unit, float(value), bool(inside))
@@ -244,13 +244,13 @@ def rows(frame: InspectedFrame, selection: Selection) -> Found:
 
 
 def _marks(frame: InspectedFrame, selection: Selection) -> dict[str, Array]:
-    found = {
+    marks = {
         "estimate": frame.estimate(selection.track),
         "searched": frame.searched(),
         "best particle": frame.layers[-1].best,
     }
     truth = true_pose(frame.of, frame.number)
-    return found if truth is None else found | {"truth": truth.pose}
+    return marks if truth is None else marks | {"truth": truth.pose}
 
 
 def _plane(

@@ -43,12 +43,12 @@ def _distances(run: InspectedRun, track: str) -> dict[int, Array]:
     poses = dict(zip(chosen.frames.tolist(), chosen.poses, strict=True))
     if run.tried is not None:
         poses[run.tried.number] = run.tried.result.estimate.pose
-    found: dict[int, Array] = {}
+    by_frame: dict[int, Array] = {}
     for frame, points in zip(poses, body_points(run.body, np.stack(list(poses.values()))), strict=True):
         truth = true_points(run, frame)
         if truth is not None:
-            found[frame] = np.linalg.norm(points - truth, axis=1)
-    return found
+            by_frame[frame] = np.linalg.norm(points - truth, axis=1)
+    return by_frame
 
 
 def limbs_too_far(body: BodyModel, distances: Array) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ from studio.results.evaluation.errors import lost_mm
 from studio.results.inspection.over_frames import stamps_of
 from studio.results.inspection.reading import InspectedFrame, InspectedRun, TriedFrame, no_value
 from studio.results.inspection.reference import body_points, by_limb, true_points
-from studio.results.inspection.tables import Found, Row, Selection, View, table
+from studio.results.inspection.tables import Row, Selection, View, ViewResult, table
 from studio.search.trackers.side_exchange import kinds_of
 from studio.sessions.results_reader import ResultsReader
 
@@ -163,13 +163,13 @@ def exchanged_in(body: BodyModel, one: Array, other: Array) -> str:
     """
     target = body_points(body, other[None])[0]
     away = float(np.linalg.norm(body_points(body, one[None])[0] - target, axis=1).mean())
-    found, nearest = "", 0.5 * away
+    exchanged, nearest = "", 0.5 * away
     for kind in kinds_of(body):
         points = body_points(body, kind.offered(one)[None])[0]
         distance = float(np.linalg.norm(points - target, axis=1).mean())
         if distance < nearest:
-            found, nearest = kind.what, distance
-    return found
+            exchanged, nearest = kind.what, distance
+    return exchanged
 
 
 def farthest_limb(body: BodyModel, one: Array, other: Array) -> tuple[str, float]:
@@ -179,16 +179,16 @@ def farthest_limb(body: BodyModel, one: Array, other: Array) -> tuple[str, float
     return limb, away[limb]
 
 
-def rows(frame: InspectedFrame, selection: Selection) -> Found:
+def rows(frame: InspectedFrame, selection: Selection) -> ViewResult:
     """The tables of view `modes`: clusters of the selected layer and, of the same places, their mass in every layer."""
     run, chosen = frame.of, frame.layer(selection)
     body, record = run.body, frame.layers[chosen]
-    found = modes_of(body, record.poses, frame.weights(chosen))
+    modes = modes_of(body, record.poses, frame.weights(chosen))
     truth = true_points(run, frame.number)
     table: list[Row] = []
-    for number, mode in enumerate(found):
-        limb, _ = farthest_limb(body, mode.points, found[0].points)
-        distance = float(np.linalg.norm(mode.points - found[0].points, axis=1).max())
+    for number, mode in enumerate(modes):
+        limb, _ = farthest_limb(body, mode.points, modes[0].points)
+        distance = float(np.linalg.norm(mode.points - modes[0].points, axis=1).max())
         error = float("nan")
         if truth is not None:
             away: Array = np.linalg.norm(mode.points - truth, axis=1)
@@ -201,33 +201,33 @@ def rows(frame: InspectedFrame, selection: Selection) -> Found:
                 float(record.log_weights[mode.members].max()),
                 distance,
                 limb if number else "",
-                exchanged_in(body, found[0].pose, mode.pose) if number else "",
+                exchanged_in(body, modes[0].pose, mode.pose) if number else "",
                 no_value(error),
             )
         )
-    return Found(
+    return ViewResult(
         {
             "modes": table,
-            "layers": _masses(frame, found),
-            "poses": [(number, *map(float, mode.pose)) for number, mode in enumerate(found)],
+            "layers": _masses(frame, modes),
+            "poses": [(number, *map(float, mode.pose)) for number, mode in enumerate(modes)],
         }
     )
 
 
-def _masses(frame: InspectedFrame, found: list[Mode]) -> list[Row]:
+def _masses(frame: InspectedFrame, modes: list[Mode]) -> list[Row]:
     """Share of every layer's weight, and particles, that lie nearest to each mode."""
-    centres = np.stack([mode.points for mode in found])
+    centres = np.stack([mode.points for mode in modes])
     table: list[Row] = []
     for layer, record in enumerate(frame.layers):
         points, weights = body_points(frame.of.body, record.poses), frame.weights(layer)
         nearest = np.linalg.norm(points[:, None] - centres, axis=3).max(axis=2).argmin(axis=1)
-        for number in range(len(found)):
+        for number in range(len(modes)):
             own = nearest == number
             table.append((layer, number, float(weights[own].sum()), int(own.sum())))
     return table
 
 
-def over_run(run: InspectedRun, selection: Selection) -> Found:
+def over_run(run: InspectedRun, selection: Selection) -> ViewResult:
     """Modes of the last layer by frame; of a long run some frames, evenly spread."""
     with run.run.results() as results:
         stamps = stamps_of(results.timeline())
@@ -240,7 +240,7 @@ def over_run(run: InspectedRun, selection: Selection) -> Found:
     notes = (
         () if len(chosen) == len(frames) else (f"Every {len(frames) // len(chosen)}th frame or so is shown.",)
     )
-    return Found({"frames": table}, notes)
+    return ViewResult({"frames": table}, notes)
 
 
 def _stamp_of(tried: TriedFrame) -> tuple[float, float, int]:
@@ -260,11 +260,11 @@ def _row_of_frame(run: InspectedRun, number: int, stamp: object, results: Result
         if key in _known:
             return _known[key]
     frame = run.frame(number, results)
-    found = modes_of(run.body, frame.layers[-1].poses, frame.weights(len(frame.layers) - 1))
+    modes = modes_of(run.body, frame.layers[-1].poses, frame.weights(len(frame.layers) - 1))
     limb, distance = ("", 0.0)
-    if len(found) > 1:
-        limb, distance = farthest_limb(run.body, found[0].points, found[1].points)
-    row = (number, len(found), found[0].mass, distance, limb)
+    if len(modes) > 1:
+        limb, distance = farthest_limb(run.body, modes[0].points, modes[1].points)
+    row = (number, len(modes), modes[0].mass, distance, limb)
     with _lock:
         _known[key] = row
     return row

@@ -17,7 +17,7 @@ from studio.foundations.words import enumerated
 from studio.results.inspection.reading import InspectedFrame, InspectedRun, no_value, ordinal
 from studio.results.inspection.reference import body_points, by_limb, true_points
 from studio.results.inspection.schedule import alarm_of, effective_number
-from studio.results.inspection.tables import Found, Row, Selection
+from studio.results.inspection.tables import Row, Selection, ViewResult
 from studio.sessions.results_reader import Timeline
 
 MOST_BYTES = 128 << 20
@@ -107,22 +107,22 @@ class _Kept:
         with self._one_at_a_time, run.run.results() as results:
             with self._lock:
                 known = dict(self._runs.get(run.run.folder, {}))
-            found: dict[int, tuple[object, FrameSummary]] = {}
+            by_frame: dict[int, tuple[object, FrameSummary]] = {}
             for frame, stamp in stamps_of(results.timeline()).items():
                 before = known.get(frame)
                 if before is not None and before[0] == stamp:
-                    found[frame] = before
+                    by_frame[frame] = before
                     continue
                 try:
-                    found[frame] = (stamp, summary_of(run.frame(frame, results)))
+                    by_frame[frame] = (stamp, summary_of(run.frame(frame, results)))
                 except NotFoundError:
                     continue
-            self._keep(run.run.folder, found)
-        return {frame: entry[1] for frame, entry in found.items()}
+            self._keep(run.run.folder, by_frame)
+        return {frame: entry[1] for frame, entry in by_frame.items()}
 
-    def _keep(self, folder: Path, found: dict[int, tuple[object, FrameSummary]]) -> None:
+    def _keep(self, folder: Path, by_frame: dict[int, tuple[object, FrameSummary]]) -> None:
         with self._lock:
-            self._runs[folder] = found
+            self._runs[folder] = by_frame
             self._runs.move_to_end(folder)
             while len(self._runs) > 1 and self._bytes() > MOST_BYTES:
                 self._runs.popitem(last=False)
@@ -136,38 +136,39 @@ _kept = _Kept()
 
 def summaries(run: InspectedRun) -> dict[int, FrameSummary]:
     """What was read of every finished frame, of one that was tried what was found there."""
-    found = _kept.of(run)
+    by_frame = _kept.of(run)
     if run.tried is not None:
-        found[run.tried.number] = summary_of(run.frame(run.tried.number))
-    return found
+        by_frame[run.tried.number] = summary_of(run.frame(run.tried.number))
+    return by_frame
 
 
-def variance_rows(run: InspectedRun, selection: Selection) -> Found:
+def variance_rows(run: InspectedRun, selection: Selection) -> ViewResult:
     """The run's tables of view `variance`, of each frame's last search: first as drawn, last after weighing; all
     layers of one parameter where it is selected.
     """
-    found = summaries(run)
+    by_frame = summaries(run)
     tables: dict[str, list[Row]] = {
         "first": [
-            (frame, *map(float, entry.variances[entry.last_search][0, 0])) for frame, entry in found.items()
+            (frame, *map(float, entry.variances[entry.last_search][0, 0]))
+            for frame, entry in by_frame.items()
         ],
-        "last": [(frame, *map(float, entry.variances[-1, 1])) for frame, entry in found.items()],
+        "last": [(frame, *map(float, entry.variances[-1, 1])) for frame, entry in by_frame.items()],
         "parameter": [],
     }
     if selection.parameter:
         at = run.parameter(selection.parameter)
         tables["parameter"] = [
             (frame, 1 + layer // entry.search_layers, layer, *map(float, moments[:, at]))
-            for frame, entry in found.items()
+            for frame, entry in by_frame.items()
             for layer, moments in enumerate(entry.variances)
         ]
-    return Found(tables, _of_last_searches(found))
+    return ViewResult(tables, _of_last_searches(by_frame))
 
 
-def schedule_rows(run: InspectedRun, selection: Selection) -> Found:
+def schedule_rows(run: InspectedRun, selection: Selection) -> ViewResult:
     """The run's table of view `schedule`, of each frame's last search."""
-    found = summaries(run)
-    return Found(
+    by_frame = summaries(run)
+    return ViewResult(
         {
             "frames": [
                 (
@@ -178,16 +179,16 @@ def schedule_rows(run: InspectedRun, selection: Selection) -> Found:
                     float(entry.effective[entry.last_search].min()),
                     int(entry.alarms[entry.last_search].sum()),
                 )
-                for frame, entry in found.items()
+                for frame, entry in by_frame.items()
             ]
         },
-        _of_last_searches(found),
+        _of_last_searches(by_frame),
     )
 
 
-def _of_last_searches(found: Mapping[int, FrameSummary]) -> tuple[str, ...]:
+def _of_last_searches(by_frame: Mapping[int, FrameSummary]) -> tuple[str, ...]:
     """Which search of the frames that have several is meant."""
-    several = [(frame, entry.searches) for frame, entry in found.items() if entry.searches > 1]
+    several = [(frame, entry.searches) for frame, entry in by_frame.items() if entry.searches > 1]
     if not several:
         return ()
     named = enumerated([f"frame {frame} by the {ordinal(count)}" for frame, count in several[:SOME]])

@@ -246,8 +246,8 @@ class InspectedFrame:
         """(D,) what the search reported, before any refinement."""
         if self.result is None:
             return self.layers[-1].mean
-        found = self.result.estimate.searched
-        return self.result.estimate.pose if found is None else found
+        searched = self.result.estimate.searched
+        return self.result.estimate.pose if searched is None else searched
 
     @cached_property
     def search_layers(self) -> int:
@@ -270,19 +270,19 @@ class InspectedFrame:
 
     def notes(self) -> tuple[str, ...]:
         """What a reader has to know of all numbers about the frame's particles."""
-        found: list[str] = []
+        notes: list[str] = []
         if len(self.layers) > self.search_layers:
-            found.append(f"The frame was searched several times over: {self._searches_in_words()}.")
+            notes.append(f"The frame was searched several times over: {self._searches_in_words()}.")
         if not self.is_weighted:
-            found.append("This tracker has no β: its particles count equally here.")
+            notes.append("This tracker has no β: its particles count equally here.")
         if self.result is None:
-            found.append("The frame is not finished.")
+            notes.append("The frame is not finished.")
         stored, whole = len(self.layers[-1].poses), self.size(len(self.layers) - 1)
         if stored < whole:
-            found.append(
+            notes.append(
                 f"Of {whole} particles a layer the {stored} heaviest are stored; weights are among these."
             )
-        return tuple(found)
+        return tuple(notes)
 
 
 def ordinal(number: int) -> str:

@@ -71,13 +71,13 @@ def limb_group(body: BodyModel, limb: str) -> str:
 def by_limb(body: BodyModel, distances: Array) -> dict[str, Array]:
     """Mean over each limb's points of distances (..., M) (NaN: unknown)."""
     owner = np.array(limbs_of_points(body))
-    found: dict[str, Array] = {}
+    limbs: dict[str, Array] = {}
     for limb in dict.fromkeys(owner.tolist()):
         own = distances[..., owner == limb]
         known = np.isfinite(own)
         with np.errstate(invalid="ignore"):
-            found[limb] = np.where(known, own, 0.0).sum(axis=-1) / known.sum(axis=-1)
-    return found
+            limbs[limb] = np.where(known, own, 0.0).sum(axis=-1) / known.sum(axis=-1)
+    return limbs
 
 
 def true_points(run: InspectedRun, frame: int) -> Array | None:
@@ -107,10 +107,10 @@ def true_pose(run: InspectedRun, frame: int) -> Reference | None:
             return _poses[key]
     names = tuple(marker.name for marker in run.body.markers)
     pose, residual = pose_from_markers(run.body, names, points, _start(run, frame))
-    found = Reference(pose, residual, points)
+    reference = Reference(pose, residual, points)
     with _lock:
-        _poses[key] = found
-    return found
+        _poses[key] = reference
+    return reference
 
 
 def _start(run: InspectedRun, frame: int) -> Array:
@@ -154,12 +154,12 @@ def refined_pose(
         return pose
     refiner = Refiner(run.body, cameras, RefinementSettings(refinement_steps=REDRAWN_STEPS))
     views = SeenFrame(refiner, Agreement(run.body, cameras), tuple(seen[camera.name] for camera in cameras))
-    found = views.hypothesis(refiner.refine(pose, views.silhouettes).pose)
+    best = views.hypothesis(refiner.refine(pose, views.silhouettes).pose)
     if near is not None:
-        return views.better(found, near).pose
+        return views.better(best, near).pose
     for kind in kinds_of(run.body):
-        found = views.better(found, kind.offered(found.pose))
-    if max(found.off.shares().values()) >= DOUBTFUL_SHARE:
+        best = views.better(best, kind.offered(best.pose))
+    if max(best.off.shares().values()) >= DOUBTFUL_SHARE:
         rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((0, frame, 0, 0, REDRAWN))))
-        found, _ = redrawn(rng, found, views)
-    return found.pose
+        best, _ = redrawn(rng, best, views)
+    return best.pose

@@ -58,13 +58,13 @@ class Retracking:
         carried = self._carried if start is None else _state_at(start, self._carried)
         seed = self.run.run.record.seed + change.seed
         refiner = FrameRefiner(self.run.body, self._source.cameras, seed)
-        found: list[FrameResult] = []
+        results: list[FrameResult] = []
         for frame in self.frames:
             stop_if_left()
             settings = changed_settings(self._settings[frame], change.settings)
-            found.append(self._tracked(frame, carried, settings, seed, refiner))
-            carried = found[-1].carried
-        return found
+            results.append(self._tracked(frame, carried, settings, seed, refiner))
+            carried = results[-1].carried
+        return results
 
     def searched(self, change: Change) -> FrameResult:
         """What the search of the first frame finds, before any refinement."""
@@ -112,10 +112,10 @@ def more_evaluations(settings: RunSettings, times: float) -> dict[str, Value]:
     """Knobs that search with about so many times as many particles, as far as the knobs reach."""
     tracker = TRACKERS[settings.tracker_name]
     limits = {entry.name: entry for entry in knobs_of(settings.tracker)}
-    found: dict[str, Value] = {}
+    values: dict[str, Value] = {}
     for names in tracker.size_knobs:
         knob = next((name for name in names if "particles" in name), names[-1])
         high = limits[knob].high
         wanted = round(getattr(settings.tracker, knob) * times)
-        found[knob] = int(min(wanted, high)) if high is not None else wanted
-    return found
+        values[knob] = int(min(wanted, high)) if high is not None else wanted
+    return values

@@ -62,12 +62,12 @@ def alarm_of(frame: InspectedFrame, layer: int) -> str:
     if not math.isfinite(record.beta):
         return ""
     weights = frame.weights(layer)
-    found: list[str] = []
+    alarms: list[str] = []
     if math.isfinite(record.alpha_wanted) and abs(record.alpha_wanted - record.alpha_reached) > SATURATED:
-        found.append("no β reaches the survival that was asked")
+        alarms.append("no β reaches the survival that was asked")
     if len(weights) and float(weights.max()) > ALONE:
-        found.append("one particle holds more than half of the weight")
-    return "; ".join(found)
+        alarms.append("one particle holds more than half of the weight")
+    return "; ".join(alarms)
 
 
 def rows(frame: InspectedFrame, selection: Selection) -> dict[str, list[Row]]:

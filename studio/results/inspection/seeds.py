@@ -21,7 +21,7 @@ from studio.foundations.progress import Progress
 from studio.results.inspection.reading import InspectedFrame, InspectedRun, no_value
 from studio.results.inspection.reference import body_points, by_limb, true_points
 from studio.results.inspection.retracking import Change, Retracking
-from studio.results.inspection.tables import Found, Row, Selection, View, table
+from studio.results.inspection.tables import Row, Selection, View, ViewResult, table
 from studio.search.trackers.tracker import FrameResult, ParticleSet
 
 VIEW = View(
@@ -92,15 +92,15 @@ def search_seeds(run: InspectedRun, frame: int, count: int, progress: Progress) 
             f"Frame {frame} of run '{run.run.name}' is not finished.", "Choose a finished frame."
         )
     again, own = Retracking(run, frame, frame), run.run.record.seed
-    found: list[SeedResult] = []
+    seeds: list[SeedResult] = []
     for number in range(count):
         progress("seeds", number, count)
         result = again.searched(Change({}, number + 1))
-        found.append(_seed_result(own + number + 1, result))
+        seeds.append(_seed_result(own + number + 1, result))
     progress("seeds", count, count)
     with _lock:
-        _kept[_key(stored)] = tuple(found)
-    return tuple(found)
+        _kept[_key(stored)] = tuple(seeds)
+    return tuple(seeds)
 
 
 def _seed_result(seed: int, result: FrameResult) -> SeedResult:
@@ -116,43 +116,43 @@ def _key(frame: InspectedFrame) -> tuple[Path, int, object]:
     return frame.of.run.folder, frame.number, stamp
 
 
-def rows(frame: InspectedFrame, selection: Selection) -> Found:
+def rows(frame: InspectedFrame, selection: Selection) -> ViewResult:
     """The tables of view `seeds`; empty before seeds were searched."""
     with _lock:
-        found = _kept.get(_key(frame), ())
-    if not found:
-        return Found({}, ("No other seed has been searched in this frame: start that job.",))
+        seeds = _kept.get(_key(frame), ())
+    if not seeds:
+        return ViewResult({}, ("No other seed has been searched in this frame: start that job.",))
     run = frame.of
-    limbs = [row for row in limb_rows(run, found) if selection.limb in ("", row[0])]
+    limbs = [row for row in limb_rows(run, seeds) if selection.limb in ("", row[0])]
     truth = true_points(run, frame.number)
     table: list[Row] = []
-    for one in found:
+    for one in seeds:
         error = float("nan")
         if truth is not None:
             away: Array = np.linalg.norm(body_points(run.body, one.estimate[None])[0] - truth, axis=1)
             error = float(np.nanmean(away))
         table.append((one.seed, one.log_weight, one.evaluations, no_value(error)))
-    return Found(
+    return ViewResult(
         {
             "limbs": limbs,
             "seeds": table,
-            "ranks": rank_rows(run, found),
-            "poses": [(one.seed, *map(float, one.estimate)) for one in found],
+            "ranks": rank_rows(run, seeds),
+            "poses": [(one.seed, *map(float, one.estimate)) for one in seeds],
         }
     )
 
 
-def limb_rows(run: InspectedRun, found: tuple[SeedResult, ...]) -> list[Row]:
+def limb_rows(run: InspectedRun, seeds: tuple[SeedResult, ...]) -> list[Row]:
     """Spread within and between seeds by limb."""
     within: list[Array] = []
-    for one in found:
+    for one in seeds:
         points, weights = body_points(run.body, one.particles.poses), np.exp(one.particles.log_weights)
         mean = np.tensordot(weights, points, axes=1)
         within.append(weights @ np.sum((points - mean) ** 2, axis=2))
-    estimates = body_points(run.body, np.stack([one.estimate for one in found]))
+    estimates = body_points(run.body, np.stack([one.estimate for one in seeds]))
     between = (
         np.sum(estimates.var(axis=0, ddof=1), axis=1)
-        if len(found) > 1
+        if len(seeds) > 1
         else np.full(estimates.shape[1], np.nan)
     )
     inside, outside = by_limb(run.body, np.mean(within, axis=0)), by_limb(run.body, between)
@@ -160,22 +160,22 @@ def limb_rows(run: InspectedRun, found: tuple[SeedResult, ...]) -> list[Row]:
     for limb, variance in inside.items():
         own, other = float(variance), float(outside[limb])
         ratio = float(np.sqrt((own + other) / own)) if own > 0.0 else float("nan")
-        one, mean = float(np.sqrt(other)), float(np.sqrt(other / len(found)))
+        one, mean = float(np.sqrt(other)), float(np.sqrt(other / len(seeds)))
         table.append((limb, float(np.sqrt(own)), no_value(one), no_value(mean), no_value(ratio)))
     return table
 
 
-def rank_rows(run: InspectedRun, found: tuple[SeedResult, ...]) -> list[Row]:
+def rank_rows(run: InspectedRun, seeds: tuple[SeedResult, ...]) -> list[Row]:
     """Weight of each seed's particles in tenths of the ranks among the particles of all seeds."""
-    poses = np.concatenate([one.particles.poses for one in found])
-    weights = np.concatenate([np.exp(one.particles.log_weights) for one in found])
-    owner = np.concatenate([np.full(len(one.particles.poses), at) for at, one in enumerate(found)])
+    poses = np.concatenate([one.particles.poses for one in seeds])
+    weights = np.concatenate([np.exp(one.particles.log_weights) for one in seeds])
+    owner = np.concatenate([np.full(len(one.particles.poses), at) for at, one in enumerate(seeds)])
     table: list[Row] = []
     for at, name in enumerate(run.names):
         order = np.argsort(poses[:, at], kind="stable")
         reached = np.cumsum(weights[order]) - 0.5 * weights[order]
-        bins = np.minimum((reached / len(found) * BINS).astype(np.int64), BINS - 1)
-        for number, one in enumerate(found):
+        bins = np.minimum((reached / len(seeds) * BINS).astype(np.int64), BINS - 1)
+        for number, one in enumerate(seeds):
             own = owner[order] == number
             counts = np.bincount(bins[own], weights[order][own], BINS)
             table += [(name, one.seed, place, float(count), 1.0 / BINS) for place, count in enumerate(counts)]

@@ -211,7 +211,7 @@ def _evaluation(shown: _Shown) -> Evaluation | None:
 
 
 def _facts(shown: _Shown) -> list[list[str]]:
-    record, found = shown.run.run.record, _evaluation(shown)
+    record, evaluation = shown.run.run.record, _evaluation(shown)
     facts = [
         ["Session", shown.run.session.name],
         ["Run", shown.run.run.name],
@@ -229,9 +229,9 @@ def _facts(shown: _Shown) -> list[list[str]]:
     ]
     if record.behaviour:
         facts.append(["Behaviour", record.behaviour])
-    if found is not None:
-        facts.append(["Mean error", f"{found.mean_mm:.1f} mm, worst frame {found.worst_mm:.1f} mm"])
-        facts.append(["Limb lost (truth)", f"in {found.lost_frames} of {len(found.frames)} frames"])
+    if evaluation is not None:
+        facts.append(["Mean error", f"{evaluation.mean_mm:.1f} mm, worst frame {evaluation.worst_mm:.1f} mm"])
+        facts.append(["Limb lost (truth)", f"in {evaluation.lost_frames} of {len(evaluation.frames)} frames"])
     return facts
 
 
@@ -257,9 +257,9 @@ def _settings(run: InspectedRun) -> list[dict[str, Any]]:
 
 def _over_frames(shown: _Shown) -> dict[str, Any]:
     """Weight, error and fit of every frame, as the studio's own view of them."""
-    found = _evaluation(shown)
-    errors = dict(zip(found.frames, found.per_frame_mm, strict=True)) if found else {}
-    lost = dict(zip(found.frames, found.lost_by_frame, strict=True)) if found else {}
+    evaluation = _evaluation(shown)
+    errors = dict(zip(evaluation.frames, evaluation.per_frame_mm, strict=True)) if evaluation else {}
+    lost = dict(zip(evaluation.frames, evaluation.lost_by_frame, strict=True)) if evaluation else {}
     with shown.run.run.results() as results:
         line = results.timeline()
     kept = set(shown.frames.tolist())
@@ -326,21 +326,21 @@ def _table(table: Table, kept: set[int]) -> dict[str, Any]:
 def _why(shown: _Shown) -> dict[str, Any]:
     """What was found about the frame; a sentence where its evidence cannot be read."""
     try:
-        found = look(
+        viewed = look(
             shown.run, shown.frame, "why", Selection(track="" if shown.track == RAW else shown.track)
         )
     except StudioError as error:
         return {"frame": shown.frame, "notes": [str(error)], "findings": [], "remedies": [], "tables": []}
     return {
         "frame": shown.frame,
-        "search_layers": found.search_layers,
-        "searches": found.searches,
-        "notes": list(found.notes),
+        "search_layers": viewed.search_layers,
+        "searches": viewed.searches,
+        "notes": list(viewed.notes),
         "findings": [
-            {"kind": one.kind, "words": one.words, "is_cause": one.is_cause} for one in found.findings
+            {"kind": one.kind, "words": one.words, "is_cause": one.is_cause} for one in viewed.findings
         ],
-        "remedies": [{"title": one.title, "words": one.words} for one in found.remedies],
-        "tables": [_table(table, {shown.frame}) for table in found.tables],
+        "remedies": [{"title": one.title, "words": one.words} for one in viewed.remedies],
+        "tables": [_table(table, {shown.frame}) for table in viewed.tables],
     }
 
 

@@ -8,7 +8,7 @@ import scipy  # stats, half a second, are loaded once they are used
 from studio.foundations.arrays import Mask
 from studio.results.inspection.genealogy import children_of
 from studio.results.inspection.reading import InspectedFrame, no_value
-from studio.results.inspection.tables import Found, Row, Selection, View, table
+from studio.results.inspection.tables import Row, Selection, View, ViewResult, table
 
 VIEW = View(
     "survivors",
@@ -55,12 +55,12 @@ def surviving(frame: InspectedFrame, layer: int) -> Mask:
     reached = record.alpha_reached if np.isfinite(record.alpha_reached) else 0.5
     kept = max(1, round(reached * frame.size(layer)))
     heaviest = np.argsort(-frame.log_weights(layer), kind="stable")[:kept]
-    found = np.zeros(len(numbers), dtype=bool)
-    found[heaviest] = True
-    return found
+    survives = np.zeros(len(numbers), dtype=bool)
+    survives[heaviest] = True
+    return survives
 
 
-def rows(frame: InspectedFrame, selection: Selection) -> Found:
+def rows(frame: InspectedFrame, selection: Selection) -> ViewResult:
     """The tables of view `survivors`."""
     run, layer = frame.of, frame.layer(selection)
     record, weights, numbers = frame.layers[layer], frame.weights(layer), frame.particles(layer)
@@ -85,7 +85,7 @@ def rows(frame: InspectedFrame, selection: Selection) -> Found:
                 no_value(float(scipy.stats.ks_2samp(alive, dead).pvalue)),
             )
         )
-    return Found(
+    return ViewResult(
         {
             "particles": [
                 (

@@ -228,7 +228,7 @@ Rows = Mapping[str, Sequence[Row]]
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class ViewResult:
     """What a view's function found: rows by table, and the notes beside them."""
 
     rows: Rows

@@ -108,22 +108,22 @@ class _KnownLimbs:
         """By frame the limbs that the silhouettes contradict; frames without any may be missing."""
         with self._lock:
             before = self._runs.get(folder, {})
-        found: dict[int, tuple[object, tuple[str, ...]]] = {}
+        by_frame: dict[int, tuple[object, tuple[str, ...]]] = {}
         for at, frame in enumerate(line.frames.tolist()):
             state, overlap, doubts = line.tracking[at], float(line.overlaps[at]), int(line.doubts[at])
             if state == NO_EVIDENCE or _is_settled(state, overlap, doubts):
                 continue
             stamp = (state, doubts, float(line.log_weights[at]), float(line.milliseconds[at]))
             if frame in before and before[frame][0] == stamp:
-                found[frame] = before[frame]
+                by_frame[frame] = before[frame]
                 continue
             try:
-                found[frame] = (stamp, limbs_off(results.result(frame), body))
+                by_frame[frame] = (stamp, limbs_off(results.result(frame), body))
             except NotFoundError:
                 continue
         with self._lock:
-            self._runs[folder] = found
-        return {frame: limbs for frame, (_, limbs) in found.items()}
+            self._runs[folder] = by_frame
+        return {frame: limbs for frame, (_, limbs) in by_frame.items()}
 
 
 _known = _KnownLimbs()

@@ -23,10 +23,19 @@ from studio.results.inspection import (
     why,
 )
 from studio.results.inspection.reading import InspectedFrame, InspectedRun
-from studio.results.inspection.tables import Column, Found, Rows, Selection, Table, TableKind, View, Viewed
+from studio.results.inspection.tables import (
+    Column,
+    Rows,
+    Selection,
+    Table,
+    TableKind,
+    View,
+    Viewed,
+    ViewResult,
+)
 
-OfFrame = Callable[[InspectedFrame, Selection], Found | Rows]
-OfRun = Callable[[InspectedRun, Selection], Found | Rows]
+OfFrame = Callable[[InspectedFrame, Selection], ViewResult | Rows]
+OfRun = Callable[[InspectedRun, Selection], ViewResult | Rows]
 
 
 class _Entry(NamedTuple):
@@ -61,16 +70,16 @@ VIEWS = {name: entry.view for name, entry in _ENTRIES.items()}
 def look(run: InspectedRun, frame: int, name: str, selection: Selection) -> Viewed:
     """A view's tables of a frame. Raises NotFoundError for a frame, layer, parameter … that is none."""
     entry, opened = _entry(name), run.frame(frame)
-    found = entry.of_frame(opened, selection)
-    viewed = _viewed(run, entry.view, entry.view.frame_tables, found, opened.notes())
+    answer = entry.of_frame(opened, selection)
+    viewed = _viewed(run, entry.view, entry.view.frame_tables, answer, opened.notes())
     return replace(viewed, search_layers=opened.search_layers, searches=opened.searches)
 
 
 def look_over(run: InspectedRun, name: str, selection: Selection) -> Viewed:
     """A view's tables of the whole run; none for a view that shows single frames only."""
     entry = _entry(name)
-    found = entry.of_run(run, selection) if entry.of_run else Found({})
-    return _viewed(run, entry.view, entry.view.run_tables, found, ())
+    answer = entry.of_run(run, selection) if entry.of_run else ViewResult({})
+    return _viewed(run, entry.view, entry.view.run_tables, answer, ())
 
 
 def view_named(name: str) -> View:
@@ -85,9 +94,13 @@ def _entry(name: str) -> _Entry:
 
 
 def _viewed(
-    run: InspectedRun, view: View, kinds: Sequence[TableKind], found: Found | Rows, notes: tuple[str, ...]
+    run: InspectedRun,
+    view: View,
+    kinds: Sequence[TableKind],
+    answer: ViewResult | Rows,
+    notes: tuple[str, ...],
 ) -> Viewed:
-    given = found if isinstance(found, Found) else Found(found)
+    given = answer if isinstance(answer, ViewResult) else ViewResult(answer)
     tables = [
         Table(kind.name, kind.title, _columns(run, kind), given.rows.get(kind.name, ())) for kind in kinds
     ]

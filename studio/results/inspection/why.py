@@ -47,7 +47,7 @@ from studio.results.inspection.reading import InspectedFrame, no_value
 from studio.results.inspection.reference import body_points, by_limb, refined_pose, true_points
 from studio.results.inspection.retracking import Change, Retracking, more_evaluations
 from studio.results.inspection.schedule import effective_number
-from studio.results.inspection.tables import Found, FrameFinding, Remedy, Row, Selection, View, table
+from studio.results.inspection.tables import FrameFinding, Remedy, Row, Selection, View, ViewResult, table
 from studio.results.inspection.verdict import STATE_WORDS, Verdict, verdict, verdict_on
 from studio.runs.run_footage import filmed_cameras
 from studio.runs.tracks import RAW, best_track, track_stamp
@@ -203,9 +203,9 @@ class Case:
         return verdict(TRACKED, (), lost) if result is None else verdict_on(result, lost, self.run.body)
 
     def _reference(self) -> ReferencePose:
-        found = reference_pose(self.frame, self.track)
-        if found.kind != "best particle":
-            return found
+        reference = reference_pose(self.frame, self.track)
+        if reference.kind != "best particle":
+            return reference
         return ReferencePose(REFINED_NOW, self._refined_now(self.frame.number))
 
     def _refined_now(self, number: int) -> Array:
@@ -227,8 +227,8 @@ class Case:
 
     def error(self, pose: Array, limbs: Sequence[str]) -> float:
         """Mean error of some limbs, mm."""
-        found = self.all_errors(pose)
-        return float(np.mean([found[limb] for limb in limbs]))
+        errors = self.all_errors(pose)
+        return float(np.mean([errors[limb] for limb in limbs]))
 
     @cached_property
     def settings(self) -> RunSettings:
@@ -259,14 +259,14 @@ class Case:
         others = sorted({began, (began + self.frame.number) // 2} - {self.frame.number})
         if here or len(others) < 2:
             return here
-        found = {self._exchanged_in_frame(number) for number in others}
-        return found.pop() if len(found) == 1 else ""
+        exchanges = {self._exchanged_in_frame(number) for number in others}
+        return exchanges.pop() if len(exchanges) == 1 else ""
 
     def _exchanged_in_frame(self, number: int) -> str:
         """The same of another frame, in which the run's own pose is judged."""
         frame = self.run.frame(number)
-        found = reference_pose(frame, self.track)
-        pose = self._refined_now(number) if self.reference.kind == REFINED_NOW else found.pose
+        reference = reference_pose(frame, self.track)
+        pose = self._refined_now(number) if self.reference.kind == REFINED_NOW else reference.pose
         return exchanged_in(self.run.body, pose, judged_pose(frame, self.track))
 
     @cached_property
@@ -306,7 +306,7 @@ class Case:
         """How far a wrong limb moved in a frame: in deviations of the first set, mm, those deviations in mm, and the
         frame. Where it began, or the median over the stretch if that is more; (0, 0, 0, -1) where it cannot be known.
         """
-        found: list[tuple[float, float, float, int]] = []
+        motions: list[tuple[float, float, float, int]] = []
         began, first = self.stretch
         for number in sorted({began, *range(first, self.frame.number + 1)}):
             if number <= self.run.run.record.first:
@@ -323,11 +323,11 @@ class Case:
                 for limb in self.wrong
                 if reach[limb] > 0.0
             ]
-            found += [max(moves)] if moves else []
-        if not found:
+            motions += [max(moves)] if moves else []
+        if not motions:
             return 0.0, 0.0, 0.0, -1
-        usual = sorted(found)[(len(found) - 1) // 2]
-        return max(usual, *(one for one in found if one[3] == began), usual)
+        usual = sorted(motions)[(len(motions) - 1) // 2]
+        return max(usual, *(one for one in motions if one[3] == began), usual)
 
     def _place(self, number: int) -> Array | None:
         """(M, 3) where the body was in a frame, None where that is not known."""
@@ -347,12 +347,12 @@ class Case:
     @cached_property
     def effective(self) -> float:
         """Median effective number over the layers of the stretch, inf for trackers without weights."""
-        found: list[float] = []
+        numbers: list[float] = []
         for number in range(self.stretch[1], self.frame.number + 1):
             frame = self.run.frame(number)
             if frame.is_weighted:
-                found += [effective_number(frame.log_weights(layer)) for layer in range(len(frame.layers))]
-        return float(np.median(found)) if found else float("inf")
+                numbers += [effective_number(frame.log_weights(layer)) for layer in range(len(frame.layers))]
+        return float(np.median(numbers)) if numbers else float("inf")
 
     @cached_property
     def preference(self) -> Preference:
@@ -469,17 +469,17 @@ def usual_survival(settings: RunSettings) -> dict[str, Value]:
     )
 
 
-def rows(frame: InspectedFrame, selection: Selection) -> Found:
+def rows(frame: InspectedFrame, selection: Selection) -> ViewResult:
     """The tables, findings and remedies of view `why`; kept for the frames that were asked for last."""
     track = selection.track if selection.track != RAW else ""
     key = (frame.of.run.folder, frame.number, track, *_stamps(frame))
     with _lock:
         if key in _known:
             return _known[key]
-    found = _explained(Case(frame, track))
+    explained = _explained(Case(frame, track))
     with _lock:
-        _known[key] = found
-    return found
+        _known[key] = explained
+    return explained
 
 
 def _stamps(frame: InspectedFrame) -> tuple[object, ...]:
@@ -491,10 +491,10 @@ def _stamps(frame: InspectedFrame) -> tuple[object, ...]:
 
 
 _lock = threading.Lock()
-_known = LRUCache[tuple[object, ...], Found](KEPT)
+_known = LRUCache[tuple[object, ...], ViewResult](KEPT)
 
 
-def _explained(case: Case) -> Found:
+def _explained(case: Case) -> ViewResult:
     findings, remedies = [_first_finding(case)], list[Remedy]()
     fault = case.camera_fault
     if fault is not None:
@@ -510,7 +510,7 @@ def _explained(case: Case) -> Found:
     if not case.verdict.fits and not remedies:
         remedies.append(BY_HAND)
     table: list[Row] = [(one.kind, one.words, one.limb, one.layer, one.camera, one.term) for one in findings]
-    return Found(
+    return ViewResult(
         {"findings": table, "nearest": case.clouds},
         (_compared_with(case),),
         tuple(findings),
@@ -572,17 +572,17 @@ def _first_finding(case: Case) -> FrameFinding:
 def _verdict_sentences(case: Case) -> list[str]:
     """Why the page marks the frame as lost; [] where it does not."""
     verdict, result = case.verdict, case.frame.result
-    found = [STATE_WORDS[verdict.tracking]] if verdict.tracking in STATE_WORDS else []
+    sentences = [STATE_WORDS[verdict.tracking]] if verdict.tracking in STATE_WORDS else []
     if verdict.by_truth:
-        found.append(
+        sentences.append(
             f"Against the truth this is lost: the {enumerated(verdict.by_truth)}, with a marker more than"
             f" {_mm(lost_mm(case.run.body))} off."
         )
     if verdict.by_silhouettes:
         shares = {} if result is None else limb_shares(case.run.body, result.disagreement)
         limbs = [f"the {limb}{_share(shares.get(limb))}" for limb in verdict.by_silhouettes]
-        found.append(f"Lost by the silhouettes: {enumerated(limbs)}.")
-    return found
+        sentences.append(f"Lost by the silhouettes: {enumerated(limbs)}.")
+    return sentences
 
 
 def _share(share: float | None) -> str:
@@ -847,26 +847,24 @@ def _layer_finding(case: Case, limb: str) -> FrameFinding:
 
 
 def _preference_finding(case: Case) -> FrameFinding:
-    found = case.preference
-    numbers = {"nats": found.nats, "share": found.share}
+    preference = case.preference
+    numbers = {"nats": preference.nats, "share": preference.share}
     words = _preference_words(case)
-    return FrameFinding("preference", words, camera=found.camera, term=found.term, numbers=numbers)
+    return FrameFinding("preference", words, camera=preference.camera, term=preference.term, numbers=numbers)
 
 
 def _preference_words(case: Case) -> str:
     """Which pose the likelihood prefers. The views compare the poses themselves: their nats are others."""
-    found, reference = case.preference, _of(case.reference.kind)
+    preference, reference = case.preference, _of(case.reference.kind)
     settled = f"each at its best within {_mm(KEPT_WITHIN_MM * case.size)}"
-    if found.is_for_the_pose:
+    if preference.is_for_the_pose:
         return (
-            f"The likelihood prefers the wrong pose, by {found.nats:.3g} nats, {settled}; most of all camera"
-            f" {found.camera} by its {found.term} term ({found.share:+.3g})."
+            f"The likelihood prefers the wrong pose, by {preference.nats:.3g} nats, {settled}; most of all camera"
+            f" {preference.camera} by its {preference.term} term ({preference.share:+.3g})."
         )
-    if found.is_for_the_reference:
-        return (
-            f"The search missed it: the likelihood prefers {reference}, by {-found.nats:.3g} nats, {settled}."
-        )
-    return f"The likelihood hardly tells the pose from {reference} ({found.nats:+.3g} nats, {settled})."
+    if preference.is_for_the_reference:
+        return f"The search missed it: the likelihood prefers {reference}, by {-preference.nats:.3g} nats, {settled}."
+    return f"The likelihood hardly tells the pose from {reference} ({preference.nats:+.3g} nats, {settled})."
 
 
 def _of(kind: str) -> str:

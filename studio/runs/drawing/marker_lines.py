@@ -54,23 +54,23 @@ def _carrying_joint_above(body: BodyModel, joint: int, carried: dict[int, list[M
 def marker_sides(body: BodyModel) -> dict[str, str]:
     """Marker name to "left", "right" or "middle": the side of the nearest limb on its joint or above."""
     sides = {limb.joint: limb.side for limb in body.limbs}
-    found: dict[str, str] = {}
+    sides_of_markers: dict[str, str] = {}
     for marker in body.markers:
         joint = marker.joint
         while joint >= 0 and joint not in sides:
             joint = body.joints[joint].parent
-        found[marker.name] = sides.get(joint, "middle")
-    return found
+        sides_of_markers[marker.name] = sides.get(joint, "middle")
+    return sides_of_markers
 
 
 def extremity_markers(body: BodyModel) -> tuple[str, ...]:
     """The outermost marker towards each extremity: wrists, ankles, head, tips (hands and feet may carry none)."""
     last = {marker.joint: marker.name for marker in body.markers}
-    found: dict[str, None] = {}
+    names: dict[str, None] = {}
     for index in extremities(body):
         joint = body.drawn[index].joint
         while joint >= 0 and joint not in last:
             joint = body.joints[joint].parent
         if joint >= 0:
-            found[last[joint]] = None
-    return tuple(found)
+            names[last[joint]] = None
+    return tuple(names)

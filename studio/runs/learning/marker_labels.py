@@ -58,18 +58,18 @@ def person_markers(labels: Sequence[str], points: Array, source: str) -> tuple[t
     at = {_plain(label[shared:] or label): place for place, label in reversed(list(enumerate(labels)))}
     joints = {name: points[:, at[label]] for name in MARKERS if (label := _label_of(name, at)) is not None}
     skin = _from_skin(at, points)
-    found = joints if _missing(joints) <= _missing(skin) else {**joints, **skin}
-    missing = [name for name in MARKERS if name not in found and name not in OPTIONAL]
+    markers = joints if _missing(joints) <= _missing(skin) else {**joints, **skin}
+    missing = [name for name in MARKERS if name not in markers and name not in OPTIONAL]
     if missing:
         listed = ", ".join(labels[:60]) + (", ..." if len(labels) > 60 else "")
         raise StudioError(
             f"'{source}' has no points for {', '.join(missing)}; its points are: {listed or 'none'}.",
             f"Label the points {', '.join(MARKERS)} (or RightKnee, R_Knee, ...), or as Vicon's Plug-in Gait does.",
         )
-    if "Hip" not in found:
-        found["Hip"] = 0.5 * (found["RHip"] + found["LHip"])
-    names = tuple(name for name in MARKERS if name in found)
-    return names, np.stack([found[name] for name in names], axis=1)
+    if "Hip" not in markers:
+        markers["Hip"] = 0.5 * (markers["RHip"] + markers["LHip"])
+    names = tuple(name for name in MARKERS if name in markers)
+    return names, np.stack([markers[name] for name in names], axis=1)
 
 
 def shared_beginning(labels: Sequence[str]) -> int:
@@ -91,8 +91,8 @@ def _plain(label: str) -> str:
     return re.sub(r"[^a-z0-9]", "", label.rsplit(":", 1)[-1].lower())
 
 
-def _missing(found: dict[str, Array]) -> int:
-    return sum(name not in found and name not in OPTIONAL for name in MARKERS)
+def _missing(markers: dict[str, Array]) -> int:
+    return sum(name not in markers and name not in OPTIONAL for name in MARKERS)
 
 
 def _label_of(name: str, at: dict[str, int]) -> str | None:
@@ -110,14 +110,14 @@ def _label_of(name: str, at: dict[str, int]) -> str | None:
 
 def _from_skin(at: dict[str, int], points: Array) -> dict[str, Array]:
     """The joints estimated from Plug-in Gait's markers."""
-    found: dict[str, Array] = {}
+    markers: dict[str, Array] = {}
     for name, choices in SKIN.items():
         whole = [choice for choice in choices if all(label in at for label in choice)]
         if whole:
-            found[name] = np.mean([points[:, at[label]] for label in whole[0]], axis=0)
+            markers[name] = np.mean([points[:, at[label]] for label in whole[0]], axis=0)
     if all(label in at for label in SPINES):
-        found |= _hips(*(points[:, at[label]] for label in SPINES))
-    return found
+        markers |= _hips(*(points[:, at[label]] for label in SPINES))
+    return markers
 
 
 def _hips(left: Array, right: Array, left_back: Array, right_back: Array) -> dict[str, Array]:

@@ -19,7 +19,7 @@ Triple = tuple[int, int, int]
 
 def triples(body: BodyModel) -> tuple[Triple, ...]:
     """Parameters of every three turns in a row about three axes; the root's, which have no limits, are left out."""
-    found: list[Triple] = []
+    triples: list[Triple] = []
     for index, joint in enumerate(body.joints):
         if joint.parent < 0:
             continue
@@ -30,9 +30,9 @@ def triples(body: BodyModel) -> tuple[Triple, ...]:
         rows = [own[:3]] if len(own) >= 3 else [own + first for first in carried if len(own) == 2 and first]
         for row in rows:
             if len({step.axis for step in row}) == 3:
-                found.append((row[0].parameter, row[1].parameter, row[2].parameter))
+                triples.append((row[0].parameter, row[1].parameter, row[2].parameter))
                 break
-    return tuple(found)
+    return tuple(triples)
 
 
 def on_branch(body: BodyModel, path: Array, beyond: bool) -> Array:
@@ -40,7 +40,7 @@ def on_branch(body: BodyModel, path: Array, beyond: bool) -> Array:
     that it never is; clamped to the limits where that branch lies outside.
     """
     lower, upper = body.lower, body.upper
-    found = path.copy()
+    respelled = path.copy()
     for triple in triples(body):
         first, second, third = triple
         wrong = (np.abs(path[:, second]) > 0.5 * math.pi) != beyond
@@ -48,8 +48,8 @@ def on_branch(body: BodyModel, path: Array, beyond: bool) -> Array:
         other[:, 1] = math.pi - path[:, second]
         for place, parameter in enumerate((first, second, third)):
             wound = _wound(other[:, place], lower[parameter], upper[parameter])
-            found[:, parameter] = np.where(wrong, wound, path[:, parameter])
-    return found
+            respelled[:, parameter] = np.where(wrong, wound, path[:, parameter])
+    return respelled
 
 
 def _wound(angles: Array, lower: float, upper: float) -> Array:

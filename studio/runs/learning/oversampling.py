@@ -85,11 +85,11 @@ def oversampled(
     body: BodyModel, poses: Array, fps: float, settings: OversamplingSettings, rng: np.random.Generator
 ) -> list[Array]:
     """The training material of a recording (F, D): for every performance as many sequences as smoothings."""
-    found: list[Array] = []
+    recordings: list[Array] = []
     for number in range(settings.performances):
         shown = poses if number == 0 else performed(body, poses, fps, settings, rng)
-        found += smoothed_copies(body, shown, fps, settings)
-    return found
+        recordings += smoothed_copies(body, shown, fps, settings)
+    return recordings
 
 
 def performed(
@@ -110,7 +110,7 @@ def performed(
 
 def smoothed_copies(body: BodyModel, poses: Array, fps: float, settings: OversamplingSettings) -> list[Array]:
     """Sequences of poses (F, D), one a smoothing: each smoothed more, and sampled a part of a frame later."""
-    found, count = list[Array](), settings.smoothings
+    copies, count = list[Array](), settings.smoothings
     for number in range(count):
         width = settings.widest_smoothing * fps * number / max(count - 1, 1)
         smooth = (
@@ -119,5 +119,5 @@ def smoothed_copies(body: BodyModel, poses: Array, fps: float, settings: Oversam
         times = np.arange(len(poses)) / fps
         if number:
             smooth = poses_at(body, times, smooth, times[:-1] + number / (count * fps))
-        found.append(smooth)
-    return found
+        copies.append(smooth)
+    return copies

@@ -76,9 +76,9 @@ def fitted_person(
 
 
 def _fitted(targets: Targets, body: BodyModel, name: str, fps: float, progress: Progress) -> Recording:
-    found = fit_poses(body, targets, fps, progress)
-    rms = float(np.sqrt(np.nanmean(found.rms_mm**2)))
-    return Recording(name, fps, found.poses, rms, tuple(bad_frames(found.rms_mm).tolist()))
+    fit = fit_poses(body, targets, fps, progress)
+    rms = float(np.sqrt(np.nanmean(fit.rms_mm**2)))
+    return Recording(name, fps, fit.poses, rms, tuple(bad_frames(fit.rms_mm).tolist()))
 
 
 def read_file(

@@ -19,7 +19,7 @@ def points_at(times: Array, points: Array, new_times: Array) -> Array:
 
     A point that is missing (NaN) for longer than LONGEST_GAP_S is missing in that time.
     """
-    found = np.full((len(new_times), *points.shape[1:]), np.nan)
+    resampled = np.full((len(new_times), *points.shape[1:]), np.nan)
     for marker in range(points.shape[1]):
         seen = np.isfinite(points[:, marker]).all(axis=1)
         if seen.sum() < 4:
@@ -31,21 +31,21 @@ def points_at(times: Array, points: Array, new_times: Array) -> Array:
         near = inside & (
             (known[after] - known[before] <= LONGEST_GAP_S) | (np.abs(known[after] - new_times) < 1e-6)
         )
-        found[near, marker] = scipy.interpolate.CubicSpline(known, points[seen, marker])(new_times[near])
-    return found
+        resampled[near, marker] = scipy.interpolate.CubicSpline(known, points[seen, marker])(new_times[near])
+    return resampled
 
 
 def poses_at(body: BodyModel, times: Array, poses: Array, new_times: Array) -> Array:
     """(W, D) poses (F, D) at the times `new_times` on cubic splines, turns unwound, within the body's limits."""
     unbounded = body.angles & ~body.bounded_angles
     steady = np.where(unbounded, np.unwrap(poses, axis=0), poses)
-    found = (
+    resampled = (
         scipy.interpolate.CubicSpline(times, steady)(new_times)
         if len(times) > 1
         else np.repeat(steady, len(new_times), axis=0)
     )
     # A tracked pose may lie outside the limits: only the curve's overshoot is clamped.
-    return clamped(body, steady, found)
+    return clamped(body, steady, resampled)
 
 
 def clamped(body: BodyModel, allowed: Array, poses: Array) -> Array:

@@ -67,7 +67,7 @@ def marker_names(body: BodyModel) -> tuple[str, ...]:
 def pointers_of(body: BodyModel, *, movable: bool) -> tuple[Pointer, ...]:
     """The pointers of a body's head, hands and feet; `movable`: only of those with their own rotation parameter."""
     frames = joint_frames(body, body.neutral)[0]
-    shapes, found = kinematic_tables(body).limb_shape, list[Pointer]()
+    shapes, pointers = kinematic_tables(body).limb_shape, list[Pointer]()
     for limb, shape in zip(body.drawn, shapes, strict=True):
         own = any(step.parameter >= 0 for step in body.joints[limb.joint].steps)
         if limb.name not in POINTING or (movable and not own):
@@ -76,8 +76,8 @@ def pointers_of(body: BodyModel, *, movable: bool) -> tuple[Pointer, ...]:
             axis = frames[limb.joint, :, :3].T @ _rest_forward(body)
         else:
             axis = np.array([0.0, 0.0, np.sign(shape[0])])
-        found.append(Pointer(limb.name, limb.joint, axis))
-    return tuple(found)
+        pointers.append(Pointer(limb.name, limb.joint, axis))
+    return tuple(pointers)
 
 
 def directions(pointers: tuple[Pointer, ...], frames: Array) -> Array:

@@ -71,16 +71,16 @@ def replay(source: StoredRun, into: StoredRun, problems: ProblemSource) -> Itera
 
 def compare(one: StoredRun, other: StoredRun) -> Comparison:
     """Compare two runs frame by frame; a frame that one of them lacks counts as different."""
-    found: list[dict[int, bytes]] = []
+    bytes_of: list[dict[int, bytes]] = []
     for run in (one, other):
         with run.results() as results:
             frames, poses = results.poses()
             weights = results.timeline().log_weights
         rows = np.column_stack([poses, weights]) if len(frames) else np.zeros((0, 1))
-        found.append({int(frame): row.tobytes() for frame, row in zip(frames, rows, strict=True)})
-    every = sorted(found[0].keys() | found[1].keys())
+        bytes_of.append({int(frame): row.tobytes() for frame, row in zip(frames, rows, strict=True)})
+    every = sorted(bytes_of[0].keys() | bytes_of[1].keys())
     return Comparison(
-        len(every), tuple(frame for frame in every if found[0].get(frame) != found[1].get(frame))
+        len(every), tuple(frame for frame in every if bytes_of[0].get(frame) != bytes_of[1].get(frame))
     )
 
 

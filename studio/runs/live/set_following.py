@@ -44,8 +44,8 @@ class SetFollower:
 
     def newest(self, after: int) -> Arrival | None:
         self._look()
-        found = self._newest
-        return None if found is None or found.frame <= max(after, self._before) else found
+        newest = self._newest
+        return None if newest is None or newest.frame <= max(after, self._before) else newest
 
     def wait(self, after: int) -> None:
         """Return when there is a set above `after`, or after a moment."""
@@ -76,8 +76,8 @@ class SetFollower:
             if row[0] == END:
                 self._ended = True
             elif row[0].isdigit():
-                found = recorded_set(row)
-                self._newest = Arrival(found.frame, tuple(found.times.values()))
+                recorded = recorded_set(row)
+                self._newest = Arrival(recorded.frame, tuple(recorded.times.values()))
 
 
 class SetNumbers:

@@ -27,24 +27,24 @@ SAME_DEGREES, SAME_MM = 1e-3, 0.1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SessionAlignment:
-    """The result of an alignment. names : of the cameras, in the order of `found`."""
+    """The result of an alignment. names : of the cameras, in the order of `aligned`."""
 
     names: tuple[str, ...]
-    found: AlignedCameras
+    aligned: AlignedCameras
 
     @property
     def needed(self) -> bool:
         """Whether the cameras miss by enough to matter."""
-        return bool(np.nanmax(self.found.before) > WORTHWHILE)
+        return bool(np.nanmax(self.aligned.before) > WORTHWHILE)
 
     @property
     def better(self) -> bool:
         """Whether turning the cameras explains most of the misses."""
-        return bool(np.nanmax(self.found.after) < BETTER * np.nanmax(self.found.before))
+        return bool(np.nanmax(self.aligned.after) < BETTER * np.nanmax(self.aligned.before))
 
     def is_of(self, session: Session) -> bool:
         """Whether the cameras in use are those that were measured: they differ from the turned ones by the turns."""
-        now, measured = session.cameras(), self.found
+        now, measured = session.cameras(), self.aligned
         if tuple(camera.name for camera in now) != self.names:
             return False
         for camera, turned, angle in zip(now, measured.cameras, measured.turns, strict=True):
@@ -56,11 +56,11 @@ class SessionAlignment:
 
     def in_words(self) -> tuple[str, ...]:
         """One line a camera."""
-        found = self.found
+        aligned = self.aligned
         return tuple(
             f"{name:12} silhouettes miss by {before:.1f} px, {after:.1f} px when turned by {turn:.2f}°"
             for name, before, after, turn in zip(
-                self.names, found.before, found.after, found.turns, strict=True
+                self.names, aligned.before, aligned.after, aligned.turns, strict=True
             )
         )
 
@@ -85,17 +85,17 @@ def align_cameras(
         for done, frame in enumerate(chosen):
             progress("reading silhouettes", done, len(chosen))
             masks[frame] = {view.camera: person_alone(view.mask) for view in maker.evidence(frame).views}
-    found = aligned_cameras(cameras, outlines_of(cameras, masks))
+    aligned = aligned_cameras(cameras, outlines_of(cameras, masks))
     progress("reading silhouettes", len(chosen), len(chosen))
-    return SessionAlignment(tuple(camera.name for camera in cameras), found)
+    return SessionAlignment(tuple(camera.name for camera in cameras), aligned)
 
 
 def keep_alignment(session: Session, aligned: SessionAlignment) -> CalibrationChange:
     """Make the aligned cameras the session's; the earlier calibration is kept. Raises SessionError while tracking."""
     source = session.manifest.calibration_source
     turned = ", ".join(
-        f"{name} {turn:.2f}°" for name, turn in zip(aligned.names, aligned.found.turns, strict=True)
+        f"{name} {turn:.2f}°" for name, turn in zip(aligned.names, aligned.aligned.turns, strict=True)
     )
     note = f"Cameras turned by their silhouettes: {turned}."
-    new = NewCalibration(aligned.found.cameras, f"{source}, aligned by silhouettes", notes=(note,))
+    new = NewCalibration(aligned.aligned.cameras, f"{source}, aligned by silhouettes", notes=(note,))
     return replace_calibration(session, new)

@@ -326,11 +326,11 @@ def _make_person_masks(session: Session, progress: Progress) -> list[str]:
     session.check_idle()
     unseen: dict[str, list[int]] = {}
     with closing(session.footage()) as footage, made_masks(session, PERSON_MASKS) as made:
-        for found in person_masks(session.cameras(), footage, progress):
-            for camera, mask in found.masks.items():
-                made.put(camera, found.frame, mask)
-            for camera in found.unseen:
-                unseen.setdefault(camera, []).append(found.frame)
+        for person in person_masks(session.cameras(), footage, progress):
+            for camera, mask in person.masks.items():
+                made.put(camera, person.frame, mask)
+            for camera in person.unseen:
+                unseen.setdefault(camera, []).append(person.frame)
     names = [source.name for source in session.manifest.footage.cameras if source.name in unseen]
     return [f"{name}: nobody was seen in {frames_in_words(unseen[name])}." for name in names]
 
@@ -365,7 +365,7 @@ def _cut_to_subject(
 
 def candidates(session: Session) -> list[BackgroundSource]:
     """The sources that a session can use, "best" left out."""
-    found: list[BackgroundSource] = []
+    sources: list[BackgroundSource] = []
     for source in SOURCES:
         if source in ("best", "subject"):
             continue
@@ -377,8 +377,8 @@ def candidates(session: Session) -> list[BackgroundSource]:
             continue
         if source == "combined" and not any(_given(session).values()) and not _cleanable(session):
             continue
-        found.append(source)
-    return found
+        sources.append(source)
+    return sources
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -433,12 +433,12 @@ def _set_up_best(session: Session, wanted: _Wanted, progress: Progress) -> Backg
             notes.append(f"{source}: {error.message}")
             continue
         now = Session(session.path)
-        found: dict[str, SampledMasks] = {}
+        sampled: dict[str, SampledMasks] = {}
         for lens in small:
             views = [view for _, view in _views_of(now, frames, [lens.name], unheard)]
             border = sum(border_support(view.picture, view.mask) for view in views) / len(views)
-            found[lens.name] = SampledMasks(tuple(reduced(view.mask, lens) for view in views), border)
-        tried[source] = _SetUp(now.manifest, read_evidence(now), made, found)
+            sampled[lens.name] = SampledMasks(tuple(reduced(view.mask, lens) for view in views), border)
+        tried[source] = _SetUp(now.manifest, read_evidence(now), made, sampled)
     masks = {source: one.masks for source, one in tried.items()}
     choice = choose_sources(small, frames, masks, progress, scale_of(session.body()))
     notes += [f"{one.source}: {one.in_words()}" for one in choice.tried]
@@ -528,11 +528,13 @@ def _tuned(
             for masks in trying.masks(knobs, small):
                 plausible = plausible and all(map(can_be_subject, masks))
                 counted.append(count_frame(masks, small, blame=False, fineness=ROUGH, scale=scale))
-            found = summed(trying.frames, tuple(camera.name for camera in cameras), counted)
+            quality = summed(trying.frames, tuple(camera.name for camera in cameras), counted)
             if not plausible and knobs.get("background_model") == MASK_SOURCES["threshold"].model:
-                return 0.0, knobs, found
-            worst = min((0.0 if view.agreement != view.agreement else view.agreement) for view in found.views)
-            return round(worst, 9), knobs, found
+                return 0.0, knobs, quality
+            worst = min(
+                (0.0 if view.agreement != view.agreement else view.agreement) for view in quality.views
+            )
+            return round(worst, 9), knobs, quality
 
         best = max(map(tried, trials), key=lambda one: one[0])
         side = min(min(camera.width, camera.height) for camera in cameras)
@@ -580,12 +582,12 @@ class _Trying:
         settings = _settings(self._session, knobs)
         maker, raw = self._maker(settings), self._raw[uncleaned(settings)]
         for frame in self.frames:
-            found: list[Bytes] = []
+            masks: list[Bytes] = []
             for camera, lens in zip(self._cameras, small, strict=True):
                 packed, to_clean = raw[frame, camera.name]
                 mask = maker.finished_mask(camera.name, RawMask(packed.unpacked(), to_clean))
-                found.append(reduced(mask, lens))
-            yield found
+                masks.append(reduced(mask, lens))
+            yield masks
 
     def _maker(self, settings: EvidenceSettings) -> EvidenceMaker:
         return EvidenceMaker(self._cameras, self._footage, self._backgrounds, settings, "none")

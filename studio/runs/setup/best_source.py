@@ -102,14 +102,18 @@ def choose_sources(
         nonlocal done
         progress(JUDGING, done, most)
         done += 1
-        found = {name: sampled[choice[name]][name] for name in names}
-        borders = {name: round(one.border, 4) for name, one in found.items()}
-        if not all(can_be_subject(mask) for one in found.values() for mask in one.masks):
+        chosen_masks = {name: sampled[choice[name]][name] for name in names}
+        borders = {name: round(one.border, 4) for name, one in chosen_masks.items()}
+        if not all(can_be_subject(mask) for one in chosen_masks.values() for mask in one.masks):
             nothing = dict.fromkeys(names, 0.0)
             return SourceTried(called, nothing, borders, 0.0, "It takes in what is around the subject.")
         counted = [
             count_frame(
-                [one.masks[k] for one in found.values()], lenses, blame=False, fineness=ROUGH, scale=scale
+                [one.masks[k] for one in chosen_masks.values()],
+                lenses,
+                blame=False,
+                fineness=ROUGH,
+                scale=scale,
             )
             for k in range(len(frames))
         ]

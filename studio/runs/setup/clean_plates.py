@@ -144,10 +144,10 @@ class _Cleaning:
         pictures: list[Bytes] = []
         masks: list[list[Bytes]] = []
         for camera, middle, small in zip(self.cameras, self.middle, self.small, strict=True):
-            first, seen, found = self._first(camera, middle, small)
+            first, seen, rough_masks = self._first(camera, middle, small)
             firsts.append(first)
             pictures.append(seen)
-            masks.append(found)
+            masks.append(rough_masks)
         space = box_of(self.cameras, scale=self.scale)
         taken = self._covers(masks, self._carvers(space, FIRST_CARVING))
         for _ in range(ROUNDS - 1):
@@ -181,13 +181,13 @@ class _Cleaning:
             seen[row] = _resized(picture, small)
         self.footage.release(camera.name)
         if plate is None:
-            found, model = None, gaussian_from_median(stack)
+            rough_masks, model = None, gaussian_from_median(stack)
             doubtful = np.ones(stack.shape[1:3], np.bool_)
         else:
-            model, doubtful, found = combination(plate, stack, camera.width / middle.width)
+            model, doubtful, rough_masks = combination(plate, stack, camera.width / middle.width)
         settings = reduced_cleaning(self.settings, camera.width / middle.width)
         masks = [reduced(cleaned(model.foreground(picture, settings), settings), small) for picture in stack]
-        first = _First(_rounded(model.mean), doubtful.astype(np.uint8), found)
+        first = _First(_rounded(model.mean), doubtful.astype(np.uint8), rough_masks)
         return first, seen, masks
 
     def _cleaner_masks(
@@ -208,15 +208,15 @@ class _Cleaning:
 
         masks : of each camera, in each frame. carvers : of the cameras without each.
         """
-        found = [np.empty((len(self.frames), small.height, small.width), np.uint8) for small in self.small]
+        covers = [np.empty((len(self.frames), small.height, small.width), np.uint8) for small in self.small]
         for row in range(len(self.frames)):
             self._step("finding empty regions")
             seen = [of_camera[row] for of_camera in masks]
             for left_out, (camera, small) in enumerate(zip(self.cameras, self.small, strict=True)):
                 hull = carvers[left_out].shape(_without(seen, left_out))
                 reach = max(1, round(REACH * small.width / camera.width - BLUR))
-                found[left_out][row] = cv2.dilate(silhouette(hull, small), disc(reach)) > 0
-        return found
+                covers[left_out][row] = cv2.dilate(silhouette(hull, small), disc(reach)) > 0
+        return covers
 
     def _plate(self, camera: Camera, first: _First, taken: Bytes, folder: Path) -> CleanPlate:
         """taken : (K, h, w) of `_covers`."""
@@ -321,8 +321,10 @@ def fill_medians_of_empty(frames: Bytes, taken: Bytes, top: int, out: Bytes, emp
                     lower[at] = min(one, other)
                     upper[at] = max(one, other)
         for x in range(width):
-            found = int(empty[y, x])
-            if found >= FEWEST_EMPTY:
+            empty_count = int(empty[y, x])
+            if empty_count >= FEWEST_EMPTY:
                 for c in range(3):
-                    pair = int(values[(found - 1) // 2, 3 * x + c]) + int(values[found // 2, 3 * x + c])
+                    pair = int(values[(empty_count - 1) // 2, 3 * x + c]) + int(
+                        values[empty_count // 2, 3 * x + c]
+                    )
                     out[y, x, c] = np.uint8((pair + 1) // 2)

@@ -247,12 +247,12 @@ def contrast_notes(session: Session, settings: EvidenceSettings, known: KnownPos
     told apart, or nothing can be measured.
     """
     try:
-        found = measure_contrast(session, settings, known)
+        contrast = measure_contrast(session, settings, known)
     except StudioError:
         return ()
-    if found is None or not found.low:
+    if contrast is None or not contrast.low:
         return ()
-    return (f"{sentence(found.words)}: they may be lost. {found.remedy}",)
+    return (f"{sentence(contrast.words)}: they may be lost. {contrast.remedy}",)
 
 
 def _by_difference(settings: EvidenceSettings, footage: Footage, cameras: Sequence[Camera]) -> bool:
@@ -322,8 +322,8 @@ class _Marks:
     def outlines(self) -> tuple[tuple[tuple[int, int], ...], ...]:
         """Polygons around them, the largest first."""
         joined = cv2.morphologyEx(self.pixels.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8))
-        found = cv2.findContours(joined, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)[0]
-        largest = sorted(found, key=cv2.contourArea, reverse=True)[:MOST_OUTLINES]
+        outlines = cv2.findContours(joined, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)[0]
+        largest = sorted(outlines, key=cv2.contourArea, reverse=True)[:MOST_OUTLINES]
         across, down = self.camera.width / self.lens.width, self.camera.height / self.lens.height
         return tuple(
             tuple((round(float(x) * across), round(float(y) * down)) for x, y in polygon[:, 0])
@@ -453,9 +453,9 @@ def _lowest(hull: Hull) -> float:
 def _shadows(pixels: Flags, view: int, changed: Sequence[Bytes], lenses: Sequence[Camera]) -> Flags:
     """(h, w) which of a view's pixels may be a shadow on the floor: too few other cameras see the floor there empty."""
     rows, columns = np.nonzero(pixels)
-    found = np.zeros_like(pixels)
+    shadows = np.zeros_like(pixels)
     if not len(rows):
-        return found
+        return shadows
     lens = lenses[view]
     places = np.stack([columns, rows], axis=1).astype(np.float64)
     flat = cv2.undistortPoints(places[:, None], lens.matrix, lens.distortion)[:, 0]
@@ -470,8 +470,8 @@ def _shadows(pixels: Flags, view: int, changed: Sequence[Bytes], lenses: Sequenc
             continue
         cells, inside = nearest_pixels(camera, points)
         empty[inside] += changed[other][cells[inside, 1], cells[inside, 0]] == 0
-    found[rows, columns] = falls & (empty < min(EMPTY_VIEWS, len(lenses) - 1))
-    return found
+    shadows[rows, columns] = falls & (empty < min(EMPTY_VIEWS, len(lenses) - 1))
+    return shadows
 
 
 def border_support(picture: Bytes, mask: Bytes) -> float:

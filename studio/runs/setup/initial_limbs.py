@@ -39,7 +39,7 @@ def limbs_put_right(
     if not draw:
         return frame.hypothesis(pose)
     rng = np.random.default_rng(np.random.SeedSequence((seed, 0x11B5)))
-    found = frame.hypothesis(refiner.refine(within_limits(body, pose), frame.silhouettes).pose)
+    best = frame.hypothesis(refiner.refine(within_limits(body, pose), frame.silhouettes).pose)
     for _ in range(ROUNDS):
-        found, _ = redrawn(rng, found, frame)
-    return found
+        best, _ = redrawn(rng, best, frame)
+    return best

@@ -130,7 +130,7 @@ def initialise(
     check_seen(session, masks)
     hull, box, note = hull_of(tree, cameras, masks)
     space = search_space(tree, session_sigma(session, tree, session.manifest.fps))
-    found = seek(
+    start = seek(
         whole_problem(tree, cameras, settings, evidence),
         space,
         tree,
@@ -142,11 +142,11 @@ def initialise(
         progress=lambda done, total: progress("searching for the pose", done, total),
     )
     progress("checking each limb", 0, 1)
-    said = facing_agreement(tree, cameras, pictures, found.pose)
-    found = facing_as_said(found, len(cameras), said)
-    if found.margin < 0.0:
+    said = facing_agreement(tree, cameras, pictures, start.pose)
+    start = facing_as_said(start, len(cameras), said)
+    if start.margin < 0.0:
         note = f"{note} {TURNED}".strip()
-    stands = limbs_put_right(tree, cameras, masks, found.pose, seed, draw=len(cameras) >= FEWEST_VIEWS)
+    stands = limbs_put_right(tree, cameras, masks, start.pose, seed, draw=len(cameras) >= FEWEST_VIEWS)
     shares = stands.off.shares()
     denied = [limb for limb, share in shares.items() if share > LIMB_LOST_SHARE]
     if denied:
@@ -156,29 +156,29 @@ def initialise(
         body=tree.name,
         names=parameter_names(tree),
         pose=stands.pose,
-        confidence=found.confidence * trust(max(shares.values(), default=0.0)),
-        margin=found.margin,
-        rival=found.rival,
-        agreement=found.agreement,
+        confidence=start.confidence * trust(max(shares.values(), default=0.0)),
+        margin=start.margin,
+        rival=start.rival,
+        agreement=start.agreement,
         overlap=Onlooker(tree, cameras).sight(masks, stands.pose).overlap,
         hull_litres=0.0 if hull is None else hull.volume() * 1e-6,
-        evaluations=found.evaluations,
+        evaluations=start.evaluations,
         note=note,
     )
 
 
-def facing_as_said(found: FoundStart, cameras: int, said: float) -> FoundStart:
+def facing_as_said(start: FoundStart, cameras: int, said: float) -> FoundStart:
     """The start pose or its rival, whichever faces the right way by its weight and by what the network says of the
     pictures (`facing_agreement` of the start pose), with the confidence of both together.
     """
-    weighed = 0.0 if found.rival is None and said < 0.0 else facing_odds(found.margin, cameras)
+    weighed = 0.0 if start.rival is None and said < 0.0 else facing_odds(start.margin, cameras)
     odds = weighed + NETWORK_ODDS * said
-    if odds < 0.0 and found.rival is not None:
+    if odds < 0.0 and start.rival is not None:
         return dataclasses.replace(
-            found, pose=found.rival, rival=found.pose, log_weight=found.log_weight - found.margin,
-            margin=-found.margin, agreement=1.0 - found.agreement, confidence=confidence(-odds),
+            start, pose=start.rival, rival=start.pose, log_weight=start.log_weight - start.margin,
+            margin=-start.margin, agreement=1.0 - start.agreement, confidence=confidence(-odds),
         )  # fmt: skip
-    return dataclasses.replace(found, confidence=confidence(odds))
+    return dataclasses.replace(start, confidence=confidence(odds))
 
 
 def trust(most: float) -> float:
@@ -191,24 +191,24 @@ def trust(most: float) -> float:
     return 1.0 / (1.0 + (most / EVEN_SHARE) ** STEEPNESS)
 
 
-def keep_pose(session: Session, found: InitialPose, replace: bool = False) -> Path:
+def keep_pose(session: Session, initial: InitialPose, replace: bool = False) -> Path:
     """Write a found pose into the session's folder; returns the file.
 
     It becomes the start pose of its body if there is none, or with `replace` (the old one is kept beside it as
     start_pose-before.csv, numbered if there are more): start_pose.csv of the session's body, start_pose-of-BODY.csv of
     another one. Otherwise it is a separate file for `--start-pose`, named after its frame.
     """
-    own, taken = session.start_pose_path(found.body), {path.name for path in session.path.glob("*.csv")}
+    own, taken = session.start_pose_path(initial.body), {path.name for path in session.path.glob("*.csv")}
     if replace or not own.exists():
         with one_at_a_time(session.path):
             keep_before(own)
-            write_pose(own, found.names, found.pose, found.frame)
-            if found.body == session.manifest.body:
-                words = f"found in frame {found.frame}, confidence {100 * found.confidence:.0f} %"
+            write_pose(own, initial.names, initial.pose, initial.frame)
+            if initial.body == session.manifest.body:
+                words = f"found in frame {initial.frame}, confidence {100 * initial.confidence:.0f} %"
                 note(session, "start-pose", words)
         return own
-    place = session.path / _free(f"{own.stem}-frame-{found.frame}", taken)
-    write_pose(place, found.names, found.pose, found.frame)
+    place = session.path / _free(f"{own.stem}-frame-{initial.frame}", taken)
+    write_pose(place, initial.names, initial.pose, initial.frame)
     return place
 
 

@@ -93,9 +93,9 @@ def level_by_silhouettes(
         for done, frame in enumerate(chosen):
             progress("reading silhouettes", done, len(chosen))
             views = {view.camera: person_alone(view.mask) for view in maker.evidence(frame).views}
-            found = posture(cameras, views)
-            if found is not None:
-                lowest.append(found.feet * found.height_mm)
+            measured = posture(cameras, views)
+            if measured is not None:
+                lowest.append(measured.feet * measured.height_mm)
     progress("reading silhouettes", len(chosen), len(chosen))
     if not lowest:
         raise CalibrationError(

@@ -226,14 +226,14 @@ def mask_quality(
             progress("comparing masks", len(cameras) * len(masks) + done, total)
             seen += [count_subjects(masks[frame], small, scale)] if blame else []
             counted.append(count_frame(masks[frame], small, blame, scale=scale))
-    found = summed(chosen, tuple(camera.name for camera in cameras), counted)
+    quality = summed(chosen, tuple(camera.name for camera in cameras), counted)
     doubts = silhouette_doubts(cameras, people, height_of(session), scale) if blame else ()
     subjects = sorted(seen, reverse=True)[:2][-1] if seen else 0
     contrast = measure_contrast(session, settings, progress=progress)
     views = tuple(
-        dataclasses.replace(view, border=float(np.mean(borders[view.camera]))) for view in found.views
+        dataclasses.replace(view, border=float(np.mean(borders[view.camera]))) for view in quality.views
     )
-    return dataclasses.replace(found, views=views, doubts=doubts, subjects=subjects, contrast=contrast)
+    return dataclasses.replace(quality, views=views, doubts=doubts, subjects=subjects, contrast=contrast)
 
 
 def _each_view(
@@ -251,12 +251,12 @@ def measure_masks(session: Session, frames: Sequence[int] = (), progress: Progre
     """The quality of the session's masks. For the default frames it is stored: a blocking finding then refuses new runs
     (`silhouette_doubts.accepted_doubts`). Raises as `mask_quality` does.
     """
-    found = mask_quality(session, session_settings(session).evidence, frames, progress=progress)
+    quality = mask_quality(session, session_settings(session).evidence, frames, progress=progress)
     if frames:
-        return found
-    stops = tuple(str(finding) for finding in blocking(found.doubts))
-    remember(session, MEASURED, found.in_words(), found.usable, stops)
-    return found
+        return quality
+    stops = tuple(str(finding) for finding in blocking(quality.doubts))
+    remember(session, MEASURED, quality.in_words(), quality.usable, stops)
+    return quality
 
 
 def look_before_the_first_run(session: Session, progress: Progress = unheard) -> bool:

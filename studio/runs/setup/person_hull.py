@@ -44,8 +44,8 @@ def person_box(masks: Sequence[Bytes], cameras: tuple[Camera, ...], scale: float
 
 def large_hull(carver: Reconstructor, masks: Sequence[Bytes]) -> Hull | None:
     """The large pieces of the hull, None if it is empty."""
-    found = carver.shape(masks)
-    return None if found.empty else _large_pieces(found)
+    hull = carver.shape(masks)
+    return None if hull.empty else _large_pieces(hull)
 
 
 def _large_pieces(hull: Hull) -> Hull:

@@ -57,9 +57,9 @@ def person_landmarks(cameras: Sequence[Camera], footage: Footage, progress: Prog
     before: Array | None = None
     votes = 0
     for frame in sorted(seen):
-        found = _joints(known, seen[frame], before)
-        if found is not None:
-            positions[frame], vote = found
+        joints = _joints(known, seen[frame], before)
+        if joints is not None:
+            positions[frame], vote = joints
             before = positions[frame]
             votes += vote
     if votes < 0:
@@ -94,10 +94,10 @@ def _joints(cameras: Mapping[str, Camera], seen: Sightings, before: Array | None
             best = missed, _without_outliers(cameras, pixels, seen, points), kept
     if best is None:
         return None
-    found, vote = best[1:]
-    other = _exchanged(found)
-    if before is None or _moved(found, before) <= _moved(other, before):
-        return found, vote
+    placed, vote = best[1:]
+    other = _exchanged(placed)
+    if before is None or _moved(placed, before) <= _moved(other, before):
+        return placed, vote
     return other, -vote
 
 
@@ -132,11 +132,11 @@ def _without_outliers(
     """The points, each without the cameras that contradict the others; NaN where only two are left that contradict
     each other.
     """
-    found = points.copy()
+    cleaned = points.copy()
     for row in range(len(points)):
         rays = {name: places[row : row + 1] for name, places in pixels.items()}
-        found[row] = _of_those_that_agree(cameras, rays, seen, points[row : row + 1])
-    return found
+        cleaned[row] = _of_those_that_agree(cameras, rays, seen, points[row : row + 1])
+    return cleaned
 
 
 def _of_those_that_agree(

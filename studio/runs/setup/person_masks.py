@@ -179,9 +179,9 @@ class _Follower:
         agreed, points = _agreed(self._cameras, seen)
         if len(seen) == 1 and not agreed:
             if searches and len(pictures) > 1 and frame - self._searched >= self._step:
-                found = self.search(frame, pictures)
-                if len(found) > 1:
-                    return found
+                persons = self.search(frame, pictures)
+                if len(persons) > 1:
+                    return persons
             agreed = dict(seen)
         return self._completed(pictures, agreed, points)
 
@@ -192,12 +192,12 @@ class _Follower:
         self._searched = frame
 
         def find(name: str) -> list[Sighting]:
-            return self._networks[name].found(pictures[name], self._cameras[name].quarter_turns)
+            return self._networks[name].find(pictures[name], self._cameras[name].quarter_turns)
 
         persons = _each(self._threads, pictures, find)
         if len(pictures) == 1:
-            ((name, found),) = persons.items()
-            largest = max(found, key=lambda one: _filled(one, pictures[name]), default=None)
+            ((name, candidates),) = persons.items()
+            largest = max(candidates, key=lambda one: _filled(one, pictures[name]), default=None)
             return self._completed(pictures, {} if largest is None else {name: largest}, None)
         best: tuple[tuple[bool, int, float], Sightings, Array | None] = ((False, 0, 0.0), {}, None)
         for one, other in itertools.combinations(pictures, 2):

@@ -132,26 +132,26 @@ def owners(
     parts = [empty] * len(maps)
     if not seen or not foreground.any():
         return parts
-    found = [one for one in maps if one is not None]
+    visible = [one for one in maps if one is not None]
     soft = _soft(picture)
     by_colour = np.stack(
         [
             colours[k].explains(soft[foreground], one.limb[foreground])
-            for k, one in zip(seen, found, strict=True)
+            for k, one in zip(seen, visible, strict=True)
         ]
     )
     by_colour = np.maximum(by_colour - by_colour.max(axis=0), -MOST_BY_COLOUR)
-    front = np.stack([np.where(one.inside, one.depth, np.inf) for one in found]).min(axis=0)
+    front = np.stack([np.where(one.inside, one.depth, np.inf) for one in visible]).min(axis=0)
     scores: list[Array] = []
-    for one, colour in zip(found, by_colour, strict=True):
+    for one, colour in zip(visible, by_colour, strict=True):
         speaks = np.zeros(whole.shape)
         speaks[foreground] = colour
         speaks -= BEHIND * (one.inside & (one.depth > front))
         scores.append(_smoothed(speaks, foreground) - one.apart / one.fades)
     owner, most = np.argmax(scores, axis=0), np.max(scores, axis=0)
-    depth = np.stack([one.depth for one in found])
+    depth = np.stack([one.depth for one in visible])
     before = np.take_along_axis(depth, owner[None], axis=0)[0]
-    for row, (number, one) in enumerate(zip(seen, found, strict=True)):
+    for row, (number, one) in enumerate(zip(seen, visible, strict=True)):
         unknown = foreground & (owner != row) & ((before < one.depth) | (scores[row] > most - SURE))
         own = foreground & (owner == row)
         parts[number] = Share(_mask(own | (unknown & one.inside)), _mask(unknown))

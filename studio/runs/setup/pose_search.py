@@ -77,7 +77,7 @@ def better_pose(
 
     progress(STEP, done, layers + 1)
     space = search_space(body, session_sigma(session, body, min(HAND_FPS, session.manifest.fps)))
-    found = search_frame(
+    result = search_frame(
         TRACKERS[TRACKER],
         problem,
         FilterState(ParticleSet(given[None], np.zeros(1))),
@@ -87,7 +87,7 @@ def better_pose(
         settings_source=lambda: (1, settings.tracker),
         on_layer=checked,
     )
-    searched = np.stack([given, found.estimate.pose, found.estimate.mode])
+    searched = np.stack([given, result.estimate.pose, result.estimate.mode])
     begin = searched[int(np.argmax(problem.log_likelihood(searched)))]
     refiner = Refiner(body, problems.cameras, RefinementSettings())
     refined = refiner.refine(begin, silhouette_distances(evidence), problem).pose

@@ -137,7 +137,7 @@ def _fitted_now(
         if any(problems.footage.absent(frame) for frame in frames):
             return _Kept(words="The shape was not fitted: not every camera has the first frames.")
         fps = session.manifest.fps
-        found = shaped_body(
+        shape = shaped_body(
             body,
             cameras,
             lambda frame: problems.evidence(frame, wanted),
@@ -146,13 +146,13 @@ def _fitted_now(
             session_sigma(session, body, fps),
             progress=progress,
         )
-    before, after = found.overlap
+    before, after = shape.overlap
     if after < max(LEAST_OVERLAP, before):
         return _Kept(words="The shape was not fitted: the masks agree too little with the body.")
     return _Kept(
-        dimensions=dict(found.body.dimensions),
-        start=tuple(float(value) for value in found.start),
-        words=_words(found, frames),
+        dimensions=dict(shape.body.dimensions),
+        start=tuple(float(value) for value in shape.start),
+        words=_words(shape, frames),
     )
 
 
@@ -186,9 +186,9 @@ def shaped_body(
     numbers = np.array(frames[: len(followed)])
     chosen = varied_frames(body, numbers, followed, FITTED_FRAMES)
     rows = np.searchsorted(numbers, chosen)
-    found = fitted_shape(body, cameras, [evidence(frame) for frame in chosen], followed[rows])
+    fit = fitted_shape(body, cameras, [evidence(frame) for frame in chosen], followed[rows])
     progress(STEP, len(frames) + 1, len(frames) + 1)
-    return FittedShape(found.body, followed[0], found.sizes, found.overlap)
+    return FittedShape(fit.body, followed[0], fit.sizes, fit.overlap)
 
 
 def fitted_shape(
@@ -198,12 +198,12 @@ def fitted_shape(
     space = shape_space(body, lengths="ends")
     prior = ShapePrior(space, ShapeSpreads(), None)
     borders = [silhouette_distances(frame) for frame in frames]
-    found = ShapeRefiner(ShapePrograms(space), cameras, borders, prior, lengths_known=True).refine(
+    fit = ShapeRefiner(ShapePrograms(space), cameras, borders, prior, lengths_known=True).refine(
         np.zeros(len(space.groups)), poses
     )
-    shaped = space.body_of(found.shape)
-    overlap = _overlap(body, cameras, frames, poses), _overlap(shaped, cameras, frames, found.poses)
-    return FittedShape(shaped, found.poses[0], _sizes(space, found.shape), overlap)
+    shaped = space.body_of(fit.shape)
+    overlap = _overlap(body, cameras, frames, poses), _overlap(shaped, cameras, frames, fit.poses)
+    return FittedShape(shaped, fit.poses[0], _sizes(space, fit.shape), overlap)
 
 
 def _overlap(
@@ -227,16 +227,16 @@ def _sizes(space: ShapeSpace, shape: Array) -> dict[str, tuple[float, float]]:
     }
 
 
-def _words(found: FittedShape, frames: range) -> str:
+def _words(shape: FittedShape, frames: range) -> str:
     changed = [
         f"{name.replace('_', ' ')} {one:.0f} → {other:.0f}"
-        for name, (one, other) in found.sizes.items()
-        if abs(other - one) >= WORDED * scale_of(found.body)
+        for name, (one, other) in shape.sizes.items()
+        if abs(other - one) >= WORDED * scale_of(shape.body)
     ]
     listed = f": {', '.join(changed)} mm" if changed else ""
     return (
         f"The body's shape was fitted to frames {frames[0]} to {frames[-1]}{listed}; the silhouettes agree by "
-        f"{100.0 * found.overlap[1]:.0f} % (before: {100.0 * found.overlap[0]:.0f} %). Bone lengths were kept."
+        f"{100.0 * shape.overlap[1]:.0f} % (before: {100.0 * shape.overlap[0]:.0f} %). Bone lengths were kept."
     )
 
 

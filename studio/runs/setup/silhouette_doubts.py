@@ -43,13 +43,13 @@ def silhouette_doubts(
     """
     known = {finding.code for finding in check_calibration(cameras)}
     seen: Masks = masks
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for finding in check_calibration(cameras, masks=seen, height_mm=height_mm, scale=scale):
         if finding.code in known or finding.code == UNEXPLAINED:
             continue
         by_height = finding.code in SIZES and height_mm is not None
-        found.append(dataclasses.replace(finding, severity="warns") if by_height else finding)
-    return tuple(found)
+        findings.append(dataclasses.replace(finding, severity="warns") if by_height else finding)
+    return tuple(findings)
 
 
 def standing_doubts(session: Session) -> tuple[str, ...]:

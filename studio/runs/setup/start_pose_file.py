@@ -74,13 +74,13 @@ def start_pose_from_file(path: Path, body: BodyModel, frame: int, fps: float) ->
         return pose, f"file {path.name}"
     motion = read_trc(path)
     rows = np.rint(motion.times * fps).astype(int)
-    found = np.flatnonzero(rows == frame)
-    if not found.size:
+    matching = np.flatnonzero(rows == frame)
+    if not matching.size:
         raise TruthError(
             f"'{path.name}' has no row for frame {frame} at {fps:g} frames per second.",
             f"Its rows are frames {rows.min()} to {rows.max()}.",
         )
-    points = motion.positions[found[0]]
+    points = motion.positions[matching[0]]
     kept = [at for at in known_markers(body, motion.names)[0] if np.isfinite(points[at]).all()]
     if len(kept) < FEWEST_MARKERS:
         known = ", ".join(sorted(marker.name for marker in body.markers)) or "the body has no markers"

@@ -45,11 +45,11 @@ Strokes = Mapping[int, tuple[Stroke, ...]]
 
 def by_frame(strokes: Sequence[Stroke], camera: str) -> Strokes:
     """One camera's strokes, those of a frame in the order in which they were painted."""
-    found: dict[int, tuple[Stroke, ...]] = {}
+    frames: dict[int, tuple[Stroke, ...]] = {}
     for stroke in strokes:
         if stroke.camera == camera:
-            found[stroke.frame] = (*found.get(stroke.frame, ()), stroke)
-    return found
+            frames[stroke.frame] = (*frames.get(stroke.frame, ()), stroke)
+    return frames
 
 
 def first_frame(strokes: Strokes) -> int | None:
@@ -125,12 +125,12 @@ def _begun(
     """A cut of the first picture, to go on from; those of the last few are kept."""
     key = (session.path, camera, pictures_of(session.manifest.footage)[camera], first, strokes)
     with _cuts_lock:
-        found = _cuts.get(key)
-        if found is None:
-            found = StrokeCut()
-            found.begin(footage.picture(camera, first), strokes)
-            _cuts[key] = found
-        return found.copy()
+        cut = _cuts.get(key)
+        if cut is None:
+            cut = StrokeCut()
+            cut.begin(footage.picture(camera, first), strokes)
+            _cuts[key] = cut
+        return cut.copy()
 
 
 class _Work:

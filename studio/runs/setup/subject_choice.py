@@ -44,10 +44,10 @@ def choose_body(session: Session, body: str) -> Session:
     return _with_body(session, body)
 
 
-def keep_fitted(session: Session, found: FittedSubject) -> Path:
+def keep_fitted(session: Session, fitted: FittedSubject) -> Path:
     """Make a fitted subject the session's own, and record its provenance."""
-    place = keep_subject(session, found)
-    note(_with_body(session, found.subject.body), "subject")
+    place = keep_subject(session, fitted)
+    note(_with_body(session, fitted.subject.body), "subject")
     return place
 
 

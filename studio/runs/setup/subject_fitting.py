@@ -156,14 +156,14 @@ def fit_session_subject(
         seed=request.seed,
         progress=lambda done, total: progress("2 of 3, fitting lengths and radii", done, total),
     )
-    found = search.run(start)
-    shown(space.body_of(found.shape), frames, found.poses)
+    searched = search.run(start)
+    shown(space.body_of(searched.shape), frames, searched.poses)
     progress("3 of 3, refining lengths and radii", 0, 1)
     borders = [silhouette_distances(one) for one in evidence]
     refiner = ShapeRefiner(
         silhouettes.programs, session.cameras(), borders, prior, lengths_known=not request.lengths
     )
-    refined = refiner.refine(found.shape, found.poses, request.seed, others=(start,))
+    refined = refiner.refine(searched.shape, searched.poses, request.seed, others=(start,))
     fitted = space.body_of(refined.shape)
     return FittedSubject(
         subject_of(subject, fitted),
@@ -171,7 +171,7 @@ def fit_session_subject(
         _sizes(space, refined),
         frames,
         refined.poses,
-        found.before,
+        searched.before,
         search.fitness(refined.shape, refined.poses),
         poses_from,
         search.evaluations,
@@ -186,12 +186,12 @@ def _sizes(space: ShapeSpace, refined: RefinedShape) -> tuple[FittedSize, ...]:
     )
 
 
-def keep_subject(session: Session, found: FittedSubject, into: Path | None = None) -> Path:
+def keep_subject(session: Session, fitted: FittedSubject, into: Path | None = None) -> Path:
     """Write a fitted subject to a file, or as the session's own (the old one is kept as subject-before.toml)."""
     if into is not None:
-        write_subject(found.subject, into)
+        write_subject(fitted.subject, into)
         return into
-    return replace_subject(session, found.subject)
+    return replace_subject(session, fitted.subject)
 
 
 def replace_subject(session: Session, subject: Subject) -> Path:
@@ -232,7 +232,7 @@ def _first_poses(
         if all(frame in rows for frame in frames):
             return frames, poses[[rows[frame] for frame in frames]], f"run {name}"
     frames = tuple(request.frames) or varied_frames(body, np.arange(count), None, request.count)
-    found: list[Array] = []
+    first_poses: list[Array] = []
     reached = 0
     for done, frame in enumerate(frames):
 
@@ -242,13 +242,13 @@ def _first_poses(
             reached = max(reached, done * 100 + 100 * part // max(whole, 1))
             report(f"1 of 3, {step} in frame {frames[done]}", reached, 100 * len(frames))
 
-        found.append(
+        first_poses.append(
             within_limits(
                 body, initialise(session, frame, body=body, seed=request.seed, progress=report_frame).pose
             )
         )
-        shown(body, frames[: done + 1], np.array(found))
-    return frames, np.array(found), "a search in each frame"
+        shown(body, frames[: done + 1], np.array(first_poses))
+    return frames, np.array(first_poses), "a search in each frame"
 
 
 def _stored_poses(
@@ -272,13 +272,13 @@ def _stored_poses(
 def _evidence(session: Session, frames: Sequence[int], report: Progress) -> tuple[FrameEvidence, ...]:
     """The masks of the frames. Raises RunError for a frame that shows no body."""
     with masks_of(session) as maker:
-        found: list[FrameEvidence] = []
+        frames_evidence: list[FrameEvidence] = []
         for done, frame in enumerate(frames):
             report("reading the frames", done, len(frames))
             evidence = maker.evidence(frame)
             check_seen(session, evidence)
-            found.append(evidence)
-    return tuple(found)
+            frames_evidence.append(evidence)
+    return tuple(frames_evidence)
 
 
 def subject_of(subject: Subject, body: BodyModel) -> Subject:

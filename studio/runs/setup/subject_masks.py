@@ -202,11 +202,11 @@ def _first(
             "Nobody is seen in the first frame: the views' masks have nothing in common.",
             "Look at the masks, or begin the footage where the subjects are in view.",
         )
-    labels, found = subjects_of(hull, masks, cameras)
-    named, number = labels_at(hull, labels, found, MM * np.array(places), scale)
+    labels, subjects = subjects_of(hull, masks, cameras)
+    named, number = labels_at(hull, labels, subjects, MM * np.array(places), scale)
     if named is None:
         x, y = places[number]
-        seen = "; ".join(_seen(one).in_words() for one in found)
+        seen = "; ".join(_seen(one).in_words() for one in subjects)
         raise FootageError(
             f"Nobody stands at {x:g},{y:g} (metres) in the first frame.", f"There is somebody at {seen}."
         )

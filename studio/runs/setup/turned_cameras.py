@@ -36,17 +36,17 @@ class Turned(msgspec.Struct, frozen=True):
 
 def remember_alignment(session: Session, aligned: SessionAlignment) -> None:
     """Store how far the silhouettes miss with the calibration in use, for the guided set-up."""
-    remember(session, PART, _missed(aligned, aligned.found.before), not aligned.needed)
+    remember(session, PART, _missed(aligned, aligned.aligned.before), not aligned.needed)
 
 
 def alignment_words(aligned: SessionAlignment) -> str:
     """How far the silhouettes miss and the remedy, as a sentence."""
-    found, missed = aligned.found, _missed(aligned, aligned.found.before)
+    angles, missed = aligned.aligned, _missed(aligned, aligned.aligned.before)
     if not aligned.needed:
         return f"{missed}: the cameras agree."
     if not aligned.better:
         return f"{missed}, and turning cameras does not explain it: check the masks and the calibration."
-    turn, after = float(np.nanmax(found.turns)), float(np.nanmax(found.after))
+    turn, after = float(np.nanmax(angles.turns)), float(np.nanmax(angles.after))
     return f"{missed}; with cameras turned by up to {turn:.2f}° they would miss by {after:.1f} px."
 
 
@@ -80,8 +80,8 @@ def turn_cameras(session: Session, aligned: SessionAlignment) -> CalibrationChan
         if change.kept is not None:
             turned = Turned(change.kept.name, source, _content(change.session))
             write_bytes(change.session.path / RECORD_PATH, msgspec.json.encode(turned))
-    found = aligned.found
-    worst, most = int(np.nanargmax(found.after)), float(np.nanmax(found.after))
+    angles = aligned.aligned
+    worst, most = int(np.nanargmax(angles.after)), float(np.nanmax(angles.after))
     words = f"The silhouettes miss by up to {most:.1f} px ({aligned.names[worst]})"
     note(change.session, PART, words)
     return change
@@ -89,8 +89,8 @@ def turn_cameras(session: Session, aligned: SessionAlignment) -> CalibrationChan
 
 def turned_from(session: Session) -> str:
     """Name of the earlier calibration that the cameras in use were turned from; "" if they were not."""
-    found = _turned(session)
-    return "" if found is None else found.before
+    turned = _turned(session)
+    return "" if turned is None else turned.before
 
 
 def turn_back(session: Session) -> CalibrationChange:
@@ -98,22 +98,22 @@ def turn_back(session: Session) -> CalibrationChange:
     while a run is being tracked.
     """
     with one_at_a_time(session.path):
-        found = _turned(session)
-        if found is None:
+        turned = _turned(session)
+        if turned is None:
             raise NotFoundError(
                 f"The cameras of session '{session.name}' were not turned by their silhouettes.",
                 "Choose one of the earlier calibrations in step Calibration.",
             )
-        return restore_calibration(session, found.before, found.source)
+        return restore_calibration(session, turned.before, turned.source)
 
 
 def _turned(session: Session) -> Turned | None:
     try:
-        found = decode_json(read_file(session.path / RECORD_PATH, LARGEST_RECORD), Turned)
-        earlier_calibration(session, found.before)
+        turned = decode_json(read_file(session.path / RECORD_PATH, LARGEST_RECORD), Turned)
+        earlier_calibration(session, turned.before)
     except (OSError, msgspec.DecodeError, SessionError):
         return None
-    return found if found.content == _content(session) else None
+    return turned if turned.content == _content(session) else None
 
 
 def _content(session: Session) -> str:

@@ -54,12 +54,12 @@ def plan_bodytrack(source: Path, calibration: Path | str | None) -> SourcePlan:
 
 
 def _folders(source: Path, prefix: str) -> tuple[Path, ...]:
-    found = [
+    folders = [
         path
         for path in source.iterdir()
         if path.is_dir() and re.fullmatch(rf"{prefix}\d+", path.name.upper())
     ]
-    return tuple(sorted(found, key=lambda path: natural_key(path.name)))
+    return tuple(sorted(folders, key=lambda path: natural_key(path.name)))
 
 
 def read_numbers(path: Path, count: int | None = None) -> Array | None:

@@ -138,9 +138,9 @@ def trials_of(source: Path) -> dict[str, Layout]:
     takes = _takes_of_camera_folders(source)
     if takes:
         return takes
-    found: dict[str, Layout] = {}
+    trials: dict[str, Layout] = {}
     for folder in _folders_below(source, DEEPEST_TRIAL):
-        if any(folder.is_relative_to(layout.folder) for layout in found.values()):
+        if any(folder.is_relative_to(layout.folder) for layout in trials.values()):
             continue
         if not _is_trial(folder):
             continue
@@ -150,8 +150,10 @@ def trials_of(source: Path) -> dict[str, Layout]:
         if title.startswith("folder") and (source / "Config.toml").is_file():
             title = "Pose2Sim trial"
         name = folder.relative_to(source).as_posix()
-        found[name] = Layout(title, folder, layout.footage, (*layout.calibrations, *above), layout.timestamps)
-    return found
+        trials[name] = Layout(
+            title, folder, layout.footage, (*layout.calibrations, *above), layout.timestamps
+        )
+    return trials
 
 
 def is_caliscope(source: Path) -> bool:
@@ -171,8 +173,8 @@ def is_opencap(source: Path) -> bool:
 
 def _opencap_cameras(source: Path) -> list[Path]:
     folders = (source / "Videos").iterdir() if (source / "Videos").is_dir() else ()
-    found = [path for path in folders if (path / "InputMedia").is_dir() and not path.is_symlink()]
-    return sorted(found, key=lambda path: natural_key(path.name))
+    cameras = [path for path in folders if (path / "InputMedia").is_dir() and not path.is_symlink()]
+    return sorted(cameras, key=lambda path: natural_key(path.name))
 
 
 def _opencap_trials(source: Path) -> dict[str, Layout]:
@@ -183,8 +185,8 @@ def _opencap_trials(source: Path) -> dict[str, Layout]:
     videos: dict[str, dict[str, Path]] = {}
     for camera in cameras:
         for folder in sorted((camera / "InputMedia").iterdir(), key=lambda path: natural_key(path.name)):
-            found = [path for path in entries(folder) if path.is_file()]
-            synchronised = [path for path in found if path.stem.endswith("_sync")] or found
+            files = [path for path in entries(folder) if path.is_file()]
+            synchronised = [path for path in files if path.stem.endswith("_sync")] or files
             if len(synchronised) == 1 and folder.name.lower() != "calibration":
                 videos.setdefault(folder.name, {})[camera.name] = synchronised[0]
     places = (*calibration_folders(source), source / "Videos", source)
@@ -192,13 +194,13 @@ def _opencap_trials(source: Path) -> dict[str, Layout]:
         trial: Layout(
             "OpenCap session",
             source,
-            tuple(found.values()),
+            tuple(files.values()),
             places,
-            names={video: camera for camera, video in found.items()},
+            names={video: camera for camera, video in files.items()},
             take=trial,
         )
-        for trial, found in videos.items()
-        if len(found) == len(cameras)
+        for trial, files in videos.items()
+        if len(files) == len(cameras)
     }
 
 
@@ -213,11 +215,11 @@ def _takes_of_camera_folders(source: Path) -> dict[str, Layout]:
         if len(cameras) < 2 or min(map(len, videos.values())) < 2:
             continue
         takes: dict[str, dict[Path, str]] = {}
-        for camera, found in videos.items():
-            for video in found:
+        for camera, clips in videos.items():
+            for video in clips:
                 name = CAMERA_IN_NAME.sub("", video.stem).strip("-_. ") or video.stem
                 takes.setdefault(name, {})[video] = camera.name
-        whole = {name: found for name, found in takes.items() if len(set(found.values())) == len(cameras)}
+        whole = {name: clips for name, clips in takes.items() if len(set(clips.values())) == len(cameras)}
         if not whole:
             raise FootageError(
                 f"The folders {listed(path.name for path in cameras)} hold several videos each, and none has the same"
@@ -226,9 +228,9 @@ def _takes_of_camera_folders(source: Path) -> dict[str, Layout]:
             )
         own = (*calibration_folders(source), source)
         return {
-            name: Layout("folder a camera", source, tuple(found), own, names=found, take=name)
-            for name, found in whole.items()
-            if len(found) == len(cameras)
+            name: Layout("folder a camera", source, tuple(clips), own, names=clips, take=name)
+            for name, clips in whole.items()
+            if len(clips) == len(cameras)
         }
     return {}
 
@@ -247,18 +249,18 @@ def entries(folder: Path) -> tuple[Path, ...]:
     """The videos of a folder and its folders that hold pictures, in natural order."""
     if not folder.is_dir():
         return ()
-    found = [
+    inside = [
         path
         for path in folder.iterdir()
         if not path.name.startswith(".")
         and (bool(list_pictures(path)) if path.is_dir() else path.suffix.lower() in VIDEO_SUFFIXES)
     ]
-    return tuple(sorted(found, key=lambda path: natural_key(path.name)))
+    return tuple(sorted(inside, key=lambda path: natural_key(path.name)))
 
 
 def entries_of_first(source: Path, places: tuple[str, ...]) -> tuple[Path, ...]:
     """The entries of the first place that has any."""
-    return next((found for place in places if (found := entries(source / place))), ())
+    return next((inside for place in places if (inside := entries(source / place))), ())
 
 
 def loose_footage(source: Path) -> tuple[Path, ...]:
@@ -281,18 +283,18 @@ def video_of_a_camera(folder: Path) -> Path | None:
     """The only video of a folder that a camera's recordings lie in, however deep (a copied card, DANNCE's
     `Camera1/0.mp4`, OpenCap's `Cam0/InputMedia/walk/walk_sync.mp4`); None where there is none or several.
     """
-    level, found = [folder], list[Path]()
+    level, clips = [folder], list[Path]()
     for _ in range(DEEPEST_VIDEO):
         inside = [path for one in level for path in one.iterdir() if not path.name.startswith(".")]
-        found += [path for path in inside if path.suffix.lower() in VIDEO_SUFFIXES and path.is_file()]
+        clips += [path for path in inside if path.suffix.lower() in VIDEO_SUFFIXES and path.is_file()]
         level = [
             path
             for path in inside
             if path.is_dir() and not path.is_symlink() and path.name.lower() not in OTHER_FOLDERS
         ]
-        if len(found) > 1 or len(level) > MOST_FOLDERS:
+        if len(clips) > 1 or len(level) > MOST_FOLDERS:
             return None
-    return found[0] if found else None
+    return clips[0] if clips else None
 
 
 def folders_of_cameras(source: Path) -> dict[str, Path]:
@@ -311,9 +313,9 @@ def folders_of_cameras(source: Path) -> dict[str, Path]:
             and path.name.lower() not in FOOTAGE_FOLDERS
         ]  # fmt: skip
         named = [path for path in folders if CAMERA_FOLDER.match(path.name)] or folders
-        found = {path.name: video for path in named if (video := video_of_a_camera(path)) is not None}
-        if len(found) > 1 and (len(found) == len(named)):
-            return {name: found[name] for name in sorted(found, key=natural_key)}
+        clips = {path.name: video for path in named if (video := video_of_a_camera(path)) is not None}
+        if len(clips) > 1 and (len(clips) == len(named)):
+            return {name: clips[name] for name in sorted(clips, key=natural_key)}
     return {}
 
 
@@ -371,7 +373,7 @@ def _is_trial(folder: Path) -> bool:
 
 
 def _folders_below(source: Path, depth: int) -> list[Path]:
-    found: list[Path] = []
+    folders: list[Path] = []
     level = [source]
     for _ in range(depth):
         level = [
@@ -381,10 +383,10 @@ def _folders_below(source: Path, depth: int) -> list[Path]:
             if path.is_dir() and not path.is_symlink() and not path.name.startswith(".")
             and path.name.lower() not in OTHER_FOLDERS and "calib" not in path.name.lower()
         ]  # fmt: skip
-        found += level
-        if len(found) > MOST_FOLDERS:
+        folders += level
+        if len(folders) > MOST_FOLDERS:
             break
-    return found
+    return folders
 
 
 def _up_to(folder: Path, source: Path) -> list[Path]:
@@ -418,7 +420,7 @@ def plan_folder(
         source=folder,
         calibration=wanted if chosen else None,
         footage=footage,
-        masks=next((found for name in MASK_FOLDERS if (found := entries(folder / name))), ()),
+        masks=next((inside for name in MASK_FOLDERS if (inside := entries(folder / name))), ()),
         backgrounds=_backgrounds(folder / "background") or _backgrounds(folder / "backgrounds"),
         truth=truth,
         points=points,
@@ -444,8 +446,8 @@ def plan_folder(
 
 def _truths(folder: Path) -> tuple[Path, ...]:
     """Files of a true motion."""
-    found = folder.iterdir() if folder.is_dir() else ()
-    return tuple(sorted(path for path in found if path.suffix.lower() in READERS and path.is_file()))
+    files = folder.iterdir() if folder.is_dir() else ()
+    return tuple(sorted(path for path in files if path.suffix.lower() in READERS and path.is_file()))
 
 
 def choose_calibration(source: Path, choice: Path | str | None) -> Path:
@@ -467,9 +469,9 @@ def _chosen(source: Path, trial: str | None) -> tuple[Layout, tuple[Path, ...]]:
     if layout is None or not layout.footage:
         trials = trials_of(source)
         if not trials:
-            found = what_was_found(source)
+            content = what_was_found(source)
             raise FootageError(
-                f"'{source.name}' holds no footage" + (f". {found}" if found else "."),
+                f"'{source.name}' holds no footage" + (f". {content}" if content else "."),
                 "Put one video a camera into 'videos/' (or into a folder named after the camera, one in each), or give"
                 " one folder of pictures a camera.",
             )
@@ -519,12 +521,12 @@ def _calibration(source: Path, places: tuple[Path, ...], choice: Path | str | No
         there = listed(path.name for place in places for path in find_calibrations(place))
         raise CalibrationError(f"There is no calibration '{choice}'.", f"Found in '{source.name}': {there}.")
     for place in places:
-        found = find_calibrations(place)
-        if len(found) == 1:
-            return found[0]
-        if found:
+        files = find_calibrations(place)
+        if len(files) == 1:
+            return files[0]
+        if files:
             raise CalibrationError(
-                f"'{place.name}' holds {len(found)} calibrations: {listed(path.name for path in found)}.",
+                f"'{place.name}' holds {len(files)} calibrations: {listed(path.name for path in files)}.",
                 "Choose one with --calibration NAME.",
             )
     pickles = [path.name for place in places for path in place.iterdir() if path.suffix.lower() in PICKLES]
@@ -544,12 +546,12 @@ def _calibration(source: Path, places: tuple[Path, ...], choice: Path | str | No
 def _backgrounds(folder: Path) -> tuple[Path, ...]:
     if not folder.is_dir():
         return ()
-    found = [
+    files = [
         path
         for path in folder.iterdir()
         if not path.name.startswith(".") and (is_picture(path) or path.suffix.lower() in VIDEO_SUFFIXES)
     ]
-    return tuple(sorted(found, key=lambda path: natural_key(path.name)))
+    return tuple(sorted(files, key=lambda path: natural_key(path.name)))
 
 
 def _file(path: Path) -> Path | None:

@@ -42,16 +42,19 @@ TRIMMED_SHARE = 0.1
 class MeasuredCamera:
     """One camera's parts, measured.
 
-    camera : as fitted to the footage. footage, masks, background : source paths. found : measured by decoding
-    the footage, before turning. crop : assumed to make it fit, if any. turned : degrees
-    clockwise. offset : the file's frame that is frame 0 of all cameras. steps : as of `CameraSource`.
-    fields : as of `CameraSource`; found counts them then. mask_form, mask_count : how the masks are meant, and how many
-    there are.
+    camera : as fitted to the footage.
+    footage, masks, background : source paths.
+    measure : of the footage as it decodes, before turning.
+    crop : assumed to make it fit, if any.
+    turned : degrees clockwise.
+    offset : the file's frame that is frame 0 of all cameras.
+    steps, fields : as of `CameraSource`; `measure` counts fields then.
+    mask_form, mask_count : how the masks are meant, and how many there are.
     """
 
     camera: Camera
     footage: Path
-    found: VideoMeasure | PicturesMeasure
+    measure: VideoMeasure | PicturesMeasure
     crop: AssumedCrop | None
     masks: Path | None
     background: Path | None
@@ -65,8 +68,10 @@ class MeasuredCamera:
     @property
     def size(self) -> tuple[int, int]:
         """(width, height) of the pictures once they are turned, px."""
-        found = self.found
-        return (found.height, found.width) if self.turned in (90, 270) else (found.width, found.height)
+        measure = self.measure
+        return (
+            (measure.height, measure.width) if self.turned in (90, 270) else (measure.width, measure.height)
+        )
 
 
 def crop_warnings(calibration: Calibration, measured: tuple[MeasuredCamera, ...]) -> list[str]:
@@ -96,9 +101,9 @@ def crop_warnings(calibration: Calibration, measured: tuple[MeasuredCamera, ...]
 def gap_warnings(measured: tuple[MeasuredCamera, ...]) -> list[str]:
     """A warning where numbers of pictures are missing, an error if they are not the same in all cameras."""
     missing = {
-        entry.footage.name: entry.found.missing
+        entry.footage.name: entry.measure.missing
         for entry in measured
-        if isinstance(entry.found, PicturesMeasure)
+        if isinstance(entry.measure, PicturesMeasure)
     }
     gaps = {name: numbers for name, numbers in missing.items() if numbers}
     if not gaps:
@@ -134,7 +139,7 @@ def common_frame_count(
     """The frames that all cameras have after their offsets. aligned : the offsets are known, so that footage may end
     at different moments.
     """
-    counts = {entry.footage.name: entry.found.frame_count - entry.offset for entry in measured}
+    counts = {entry.footage.name: entry.measure.frame_count - entry.offset for entry in measured}
     shortest, longest = min(counts.values()), max(counts.values())
     if shortest == longest:
         return shortest
@@ -176,10 +181,10 @@ def common_rate(
     time: then the slowest.
     """
     videos = [
-        (entry.footage.name, entry.found) for entry in measured if isinstance(entry.found, VideoMeasure)
+        (entry.footage.name, entry.measure) for entry in measured if isinstance(entry.measure, VideoMeasure)
     ]
-    rates = {name: found.fps for name, found in videos}
-    uneven = {name: found.uneven_frame for name, found in videos if found.uneven_frame >= 0}
+    rates = {name: measure.fps for name, measure in videos}
+    uneven = {name: measure.uneven_frame for name, measure in videos if measure.uneven_frame >= 0}
     if requested is not None:
         other = [
             f"{name}: {rate:g}" for name, rate in rates.items() if abs(rate / requested - 1.0) > SAME_RATE
@@ -199,12 +204,12 @@ def common_rate(
         )
     if known is not None:
         return known
-    found = sorted(rates.values())
-    if not found or found[0] <= 0.0:
+    measure = sorted(rates.values())
+    if not measure or measure[0] <= 0.0:
         raise FootageError("The frame rate of the footage is unknown.", "Give the frame rate with --fps.")
-    if found[-1] / found[0] - 1.0 > SAME_RATE and not by_time:
+    if measure[-1] / measure[0] - 1.0 > SAME_RATE and not by_time:
         raise different_rates(rates)
-    return found[0]
+    return measure[0]
 
 
 def different_rates(rates: Mapping[str, float]) -> FootageError:
@@ -317,27 +322,27 @@ def check_in_step(
     """Raises FootageError where pictures with one number come to lie more than half a frame apart by the videos' times;
     trusted : warns only, as a rate or recorded times were given that say otherwise. A frame lost is a warning.
     """
-    found = drifts(_own_times(measured, rate), rate)
-    apart = [drift for drift in found if drift.first >= 0]
-    words = " ".join(drift.words(rate) for drift in found)
+    drifting = drifts(_own_times(measured, rate), rate)
+    apart = [drift for drift in drifting if drift.first >= 0]
+    words = " ".join(drift.words(rate) for drift in drifting)
     if apart and not trusted:
         raise FootageError(
             words,
             "Pair the frames by their times (--by-time), or give --fps to take them as evenly spaced in all cameras.",
         )
-    if found:
+    if drifting:
         warnings.append(words)
 
 
 def _own_times(measured: tuple[MeasuredCamera, ...], rate: float) -> dict[str, Array]:
     """Seconds of each camera's frames from its offset on, by its file, else at the common rate."""
-    found: dict[str, Array] = {}
+    own: dict[str, Array] = {}
     for entry in measured:
-        times = entry.found.times if isinstance(entry.found, VideoMeasure) else np.zeros(0)
-        if len(times) != entry.found.frame_count:
-            times = np.arange(entry.found.frame_count) / rate
-        found[entry.camera.name] = times[entry.offset :]
-    return found
+        times = entry.measure.times if isinstance(entry.measure, VideoMeasure) else np.zeros(0)
+        if len(times) != entry.measure.frame_count:
+            times = np.arange(entry.measure.frame_count) / rate
+        own[entry.camera.name] = times[entry.offset :]
+    return own
 
 
 def with_times(
@@ -354,7 +359,7 @@ def with_times(
             entry = next((one for one in measured if one.camera.name == match.camera), None)
             if entry is not None:
                 times = _recorded_of(entry, recorded[match.footage])
-                own[match.camera] = times[entry.offset : entry.found.frame_count]
+                own[match.camera] = times[entry.offset : entry.measure.frame_count]
     steps, count = paired_by_time(own, rate)
     placed = tuple(dataclasses.replace(entry, steps=steps[entry.camera.name]) for entry in measured)
     changed = {name: len(one) for name, one in steps.items() if one}
@@ -366,9 +371,9 @@ def with_times(
 def _turned_by_files(measured: tuple[MeasuredCamera, ...]) -> tuple[str, ...]:
     """A note on videos that say themselves how they are to be turned."""
     turned = {
-        entry.footage.name: entry.found.turned
+        entry.footage.name: entry.measure.turned
         for entry in measured
-        if isinstance(entry.found, VideoMeasure) and entry.found.turned
+        if isinstance(entry.measure, VideoMeasure) and entry.measure.turned
     }
     words = ", ".join(f"{name} by {degrees} degrees" for name, degrees in turned.items())
     return (f"Turned clockwise as the files themselves say: {words}.",) if turned else ()
@@ -379,14 +384,18 @@ def _interlaced(measured: tuple[MeasuredCamera, ...], *, guess: bool) -> list[st
     that is wrong.
     """
     videos = {
-        entry.footage.name: (entry.found, entry.fields)
+        entry.footage.name: (entry.measure, entry.fields)
         for entry in measured
-        if isinstance(entry.found, VideoMeasure) and entry.found.interlaced
+        if isinstance(entry.measure, VideoMeasure) and entry.measure.interlaced
     }
     whole = [name for name, (_, fields) in videos.items() if not fields]
-    guessed = [name for name, (found, fields) in videos.items() if guess and fields and not found.first_field]
+    guessed = [
+        name for name, (measure, fields) in videos.items() if guess and fields and not measure.first_field
+    ]
     wrong = [
-        name for name, (found, fields) in videos.items() if fields and found.first_field not in ("", fields)
+        name
+        for name, (measure, fields) in videos.items()
+        if fields and measure.first_field not in ("", fields)
     ]
     warnings: list[str] = []
     if whole:
@@ -422,9 +431,9 @@ def in_fields(
     if not split:
         return tuple(_of_fields(entry, before.get(entry.camera.name, "")) for entry in measured)
     seen: dict[str, Fields] = {
-        entry.camera.name: entry.found.first_field or "top"
+        entry.camera.name: entry.measure.first_field or "top"
         for entry in measured
-        if isinstance(entry.found, VideoMeasure) and entry.found.interlaced
+        if isinstance(entry.measure, VideoMeasure) and entry.measure.interlaced
     }
     if split == "auto":
         return tuple(_of_fields(entry, seen.get(entry.camera.name, "")) for entry in measured)
@@ -434,29 +443,29 @@ def in_fields(
 
 def _of_fields(entry: MeasuredCamera, first: Fields) -> MeasuredCamera:
     """The camera with a frame of each field of its video. first : the earlier one, "" to leave pictures whole."""
-    found = entry.found
-    if not first or not isinstance(found, VideoMeasure):
+    measure = entry.measure
+    if not first or not isinstance(measure, VideoMeasure):
         return entry
-    count = 2 * found.frame_count
+    count = 2 * measure.frame_count
     if count > MAX_FRAMES:
         raise FootageError(
             f"'{entry.footage.name}' has more than {MAX_FRAMES} fields.", "Cut it into pieces."
         )
     fields = dataclasses.replace(
-        found,
+        measure,
         frame_count=count,
-        fps=2.0 * found.fps,
-        uneven_frame=2 * found.uneven_frame if found.uneven_frame >= 0 else -1,
-        times=times_of_fields(found.times, count),
+        fps=2.0 * measure.fps,
+        uneven_frame=2 * measure.uneven_frame if measure.uneven_frame >= 0 else -1,
+        times=times_of_fields(measure.times, count),
     )
-    return dataclasses.replace(entry, found=fields, fields=first)
+    return dataclasses.replace(entry, measure=fields, fields=first)
 
 
 def _split_in_fields(measured: tuple[MeasuredCamera, ...]) -> tuple[str, ...]:
     """A note on videos that were split into their fields."""
     split = {entry.footage.name: entry for entry in measured if entry.fields}
     words = ", ".join(
-        f"{name} ({entry.fields} field first, {entry.found.frame_count} frames)"
+        f"{name} ({entry.fields} field first, {entry.measure.frame_count} frames)"
         for name, entry in split.items()
     )
     return (
@@ -466,7 +475,7 @@ def _split_in_fields(measured: tuple[MeasuredCamera, ...]) -> tuple[str, ...]:
 
 def _recorded_of(entry: MeasuredCamera, times: Array) -> Array:
     """A recorder's times of a camera's frames: of each field, where it is split and the times are of its pictures."""
-    return times_of_fields(times, entry.found.frame_count) if entry.fields else times
+    return times_of_fields(times, entry.measure.frame_count) if entry.fields else times
 
 
 def part_name(path: Path) -> str:
@@ -483,8 +492,8 @@ def _measure_camera(
     background: Path | None,
     progress: Progress,
 ) -> MeasuredCamera:
-    found = _measure(footage, f"reading {footage.name}", progress)
-    entry = MeasuredCamera(camera, footage, found, None, masks, background, turned)
+    measure = _measure(footage, f"reading {footage.name}", progress)
+    entry = MeasuredCamera(camera, footage, measure, None, masks, background, turned)
     if not calibration.sizes_known:
         return dataclasses.replace(entry, camera=_sized(camera, *entry.size))
     bars = _bars(entry) if entry.size != (camera.width, camera.height) else NO_BARS
@@ -500,7 +509,7 @@ def _measure(path: Path, step: str, progress: Progress) -> VideoMeasure | Pictur
 
 
 def _bars(entry: MeasuredCamera) -> Margins:
-    footage, count = entry.footage, entry.found.frame_count
+    footage, count = entry.footage, entry.measure.frame_count
     reader = PictureReader(footage, count) if footage.is_dir() else VideoReader(footage, count)
     try:
         return black_margins(lambda frame: turned_picture(reader.read(frame), entry.turned), count)
@@ -547,29 +556,29 @@ def _with_masks(
     entry: MeasuredCamera, masks: Path, count: int, inverted: bool, progress: Progress
 ) -> MeasuredCamera:
     """The camera with how its masks are meant. Raises FootageError where they do not fit the footage."""
-    found = _measure(masks, f"reading masks {masks.name}", progress)
-    if (found.width, found.height) != (entry.found.width, entry.found.height):
+    measure = _measure(masks, f"reading masks {masks.name}", progress)
+    if (measure.width, measure.height) != (entry.measure.width, entry.measure.height):
         raise FootageError(
-            f"The masks '{masks.name}' are {found.width}x{found.height} pixels, the footage"
-            f" {entry.found.width}x{entry.found.height}.",
+            f"The masks '{masks.name}' are {measure.width}x{measure.height} pixels, the footage"
+            f" {entry.measure.width}x{entry.measure.height}.",
             "Give masks of the footage's size.",
         )
     last = entry.offset + file_frame(entry.steps, count - 1)
-    if found.frame_count <= last:
+    if measure.frame_count <= last:
         raise FootageError(
-            f"The masks '{masks.name}' have {found.frame_count} frames, the footage {last + 1}.",
+            f"The masks '{masks.name}' have {measure.frame_count} frames, the footage {last + 1}.",
             "Give one mask for every field." if entry.fields else "Give one mask for every frame.",
         )
-    form = form_of_masks(masks, found.frame_count, inverted)
-    return dataclasses.replace(entry, mask_form=form, mask_count=found.frame_count)
+    form = form_of_masks(masks, measure.frame_count, inverted)
+    return dataclasses.replace(entry, mask_form=form, mask_count=measure.frame_count)
 
 
 def _check_background(entry: MeasuredCamera, background: Path) -> None:
     if is_picture(background):
         width, height = check_picture(background)
     else:
-        found = measure_video(background)
-        width, height = found.width, found.height
+        measure = measure_video(background)
+        width, height = measure.width, measure.height
     turned = background_turn(entry.turned, entry.size, (width, height)) in (90, 270)
     check_plate_size((height, width) if turned else (width, height), entry.size, background.name)
 
@@ -650,25 +659,25 @@ def _recorded(
             "Give the offsets by hand with --offset.",
         )
     for entry in measured:
-        count, frames = len(by_camera[entry.camera.name]), entry.found.frame_count
+        count, frames = len(by_camera[entry.camera.name]), entry.measure.frame_count
         if abs(count - frames) > 1:
             warnings.append(
                 f"'{path.name}' has times of {count} frames of camera {entry.camera.name}, which has {frames}."
             )
-    found = offsets_from_times({entry.camera.name: by_camera[entry.camera.name] for entry in measured})
-    notes.append(f"Offsets are taken from '{path.name}' ({found.apart:.2f} frames apart at most).")
-    warnings.extend(found.notes)
-    return found.offsets
+    synchrony = offsets_from_times({entry.camera.name: by_camera[entry.camera.name] for entry in measured})
+    notes.append(f"Offsets are taken from '{path.name}' ({synchrony.apart:.2f} frames apart at most).")
+    warnings.extend(synchrony.notes)
+    return synchrony.offsets
 
 
 def _by_camera(requested: Mapping[str, Value], footage: Mapping[str, Path]) -> dict[str, Value]:
     """Requested values by camera, from names of cameras or of their footage. Raises FootageError for other names."""
-    found: dict[str, Value] = {}
+    values: dict[str, Value] = {}
     for name, value in requested.items():
         fitting = [camera for camera, path in footage.items() if name in (camera, path.name, path.stem)]
         if len(fitting) != 1:
             raise FootageError(
                 f"There is no camera '{name}'.", f"The cameras with footage are {listed(footage)}."
             )
-        found[fitting[0]] = value
-    return found
+        values[fitting[0]] = value
+    return values

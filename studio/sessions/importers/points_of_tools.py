@@ -59,8 +59,8 @@ def label3d_of(folder: Path) -> Path | None:
     with foreign_file(project, FootageError, "DANNCE's io.yaml", "Remove it, or write it again."):
         text = read_foreign_text(project, LARGEST_RECORD, FootageError)
         named = {(folder / name.strip()).resolve() for name in LABEL3D_FILE.findall(text)}
-        found = [path for path in named if path.is_relative_to(folder.resolve()) and path.is_file()]
-    return folder / found[0].relative_to(folder.resolve()) if len(found) == 1 else None
+        files = [path for path in named if path.is_relative_to(folder.resolve()) and path.is_file()]
+    return folder / files[0].relative_to(folder.resolve()) if len(files) == 1 else None
 
 
 def points_of_tool(folder: Path, take: str) -> tuple[ToolPoints | None, str]:
@@ -71,31 +71,31 @@ def points_of_tool(folder: Path, take: str) -> tuple[ToolPoints | None, str]:
     if named is not None:
         return ToolPoints(named, placed=True), ""
     for pattern in PLACES:
-        found = [path for path in folder.glob(pattern) if path.suffix.lower() in ENDINGS and path.is_file()]
-        found = sorted(found, key=lambda path: natural_key(path.name))
-        of_take = [path for path in found if take and path.stem.lower().startswith(take.lower())]
-        chosen = _one(of_take or found)
+        files = [path for path in folder.glob(pattern) if path.suffix.lower() in ENDINGS and path.is_file()]
+        files = sorted(files, key=lambda path: natural_key(path.name))
+        of_take = [path for path in files if take and path.stem.lower().startswith(take.lower())]
+        chosen = _one(of_take or files)
         if chosen is not None:
             return ToolPoints(chosen, OWN_WORLD not in chosen.relative_to(folder).parts), ""
-        if found:
-            names = ", ".join(path.name for path in found[:4])
+        if files:
+            names = ", ".join(path.name for path in files[:4])
             return None, (
-                f"'{found[0].parent.name}' holds points of several takes ({names}): none was taken for the truth. Put"
+                f"'{files[0].parent.name}' holds points of several takes ({names}): none was taken for the truth. Put"
                 " the right one into 'truth/', or give it to 'studio evaluate --truth'."
             )
     return None, ""
 
 
-def _one(found: Sequence[Path]) -> Path | None:
-    refined = [path for path in found if any(mark in path.stem.lower() for mark in REFINED)]
-    if len(found) == 1:
-        return found[0]
-    return refined[0] if len(refined) == 1 and len(_stems(found)) == 1 else None
+def _one(files: Sequence[Path]) -> Path | None:
+    refined = [path for path in files if any(mark in path.stem.lower() for mark in REFINED)]
+    if len(files) == 1:
+        return files[0]
+    return refined[0] if len(refined) == 1 and len(_stems(files)) == 1 else None
 
 
-def _stems(found: Sequence[Path]) -> set[str]:
+def _stems(files: Sequence[Path]) -> set[str]:
     """Names without the marks and what follows them."""
-    stems = {path.stem.lower() for path in found}
+    stems = {path.stem.lower() for path in files}
     for mark in REFINED:
         stems = {stem.split(mark)[0] for stem in stems}
     return stems

@@ -108,13 +108,13 @@ def carried_truth(
     That world is of a calibration beside them (truth/*.toml and the like), else of the source's calibration as its file
     has it. frame_count : of the footage. unit : of that one, as requested. Raises TruthError, CalibrationError.
     """
-    found: dict[str, MarkerMotion] = {}
+    truths: dict[str, MarkerMotion] = {}
     notes: list[str] = []
     if plan.points is not None and plan.calibration is not None:
         path = plan.points.path
         try:
             own = read_calibration(plan.calibration, unit)
-            found[path.stem], said = _of_tool(plan.points, own, calibration, fps, frame_count)
+            truths[path.stem], said = _of_tool(plan.points, own, calibration, fps, frame_count)
             notes += said
         except StudioError as problem:
             notes.append(f"The points '{path.name}' were not taken for the truth: {problem}")
@@ -124,7 +124,7 @@ def carried_truth(
             notes += motion.notes
             if motion.notes:
                 # What it means is kept, so that nothing has to be judged again.
-                found[path.stem] = motion
+                truths[path.stem] = motion
             continue
         if plan.calibration is None:
             continue
@@ -136,12 +136,12 @@ def carried_truth(
             motion = _in_unit_of(own, motion, place.name)
         notes += motion.notes
         positions, missed = carried(motion.positions, own.cameras, calibration.cameras)
-        found[path.stem] = replace(motion, positions=positions, unit="mm")
+        truths[path.stem] = replace(motion, positions=positions, unit="mm")
         notes.append(
             f"The points of '{path.name}' were taken from the world of '{place.name}' into the session's by where the"
             f" cameras see them ({missed:.1f} px off in the median)."
         )
-    return found, tuple(notes)
+    return truths, tuple(notes)
 
 
 MOST_METRES = 10.0
@@ -281,7 +281,7 @@ def write_footage(folder: Path, measured: MeasuredSource, copy: bool, progress: 
                 "pictures" if is_folder else "video",
                 _put(entry.footage, folder, place, copy, progress),
                 *entry.size,
-                entry.found.frame_count,
+                entry.measure.frame_count,
                 masks,
                 background,
                 entry.offset,

@@ -336,5 +336,5 @@ def test_a_frame_that_did_not_simply_go_on_says_so(posted: Posted) -> None:
     tokens, moment = colour_tokens(), Moment(0, None, None, (), 4, None, tracking="limb lost")
     assert "a limb is off" in mark_html(posted.model, moment, tokens)
     assert mark_html(posted.model, dataclasses.replace(moment, tracking="tracked"), tokens) == ""
-    found = scene.edit_pose(posted.model, lambda edit: begun(edit, found="confidence 92 %"))
+    found = scene.edit_pose(posted.model, lambda edit: begun(edit, confidence="confidence 92 %"))
     assert "confidence 92 %" in mark_html(found, moment, tokens)

@@ -60,9 +60,9 @@ def test_a_correction_restarts_and_the_start_pose_can_be_restored() -> None:
 
 
 def test_a_found_pose_is_marked_until_the_editing_ends() -> None:
-    found = pose_edit.begun(start(), np.ones(2), found="confidence 92 %")
-    assert found.found == "confidence 92 %"
-    assert pose_edit.ended(found).found == ""
+    edit = pose_edit.begun(start(), np.ones(2), confidence="confidence 92 %")
+    assert edit.confidence == "confidence 92 %"
+    assert pose_edit.ended(edit).confidence == ""
 
 
 def test_mirror_and_round(human: BodyModel) -> None:

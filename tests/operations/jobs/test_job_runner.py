@@ -90,13 +90,13 @@ def office() -> Iterator[Office]:
 
 def test_what_work_returns_goes_into_its_state(office: Office) -> None:
     def work(job: Job) -> Mapping[str, object]:
-        job.found = "the scales"
+        job.result = "the scales"
         job.report("reading", 1, 4)
         return {"weight": 71.5}
 
     reported = office.ended(work)
     assert (reported.state, reported.weight, reported.seconds_left) == ("done", 71.5, 0.0)
-    assert office.jobs.found(WEIGHING, reported.identifier) == "the scales"
+    assert office.jobs.result(WEIGHING, reported.identifier) == "the scales"
     steps = [
         (message["type"], message["run"], message.get("state"), message.get("step"))
         for message in office.said
@@ -283,7 +283,7 @@ def test_the_oldest_are_forgotten_but_none_that_goes_on(office: Office) -> None:
 def test_one_nobody_knows_is_refused_by_name(office: Office) -> None:
     assert office.jobs.known(WEIGHING, "none") is None
     office.jobs.cancel(WEIGHING, "none")
-    for ask in (office.jobs.state, office.jobs.change, office.jobs.found):
+    for ask in (office.jobs.state, office.jobs.change, office.jobs.result):
         with pytest.raises(NotFoundError, match="no weighing 'none'"):
             ask(WEIGHING, "none")
 

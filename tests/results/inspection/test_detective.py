@@ -14,7 +14,7 @@ from studio.foundations.arrays import Array
 from studio.operations.inspecting import worst_frame
 from studio.results.inspection.limbs import errors_of
 from studio.results.inspection.reading import InspectedRun
-from studio.results.inspection.tables import Found, Selection
+from studio.results.inspection.tables import Selection, ViewResult
 from studio.results.inspection.why import rows
 
 WORDS = {
@@ -32,12 +32,12 @@ WORDS = {
 """What the sentence begins with, the remedy's title holds, and its settings are."""
 
 
-def explained(run: InspectedRun) -> Found:
+def explained(run: InspectedRun) -> ViewResult:
     """Why the run's worst frame failed."""
     return rows(run.frame(worst_frame(run)), Selection())
 
 
-def check(cause: str, found: Found) -> None:
+def check(cause: str, found: ViewResult) -> None:
     """The cause is the one that was planted, in its words."""
     words, title, settings = WORDS[cause]
     [main] = [finding for finding in found.findings if finding.is_cause]
