@@ -71,6 +71,8 @@ def __getattr__(name: str) -> object:
     if name not in _MODULE_OF:
         raise AttributeError(f"module 'studio' has no attribute '{name}'")
     verb = getattr(importlib.import_module(_MODULE_OF[name]), name)
+    if declared := getattr(verb, "__operation__", None):
+        verb.__doc__, verb.__signature__ = declared.help, declared.signature
     globals()[name] = verb
     return verb
 

@@ -7,6 +7,8 @@ command line (`cli.deriving`), the entry of the HTTP body (`app.server.requests`
 
 import functools
 import inspect
+import re
+import textwrap
 import types
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,7 +18,7 @@ from typing import Annotated, Any, ParamSpec, TypeVar, Union, cast, get_args, ge
 
 import numpy as np
 from annotated_types import BaseMetadata, Ge, Gt, Le
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 
@@ -30,6 +32,9 @@ F = TypeVar("F", bound=Callable[..., object])
 
 REQUIRED = inspect.Parameter.empty
 PROGRESS = "progress"
+PROGRESS_MEANS = "A function of (step, done, total); True for a bar, False for nothing."
+PACKAGE = re.compile(r"\b(?:[a-z_]+\.)+")
+ARRAY_LIKE = PACKAGE.sub("", inspect.formatannotation(ArrayLike)).removeprefix("Union[").removesuffix("]")
 CONFIG = ConfigDict(arbitrary_types_allowed=True)
 LARGEST = 2**63 - 1
 
@@ -112,6 +117,14 @@ class Parameter:
     def help(self) -> str:
         """What it means, in a sentence."""
         return self.info.description or ""
+
+    @property
+    def meaning(self) -> str:
+        """The help of any parameter, also of a session, a run, or knobs."""
+        if self.target:
+            return "SESSION/RUN" if self.target == "run" else "Name or folder."
+        knobs = self.mark(Knobs)
+        return f"{self.help} {', '.join(one.name for one in knobs.listed()) if knobs else ''}".strip()
 
     @property
     def terminal(self) -> Terminal:
@@ -204,6 +217,36 @@ class Operation:
         return "\n\n".join(part for part in parts if not part.startswith("Raises"))
 
     @cached_property
+    def returned(self) -> str:
+        """The type of the result, and the docstring of the studio's record in it if there is one."""
+        kind = get_type_hints(self.function).get("return")
+        own = [one for one in (kind, *get_args(kind)) if getattr(one, "__module__", "").startswith("studio.")]
+        about = "".join(f": {inspect.getdoc(one)}" for one in own)
+        return f"Returns {_type_in_words(kind)}{about}"
+
+    @property
+    def signature(self) -> inspect.Signature:
+        """The signature with types that a person can read."""
+        shown = inspect.signature(self.function)
+        kinds = {name: _type_in_words(one.kind) for name, one in self.parameters.items()}
+        entries = [
+            one.replace(annotation=kinds.get(name, "Progress")) for name, one in shown.parameters.items()
+        ]
+        return shown.replace(parameters=entries, return_annotation=inspect.Signature.empty)
+
+    @property
+    def help(self) -> str:
+        """The docstring with its parameters and result, as `help` shows it."""
+        raises = inspect.cleandoc(self.function.__doc__ or "").removeprefix(self.about).strip()
+        means = {entry.name: entry.meaning for entry in self.parameters.values() if not entry.any_name}
+        if PROGRESS in inspect.signature(self.function).parameters:
+            means[PROGRESS] = PROGRESS_MEANS
+        lines = [
+            textwrap.fill(f"{name} : {words}", 100, subsequent_indent="    ") for name, words in means.items()
+        ]
+        return "\n\n".join(part for part in (self.about, "\n".join(lines), self.returned, raises) if part)
+
+    @cached_property
     def _readers(self) -> dict[str, TypeAdapter[Any]]:
         """What reads each parameter that is taken alike everywhere."""
         plain = [entry for entry in self.parameters.values() if entry.is_plain]
@@ -269,6 +312,11 @@ def declared(function: Callable[..., object]) -> Operation:
 def alternatives(kind: Any) -> tuple[Any, ...]:  # noqa: ANN401 - a type, which has no type of its own
     """The types of a union; the type alone where it is none."""
     return get_args(kind) if get_origin(kind) in (Union, types.UnionType) else (kind,)
+
+
+def _type_in_words(kind: Any) -> str:  # noqa: ANN401 - a type
+    """A type without the packages of its parts."""
+    return PACKAGE.sub("", inspect.formatannotation(kind)).replace(ARRAY_LIKE, "ArrayLike")
 
 
 def _without_numpy(value: object) -> object:

@@ -37,7 +37,14 @@ SHOWN_BAD_FRAMES = 12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LearntModel:
-    """A model that was learnt. name : by which `track` takes it. recordings : as they were read."""
+    """A behaviour model that was learnt.
+
+    name : by which `track` takes it.
+    path : its file.
+    model : the model itself.
+    learnt : counts and entropies of the learning.
+    recordings : the sources as they were read.
+    """
 
     name: str
     path: Path
@@ -68,12 +75,14 @@ def learn(
     progress: Reporting = None,
     **options: Any,  # noqa: ANN401 - of the types that are declared
 ) -> LearntModel:
-    """Learn what a body tends to do from recorded motion.
+    """Learn how a body tends to move from recorded motion.
 
-    The sources are put on the body, oversampled with varied smoothing, clustered, and their order is learnt. Nothing is
-    written before the model is whole.
+    The recordings are fitted to the body, oversampled with varied smoothing and clustered; then the order of the
+    clusters is learnt (Caillette, Galata & Howard 2007, sections 3.2, 4 and 7.1). Nothing is written before the model
+    is complete.
 
-    Raises StudioError.
+    Raises StudioError for sources that hold no motion of the body, BehaviourError for a name that is taken,
+    SettingsError for an unknown knob.
     """
     wanted, workspace = LearningOptions(**options), Workspace()
     tree = load_body(wanted.body or workspace.usual_body(), (workspace.root / BODIES_NAME,))
@@ -94,8 +103,12 @@ def learn(
 
 @dataclass(frozen=True, slots=True)
 class LearningChoices:
-    """What a form needs: the knobs group after group, the bodies, the endings of motion files, bundled recipes of a
-    person, and what is being learnt or was last, null before the first.
+    """What the form for learning offers.
+
+    knobs : group after group.
+    endings : of motion files.
+    recipes : bundled recipes with a person.
+    progress : of the learning under way or the last one; null before the first.
     """
 
     knobs: tuple[Knob, ...]
@@ -108,7 +121,7 @@ class LearningChoices:
 
 
 def learning_choices(workspace: Workspace, progress: LearningProgress | None) -> LearningChoices:
-    """What can be learnt from and with. progress : of what is being learnt."""
+    """What the form for learning offers. progress : of the learning under way."""
     return LearningChoices(
         knobs=(*knobs_of(LearningSettings), *knobs_of(OversamplingSettings)),
         bodies=list_bodies((workspace.root / BODIES_NAME,)),
@@ -123,9 +136,12 @@ def learning_choices(workspace: Workspace, progress: LearningProgress | None) ->
 def learning_order(
     workspace: Workspace, name: str, sources: Sequence[str], upload: Path | None, options: LearningOptions
 ) -> LearningOrder:
-    """What is to be learnt, checked. sources : runs as SESSION/RUN and recipes. upload : a folder of motion files.
+    """The checked order for a learning.
 
-    Raises StudioError: a name that is taken, no such source, wrong knobs.
+    sources : runs as SESSION/RUN, and recipes.
+    upload : a folder of motion files.
+
+    Raises StudioError where the name is taken, a source does not exist, or a knob is wrong.
     """
     wanted = replace(options, body=options.body or workspace.usual_body())
     if (models_folder(workspace.root) / f"{checked_name(name, 'model')}{SUFFIX}").exists():

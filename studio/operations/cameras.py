@@ -46,8 +46,11 @@ Frames = Annotated[Sequence[int], Field(max_length=64)]
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """What came of it. files : the calibration, its report and the coverage pictures. notes : what it means for a
-    session.
+    """The result of a calibration.
+
+    solved : lenses, cameras and findings.
+    files : the calibration, its report and the coverage pictures.
+    notes : what it means for a session.
     """
 
     solved: Calibrated
@@ -61,12 +64,12 @@ class Calibration:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What the checks say, what blocks first."""
+        """What the checks say, blocking findings first."""
         return self.solved.findings
 
     @property
     def report(self) -> dict[str, object]:
-        """Everything a person wants to know of it, as plain values (lengths mm, angles degrees)."""
+        """The whole report as plain values (lengths in mm, angles in degrees)."""
         return report_of(self.solved)
 
     def in_words(self) -> list[str]:
@@ -121,10 +124,11 @@ def calibrate(
     """Solve cameras from footage of a printed board: lenses, places, floor.
 
     A session or folder holds intrinsics/ and extrinsics/ (unless they are named): one video or folder of pictures a
-    camera, named after the cameras. Beside the calibration lie its report (JSON) and coverage pictures. That of a
-    session becomes the session's.
+    camera, named after the cameras. The report (JSON) and coverage pictures are written beside the calibration. The
+    calibration of a session becomes the one in use. Lenses by Zhang's method (PAMI 2000) as OpenCV implements it, then
+    all boards and cameras in one bundle adjustment.
 
-    Raises CalibrationError where something blocks: nothing but the report is written then.
+    Raises CalibrationError where a check blocks: then nothing but the report is written.
     """
     wanted = BoardOptions(**options)
     pattern = board_from_text(board, wanted.thickness_mm) if isinstance(board, str) else board
@@ -150,11 +154,11 @@ def board(
     ] = "",
     page: Annotated[Literal["a3", "a4", "letter"], Field(description="Of the printer.")] = "a4",
 ) -> Board:
-    """Make a calibration board to print, as PDF of true size.
+    """Make a calibration board to print, as a PDF of true size.
 
-    Print at 100 %, measure the bar and the squares, glue the page on a flat, stiff plate.
+    Print it at 100 %, measure the bar and the squares, and glue the page on a flat, stiff plate.
 
-    Raises CalibrationError.
+    Raises CalibrationError for a board that cannot be made or does not fit the page.
     """
     if page not in PAGES:
         raise SettingsError(f"There is no page '{page}'.", f"Known: {', '.join(PAGES)}.")
@@ -165,8 +169,11 @@ def board(
 
 @dataclass(frozen=True, slots=True)
 class AlignmentLine:
-    """One camera. before_px, after_px : by which the silhouettes miss, as it stands and turned (median, none where
-    nothing shows). turn_degrees : by which it would be turned.
+    """One camera of an alignment.
+
+    before_px, after_px : median distance by which the silhouettes miss, as the camera stands and turned; null where
+        nothing shows.
+    turn_degrees : by which it would be turned.
     """
 
     camera: str
@@ -177,11 +184,16 @@ class AlignmentLine:
 
 @dataclass(frozen=True, slots=True)
 class Alignment:
-    """What the silhouettes say of the cameras, by name.
+    """What the silhouettes say of the cameras.
 
-    before, after : pixels by which the silhouettes miss (median; NaN for a camera that nothing tells of), as the
-    cameras were and turned. turns : degrees. needed : whether the misses matter; better : whether turning explains
-    them; changed : whether the session uses the turned cameras now. notes : what that means for what is there.
+    before, after : by camera, the pixels by which the silhouettes miss (median; NaN where nothing shows), as the
+        cameras were and turned.
+    turns : by camera, degrees.
+    needed : whether the misses matter.
+    better : whether turning explains them.
+    changed : whether the session uses the turned cameras now.
+    words : the same as a sentence.
+    notes : what the change means for masks and runs that are there.
     """
 
     session: Session
@@ -197,7 +209,7 @@ class Alignment:
 
     @property
     def cameras(self) -> tuple[AlignmentLine, ...]:
-        """The same camera by camera."""
+        """The same, one line a camera."""
         return tuple(
             AlignmentLine(name, before, self.after[name], self.turns[name])
             for name, before in self.before.items()
@@ -205,7 +217,7 @@ class Alignment:
 
     @property
     def frames(self) -> tuple[int, ...]:
-        """Those that were looked at."""
+        """The frames that were looked at."""
         return tuple(self.alignment.aligned.frames)
 
 
@@ -226,10 +238,11 @@ def align(
 ) -> Alignment:
     """Turn a session's cameras a little so that the silhouettes of all views agree.
 
-    For calibrations that are nearly right: a camera that was touched after it. Needs masks (studio background) of a
-    person who is whole in the pictures. The calibration before is kept; nothing is changed where the cameras agree.
+    For a calibration that is nearly right, such as of a camera that was touched after it. Needs masks (studio
+    background) of a person who is completely in the pictures. The earlier calibration is kept; nothing is changed where
+    the cameras agree. The turns minimise how far epipolar tangents of the outlines miss each other.
 
-    Raises CalibrationError for one camera, or too few whole silhouettes.
+    Raises CalibrationError for a single camera, or for too few complete silhouettes.
     """
     opened = open_session(session)
     with reporting(progress, f"{opened.name}: cameras") as report:
@@ -254,8 +267,10 @@ def align(
 
 @dataclass(frozen=True, slots=True)
 class CamerasInUse:
-    """possible : there are several calibrated cameras, which can be compared. turned : the cameras in use were turned
-    from an earlier calibration, which can be had back.
+    """The cameras that a session has.
+
+    possible : there are several calibrated cameras, which can be compared.
+    turned : they were turned from an earlier calibration, which can be restored.
     """
 
     session: str
@@ -269,8 +284,10 @@ def cameras_in_use(session: Session) -> CamerasInUse:
 
 
 def use_turned(session: Session, aligned: SessionAlignment) -> CalibrationChange:
-    """Let the session use the turned cameras; the calibration before is kept. Raises SessionError while a run is being
-    tracked, CalibrationError where the calibration is another one than that which was measured.
+    """Let the session use the turned cameras; the earlier calibration is kept.
+
+    Raises SessionError while a run is being tracked, CalibrationError where the calibration is no longer the one that
+    was measured.
     """
     change = turn_cameras(session, aligned)
     forget_composers()
@@ -278,8 +295,9 @@ def use_turned(session: Session, aligned: SessionAlignment) -> CalibrationChange
 
 
 def use_unturned(session: Session) -> CalibrationChange:
-    """Let the session use the calibration again that its cameras were turned from. Raises NotFoundError, SessionError
-    while a run is being tracked.
+    """Let the session use the calibration again from which its cameras were turned.
+
+    Raises NotFoundError where they were not turned, SessionError while a run is being tracked.
     """
     change = turn_back(session)
     forget_composers()
@@ -289,9 +307,9 @@ def use_unturned(session: Session) -> CalibrationChange:
 @operation
 @keeping_in_place
 def unalign(session: SessionName, *, progress: Reporting = None) -> Session:
-    """Use the calibration again that a session's cameras were turned from.
+    """Restore the calibration from which a session's cameras were turned.
 
-    Raises NotFoundError where they were not.
+    Raises NotFoundError where they were not turned.
     """
     change = use_unturned(open_session(session))
     say(progress, change.notes)
@@ -301,8 +319,13 @@ def unalign(session: SessionName, *, progress: Reporting = None) -> Session:
 
 @dataclass(frozen=True, slots=True)
 class Levelled:
-    """A session's world after it was levelled. tilted : degrees that it was off the vertical. lowered : mm that its
-    origin lay above the floor. how : by what. changed : whether the session uses it now. notes : what that means.
+    """A session whose world was levelled.
+
+    tilted : degrees that the world was off the vertical.
+    lowered : mm that its origin lay above the floor.
+    how : by what it was measured.
+    changed : whether the session uses the levelled world now.
+    notes : what the change means for masks and runs that are there.
     """
 
     session: Session
@@ -335,9 +358,9 @@ def level(
 ) -> Levelled:
     """Turn a session's world to the vertical, and put z = 0 on the floor.
 
-    For calibrations whose world is a camera's frame (aniposelib, FreeMoCap) or a guess. By clicked points of the
-    floor, by a run's feet, or by the silhouettes (some centimetres off); the last two take the vertical from the
-    cameras, which stand level. The calibration before is kept.
+    For calibrations whose world is a camera's frame (aniposelib, FreeMoCap) or a guess. Measured by clicked points of
+    the floor, by a run's feet, or by the silhouettes (off by some centimetres); the last two take the vertical from the
+    cameras, which are assumed to stand level. The earlier calibration is kept.
 
     Raises CalibrationError where nothing shows the vertical or the floor.
     """
@@ -360,7 +383,7 @@ def level(
 
 
 def _measure_masks_again(session: Session, progress: Reporting) -> None:
-    """Measure how far the masks agree under the cameras of now, where that was known of those before."""
+    """Measure how far the masks agree with the cameras of now, if it had been measured with those before."""
     if origin_of(session, MEASURED) is None:
         return
     # Cameras that were turned stay so, whatever the masks say.

@@ -66,7 +66,7 @@ USUAL = tuple(name for name in sorted(TRACKERS) if not needs_model(name, None))
 
 @dataclass(frozen=True, slots=True)
 class CompareRequest:
-    """What is compared with what."""
+    """What is compared."""
 
     trackers: Annotated[
         Sequence[str],
@@ -98,7 +98,7 @@ class CompareRequest:
     ] = None
 
     def plan(self, session: Session) -> Plan:
-        """What will be done. Raises StudioError for what cannot be compared."""
+        """The checked plan. Raises StudioError for what cannot be compared."""
         changes = cast("Mapping[str, Mapping[str, Value]]", self.changes or {})
         lineup = Lineup(tuple(self.trackers), self.weighting, self.evaluations, self.layers, changes)
         return plan_comparison(
@@ -114,7 +114,11 @@ class CompareRequest:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Compared:
-    """A comparison and where it is kept."""
+    """A comparison.
+
+    comparison : its numbers, and the verdict on every pair of trackers.
+    kept : where it lies.
+    """
 
     comparison: Comparison
     kept: KeptComparison
@@ -151,11 +155,12 @@ def compare(
 ) -> Compared:
     """Compare trackers on a session with a truth: same evidence, same number of evaluations a frame, same seeds.
 
-    Says how far they are from the truth, with sign tests over frames and seeds; keeps each trial as soon as it is done
-    (in the session, or in another folder), so that after Ctrl-C the same call goes on. The studio shows what is kept in
-    the session.
+    Measures how far they are from the truth, with sign tests over frames and seeds. Each trial is kept as soon as it is
+    done (in the session, or in another folder), so after Ctrl-C the same call continues. The studio shows what is kept
+    in the session.
 
-    Raises StudioError for what cannot be compared.
+    Raises TruthError for a session without a truth, SettingsError for an unknown tracker or knob, RunError where
+    another process works at the comparison.
     """
     opened = open_session(session, remote=True)
     bring_comparisons(opened)
@@ -172,7 +177,11 @@ def compare(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SweptGrid:
-    """A sweep and where it is kept; its runs are the session's."""
+    """A sweep; its runs are the session's.
+
+    sweep : the measured runs and points.
+    kept : where it lies.
+    """
 
     sweep: Sweep
     kept: KeptComparison
@@ -190,7 +199,7 @@ class SweptGrid:
 
 @dataclass(frozen=True, slots=True)
 class SweepRequest:
-    """Which knobs are varied, and how every combination is tracked."""
+    """Which knobs are varied, and how each combination is tracked."""
 
     vary: Annotated[
         Mapping[str, Sequence[object]],
@@ -222,7 +231,7 @@ class SweepRequest:
     allow_inconsistent: AllowInconsistent = False
 
     def plan(self, session: Session) -> Plan:
-        """What will be done. Raises StudioError for what cannot be swept."""
+        """The checked plan. Raises StudioError for what cannot be swept."""
         given: dict[str, Any] = {entry.name: getattr(self, entry.name) for entry in fields(self)}
         given["seeds"] = range(self.seeds)
         return plan_sweep(session, **given)
@@ -246,11 +255,11 @@ def sweep(
 ) -> SweptGrid:
     """Track every combination of some knobs' values with several seeds, and compare the runs.
 
-    Says how many runs that are and about how long they take before it begins. Every run is stored in the session with
-    its frames; after Ctrl-C the same call goes on. Measures are errors where the session has a truth, and how well the
-    body fits the masks.
+    Before it begins it says how many runs there will be and about how long they take. Every run is stored in the
+    session with its frames; after Ctrl-C the same call continues. The measure is the error where the session has a
+    truth, and else how well the body fits the masks.
 
-    Raises StudioError for an unknown knob or a value out of its range; then nothing was made.
+    Raises SettingsError for an unknown knob or a value out of its range; then nothing was made.
     """
     opened = open_session(session, remote=True)
     bring_comparisons(opened)
@@ -267,7 +276,7 @@ def sweep(
 
 
 def expected_sweep(session: Session, request: SweepRequest) -> SweepExpected:
-    """How many runs a sweep beside the studio has and about how long they take. Raises StudioError for what cannot be
+    """How many runs a sweep has beside the studio, and about how long they take. Raises StudioError for what cannot be
     swept.
     """
     return expected(session, request.plan(session), processes_beside(), cores())
@@ -282,8 +291,9 @@ def _measured(
     lines: list[str],
     progress: Reporting,
 ) -> Result:
-    """The conclusion from all trials, put back where the session lies. lines : said before, and then where it is
-    kept.
+    """The conclusion from all trials, moved back to where the session lies now.
+
+    lines : shown before, and after it where it is kept.
     """
     say(progress, lines)
     with (
@@ -299,7 +309,7 @@ def _measured(
 
 
 def kept_sweep(session: Session, plan: Plan, name: str = "") -> KeptComparison:
-    """The folder of a sweep: one of the same request that is not finished, else a new one. Raises SessionError."""
+    """The folder of an unfinished sweep with the same request, else a new one. Raises SessionError."""
     if not name:
         again = unfinished_like(session, plan)
         if again is not None:
@@ -312,7 +322,7 @@ def kept_sweep(session: Session, plan: Plan, name: str = "") -> KeptComparison:
 
 
 def _kept(session: Session, plan: Plan, name: str, out: Path | None) -> KeptComparison:
-    """The folder to work in: one of the same request that is not finished, else a new one.
+    """The folder to work in: of an unfinished comparison with the same request, else a new one.
 
     Raises SessionError for a folder that holds something else, or cannot be written.
     """
@@ -332,7 +342,7 @@ def _kept(session: Session, plan: Plan, name: str, out: Path | None) -> KeptComp
 
 
 def _same(folder: Path, plan: Plan) -> KeptComparison:
-    """The comparison in a folder, if it is of the same request. Raises RunError."""
+    """The comparison in a folder if it has the same request. Raises RunError for another one."""
     kept = KeptComparison(folder)
     other = differences(plan, kept.plan())
     if other:

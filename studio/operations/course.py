@@ -86,7 +86,11 @@ class CourseView:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Course:
-    """The course's runs, all of them tracked."""
+    """The runs of the guide's course, all tracked.
+
+    session : the bundled walk.
+    runs : one for each kind of search.
+    """
 
     session: Session
     runs: tuple[StoredRun, ...]
@@ -96,9 +100,9 @@ class Course:
 def course(*, progress: Reporting = None) -> Course:
     """Make the runs that the guide's course speaks of: the bundled walk, tracked by each kind of search.
 
-    Runs that are there already stay; one that was broken off is gone on with.
+    Runs that exist are kept; an interrupted one is continued.
 
-    Raises StudioError.
+    Raises SessionError where the workspace cannot be written, RunError where a run fails.
     """
     with reporting(progress, "course") as report:
         return make_course(Workspace(), report)

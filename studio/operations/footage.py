@@ -72,7 +72,7 @@ def new_session(
 ) -> Session:
     """Make an empty session, to which footage and a calibration are added.
 
-    Raises SessionError, BodyError.
+    Raises SessionError for a name that is taken, BodyError for an unknown body.
     """
     return begin_session(Workspace().place_for(into), title, body)
 
@@ -90,7 +90,8 @@ def import_footage(
 
     Folders of Pose2Sim, FreeMoCap, Caliscope, anipose, EasyMocap, OpenCap, DANNCE and PARSEC are recognised.
 
-    Raises StudioError; then nothing was made.
+    Raises FootageError, CalibrationError or SessionError naming the file or camera that is wrong; then nothing was
+    made.
     """
     with reporting(progress, "Importing") as report:
         place = Workspace().place_for(into)
@@ -109,9 +110,10 @@ def add_footage(
     progress: Reporting = None,
     **options: Any,  # noqa: ANN401 - of the types that are declared
 ) -> ImportReport:
-    """Add the footage of a folder to a session that is there, before or after it is calibrated.
+    """Add the footage of a folder to a session that exists, before or after it is calibrated.
 
-    Raises StudioError; then the session is as it was.
+    Raises FootageError, CalibrationError or SessionError naming the file or camera that is wrong; then the session is
+    unchanged.
     """
     with reporting(progress, "Adding") as report:
         added = add_to_session(open_session(session), Path(source), ImportOptions(**options), progress=report)
@@ -138,7 +140,10 @@ def synthesize(
     ] = None,
     progress: Reporting = None,
 ) -> Session:
-    """Render footage with exact truth from a recipe."""
+    """Render footage with exact truth from a recipe.
+
+    Raises NotFoundError for an unknown recipe, SessionError for a name that is taken.
+    """
     place = Workspace().place_for(into)
     with reporting(progress, "Rendering") as report:
         synthesize_recipe(recipe, place, progress=report, frames=frames)
@@ -147,7 +152,10 @@ def synthesize(
 
 @dataclass(frozen=True, slots=True)
 class FootageCamera:
-    """One camera's footage. offset : the file's frame that is frame 0 of the session. turned : degrees clockwise.
+    """One camera's footage.
+
+    offset : the file's frame that is frame 0 of the session.
+    turned : degrees clockwise.
     width, height : pixels.
     """
 
@@ -164,8 +172,11 @@ class FootageCamera:
 
 @dataclass(frozen=True, slots=True)
 class FootageState:
-    """How a session's cameras are put together. frame_count : frames that all have. stale_runs : those made before the
-    footage was last changed. notes : what the change that was just made means.
+    """How a session's footage is put together.
+
+    frame_count : frames that all cameras have.
+    stale_runs : runs made before the footage was last changed.
+    notes : what the last change means.
     """
 
     session: str
@@ -178,7 +189,7 @@ class FootageState:
 
 
 def footage_state(session: Session, notes: tuple[str, ...] = ()) -> FootageState:
-    """How a session's cameras are put together now. notes : on a change just made."""
+    """How a session's footage is put together. notes : on the change just made."""
     source = session.manifest.footage
     cameras = tuple(
         extended(FootageCamera, one, has_masks=bool(one.masks), has_background=bool(one.background))
@@ -191,8 +202,11 @@ def footage_state(session: Session, notes: tuple[str, ...] = ()) -> FootageState
 
 
 def unpacked_upload(folder: Path, parts: Sequence[str] = FOOTAGE_PARTS, progress: Progress = unheard) -> Path:
-    """What was uploaded: out of its archive, and without the folders that only wrap it. parts : patterns of what lies
-    in the folder that is meant. Raises SessionError for an archive that is none.
+    """The uploaded folder: out of its archive, and without folders that only wrap it.
+
+    parts : patterns of what the folder in question holds.
+
+    Raises SessionError for an archive that cannot be read.
     """
     if only_archive(folder):
         progress("unpacking", 0, 1)
@@ -201,8 +215,11 @@ def unpacked_upload(folder: Path, parts: Sequence[str] = FOOTAGE_PARTS, progress
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Synchronised:
-    """How far the cameras began apart. session : as it is now. found : by motion or by recorded times, None for
-    offsets by hand. change : what was written, None for nothing.
+    """By how many frames the cameras of a session began apart.
+
+    session : after the change, if there was one.
+    synchrony : estimated from motion or read from recorded times; None for offsets given by hand.
+    change : what was written; None for nothing.
     """
 
     session: Session
@@ -210,7 +227,7 @@ class Synchronised:
     change: FootageChange | None = None
 
     def in_words(self) -> list[str]:
-        """What was estimated or read, lines."""
+        """The estimate or what was read, as lines."""
         if isinstance(self.synchrony, Synchrony):
             return [in_words(self.synchrony)]
         if self.synchrony is None:
@@ -254,10 +271,11 @@ def synchronise(
 ) -> Synchronised:
     """Say by how many frames the cameras of a session began apart.
 
-    Without offsets or turns, estimates it from what moves in the pictures and says how far to trust it; nothing is
-    changed unless that is applied. Offsets and turns by hand are written at once.
+    Without offsets or turns it estimates them from motion in the pictures, and says how far to trust the estimate;
+    nothing is changed unless the estimate is applied. Offsets and turns given by hand are written at once.
 
-    Raises FootageError, also for an estimate that is to be applied and cannot be trusted.
+    Raises FootageError for offsets that do not fit the footage, and for an estimate that is to be applied but cannot be
+    trusted.
     """
     opened, request = open_session(session), SynchronyRequest(**options)
     if request.offsets or request.rotations:
@@ -303,8 +321,12 @@ Seconds = Annotated[float | None, Field(gt=0, le=86400)]
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """What was recorded. spread : of the pictures of a frame over time. notes : for a person, warnings last. standing :
-    how the recording ended; None for one that was cut off and is finished.
+    """A recording.
+
+    session : made of it.
+    spread : of the pictures of one frame over time.
+    notes, warnings : sentences.
+    standing : how the recording ended; None for an interrupted one that was finished.
     """
 
     session: Session
@@ -339,13 +361,13 @@ def record(
     ] = None,
     progress: Reporting = None,
 ) -> Recorded:
-    """Record live cameras all at once into a session, each picture with the time at which it came.
+    """Record live cameras at once into a session, each picture with its time of arrival.
 
-    What is recorded lies in a folder beside the session until it is imported; a kill or a full disk loses less than a
+    The recording lies in a folder beside the session until it is imported; a kill or a full disk loses less than a
     second of it, and `finish` makes a session of the rest. Ctrl-C (a notebook's stop button) ends the recording and
     keeps it.
 
-    Raises FootageError, SessionError.
+    Raises FootageError for a camera that gives no picture, SessionError for a name that is taken.
     """
     place = Workspace().place_for(into)
     if place.exists():
@@ -377,7 +399,7 @@ def record(
 
 
 def addresses_of(cameras: Mapping[str, str] | Sequence[str]) -> list[CameraAddress]:
-    """Cameras by name, or as NAME=ADDRESS. Raises FootageError."""
+    """Addresses by camera, from a mapping or from NAME=ADDRESS. Raises FootageError."""
     if not cameras:
         raise FootageError(
             "No camera was given.",
@@ -392,7 +414,7 @@ def addresses_of(cameras: Mapping[str, str] | Sequence[str]) -> list[CameraAddre
 
 
 def _until(recording: StreamRecording, seconds: float | None, report: Progress, progress: Reporting) -> None:
-    """Record for so long, or until it ends by itself."""
+    """Record for so many seconds, or until the recording ends by itself."""
     began = time.monotonic()
     stopped: set[str] = set()
     while seconds is None or time.monotonic() - began < seconds:
@@ -411,7 +433,7 @@ def _until(recording: StreamRecording, seconds: float | None, report: Progress, 
 def _kept(
     folder: Path, place: Path, calibration: Path, standing: RecordingStanding | None, progress: Reporting
 ) -> Recorded:
-    """The session of a recording."""
+    """The session made of a recording."""
     with reporting(progress, f"{place.name}: importing") as report:
         imported, spread = import_recording(
             folder, place, calibration, standing.notes if standing else (), report

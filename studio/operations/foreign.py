@@ -19,12 +19,13 @@ def inspect(
         Terminal(kind=str, metavar="FOLDER"),
     ],
 ) -> Inspection:
-    """Say what is odd about a session or a source of others before anything of it is opened or imported.
+    """Say what is odd about a session or footage of other people before it is opened or imported.
 
-    Named are links that lead out, pipes and devices, sizes beyond what is read, records and stores that cannot be, and
-    footage that lies elsewhere. Nothing is changed or unpacked. The command ends with 1 where it should not be used.
+    It names links that lead out of the folder, pipes and devices, files larger than what is read, records and stores
+    that cannot be right, and footage that lies elsewhere. Nothing is changed or unpacked. The command ends with 1 where
+    the source should not be used.
 
-    Raises NotFoundError.
+    Raises NotFoundError where nothing lies at the place.
     """
     path = Path(place).expanduser()
     named = Workspace().root / str(place)

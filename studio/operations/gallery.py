@@ -181,7 +181,11 @@ class CardView:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gallery:
-    """The gallery's cards. made : the session of the card that was asked for."""
+    """The gallery.
+
+    cards : all of them, with what each lacks.
+    made : the session of the requested card.
+    """
 
     cards: tuple[CardStanding, ...]
     made: Session | None = None
@@ -205,10 +209,10 @@ def gallery(
     """List the sessions of the gallery, and make one: bundled samples are copied, rendered clips rendered with their
     exact truth.
 
-    What is there already stays. Footage that cannot be shipped says where it comes from and by which commands; where
-    the folder that STUDIO_REAL_DATA names has a copy, it is imported.
+    A session that exists is kept. For footage that cannot be shipped it says where it comes from and which commands
+    make the session; it is imported where the folder that STUDIO_REAL_DATA names has a copy.
 
-    Raises NotFoundError for an unknown card, SessionError for one whose footage is not there.
+    Raises NotFoundError for an unknown card, SessionError for one whose footage is not available.
     """
     workspace = Workspace()
     made = None

@@ -59,7 +59,9 @@ class ViewAnswer:
 
 
 def inspected(run: RunName, tried: TriedFrame | None = None) -> InspectedRun:
-    """A run, ready to be looked into. tried : stands in the place of the stored frame of its number.
+    """A run that can be looked into.
+
+    tried : a trial, in place of the stored frame of its number.
 
     Raises RunError, NotFoundError.
     """
@@ -80,7 +82,7 @@ def view(
 ) -> Viewed:
     """Show the inside of a run's search: the tables of a view, of a frame or of the whole run.
 
-    Raises NotFoundError for a view, frame, layer or name that is none.
+    Raises NotFoundError for an unknown view, frame, layer or name.
     """
     return _viewed(inspected(run), name, frame, Selection(**selected))
 
@@ -119,7 +121,7 @@ def why(
     *,
     track: Annotated[str, Field(description="Whose pose; default: what the search found.")] = "",
 ) -> Viewed:
-    """Say why a frame failed, and what may help: findings and remedies, from measurements.
+    """Say why a frame failed and what may help: findings and remedies, from measurements.
 
     Raises RunError for a run without frames.
     """
@@ -128,8 +130,9 @@ def why(
 
 
 def worst_frame(run: InspectedRun) -> int:
-    """The frame whose worst limb is farthest off; without a truth, disagrees most with the silhouettes. Raises
-    RunError.
+    """The frame whose worst limb is farthest off; without a truth the one that disagrees most with the silhouettes.
+
+    Raises RunError for a run without frames.
     """
     known = errors_of(run) or disagreements_of(run)
     if not known:
@@ -152,7 +155,7 @@ def seeds(
     ] = None,
     progress: Reporting = None,
 ) -> Viewed:
-    """Search a stored frame again with other seeds: spread within and between them. Nothing of the run changes.
+    """Search a stored frame again with other seeds: spread within and between them. The run is not changed.
 
     Raises NotFoundError for a frame that is not finished.
     """
@@ -173,13 +176,13 @@ def compare_runs(
 ) -> RunsCompared:
     """Put two to six stored runs side by side: curves over frames, settings that differ, the worst frame of each.
 
-    Raises RunError.
+    Raises RunError for fewer or more runs, or for one without frames.
     """
     return compare_stored([inspected(run) for run in runs])
 
 
 def write_tables(tables: Sequence[Table], caption: str, file: Path) -> None:
-    """Write tables to a CSV file. Raises SessionError where that is not possible."""
+    """Write tables to a CSV file. Raises SessionError where that fails."""
     write_bytes(file, tables_csv(tables, caption).encode())
 
 

@@ -111,20 +111,19 @@ def background(
 ) -> BackgroundSetup:
     """Choose where a session's masks come from, what does not count, and (on the command line) see how good they are.
 
-    Sources: a background ("plate", "clip", "median", "combined"), "person" (a network cuts a person out: no picture of
-    the empty room, about a twentieth of a second a picture), "strokes" (anything, from a few brush strokes in one
-    picture of each camera or in more), "threshold" (by brightness and colour: knobs `mask_darkest`, `mask_brightest`,
-    `mask_hue`, `mask_hue_reach`, `mask_saturation`), "masks" (those that came with the footage), "best" (all of these
-    are tried, and each camera gets the one under which views agree and borders lie on edges of the picture), "subject"
-    (the masks in use, cut down to the one of several who stands at `subject_at`; with any other source that place cuts
-    the masks made of it).
+    Sources: a background ("plate", "clip", "median", "combined"); "person" (a network cuts out a person; needs no
+    picture of the empty room, takes about a twentieth of a second a picture); "strokes" (anything, from a few brush
+    strokes in one or more pictures of each camera); "threshold" (by brightness and colour: knobs `mask_darkest`,
+    `mask_brightest`, `mask_hue`, `mask_hue_reach`, `mask_saturation`); "masks" (that came with the footage); "best"
+    (all of these are tried, and each camera gets the one under which views agree and borders lie on edges of the
+    picture); "subject" (the masks in use, cut down to one of several subjects, who stands at `subject_at`; with any
+    other source that place cuts the masks made of it).
 
     Agreement is the smaller of two shares: of a camera's mask that the visual hull of all views covers, and of the
     hull's silhouette that lies in the mask. From 0.9 on masks are called usable, unless subject and background are
-    alike in colour: then all masks may lack the same part. Where that is so, "best" is tried as well, unless `tune` is
-    off.
+    alike in colour: then all masks may lack the same part. In that case "best" is tried as well, unless `tune` is off.
 
-    Raises FootageError for a source that is not there, SettingsError for a knob; then nothing is changed.
+    Raises FootageError for a source that the session lacks, SettingsError for an unknown knob; then nothing is changed.
     """
     opened, request = open_session(session), MaskRequest(**options)
     if request.plates:
@@ -173,12 +172,12 @@ def mask_quality(
     ] = None,
     progress: Reporting = None,
 ) -> MaskQuality:
-    """How far the masks agree in the hull, camera by camera, whether subject and background can be told apart, and what
-    the silhouettes say against the calibration.
+    """Measure how far the masks agree in the hull, camera by camera, whether subject and background can be told apart,
+    and what the silhouettes say against the calibration.
 
-    Without frames it is remembered; then a fault that makes results wrong keeps tracking from beginning.
+    Without frames the result is remembered; a fault that would make results wrong then keeps tracking from beginning.
 
-    Raises RunError for a single camera, SettingsError for a knob.
+    Raises RunError for a single camera, SettingsError for an unknown knob.
     """
     opened = open_session(session)
     with reporting(progress, f"{opened.name}: masks") as report:

@@ -39,7 +39,7 @@ def note(
     *,
     remove: Annotated[bool, Field(description="Take the frame's note away instead.")] = False,
 ) -> tuple[Note, ...]:
-    """Put a note or a bookmark on a frame of a run, in place of the one it has; all notes of the run.
+    """Put a note or a bookmark on a frame of a run, in place of the one it has, and return all notes of the run.
 
     Raises NotFoundError for a frame that the run does not have.
     """

@@ -37,13 +37,14 @@ AnySession = Annotated[Session | str | Path, Target("session", remote=True)]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tracked:
-    """A run that was tracked. Goes wherever a run is wanted.
+    """A run that was tracked; every verb that takes a run takes it.
 
-    run : on disk.
-    track : frames (K,), poses (K, D) rad and mm, confidence (K,), states.
-    names : D parameters.
-    notes : on what was filled in.
-    seconds, evaluations_per_frame : of the search.
+    run : as stored.
+    track : frames (K,), poses (K, D) in radians and mm, confidence (K,), states.
+    names : of the D parameters.
+    notes : on defaults that were filled in.
+    seconds : that the search took.
+    evaluations_per_frame : poses weighed in a frame.
     likelihood_scale : β of the last layer.
     exchanged : left and right that were put right in the track "sides", in words.
     """
@@ -59,7 +60,7 @@ class Tracked:
 
     @property
     def sides_in_words(self) -> str:
-        """What was exchanged, as a sentence; "" if nothing."""
+        """What was exchanged, as a sentence; "" for nothing."""
         return in_words(self.exchanged) if self.exchanged else ""
 
     def to_xarray(self, frames: Iterable[int] | None = None) -> Any:  # noqa: ANN401 - xarray.Dataset
@@ -72,7 +73,7 @@ class Tracked:
 
     @property
     def frames(self) -> NDArray[np.int64]:
-        """(K,) the frames that were tracked."""
+        """(K,) numbers of the tracked frames."""
         return self.track.frames
 
     @property
@@ -86,9 +87,11 @@ RunName = Annotated[Tracked | StoredRun | str | Path, Target("run")]
 
 
 def open_session(session: AnySession, *, remote: bool = False) -> Session:
-    """A session as it is now, by name or folder. remote : also by an address, as a copy (`sessions.remote_sessions`).
+    """A session by name or folder.
 
-    Raises NotFoundError, SessionError.
+    remote : also by an address, as a copy (`sessions.remote_sessions`).
+
+    Raises NotFoundError where there is none, SessionError where it is damaged.
     """
     if isinstance(session, Session):
         return Session(session.path)
@@ -96,9 +99,10 @@ def open_session(session: AnySession, *, remote: bool = False) -> Session:
 
 
 def keeping_in_place(function: Callable[P, R]) -> Callable[P, R]:
-    """Let the sessions and runs that a verb is about (those that it takes as such, else its first parameter) stay where
-    they are while the verb goes on, whatever other processes do. What is no session of this machine is left to the
-    verb.
+    """Let the sessions and runs that a verb is about stay where they are while it works, whatever other processes do.
+
+    These are the parameters marked as targets, else the first one. Whatever is no session of this machine is left to
+    the verb.
     """
     signature = inspect.signature(function)
     about = [name for name, one in signature.parameters.items() if _is_target(one)] or [
@@ -134,17 +138,20 @@ def _places_of(value: Any, name: str) -> Iterator[tuple[Path, str]]:  # noqa: AN
 
 
 def list_sessions() -> tuple[str, ...]:
-    """Names of the workspace's sessions."""
+    """The names of the workspace's sessions."""
     return tuple(entry.name for entry in Workspace().sessions())
 
 
 def list_runs(session: SessionName) -> tuple[RunSummary, ...]:
-    """The runs of a session, oldest first: what each is and how far it came."""
+    """The runs of a session, oldest first, each with its request and how many frames it has."""
     return tuple(run.summary() for run in open_session(session).runs())
 
 
 def open_run(run: RunName) -> StoredRun:
-    """A run by its name or folder. Raises RunError, NotFoundError."""
+    """A run by its name (SESSION/RUN) or folder.
+
+    Raises RunError for another name, NotFoundError where there is none.
+    """
     if isinstance(run, Tracked):
         return StoredRun(run.run.folder)
     if isinstance(run, StoredRun):
@@ -170,17 +177,17 @@ def bodies() -> tuple[BodyModel, ...]:
 @operation
 @keeping_in_place
 def workflow(session: SessionName) -> Workflow:
-    """Say how far a session is, step by step from footage to an exported motion, and what is next."""
+    """Say how far a session is, step by step from footage to an exported motion, and which step is next."""
     return workflow_now(open_session(session))
 
 
 def workflow_now(session: Session, running: Mapping[str, str] | None = None) -> Workflow:
-    """How far a session is. running : step to the progress of its job, in words."""
+    """How far a session is. running : by step, the progress of its job in words."""
     run = run_to_use(session)
     return workflow_of(session, running, exported_files(run) if run else ())
 
 
 def moved_meanwhile(workspace: Workspace, name: str) -> NotFoundError | None:
-    """Why whatever was done to a session failed that was renamed or deleted meanwhile; None where it is there."""
+    """Why work on a session failed that was renamed or deleted meanwhile; None where it is still there."""
     is_there = not is_name(name) or (workspace.root / name / MANIFEST_NAME).is_file()
     return None if is_there else gone(f"Session '{name}'")

@@ -30,7 +30,13 @@ MOST_CHANGES = 2000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EditedBody:
-    """A body as it is after a change. text : its file. notes : on what else followed. file : what it was saved as."""
+    """A body after a change.
+
+    body : the body.
+    text : its file.
+    notes : on what else followed from the change.
+    file : where it was saved.
+    """
 
     body: BodyModel
     text: str
@@ -40,7 +46,7 @@ class EditedBody:
 
 @dataclass(frozen=True, slots=True)
 class BodyChanges:
-    """What is changed of a body: sizes, limits and markers first, then one side is copied onto the other."""
+    """What is changed of a body: first sizes, limits and markers, then one side is copied onto the other."""
 
     sizes: Annotated[
         Mapping[str, float] | None,
@@ -118,10 +124,10 @@ def edit_body(
 ) -> EditedBody:
     """Change a body's sizes, limits of joints and markers, mirror one side onto the other, and save it as your own.
 
-    A session's own body begins in the size of its subject. What is saved can be used at once: `studio subject SESSION
+    A session's own body begins in the size of its subject. A saved body can be used at once: `studio subject SESSION
     --body NAME`.
 
-    Raises BodyError with the part that is wrong.
+    Raises BodyError naming the part that is wrong.
     """
     opened = None if session is None else open_session(session)
     place = bodies_folder(Workspace(), opened) if folder is None else Path(folder)

@@ -54,13 +54,13 @@ def subject(
     progress: Reporting = None,
 ) -> BodyModel:
     """Write down who is in front of a session's cameras (new runs then have that body), and return the body in that
-    size; with nothing given, as it is. A body alone, such as an animal's or one of your own, is as large as its file
-    says; the subject before stays beside it as subject-before.toml.
+    size.
 
-    With nothing but a height every length, hands and feet included, is its published share of it (sources: the body
-    file).
+    With nothing given it returns the body as it is. With a height alone every length, hands and feet included, is its
+    published share of it (sources: the body file). With a body alone, such as an animal's or one of your own, the sizes
+    are those of its file. The earlier subject is kept beside it as subject-before.toml.
 
-    Raises BodyError.
+    Raises BodyError for an unknown body or length, or a size that is impossible.
     """
     opened = open_session(session)
     if height_mm is None and not lengths_mm:
@@ -78,8 +78,12 @@ def subject(
 
 @dataclass(frozen=True, slots=True)
 class SubjectInUse:
-    """A session's person. dimensions : mm (ratios without unit), by the body's own names. source : of proportions.
-    saved : whether the session has a subject at all. fitted : whether it was fitted to the footage.
+    """A session's subject.
+
+    dimensions : mm (ratios without unit), by the body's own names.
+    source : of the proportions.
+    saved : whether the session has a subject at all.
+    fitted : whether it was fitted to the footage.
     """
 
     body: str
@@ -149,7 +153,7 @@ def fit_subject(
 ) -> FittedSubject:
     """Find limb lengths and radii of the person in a session, together with the poses of a few frames.
 
-    The result becomes the session's subject (the old one stays beside it as subject-before.toml). ± is one standard
+    The result becomes the session's subject (the old one is kept beside it as subject-before.toml). ± is one standard
     deviation.
 
     Raises RunError where nothing is to be seen in a frame, or nothing may change.
@@ -174,7 +178,7 @@ def keep_fit(session: Session, fitted: FittedSubject) -> FittedSubject:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StartPoseRequest:
-    """How a start pose is searched, and what becomes of it."""
+    """How a start pose is searched, and whether it is kept."""
 
     body: Body = ""
     behaviour: Annotated[Model, Field(description="Its prototypes are poses to try.")] = ""
@@ -200,7 +204,7 @@ def initialise(
 ) -> InitialPose:
     """Find the pose in a frame of a session with nothing given but the body's dimensions, and write it down.
 
-    It becomes the session's start pose if that has none, else a file beside it that tracking takes as a start pose.
+    It becomes the session's start pose if there is none, else a file beside it that tracking takes as a start pose.
 
     Raises RunError where nothing is to be seen in the frame.
     """
@@ -226,7 +230,12 @@ def initialise(
 
 @dataclass(frozen=True, slots=True)
 class Landmarks:
-    """Where a network sees a person's joints. file : the TRC. seen : share of the frames with all of its joints."""
+    """A person's joints as a network sees them.
+
+    file : the TRC that was written.
+    motion : the joints over time, mm.
+    seen : share of the frames with all joints.
+    """
 
     file: Path
     motion: MarkerMotion
@@ -246,11 +255,12 @@ def landmarks(
     *,
     progress: Reporting = None,
 ) -> Landmarks:
-    """Write where a network sees a person's joints, triangulated over the cameras: a witness to measure a run by.
+    """Write where a network sees a person's joints, triangulated over the cameras, as a reference that a run is
+    measured by.
 
-    It knows nothing of the studio's bodies and searches, and needs no markers: shoulders, elbows, wrists, hips, knees
-    and ankles of a person (of people only), coarse by some centimetres and constantly beside a body's own joints by as
-    much: `studio evaluate --truth FILE` prints the error with and without that.
+    The network knows nothing of the studio's bodies and searches, and needs no markers. It gives shoulders, elbows,
+    wrists, hips, knees and ankles of a person (of people only), off by some centimetres, and shifted against a body's
+    own joints by as much: `studio evaluate --truth FILE` prints the error with and without that shift.
 
     Raises FootageError where no two cameras see the same person.
     """

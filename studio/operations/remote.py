@@ -39,7 +39,7 @@ class RunsThere:
 
     place : the workspace's folder, or the address.
     runs : of the workspace's sessions.
-    stored : sessions at the address, None where it was none.
+    stored : sessions at the address; None for this machine.
     """
 
     place: str
@@ -67,11 +67,11 @@ def upload(
     *,
     progress: Reporting = None,
 ) -> str:
-    """Put a session with its runs into an object store, from which any machine tracks it; returns its address.
+    """Put a session with its runs into an object store, from which any machine can track it, and return its address.
 
-    What is broken off is not seen as a session there; the same call begins it again.
+    An interrupted upload is not seen as a session there; the same call begins it again.
 
-    Raises SessionError.
+    Raises SessionError where the store cannot be written or has such a session already.
     """
     opened = open_session(session)
     with reporting(progress, f"{opened.name}: uploading") as report:
@@ -89,9 +89,9 @@ def download(
     *,
     progress: Reporting = None,
 ) -> Session:
-    """Bring a session with its runs and comparisons from an object store, whole or not at all.
+    """Bring a session with its runs and comparisons from an object store, completely or not at all.
 
-    Raises NotFoundError, SessionError.
+    Raises NotFoundError where there is no session at the address, SessionError for a name that is taken.
     """
     place = Workspace().place_for(into)
     with reporting(progress, f"{place.name}: downloading") as report:
@@ -100,8 +100,11 @@ def download(
 
 @dataclass(frozen=True, slots=True)
 class BatchLine:
-    """A session of a batch. place : its folder or address. run : measured; None where it failed, then `failure` says
-    why.
+    """A session of a batch.
+
+    place : its folder or address.
+    run : the measured run; None where it failed.
+    failure : why, then.
     """
 
     session: str
@@ -112,7 +115,10 @@ class BatchLine:
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """A batch that was tracked, in the order of its sessions."""
+    """A tracked batch.
+
+    lines : one a session, in the order of the sessions.
+    """
 
     lines: tuple[BatchLine, ...]
 
@@ -137,12 +143,12 @@ def batch(
     progress: Reporting = None,
     **options: Any,  # noqa: ANN401 - of the types that are declared
 ) -> Batch:
-    """Track many sessions with the same settings, on all cores or on a cluster's workers, a run each.
+    """Track many sessions with the same settings, on all cores or on a cluster's workers, one run each.
 
-    The runs bear one name, and lie where their sessions lie. A session that fails stops no other. The same call goes on
-    where one was broken off, and tracks nothing again.
+    All runs have the same name and lie in their sessions. A session that fails does not stop the others. The same call
+    continues an interrupted batch and tracks nothing twice.
 
-    Raises RunError where no session is given, SessionError where one is none.
+    Raises RunError where no session is given, SessionError where a place holds none.
     """
     places = [place for one in sessions for place in _places(one)]
     if not places:

@@ -50,17 +50,29 @@ Replace = Annotated[bool, Field(description="Write over a derived track of that 
 
 
 def list_tracks(run: RunName) -> tuple[str, ...]:
-    """Names of a run's tracks: "raw" is what the search found, the others were made of it."""
+    """The names of a run's tracks: "raw" is the result of the search, the others were made from it."""
     return track_names(open_run(run))
 
 
 def read_track(run: RunName, track: TrackName = BEST) -> Track:
-    """A track as arrays: name, frames (K,), poses (K, D) rad and mm, confidence (K,), states. Raises NotFoundError."""
+    """A track of a run as arrays.
+
+    run : SESSION/RUN, a run's folder, or a run.
+    track : "best" (smoothed, else refined, else raw) or a track's name.
+
+    Raises NotFoundError where there is no such track.
+    """
     return read_stored_track(open_run(run), track)
 
 
 def markers(run: RunName, track: TrackName = BEST) -> MarkerMotion:
-    """The body's markers along a track: names (M), times (K,) s, positions (K, M, 3) mm, z up."""
+    """The body's markers along a track.
+
+    run : SESSION/RUN, a run's folder, or a run.
+    track : "best" (smoothed, else refined, else raw) or a track's name.
+
+    Raises NotFoundError where there is no such track.
+    """
     stored = open_run(run)
     body, chosen = stored.body(), read_stored_track(stored, track)
     return MarkerMotion(
@@ -85,11 +97,11 @@ def refine(
     knobs: Annotated[Values, Knobs(lambda: knobs_of(RefinementSettings))] = None,
     progress: Reporting = None,
 ) -> MadeTrack:
-    """Refine every frame of a run on its silhouettes, and keep that beside what the search found.
+    """Refine every frame of a run on its silhouettes, and keep that as a track beside the result of the search.
 
-    Frames that follow each other are refined together; no weight ever falls. Ctrl-C ends it, and nothing is kept.
+    Consecutive frames are refined together; no weight ever falls. Ctrl-C ends it, and nothing is kept.
 
-    Raises SessionError, RunError, SettingsError.
+    Raises RunError for a run without frames or a track that exists, SettingsError for an unknown knob.
     """
     stored = open_run(run)
     opened = session_of(stored)
@@ -112,11 +124,11 @@ def smooth(
     replace: Replace = False,
     knobs: Annotated[Values, Knobs(lambda: knobs_of(SmoothingSettings))] = None,
 ) -> MadeTrack:
-    """Smooth a run's poses in time, and keep that beside what the search found.
+    """Smooth a run's poses in time, and keep that as a track beside the result of the search.
 
     Short gaps are filled and marked, long ones stay gaps.
 
-    Raises SessionError, RunError, SettingsError.
+    Raises RunError for a run without frames or a track that exists, SettingsError for an unknown knob.
     """
     settings = changed(SmoothingSettings(), knobs or {})
     return smooth_run(open_run(run), source=source, into=into, settings=settings, replace=replace)
@@ -133,7 +145,7 @@ def check(
 ) -> RunCheck:
     """Say how well a run fits its pictures: share in the masks, lost frames and limbs, sudden turns, jumps, jitter.
 
-    What was measured is kept beside the run, and shown in the guided set-up's step Check.
+    The measurements are kept beside the run, and shown in step Check of the guided set-up.
 
     Raises RunError for a run without frames.
     """
@@ -179,7 +191,8 @@ def evaluate(
 ) -> Evaluation:
     """Measure a run against the true markers: mm without alignment, root-aligned, after Procrustes.
 
-    Raises TruthError; CalibrationError for cameras that do not fit the truth.
+    Raises TruthError for a truth that is missing or does not fit the body, CalibrationError for cameras that do not fit
+    the truth.
     """
     stored = open_run(run)
     opened = session_of(stored)
@@ -231,7 +244,7 @@ def export_run(
 
     The file is read back and compared before it takes its place; Ctrl-C leaves nothing behind.
 
-    Raises ExportError, SettingsError.
+    Raises ExportError for an unknown format or option, or where the file cannot be written.
     """
     place = Path(to)
     stored, form = open_run(run), format_of_file(place)
@@ -243,7 +256,11 @@ def export_run(
 
 @dataclass(frozen=True, slots=True)
 class Verified:
-    """found : what was read, and what is wrong after repairs. repaired : runs that were."""
+    """The result of a verification.
+
+    verification : what was read, and what is wrong after repairs.
+    repaired : the runs that were repaired.
+    """
 
     verification: Verification
     repaired: tuple[Repair, ...] = ()
@@ -264,7 +281,7 @@ def verify(
     ] = False,
     progress: Reporting = None,
 ) -> Verified:
-    """Compare all that a session stores with its checksums, and name what is damaged.
+    """Compare everything that a session stores with its checksums, and name what is damaged.
 
     The command ends with 1 where something is damaged and was not repaired.
     """

@@ -19,7 +19,12 @@ from studio.sessions.stored_run import StoredRun
 
 @dataclass(frozen=True, slots=True)
 class Shared:
-    """A page that was written. frame : that it looks into. size : bytes."""
+    """A page that was written.
+
+    path : its file.
+    frame : that it looks into.
+    size : bytes.
+    """
 
     path: Path
     frame: int
@@ -49,9 +54,9 @@ def share(
     """Write a run as one self-contained page: settings, the views of its search, the body moving in 3-D, the particles
     of chosen frames playing layer by layer.
 
-    It opens from any folder without the studio and asks no other machine for anything; a few MB at most.
+    It opens from any folder without the studio and asks no other machine for anything; it has a few MB at most.
 
-    Raises RunError for a run without frames, NotFoundError for a frame or track that is none.
+    Raises RunError for a run without frames, NotFoundError for an unknown frame or track.
     """
     stored, place = open_run(run), Path(to)
     with reporting(progress, f"{stored.session_name} / {stored.name}: page") as report:

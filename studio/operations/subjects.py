@@ -25,8 +25,11 @@ from studio.sessions.workspace import Workspace
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Subjects:
-    """seen : who is in view in the first frame, the largest first. sessions : that were made, one for each place.
-    notes : for the user.
+    """Who is in view.
+
+    seen : in the first frame, the largest first.
+    sessions : that were made, one for each place.
+    notes : sentences.
     """
 
     seen: tuple[SeenSubject, ...]
@@ -36,7 +39,10 @@ class Subjects:
 
 @dataclass(frozen=True, slots=True)
 class SubjectInView(SeenSubject):
-    """A subject in view. points : where its middle is seen, by camera, as shares of the picture's width and height."""
+    """A subject in view.
+
+    points : by camera, where its middle is seen, as shares of the picture's width and height.
+    """
 
     points: dict[str, tuple[FiniteFloat, FiniteFloat]]
 
@@ -88,10 +94,11 @@ def subjects(
     ] = (),
     progress: Reporting = None,
 ) -> Subjects:
-    """Who is in view, and a session for each of those asked for: the same footage, masks of that subject alone.
+    """List who is in view, and make a session for each subject that is wanted: the same footage, masks of that subject
+    alone.
 
     The masks in use are cut by the pieces of their visual hull, followed over time. Give each session its subject's
-    measures, then let `together` share the masks by bodies, which parts those who touch.
+    measures, then let `together` share the masks by bodies, which separates subjects who touch.
 
     Raises FootageError where no subject stands at a place; then nothing is made.
     """
@@ -128,7 +135,7 @@ def together(
 ) -> BodiesTogether:
     """Track several bodies at once, each in its own session, and share the masks by who explains which pixel.
 
-    Each session (as `subjects` makes them) is left with masks of its own subject, in which runs are tracked as always.
+    Each session (as `subjects` makes them) is left with masks of its own subject, in which runs are tracked as usual.
 
     Raises RunError for sessions that do not belong together; then nothing is changed.
     """

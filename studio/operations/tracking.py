@@ -63,7 +63,7 @@ R = TypeVar("R")
 def of_new_run(
     make: Callable[Concatenate[Session, P], StoredRun],
 ) -> Callable[[Callable[..., R]], Callable[Concatenate[SessionName, P], R]]:
-    """Let a verb take what a new run is made of, of a session by its name."""
+    """Let a verb take what a new run takes, with the session by its name."""
     return taking(make)
 
 
@@ -71,7 +71,7 @@ def of_new_run(
 @of_new_run(prepare_run)
 @keeping_in_place
 def new_run(session: AnySession, *, progress: Reporting = None, **options: object) -> StoredRun:
-    """A new run, ready to be tracked; what is left out is the session's own or the studio's default.
+    """Prepare a new run; what is left out is the session's own or the studio's default.
 
     Raises StudioError naming what is wrong; then nothing was made.
     """
@@ -85,11 +85,12 @@ def new_run(session: AnySession, *, progress: Reporting = None, **options: objec
 @operation
 @of_new_run(prepare_run)
 def track(session: AnySession, *, progress: Reporting = None, **options: object) -> Tracked:
-    """Track a session and store the run; Ctrl-C cancels, what was tracked stays and can be gone on with.
+    """Track a session and store the run. Ctrl-C cancels; frames that are tracked are kept, and the run can be
+    continued.
 
     The same seed gives the same run.
 
-    Raises StudioError.
+    Raises SettingsError for an unknown knob or name, RunError or FootageError where the session cannot be tracked.
     """
     return go_on(new_run(session, progress=progress, **options), progress=progress)  # pyright: ignore[reportArgumentType]
 
@@ -103,7 +104,10 @@ def run_to_go_on(session: Session, name: str) -> StoredRun:
 @operation
 @keeping_in_place
 def go_on(run: RunName, *, progress: Reporting = None) -> Tracked:
-    """Track a run on that was interrupted: bit for bit what it would have been."""
+    """Continue an interrupted run: bit for bit what it would have been.
+
+    Raises RunError for a finished run, or one that another process tracks.
+    """
     stored = open_run(run)
     _say_notes(stored, progress)
 
@@ -125,7 +129,7 @@ def go_on(run: RunName, *, progress: Reporting = None) -> Tracked:
 
 @contextmanager
 def _reporting(run: StoredRun, progress: Reporting, how_far: Callable[[], str]) -> Generator[Progress]:
-    """What tracking a run reports to. Ctrl-C is passed on once it is said how far it came."""
+    """The progress of tracking a run. Ctrl-C is passed on after it was said how many frames are done."""
     title = f"{run.session_name} / {run.name}"
     try:
         with reporting(progress, title) as report:
@@ -147,8 +151,11 @@ SendTo = Annotated[
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackedLive:
-    """A live run that was tracked. summary : which frames came, how fast. standing : of the cameras, where there were
-    any; their session is then a new one.
+    """A live run that was tracked.
+
+    session, run : as stored.
+    summary : which frames came, and how fast.
+    standing : of the cameras, if there were any; their session is then a new one.
     """
 
     session: Session
@@ -159,7 +166,7 @@ class TrackedLive:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LiveRequest:
-    """What a live run is made of."""
+    """What a live run takes."""
 
     tracker: Annotated[str, Field(description="What searches."), OneOf(TRACKERS)] = "behaviour"
     weighting: Annotated[str, Field(description="What tells poses apart."), OneOf(WEIGHTINGS)] = "blobs"
@@ -213,11 +220,11 @@ def live(
 ) -> TrackedLive:
     """Track a session as its pictures come: at the footage's own rate, dropping frames rather than falling behind.
 
-    With cameras these are tracked with the session's calibration, empty room and person, and recorded at once into a
-    session of their own, where the run is tracked again bit for bit with `replay`. Ctrl-C ends it and keeps what was
-    tracked.
+    Live cameras are tracked with the session's calibration, empty room and person, and recorded at the same time into a
+    session of their own, in which `replay` tracks the run again bit for bit. Ctrl-C ends it and keeps the tracked
+    frames.
 
-    Raises StudioError.
+    Raises SettingsError for options that exclude each other, FootageError for a camera that gives no picture, RunError.
     """
     request, opened = LiveRequest(**options), open_session(session)
     send_to = _send_addresses(request.send)
@@ -253,7 +260,7 @@ def live(
 def resume_live(
     run: RunName, *, send: Annotated[SendTo, Web(left_out=True)] = (), progress: Reporting = None
 ) -> TrackedLive:
-    """Go on with a live run that was ended."""
+    """Continue a live run that was ended."""
     stored = open_run(run)
     _say_notes(stored, progress)
     opened = session_of(stored)
@@ -263,7 +270,12 @@ def resume_live(
 
 @dataclass(frozen=True, slots=True)
 class Replayed:
-    """run : that was made. of : the live one. compared : what differs."""
+    """A live run tracked again without the clock.
+
+    run : the new run.
+    of : the live run.
+    compared : in which frames they differ.
+    """
 
     run: StoredRun
     of: StoredRun
@@ -314,9 +326,9 @@ def correct(
     name: Annotated[str, Field(description="Of the corrected run; default: numbered.")] = "",
     progress: Reporting = None,
 ) -> Tracked:
-    """Give a run the right pose in one frame and track on from there, into a new run; the old one stays.
+    """Give a run the right pose in one frame and track on from there, into a new run; the old one is kept.
 
-    Ctrl-C stops; what was tracked stays, and forwards the new run can be gone on with.
+    Ctrl-C stops; tracked frames are kept, and a run tracked forwards can be continued.
 
     Raises SettingsError unless exactly one pose is given.
     """
@@ -343,9 +355,11 @@ def correct(
 def track_back(
     run: RunName, progress: Progress = unheard, cancelled: Callable[[], bool] | None = None
 ) -> int:
-    """Track a corrected run backwards from its corrected frame; how many frames have new poses.
+    """Track a corrected run backwards from its corrected frame; the number of frames with new poses.
 
-    progress : called after each frame. cancelled : checked before each layer; True stops and keeps the frames done.
+    progress : called after each frame.
+    cancelled : checked before each layer; True stops and keeps the frames done.
+
     Raises RunError for a run that was not made for this, or that another process has open.
     """
     stored = open_run(run)
@@ -369,10 +383,10 @@ def branch(
     ] = "",
     progress: Reporting = None,
 ) -> Tracked:
-    """Track a frame and all after it again with other knobs, into a new run; the old one stays.
+    """Track a frame and all later ones again with other knobs, into a new run; the old one is kept.
 
-    The frames before it are the old run's. Without knobs those count that were moved in the run. Ctrl-C stops; what was
-    tracked stays and can be gone on with.
+    Earlier frames are the old run's. Without knobs the ones that were moved in the run are used. Ctrl-C stops; tracked
+    frames are kept, and the run can be continued.
 
     Raises SettingsError where no knob differs.
     """
@@ -383,7 +397,7 @@ def branch(
 def branched_run(
     run: RunName, frame: int, knobs: Mapping[str, object] | None = None, name: str = ""
 ) -> StoredRun:
-    """The run that `branch` makes, before anything of it is tracked."""
+    """The run of `branch`, before anything is tracked."""
     stored = open_run(run)
     return prepare_branch(session_of(stored), stored, frame, knobs, name)
 
@@ -398,7 +412,7 @@ def corrected_run(
     name: str = "",
     source: str = "",
 ) -> StoredRun:
-    """The run that `correct` makes, before anything of it is tracked. source : where the pose came from, in words."""
+    """The run of `correct`, before anything is tracked. source : where the pose came from, in words."""
     if (pose is None) == (not from_track):
         raise SettingsError("A corrected frame needs a pose.", "Give one, or the track to take it from.")
     if pose is None:
@@ -411,7 +425,7 @@ def corrected_run(
 
 
 def _place(session: Session, into: str | Path | None) -> Path:
-    """Where the recording of live cameras is made: beside its session unless said otherwise."""
+    """The folder for a recording of live cameras: beside its session unless another is named."""
     if into:
         return Workspace().place_for(into)
     taken = {path.name for path in session.path.parent.iterdir()}
@@ -419,7 +433,7 @@ def _place(session: Session, into: str | Path | None) -> Path:
 
 
 def _say_notes(run: StoredRun, progress: Reporting) -> None:
-    """A run's notes: what holds for the session once, what was accepted for this run always."""
+    """Show a run's notes: what holds for the session once, what was accepted for this run every time."""
     accepted = [line for line in run.record.notes if line.startswith(DESPITE)]
     say(progress, [line for line in run.record.notes if line not in accepted], run.folder.parent.parent)
     say(progress, accepted)
@@ -445,7 +459,7 @@ def _send_addresses(send: Sequence[str]) -> tuple[SendAddress, ...] | None:
 
 
 def live_words(run: LiveSummary) -> str:
-    """How a live run went, for a person."""
+    """How a live run went, as a sentence."""
     if not run.tracked:
         return "nothing was tracked."
     words = f"{len(run.tracked)} frames tracked, {run.frames_per_second:.1f} a second"

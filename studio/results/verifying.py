@@ -34,7 +34,11 @@ REPAIR = "Track it again: studio verify --repair, or resume the run."
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """Damaged data. place : a path in the session, and for a store the part of it. run, frame : of a damaged frame."""
+    """Damaged data.
+
+    place : a path in the session, and for a store the part of it.
+    run, frame : of a damaged frame.
+    """
 
     place: str
     what: str
@@ -45,9 +49,13 @@ class Fault:
 
 @dataclass(frozen=True, slots=True)
 class Verification:
-    """The result of a verification. files, frames : read. unchecked : frames without checksums, all of which could be
-    unpacked. written_again : files written since, not faults. new : files with a checksum for the first time. left :
-    places of what something that was broken off left behind, in the session or beside it.
+    """The result of a verification.
+
+    files, frames : how many were read.
+    unchecked : frames without checksums, all of which could be unpacked.
+    written_again : files written since, which is no fault.
+    new : files with a checksum for the first time.
+    left : places of what interrupted work left behind, in the session or beside it.
     """
 
     files: int

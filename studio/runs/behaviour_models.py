@@ -29,8 +29,11 @@ MODELS_NAME, SUFFIX = "models", ".behaviour"
 
 @dataclass(frozen=True, slots=True)
 class ModelSummary:
-    """A model as a line of a list. parameters : of its body's pose. fps, frames, sources : of its learning, each
-    recording once. problem : why it cannot be read (the rest is empty then), else "".
+    """A behaviour model in a list.
+
+    parameters : of its body's pose.
+    fps, frames, sources : of its learning, each recording once.
+    problem : why it cannot be read (the rest is empty then), else "".
     """
 
     name: str

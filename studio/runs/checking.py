@@ -69,10 +69,15 @@ class DeniedLimb(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class RunCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Measurements of a track. stamp, count : of the track when it was checked. frames : checked. inside, covered :
-    (F, V) shares, None where there is nothing to divide by. lost, doubtful, turned : frame numbers. jitter_mm : root
-    mean square second difference of the markers. jumps, denied : limbs that jump, and limbs contradicted by the masks
-    of checked frames; None: not measured.
+    """How well a track fits the pictures.
+
+    frames : numbers of the frames that were checked.
+    inside, covered : (F, V) shares: of the model's pixels in the mask, of the mask's under the model; None where there
+        is nothing to divide by.
+    lost, doubtful, turned : frame numbers.
+    jitter_mm : root mean square second difference of the markers.
+    jumps, denied : limbs that jump, and limbs that the masks of checked frames contradict; None: not measured.
+    stamp, count : of the track when it was checked.
     """
 
     schema: int = SCHEMA_VERSION
@@ -102,13 +107,15 @@ class RunCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
     @property
     def inside_mean(self) -> float:
-        """Mean share of the model's pixels in the masks over all checked frames and cameras; NaN if there is none."""
+        """Mean share of the model's pixels in the masks, over all checked frames and cameras; NaN if there is none."""
         known = [share for row in self.inside for share in row if share is not None]
         return float(np.mean(known)) if known else float("nan")
 
     @property
     def covered_mean(self) -> float:
-        """Mean share of the masks' pixels under the model, of all checked frames and cameras; NaN if there is none."""
+        """Mean share of the masks' pixels under the model, over all checked frames and cameras; NaN if there
+        is none.
+        """
         known = [share for row in self.covered for share in row if share is not None]
         return float(np.mean(known)) if known else float("nan")
 

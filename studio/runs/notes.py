@@ -16,7 +16,12 @@ LONGEST = 2000
 
 
 class Note(msgspec.Struct, frozen=True):
-    """frame : it is about. text : "" of a bookmark. made : when it was written, as an ISO date with time."""
+    """A note or a bookmark.
+
+    frame : that it is about.
+    text : "" for a bookmark.
+    made : when it was written, ISO 8601.
+    """
 
     frame: int
     text: str = ""

@@ -41,10 +41,13 @@ from studio.sessions.stored_run import StoredRun
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MadeTrack:
-    """A derived track with its figures. moved : frames whose pose changed (refine). agreement_before, agreement_after
-    : of the silhouettes, f_s, mean over the frames that show any (refine). filled, left_out : frames (smooth).
+    """A derived track with its figures.
+
+    moved : number of frames whose pose changed (refine).
+    agreement_before, agreement_after : of the silhouettes, f_s, mean over the frames that show any (refine).
+    filled, left_out : frame numbers (smooth).
     jitter_before, jitter_after : root mean square second difference of the body's markers, mm a frame², over
-    consecutive frames.
+        consecutive frames.
     """
 
     track: Track

@@ -55,7 +55,11 @@ Shares = Mapping[str, Share]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodiesTogether:
-    """What was tracked. first : frame. poses : (F, D) of each session's body, from there on."""
+    """Bodies that were tracked together.
+
+    first : number of the first frame.
+    poses : (F, D) radians and mm of each session's body, from there on.
+    """
 
     first: int
     poses: tuple[Array, ...]

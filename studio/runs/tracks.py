@@ -45,10 +45,12 @@ KNOWN_STATES = (*TRACKING_STATES, "")
 class Track:
     """The poses of a run's frames, tracked or derived.
 
-    name : "raw", "refined", "smoothed", … frames : (K,) ascending; a missing number is a gap. poses : (K, D) radians
-    and mm. confidence : (K,) 0 to 1, NaN unknown (of the search: how well the silhouettes agree, f_s). states : K words
-    of `search.trackers.tracker.TRACKING_STATES`, "" unknown. made_by : the track's provenance, {} for raw: "verb",
-    "from" and the settings.
+    name : "raw", "refined", "smoothed", …
+    frames : (K,) ascending; a missing number is a gap.
+    poses : (K, D) radians and mm.
+    confidence : (K,) 0 to 1, NaN unknown (of the search: how well the silhouettes agree, f_s).
+    states : K words of `search.trackers.tracker.TRACKING_STATES`, "" unknown.
+    made_by : "verb", "from" and the settings; {} for raw.
     """
 
     name: str

@@ -49,8 +49,11 @@ class Oddity:
 
 @dataclass(frozen=True, slots=True)
 class Inspection:
-    """kind : "session", "footage" (a source to import) or "archive". files, bytes : in all, of an archive as its index
-    says. oddities : in the order of the places.
+    """What a source holds.
+
+    kind : "session", "footage" (a source to import) or "archive".
+    files, bytes : in all; of an archive as its index says.
+    oddities : in the order of their places.
     """
 
     kind: str

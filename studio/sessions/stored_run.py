@@ -26,11 +26,12 @@ NAMED = 10
 
 @dataclass(frozen=True, slots=True)
 class RunSummary:
-    """The status of a run, for lists.
+    """A run in a list.
 
     status : "new", "tracking" (some process has it open), "interrupted", "cancelled" or "finished".
-    done : intact finished frames of first … last. tracked_to : the frame after the last of them. damaged : damaged
-    stored frames; resuming the run tracks them again.
+    done : intact finished frames of first … last.
+    tracked_to : the frame after the last of them.
+    damaged : damaged stored frames; resuming the run tracks them again.
     """
 
     session: str

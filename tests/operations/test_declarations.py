@@ -56,8 +56,8 @@ LEFT_WHERE_IT_IS = {
 def test_a_session_stays_where_it_is_while_a_verb_works_on_it() -> None:
     about = {
         name
-        for name in VERBS
-        if any(map(_is_target, inspect.signature(getattr(studio, name)).parameters.values()))
+        for name, one in VERBS.items()
+        if any(map(_is_target, inspect.signature(one.function).parameters.values()))
     }
     keeping = {name for name in about if getattr(getattr(studio, name), "keeps_in_place", False)}
     assert about - keeping == set(LEFT_WHERE_IT_IS)

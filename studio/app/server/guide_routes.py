@@ -13,7 +13,7 @@ from starlette.responses import HTMLResponse
 
 import studio
 from studio.app.server.answers import Router
-from studio.app.server.interfaces_page import INTERFACES, interfaces_page
+from studio.app.server.interfaces_page import INTERFACES, interfaces_page, text_of
 from studio.app.server.pages import NAME, html_page
 from studio.evidence.settings import EvidenceSettings
 from studio.foundations.declaring import REQUIRED, Knobs, Operation, Parameter, declared
@@ -171,7 +171,7 @@ def verbs_page() -> dict[str, str]:
 
 
 def _verb(name: str, verb: Operation) -> str:
-    """One verb: what it does, and a table of what it takes."""
+    """One verb: what it does, a table of its parameters, and what it returns."""
     words = "".join(f"<p>{html.escape(part)}</p>" for part in verb.about.split("\n\n"))
     head = "".join(f"<th>{column}</th>" for column in VERB_COLUMNS)
     rows = "\n".join(
@@ -179,7 +179,8 @@ def _verb(name: str, verb: Operation) -> str:
         for entry in verb.parameters.values()
     )
     table = f'<div class="wide"><table><thead><tr>{head}</tr></thead>\n<tbody>{rows}</tbody></table></div>'
-    return f'<h2 id="{name}"><code>studio.{name}</code></h2>\n{words}\n{table if rows else ""}'
+    head = f'<h2 id="{name}"><code>studio.{name}</code></h2>'
+    return "\n".join([head, words, table if rows else "", text_of(verb.returned)])
 
 
 def _entry(entry: Parameter) -> tuple[str, ...]:
@@ -187,11 +188,8 @@ def _entry(entry: Parameter) -> tuple[str, ...]:
     default = "" if entry.default in (REQUIRED, None, "", ()) else str(entry.default)
     option = "" if entry.terminal.left_out or entry.mark(Knobs) else entry.option
     body = "" if entry.web.left_out else entry.web.name or entry.name
-    meaning = "SESSION/RUN" if entry.target == "run" else "Name or folder." if entry.target else entry.help
-    if knobs := entry.mark(Knobs):
-        meaning = f"{meaning} {', '.join(knob.name for knob in knobs.listed())}".strip()
     code = [f"<code>{html.escape(word)}</code>" if word else "" for word in (default, option, body)]
-    return f"<code>{entry.name}</code>", html.escape(meaning), *code
+    return f"<code>{entry.name}</code>", html.escape(entry.meaning), *code
 
 
 def findings_of_the_guide() -> dict[str, dict[str, Any]]:

@@ -38,14 +38,14 @@ def _member(name: str, value: Any) -> str:  # noqa: ANN401 - whatever is public
             for method, function in vars(value).items()
             if inspect.isfunction(function) and not method.startswith("_")
         ]
-        return "\n".join([head, _text(inspect.getdoc(value) or ""), *methods])
+        return "\n".join([head, text_of(inspect.getdoc(value) or ""), *methods])
     if inspect.isfunction(value):
         return f"{head}\n{_described(f'{name}{_signature(value)}', value)}"
     return f"{head}\n<p><code>{html.escape(repr(value))}</code></p>"
 
 
 def _described(call: str, function: Callable[..., object]) -> str:
-    return f"<h3><code>{html.escape(call)}</code></h3>\n{_text(inspect.getdoc(function) or '')}"
+    return f"<h3><code>{html.escape(call)}</code></h3>\n{text_of(inspect.getdoc(function) or '')}"
 
 
 def _signature(function: Callable[..., object]) -> str:
@@ -60,7 +60,7 @@ def _signature(function: Callable[..., object]) -> str:
     return f"({', '.join(names)})"
 
 
-def _text(text: str) -> str:
+def text_of(text: str) -> str:
     """A docstring: its paragraphs, and its fields as a list."""
     parts: list[str] = []
     for paragraph in text.split("\n\n"):

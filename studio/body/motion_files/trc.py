@@ -43,9 +43,12 @@ HEADER_FIELDS = (
 class MarkerMotion:
     """Markers over time.
 
-    names : M marker names. times : (F,) seconds, rising. positions : (F, M, 3) mm, world z up; NaN
-    where a marker is missing. unit : the unit of the file ("m" or "mm"). rate : rows per second as the
-    header says. notes : what was taken to be meant, sentences.
+    names : M marker names.
+    times : (F,) seconds, rising.
+    positions : (F, M, 3) mm, world z up; NaN where a marker is missing.
+    unit : of the file ("m" or "mm").
+    rate : rows per second as the header says.
+    notes : what was assumed, sentences.
     """
 
     names: tuple[str, ...]

@@ -30,9 +30,11 @@ class Board:
     """A printed board.
 
     columns, rows : squares of a ChArUco board, inner corners of a chessboard (as OpenCV and most tools count).
-    square_mm, marker_mm : side lengths as *measured on the print*; marker_mm 0 for chessboards. dictionary : OpenCV's
-    name of the markers' dictionary. legacy : ChArUco pattern as OpenCV before 4.6 drew it (differs for an even
-    number of rows). thickness_mm : of the plate that carries it; matters when it lies on the floor.
+    square_mm, marker_mm : side lengths as *measured on the print*; marker_mm 0 for chessboards.
+    dictionary : OpenCV's name of the markers' dictionary.
+    legacy : ChArUco pattern as OpenCV before 4.6 drew it (differs for an even number of rows).
+    thickness_mm : of the plate that carries it; matters when it lies on the floor.
+
     Raises CalibrationError for a board that cannot be.
     """
 

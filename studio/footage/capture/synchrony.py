@@ -60,10 +60,13 @@ class PairLag:
 
 @dataclass(frozen=True, slots=True)
 class Synchrony:
-    """An estimate. offsets : each camera's frame that belongs to frame 0, the smallest being 0.
+    """By how many frames cameras began apart, estimated from motion.
 
-    confidence : peak over second peak on the weakest link that a camera's offset rests on. within : how many frames
-    off it may be. sure : whether every link stands out and no trusted pair contradicts. notes : doubts, sentences.
+    offsets : each camera's frame that belongs to frame 0, the smallest being 0.
+    confidence : peak over second peak on the weakest link that a camera's offset rests on.
+    within : how many frames the offset may be off.
+    sure : whether every link stands out and no trusted pair contradicts.
+    notes : what speaks against it, sentences.
     """
 
     offsets: dict[str, int]

@@ -31,8 +31,13 @@ OVER = "all replayed videos are over"
 
 @dataclass(frozen=True, slots=True)
 class RecordingStanding:
-    """A recording at this moment. seconds : since it began. figures : by camera. missed : pictures by camera that the
-    disk was too slow for. bytes : written so far. ended : why, "" while it goes on.
+    """A recording at this moment.
+
+    seconds : since it began.
+    figures : by camera.
+    missed : by camera, pictures that the disk was too slow for.
+    bytes : written so far.
+    ended : why, "" while it goes on.
     """
 
     seconds: float

@@ -61,11 +61,12 @@ MEASURES = (
 
 @dataclass(frozen=True, slots=True)
 class Swept:
-    """A run of a sweep, measured. Numbers that a session has nothing for are None.
+    """A measured run of a sweep. Numbers that the session has no measure for are None.
 
-    run : its name. worst_frame : with the largest error; without a truth the one that fits the masks least, else the
-    one of the least log-weight. per_frame : by frame its error, mm, or without a truth its share in the masks. Others
-    are those of MEASURES.
+    run : its name.
+    worst_frame : with the largest error; without a truth the one that fits the masks least, else the one of the least
+        log weight.
+    per_frame : by frame its error, mm, or without a truth its share in the masks.
     """
 
     run: str
@@ -83,7 +84,11 @@ class Swept:
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
-    """The result of a sweep. runs : in the order of `sweep_trials`. knobs : declarations of those that were varied."""
+    """The result of a sweep.
+
+    runs : in the order of `sweep_trials`.
+    knobs : declarations of those that were varied.
+    """
 
     plan: Plan
     runs: tuple[Swept, ...]
@@ -96,7 +101,7 @@ class Sweep:
 
     @property
     def chief(self) -> Measure:
-        """The one that judges the points: the first that every run has."""
+        """The measure that ranks the points: the first that every run has."""
         return next(one for one in MEASURES if all(getattr(run, one.key) is not None for run in self.runs))
 
     def of_point(self, place: int) -> tuple[Swept, ...]:

@@ -83,22 +83,28 @@ TRUNK = "head and trunk"
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """Errors of a run against a truth, mm; without alignment unless noted (`alignment`: of the truth as a whole).
+    """Errors of a run against a truth, mm; without alignment unless noted.
 
-    frames : the frames that were measured (those that the truth has a row for). mean_mm : mean over frames
-    of the frames' means; std_mm : their standard deviation; worst_mm : the worst frame's mean. lost_frames
-    : how many frames have any limb lost, lost_frame_numbers : which; lost_limbs : limbs lost in any frame;
-    lost_threshold_mm : the distance from which a marker's limb is lost. lost_by_frame : the limbs lost in each of
-    `frames`.
-    per_frame_mm : in the order of `frames`. root_aligned_mm : with the root marker laid on the true one.
-    procrustes_mm : after the best turn, scale and move of each frame, None where no frame has three
-    markers. without_offsets_mm : with each marker's constant offset removed, which two definitions of a joint or a
-    calibration that is shifted make; offsets_mm : how long these are; common_offset_mm : the length of their mean.
+    frames : the frames that were measured (those that the truth has a row for).
+    mean_mm, std_mm, worst_mm : mean and standard deviation over frames of the frames' means, and the worst frame's
+        mean.
+    lost_frames, lost_frame_numbers : how many frames have any limb lost, and which.
+    lost_limbs, lost_by_frame : limbs lost in any frame, and in each of `frames`.
+    lost_threshold_mm : distance from which a marker's limb is lost.
+    per_marker_mm : by marker, its mean error.
+    per_frame_mm : in the order of `frames`.
+    root_aligned_mm : with the root marker laid on the true one.
+    procrustes_mm : after the best turn, scale and move of each frame; None where no frame has three markers.
+    without_offsets_mm : with each marker's constant offset removed, which comes from two definitions of a joint or from
+        a shifted calibration.
+    offsets_mm, common_offset_mm : by marker the length of its constant offset, and the length of their mean.
     unmatched_markers : names that only the body or only the truth has.
-    angles_deg : by joint, the error of the angle between the two limbs that meet there, mean over frames of the
-    absolute difference, degrees; directions_deg : by limb, the mean angle between its direction and the true one. Both
-    are of the straight lines between markers, so that a limb's twist about its axis shows in neither. mean_… : over
-    joints, over limbs; None without any.
+    angles_deg : by joint, the error of the angle between the two limbs that meet there: mean over frames of the
+        absolute difference.
+    directions_deg : by limb, the mean angle between its direction and the true one. Both use the straight lines between
+        markers, so a limb's twist about its axis shows in neither.
+    mean_angle_deg, mean_direction_deg : over joints, over limbs; None without any.
+    alignment : of the truth as a whole, in words.
     """
 
     frames: tuple[int, ...]

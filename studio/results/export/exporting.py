@@ -25,8 +25,11 @@ from studio.sessions.stored_run import StoredRun
 class ExportReport:
     """The result of an export.
 
-    files : written, and nothing else. track : that they hold, "" for none. checked : what reading back showed. notes :
-    sentences on gaps, names and axes, and on a better track that was passed over.
+    files : that were written.
+    frames : how many are in them.
+    checked : what reading the file back showed.
+    notes : sentences on gaps, names and axes, and on a better track that was not used.
+    track : that was written, "" for none.
     """
 
     format: str

@@ -18,7 +18,11 @@ DESCRIBED = ("tracker", "weighting", "body", "seed", "first", "last", "fps", "so
 
 @dataclass(frozen=True, slots=True)
 class RunsCompared:
-    """runs : as "SESSION/RUN". tables : "curves" (by run and frame), "settings" (what differs), "worst" (of each)."""
+    """Runs side by side.
+
+    runs : as "SESSION/RUN".
+    tables : "curves" (by run and frame), "settings" (that differ), "worst" (frame of each run).
+    """
 
     runs: tuple[str, ...]
     tables: tuple[Table, ...]

@@ -168,9 +168,14 @@ class Selection:
 
 @dataclass(frozen=True, slots=True)
 class Remedy:
-    """Something that may help. title : for a button. words : why. settings : knobs to change, by name. action : what
-    else to do, as a machine reads it ("start pose", "calibrate", "masks", "correct sides"), "" where the knobs are all.
-    frame : the one from which on it was tried, where that is another than the frame that is asked about.
+    """Something that may help.
+
+    title : for a button.
+    words : why.
+    settings : knobs to change, by name.
+    action : what else to do, as a machine reads it ("start pose", "calibrate", "masks", "correct sides"); "" where the
+        knobs are all.
+    frame : the first frame of the trial, where that is not the frame in question.
     """
 
     title: str
@@ -182,8 +187,14 @@ class Remedy:
 
 @dataclass(frozen=True, slots=True)
 class FrameFinding:
-    """One thing that a view says of a frame. kind : see `why`. words : a sentence. numbers : what it rests on.
-    is_cause : it is the main cause. layer : its index. frame : to look at, where that is another one.
+    """One finding about a frame.
+
+    kind : see `why`.
+    words : a sentence.
+    numbers : that it rests on.
+    is_cause : whether it is the main cause.
+    layer : its index.
+    frame : to look at, where that is another one.
     """
 
     kind: str
@@ -199,8 +210,11 @@ class FrameFinding:
 
 @dataclass(frozen=True, slots=True)
 class Viewed:
-    """A view's content. notes : what a reader has to know of the numbers. findings, remedies : of `why` only.
-    search_layers, searches : layers of one search of the frame, and how many searches it has; 0 of a whole run.
+    """A view's content.
+
+    notes : what a reader has to know of the numbers.
+    findings, remedies : of `why` only.
+    search_layers, searches : layers of one search of the frame, and how many searches it has; 0 for a whole run.
     """
 
     tables: tuple[Table, ...]

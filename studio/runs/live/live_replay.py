@@ -24,7 +24,11 @@ from studio.sessions.stored_run import BODY_FOLDER, StoredRun
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Two runs compared. frames : number compared. different : those whose pose or log-weight differs in any bit."""
+    """Two runs compared.
+
+    frames : how many were compared.
+    different : numbers of the frames whose pose or log weight differs in any bit.
+    """
 
     frames: int
     different: tuple[int, ...]

@@ -190,8 +190,13 @@ HOLE_AREA = 4.0
 
 @dataclass(frozen=True, slots=True)
 class BackgroundSetup:
-    """The background that was set. knobs : of the session's evidence. notes : for the user. quality : None if
-    unmeasured. choice : of "best", between the sources.
+    """The background that was set.
+
+    source : of the masks.
+    knobs : of the session's evidence, by name.
+    notes : sentences.
+    quality : how far the masks agree; None if not measured.
+    choice : of "best", which source each camera has.
     """
 
     source: str

@@ -72,11 +72,19 @@ EVEN_SHARE, STEEPNESS = 0.1, 4.0
 class InitialPose:
     """An estimated start pose.
 
-    names : of the parameters. pose : (D,). body : its name. confidence : 0 to 1, that pose and heading are right.
+    names : of the D parameters.
+    pose : (D,) radians and mm.
+    body : its name.
+    confidence : 0 to 1, that pose and heading are right.
     margin : log weight above the best pose that faces the other way, inf without one; negative where the pictures say
-    that a person faces as the lighter one does. rival : that pose.
-    agreement : share of the last searches with this heading. overlap : f_s. hull_litres : volume of the hull, 0
-    without one. note : for the user, or "". file : that it was written to.
+        that a person faces as the lighter pose does.
+    rival : that pose.
+    agreement : share of the last searches with this heading.
+    overlap : of silhouettes and model, f_s.
+    hull_litres : volume of the hull, 0 without one.
+    evaluations : poses weighed.
+    note : a sentence, or "".
+    file : that was written; None for none.
     """
 
     frame: int

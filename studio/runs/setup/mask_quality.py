@@ -110,8 +110,11 @@ class ViewQuality:
 
 @dataclass(frozen=True, slots=True)
 class MaskQuality:
-    """The quality of all cameras' masks in some frames. hull_litres : the hull's volume in each. doubts : findings of
-    the silhouettes on the calibration. subjects : seen in two frames or more (in one, of one), 0: not counted.
+    """How good the masks of all cameras are in some frames.
+
+    hull_litres : the hull's volume in each frame.
+    doubts : findings of the silhouettes against the calibration.
+    subjects : seen in two frames or more (in one frame: in that one); 0: not counted.
     contrast : of subject and background; None: not measured, or the masks are not made by it.
     """
 
@@ -129,7 +132,7 @@ class MaskQuality:
 
     @property
     def usable(self) -> Annotated[bool, Field()]:
-        """Whether they agree, and something else confirms them: for what all of them lack they agree about, too."""
+        """Whether the masks agree and something else confirms them: they also agree about whatever all of them lack."""
         return self.agreeing and not self.unconfirmed
 
     @property
@@ -148,8 +151,8 @@ class MaskQuality:
 
     @property
     def worst(self) -> Annotated[str, Field()]:
-        """The camera to check first, "" where all are usable: one that removes what the others see causes their poor
-        agreement; else the one that agrees least.
+        """The camera to check first, "" where all are usable: one that removes what the others see, else the one that
+        agrees least.
         """
         if all(view.usable for view in self.views):
             return ""

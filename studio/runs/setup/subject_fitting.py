@@ -105,8 +105,13 @@ def _unshown(_body: BodyModel, _frames: tuple[int, ...], _poses: Array) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FittedSubject:
-    """A subject that was found. frames, poses (F, D) : with it. overlap_before, overlap : (F,) f_s. file : that it was
-    written to.
+    """A subject fitted to footage.
+
+    sizes : what changed, mm, with standard deviations.
+    frames, poses : (F,) numbers of the frames, and the body's poses (F, D) in them.
+    overlap_before, overlap : (F,) overlap of silhouettes and model (f_s) before and after.
+    poses_from : where the first poses came from.
+    file : that was written; None for none.
     """
 
     subject: Subject

@@ -46,8 +46,12 @@ STEPS: tuple[StepName, ...] = get_args(StepName)
 
 @dataclass(frozen=True, slots=True)
 class StepStatus:
-    """A step. words : its result; why : why it is stale, blocked or unreadable, sentences. optional : tracking works
-    without it. run : that it is about, "" for none.
+    """How a step stands.
+
+    words : its result.
+    why : why it is stale, blocked or unreadable, sentences.
+    optional : whether tracking works without it.
+    run : that it is about, "" for none.
     """
 
     step: StepName
@@ -343,7 +347,10 @@ NEEDS: Mapping[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True, slots=True)
 class Workflow:
-    """All steps in order. next : the first that needs work, "" if none does."""
+    """All steps in order.
+
+    next : the first that needs work, "" if none does.
+    """
 
     steps: tuple[StepStatus, ...]
     next: str

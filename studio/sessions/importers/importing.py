@@ -162,8 +162,14 @@ class ImportOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImportReport:
-    """The result of an import. session : after it. matching : footage to cameras, shown to the user. warnings : what to
-    check. layout : the recognised layout. calibrated : whether the source's calibration was used.
+    """The result of an import.
+
+    session : after the import.
+    matching : footage to cameras.
+    notes : what was assumed.
+    warnings : what to check.
+    layout : the recognised layout.
+    calibrated : whether the source's calibration was used.
     """
 
     session: Session
