@@ -23,7 +23,7 @@ Names that stand for several:
 {GROUPS}
 """
 TRACKERS = click.option(
-    "--trackers", metavar="A,B,C", default=",".join(USUAL), show_default=True, help="Who is compared."
+    "--trackers", metavar="A,B,C", default=",".join(USUAL), show_default=True, help="The trackers to compare."
 )
 FRAMES = click.option("--frames", metavar="A:B", default=":", help="Half open, from 0; default: all.")
 SET = click.option(

@@ -46,9 +46,14 @@ class LimbShape:
 
 @dataclass(frozen=True, slots=True)
 class ClusterPicture:
-    """An elementary movement. share: of the training frames. stays: frames in a row, in the mean. limbs: of its
-    prototype. arrows: from where to where the extremities go in `BehaviourDetail.arrow_seconds`, at the mean of the
-    cluster's derivatives. source: the recording of the prototype, frame: its frame in it.
+    """An elementary movement.
+
+    share : of the training frames.
+    stays : frames in a row, in the mean.
+    limbs : of its prototype.
+    arrows : where the extremities move from and to in `BehaviourDetail.arrow_seconds`, by the mean of the cluster's
+        derivatives.
+    source, frame : the recording of the prototype, and its frame in it.
     """
 
     cluster: int
@@ -62,7 +67,7 @@ class ClusterPicture:
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """How often a cluster follows another, of the times that the first is left."""
+    """How often a cluster follows another, as a share of the times that the first is left."""
 
     source: int
     target: int
@@ -71,9 +76,13 @@ class Transition:
 
 @dataclass(frozen=True, slots=True)
 class BehaviourDetail:
-    """A model. clusters: most frequent first. transitions: between different clusters, memory left aside.
-    context_lengths: states of the automaton by the length of their history, 0 first; kept_lengths: those of them that
-    passed the ε test. problem: why no poses can be shown, "" if they can.
+    """A behaviour model.
+
+    clusters : most frequent first.
+    transitions : between different clusters, memory left aside.
+    context_lengths : states of the automaton by the length of their history, 0 first.
+    kept_lengths : those of them that passed the ε test.
+    problem : why no poses can be shown, "" if they can.
     """
 
     model: ModelSummary
@@ -88,7 +97,7 @@ class BehaviourDetail:
 
 @dataclass(frozen=True, slots=True)
 class EntropyLine:
-    """Entropies over memory for one ε, nats a frame: of what the automaton was learnt from, and of the rest."""
+    """Entropies over memory for one ε, nats a frame: of the training material, and of the rest."""
 
     epsilon: FiniteFloat
     memory: list[int]
@@ -99,8 +108,8 @@ class EntropyLine:
 
 @dataclass(frozen=True, slots=True)
 class Entropies:
-    """The automaton learnt again from four of five recordings (where there are fewer than five: four fifths of each),
-    tested on the rest.
+    """The automaton learnt again from four of five recordings (or four fifths of each, if there are fewer), tested on
+    the rest.
     """
 
     lines: list[EntropyLine]
@@ -108,7 +117,11 @@ class Entropies:
 
 @dataclass(frozen=True, slots=True)
 class GeneratedWalk:
-    """A walk through the automaton. frames: limbs of every frame; clusters, histories: where it is in each."""
+    """A walk through the automaton.
+
+    frames : limbs of every frame.
+    clusters, histories : cluster and history of every frame.
+    """
 
     seed: int
     fps: FiniteFloat
@@ -118,14 +131,14 @@ class GeneratedWalk:
 
 
 def _body_of(model: BehaviourModel, workspace: Workspace) -> BodyModel:
-    """A body of the model's kind, the studio's or the workspace's own. Raises BehaviourError where it is gone."""
+    """The model's body, shipped or of the workspace. Raises BehaviourError where it no longer exists."""
     name = model.space.body
     try:
         body = load_body(name, (workspace.root / BODIES_NAME,))
         model.space.check_body(body)
     except BodyError:
         raise BehaviourError(
-            f"The model's body '{name}' is not here any more, so its movements cannot be drawn.",
+            f"The model's body '{name}' no longer exists, so its movements cannot be drawn.",
             "Put the body back, or learn the model again on another one.",
         ) from None
     except BehaviourError as problem:
@@ -146,9 +159,9 @@ def _read(path: Path) -> BehaviourModel:
 
 
 def behaviour_detail(path: Path, workspace: Workspace) -> BehaviourDetail:
-    """Clusters of a model as poses, which follows which, states of its automaton by the length of their history.
+    """Clusters of a model as poses, their order, and states of its automaton by the length of their history.
 
-    Of a model whose body is gone or another one by now, `problem` says so; it has no poses to show then.
+    `problem` says so if the model's body no longer exists or has changed; there are no poses to show then.
     """
     model = _read(path)
     contexts = model.automaton.contexts
@@ -169,7 +182,7 @@ def behaviour_detail(path: Path, workspace: Workspace) -> BehaviourDetail:
 
 
 def entropies_of(path: Path) -> Entropies:
-    """Eq. 2 of a model over memory, at its own ε and at a larger one."""
+    """Entropies (Eq. 2) of a model over memory, at its own ε and at a larger one."""
     model = _read(path)
     train, test = _parted(model.making.labels)
     settings = model.making.settings
@@ -192,7 +205,7 @@ def entropies_of(path: Path) -> Entropies:
 
 
 def _parted(recordings: tuple[IntArray, ...]) -> tuple[list[IntArray], list[IntArray]]:
-    """Labels to learn from and to test on: every fifth recording, or the last fifth of each where there are few."""
+    """Labels to learn from and to test on: every fifth recording, or the last fifth of each if there are few."""
     if len(recordings) >= FIFTH:
         kept = [labels for place, labels in enumerate(recordings) if place % FIFTH != FIFTH - 1]
         return kept, list(recordings[FIFTH - 1 :: FIFTH])
@@ -206,7 +219,7 @@ def _parted(recordings: tuple[IntArray, ...]) -> tuple[list[IntArray], list[IntA
 def walk_of(path: Path, workspace: Workspace, frames: int, seed: int) -> GeneratedWalk:
     """A walk through a model's automaton and the movement it makes; the same for the same seed.
 
-    Raises BehaviourError where the model's body is gone.
+    Raises BehaviourError where the model's body no longer exists.
     """
     model = _read(path)
     body = _body_of(model, workspace)

@@ -1,4 +1,4 @@
-"""Which bodies there are, and all that can be changed of one."""
+"""The bodies, and everything that can be changed of one."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -20,8 +20,10 @@ from studio.sessions.workspace import Workspace
 
 @dataclass(frozen=True, slots=True)
 class BodyEntry:
-    """A body that can be tracked. own: whose it is: the workspace's, a session's, "" for one that is shipped.
-    problem: why its file cannot be read, "" if it can.
+    """A body that can be tracked.
+
+    own : whose it is: the workspace's, a session's, "" for a shipped one.
+    problem : why its file cannot be read, "" if it can.
     """
 
     name: str
@@ -34,7 +36,10 @@ class BodyEntry:
 
 @dataclass(frozen=True, slots=True)
 class BodyList:
-    """All bodies by name. chosen: the session's, "" without one."""
+    """All bodies by name.
+
+    chosen : the session's, "" without one.
+    """
 
     bodies: list[BodyEntry]
     chosen: str = ""
@@ -42,8 +47,9 @@ class BodyList:
 
 @dataclass(frozen=True, slots=True)
 class SizeView:
-    """A size of a limb: mm, or for a scale without unit. dimension: its name in the body's file, "" where the limb has
-    a number of its own.
+    """A size of a limb: mm, or a scale without unit.
+
+    dimension : its name in the body's file, "" where the limb has a number of its own.
     """
 
     value: float
@@ -66,7 +72,10 @@ class LimbSizes:
 
 @dataclass(frozen=True, slots=True)
 class DimensionView:
-    """A dimension that is no limb's size: where joints and markers lie. unit: "mm", or "" for a ratio."""
+    """A dimension that is no limb's size: where joints and markers lie.
+
+    unit : "mm", or "" for a ratio.
+    """
 
     name: str
     value: float
@@ -75,7 +84,11 @@ class DimensionView:
 
 @dataclass(frozen=True, slots=True)
 class LimitView:
-    """A parameter: degrees or mm. lower, upper: null where there is none. neutral: null where it follows from sizes."""
+    """A parameter: degrees or mm.
+
+    lower, upper : null where there is none.
+    neutral : null where it follows from sizes.
+    """
 
     name: str
     label: str
@@ -98,8 +111,12 @@ class MarkerView:
 
 @dataclass(frozen=True, slots=True)
 class BodyDetail:
-    """A body with all that can be changed. text: its file. sided: whether it has a left and a right. drawings: its
-    limbs as it stands. saved: what it was saved as, "" where it was not.
+    """A body with everything that can be changed.
+
+    text : its file.
+    sided : whether it has a left and a right.
+    drawings : its limbs as it stands.
+    saved : where it was saved, "" for nowhere.
     """
 
     name: str
@@ -118,7 +135,7 @@ class BodyDetail:
 
 
 def list_with_own(workspace: Workspace, session: Session | None) -> BodyList:
-    """The bodies that are shipped, those of the workspace and of a session."""
+    """The shipped bodies, and those of the workspace and of a session."""
     folders = body_folders(workspace, session)
     own, shared = (_names(workspace, one) for one in (session, None))
     entries: list[BodyEntry] = []
@@ -134,19 +151,19 @@ def list_with_own(workspace: Workspace, session: Session | None) -> BodyList:
 
 
 def _names(workspace: Workspace, session: Session | None) -> set[str]:
-    """The own bodies of a folder; one of a shipped body's name goes before that."""
+    """The own bodies of a folder; one with a shipped body's name takes its place."""
     folder = bodies_folder(workspace, session)
     return {path.stem for path in body_files(folder)} if folder.is_dir() else set()
 
 
 def body_detail(name: str, workspace: Workspace, session: Session | None) -> BodyDetail:
-    """A body with all that can be changed; a session's own is in its subject's size. Raises BodyError."""
+    """A body with everything that can be changed; a session's own is in its subject's size. Raises BodyError."""
     body = body_to_edit(name, session, bodies_folder(workspace, None))
     return edited_detail(EditedBody(body, body_text(body)))
 
 
 def edited_detail(edit: EditedBody) -> BodyDetail:
-    """A body after a change, with all that can be changed. Raises BodyError."""
+    """A body after a change. Raises BodyError."""
     body = edit.body
     definition = body.definition
     if definition is None:

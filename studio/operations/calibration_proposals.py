@@ -1,4 +1,4 @@
-"""Calibrations that were solved or read but are not in use yet: to be looked at, turned, applied or left."""
+"""Calibrations that were solved or read but are not in use yet: to be looked at, turned, applied or dropped."""
 
 import dataclasses
 import secrets
@@ -59,10 +59,13 @@ WITHOUT_PLACES = Finding(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Proposal:
-    """A calibration of a session, as it would be used. originals : name → content of the file it is of. pictures :
-    camera → its picture of a moment of the board footage.
-    in_use : made of the session's own. clicked : the points that its floor was set by. floor : what it was set by here,
-    as text.
+    """A calibration of a session that is not in use yet.
+
+    originals : by name, the content of the files it was read from.
+    pictures : by camera, its picture of one moment of the board footage.
+    in_use : made from the session's own.
+    clicked : the points that set its floor.
+    floor : how it was set here, as text.
     """
 
     identifier: str
@@ -103,14 +106,14 @@ class Proposals:
         self._kept: dict[str, Proposal] = {}
 
     def keep(self, proposal: Proposal) -> Proposal:
-        """Remember it; the oldest are forgotten."""
+        """Remember a proposal; the oldest are forgotten."""
         self._kept[proposal.identifier] = proposal
         while len(self._kept) > KEPT:
             self._kept.pop(next(iter(self._kept)))
         return proposal
 
     def find(self, session: str, identifier: str) -> Proposal:
-        """One of a session's. Raises NotFoundError."""
+        """A proposal of a session. Raises NotFoundError."""
         proposal = self._kept.get(identifier)
         if proposal is None or proposal.session != session:
             raise NotFoundError(
@@ -120,7 +123,9 @@ class Proposals:
 
 
 def propose_file(session: Session, place: Path, file: str = "", unit: Unit = "", up: Up = "z") -> Proposal:
-    """What a calibration file gives a session. place : it, or a folder in which it is the only one, or lies as `file`.
+    """A session's calibration from a file.
+
+    place : the file, or a folder in which it is the only one or is called `file`.
 
     Raises CalibrationError where there is none, or several, or it does not fit the footage; NotFoundError.
     """
@@ -176,8 +181,12 @@ def _proposal_of_file(session: Session, read: Calibration) -> Proposal:
 
 @dataclass(frozen=True, slots=True)
 class BoardFootage:
-    """Where footage of a board lies. lenses : a video or folder a camera. common : of all cameras at once. lying :
-    pictures of the board on the floor; floor : else "frame:N" of the common footage, "" for none.
+    """Where footage of a board lies.
+
+    lenses : a video or folder a camera.
+    common : of all cameras at once.
+    lying : pictures of the board on the floor.
+    floor : else "frame:N" of the common footage, "" for none.
     """
 
     lenses: Path | None
@@ -187,12 +196,12 @@ class BoardFootage:
 
     @property
     def recordings(self) -> int:
-        """How many there are to be looked through."""
+        """The number of recordings to look through."""
         places = [place for place in (self.lenses, self.common, self.lying) if place and place.is_dir()]
         return sum(len(list_footage(place)) for place in places)
 
     def completed(self, whole: Path) -> "BoardFootage":
-        """With the folders of a session or folder where none is named. Raises CalibrationError."""
+        """The same with the folders of a session where none is named. Raises CalibrationError."""
         if self.lenses is not None or self.common is not None:
             return self
         lenses, common = find_board_footage(whole)
@@ -200,7 +209,9 @@ class BoardFootage:
 
 
 def checked_board(session: Session, text: str, options: BoardOptions) -> Board:
-    """The board of a text. Raises CalibrationError for one that cannot be, or offsets of a camera that is not there."""
+    """The board of a text. Raises CalibrationError for an impossible one, or for offsets of a camera that does not
+    exist.
+    """
     how_taken(session, options.offsets or {})
     return board_from_text(text, options.thickness_mm)
 
@@ -208,7 +219,7 @@ def checked_board(session: Session, text: str, options: BoardOptions) -> Board:
 def propose_boards(
     session: Session, footage: BoardFootage, board: Board, options: BoardOptions, progress: Progress = unheard
 ) -> Proposal:
-    """What board footage gives a session. Lenses alone give no cameras, and a finding that blocks.
+    """A session's calibration from board footage. Lenses alone give no cameras, and a finding that blocks.
 
     Raises CalibrationError, FootageError.
     """
@@ -283,7 +294,7 @@ def propose_level(session: Session, run: str = "", progress: Progress = unheard)
 
 
 def with_floor(base: Proposal, points: Sequence[Click]) -> Proposal:
-    """The same cameras in the world that clicked points make; nothing is kept of `base`. Raises CalibrationError."""
+    """The same cameras in the world that clicked points define; nothing of `base` is kept. Raises CalibrationError."""
     clicked = clicked_floor(Clicks(tuple(points)), base.cameras)
     turned = moved_cameras(base.cameras, clicked.new_from_old)
     cameras = tuple(dataclasses.replace(camera, quarter_turns=quarter_turns(camera)) for camera in turned)
@@ -309,7 +320,7 @@ def with_floor(base: Proposal, points: Sequence[Click]) -> Proposal:
 
 
 def apply_proposal(session: Session, proposal: Proposal) -> CalibrationChange:
-    """Let the session use a proposal from now on, whatever its findings say; the calibration before is kept.
+    """Let the session use a proposal from now on, whatever its findings say; the earlier calibration is kept.
 
     Raises SessionError while a run is being tracked.
     """
@@ -327,7 +338,7 @@ def apply_proposal(session: Session, proposal: Proposal) -> CalibrationChange:
 
 
 def _board_pictures(solved: Calibrated, footage: BoardFootage, taken: HowTaken) -> dict[str, Bytes]:
-    """Each camera's picture of the floor's moment, else of the moment that most cameras saw the board in."""
+    """Each camera's picture of the floor's moment, else of the moment when most cameras saw the board."""
     folder, floor = (
         (footage.lying, "frame:0") if footage.lying is not None else (footage.common, footage.floor)
     )

@@ -1,4 +1,4 @@
-"""A session's calibration and those proposed, with what speaks for and against them; their pictures and files."""
+"""A session's calibration and those proposed, with what the checks say; their pictures and files."""
 
 import io
 import math
@@ -36,8 +36,13 @@ from studio.sessions.session import CAMERAS_PATH, Session
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CalibratedCamera:
-    """A camera as it stands. width, height : pixels. focal_px, centre_px : (2,). position : (3,) mm. forward : (3,) its
-    optical axis. rms_px : of its board corners, none where no board was seen.
+    """A camera of a calibration.
+
+    width, height : pixels.
+    focal_px, centre_px : (2,).
+    position : (3,) mm.
+    forward : (3,) its optical axis.
+    rms_px : of its board corners, null where no board was seen.
     """
 
     name: str
@@ -61,7 +66,10 @@ class ClickedPoint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rig:
-    """Cameras with what speaks for and against them. report : as the command writes it, {} for files."""
+    """Cameras and what the checks say of them.
+
+    report : as the command writes it, {} for files.
+    """
 
     source: str
     cameras: tuple[CalibratedCamera, ...]
@@ -75,8 +83,10 @@ class Rig:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ProposalView(Rig):
-    """A calibration to look at before it is applied; it lives until the studio ends. unit_note : how the unit was
-    recognised. matching : the footage's cameras to the calibration's own names.
+    """A calibration to look at before it is applied; it lives until the studio ends.
+
+    unit_note : how the unit was recognised.
+    matching : the footage's cameras to the calibration's names.
     """
 
     identifier: str
@@ -87,9 +97,13 @@ class ProposalView(Rig):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CalibrationView:
-    """The calibration in use, none while there is none. earlier : those before it, newest first. stale_runs : tracked
-    with another one. changed : when it was replaced (ISO 8601). board_footage : whether folders of it lie in the
-    session. notes : what the change that was just made means.
+    """The calibration in use, if there is one.
+
+    earlier : older ones, newest first.
+    stale_runs : tracked with an older one.
+    changed : when it was replaced (ISO 8601).
+    board_footage : whether the session has folders of it.
+    notes : what the last change means.
     """
 
     session: str
@@ -107,8 +121,9 @@ Report = dict[str, object]
 
 
 def calibration_view(session: Session, notes: tuple[str, ...] = ()) -> CalibrationView:
-    """The calibration that a session has. notes : on a change just made. Raises CalibrationError for one that cannot be
-    read.
+    """The calibration of a session. notes : on the last change.
+
+    Raises CalibrationError for one that cannot be read.
     """
     present = None
     if session.is_calibrated:
@@ -127,7 +142,7 @@ def calibration_view(session: Session, notes: tuple[str, ...] = ()) -> Calibrati
 
 
 def proposal_view(proposal: Proposal) -> ProposalView:
-    """A proposal with all that speaks for and against it."""
+    """A proposal and what the checks say of it."""
     report = report_of(proposal.calibrated) if proposal.calibrated is not None else {}
     return extended(
         ProposalView,
@@ -181,7 +196,7 @@ def _points(proposal: Proposal) -> tuple[ClickedPoint, ...]:
 
 
 def _residuals(report: Report) -> dict[str, float]:
-    """Camera → pixels that its corners are off in the rig."""
+    """By camera, by how many pixels its corners are off in the rig."""
     entries = report.get("cameras", [])
     off = {
         str(entry.get("name")): entry.get("rig_rms_px")
@@ -209,8 +224,12 @@ def _has_boards(session: Session) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class WorldPicture:
-    """How a picture of a calibration's world is made. height : pixels. frame : of the session's footage. board : of the
-    board's footage where the proposal has some. axes : floor, axes and a pole are drawn.
+    """How a picture of a calibration's world is made.
+
+    height : pixels.
+    frame : of the session's footage.
+    board : of the board's footage where the proposal has some.
+    axes : whether floor, axes and a pole are drawn.
     """
 
     height: Annotated[int, Ge(64), Le(2160)] = 720
@@ -259,7 +278,10 @@ def draw_coverage(session: Session, proposal: Proposal, camera: str) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationFile:
-    """A calibration for another tool. notes : what its format cannot hold."""
+    """A calibration for another tool.
+
+    notes : what its format cannot hold.
+    """
 
     name: str
     content: bytes

@@ -110,14 +110,16 @@ def calibrate(
     to: Annotated[
         str | Path | None,
         Field(
-            description="The calibration to write; default: calibration/cameras.toml in the session or folder."
+            description="File of the new calibration; default: calibration/cameras.toml in the session or folder."
         ),
         Terminal(kind=Path),
     ] = None,
     replace: Annotated[
-        bool, Field(description="Replace the calibration that is there (it is kept)."), Terminal("--force")
+        bool, Field(description="Replace the present calibration (it is kept)."), Terminal("--force")
     ] = False,
-    anyway: Annotated[bool, Field(description="Write it even if a check says that it is wrong.")] = False,
+    anyway: Annotated[
+        bool, Field(description="Write the calibration even if a check says that it is wrong.")
+    ] = False,
     progress: Reporting = None,
     **options: Any,  # noqa: ANN401 - of the types that are declared
 ) -> Calibration:
@@ -225,7 +227,7 @@ class Alignment:
 @keeping_in_place
 def align(
     session: SessionName,
-    frames: Annotated[Frames, Field(description="To look at; default: sixteen, evenly spread.")] = (),
+    frames: Annotated[Frames, Field(description="Frames to look at; default: sixteen, evenly spread.")] = (),
     *,
     keep: Annotated[
         bool,
@@ -348,7 +350,7 @@ def level(
     ] = None,
     run: Annotated[
         str,
-        Field(max_length=100, description="A run of the session: its feet show the floor."),
+        Field(max_length=100, description="A run of the session whose feet show the floor."),
         Terminal(metavar="RUN"),
     ] = "",
     keep: Annotated[

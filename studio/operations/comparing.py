@@ -70,29 +70,29 @@ class CompareRequest:
 
     trackers: Annotated[
         Sequence[str],
-        Field(description="Who is compared: trackers, tracker:label, or a name that stands for several."),
+        Field(description="Trackers, tracker:label, or a name that stands for several."),
         Terminal(metavar="A,B,C", kind=str),
         Web(left_out=True),
     ] = USUAL
-    evaluations: Annotated[int, Field(ge=1, le=1_000_000, description="Poses weighed a frame, by each.")] = (
-        1000
-    )
-    seeds: Annotated[int, Field(ge=1, le=1000, description="How many seeds each, from 0 on.")] = 5
-    weighting: Annotated[str, Field(description="Of all; default: the session's own."), OneOf(WEIGHTINGS)] = (
-        ""
-    )
+    evaluations: Annotated[
+        int, Field(ge=1, le=1_000_000, description="Poses that each tracker weighs a frame.")
+    ] = 1000
+    seeds: Annotated[int, Field(ge=1, le=1000, description="Number of seeds of each tracker, from 0 on.")] = 5
+    weighting: Annotated[
+        str, Field(description="The likelihood of all; default: the session's own."), OneOf(WEIGHTINGS)
+    ] = ""
     body: Body = ""
     behaviour: Annotated[
-        Model, Field(description="Behaviour model of those that need one, by name or file.")
+        Model, Field(description="Behaviour model, by name or file, for trackers that need one.")
     ] = ""
     first: First = None
     last: Last = None
-    layers: Annotated[int, Field(ge=1, le=60, description="Of trackers whose layers can be chosen.")] = (
-        DEFAULT_LAYERS
-    )
+    layers: Annotated[
+        int, Field(ge=1, le=60, description="Layers of trackers whose layers can be chosen.")
+    ] = DEFAULT_LAYERS
     changes: Annotated[
         Mapping[str, Mapping[str, object]] | None,
-        Field(description='By tracker its own knobs; under "" those of all that have them.'),
+        Field(description='Knobs by tracker; under "" for all trackers that have them.'),
         Terminal(left_out=True),
         Web(left_out=True),
     ] = None
@@ -140,10 +140,10 @@ class Compared:
 def compare(
     session: AnySession,
     *,
-    name: Annotated[str, Field(description="Of the comparison; default: numbered.")] = "",
+    name: Annotated[str, Field(description="Name of the comparison; default: numbered.")] = "",
     out: Annotated[
         str | Path | None,
-        Field(description="Folder to keep it in, instead of the session's."),
+        Field(description="Folder for the comparison, instead of the session's."),
         Terminal(kind=Path),
     ] = None,
     processes: Annotated[
@@ -207,7 +207,9 @@ class SweepRequest:
         Terminal(left_out=True),
         Web(kind=dict[str, list[Value]]),
     ]
-    seeds: Annotated[int, Field(ge=1, le=1000, description="Runs of each combination: seeds from 0 on.")] = 3
+    seeds: Annotated[
+        int, Field(ge=1, le=1000, description="Number of runs of each combination, seeds from 0 on.")
+    ] = 3
     tracker: Annotated[
         str, Field(description="Default: the session's own, else annealed."), OneOf(TRACKERS)
     ] = ""
@@ -244,7 +246,7 @@ def sweep(
     session: AnySession,
     *,
     name: Annotated[
-        str, Field(description="Of the sweep, with which its runs' names begin; default: numbered.")
+        str, Field(description="Name of the sweep, with which its runs' names begin; default: numbered.")
     ] = "",
     processes: Annotated[
         int | None, Field(ge=1, description="Runs at once; default: one a core."), Web(left_out=True)

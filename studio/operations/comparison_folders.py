@@ -58,8 +58,9 @@ def _begun(folder: Path, plan: Plan) -> KeptComparison:
 
 
 def place_of(session: Session, name: str = "", *, sweep: bool = False) -> Path:
-    """The folder for a comparison of a session; without a name comparison-1, comparison-2, … or sweep-1, sweep-2, … A
-    sweep's name is none that runs of an earlier one bear.
+    """The folder for a comparison of a session; without a name comparison-1, comparison-2, … or sweep-1, sweep-2, …
+
+    A sweep gets no name that runs of an earlier one have.
     """
     folder = session.path / FOLDER_NAME
     taken: set[str] = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
@@ -105,7 +106,7 @@ def unfinished_like(session: Session, plan: Plan) -> KeptComparison | None:
 
 
 def runs_of(session: Session, kept: KeptComparison) -> dict[str, StoredRun]:
-    """The runs that were made for a comparison's trials, by the notes that say so (`KeptComparison.note_of`)."""
+    """The runs that were made for a comparison's trials, recognised by their notes (`KeptComparison.note_of`)."""
     begin = kept.note_of("")
     runs: dict[str, StoredRun] = {}
     for run in session.runs():
@@ -116,7 +117,7 @@ def runs_of(session: Session, kept: KeptComparison) -> dict[str, StoredRun]:
 
 
 def throw_away(workspace: Workspace, session: Session, kept: KeptComparison) -> Path:
-    """Move a comparison to the workspace's trash. Raises SessionError while a process works at it."""
+    """Move a comparison to the workspace's trash. Raises SessionError while a process works on it."""
     if kept.is_running():
         raise SessionError(f"Comparison '{kept.name}' is running.", "Cancel it first.")
     return workspace.to_trash(kept.folder, f"{session.name}--{kept.name}")

@@ -1,4 +1,4 @@
-"""Comparisons and sweeps that a session keeps: listed, looked into, thrown away; and who can be compared."""
+"""Comparisons and sweeps that a session keeps, and the trackers that can be compared."""
 
 import logging
 from collections.abc import Callable, Iterator
@@ -33,7 +33,11 @@ Going = Callable[[Session, KeptComparison], ComparisonState | None]
 
 @dataclass(frozen=True, slots=True)
 class ComparisonLine:
-    """A comparison in a list. done, total: trials. best: the tracker with the smallest mean error, once it is done."""
+    """A comparison in a list.
+
+    done, total : trials.
+    best : the tracker with the smallest mean error, once it is done.
+    """
 
     session: str
     name: str
@@ -60,9 +64,12 @@ class ComparisonLine:
 
 @dataclass(frozen=True, slots=True)
 class ComparisonDetail:
-    """A comparison. settings: by tracker its weighting and knobs; result: null until it is done, else the numbers
-    as `studio compare --json` prints them, every frame's error and the findings; of a sweep as `studio sweep --json`.
-    trials: of a finished comparison.
+    """A comparison.
+
+    settings : by tracker its weighting and knobs.
+    result : null until it is done, else the numbers as `studio compare --json` (of a sweep `studio sweep --json`)
+        prints them, every frame's error and the findings.
+    trials : of a finished comparison.
     """
 
     comparison: ComparisonLine
@@ -77,8 +84,10 @@ class ComparisonDetail:
 
 @dataclass(frozen=True, slots=True)
 class CandidateChoice:
-    """A name that can take part. changes: the knobs that it brings along. sized_by: those that follow from the
-    evaluations.
+    """A tracker, or a label of one.
+
+    changes : its knobs.
+    sized_by : knobs that follow from the evaluations.
     """
 
     name: str
@@ -90,7 +99,7 @@ class CandidateChoice:
 
 @dataclass(frozen=True, slots=True)
 class LineupChoice:
-    """A name that stands for several."""
+    """A name that stands for several trackers."""
 
     name: str
     trackers: tuple[str, ...]
@@ -98,7 +107,7 @@ class LineupChoice:
 
 @dataclass(frozen=True, slots=True)
 class ComparisonChoices:
-    """Who can take part."""
+    """The trackers that can be compared."""
 
     candidates: list[CandidateChoice]
     lineups: list[LineupChoice]
@@ -106,7 +115,7 @@ class ComparisonChoices:
 
 
 def comparison_choices() -> ComparisonChoices:
-    """Who can be compared: trackers, labels that bring their knobs, line-ups of several."""
+    """The trackers that can be compared: by name, by labels that bring knobs, by names of several."""
     candidates = [
         CandidateChoice(
             name=name,
@@ -123,7 +132,7 @@ def comparison_choices() -> ComparisonChoices:
 
 
 def comparison_lines(session: Session, going: Going) -> Iterator[ComparisonLine]:
-    """A session's comparisons, newest first; a folder that cannot be read is left out, its own address says why."""
+    """A session's comparisons, newest first; without folders that cannot be read, whose own address says why."""
     for kept in kept_comparisons(session):
         try:
             yield comparison_line(session, kept, going(session, kept))
@@ -132,7 +141,7 @@ def comparison_lines(session: Session, going: Going) -> Iterator[ComparisonLine]
 
 
 def comparison_line(session: Session, kept: KeptComparison, job: ComparisonState | None) -> ComparisonLine:
-    """A comparison in a list. job : the work on it, None where there is none or it is over."""
+    """A comparison in a list. job : the work on it, None if there is none."""
     record, plan = kept.record(), kept.plan(session)
     status: Any = job.state.value if job else kept.status()
     total = len(plan.seeds) * len(plan.candidates)
@@ -178,7 +187,7 @@ def _best_of(kept: KeptComparison, _written: int) -> tuple[str, float | None]:
 def comparison_detail(
     session: Session, kept: KeptComparison, job: ComparisonState | None
 ) -> ComparisonDetail:
-    """Everything about one comparison. job : the work on it, None where there is none or it is over."""
+    """Everything about one comparison. job : the work on it, None if there is none."""
     plan = kept.plan(session)
     return ComparisonDetail(
         comparison=comparison_line(session, kept, job),
@@ -203,9 +212,9 @@ def result_file(kept: KeptComparison, name: str) -> bytes:
 def discard_comparison(
     workspace: Workspace, session: Session, kept: KeptComparison, moving: Moving, *, runs: bool
 ) -> Path:
-    """Move a comparison to the trash; where it lies then. runs : of a sweep its runs, too.
+    """Move a comparison to the trash; returns where it lies then. runs : a sweep's runs, too.
 
-    Raises RunError while it goes on, or one of the runs that shall go is being tracked.
+    Raises RunError while work on it continues, or one of these runs is being tracked.
     """
     own = [*runs_of(session, kept).values()] if runs and kept.plan().vary else []
     if tracked := [run.name for run in own if run.being_tracked()]:

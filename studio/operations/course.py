@@ -68,7 +68,7 @@ COURSE = JobKind(
 
 @dataclass(frozen=True, slots=True)
 class CourseRunLine:
-    """A run of the course. there: whether it is tracked to its end."""
+    """A run of the course. there : whether it is tracked to its end."""
 
     name: str
     words: str
@@ -77,7 +77,7 @@ class CourseRunLine:
 
 @dataclass(frozen=True, slots=True)
 class CourseView:
-    """The course's runs. job: how their making stands, null where it was not begun."""
+    """The course's runs. job : how their making stands, null if it was not begun."""
 
     session: str
     runs: list[CourseRunLine]
@@ -153,13 +153,13 @@ def course_view(workspace: Workspace, job: CourseState | None) -> CourseView:
 
 
 def finished(session: Session, run: CourseRun) -> bool:
-    """Whether a run of the course is there, whole."""
+    """Whether a run of the course is complete."""
     known = {one.name: one for one in session.runs()}
     return run.name in known and known[run.name].summary(blobs=False).status == "finished"
 
 
 def begins(workspace: Workspace) -> bool:
-    """Whether the run that the course begins with is there."""
+    """Whether the course's first run exists."""
     try:
         return bool(workspace.session(BEGINNING).run(BEGINNING_RUN).folder)
     except StudioError:

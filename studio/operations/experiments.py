@@ -1,4 +1,4 @@
-"""The papers' experiments, as pages and jobs use them, and what was reproduced; who runs them is plugged in
+"""The papers' experiments as pages and jobs use them, and their results; the module that runs them is plugged in
 (`registry.plugged_in`).
 """
 
@@ -23,7 +23,11 @@ DOWNLOADS = {RESULTS: "application/json", SUMMARY: "text/markdown; charset=utf-8
 
 @dataclass(frozen=True, slots=True)
 class ExperimentLine:
-    """An experiment. claim : the paper's, in our words. is_long : its full form takes hours."""
+    """An experiment.
+
+    claim : the paper's, in our words.
+    is_long : its full form takes hours.
+    """
 
     name: str
     title: str
@@ -34,7 +38,7 @@ class ExperimentLine:
 
 @dataclass(frozen=True, slots=True)
 class TrialCounts:
-    """Numbers of trials run now, kept from before, and failed."""
+    """Numbers of trials that were run now, kept from before, and failed."""
 
     measured: int
     kept: int
@@ -42,7 +46,10 @@ class TrialCounts:
 
 
 class Reports(msgspec.Struct, frozen=True):
-    """What was reproduced so far. experiments: documents as results.json has them; none before the first command."""
+    """The reproduced experiments.
+
+    experiments : documents as results.json has them; none before the first command.
+    """
 
     software: str = ""
     date: str = ""
@@ -59,16 +66,18 @@ class Experiments(Protocol):
     def reproduce(
         self, name: str, out: Path, *, quick: bool, seeds: int | None, progress: Progress
     ) -> TrialCounts:
-        """Run what is missing of an experiment, or of ALL, and write the folder `out`.
+        """Run the missing trials of an experiment, or of ALL, and write the folder `out`.
 
-        quick : fewer seeds, frames and settings. seeds : None for as many as the form has. Raises NotFoundError for an
-        unknown one, RunError while another process works in the folder.
+        quick : fewer seeds, frames and settings.
+        seeds : None for as many as the form has.
+
+        Raises NotFoundError for an unknown experiment, RunError while another process works in the folder.
         """
         ...
 
 
 def experiments() -> Experiments:
-    """What is plugged in. Raises PlugInError where nothing is."""
+    """The plugged-in experiments. Raises PlugInError where there are none."""
     return plugged_in("experiments")
 
 
@@ -86,7 +95,7 @@ def kept_reports(workspace: Workspace) -> Reports:
 
 
 def report_file(workspace: Workspace, name: str) -> Path:
-    """A file of what was reproduced, one of DOWNLOADS. Raises NotFoundError."""
+    """A file of the report, one of DOWNLOADS. Raises NotFoundError."""
     path = reproductions_folder(workspace) / name
     if name not in DOWNLOADS or not path.is_file():
         raise NotFoundError(f"There is no report '{name[:40]}'.", "Make one: studio reproduce all --quick.")
@@ -94,5 +103,5 @@ def report_file(workspace: Workspace, name: str) -> Path:
 
 
 def reproductions_folder(workspace: Workspace) -> Path:
-    """Where experiments that are run from the page are kept."""
+    """The folder for experiments that are run from the page."""
     return workspace.root / REPRODUCTIONS

@@ -30,9 +30,13 @@ SAID = ".said.json"
 
 
 class KeptExport(msgspec.Struct, frozen=True):
-    """One export. file : its name in the folder. made : UTC, ISO 8601. checked, notes : as in `ExportReport`. track,
-    content : the track that it was made from and a digest of its poses then; "" for a file that holds none, or an
-    unknown one.
+    """An export.
+
+    file : its name in the folder.
+    made : UTC, ISO 8601.
+    checked, notes : as in `ExportReport`.
+    track, content : the track that was written and a digest of its poses then; "" for a file without poses, or an
+        unknown one.
     """
 
     file: str
@@ -50,8 +54,11 @@ class KeptExport(msgspec.Struct, frozen=True):
 
 
 class ExportLine(KeptExport, frozen=True):
-    """A finished export. checked: what reading the file back showed. notes: on gaps, names and axes. stale: why it does
-    not hold its track as it is now.
+    """A finished export.
+
+    checked : what reading the file back showed.
+    notes : on gaps, names and axes.
+    stale : why it does not hold its track as it is now.
     """
 
     stale: str = ""
@@ -59,8 +66,10 @@ class ExportLine(KeptExport, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class RunExports:
-    """A run's exports, newest first, and its tracks and cameras to choose among. best: the track that is written unless
-    another is chosen; note: on better ones that are out of date.
+    """A run's exports, newest first, and its tracks and cameras to choose among.
+
+    best : the track that is written unless another is chosen.
+    note : on better ones that are out of date.
     """
 
     exports: tuple[ExportLine, ...]
@@ -72,7 +81,10 @@ class RunExports:
 
 @dataclass(frozen=True, slots=True)
 class ExportChoices:
-    """What a run can be exported to, and how. calibrations: writers by the ending of their files."""
+    """The formats and options of an export.
+
+    calibrations : writers by the ending of their files.
+    """
 
     formats: tuple[ExportFormat, ...]
     options: tuple[Knob, ...]
@@ -93,7 +105,7 @@ def export_choices() -> ExportChoices:
 
 
 def exports_of(run: StoredRun) -> RunExports:
-    """A run's exports, and what the next one can be made of."""
+    """A run's exports, and the choices for the next one."""
     lines = (
         ExportLine(**msgspec.structs.asdict(kept), stale=stale_export(run, kept))
         for kept in kept_exports(run)
@@ -103,7 +115,7 @@ def exports_of(run: StoredRun) -> RunExports:
 
 
 def requested_format(name: str, options: Mapping[str, object]) -> ExportFormat:
-    """The format of a request. Raises ExportError, SettingsError for a format or an option that there is not."""
+    """The format of a request. Raises ExportError, SettingsError for an unknown format or option."""
     form = format_of(name)
     settled(form, options)
     return form
@@ -152,8 +164,9 @@ def export_into_run(
 def keep_file(
     run: StoredRun, stem: str, kind: str, fps: float, write: Callable[[Path], int], words: str
 ) -> KeptExport:
-    """Keep what was made for a run, such as a film of its scene, among its exports. write : makes the file, and says
-    how many frames it has. Another of the same name is replaced.
+    """Keep a file that was made for a run, such as a film of its scene, among its exports.
+
+    write : makes the file, and returns its number of frames. Another of the same name is replaced.
     """
     folder = run.folder / FOLDER
     folder.mkdir(exist_ok=True)
@@ -172,7 +185,7 @@ def keep_file(
 
 
 def kept_exports(run: StoredRun) -> tuple[KeptExport, ...]:
-    """The run's exports, newest first; a file of which nothing is known is left out."""
+    """The run's exports, newest first, without unknown files."""
     exports: list[KeptExport] = []
     for path in (run.folder / FOLDER).glob(f"*{SAID}"):
         try:
@@ -189,7 +202,7 @@ def stale_export(run: StoredRun, kept: KeptExport) -> str:
     if not kept.content:
         return ""
     if kept.track not in track_names(run):
-        return f"track '{kept.track}' that it was written from is not there any more"
+        return f"track '{kept.track}' that it was written from no longer exists"
     if _content(run, kept.track) != kept.content:
         return f"written before track '{kept.track}' changed"
     best = best_track(run).name
@@ -221,9 +234,7 @@ def discard_export(run: StoredRun, name: str) -> None:
 def _stem(
     session: Session, run: StoredRun, form: ExportFormat, requested: Mapping[str, str | int | float | bool]
 ) -> str:
-    """A file name that says what is in it: session, run, its track unless that is the raw one, and what differs from
-    the usual.
-    """
+    """A file name that says what the file holds: session, run, its track unless raw, and unusual options."""
     usual = ExportOptions(track=RAW)
     parts, chosen = [session.name, run.name], dict(requested)
     if "track" in form.takes and chosen.get("track", BEST) == BEST:

@@ -65,10 +65,10 @@ def new_session(
     *,
     title: Annotated[
         str,
-        Field(max_length=200, description="What people see; the name unless given."),
+        Field(max_length=200, description="The title that people see; default: the name."),
         Web(kind=str),
     ] = "",
-    body: Annotated[Body, Field(description="The body that is tracked; the studio's own unless given.")] = "",
+    body: Annotated[Body, Field(description="The body that is tracked; default: the studio's own.")] = "",
 ) -> Session:
     """Make an empty session, to which footage and a calibration are added.
 
@@ -135,9 +135,7 @@ def synthesize(
     ],
     into: Into,
     *,
-    frames: Annotated[
-        int | None, Field(ge=1, description="Only so many frames; default: the recipe's.")
-    ] = None,
+    frames: Annotated[int | None, Field(ge=1, description="Number of frames; default: the recipe's.")] = None,
     progress: Reporting = None,
 ) -> Session:
     """Render footage with exact truth from a recipe.
@@ -254,9 +252,9 @@ class SynchronyRequest:
         bool,
         Field(description="Pair frames by their times, not by number: drift, lost frames. Written at once."),
     ] = False
-    within: Annotated[
-        float, Field(gt=0, le=600, description="Largest offset that is looked for, seconds.")
-    ] = MOST_SECONDS
+    within: Annotated[float, Field(gt=0, le=600, description="Largest offset that is searched, seconds.")] = (
+        MOST_SECONDS
+    )
     apply: Annotated[bool, Field(description="Write what was estimated or read into the session.")] = False
 
 
@@ -349,14 +347,14 @@ def record(
     ],
     *,
     seconds: Annotated[
-        Seconds, Field(description="For so long; default: until the streams end, or Ctrl-C.")
+        Seconds, Field(description="Seconds to record; default: until the streams end, or Ctrl-C.")
     ] = None,
     fps: Annotated[
         float | None, Field(gt=0, le=10_000, description="Pictures a second; default: as measured.")
     ] = None,
     finish: Annotated[
         str | Path | None,
-        Field(description="Make a session of a recording that was cut off, instead."),
+        Field(description="Make a session of an interrupted recording instead."),
         Terminal(kind=Path, metavar="FOLDER"),
     ] = None,
     progress: Reporting = None,

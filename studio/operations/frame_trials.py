@@ -1,4 +1,4 @@
-"""Trials of a frame: annealed again with moved knobs and not stored, beside the stored result."""
+"""Trials of a frame: annealed again with other knobs and not stored, beside the stored result."""
 
 from dataclasses import dataclass, fields
 from typing import Annotated, Any, Literal
@@ -31,7 +31,7 @@ class KnobMoved:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameNumbers:
-    """What a result of a frame comes to.
+    """The numbers of a frame's result.
 
     error_mm : null without a truth.
     limbs : in the body's order.
@@ -52,7 +52,7 @@ class FrameNumbers:
 class TrialView(FrameNumbers):
     """A trial.
 
-    name : its frame, and what its settings come to.
+    name : made from its frame and settings.
     moved : the knobs that differ from the stored frame's.
     """
 
@@ -62,7 +62,7 @@ class TrialView(FrameNumbers):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrialList:
-    """What was tried of a frame, the oldest first, and what is stored of it. sides : of the sketches' lines."""
+    """The trials of a frame, the oldest first, and the stored result. sides : of the sketches' lines."""
 
     frame: int
     sides: tuple[str, ...]
@@ -89,7 +89,7 @@ class TrialLayers:
 
 
 def trials_of_frame(run: InspectedRun, kept: TriedFrames, frame: int) -> TrialList:
-    """All that was tried of a frame and is kept, beside the stored result. Raises NotFoundError."""
+    """All trials of a frame that are kept, beside the stored result. Raises NotFoundError."""
     stored = run.frame(frame)
     if stored.result is None:
         raise NotFoundError(f"Frame {frame} is not finished.", "Choose a finished frame.")

@@ -28,12 +28,14 @@ CardKind = Literal["sample", "recipe", "elsewhere"]
 
 @dataclass(frozen=True, slots=True)
 class Card:
-    """A session of the gallery. name : of the session that it becomes, and of the sample or recipe unless `recipe` says
-    another. kind : "sample" travels with the studio; "recipe" is rendered; "elsewhere": its footage cannot be shipped.
+    """A session of the gallery.
 
-    data : where footage or motion that is not shipped comes from. footage : where a copy of it lies in the folder of
-    the real data, from which it is imported. commands : that make the session of it. guide : the page of the guide that
-    tells how.
+    name : of the session, and of the sample or recipe unless `recipe` names another.
+    kind : "sample" is shipped with the studio; "recipe" is rendered; "elsewhere": its footage cannot be shipped.
+    data : where footage or motion that is not shipped comes from.
+    footage : where a copy of it lies in the folder of the real data, from which it is imported.
+    commands : that make the session from it.
+    guide : page of the guide on it.
     """
 
     name: str
@@ -135,8 +137,10 @@ GALLERY_PICTURES = assets_folder() / "gallery"
 
 @dataclass(frozen=True, slots=True)
 class CardStanding:
-    """A card in a workspace. there : whether a session of its name is there. missing : why it cannot be made here, ""
-    where it can.
+    """A card in a workspace.
+
+    there : whether a session of its name exists.
+    missing : why it cannot be made here, "" if it can.
     """
 
     card: Card
@@ -161,9 +165,15 @@ GALLERY = JobKind(
 
 @dataclass(frozen=True, slots=True)
 class CardView:
-    """A card. there: whether its session is in the workspace. missing: why it cannot be made here, "" where it can.
-    data: where footage or motion that is not shipped comes from. commands: that make the session. guide: the page that
-    tells how. picture: whether it has one. job: how its making stands.
+    """A card.
+
+    there : whether its session is in the workspace.
+    missing : why it cannot be made here, "" if it can.
+    data : where footage or motion that is not shipped comes from.
+    commands : that make the session.
+    guide : page of the guide on it.
+    picture : whether it has one.
+    job : how its making stands.
     """
 
     name: str
@@ -194,7 +204,7 @@ class Gallery:
 @operation
 def gallery(
     make: Annotated[
-        str, Field(description="Card whose session is opened or made."), Terminal(metavar="CARD")
+        str, Field(description="The card whose session is opened or made."), Terminal(metavar="CARD")
     ] = "",
     *,
     into: Annotated[
@@ -262,7 +272,7 @@ def card_view(card: Card, workspace: Workspace, job: GalleryState | None) -> Car
 
 
 def card_picture(card: Card, workspace: Workspace) -> bytes:
-    """A small picture (JPEG) of a card's session: of one that is there, or of what travels with the studio.
+    """A small picture (JPEG) of a card's session, or the shipped one.
 
     Raises NotFoundError where it has none.
     """
@@ -281,7 +291,7 @@ def _shipped_picture(card: Card) -> Path:
 
 
 def make_card(card: Card, place: Path, frames: int | None, progress: Progress) -> Session:
-    """The session of a card at a place; one that is there is opened. Raises StudioError; then nothing was made."""
+    """The session of a card at a place; an existing one is opened. Raises StudioError; then nothing was made."""
     if (place / FILE_NAME).is_file():
         return Session(place)
     if card.kind == "elsewhere":
@@ -292,7 +302,7 @@ def make_card(card: Card, place: Path, frames: int | None, progress: Progress) -
 
 
 def _imported(card: Card, place: Path, progress: Progress) -> Session:
-    """The session of footage that is not shipped, with the calibration that lies beside it, if any."""
+    """The session of footage that is not shipped, with the calibration beside it, if any."""
     source = real_footage(card.footage)
     if source is None:
         raise SessionError(
@@ -308,8 +318,8 @@ def _imported(card: Card, place: Path, progress: Progress) -> Session:
 
 
 def prepare_demo(workspace_root: Path) -> Session:
-    """The bundled walk as a session of the workspace with the runs that travel with it, copied there if absent; the
-    planar arm, with which the course begins, beside it.
+    """The bundled walk as a session of the workspace with its shipped runs, copied there if absent, and beside it the
+    planar arm, with which the course begins.
     """
     workspace = Workspace(workspace_root)
     for sample in ("planar_arm", "walk"):

@@ -23,14 +23,12 @@ from studio.sessions.atomic_files import write_bytes
 ViewName = Annotated[
     str, Field(description=f"Which: {', '.join(VIEWS)}."), Terminal("--view", metavar="NAME")
 ]
-Frame = Annotated[
-    int, Field(ge=0, le=LARGEST, description="The frame that is looked at."), Terminal("--frame")
-]
+Frame = Annotated[int, Field(ge=0, le=LARGEST, description="The frame."), Terminal("--frame")]
 
 
 @dataclass(frozen=True, slots=True)
 class ViewList:
-    """All views, in the order in which a person looks at them."""
+    """All views, in the order in which to read them."""
 
     views: tuple[View, ...]
 
@@ -119,7 +117,9 @@ def why(
         int | None, Field(ge=0, le=LARGEST, description="The frame; default: the run's worst one.")
     ] = None,
     *,
-    track: Annotated[str, Field(description="Whose pose; default: what the search found.")] = "",
+    track: Annotated[
+        str, Field(description="The track whose pose is explained; default: raw, the search's own.")
+    ] = "",
 ) -> Viewed:
     """Say why a frame failed and what may help: findings and remedies, from measurements.
 
@@ -146,10 +146,10 @@ def seeds(
     run: RunName,
     frame: Frame,
     *,
-    count: Annotated[int, Field(ge=2, le=64, description="How many other seeds.")] = 8,
+    count: Annotated[int, Field(ge=2, le=64, description="Number of other seeds.")] = 8,
     tried: Annotated[
         TriedFrame | None,
-        Field(description="A trial of the frame, in place of what is stored."),
+        Field(description="A trial of the frame, instead of the stored result."),
         Terminal(left_out=True),
         Web(left_out=True),
     ] = None,

@@ -1,4 +1,4 @@
-"""The outline of each layer that goes to the pages, made once a layer; a run's body and first camera are read once."""
+"""The outline of each layer for the pages, made once a layer; a run's body and first camera are read once."""
 
 from functools import lru_cache
 from pathlib import Path
@@ -21,7 +21,7 @@ class LayerOutlines:
         self._workspace = workspace
 
     def of_event(self, event: LayerFinished) -> CloudOutline | None:
-        """The outline of a layer that was finished; None where its run is gone."""
+        """The outline of a finished layer; None where its run no longer exists."""
         try:
             folder = self._workspace.session(event.session).run(event.run).folder
             body, camera = _seen_by_first_camera(folder, (folder / "run.json").stat().st_mtime_ns)

@@ -1,4 +1,4 @@
-"""Masks of a session: what they are made of, and how far the views agree."""
+"""Masks of a session: their source, and how far the views agree."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -51,7 +51,7 @@ from studio.sessions.work_under_way import one_at_a_time
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MaskRequest:
-    """How a session's masks are set up, beside their source."""
+    """How a session's masks are set up, besides their source."""
 
     plates: Annotated[
         Mapping[str, str | Path] | None,
@@ -62,8 +62,8 @@ class MaskRequest:
     exclude: Annotated[
         Mapping[str, ArrayLike | str | Path | None] | None,
         Field(
-            description="By camera, what does not count: a polygon (K, 2) of pixels, a painted picture's path, None for"
-            " nothing any more."
+            description="By camera, the region that does not count: a polygon (K, 2) of pixels or the path of a"
+            " painted picture; None removes it."
         ),
         Terminal(left_out=True),
         Web(left_out=True),
@@ -75,7 +75,7 @@ class MaskRequest:
     ] = None
     run: Annotated[
         str,
-        Field(max_length=64, description="A tracked run: its model's projection helps to carry strokes."),
+        Field(max_length=64, description="A tracked run whose projected model helps to carry strokes."),
     ] = ""
     knobs: Annotated[
         Values,
@@ -83,15 +83,19 @@ class MaskRequest:
         Knobs(others=True),
         Web("knobs"),
     ] = None
-    tune: Annotated[bool, Field(description="Try knobs, keep those under which the views agree best.")] = True
+    tune: Annotated[bool, Field(description="Try knobs and keep those with which the views agree best.")] = (
+        True
+    )
     exclude_unused: Annotated[
-        bool, Field(description="What no view's hull comes near does not count."), Terminal(left_out=True)
+        bool,
+        Field(description="Regions that no view's hull comes near do not count."),
+        Terminal(left_out=True),
     ] = False
     subject_at: Annotated[
         tuple[float, float] | None,
         Field(
-            description="Of several in view, follow the one who stands here in the first frame: x and y on the floor in"
-            " metres. The others are cut out of the masks."
+            description="With several subjects in view: where the wanted one stands in the first frame, x and y"
+            " on the floor in metres. The others are cut out of the masks."
         ),
         Terminal(metavar="X,Y"),
     ] = None
@@ -155,7 +159,7 @@ def background(
 def mask_quality(
     session: SessionName,
     frames: Annotated[
-        Sequence[int], Field(max_length=24, description="To look at; default: five, evenly spread.")
+        Sequence[int], Field(max_length=24, description="Frames to look at; default: five, evenly spread.")
     ] = (),
     *,
     knobs: Annotated[
@@ -163,10 +167,13 @@ def mask_quality(
         Field(max_length=64, description="Knobs to try in place of the session's."),
         Knobs(others=True),
     ] = None,
-    keep: Annotated[bool, Field(description="Remember what comes of the session's own knobs.")] = True,
+    keep: Annotated[bool, Field(description="Remember the result for the session's own knobs.")] = True,
     pictures: Annotated[
         str | Path | None,
-        Field(description="Folder for a picture a camera, in which is outlined what is like the background."),
+        Field(
+            description="Folder for one picture a camera, in which regions that are like the background are"
+            " outlined."
+        ),
         Terminal(metavar="FOLDER"),
         Web(left_out=True),
     ] = None,
@@ -210,7 +217,7 @@ def mask_knobs(session: Session) -> MaskKnobs:
 
 
 def keep_mask_knobs(session: Session, knobs: Mapping[str, Value]) -> MaskKnobs:
-    """Let new runs of a session begin with these knobs alone; runs that are there keep theirs. Raises SettingsError."""
+    """Let new runs of a session begin with exactly these knobs; existing runs keep theirs. Raises SettingsError."""
     mask_settings(session, knobs)
     with one_at_a_time(session.path):
         write_evidence(session, msgspec.structs.replace(read_evidence(session), knobs=dict(knobs)))
@@ -219,15 +226,18 @@ def keep_mask_knobs(session: Session, knobs: Mapping[str, Value]) -> MaskKnobs:
 
 @dataclass(frozen=True, slots=True)
 class Exclusion:
-    """What does not count of a camera. pixels : how many."""
+    """The region of a camera that does not count. pixels : how many."""
 
     camera: str
     pixels: int
 
 
 def exclude_region(session: Session, camera: str, region: ArrayLike | str | Path | bytes | None) -> Exclusion:
-    """Let a region of a camera's pictures not count, as `background` takes it, or as the bytes of a painted picture
-    (none: nothing any more). Raises NotFoundError, FootageError.
+    """Let a region of a camera's pictures not count.
+
+    region : as `background` takes it, or the bytes of a painted picture; none removes it.
+
+    Raises NotFoundError, FootageError.
     """
     if region is None or isinstance(region, bytes):
         pixels = set_exclusion(session, camera, region or b"")
@@ -240,7 +250,7 @@ def exclude_region(session: Session, camera: str, region: ArrayLike | str | Path
 
 
 def excluded_picture(session: Session, camera: str) -> bytes:
-    """PNG: white where nothing of a camera's pictures counts, as stored. Raises NotFoundError where all does."""
+    """PNG, as stored: white where a camera's pictures do not count. Raises NotFoundError where all of them count."""
     path = _exclusion_of(session, session.camera_source(camera).name)
     if not path.exists():
         raise NotFoundError(f"Nothing of camera '{camera[:64]}' is excluded.", "Paint something.")
@@ -252,8 +262,12 @@ def _exclusion_of(session: Session, camera: str) -> Path:
 
 
 def give_plates(session: Session, plates: Mapping[str, Path], files: Iterable[Path] = ()) -> Session:
-    """The session with pictures or clips of the empty room in use: `plates` by camera, and `files`, which are matched
-    to the other cameras by their names. They are copied. Raises NotFoundError, FootageError.
+    """The session with pictures or clips of the empty room in use; they are copied.
+
+    plates : by camera.
+    files : matched to the other cameras by their names.
+
+    Raises NotFoundError, FootageError.
     """
     rest = {path.stem: path for path in files}
     if rest:
@@ -268,8 +282,13 @@ def give_plates(session: Session, plates: Mapping[str, Path], files: Iterable[Pa
 
 @dataclass(frozen=True, slots=True)
 class BackgroundCamera:
-    """One camera. given : what the studio was given of its empty room. file : its name. masks : whether it has some.
-    excluded : whether regions of it do not count. width, height : pixels.
+    """One camera.
+
+    given : which kind of picture of its empty room there is.
+    file : its name.
+    masks : whether it has some.
+    excluded : whether regions of it do not count.
+    width, height : pixels.
     """
 
     name: str
@@ -283,8 +302,10 @@ class BackgroundCamera:
 
 @dataclass(frozen=True, slots=True)
 class SourceLine:
-    """What a session's masks can be made of. lacking : what is to be done first, "" where it is possible now. has_knobs
-    : whether knobs of the masks change what becomes of it.
+    """A source of masks.
+
+    lacking : what has to be done first, "" where the source can be used now.
+    has_knobs : whether knobs of the masks change the result.
     """
 
     name: BackgroundSource
@@ -296,9 +317,14 @@ class SourceLine:
 
 @dataclass(frozen=True, slots=True)
 class Background:
-    """A session's background. source : what it is made of, "masks" where masks came with the footage. possible : what
-    it can be made of now; sources : all. knobs : of masks; settings : their values in use; own : those the session has
-    said. measured : how far the views agreed when that was last measured, in words.
+    """A session's background.
+
+    source : in use; "masks" where masks came with the footage.
+    possible, sources : those that can be used now, and all.
+    knobs : of masks.
+    settings : their values in use.
+    own : those that the session sets.
+    measured : how far the views agreed at the last measurement, in words.
     """
 
     session: str
@@ -314,7 +340,7 @@ class Background:
 
 
 def background_of(session: Session) -> Background:
-    """What a session's masks are made of, and with which knobs."""
+    """A session's source of masks and its knobs."""
     evidence, settings = read_evidence(session), session_settings(session)
     knobs, known = knobs_of(settings.evidence), origin_of(session, "background")
     now = values(settings)

@@ -11,7 +11,7 @@ from studio.sessions.workspace import TRASH_NAME, Workspace
 
 
 def place_for_model(name_or_path: str, workspace: Workspace, *, replace: bool = False) -> Path:
-    """The file for a new model: of a name in the workspace's models, or a path itself.
+    """The file for a new model: of a name in the workspace's models, or a path.
 
     Raises NameRefused, and BehaviourError where it exists and `replace` is not set.
     """
@@ -79,5 +79,5 @@ def bring_back_model(workspace: Workspace, trashed_name: str) -> Path:
 
 
 def list_models(workspace: Workspace) -> tuple[ModelSummary, ...]:
-    """The workspace's models by name; with the reason for those that cannot be read."""
+    """The workspace's models by name; for those that cannot be read, why."""
     return models_in((models_folder(workspace.root),))

@@ -32,12 +32,12 @@ def note(
     frame: Annotated[int, Field(ge=0, description="The frame that it is about."), Terminal("--frame")],
     text: Annotated[
         str,
-        Field(max_length=LONGEST, description="What to remember; left out: a bookmark."),
+        Field(max_length=LONGEST, description="The note; without it: a bookmark."),
         Terminal("--text"),
         Web(kind=str),
     ] = "",
     *,
-    remove: Annotated[bool, Field(description="Take the frame's note away instead.")] = False,
+    remove: Annotated[bool, Field(description="Remove the frame's note instead.")] = False,
 ) -> tuple[Note, ...]:
     """Put a note or a bookmark on a frame of a run, in place of the one it has, and return all notes of the run.
 

@@ -1,4 +1,4 @@
-"""Sessions and runs as a person names them, and what there is."""
+"""Sessions and runs by the names that people give them."""
 
 import functools
 import inspect
@@ -128,7 +128,7 @@ def _is_target(parameter: inspect.Parameter) -> bool:
 
 
 def _places_of(value: Any, name: str) -> Iterator[tuple[Path, str]]:  # noqa: ANN401 - SessionName or RunName
-    """The folder of the session, and the run's name, if it is one of this machine."""
+    """The folder of the session and the run's name, for one of this machine."""
     with suppress(SessionError):
         if name == "run":
             folder = open_run(value).folder

@@ -1,4 +1,4 @@
-"""Sessions and runs as lists and pages show them: what each is, how far it came, what it lacks."""
+"""Sessions and runs as lists and pages show them."""
 
 import logging
 from dataclasses import dataclass, fields, replace
@@ -213,7 +213,7 @@ class LogLines:
 
 
 def list_lines(workspace: Workspace) -> SessionList:
-    """All sessions by name with their runs, newest first; those that cannot be opened say why."""
+    """All sessions by name with their runs, newest first; one that cannot be opened says why."""
     return SessionList(tuple(_line(workspace, entry) for entry in workspace.sessions()))
 
 
@@ -263,7 +263,7 @@ def run_lines(session: Session) -> RunList:
 
 
 def run_line(summary: RunSummary, session: Session | None) -> RunLine:
-    """A run in a list; without description and error where they cannot be had: the run's own page says why."""
+    """A run in a list; without description and error where they cannot be read: the run's own page says why."""
     line = RunLine(**{entry.name: getattr(summary, entry.name) for entry in fields(summary)})
     if session is None:
         return line
@@ -277,8 +277,8 @@ def run_line(summary: RunSummary, session: Session | None) -> RunLine:
 
 
 def describe(record: RunRecord, history: SettingsHistory = NOTHING_CHANGED) -> str:
-    """A run in a few words: tracker, layers × particles and from which frame on others, likelihood where it is not the
-    tracker's usual one.
+    """A run in a few words: tracker, layers × particles (with the frame from which they changed), the likelihood if it
+    is not the tracker's usual one.
     """
     size = size_in_words(record.tracker, record.settings)
     now = size
@@ -291,12 +291,12 @@ def describe(record: RunRecord, history: SettingsHistory = NOTHING_CHANGED) -> s
 
 
 def _tracker(session: Session | None) -> str:
-    """What runs of a session are tracked with by default."""
+    """The default tracker of a session's runs."""
     return (session and session.manifest.tracker) or DEFAULT_TRACKER
 
 
 def _weighting(session: Session | None) -> str:
-    """The likelihood that runs of a session have by default."""
+    """The default likelihood of a session's runs."""
     return (session and session.manifest.weighting) or DEFAULT_WEIGHTING
 
 
@@ -332,8 +332,9 @@ def session_detail(session: Session) -> SessionDetail:
 
 
 def run_detail(run: StoredRun, session: Session, *, check: bool) -> RunDetail:
-    """What was requested of a run, how far it got, and its body's parameters. check : whether all that is stored is
-    read and checked for damage.
+    """A run's request, how far it got, and its body's parameters.
+
+    check : whether everything that is stored is read and checked for damage.
     """
     record = run.record
     return RunDetail(

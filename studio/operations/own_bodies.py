@@ -1,4 +1,4 @@
-"""Bodies of one's own: one that is there is changed and saved under another name, or moved to the trash.
+"""Your own bodies: an existing one is changed and saved under another name, or moved to the trash.
 
 They are TOML files in a workspace's or a session's folder `bodies`.
 """
@@ -71,24 +71,25 @@ class BodyChanges:
     ] = ()
     without_markers: Annotated[
         Sequence[str],
-        Field(max_length=MOST_CHANGES, description="Markers that are taken away."),
+        Field(max_length=MOST_CHANGES, description="Markers to remove."),
         Terminal("--without-marker", "NAME"),
     ] = ()
     mirror: Annotated[
         Literal["", "left", "right"],
-        Field(description="The side that is copied onto the other, last of all."),
+        Field(description="The side that is copied onto the other, after all other changes."),
     ] = ""
     title: Annotated[
-        str, Field(max_length=200, description="What people see."), Terminal(metavar="WORDS"), Web(kind=str)
+        str,
+        Field(max_length=200, description="The title that people see."),
+        Terminal(metavar="WORDS"),
+        Web(kind=str),
     ] = ""
     save_as: Annotated[
         str,
         Field(max_length=64, description="Name of the body of your own; default: nothing is saved."),
         Terminal("--as", "NAME"),
     ] = ""
-    replace: Annotated[bool, Field(description="In place of the body of your own that has that name.")] = (
-        False
-    )
+    replace: Annotated[bool, Field(description="Replace your own body of that name.")] = False
 
 
 @operation
@@ -103,13 +104,15 @@ def edit_body(
     *,
     text: Annotated[
         str,
-        Field(max_length=MOST_TEXT, description="A body file's text, in place of the file."),
+        Field(max_length=MOST_TEXT, description="Text of a body file, instead of the file."),
         Terminal(left_out=True),
         Web(kind=str),
     ] = "",
     session: Annotated[
         SessionName | None,
-        Field(description="It becomes this session's; default: all sessions of the workspace may use it."),
+        Field(
+            description="Session that the body belongs to; default: all sessions of the workspace may use it."
+        ),
         Target(""),
         Web(left_out=True),
         Terminal("--session", "SESSION", kind=str),
@@ -153,16 +156,16 @@ def edit_body(
 
 
 def body_to_edit(body: str, session: Session | None, folder: Path) -> BodyModel:
-    """A body as it is edited: a session's own in its subject's size. folder : of own bodies. Raises BodyError."""
+    """A body for editing: a session's own in its subject's size. folder : of own bodies. Raises BodyError."""
     if session is not None and body == session.manifest.body:
         return session.body()
     return load_body(body, (folder, *(session.body_folders if session is not None else ())))
 
 
 def discard_body(workspace: Workspace, session: Session | None, name: str) -> Path:
-    """Move one's own body to the trash; where it lies then. Runs keep the copy that they were made with.
+    """Move an own body to the trash; returns where it lies then. Runs keep the copy that they were made with.
 
-    Raises BodyError where there is none, and while a session is to be tracked with it; NameRefused.
+    Raises BodyError where it does not exist, and while a session is set to be tracked with it; NameRefused.
     """
     folder = bodies_folder(workspace, session)
     path = folder / f"{checked_name(name, 'body')}{SUFFIX}"
@@ -182,12 +185,12 @@ def discard_body(workspace: Workspace, session: Session | None, name: str) -> Pa
 
 
 def bodies_folder(workspace: Workspace, session: Session | None) -> Path:
-    """Where own bodies lie: a session's, else the workspace's."""
+    """The folder of own bodies: a session's, else the workspace's."""
     return (workspace.root if session is None else session.path) / BODIES_NAME
 
 
 def body_folders(workspace: Workspace, session: Session | None = None) -> tuple[Path, ...]:
-    """Where own bodies are looked for, a session's folder first; only folders that are there."""
+    """The folders that are searched for own bodies, a session's first; only existing ones."""
     if session is not None:
         return session.body_folders
     folder = bodies_folder(workspace, None)
@@ -195,8 +198,9 @@ def body_folders(workspace: Workspace, session: Session | None = None) -> tuple[
 
 
 def _save(text: str, name: str, folder: Path, *, replace: bool) -> Path:
-    """Write a body file that was checked. Raises BodyError for a shipped body's name, and for one that is there unless
-    it is replaced; NameRefused.
+    """Write a body file that was checked.
+
+    Raises BodyError for a shipped body's name, and for an existing one unless it is replaced; NameRefused.
     """
     path = folder / f"{checked_name(name, 'body')}{SUFFIX}"
     if name in packaged_bodies():

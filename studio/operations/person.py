@@ -42,7 +42,7 @@ from studio.sessions.session import SUBJECT_NAME, Session
 def subject(
     session: SessionName,
     height_mm: Annotated[
-        Height, Field(description="Of the person, mm; all lengths follow by published proportions.")
+        Height, Field(description="Height of the person, mm; all lengths follow by published proportions.")
     ] = None,
     *,
     lengths_mm: Annotated[
@@ -99,7 +99,9 @@ class SubjectInUse:
 def subject_in_use(session: Session, height_mm: float | None = None, body: str = "") -> SubjectInUse:
     """Every dimension of a session's body as a run would have it, and its limbs as it stands upright.
 
-    height_mm, body : as if the person were so tall, or it were this body. Raises BodyError.
+    height_mm, body : as if the person were so tall, or had this body.
+
+    Raises BodyError.
     """
     known = session.subject()
     if height_mm is None and not body:
@@ -121,7 +123,7 @@ def subject_in_use(session: Session, height_mm: float | None = None, body: str =
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FitSoFar:
-    """What a fit under way has: poses (F, D) of a body in F frames."""
+    """A fit under way: the body and its poses (F, D) in F frames."""
 
     body: BodyModel
     frames: tuple[int, ...]
@@ -135,11 +137,11 @@ def fit_subject(
     session: SessionName,
     *,
     keep: Annotated[
-        bool, Field(description="Make it the session's subject; the old one stays beside it.")
+        bool, Field(description="Make it the session's subject; the old one is kept beside it.")
     ] = True,
     into: Annotated[
         str | Path | None,
-        Field(description="File instead of the session's own subject."),
+        Field(description="File to write instead of the session's own subject."),
         Terminal(kind=Path),
     ] = None,
     progress: Reporting = None,
@@ -170,7 +172,7 @@ def fit_subject(
 
 
 def keep_fit(session: Session, fitted: FittedSubject) -> FittedSubject:
-    """Make a fitted subject the session's own; the old one stays beside it as subject-before.toml."""
+    """Make a fitted subject the session's own; the old one is kept beside it as subject-before.toml."""
     kept = dataclasses.replace(fitted, file=keep_fitted(session, fitted))
     forget_composers()
     return kept
@@ -182,11 +184,11 @@ class StartPoseRequest:
 
     body: Body = ""
     behaviour: Annotated[Model, Field(description="Its prototypes are poses to try.")] = ""
-    weighting: Annotated[str, Field(description="What tells poses apart."), OneOf(WEIGHTINGS)] = WEIGHTING
+    weighting: Annotated[str, Field(description="The likelihood."), OneOf(WEIGHTINGS)] = WEIGHTING
     seed: Seed = 0
-    keep: Annotated[bool, Field(description="Write the pose down.")] = True
+    keep: Annotated[bool, Field(description="Write the pose to a file.")] = True
     replace: Annotated[
-        bool, Field(description="Make it the session's start pose; the old one stays beside it.")
+        bool, Field(description="Make it the session's start pose; the old one is kept beside it.")
     ] = False
 
 
@@ -196,7 +198,7 @@ class StartPoseRequest:
 def initialise(
     session: SessionName,
     frame: Annotated[
-        int, Field(ge=0, description="Where the start pose is searched."), Terminal("--frame")
+        int, Field(ge=0, description="The frame in which the start pose is searched."), Terminal("--frame")
     ] = 0,
     *,
     progress: Reporting = None,

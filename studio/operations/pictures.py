@@ -1,4 +1,4 @@
-"""Pictures of a session's cameras, upright, bare or with what was seen and projected drawn over them."""
+"""Pictures of a session's cameras, upright, bare or with overlays."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,7 +19,11 @@ from studio.sessions.stored_run import StoredRun
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What is shown. layers : over the picture, of `OVERLAYS`. height : of the picture as shown, None: as stored."""
+    """What is shown.
+
+    layers : over the picture, of `OVERLAYS`.
+    height : of the picture as shown, None: as stored.
+    """
 
     frame: int
     camera: str
@@ -38,9 +42,11 @@ def footage_picture(session: Session, view: View) -> bytes:
 def session_picture(
     session: Session, view: View, knobs: Mapping[str, object], pose: Array | None = None
 ) -> bytes:
-    """JPEG: what a camera saw in a frame; masks and edges are made with the session's settings, these knobs changed.
+    """JPEG: what a camera saw in a frame; masks and edges are made with the session's settings and the changed knobs.
 
-    pose : (D,) of the session's body, whose outlines are drawn. Raises NotFoundError, SettingsError.
+    pose : (D,) of the session's body, whose outlines are drawn.
+
+    Raises NotFoundError, SettingsError.
     """
     _check(session, view)
     settings = session_settings(session, changes=knobs)
@@ -61,10 +67,13 @@ def run_picture(
     beside: Array | None = None,
     compared: Sequence[str] = (),
 ) -> bytes:
-    """JPEG: what a camera saw in a frame, with a run's answer and evidence over it.
+    """JPEG: what a camera saw in a frame, with a run's pose and evidence over it.
 
-    track : whose pose is projected. beside : (D,) another pose that is outlined too. compared : other runs of the
-    session that are outlined too, coloured by their place; "" keeps a place free. Raises NotFoundError, SettingsError.
+    track : whose pose is projected.
+    beside : (D,) another pose that is outlined too.
+    compared : other runs of the session that are outlined too, coloured by their place; "" keeps a place free.
+
+    Raises NotFoundError, SettingsError.
     """
     _check(session, view, run)
     pose = None if track == RAW else pose_in_track(run, track, view.frame)
@@ -111,7 +120,7 @@ def _body_of(session: Session, name: str, frame: int, place: int) -> OtherBody |
 
 
 def _check(session: Session, view: View, run: StoredRun | None = None) -> None:
-    """Raise NotFoundError for what the session does not have, before any footage is opened."""
+    """Raise NotFoundError for names that the session lacks, before any footage is opened."""
     last = session.manifest.frame_count
     if run is not None and run.record.ping_pong:
         last = max(last, run.record.last)

@@ -31,8 +31,10 @@ class GripView:
 class PoseView:
     """A pose (D,) of a body: radians and mm in the order of `parameters`.
 
-    stored : whether it is the session's start pose (else the rest pose). frame : that it is of. left_mm : after a drag,
-    how far the limb's end still is from where it was dragged. has_sides : whether it can be mirrored.
+    stored : whether it is the session's start pose (else the rest pose).
+    frame : that it is of.
+    left_mm : after a drag, how far the limb's end still is from its target.
+    has_sides : whether it can be mirrored.
     """
 
     body: str
@@ -48,7 +50,7 @@ class PoseView:
 def pose_view(
     body: BodyModel, pose: Array, *, stored: bool = False, frame: int = 0, left_mm: float | None = None
 ) -> PoseView:
-    """A pose (D,) of a body with what can be done to it."""
+    """A pose (D,) of a body for a page."""
     dragger = Dragger(body)
     places = dragger.points(pose)
     grips = (GripView(grip.name, grip.side, place) for grip, place in zip(dragger.grips, places, strict=True))
@@ -58,7 +60,7 @@ def pose_view(
 
 
 def start_pose(session: Session) -> PoseView:
-    """A session's start pose, or its body's rest pose while it has none. Raises BodyError."""
+    """A session's start pose, or its body's rest pose if it has none. Raises BodyError."""
     body = session.body()
     own = session.start_pose(body)
     pose = body.neutral if own is None else own
@@ -66,9 +68,11 @@ def start_pose(session: Session) -> PoseView:
 
 
 def set_start_pose(session: Session, pose: list[float], frame: int | None = None) -> PoseView:
-    """Make a pose the session's start pose; the one it had stays beside it. frame : that it is of, None: as before.
+    """Make a pose the session's start pose; the old one is kept beside it.
 
-    Raises SettingsError for a pose that is none of the body, RunError for a frame outside the footage.
+    frame : that it is of, None: as before.
+
+    Raises SettingsError for a pose that does not fit the body, RunError for a frame outside the footage.
     """
     body = session.body()
     keep_start_pose(session, body, checked_pose(body, pose, SettingsError), frame)
@@ -83,8 +87,10 @@ def dragged_pose(body: BodyModel, pose: Array, limb: str, target: tuple[float, f
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseSearch:
-    """A short search around a pose (D,), then local refinement. run : whose body and likelihood are used, None: the
-    session's. keep : what is better becomes the session's start pose.
+    """A short search around a pose (D,), then local refinement.
+
+    run : whose body and likelihood are used, None: the session's.
+    keep : whether a better pose becomes the session's start pose.
     """
 
     frame: int

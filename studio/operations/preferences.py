@@ -1,4 +1,4 @@
-"""What a person's pages remember (theme, speed, folded panels): a free object in a file of the workspace."""
+"""The preferences of a person's pages (theme, speed, folded panels): a free object in a file of the workspace."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ class PreferencesError(StudioError, status=422, code="preferences"):
 
 
 def read_preferences(folder: Path) -> dict[str, object]:
-    """The stored object; a missing or damaged file counts as empty, for nothing depends on it."""
+    """The stored object; a missing or damaged file counts as empty, since nothing depends on it."""
     try:
         return decode_json(read_file(folder / FILE_NAME, LARGEST_RECORD), dict[str, object])
     except (OSError, SessionError, msgspec.DecodeError):
@@ -27,7 +27,7 @@ def read_preferences(folder: Path) -> dict[str, object]:
 
 
 def change_preferences(folder: Path, changes: dict[str, object]) -> dict[str, object]:
-    """Set some entries (None removes one); all of them. Raises PreferencesError for more than LARGEST."""
+    """Set some entries (None removes one), and return all. Raises PreferencesError for more than LARGEST."""
     kept = {name: value for name, value in (read_preferences(folder) | changes).items() if value is not None}
     content = msgspec.json.encode(kept)
     if len(content) > LARGEST:

@@ -1,4 +1,4 @@
-"""Ready-made settings: those that the studio brings, and those that a person kept (a file of the workspace)."""
+"""Ready-made settings: the studio's own, and those that a person kept (a file of the workspace)."""
 
 import threading
 from dataclasses import dataclass
@@ -16,9 +16,11 @@ from studio.sessions.record_files import Entries, RecordFile
 
 @dataclass(frozen=True, slots=True)
 class PresetView:
-    """Ready-made settings: a handful of knobs, or a paper's whole tracker. tracker, weighting, body: what it is made
-    for (weighting: the likelihood); empty fits any that has its knobs, and the session's body. own: made by a person,
-    so that it can be deleted.
+    """Ready-made settings: some knobs, or a paper's whole tracker.
+
+    tracker, weighting, body : that it is made for (weighting: the likelihood); empty fits any that has its knobs, and
+        the session's body.
+    own : whether a person kept it, so that it can be deleted.
     """
 
     name: str
@@ -55,9 +57,7 @@ class _File(msgspec.Struct):
 
 
 def _with_trackers(entries: Entries) -> Entries:
-    """Version 1 had the presets by name, without what they are made for: the only tracker that has all their knobs,
-    where there is one.
-    """
+    """Version 1 had presets by name, without tracker: it is the only one that has all their knobs, if there is one."""
     by_name: Entries = {}
     for name, kept in entries.items():
         if name != "schema":
@@ -92,7 +92,9 @@ def preset(name: str, folder: Path) -> Preset:
 
 
 def _own(folder: Path) -> dict[str, Preset]:
-    """A person's own presets by name; none where their file is damaged: it stays, and keeping another one says why."""
+    """A person's own presets by name; none where their file is damaged: it stays, and keeping another preset
+    says why.
+    """
     try:
         kept = _read(folder)
     except StudioError:
@@ -114,10 +116,12 @@ def keep_preset(
     weighting: str = "",
     body: str = "",
 ) -> None:
-    """Keep a preset of a person's own, replacing one of the same name. tracker, weighting, body : see `PresetView`.
+    """Keep a preset of a person's own, replacing one of the same name.
 
-    Raises PresetError for a name that the studio's own presets have, an unknown knob, or too many; SettingsError for an
-    unknown tracker or weighting; SessionError where the kept ones cannot be read.
+    tracker, weighting, body : see `PresetView`.
+
+    Raises PresetError for a name of the studio's own presets, an unknown knob, or too many presets; SettingsError for
+    an unknown tracker or weighting; SessionError where the kept presets cannot be read.
     """
     words = " ".join(name.split())
     if not 0 < len(words) <= 64 or any(entry.name == words for entry in presets()):

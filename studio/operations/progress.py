@@ -1,4 +1,4 @@
-"""Where a verb reports its progress: a function of one's own, a bar on a terminal, or the caller's display."""
+"""Where a verb reports its progress: a function, a bar on a terminal, or the caller's display."""
 
 from collections.abc import Callable, Generator, Iterable
 from contextlib import AbstractContextManager, contextmanager, suppress
@@ -23,7 +23,11 @@ SAID = ".notes-said.json"
 
 @dataclass(frozen=True, slots=True)
 class Display:
-    """How a command shows what a verb does. watch : begins a stage of that title. say : shows a line."""
+    """How a command shows the progress of a verb.
+
+    watch : begins a stage with that title.
+    say : shows a line.
+    """
 
     watch: Callable[[str], AbstractContextManager[Progress]]
     say: Callable[[str], None]
@@ -35,7 +39,7 @@ Reporting = Progress | Display | bool | None
 
 @contextmanager
 def reporting(progress: Reporting, title: str) -> Generator[Progress]:
-    """What a verb reports to. A function that raises ends the verb, and nothing half done is kept."""
+    """The progress that a verb reports to. A function that raises ends the verb, and nothing half done is kept."""
     console = Console(stderr=True, highlight=False)
     if isinstance(progress, Display):
         with progress.watch(title) as report:
@@ -50,9 +54,9 @@ def reporting(progress: Reporting, title: str) -> Generator[Progress]:
 
 
 def say(progress: Reporting, lines: Iterable[str], once_in: Path | None = None) -> None:
-    """Show lines while the verb goes on, where there is a display; the verb's answer has them for all others.
+    """Show lines during the verb, if there is a display; for all others they are in the verb's result.
 
-    once_in : a session's folder; each line is shown the first time only that it is said of what lies there.
+    once_in : a session's folder; each line is shown only the first time for it.
     """
     if isinstance(progress, Display):
         for line in lines if once_in is None else _new_in(once_in, list(lines)):
@@ -60,7 +64,9 @@ def say(progress: Reporting, lines: Iterable[str], once_in: Path | None = None) 
 
 
 def _new_in(folder: Path, lines: list[str]) -> list[str]:
-    """Lines that were not shown of a session before; they are remembered. What cannot be remembered is shown again."""
+    """Lines that were not shown of a session before; they are remembered. A line that cannot be remembered is shown
+    again.
+    """
     known = set[str]()
     with suppress(OSError, StudioError, msgspec.DecodeError):
         known = set(decode_json(read_file(folder / SAID), list[str]))

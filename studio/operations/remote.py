@@ -29,7 +29,7 @@ from studio.sessions.stored_run import RunSummary
 from studio.sessions.workspace import Workspace
 
 Address = Annotated[
-    str, Field(description="Where in a store, such as s3://BUCKET/sessions/NAME."), Web(left_out=True)
+    str, Field(description="Address in a store, such as s3://BUCKET/sessions/NAME."), Web(left_out=True)
 ]
 
 
@@ -131,11 +131,14 @@ class Batch:
 def batch(
     sessions: Annotated[
         Sequence[str | Path],
-        Field(description="By name, folder or address; an address of a folder means all sessions below it."),
+        Field(
+            description="Sessions by name, folder or address; the address of a folder means all sessions below"
+            " it."
+        ),
         Terminal(metavar="SESSION…"),
     ],
     *,
-    name: Annotated[str, Field(description="Of the runs (letters, digits, - and _).")] = "batch",
+    name: Annotated[str, Field(description="Name of the runs (letters, digits, - and _).")] = "batch",
     processes: Annotated[
         int | None, Field(ge=1, description="Sessions at once; default: one a core."), Web(left_out=True)
     ] = None,

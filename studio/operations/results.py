@@ -1,4 +1,4 @@
-"""What a run holds, what is made of it afterwards, how good it is, and files for other programs."""
+"""A run's tracks, how good they are, and files for other programs."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -45,8 +45,8 @@ TrackName = Annotated[
     Terminal(metavar="NAME"),
 ]
 Origin = Annotated[str, Terminal("--from")]
-NewTrack = Annotated[str, Field(description="Name of the track that is made.")]
-Replace = Annotated[bool, Field(description="Write over a derived track of that name.")]
+NewTrack = Annotated[str, Field(description="Name of the new track.")]
+Replace = Annotated[bool, Field(description="Replace a derived track of that name.")]
 
 
 def list_tracks(run: RunName) -> tuple[str, ...]:
@@ -90,7 +90,7 @@ def refine(
     run: RunName,
     *,
     source: Annotated[
-        Origin, Field(description="The track that is refined; default: as tracked, sides put right.")
+        Origin, Field(description="The track to refine; default: as tracked, sides put right.")
     ] = "",
     into: NewTrack = REFINED,
     replace: Replace = False,
@@ -118,7 +118,7 @@ def smooth(
     run: RunName,
     *,
     source: Annotated[
-        Origin, Field(description="The track that is smoothed; default: refined, else sides, else raw.")
+        Origin, Field(description="The track to smooth; default: refined, else sides, else raw.")
     ] = "",
     into: NewTrack = SMOOTHED,
     replace: Replace = False,
@@ -140,7 +140,7 @@ def check(
     run: RunName,
     track: Annotated[TrackName, Terminal("--track", "NAME")] = BEST,
     *,
-    every: Annotated[int, Field(ge=1, le=10_000, description="Look at so-many-th frames.")] = EVERY,
+    every: Annotated[int, Field(ge=1, le=10_000, description="Check every so many frames.")] = EVERY,
     progress: Reporting = None,
 ) -> RunCheck:
     """Say how well a run fits its pictures: share in the masks, lost frames and limbs, sudden turns, jumps, jitter.
@@ -168,22 +168,21 @@ def evaluate(
     truth_cameras: Annotated[
         str | Path | None,
         Field(
-            description="Calibration of the same cameras, in whose world the points of a CSV are: each is projected"
-            " with it and triangulated with the session's."
+            description="Calibration of the same cameras in whose world the points of a CSV lie: each point is"
+            " projected with it and triangulated with the session's."
         ),
         Terminal(kind=Path),
     ] = None,
     truth_up: Annotated[
         Literal["", "x", "y", "z", "-x", "-y", "-z"],
-        Field(
-            description="The axis of a TRC that points up; default: as its heads and feet show it, else y."
-        ),
+        Field(description="The axis of a TRC that points up; default: from its heads and feet, else y."),
     ] = "",
     align: Annotated[
         Literal["", "none", "rigid", "similarity"],
         Field(
-            description="How a truth of another world is laid on the run, once for all frames; default: not at all, but"
-            " any but a TRC without --truth-cameras rigidly (similarity where it names no unit)."
+            description="How a truth of another world is laid on the run, once for all frames; default: not at"
+            " all for a TRC or with --truth-cameras, else rigidly (by similarity where the file names"
+            " no unit)."
         ),
     ] = "",
     track: TrackName = BEST,
@@ -274,8 +273,8 @@ def verify(
     mend: Annotated[
         bool,
         Field(
-            description="Track damaged frames again, bit for bit where nothing else has changed, and remove what broken"
-            " off work left behind."
+            description="Track damaged frames again, bit for bit where nothing else has changed, and remove what"
+            " interrupted work left behind."
         ),
         Terminal("--repair"),
     ] = False,

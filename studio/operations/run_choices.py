@@ -1,4 +1,4 @@
-"""What a new run can be made of."""
+"""The choices for a new run."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -20,7 +20,7 @@ from studio.sessions.workspace import Workspace
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """Something that has a name and a label."""
+    """A name with a label."""
 
     name: str
     label: str
@@ -28,14 +28,14 @@ class Choice:
 
 @dataclass(frozen=True, slots=True)
 class TrackerChoice(Choice):
-    """needs_behaviour : whether a run with it has to have a behaviour model."""
+    """A tracker. needs_behaviour : whether a run with it needs a behaviour model."""
 
     needs_behaviour: bool
 
 
 @dataclass(frozen=True, slots=True)
 class BodyChoice(Choice):
-    """A body that runs may use. by_height: whether its lengths follow from a person's height."""
+    """A body that runs may use. by_height : whether its lengths follow from a person's height."""
 
     parameters: int
     limbs: int
@@ -44,7 +44,7 @@ class BodyChoice(Choice):
 
 @dataclass(frozen=True, slots=True)
 class Choices:
-    """What a new run can be made of. problems : what is wrong with trackers and weightings that packages add."""
+    """The choices for a new run. problems : faults of trackers and likelihoods that packages add."""
 
     trackers: list[TrackerChoice]
     weightings: list[Choice]
@@ -76,7 +76,7 @@ def choices_of(workspace: Workspace, session: Session | None, presets: list[Pres
 
 @lru_cache(maxsize=4)
 def _bodies(folders: tuple[Path, ...], _stamp: tuple[tuple[str, int], ...]) -> tuple[BodyChoice, ...]:
-    """The bodies that can be read; one that cannot is named where it is used."""
+    """The bodies that can be read; a fault is named where the body is used."""
     bodies: list[BodyChoice] = []
     for name in list_bodies(folders):
         try:

@@ -1,4 +1,4 @@
-"""How far a run's poses are from the session's truth, measured again only when there is more to measure."""
+"""How far a run's poses are from the session's truth, measured again only when there are new frames."""
 
 import threading
 from collections import OrderedDict
@@ -23,9 +23,11 @@ def evaluation_of(
     session: Session, run: StoredRun, track: str = RAW, *, blobs: bool = True
 ) -> Evaluation | None:
     """The errors of all frames of a track (the search's own: the finished ones); None without a truth or before the
-    first frame. blobs : as `ResultsReader.damaged`.
+    first frame.
 
-    Raises TruthError, BodyError, NotFoundError where there is no such track.
+    blobs : as `ResultsReader.damaged`.
+
+    Raises TruthError, BodyError, NotFoundError for an unknown track.
     """
     path = session.truth_path
     if path is None:
@@ -74,5 +76,5 @@ def _poses_of(run: StoredRun, track: str, blobs: bool) -> tuple[Indices, Array]:
 
 @lru_cache(maxsize=8)
 def _truth(path: Path, _stamp: int) -> MarkerMotion:
-    """The motion in a TRC; its time of change is part of the question, so that a new file is read."""
+    """The motion in a TRC, read again when the file's time of change differs."""
     return read_trc(path)

@@ -1,4 +1,4 @@
-"""Knobs and settings: of a tracker with a likelihood, of a run since its start, and those that it can change to."""
+"""Knobs and settings: of a tracker with a likelihood, and of a run since its start."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -28,7 +28,7 @@ NEW_RUN = "new run"
 
 @dataclass(frozen=True, slots=True)
 class KnobList:
-    """The knobs of a tracker with a weighting. json_schema: the same as JSON Schema (2020-12)."""
+    """The knobs of a tracker with a likelihood. json_schema : the same as JSON Schema (2020-12)."""
 
     tracker: str
     weighting: str
@@ -49,9 +49,9 @@ class SettingsChange:
 
 @dataclass(frozen=True, slots=True)
 class SettingsInUse:
-    """A run's settings: the newest version that its frames used, since when it is in use, and all changes before.
+    """A run's settings: the newest version that its frames used, since when it is in use, and all earlier changes.
 
-    moved : knobs that were moved since and that no stored frame uses; the search goes on with these values.
+    moved : knobs that were moved since and that no stored frame uses; the search continues with these values.
     """
 
     tracker: str
@@ -102,12 +102,12 @@ def settings_of(run: StoredRun) -> SettingsInUse:
 
 
 def check_changes(run: StoredRun, changes: Mapping[str, Value]) -> None:
-    """Raise SettingsError for what a run's knobs cannot be changed to."""
+    """Raise SettingsError for changes that a run's knobs do not allow."""
     check_prediction(changed_settings(settings_with_moved(run), changes), bool(run.record.behaviour))
 
 
 def defaults_of(run: StoredRun, names: Sequence[str]) -> dict[str, Value]:
-    """The defaults of a run's knobs; of all that may change inside a run where none is named. Raises SettingsError."""
+    """The defaults of a run's knobs; without names, of all that may change during a run. Raises SettingsError."""
     knobs = {entry.name: entry for entry in _knobs(run)}
     for name in names:
         if name not in knobs:
@@ -117,7 +117,7 @@ def defaults_of(run: StoredRun, names: Sequence[str]) -> dict[str, Value]:
 
 
 def values_of_preset(run: StoredRun, name: str, folder: Path) -> dict[str, Value]:
-    """The knobs that a preset sets, but for those that a run keeps. folder : of the kept presets.
+    """The knobs of a preset that can change during a run. folder : of the kept presets.
 
     Raises NotFoundError; SettingsError where it is made for another tracker or likelihood.
     """
@@ -134,7 +134,7 @@ def values_of_preset(run: StoredRun, name: str, folder: Path) -> dict[str, Value
 
 def expected_pace(session: Session, tracker: str, weighting: str, evaluations: int) -> StoredPace:
     """How long a pose and a frame of so many evaluations take, by a stored run of the session with that likelihood; NaN
-    and no run where there is none.
+    and no run without one.
     """
     return stored_pace(session, tracker, weighting, evaluations) or StoredPace("", math.nan, math.nan, 0)
 

@@ -1,4 +1,4 @@
-"""A run given to others: one page that opens without the studio."""
+"""A run for others: one page that opens without the studio."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -40,14 +40,16 @@ def share(
     ],
     *,
     frame: Annotated[
-        int | None, Field(ge=0, description="The frame that is looked into; default: the run's worst one.")
+        int | None, Field(ge=0, description="The frame whose search is shown; default: the run's worst one.")
     ] = None,
     track: Annotated[
-        str, Field(description="Whose poses are drawn and measured; default: what the search found.")
+        str, Field(description="The track that is drawn and measured; default: raw, the search's own.")
     ] = "",
     clouds: Annotated[
         Sequence[int],
-        Field(max_length=11, description="Frames whose particles are in the page; default: that one alone."),
+        Field(
+            max_length=11, description="Frames whose particles are in the page; default: that frame alone."
+        ),
     ] = (),
     progress: Reporting = None,
 ) -> Shared:

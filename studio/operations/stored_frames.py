@@ -129,7 +129,7 @@ class FramesSummary:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LayerView:
-    """One layer without its particles; the same entries as a `layer` event."""
+    """One layer without its particles, with the entries of a `layer` event."""
 
     frame: int
     layer: int
@@ -204,7 +204,7 @@ class FrameDetail:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ParticlesView:
-    """The particles of a layer as they were weighed. log_weights : raw, before β."""
+    """The weighed particles of a layer. log_weights : raw, before β."""
 
     frame: int
     layer: int
@@ -362,10 +362,10 @@ def live_view(run: StoredRun) -> LiveView:
 
 
 def layer_summary(record: LayerRecord) -> dict[str, Any]:
-    """What the charts need of a layer: all but the particles.
+    """What the charts need of a layer: everything but the particles.
 
-    log_weight_quantiles : minimum, quartiles and maximum of the raw log-weights. effective_share :
-    effective sample size over N at the layer's β.
+    log_weight_quantiles : minimum, quartiles and maximum of the raw log weights.
+    effective_share : effective sample size over N at the layer's β.
     """
     return {
         "frame": record.frame,
@@ -404,14 +404,12 @@ def frame_summary(result: FrameResult) -> dict[str, object]:
 
 
 def tracking_of(result: FrameResult) -> str:
-    """What is said of a stored frame: one of TRACKING_STATES."""
+    """The tracking state of a stored frame, one of TRACKING_STATES."""
     return verdict_on(result).tracking
 
 
 def effective_share(log_weights: Array, beta: float) -> float:
-    """(Σ w^β)² ÷ (N Σ w^2β): 1 for equal weights, 1/N when one particle has everything; NaN without
-    particles.
-    """
+    """(Σ w^β)² ÷ (N Σ w^2β): 1 for equal weights, 1/N when one particle has all the weight; NaN without particles."""
     if not log_weights.size or not np.isfinite(beta):
         return float("nan")
     scaled = np.exp(beta * (log_weights - log_weights.max()))
@@ -423,7 +421,7 @@ def _quantiles(values: Array) -> list[float]:
 
 
 def _measured(session: Session, run: StoredRun, track: str, *, check: bool) -> tuple[Evaluation | None, str]:
-    """The track's errors, None without a truth; and why that cannot be used, which is named, not fatal."""
+    """The track's errors, None without a truth; and why the truth cannot be used, if so."""
     try:
         return evaluation_of(session, run, track, blobs=check), ""
     except NotFoundError:

@@ -1,4 +1,4 @@
-"""Brush strokes of a session, painted on the pictures of its cameras, and the mask that they give in one frame."""
+"""Brush strokes on the pictures of a session's cameras, and the mask that they give in one frame."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +19,11 @@ SHOWN = (120, 220, 90, 115)
 
 @dataclass(frozen=True, slots=True)
 class CameraStrokes:
-    """One camera. ready : it has a stroke inside. made : its masks in use are those of these strokes."""
+    """One camera.
+
+    ready : whether it has a stroke inside the subject.
+    made : whether its masks in use are made from these strokes.
+    """
 
     camera: str
     strokes: tuple[Stroke, ...]
@@ -48,17 +52,19 @@ def strokes_of(session: Session) -> Strokes:
 
 
 def keep_strokes(session: Session, camera: str, strokes: Sequence[Stroke]) -> Strokes:
-    """Keep these strokes of a camera in place of those it has; the masks stay until they are made again.
+    """Keep these strokes of a camera in place of the old ones; the masks stay until they are made again.
 
-    Raises NotFoundError, FootageError for what does not fit the session.
+    Raises NotFoundError, FootageError for strokes that do not fit the session.
     """
     replace_strokes(session, session.camera_source(camera).name, strokes)
     return strokes_of(session)
 
 
 def preview_strokes(session: Session, camera: str, frame: int, strokes: Sequence[Stroke]) -> bytes | None:
-    """About the mask that strokes give in a frame: a transparent PNG to lie over the camera's picture, upright; None
-    where no stroke says anything of the frame yet. Changes nothing. Raises NotFoundError, FootageError.
+    """Roughly the mask that strokes give in a frame: a transparent PNG to lie over the camera's upright picture; None
+    where no stroke reaches the frame yet. Changes nothing.
+
+    Raises NotFoundError, FootageError.
     """
     source = session.camera_source(camera)
     mask = preview_mask(session, camera, frame, strokes)

@@ -83,8 +83,8 @@ def subjects(
         Sequence[tuple[float, float]],
         Field(
             max_length=16,
-            description="Where one who is to have a session stands in the first frame: x and y on the floor in"
-            " metres. Without any, who is in view is listed.",
+            description="Where a subject who gets a session stands in the first frame: x and y on the floor in"
+            " metres. Without any, the subjects in view are listed.",
         ),
         Terminal(metavar="X,Y"),
     ] = (),
@@ -126,7 +126,7 @@ def together(
     session: SessionName,
     beside: Annotated[
         Sequence[str],
-        Field(min_length=1, max_length=15, description="Sessions of the others in view."),
+        Field(min_length=1, max_length=15, description="Sessions of the other subjects in view."),
         Terminal("--beside", metavar="SESSION"),
         Web(kind=list[str]),
     ],

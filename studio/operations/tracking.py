@@ -119,7 +119,7 @@ def go_on(run: RunName, *, progress: Reporting = None) -> Tracked:
         try:
             batch = track_to_end(session, stored, report)
         except BaseException:
-            # What broke it off counts, not that its frames cannot be put beside the original, too.
+            # The error that interrupted it matters, not a second one from uploading its frames.
             with suppress(StudioError):
                 put_run(session, stored)
             raise
@@ -169,33 +169,33 @@ class LiveRequest:
     """What a live run takes."""
 
     tracker: Annotated[str, Field(description="What searches."), OneOf(TRACKERS)] = "behaviour"
-    weighting: Annotated[str, Field(description="What tells poses apart."), OneOf(WEIGHTINGS)] = "blobs"
+    weighting: Annotated[str, Field(description="The likelihood."), OneOf(WEIGHTINGS)] = "blobs"
     body: Body = ""
     behaviour: Model = ""
     first: Annotated[int, Field(ge=0, description="The frame that comes first."), Terminal("--from")] = 0
     seconds: Annotated[
-        float | None, Field(gt=0, le=86400, description="Track for so long; default: to the footage's end.")
+        float | None, Field(gt=0, le=86400, description="Seconds to track; default: to the footage's end.")
     ] = None
-    repeat: Annotated[
-        bool, Field(description="Go forth and back through the footage; needs a time to end.")
-    ] = False
+    repeat: Annotated[bool, Field(description="Play the footage forwards and backwards; needs seconds.")] = (
+        False
+    )
     seed: Seed = 0
     knobs: Annotated[
         Values, Field(description="Any other knob."), Knobs(own_knobs, others=True, with_defaults=False)
     ] = None
-    name: Annotated[str, Field(description="Of the run; default: numbered.")] = ""
+    name: Annotated[str, Field(description="Name of the run; default: numbered.")] = ""
     allow_inconsistent: AllowInconsistent = False
     cameras: Annotated[Cameras, Web(left_out=True)] = ()
     into: Annotated[
         str | Path | None,
-        Field(description="With cameras: the session that keeps what they saw."),
+        Field(description="With cameras: the session that keeps their pictures."),
         Terminal(kind=str, metavar="SESSION"),
     ] = None
     keep_start: Annotated[
         bool,
         Field(
-            description="With cameras: the person begins in the session's start pose; else it is searched for in the"
-            " first pictures."
+            description="With cameras: the person begins in the session's start pose; default: the pose is"
+            " searched for in the first pictures."
         ),
         Terminal("--keep-start/--seek-start"),
     ] = True
@@ -287,7 +287,7 @@ class Replayed:
 def replay(
     run: RunName,
     *,
-    name: Annotated[str, Field(description="Of the run that is made; default: numbered.")] = "",
+    name: Annotated[str, Field(description="Name of the new run; default: numbered.")] = "",
     progress: Reporting = None,
 ) -> Replayed:
     """Track a live run's frames again, without the clock, and compare the two."""
@@ -319,11 +319,11 @@ def correct(
         int | None,
         Field(
             ge=0,
-            description="Track backwards to this frame; all others stay. Default: forwards to the run's end.",
+            description="Track backwards to this frame and keep all others; default: forwards to the run's end.",
         ),
         Terminal(metavar="J"),
     ] = None,
-    name: Annotated[str, Field(description="Of the corrected run; default: numbered.")] = "",
+    name: Annotated[str, Field(description="Name of the corrected run; default: numbered.")] = "",
     progress: Reporting = None,
 ) -> Tracked:
     """Give a run the right pose in one frame and track on from there, into a new run; the old one is kept.
@@ -379,7 +379,7 @@ def branch(
         Knobs(own_knobs, others=True, with_defaults=False),
     ] = None,
     name: Annotated[
-        str, Field(description="Of the new run; default: the run's own, with what is changed.")
+        str, Field(description="Name of the new run; default: the old name and the changed knobs.")
     ] = "",
     progress: Reporting = None,
 ) -> Tracked:

@@ -92,7 +92,7 @@ class CheckLine:
 class CheckAnswer:
     """The check of a track.
 
-    track : the one that is requested.
+    track : the one that was requested.
     usual : the best, which is exported unless another is chosen.
     check : null before.
     note : on better tracks that are out of date.
@@ -127,8 +127,8 @@ def _line(session: Session, run: StoredRun, name: str) -> TrackLine:
 
 
 def shown_track(run: StoredRun, track: str) -> tuple[str, int]:
-    """The track shown when `track` is requested, raw where there is no such one, and a number that changes when it is
-    made again.
+    """The track to show when `track` is requested, raw if it does not exist, and a number that changes when it is made
+    again.
     """
     if track == RAW or track not in track_names(run):
         return RAW, 0
@@ -144,7 +144,8 @@ def check_derived(
     replace: bool = False,
     knobs: Mapping[str, object] | None = None,
 ) -> None:
-    """Raise what refining or smoothing would, before it is begun. usual : the name of the track, REFINED or SMOOTHED.
+    """Raise the errors of refining or smoothing, before it is begun. usual : the name of the track, REFINED or
+    SMOOTHED.
 
     Raises RunError, SessionError, SettingsError.
     """

@@ -1,4 +1,4 @@
-"""The trash of a workspace: what lies in it, and bringing it back."""
+"""The trash of a workspace."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,8 +20,8 @@ from studio.sessions.workspace import TRASH_NAME, Workspace
 class TrashEntry:
     """Something in the trash.
 
-    name : what it was called.
-    kind : what is "other" cannot be restored.
+    name : its former name.
+    kind : "other" cannot be restored.
     """
 
     id: str
@@ -39,7 +39,7 @@ class TrashList:
 
 @dataclass(frozen=True, slots=True)
 class Restored:
-    """Where something came back to.
+    """Where something was restored to.
 
     name : the session, "" for a model.
     run, comparison, model : "" where it is none.
@@ -58,7 +58,7 @@ def list_trash(workspace: Workspace) -> TrashList:
 
 
 def restore(workspace: Workspace, identifier: str) -> Restored:
-    """Bring a session, a model, or a run or comparison into its session, back under its own name or one like it.
+    """Restore a session, a model, or a session's run or comparison, under its own name or a similar one.
 
     Raises NotFoundError.
     """
@@ -75,7 +75,7 @@ def restore(workspace: Workspace, identifier: str) -> Restored:
 
 
 def trash_entry(place: Path) -> TrashEntry:
-    """What lies at a place in the trash, by its own record."""
+    """An entry of the trash, by its own record."""
     try:
         if (place / FILE_NAME).is_file():
             return TrashEntry(place.name, read_manifest(place).name, "session")

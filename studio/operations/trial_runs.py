@@ -1,5 +1,5 @@
-"""A trial of a comparison as a stored run: tracked again with its settings and seed, so that its search can be looked
-into.
+"""A trial of a comparison as a stored run: tracked again with its settings and seed, so that its search can be
+inspected.
 
 Trials are tracked in memory and keep their errors only; with the same settings and seed the run finds the same poses.
 """
@@ -27,7 +27,11 @@ LONGEST_NAME = 64
 
 @dataclass(frozen=True, slots=True)
 class TrialLine:
-    """A measured trial. worst_frame : where its error, worst_mm, is largest. run : the run made of it, "" for none."""
+    """A measured trial.
+
+    worst_frame : where its error, worst_mm, is largest.
+    run : the run made from it, "" for none.
+    """
 
     tracker: str
     seed: int
@@ -39,7 +43,7 @@ class TrialLine:
 
 
 def trial_lines(session: Session, kept: KeptComparison) -> list[TrialLine]:
-    """The trials of a finished comparison, tracker by tracker; none while it is not finished, none of a sweep: those
+    """The trials of a finished comparison, tracker by tracker; none of an unfinished one or of a sweep, whose trials
     are runs.
     """
     result = kept.result()
@@ -63,7 +67,8 @@ def trial_lines(session: Session, kept: KeptComparison) -> list[TrialLine]:
 
 
 def run_of_trial(session: Session, kept: KeptComparison, tracker: str, seed: int) -> StoredRun:
-    """The run of a trial; made, ready to be tracked, where there is none yet. tracker : its name in the comparison.
+    """The run of a trial, newly made and ready to be tracked where there is none yet. tracker : its name in the
+    comparison.
 
     Raises NotFoundError where the comparison has no such trial, StudioError where the run cannot be made.
     """

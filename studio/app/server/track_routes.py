@@ -189,7 +189,7 @@ async def begin_check(
     arguments: Annotated[Arguments, body_of(check_run, "CheckRequest")],
     app: App,
 ) -> TrackJobState:
-    """Measure a track in every so-many-th frame."""
+    "Measure how well a track fits the pictures."
     name = (await asyncio.to_thread(read_track, run, arguments.get("track", BEST))).name
 
     def work(job: Job) -> dict[str, object]:

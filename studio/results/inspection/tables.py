@@ -158,7 +158,9 @@ class Selection:
     limb: Annotated[Name, Field(description="A limb of the body.")] = ""
     particle: Annotated[int | None, Field(ge=0, le=LARGEST, description="A particle of the layer.")] = None
     camera: Annotated[Name, Field(description="A camera.")] = ""
-    track: Annotated[Name, Field(description="Whose pose; default: raw, the search's own.")] = ""
+    track: Annotated[
+        Name, Field(description="The track whose pose is shown; default: raw, the search's own.")
+    ] = ""
     second: Annotated[Name, Field(description="Another parameter, for a plane of the landscape.")] = ""
     towards: Annotated[
         Name,

@@ -59,7 +59,7 @@ class FitRequest:
 
     frames: Annotated[
         Sequence[int],
-        Field(max_length=MOST_FRAMES, description="To look at; default: chosen for their variety."),
+        Field(max_length=MOST_FRAMES, description="Frames to look at; default: chosen for their variety."),
     ] = ()
     count: Annotated[int, Field(ge=1, le=MOST_FRAMES, description="How many frames to choose.")] = COUNT
     symmetric: Annotated[

@@ -134,7 +134,7 @@ class ImportOptions:
     masks: Annotated[
         Literal["", "inverted"],
         Field(
-            description="What is the person in the footage's masks; default: white, labels, or opaque alpha."
+            description="How the footage's masks mark the person; default: white, labels, or opaque alpha."
         ),
     ] = ""
     fields: Annotated[

@@ -179,13 +179,13 @@ def test_a_model_without_its_body_tells_its_numbers_and_says_why(
 
     monkeypatch.setattr(behaviour_details, "load_body", gone)
     response = learnt.client.get("/api/behaviours/wave").json()
-    assert "body 'planar_arm4' is not here any more" in response["problem"]
+    assert "body 'planar_arm4' no longer exists" in response["problem"]
     assert response["clusters"] == response["limbs"] == []
     assert response["model"]["states"] == model.states == sum(response["context_lengths"])
     assert learnt.client.get("/api/behaviours/wave/entropies").json()["lines"]
     walk = learnt.client.get("/api/behaviours/wave/walk?frames=5")
     assert walk.status_code == 422
-    assert "not here any more" in walk.json()["message"]
+    assert "no longer exists" in walk.json()["message"]
 
 
 def test_a_body_of_the_workspaces_own_is_found(learnt: Studio, model: BehaviourModel) -> None:

@@ -52,7 +52,7 @@ def test_the_guided_setup_names_the_old_file(arm) -> None:
     assert after.state == "stale"
     assert f"{written.file}: written before track '{MADE}' changed" in after.why
     run.folder.joinpath("tracks", f"{MADE}.npz").unlink()
-    assert "is not there any more" in export_of_way(session, run).why
+    assert "no longer exists" in export_of_way(session, run).why
 
 
 def test_a_file_of_the_best_track_is_old_once_another_is_the_best(arm) -> None:
