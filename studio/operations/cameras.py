@@ -24,7 +24,7 @@ from studio.results.overlay_pictures import forget_composers
 from studio.runs.setup.aligning import SessionAlignment, align_cameras
 from studio.runs.setup.levelling import level_by_clicks, level_by_run, level_by_silhouettes, use_level_world
 from studio.runs.setup.mask_quality import measure_masks
-from studio.runs.setup.silhouette_doubts import MEASURED
+from studio.runs.setup.silhouette_faults import MEASURED
 from studio.runs.setup.turned_cameras import (
     alignment_words,
     remember_alignment,

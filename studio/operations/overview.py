@@ -17,7 +17,7 @@ from studio.foundations.knobs import Value
 from studio.operations.comparison_folders import comparison_count
 from studio.operations.run_errors import mean_error
 from studio.operations.run_settings import history_of
-from studio.runs.setup.silhouette_doubts import standing_doubts
+from studio.runs.setup.silhouette_faults import known_faults
 from studio.runs.sides import notes_of
 from studio.search.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, SettingsHistory
 from studio.search.trackers.catalogue import size_in_words
@@ -327,7 +327,7 @@ def session_detail(session: Session) -> SessionDetail:
         runs=run_lines(session).runs,
         next_step=next_step(len(sources), session.is_calibrated),
         start_pose_frame=session.start_pose_frame(),
-        doubts=standing_doubts(session),
+        doubts=known_faults(session),
     )
 
 

@@ -61,7 +61,7 @@ class FrameHistory:
 
     def steps_to(self, frame: int) -> int:
         """Frames since the previously tracked one."""
-        if self._record.is_anew(frame):
+        if self._record.is_restarted(frame):
             return 1
         return steps_between(self._before(frame)[0], frame, self._record.fps)
 
@@ -71,7 +71,7 @@ class FrameHistory:
         """
         if frame == self._record.corrected:
             return start_of(self._record.corrected_pose)
-        if self._record.is_anew(frame) and self._results.last_before(frame + 2) == frame + 1:
+        if self._record.is_restarted(frame) and self._results.last_before(frame + 2) == frame + 1:
             return self._results.result(frame + 1).carried
         before, second = self._before(frame)
         if before is None:

@@ -43,7 +43,7 @@ from studio.runs.setup.initialising import InitialPose, initialise
 from studio.runs.setup.mask_quality import look_before_the_first_run
 from studio.runs.setup.session_settings import session_settings
 from studio.runs.setup.shape_on_the_way import session_shape
-from studio.runs.setup.silhouette_doubts import accepted_doubts
+from studio.runs.setup.silhouette_faults import accepted_faults
 from studio.runs.setup.start_pose_file import frame_of_file, start_pose_from_file
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, knob_table, values
@@ -155,7 +155,7 @@ def prepare_run(
     Raises StudioError; then nothing was made.
     """
     is_first = look_before_the_first_run(session, progress)
-    doubts = accepted_doubts(session, allow_inconsistent)
+    faults = accepted_faults(session, allow_inconsistent)
     tracker = tracker or session.manifest.tracker or DEFAULT_TRACKER
     weighting = weighting or session.manifest.weighting or DEFAULT_WEIGHTING
     settings = session_settings(session, tracker, weighting, live_changes(knobs or {}) if live else knobs)
@@ -172,7 +172,7 @@ def prepare_run(
     first, last = session.checked_frames(_first(session, first, last, of), last, endless=ping_pong)
     if not 0 <= seed < 2**63:
         raise RunError(f"The seed {seed} cannot be used.", "Give a whole number of 0 or more.")
-    notes = (*([note] if note else []), *notes, *(f"{DESPITE}{doubt}" for doubt in doubts))
+    notes = (*([note] if note else []), *notes, *(f"{DESPITE}{fault}" for fault in faults))
     model = chosen_model(session, tree, settings, behaviour)
     if model is not None and model.note:
         notes = (*notes, model.note)

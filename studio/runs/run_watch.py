@@ -77,7 +77,7 @@ class Standing:
 
 
 class RunWatch:
-    """Loss detection and recovery of one run. settings_in : of a frame's first layer. anew : frames restarted by a
+    """Loss detection and recovery of one run. settings_in : of a frame's first layer. restarted : frames restarted by a
     correction: the body is not searched for there, and the frames before do not count.
     """
 
@@ -90,20 +90,20 @@ class RunWatch:
         seed: int,
         first: int,
         fps: float,
-        anew: Callable[[int], bool] = lambda frame: False,
+        restarted: Callable[[int], bool] = lambda frame: False,
     ) -> None:
         self._problems = problems if isinstance(problems, Sightings) else None
         self._onlooker = (
             Onlooker(problems.body, problems.cameras) if isinstance(problems, Sightings) else None
         )
         self._results, self._settings_in = results, settings_in
-        self._seed, self._first, self._fps, self._anew = seed, first, fps, anew
+        self._seed, self._first, self._fps, self._restarted = seed, first, fps, restarted
         self._known: tuple[int, Standing] | None = None
-        self._sought: tuple[object, ParticleSet] | None = None
+        self._restart: tuple[object, ParticleSet] | None = None
 
     def forget(self) -> None:
         """Forget what was read, because stored frames have changed."""
-        self._known = self._sought = None
+        self._known = self._restart = None
 
     def start(self, frame: int, carried: FilterState, space: SearchSpace) -> tuple[FilterState, bool]:
         """The start of a frame's search, and whether it is a search for a lost body."""
@@ -115,23 +115,23 @@ class RunWatch:
         if not anything_seen(masks):
             return carried, False
         key = (frame, settings.recovery.recovery, settings.evidence)
-        if self._sought is None or self._sought[0] != key:
-            self._sought = (key, self._found(frame, carried, space, settings, masks))
-        return FilterState(self._sought[1], memory=carried.memory), True
+        if self._restart is None or self._restart[0] != key:
+            self._restart = (key, self._found(frame, carried, space, settings, masks))
+        return FilterState(self._restart[1], memory=carried.memory), True
 
-    def is_sought(self, frame: int) -> bool:
+    def searches_for_lost(self, frame: int) -> bool:
         """Whether `start` searches for a lost body in that frame, as far as the frames before decide it."""
         settings = self._settings_in(frame)
         if self._problems is None or settings.recovery.recovery == OFF or not self._is_due(frame, settings):
             return False
         return anything_seen(self._problems.evidence(frame, _seeking(settings)))
 
-    def judged(
-        self, result: FrameResult, carried: FilterState, problem: FrameLikelihood | None, sought: bool
+    def evaluate(
+        self, result: FrameResult, carried: FilterState, problem: FrameLikelihood | None, for_lost: bool
     ) -> FrameResult:
         """The result with its tracking state; without evidence, the incoming pose is held.
 
-        carried : into the frame. problem : the frame's, as it was searched. sought : whether the search was for a
+        carried : into the frame. problem : the frame's, as it was searched. for_lost : whether the search was for a
         lost body.
         """
         settings = self._settings_in(result.frame)
@@ -141,19 +141,19 @@ class RunWatch:
         sight = self._onlooker.sight(evidence, result.estimate.pose, problem)
         result = dataclasses.replace(result, notes=(*result.notes, *sight.notes))
         before = self._standing(result.frame)
-        if self._anew(result.frame):
+        if self._restarted(result.frame):
             before = dataclasses.replace(before, state=TRACKED, doubts=0)
         if not sight.seen:
             return _held(result, carried)
         watch = before.watch if before.weighed == _weighed(settings) else _watch(settings)
         if not watch.is_lost(result.estimate.log_weight, sight):
-            back = sought or before.state in (LOST, NO_EVIDENCE)
+            back = for_lost or before.state in (LOST, NO_EVIDENCE)
             state = RECOVERED if back else LIMB_LOST if result.limbs_lost else TRACKED
             return dataclasses.replace(result, tracking=state, overlap=sight.overlap)
-        doubts = before.doubts + 1
-        lost = sought or before.state == LOST or doubts >= settings.recovery.lost_after
+        misses = before.doubts + 1
+        lost = for_lost or before.state == LOST or misses >= settings.recovery.lost_after
         return dataclasses.replace(
-            result, tracking=LOST if lost else TRACKED, overlap=sight.overlap, doubts=doubts
+            result, tracking=LOST if lost else TRACKED, overlap=sight.overlap, doubts=misses
         )
 
     def stored(self, result: FrameResult) -> None:
@@ -191,19 +191,19 @@ class RunWatch:
         return self._known[1]
 
     def _update(
-        self, standing: Standing, frame: int, state: str, doubts: int, log_weight: float, overlap: float
+        self, standing: Standing, frame: int, state: str, misses: int, log_weight: float, overlap: float
     ) -> None:
         settings = self._settings_in(frame)
         if standing.weighed != _weighed(settings):
             standing.watch, standing.weighed = _watch(settings), _weighed(settings)
-        if state in (TRACKED, RECOVERED) and not doubts:
+        if state in (TRACKED, RECOVERED) and not misses:
             standing.watch.well_tracked(log_weight, overlap)
         standing.streak = standing.streak + 1 if state == standing.state else 1
-        standing.state, standing.doubts = state, doubts
+        standing.state, standing.doubts = state, misses
 
     def _is_due(self, frame: int, settings: RunSettings) -> bool:
         """Whether to search for the body: at once when lost, then at intervals; and after a time without evidence."""
-        if frame == self._first or self._anew(frame):
+        if frame == self._first or self._restarted(frame):
             return False
         before = self._standing(frame)
         if before.state == NO_EVIDENCE:

@@ -82,7 +82,7 @@ class TrackingRun:
             seed=self.record.seed,
             first=self.record.first,
             fps=self.record.fps,
-            anew=self.record.is_anew,
+            restarted=self.record.is_restarted,
         )
         self._seen = problems if isinstance(problems, Sightings) else None
         self._check_cameras()
@@ -150,7 +150,7 @@ class TrackingRun:
         """
         frames = self._reader.frames()
         damaged = {} if self.record.live else self._reader.damaged()
-        backwards = [frame for frame in damaged if self.record.is_anew(frame)]
+        backwards = [frame for frame in damaged if self.record.is_restarted(frame)]
         self.damaged = len(damaged)
         """Number of damaged frames to track again before any other."""
         end = max([*frames, *damaged], default=self.record.first - 1) + 1
@@ -263,9 +263,9 @@ class TrackingRun:
                 result = self._refiner.refined(
                     result, partial(silhouettes_by_camera, evidence), problem, settings.refinement
                 )
-        carried, sought = self.carried_into(search.frame), self._watch.is_sought(search.frame)
+        carried, for_lost = self.carried_into(search.frame), self._watch.searches_for_lost(search.frame)
         with span("conclude", search.frame):
-            return self._watch.judged(result, carried, problem, sought)
+            return self._watch.evaluate(result, carried, problem, for_lost)
 
     def _store(
         self, result: FrameResult, settings: RunSettings, came: tuple[float, float] | None = None
@@ -386,12 +386,12 @@ class TrackingRun:
         space = space_over(self._behaviour.space_in(frame), self._handed.steps_to(frame))
         carried = self._behaviour.carried_into(frame, self.carried_into(frame))
         if state is None:
-            carried, sought = self._watch.start(frame, carried, space)
-        elif sought := self._watch.is_sought(frame):
+            carried, for_lost = self._watch.start(frame, carried, space)
+        elif for_lost := self._watch.searches_for_lost(frame):
             # The state already has its result.
             carried = FilterState(None, memory=carried.memory)
         repeats = 1
-        if self._handed.is_first(frame) or sought:
+        if self._handed.is_first(frame) or for_lost:
             repeats = self._settings_at(frame)[1].tracker.start_repeats
         space = space_after(space, carried, self._settings_at(frame)[1].refinement)
         return FrameSearch(

@@ -65,7 +65,7 @@ class RunRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     backwards_to: int | None = None
     subject_dimensions: dict[str, float] = {}
 
-    def is_anew(self, frame: int) -> bool:
+    def is_restarted(self, frame: int) -> bool:
         """Whether a frame was started by a correction: the corrected one, or one that was tracked backwards from it."""
         if self.corrected is None:
             return False

@@ -13,7 +13,7 @@ from studio.evidence.pipeline import EvidenceMaker
 from studio.foundations.geometry.camera import Camera
 from studio.runs.setup.person_hull import spread_frames
 from studio.runs.setup.session_settings import session_settings
-from studio.runs.setup.silhouette_doubts import person_alone, silhouette_doubts
+from studio.runs.setup.silhouette_faults import person_alone, silhouette_faults
 from studio.sessions.importers.importing import import_source
 from studio.sessions.session import Session
 
@@ -41,7 +41,7 @@ def walk(real_data: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[tup
 
 
 def test_the_calibration_raises_nothing(walk: tuple[tuple[Camera, ...], Masks]) -> None:
-    assert silhouette_doubts(*walk, None) == ()
+    assert silhouette_faults(*walk, None) == ()
 
 
 @pytest.mark.parametrize("names", list(combinations(NAMES, 2)))
@@ -50,7 +50,7 @@ def test_exchanged_cameras(walk: tuple[tuple[Camera, ...], Masks], names: tuple[
     other = dict(zip(names, reversed(names), strict=True))
     by_name = {camera.name: camera for camera in cameras}
     exchanged = tuple(dataclasses.replace(by_name[other.get(name, name)], name=name) for name in by_name)
-    (found,) = silhouette_doubts(exchanged, masks, None)
+    (found,) = silhouette_faults(exchanged, masks, None)
     assert (found.code, found.severity, found.cameras) == ("swapped-cameras", "blocks", names)
 
 
@@ -61,5 +61,5 @@ def test_a_mirrored_video(walk: tuple[tuple[Camera, ...], Masks], name: str) -> 
         frame: {camera: mask[:, ::-1] if camera == name else mask for camera, mask in views.items()}
         for frame, views in masks.items()
     }
-    (found,) = silhouette_doubts(cameras, mirrored, None)
+    (found,) = silhouette_faults(cameras, mirrored, None)
     assert (found.code, found.severity, found.cameras) == ("mirrored-video", "blocks", (name,))

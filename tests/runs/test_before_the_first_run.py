@@ -10,7 +10,7 @@ from nudged_camera import make_nudged_session, true_cameras
 from studio.footage.capture.calibration_files import write_calibration
 from studio.foundations.errors import CalibrationError
 from studio.runs.setup.mask_quality import look_before_the_first_run
-from studio.runs.setup.silhouette_doubts import accepted_doubts, standing_doubts
+from studio.runs.setup.silhouette_faults import accepted_faults, known_faults
 from studio.sessions.session import CAMERAS_PATH, Session, described_anew
 
 
@@ -29,11 +29,11 @@ def test_exchanged_cameras_are_found_before_a_frame_is_tracked(tmp_path: Path) -
     session = Session(session.path)
     look_before_the_first_run(session)
     with pytest.raises(CalibrationError, match="cam1 and cam2 are exchanged"):
-        accepted_doubts(session, allow_inconsistent=False)
+        accepted_faults(session, allow_inconsistent=False)
 
 
 def test_what_agrees_is_not_remembered_and_stops_nothing(tmp_path: Path) -> None:
     session = imported(tmp_path / "right")
     look_before_the_first_run(session)
-    assert standing_doubts(session) == ()
-    assert accepted_doubts(session, allow_inconsistent=False) == ()
+    assert known_faults(session) == ()
+    assert accepted_faults(session, allow_inconsistent=False) == ()

@@ -155,7 +155,7 @@ def test_what_was_lost_before_is_not_held_against_a_corrected_frame(session_on_d
             writer.write_frame(lost, results.layers(frame))
     right = prepare_correction(session_on_disk, run, K, true_poses()[K])
     with opened(session_on_disk, right) as tracking:
-        assert not tracking._watch.is_sought(K)
+        assert not tracking._watch.searches_for_lost(K)
         first = tracking.step_layer().record
     assert np.abs(first.poses.mean(axis=0) - true_poses()[K]).max() < 0.1
     finish(session_on_disk, right)

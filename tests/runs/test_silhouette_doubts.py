@@ -15,7 +15,7 @@ from studio.foundations.geometry.camera import Camera
 from studio.runs.new_run import prepare_run
 from studio.runs.setup.mask_quality import mask_quality, measure_masks
 from studio.runs.setup.session_settings import session_settings
-from studio.runs.setup.silhouette_doubts import silhouette_doubts
+from studio.runs.setup.silhouette_faults import silhouette_faults
 from studio.runs.setup.workflow import workflow_of
 from studio.sessions.samples import sample_folder
 from studio.sessions.session import CAMERAS_PATH, Session
@@ -53,12 +53,12 @@ def masks(rig: tuple[Camera, ...]) -> dict[int, dict[str, np.ndarray]]:
 
 
 def test_a_sound_calibration_raises_nothing(rig: tuple[Camera, ...], masks: dict) -> None:
-    assert silhouette_doubts(rig, masks, None) == ()
-    assert silhouette_doubts(rig, masks, HEIGHT) == ()
+    assert silhouette_faults(rig, masks, None) == ()
+    assert silhouette_faults(rig, masks, HEIGHT) == ()
 
 
 def test_cameras_that_were_exchanged_are_named(rig: tuple[Camera, ...], masks: dict) -> None:
-    (found,) = silhouette_doubts(exchanged(rig, 0, 1), masks, HEIGHT)
+    (found,) = silhouette_faults(exchanged(rig, 0, 1), masks, HEIGHT)
     assert (found.code, found.severity, found.cameras) == ("swapped-cameras", "blocks", ("cam1", "cam2"))
 
 
@@ -67,7 +67,7 @@ def test_a_mirrored_video_is_named(rig: tuple[Camera, ...], masks: dict) -> None
         frame: {name: mask[:, ::-1] if name == "cam3" else mask for name, mask in views.items()}
         for frame, views in masks.items()
     }
-    (found,) = silhouette_doubts(rig, mirrored, None)
+    (found,) = silhouette_faults(rig, mirrored, None)
     assert (found.code, found.cameras) == ("mirrored-video", ("cam3",))
 
 
@@ -75,16 +75,16 @@ def test_a_wrong_size_blocks_unless_only_the_given_height_differs(
     rig: tuple[Camera, ...], masks: dict
 ) -> None:
     larger = tuple(dataclasses.replace(camera, translation=1.3 * camera.translation) for camera in rig)
-    (finding,) = silhouette_doubts(larger, masks, HEIGHT)
+    (finding,) = silhouette_faults(larger, masks, HEIGHT)
     assert (finding.code, finding.severity) == ("square-size", "warns")
     giant = tuple(dataclasses.replace(camera, translation=2.0 * camera.translation) for camera in rig)
-    (unseen,) = silhouette_doubts(giant, masks, None)
+    (unseen,) = silhouette_faults(giant, masks, None)
     assert unseen.severity == "blocks"
 
 
 def test_faults_shown_by_the_file_alone_are_not_repeated(rig: tuple[Camera, ...], masks: dict) -> None:
     in_metres = tuple(dataclasses.replace(camera, translation=camera.translation / 1000.0) for camera in rig)
-    assert silhouette_doubts(in_metres, masks, HEIGHT) == ()
+    assert silhouette_faults(in_metres, masks, HEIGHT) == ()
 
 
 @pytest.fixture

@@ -152,8 +152,8 @@ def test_two_pictures_say_nothing_where_nothing_moves() -> None:
     motion = FieldMotion()
     for _ in range(5):
         motion.compare(moment(0)[..., 0], moment(0)[..., 0])
-    assert motion.judged(True) == (True, "")
-    assert motion.judged(False) == (False, "")
+    assert motion.decide(True) == (True, "")
+    assert motion.decide(False) == (False, "")
 
 
 def mixed_source(folder: Path) -> Path:

@@ -6,9 +6,9 @@ CSV = "text/csv; charset=utf-8"
 BINARY = "application/octet-stream"
 
 
-def picture(content: bytes, kind: str = "jpeg", *, checked_anew: bool = False) -> Response:
-    """A picture that is not kept by the browser; checked_anew : that is, and asked for again if it has changed."""
-    headers = {"cache-control": "no-cache" if checked_anew else "no-store"}
+def picture(content: bytes, kind: str = "jpeg", *, revalidated: bool = False) -> Response:
+    """A picture that is not kept by the browser; revalidated : that is, and asked for again if it has changed."""
+    headers = {"cache-control": "no-cache" if revalidated else "no-store"}
     return Response(content, media_type=f"image/{kind}", headers=headers)
 
 

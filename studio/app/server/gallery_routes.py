@@ -38,7 +38,7 @@ def gallery_cards(app: App) -> GalleryView:
 @router.get("/{card}/picture.jpg", response_class=Response)
 def picture(card: str, app: App) -> Response:
     """A small picture of a card's session (JPEG): of one that is there, or of what travels with the studio."""
-    return files.picture(card_picture(card_of(card), app.workspace), checked_anew=True)
+    return files.picture(card_picture(card_of(card), app.workspace), revalidated=True)
 
 
 @router.post("/{card}", status_code=202)

@@ -64,7 +64,7 @@ def thumbnail(session: OpenSession) -> Response:
     path = session.thumbnail()
     if path is None:
         raise NotFoundError(f"Session '{session.name}' has no picture to show.", "Check its footage.")
-    return files.picture(read_file(path), checked_anew=True)
+    return files.picture(read_file(path), revalidated=True)
 
 
 @router.patch("/sessions/{session}")

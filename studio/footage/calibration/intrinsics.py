@@ -96,7 +96,7 @@ def solve_lens(board: Board, sightings: Sequence[Sighting]) -> Lens:
         )
         del used[worst]
         solution, model = _fitted(board, used, size)
-    doubt = _profiled_deviation(board, used, size, solution)
+    profiled = _profiled_deviation(board, used, size, solution)
     turns: list[Array] = list(solution.turns)
     upright = [abs(float(np.asarray(cv2.Rodrigues(turn)[0], dtype=np.float64)[2, 2])) for turn in turns]
     tilts = np.degrees(np.arccos(np.clip(upright, 0, 1)))
@@ -118,7 +118,7 @@ def solve_lens(board: Board, sightings: Sequence[Sighting]) -> Lens:
         solution.matrix,
         solution.distortion,
         solution.rms,
-        max(float(np.max(solution.deviations[:2])), doubt),
+        max(float(np.max(solution.deviations[:2])), profiled),
         float(np.max(solution.deviations[2:4])),
         model,
         residuals,

@@ -22,7 +22,7 @@ UNLIKE_FOCAL = (0.35, 6.0)
 
 def lens_findings(lens: Lens) -> tuple[Finding, ...]:
     """Findings on a lens; none for a reliable one, or one read from a file."""
-    findings = _doubts(lens) if lens.residuals else ()
+    findings = _findings(lens) if lens.residuals else ()
     return tuple(sorted(findings, key=lambda finding: finding.severity != "blocks"))
 
 
@@ -38,15 +38,15 @@ def verdict(lens: Lens) -> str:
     )
 
 
-def _doubts(lens: Lens) -> Iterator[Finding]:
+def _findings(lens: Lens) -> Iterator[Finding]:
     camera = f"camera {lens.camera}"
 
-    def doubt(code: str, blocks: bool, message: str, remedy: str) -> Finding:
+    def finding(code: str, blocks: bool, message: str, remedy: str) -> Finding:
         return Finding(code, "blocks" if blocks else "warns", message, remedy, (lens.camera,))
 
     count, share = len(lens.used), lens.coverage.share
     if count < FEW:
-        yield doubt(
+        yield finding(
             "few-pictures",
             count < TOO_FEW,
             f"Camera {lens.camera} was calibrated from {count} pictures.",
@@ -54,7 +54,7 @@ def _doubts(lens: Lens) -> Iterator[Finding]:
         )
     if share < GOOD_COVERAGE:
         empty = ", ".join(lens.coverage.empty_parts) or "the edges"
-        yield doubt(
+        yield finding(
             "coverage",
             share < POOR_COVERAGE,
             f"The board was seen in {share:.0%} of the picture of {camera} only; hardly in: {empty}.",
@@ -63,7 +63,7 @@ def _doubts(lens: Lens) -> Iterator[Finding]:
     tilts = np.array([residual.tilt for residual in lens.used])
     tilted = np.count_nonzero(tilts >= ENOUGH_TILT)
     if tilted < min(TILTED_BOARDS, len(tilts)):
-        yield doubt(
+        yield finding(
             "little-tilt",
             False,
             f"Only {tilted} of {len(tilts)} boards before {camera} were tilted by {ENOUGH_TILT:.0f}° or more (the most:"
@@ -74,7 +74,7 @@ def _doubts(lens: Lens) -> Iterator[Finding]:
     focal = float(np.mean(np.diag(lens.matrix)[:2]))
     unsure = 2.0 * lens.focal_deviation / focal
     if unsure > SURE:
-        yield doubt(
+        yield finding(
             "uncertain-focal",
             unsure > UNSURE,
             f"The focal length of {camera} is {focal:.0f} px give or take {unsure:.1%}.",
@@ -82,14 +82,14 @@ def _doubts(lens: Lens) -> Iterator[Finding]:
         )
     relative = lens.rms * 1000.0 / lens.size[0]
     if relative > SHARP:
-        yield doubt(
+        yield finding(
             "residual",
             relative > 5.0 * SHARP,
             f"The corners of {camera} miss the model by {lens.rms:.2f} px.",
             "Use a flat, stiff board and pictures without motion blur; check the board's numbers of squares.",
         )
     if not UNLIKE_FOCAL[0] < focal / max(lens.size) < UNLIKE_FOCAL[1]:
-        yield doubt(
+        yield finding(
             "unlikely-focal",
             True,
             f"The focal length of {camera}, {focal:.0f} px, is unlike any usual lens.",

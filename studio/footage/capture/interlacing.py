@@ -1,6 +1,6 @@
 """Interlaced video: each picture holds two fields, taken one after the other in its even and odd lines.
 
-Which of the two is the earlier is judged by what moves, as files mark it wrongly or not at all: the later field of a
+Which of the two is the earlier follows from what moves, as files mark it wrongly or not at all: the later field of a
 picture is one step from the earlier one of the next, the earlier field three from the later one of the next.
 """
 
@@ -59,7 +59,7 @@ class FieldMotion:
             self.shares.append((far - near) / (near + far))
             self.within.append((min(near, far) - own) / (min(near, far) + own))
 
-    def judged(self, marked: bool) -> tuple[bool, Fields]:
+    def decide(self, marked: bool) -> tuple[bool, Fields]:
         """Whether the pictures are of two moments, and which field is the earlier, "" where that is not known. marked :
         whether the file says that they are.
         """

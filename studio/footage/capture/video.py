@@ -275,7 +275,7 @@ def _measured(path: Path, on_frame: Callable[[int, int], None]) -> VideoMeasure:
     fps, uneven = _rate(np.array(times), nominal)
     known = np.array(times)
     shown_at = known if np.isfinite(known).all() and np.all(np.diff(known) > 0.0) else np.zeros(0)
-    interlaced, first = motion.judged(2 * marked > len(times))
+    interlaced, first = motion.decide(2 * marked > len(times))
     if interlaced and not first and codec in LOWER_FIRST:
         first = "bottom"
     return VideoMeasure(width, height, len(times), fps, uneven, turned, interlaced, first, shown_at)

@@ -92,7 +92,7 @@ class StudioControl:
         with self._lock:
             self._note(command)
             if self._process is None:
-                self._process = OwnedProcess(self.heard, self.silent, self.ended)
+                self._process = OwnedProcess(self.take_event, self.take_silence, self.take_end)
             process = self._process
             # What waits for an answer waits for this process's.
             if answer is not None:
@@ -147,7 +147,7 @@ class StudioControl:
         """Start the process ahead of the first command, so that no command waits for it."""
         with self._lock:
             if self._process is None:
-                self._process = OwnedProcess(self.heard, self.silent, self.ended)
+                self._process = OwnedProcess(self.take_event, self.take_silence, self.take_end)
 
     def restart(self, resume: bool = True) -> None:
         """Start the process again and open the run that was open; runs that waited wait again.
@@ -196,7 +196,7 @@ class StudioControl:
 
     # ------------------------------------------------------------------ hearing
 
-    def heard(self, process: OwnedProcess, event: Event) -> None:
+    def take_event(self, process: OwnedProcess, event: Event) -> None:
         """Pass an event on to all who watch."""
         if process is not self._process:
             return
@@ -211,7 +211,7 @@ class StudioControl:
             if answer is not None:
                 answer.set_result(event)
 
-    def silent(self, process: OwnedProcess, silent: bool) -> None:
+    def take_silence(self, process: OwnedProcess, silent: bool) -> None:
         """Say that the process does not speak, or that it speaks again."""
         if process is not self._process:
             return
@@ -220,7 +220,7 @@ class StudioControl:
         else:
             self._publish(self._said)
 
-    def ended(self, process: OwnedProcess) -> None:
+    def take_end(self, process: OwnedProcess) -> None:
         """Say that the process is gone, unless it was closed; whoever waits for an answer gets one."""
         with self._lock:
             if process is not self._process:

@@ -102,22 +102,21 @@ def _send_all(events: Subscription[Event], outbox: Connection) -> None:
 
 
 class OwnedProcess:
-    """One life of the process, as seen from the server: started at once, spoken to, listened to, ended.
+    """One life of the process, as seen from the server: it starts at once.
 
-    heard, silent, ended : called from a thread of its own with this and an event that came, with this and whether
-    nothing has come for long or something came again, and with this when it is gone (`exit_code` says how).
+    on_event(self, event), on_silence(self, whether it is silent) and on_end(self) are called from a thread of its own.
     """
 
     def __init__(
         self,
-        heard: "Callable[[OwnedProcess, Event], None]",
-        silent: "Callable[[OwnedProcess, bool], None]",
-        ended: "Callable[[OwnedProcess], None]",
+        on_event: "Callable[[OwnedProcess, Event], None]",
+        on_silence: "Callable[[OwnedProcess, bool], None]",
+        on_end: "Callable[[OwnedProcess], None]",
     ) -> None:
         context = multiprocessing.get_context("spawn")
         inbox_end, inbox = context.Pipe(duplex=False)
         outbox, outbox_end = context.Pipe(duplex=False)
-        self._heard, self._silent, self._ended = heard, silent, ended
+        self._on_event, self._on_silence, self._on_end = on_event, on_silence, on_end
         self._inbox, self._outbox = inbox, outbox
         self._sending = threading.Lock()
         self._process = context.Process(
@@ -169,7 +168,7 @@ class OwnedProcess:
                 if not outbox.poll(patience):
                     if not silent:
                         silent = True
-                        self._silent(self, True)
+                        self._on_silence(self, True)
                     continue
                 message, patience = outbox.recv(), SILENT_SECONDS
             except (EOFError, OSError, pickle.UnpicklingError):
@@ -177,12 +176,12 @@ class OwnedProcess:
             try:
                 if silent:
                     silent = False
-                    self._silent(self, False)
+                    self._on_silence(self, False)
                 if not isinstance(message, Heartbeat):
-                    self._heard(self, message)
+                    self._on_event(self, message)
             except Exception:
                 # One event that cannot be passed on must not make its owner deaf.
                 logger.exception("An event of the tracking process could not be passed on.")
         outbox.close()
         self._process.join()
-        self._ended(self)
+        self._on_end(self)

@@ -136,7 +136,7 @@ class SetRecording:
 
     def _record(self) -> str:
         """Record until the end; returns why."""
-        heard = self._clock()
+        last_sign = self._clock()
         while not self._stopping.is_set():
             if self._sets and self._went is None:
                 if not self._writer.may_go:
@@ -148,12 +148,12 @@ class SetRecording:
                 if all(state == "ended" for state in states):
                     return "all replayed videos are over"
                 if "running" in states:
-                    heard = self._clock()
-                elif self._clock() - heard > LONGEST_SILENCE:
+                    last_sign = self._clock()
+                elif self._clock() - last_sign > LONGEST_SILENCE:
                     return f"no camera gave a picture for {LONGEST_SILENCE:.0f} s"
                 self._cameras.wait(LOOK_SECONDS)
                 continue
-            heard = self._clock()
+            last_sign = self._clock()
             frame = self._number(pictures)
             if frame >= self._last:
                 return "its time was over"

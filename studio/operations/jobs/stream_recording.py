@@ -95,7 +95,7 @@ class StreamRecording:
         self._over = threading.Event()
         self._tracks = [self._track(camera, fps) for camera in readers.cameras.cameras]
         for track in self._tracks:
-            track.camera.listen(track.heard)
+            track.camera.listen(track.put)
             track.thread.start()
         readers.release()
 
@@ -126,7 +126,7 @@ class StreamRecording:
         """End it and its files; how it went."""
         standing = self.standing
         for track in self._tracks:
-            track.camera.forget(track.heard)
+            track.camera.forget(track.put)
             track.waiting.put(None)
         for track in self._tracks:
             track.thread.join()
@@ -154,7 +154,7 @@ class _Track:
         self.missed = 0
         self.thread = threading.Thread(target=self._run, name=f"recording-{camera.name}", daemon=True)
 
-    def heard(self, name: str, shot: Shot) -> None:
+    def put(self, name: str, shot: Shot) -> None:
         if self.waiting.qsize() >= WAITING_SHOTS:
             self.missed += 1
         else:

@@ -27,7 +27,7 @@ from studio.results.evaluation.errors import evaluate
 from studio.runs.behaviour_models import chosen_model, needs_model
 from studio.runs.pace import stored_pace
 from studio.runs.setup.session_settings import session_settings
-from studio.runs.setup.silhouette_doubts import accepted_doubts
+from studio.runs.setup.silhouette_faults import accepted_faults
 from studio.search.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, all_knobs, changed_settings, values
 from studio.search.trackers.catalogue import TRACKERS
 from studio.search.trackers.tracker import LIMB_LOST, LOST
@@ -151,7 +151,7 @@ def plan_sweep(
     Raises SettingsError for an unknown knob, a value out of its range or too many of them; CalibrationError where the
     footage contradicts it, unless `allow_inconsistent`; RunError, BodyError, BehaviourError for what cannot be tracked.
     """
-    accepted_doubts(session, allow_inconsistent)
+    accepted_faults(session, allow_inconsistent)
     _check_size(vary, knobs or {}, seeds)
     tracker = tracker or session.manifest.tracker or DEFAULT_TRACKER
     weighting = weighting or session.manifest.weighting or DEFAULT_WEIGHTING

@@ -106,7 +106,7 @@ class ReferencePose:
     pose: Array
 
 
-def judged_pose(frame: InspectedFrame, track: str = "") -> Array:
+def explained_pose(frame: InspectedFrame, track: str = "") -> Array:
     """(D,) the pose that is asked about: a track's, else what the search found."""
     return frame.searched() if track in ("", RAW) else frame.estimate(track)
 
@@ -140,7 +140,7 @@ def pulls_at(frame: InspectedFrame, evaluation: FrameEvaluation, pose: Array) ->
 def rows(frame: InspectedFrame, selection: Selection) -> ViewResult:
     """The tables of view `blame`."""
     run, evaluation = frame.of, evaluation_of(frame)
-    pose, reference = judged_pose(frame, selection.track), reference_pose(frame, selection.track)
+    pose, reference = explained_pose(frame, selection.track), reference_pose(frame, selection.track)
     limbs, swapped = limbs_swapped(run, pose, reference.pose)
     shares = evaluation.shares(np.concatenate([pose[None], reference.pose[None], swapped]))
     here, there, by_limb = shares.values[0], shares.values[1], shares.values[2:]

@@ -38,7 +38,7 @@ from studio.foundations.errors import SettingsError, StudioError
 from studio.foundations.knobs import Value, knobs_of
 from studio.foundations.words import enumerated
 from studio.results.evaluation.errors import lost_mm
-from studio.results.inspection.blame import ReferencePose, judged_pose, reference_pose
+from studio.results.inspection.blame import ReferencePose, explained_pose, reference_pose
 from studio.results.inspection.camera_checks import CameraFault, fault_of, view_fits
 from studio.results.inspection.likelihoods import FrameEvaluation, evaluation_of
 from studio.results.inspection.limbs import limb_shares, limbs_too_far
@@ -173,7 +173,7 @@ class Case:
         self._made: dict[int, Array] = {}
         self._tried: dict[str, Trial] = {}
         self.size = scale_of(frame.of.body)
-        self.pose = judged_pose(frame, track)
+        self.pose = explained_pose(frame, track)
         self.verdict = self._verdict()
         self.reference = self._reference()
         self.errors, self.wrong = self._compared()
@@ -212,7 +212,7 @@ class Case:
         """(D,) a frame's pose, refined on its silhouettes."""
         if number not in self._made:
             frame = self.run.frame(number)
-            evidence, pose = evaluation_of(frame).evidence, judged_pose(frame, self.track)
+            evidence, pose = evaluation_of(frame).evidence, explained_pose(frame, self.track)
             self._made[number] = refined_pose(self.run, evidence, number, pose, self._made.get(number + 1))
         return self._made[number]
 
@@ -267,7 +267,7 @@ class Case:
         frame = self.run.frame(number)
         reference = reference_pose(frame, self.track)
         pose = self._refined_now(number) if self.reference.kind == REFINED_NOW else reference.pose
-        return exchanged_in(self.run.body, pose, judged_pose(frame, self.track))
+        return exchanged_in(self.run.body, pose, explained_pose(frame, self.track))
 
     @cached_property
     def stretch(self) -> tuple[int, int]:
@@ -299,7 +299,7 @@ class Case:
 
     def _judged(self, number: int) -> Array:
         """(D,) the pose that is asked about, of another frame."""
-        return judged_pose(self.run.frame(number), self.track)
+        return explained_pose(self.run.frame(number), self.track)
 
     @cached_property
     def motion(self) -> tuple[float, float, float, int]:

@@ -23,7 +23,7 @@ from studio.foundations.progress import Progress
 from studio.runs.setup.mask_quality import count_frame, summed
 from studio.runs.setup.person_hull import ROUGH
 
-JUDGING = "comparing the sources"
+COMPARING = "comparing the sources"
 GAIN = 0.01
 """By how much another source for one camera must raise the worst score."""
 MOST_CHANGES = 4
@@ -35,7 +35,7 @@ MOST_FILLED, MOST_BORDER = 0.5, 0.35
 class SampledMasks:
     """One camera's masks of the tried frames by one source.
 
-    masks : (h, w) 0 or 255, of the size of its judged camera. border : their mean `border_support`.
+    masks : (h, w) 0 or 255, of the size of its reduced camera. border : their mean `border_support`.
     """
 
     masks: tuple[Bytes, ...]
@@ -98,9 +98,9 @@ def choose_sources(
     most = len(sampled) + MOST_CHANGES * len(names) * max(0, len(sampled) - 1)
     done = 0
 
-    def judged(choice: Mapping[str, str], called: str) -> SourceTried:
+    def evaluate(choice: Mapping[str, str], called: str) -> SourceTried:
         nonlocal done
-        progress(JUDGING, done, most)
+        progress(COMPARING, done, most)
         done += 1
         chosen_masks = {name: sampled[choice[name]][name] for name in names}
         borders = {name: round(one.border, 4) for name, one in chosen_masks.items()}
@@ -121,7 +121,7 @@ def choose_sources(
         agreements = {view.camera: round(float(np.nan_to_num(view.agreement)), 4) for view in quality.views}
         return SourceTried(called, agreements, borders, round(statistics.median(quality.hull_litres), 3))
 
-    tried = [judged(dict.fromkeys(names, source), source) for source in sampled]
+    tried = [evaluate(dict.fromkeys(names, source), source) for source in sampled]
     best = max(tried, key=lambda one: one.worst, default=None)
     if best is None or best.worst <= 0.0:
         raise FootageError(
@@ -131,12 +131,12 @@ def choose_sources(
     choice = dict.fromkeys(names, best.source)
     for _ in range(MOST_CHANGES):
         changes = [{**choice, name: source} for name in names for source in sampled if source != choice[name]]
-        changed = [(judged(change, ""), change) for change in changes]
+        changed = [(evaluate(change, ""), change) for change in changes]
         better, change = max(changed, key=lambda pair: pair[0].worst, default=(best, choice))
         if better.worst < best.worst + GAIN:
             break
         best, choice = better, change
-    progress(JUDGING, most, most)
+    progress(COMPARING, most, most)
     return SourceChoice(tuple(tried), choice, best)
 
 

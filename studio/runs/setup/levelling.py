@@ -23,7 +23,7 @@ from studio.foundations.geometry.rigid import rigid
 from studio.foundations.progress import Progress, unheard
 from studio.runs.setup.person_hull import spread_frames
 from studio.runs.setup.session_settings import masks_of
-from studio.runs.setup.silhouette_doubts import person_alone
+from studio.runs.setup.silhouette_faults import person_alone
 from studio.runs.tracks import best_track, read_track
 from studio.sessions.calibration_changes import CalibrationChange, NewCalibration, replace_calibration
 from studio.sessions.session import Session

@@ -42,7 +42,7 @@ from studio.runs.setup.person_hull import (
     spread_frames,
 )
 from studio.runs.setup.session_settings import masks_of, session_settings
-from studio.runs.setup.silhouette_doubts import MEASURED, height_of, person_alone, silhouette_doubts
+from studio.runs.setup.silhouette_faults import MEASURED, height_of, person_alone, silhouette_faults
 from studio.runs.setup.subject_masks import count_subjects
 from studio.sessions.provenance import changed_inputs, origin_of, remember
 from studio.sessions.session import Session
@@ -230,13 +230,13 @@ def mask_quality(
             seen += [count_subjects(masks[frame], small, scale)] if blame else []
             counted.append(count_frame(masks[frame], small, blame, scale=scale))
     quality = summed(chosen, tuple(camera.name for camera in cameras), counted)
-    doubts = silhouette_doubts(cameras, people, height_of(session), scale) if blame else ()
+    faults = silhouette_faults(cameras, people, height_of(session), scale) if blame else ()
     subjects = sorted(seen, reverse=True)[:2][-1] if seen else 0
     contrast = measure_contrast(session, settings, progress=progress)
     views = tuple(
         dataclasses.replace(view, border=float(np.mean(borders[view.camera]))) for view in quality.views
     )
-    return dataclasses.replace(quality, views=views, doubts=doubts, subjects=subjects, contrast=contrast)
+    return dataclasses.replace(quality, views=views, doubts=faults, subjects=subjects, contrast=contrast)
 
 
 def _each_view(
@@ -252,7 +252,7 @@ def _each_view(
 
 def measure_masks(session: Session, frames: Sequence[int] = (), progress: Progress = unheard) -> MaskQuality:
     """The quality of the session's masks. For the default frames it is stored: a blocking finding then refuses new runs
-    (`silhouette_doubts.accepted_doubts`). Raises as `mask_quality` does.
+    (`silhouette_faults.accepted_faults`). Raises as `mask_quality` does.
     """
     quality = mask_quality(session, session_settings(session).evidence, frames, progress=progress)
     if frames:
@@ -273,7 +273,7 @@ def look_before_the_first_run(session: Session, progress: Progress = unheard) ->
     if measured is not None and not changed_inputs(session, MEASURED, ("footage", "calibration")):
         return True
     try:
-        doubts = _doubts_by_silhouettes(session, progress)
+        doubts = _faults_by_silhouettes(session, progress)
     except StudioError:
         return True
     if stops := blocking(doubts):
@@ -281,7 +281,7 @@ def look_before_the_first_run(session: Session, progress: Progress = unheard) ->
     return True
 
 
-def _doubts_by_silhouettes(session: Session, progress: Progress) -> tuple[Finding, ...]:
+def _faults_by_silhouettes(session: Session, progress: Progress) -> tuple[Finding, ...]:
     """What the silhouettes say against the calibration: the part of `mask_quality` that takes little time."""
     cameras = session.cameras()
     check_views(cameras)
@@ -290,7 +290,7 @@ def _doubts_by_silhouettes(session: Session, progress: Progress) -> tuple[Findin
         total = len(cameras) * len(people)
         for camera, frame, view in _each_view(maker, cameras, tuple(people), total, progress):
             people[frame].put(camera.name, person_alone(view.mask))
-    return silhouette_doubts(cameras, people, height_of(session), scale_of(session.body()))
+    return silhouette_faults(cameras, people, height_of(session), scale_of(session.body()))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -20,7 +20,7 @@ from studio.foundations.words import counted, enumerated
 from studio.runs.checking import kept_check
 from studio.runs.setup.background_setup import MASK_SOURCES
 from studio.runs.setup.levelling import floor_was_set
-from studio.runs.setup.silhouette_doubts import standing_doubts
+from studio.runs.setup.silhouette_faults import known_faults
 from studio.runs.setup.turned_cameras import misses_in_words
 from studio.runs.tracks import best_track
 from studio.sessions.background_files import (
@@ -115,8 +115,8 @@ def calibration_step(session: Session) -> StepStatus:
     if tilted := [finding for finding in findings if finding.code in asked]:
         why = " ".join([*(finding.message for finding in tilted), tilted[0].remedy])
         return StepStatus("calibration", "stale", words, why)
-    if doubts := standing_doubts(session):
-        return StepStatus("calibration", "stale", words, f"The footage contradicts it: {doubts[0]}")
+    if faults := known_faults(session):
+        return StepStatus("calibration", "stale", words, f"The footage contradicts it: {faults[0]}")
     return StepStatus(
         "calibration", "done", f"{words}, {source}" if source else words, misses_in_words(session)
     )
@@ -155,7 +155,7 @@ def background_step(session: Session) -> StepStatus:
 
 def _what_to_look_at(session: Session) -> str:
     """The remedy for masks that disagree, by what was measured."""
-    if misses_in_words(session) or standing_doubts(session):
+    if misses_in_words(session) or known_faults(session):
         return "the calibration, which the silhouettes contradict, may be the cause: see there, then check the masks"
     return "check the masks, and measure whether the cameras agree"
 

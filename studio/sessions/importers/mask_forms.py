@@ -54,7 +54,7 @@ class MaskForm:
         several = "; all of them are taken for the person" if len(self.labels) > 1 else ""
         return (f"The masks of camera {camera} are labels ({values}), not black and white{several}.",)
 
-    def doubts(self, camera: str) -> tuple[str, ...]:
+    def warnings(self, camera: str) -> tuple[str, ...]:
         """What speaks against the masks, sentences."""
         least, most = self.share
         if most == 0.0:

@@ -310,7 +310,7 @@ def measure_source(
     for entry in measured:
         if entry.mask_form is not None:
             notes = (*notes, *entry.mask_form.words(entry.camera.name))
-            warnings += entry.mask_form.doubts(entry.camera.name)
+            warnings += entry.mask_form.warnings(entry.camera.name)
         if entry.background is not None:
             _check_background(entry, entry.background)
     return MeasuredSource(measured, rate, count, matching, tuple(warnings), notes)

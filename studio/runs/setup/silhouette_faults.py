@@ -29,7 +29,7 @@ def person_alone(mask: Bytes) -> Bytes:
     return cleaned(mask, PERSON_ALONE)
 
 
-def silhouette_doubts(
+def silhouette_faults(
     cameras: tuple[Camera, ...],
     masks: Mapping[int, Mapping[str, Bytes]],
     height_mm: float | None,
@@ -52,7 +52,7 @@ def silhouette_doubts(
     return tuple(findings)
 
 
-def standing_doubts(session: Session) -> tuple[str, ...]:
+def known_faults(session: Session) -> tuple[str, ...]:
     """The blocking findings of the last measurement, as sentences; none if footage or calibration has changed since."""
     measured = origin_of(session, MEASURED)
     if measured is None or changed_inputs(session, MEASURED, ("footage", "calibration")):
@@ -60,15 +60,15 @@ def standing_doubts(session: Session) -> tuple[str, ...]:
     return measured.stops
 
 
-def accepted_doubts(session: Session, allow_inconsistent: bool) -> tuple[str, ...]:
+def accepted_faults(session: Session, allow_inconsistent: bool) -> tuple[str, ...]:
     """The standing doubts, for a run's notes. Raises CalibrationError for any, unless `allow_inconsistent`."""
-    doubts = standing_doubts(session)
-    if doubts and not allow_inconsistent:
+    faults = known_faults(session)
+    if faults and not allow_inconsistent:
         raise CalibrationError(
-            f"The footage of '{session.name}' contradicts its calibration: {doubts[0]}",
+            f"The footage of '{session.name}' contradicts its calibration: {faults[0]}",
             "Correct it and measure the masks again, or track anyway (--allow-inconsistent; a checkbox in the forms).",
         )
-    return doubts
+    return faults
 
 
 def height_of(session: Session) -> float | None:
