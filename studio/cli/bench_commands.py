@@ -93,7 +93,7 @@ PARTS: dict[str, Callable[[Progress], dict[str, object]]] = {
 @click.option(
     "--minutes",
     type=click.FloatRange(0.1, 600.0),
-    help="Track live with the scene open for so long, and measure nothing else.",
+    help="Track live with the scene open for so many minutes, and measure nothing else.",
 )
 @command
 def bench_command(

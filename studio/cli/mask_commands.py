@@ -51,7 +51,8 @@ OWN = (
         "--pictures",
         type=click.Path(path_type=Path),
         metavar="FOLDER",
-        help="With --quality: a picture a camera there, in which is outlined what is like the background.",
+        help="With --quality: folder for one picture a camera, in which regions that are like the background are"
+        " outlined.",
     ),
 )
 

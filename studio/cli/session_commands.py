@@ -150,6 +150,6 @@ def workflow_command(call: Call) -> dict[str, object]:
         f"{MARKS[step.state]} {step.step:12} {step.words}{f'  ({step.why})' if step.why else ''}"
         for step in now.steps
     ]
-    said = f"Next: {now.next}." if now.next else "Nothing is left to be done."
+    said = f"Next: {now.next}." if now.next else "Nothing is left to do."
     steps = [asdict(step) for step in now.steps]
     return {"steps": steps, "next": now.next, "text": "\n".join((*lines, said))}

@@ -97,7 +97,7 @@ REPLAY = click.option(
 def live_command(call: Call, resume: str | None, again: str | None) -> dict[str, object]:
     session: Session = call.given["session"]
     if (resume or again) and call.given["cameras"]:
-        raise RunError("Live cameras have no footage to begin in, repeat or go on with.", "Leave that out.")
+        raise RunError("Live cameras have no footage to begin in, repeat or continue.", "Leave that out.")
     if again:
         return _replayed(session, call.do(replay, run=session.run(again), name=call.given.get("name", "")))
     done: TrackedLive = (

@@ -69,7 +69,7 @@ def foreign_file(
         if isinstance(problem, FileNotFoundError) and not path.parent.is_dir():
             raise wrong(
                 f"'{path}' is no longer there, nor is its folder.",
-                "Where that was renamed meanwhile, do this again under its new name.",
+                "If that was renamed meanwhile, do this again under its new name.",
             ) from None
         if isinstance(problem, FileNotFoundError | PermissionError | IsADirectoryError | NotADirectoryError):
             raise wrong(f"'{path}' cannot be read ({problem.strerror}).", "Check the path.") from None

@@ -114,7 +114,7 @@ class Registry(Mapping[str, Member], Generic[Member]):
                     PlugInError(
                         f"Package '{_package(point)}' adds a {self.kind} '{point.name}' that cannot be used:"
                         f" {why.rstrip('.')}.",
-                        "Mend or remove the package; the guide says what is needed.",
+                        "Correct or remove the package; the guide says what it needs.",
                     ),
                 )
             else:

@@ -205,7 +205,7 @@ def result_file(kept: KeptComparison, name: str) -> bytes:
     """A file of a finished comparison. Raises NotFoundError."""
     path = kept.folder / name
     if not path.is_file():
-        raise NotFoundError(f"Comparison '{kept.name}' is not finished.", "Wait for it, or let it go on.")
+        raise NotFoundError(f"Comparison '{kept.name}' is not finished.", "Wait for it, or continue it.")
     return read_file(path)
 
 

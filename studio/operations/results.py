@@ -297,6 +297,6 @@ def verify(
     done = "removed" if mend else "to be removed by --repair"
     say(
         progress,
-        [f"left behind by something that was broken off, {done}: {place}" for place in verification.left],
+        [f"left behind by interrupted work, {done}: {place}" for place in verification.left],
     )
     return Verified(verification, repaired)

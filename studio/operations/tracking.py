@@ -142,8 +142,8 @@ def _reporting(run: StoredRun, progress: Reporting, how_far: Callable[[], str]) 
 SendTo = Annotated[
     Sequence[str],
     Field(
-        description="Where the poses are sent as they are tracked: osc://HOST:PORT (VMC) or ws://HOST:PORT (JSON to who"
-        " connects there); without a host this machine."
+        description="Where the poses are sent as they are tracked: osc://HOST:PORT (VMC) or ws://HOST:PORT (JSON);"
+        " without a host this machine."
     ),
     Terminal("--send", "ADDRESS"),
 ]
@@ -230,9 +230,7 @@ def live(
     send_to = _send_addresses(request.send)
     if request.cameras:
         if request.repeat or request.first:
-            raise RunError(
-                "Live cameras have no footage to begin in, repeat or go on with.", "Leave that out."
-            )
+            raise RunError("Live cameras have no footage to begin in, repeat or continue.", "Leave that out.")
         recording = LiveRecordingRequest(
             _place(opened, request.into), request.seconds, keep_start=request.keep_start, send_to=send_to
         )

@@ -148,7 +148,7 @@ class RunCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
         parts += [f"{len(self.poor)} of {len(self.frames)} checked frames do not fit"] if self.poor else []
         if self.is_beside_others:
             parts.append(
-                f"only {100 * self.covered_mean:.0f} % of the masks explained: is somebody else in view?"
+                f"only {100 * self.covered_mean:.0f} % of the masks explained: is another person in view?"
             )
         parts += [f"{len(self.lost)} lost"] if self.lost else []
         parts += [

@@ -30,7 +30,7 @@ def check_writable(folder: Path) -> None:
     if not os.access(folder, os.W_OK):
         raise SessionError(
             f"The folder '{folder}' cannot be written.",
-            "Check the folder's permissions, or give another place for what is made.",
+            "Check the folder's permissions, or choose another place.",
         )
 
 
@@ -193,7 +193,7 @@ class NameTakenError(SessionError):
 def taken(place: Path) -> NameTakenError:
     """The error for a place where something is."""
     return NameTakenError(
-        f"There is something at '{place}' already.", "Choose another name, or delete what is there first."
+        f"There is something at '{place}' already.", "Choose another name, or delete the old one first."
     )
 
 

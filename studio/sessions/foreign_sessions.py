@@ -157,7 +157,7 @@ def _oddities(
     if any(ord(letter) < 32 or 127 <= ord(letter) < 160 for letter in name):
         yield Oddity(name, "a name with control characters")
     if path.name.startswith(PARTIAL_PREFIX):
-        yield Oddity(name, "left by something that was broken off (studio verify --repair removes it)")
+        yield Oddity(name, "left by interrupted work (studio verify --repair removes it)")
         return
     suffix = path.suffix.lower()
     most = LARGEST_RECORD if suffix in RECORDS else LARGEST

@@ -259,7 +259,7 @@ def _check_backgrounds(base: Session, sources: list[CameraSource]) -> None:
     model = read_evidence(base).knobs.get("background_model", "auto")
     if model not in FROM_PLATES:
         raise FootageError(
-            f"Masks of session '{base.name}' are made with '{model}', which needs footage that is not there yet.",
+            f"Masks of session '{base.name}' are made with '{model}', which needs footage that does not exist yet.",
             "Choose the plate or the empty clip with 'studio background'.",
         )
 

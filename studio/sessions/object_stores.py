@@ -195,7 +195,7 @@ def _refused(address: str, problem: Exception) -> SessionError:
     kind, text = type(problem).__name__, str(problem).strip().partition("\n")[0][:200]
     if "Credential" in kind or "Token" in kind or isinstance(problem, PermissionError):
         return SessionError(
-            f"The store of '{address}' lets nobody in without a right to it ({text or kind}).",
+            f"The store of '{address}' refuses access ({text or kind}).",
             "Give every machine the credentials that the store's own tools use (AWS_ACCESS_KEY_ID and"
             " AWS_SECRET_ACCESS_KEY, or a profile), with the right to read and write there.",
         )

@@ -151,7 +151,7 @@ def bring_part(session: Session, kind: str, name: str) -> None:
     files = store.listed()
     if not files.keys() & {RUN_RECORD, COMPARISON_RECORD}:
         raise NotFoundError(
-            f"There is nothing whole at '{store.address}'.", "List what there is: studio runs."
+            f"There is no complete session at '{store.address}'.", "List what there is: studio runs."
         )
     try:
         with made_whole(place) as folder:
@@ -330,8 +330,8 @@ def _wanted(store: Store, files: Mapping[str, Listed] | None = None) -> dict[str
                 "List what is there with 'studio runs ADDRESS', or put one there with 'studio upload'.",
             )
         raise SessionError(
-            f"What lies at '{store.address}' is no whole session: it has no '{MANIFEST}', which is put last.",
-            "Its upload was broken off or is going on: wait, or upload it again.",
+            f"What lies at '{store.address}' is no complete session: it has no '{MANIFEST}', which is put last.",
+            "Its upload was interrupted or is not finished: wait, or upload it again.",
         )
     return {name: one for name, one in files.items() if not name.startswith(NOT_BROUGHT)}
 
@@ -381,7 +381,8 @@ def _bring_checked(store: Store, files: Mapping[str, Listed], folder: Path, prog
     if damaged:
         name, what = next(iter(damaged.items()))
         raise SessionError(
-            f"'{below(store.address, name)}' {what}.", "Delete the session there and upload it again, whole."
+            f"'{below(store.address, name)}' {what}.",
+            "Delete the session there and upload it again completely.",
         )
 
 

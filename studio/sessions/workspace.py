@@ -177,7 +177,7 @@ class Workspace:
             except shutil.Error as error:
                 raise SessionError(
                     f"Session '{name}' cannot be copied: {error.args[0][0][2]}.",
-                    "Say 'studio inspect' of it, and remove what is no file.",
+                    "Run 'studio inspect' on it, and remove whatever is not a file.",
                 ) from None
             for store in session.path.glob(f"{RUNS_NAME}/*/{RESULTS_NAME}"):
                 copy = folder / store.relative_to(session.path)

@@ -78,7 +78,7 @@ from studio.operations.layer_outlines import LayerOutlines
 from studio.sessions.workspace import Workspace
 
 DESCRIPTION = (
-    "Sessions, runs, settings and results of the capture studio. Every answer that is no success is "
+    "Sessions, runs, settings and results of the capture studio. Every error is "
     "`{code, message, hint, status}`. Requests carry the cookie that the printed address sets, or the token "
     "as `Authorization: Bearer`. Lengths in mm, angles in radians, NaN as null. "
     "Events: WebSocket `/api/events`."

@@ -198,9 +198,7 @@ def edit(request: EditRequest, app: App, scene: Scene) -> None:
     session = app.workspace.session(request.session)
     run = session.run(request.run) if request.run else None
     if run is not None and request.frame is None:
-        raise SettingsError(
-            "A correction needs a frame.", "Name the frame of the run that is to be corrected."
-        )
+        raise SettingsError("A correction needs a frame.", "Name the frame of the run to correct.")
     if request.pose is not None:
         checked_pose(run.body() if run else session.body(), request.pose, SettingsError)
     if request.frame is not None:

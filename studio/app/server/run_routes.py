@@ -69,8 +69,9 @@ OpenRun = Annotated[StoredRun, Depends(run_of)]
 Checked = Annotated[
     bool,
     Query(
-        description="Whether all that is stored is read and checked for damage first, once by each server: of thousands"
-        " of frames it takes seconds. False: numbers and poses are checked, and known damage is left out."
+        description="Whether everything that is stored is read and checked for damage first, once by each server;"
+        " thousands of frames take seconds. False: only numbers and poses are checked, and known"
+        " damage is left out."
     ),
 ]
 

@@ -6,7 +6,8 @@ from fastapi import Header, Path, Query
 
 _NAME = r"^[A-Za-z0-9_-]{0,64}$"
 _MEANING = (
-    "Whose scene is meant: every window sends its own name. Without it: the scene of all that send none."
+    "The window whose scene is meant: every window sends its own name. Without it: the scene that all windows"
+    " without a name share."
 )
 
 Window = Annotated[str, Header(alias="X-Studio-Window", pattern=_NAME, description=_MEANING)]

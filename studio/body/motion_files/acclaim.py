@@ -62,7 +62,7 @@ def read_acclaim(motion: Path, skeleton: Path | None = None) -> RecordedMotion:
     beside = skeleton or _skeleton_beside(motion)
     if not beside.is_file():
         raise StudioError(
-            f"The skeleton of '{motion.name}', '{beside.name}', is not there.", "Name its ASF file."
+            f"The skeleton of '{motion.name}', '{beside.name}', is missing.", "Name its ASF file."
         )
     tree = _read_skeleton(beside)
     root, angles = _read_frames(motion, tree)

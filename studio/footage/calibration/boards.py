@@ -53,7 +53,7 @@ class Board:
             raise CalibrationError(f"A board with {across}x{down} inner corners cannot be used.", SPELLING)
         if not (np.isfinite(self.square_mm) and self.square_mm > 0.0):
             raise CalibrationError(
-                f"Squares of {self.square_mm:g} mm cannot be.", "Measure the printed board."
+                f"Squares of {self.square_mm:g} mm are impossible.", "Measure the printed board."
             )
         if self.kind == "chessboard":
             if across == down:

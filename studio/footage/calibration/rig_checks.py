@@ -169,8 +169,8 @@ def _tilt(vertical: Vertical | None) -> Iterator[Finding]:
     if vertical is None or not vertical.level or off <= max(TILTED_DEGREES, 3.0 * vertical.degrees):
         return
     message = (
-        f"The world's Z axis is {off:.1f} degrees off the cameras' common vertical: who stands upright leans by that,"
-        " and the floor is tilted."
+        f"The world's Z axis is {off:.1f} degrees off the cameras' common vertical: a person who stands upright leans"
+        " by that, and the floor is tilted."
     )
     yield Finding(TILTED, "warns", message, LEVEL_IT)
 
@@ -248,10 +248,10 @@ def _unit(cameras: Sequence[Camera]) -> Iterator[Finding]:
         return
     message = f"The cameras lie within {spread:.3g} mm of their middle"
     if 0.5 < spread <= SMALLEST_RIG_MM:
-        message = f"{message}: metres were taken for millimetres, it seems."
+        message = f"{message}: it seems that metres were taken for millimetres."
         remedy = "Import it with --unit m (or cm, in, board=MM)."
     elif spread > LARGEST_RIG_MM:
-        message = f"{message}: millimetres were taken for metres, it seems."
+        message = f"{message}: it seems that millimetres were taken for metres."
         remedy = "Import it with --unit mm (or cm, in, board=MM)."
     else:
         message, remedy = f"{message}: they are all in one place.", "Calibrate the cameras' positions, too."

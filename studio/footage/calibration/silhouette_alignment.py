@@ -58,8 +58,8 @@ def aligned_cameras(cameras: Sequence[Camera], outlines: Outlines) -> AlignedCam
     misses, _ = _misses(cameras, rays, start)
     if np.count_nonzero(np.isfinite(misses)) < FEWEST_TANGENTS:
         raise CalibrationError(
-            "Too few silhouettes are whole in two views to align the cameras by.",
-            "Choose frames in which the person is whole in the pictures, or look at the masks.",
+            "Too few silhouettes are complete in two views to align the cameras.",
+            "Choose frames in which the person is completely in the pictures, or look at the masks.",
         )
     finite = np.isfinite(misses)
 

@@ -196,7 +196,7 @@ def open_footage(source: FootageSource, session_folder: Path) -> Footage:
                 if not session_folder.is_dir():
                     raise NotFoundError(
                         f"'{session_folder}' is no longer there.",
-                        "Where it was renamed meanwhile, do this again under its new name.",
+                        "If it was renamed meanwhile, do this again under its new name.",
                     )
                 raise FootageError(
                     f"Footage '{entry}' of camera {camera.name} is not there.",

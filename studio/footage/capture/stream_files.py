@@ -228,7 +228,7 @@ def mend_recording(path: Path) -> int:
     check_file(path, FootageError)
     size, whole = path.stat().st_size, whole_boxes(path)
     if not whole:
-        raise FootageError(f"'{path.name}' holds no whole piece of a recording.", "Leave that camera out.")
+        raise FootageError(f"'{path.name}' holds no complete piece of a recording.", "Leave that camera out.")
     if whole < size:
         os.truncate(path, whole)
     return size - whole

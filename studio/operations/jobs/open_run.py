@@ -68,7 +68,7 @@ class SettingsMailbox:
                 if name in fixed:
                     raise SettingsError(
                         f"Setting '{name}' cannot change inside a run.",
-                        "Start a new run with the value wanted.",
+                        "Start a new run with that value.",
                     )
             if moved:
                 self._check(following)

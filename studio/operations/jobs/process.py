@@ -32,7 +32,7 @@ SILENT_SECONDS = 20.0
 """A process sends a heartbeat every second; after this long without one it is said to be silent."""
 STARTING_SECONDS = 120.0
 """How long its first one may take: on a busy machine the imports alone take longer than SILENT_SECONDS."""
-LOST_HINT = "Resume: the run goes on from its last finished frame with the same result."
+LOST_HINT = "Resume: the run continues after its last finished frame with the same result."
 
 logger = logging.getLogger(__name__)
 

@@ -147,5 +147,5 @@ def _check_shared(shared: Mapping[str, Value], names: Sequence[str], weighting: 
             )
         if knob not in known:
             raise SettingsError(
-                f"No tracker that takes part has a setting '{knob}'.", f"Known: {', '.join(sorted(known))}."
+                f"No tracker of the comparison has a setting '{knob}'.", f"Known: {', '.join(sorted(known))}."
             )

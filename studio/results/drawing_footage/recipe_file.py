@@ -189,7 +189,7 @@ def _entries(path: Path, chain: int) -> dict[str, Any]:
         return own
     if chain == 0 or not isinstance(base, str):
         raise StudioError(
-            f"Recipe '{path.name}': 'like' does not lead to a whole recipe.", "Correct the entry."
+            f"Recipe '{path.name}': 'like' does not lead to a complete recipe.", "Correct the entry."
         )
     whole = _entries(named_recipe(base, path.parent), chain - 1)
     # Cameras are one choice of several: they are replaced as a whole.

@@ -220,7 +220,7 @@ def meant_axes(poses: Array, frames: Indices, body: BodyModel, truth: MarkerMoti
     remedy = "--align similarity" if unit != 1.0 else "--align rigid, or its vertical with --truth-up"
     return (
         f"FILE lies {off:.0f} mm off as it is, and {tries[unit, number]:.1f} mm {' and '.join(words)}: its axes or unit"
-        f" are others than the session's ({remedy})."
+        f" differ from the session's ({remedy})."
     )
 
 

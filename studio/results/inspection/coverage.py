@@ -62,7 +62,7 @@ NO_TRUTH = "The session has no truth: there is no error to compare the spread wi
 
 def of_frame(frame: InspectedFrame, selection: Selection) -> ViewResult:
     """No tables of one frame."""
-    return ViewResult({}, ("Coverage is of a whole run.",))
+    return ViewResult({}, ("Coverage is measured over a whole run.",))
 
 
 def over_run(run: InspectedRun, selection: Selection) -> ViewResult:

@@ -88,7 +88,7 @@ def rows(frame: InspectedFrame, selection: Selection) -> ViewResult:
             "The run stores no parents: it was tracked by an older studio, or its tracker draws none."
         )
     elif not all(known[1:]):
-        notes.append("The frame was searched more than once over; lines begin anew with each search.")
+        notes.append("The frame was searched several times; lines begin again with each search.")
     particles: list[Row] = []
     summary: list[Row] = []
     for layer in range(count):

@@ -828,7 +828,7 @@ def _layer_finding(case: Case, limb: str) -> FrameFinding:
     near = _mm(NEAR_MM * case.size)
     if len(case.frame.layers) == 1 and layer is None:
         words = (
-            f"There was a particle near {place}: the nearest {_mm(nearest)} away. There was no second layer to go on"
+            f"There was a particle near {place}: the nearest {_mm(nearest)} away. There was no second layer to continue"
             " from it."
         )
         return FrameFinding("near to the end", words, limb, numbers=numbers)

@@ -147,7 +147,7 @@ MASK_SOURCES: dict[BackgroundSource, MaskSource] = {
         "Of those in view you choose one; the others are cut out of the masks in use. For several at once: studio "
         "subjects, studio together.",
         "auto",
-        lacking="Calibrate the cameras first: where somebody stands is seen by two of them.",
+        lacking="Calibrate the cameras first: it takes two of them to see where a person stands.",
         home=SUBJECT_MASKS,
         has_knobs=False,
     ),
@@ -637,7 +637,7 @@ def _check_subject(session: Session, source: str, place: Place | None) -> None:
         raise FootageError("A place has two finite numbers.", "Give x and y on the floor in metres.")
     if not session.is_comparable:
         raise FootageError(
-            "Only two calibrated cameras or more can tell where somebody stands.",
+            "Only two calibrated cameras or more can tell where a person stands.",
             "Calibrate the cameras, or exclude the others by hand (--exclude).",
         )
     session.check_idle()

@@ -106,7 +106,7 @@ def choose_sources(
         borders = {name: round(one.border, 4) for name, one in chosen_masks.items()}
         if not all(can_be_subject(mask) for one in chosen_masks.values() for mask in one.masks):
             nothing = dict.fromkeys(names, 0.0)
-            return SourceTried(called, nothing, borders, 0.0, "It takes in what is around the subject.")
+            return SourceTried(called, nothing, borders, 0.0, "It includes the surroundings of the subject.")
         counted = [
             count_frame(
                 [one.masks[k] for one in chosen_masks.values()],

@@ -22,7 +22,7 @@ def body_of_choice(session: Session, subject: Subject) -> tuple[BodyModel, tuple
     """
     if subject.height_mm is not None and not LEAST_HEIGHT <= subject.height_mm <= MOST_HEIGHT:
         raise BodyError(
-            f"A height of {subject.height_mm:g} mm is no person's.", "Give millimetres, such as 1800."
+            f"A height of {subject.height_mm:g} mm is not a person's.", "Give millimetres, such as 1800."
         )
     return fit_subject(load_body(subject.body, session.body_folders), subject, session.body_folders)
 

@@ -115,7 +115,7 @@ class _Carver:
         self.cameras = session.cameras()
         if len(self.cameras) < 2:
             raise FootageError(
-                f"Session '{session.name}' has one camera: it cannot tell where somebody stands.",
+                f"Session '{session.name}' has one camera: it cannot tell where a person stands.",
                 "Exclude the others by hand (--exclude), or paint strokes.",
             )
         check_views(self.cameras)
@@ -208,7 +208,7 @@ def _first(
         x, y = places[number]
         seen = "; ".join(_seen(one).in_words() for one in subjects)
         raise FootageError(
-            f"Nobody stands at {x:g},{y:g} (metres) in the first frame.", f"There is somebody at {seen}."
+            f"Nobody stands at {x:g},{y:g} (metres) in the first frame.", f"There is a person at {seen}."
         )
     return named, number
 

@@ -327,7 +327,7 @@ def export_step(session: Session, exports: Sequence[ExportedFile]) -> StepStatus
     old = [file for file in exports if file.stale]
     if old:
         why = f"{'; '.join(f'{file.name}: {file.stale}' for file in old[:3])}{' …' if len(old) > 3 else ''}."
-        why = f"{why} Export again, or delete what is old."
+        why = f"{why} Export again, or delete the old files."
         return StepStatus("export", "stale", words, why, run=run.name)
     return StepStatus("export", "done", words, run=run.name)
 

@@ -341,7 +341,7 @@ def what_was_found(source: Path) -> str:
         more = f" and {len(videos) - 4} more" if len(videos) > 4 else ""
         sentences.append(f"Videos lie deeper: {', '.join(videos[:4])}{more}.")
     if broken:
-        sentences.append(f"'{broken[0]}' is a link to a file that is not there.")
+        sentences.append(f"'{broken[0]}' is a link to a file that does not exist.")
     return " ".join(sentences)
 
 
@@ -495,7 +495,7 @@ def _check_links(source: Path, layout: Layout | None) -> None:
         for path in place.iterdir():
             if path.suffix.lower() in VIDEO_SUFFIXES and path.is_symlink() and not path.exists():
                 raise FootageError(
-                    f"'{path.relative_to(source).as_posix()}' is a link to a file that is not there.",
+                    f"'{path.relative_to(source).as_posix()}' is a link to a file that does not exist.",
                     "Copy the video itself, or remove the link.",
                 )
 

@@ -224,7 +224,7 @@ def import_source(
                 progress("finishing", 1, 1)
                 note_files(folder)
     except FileNotFoundError as problem:
-        raise SessionError(f"The file '{problem.filename}' is not there.", "Check the folder.") from None
+        raise SessionError(f"The file '{problem.filename}' does not exist.", "Check the folder.") from None
     except OSError as problem:
         raise SessionError(
             f"The import into '{into.name}' failed: {problem}.", "Check the disk's room and permissions."

@@ -97,7 +97,7 @@ def test_recorded_changes_make_the_same_settings_again() -> None:
         (("annealed:mine",), (), "does not differ"),
         (("annealed",), ("condensation.particles=3",), "does not take part"),
         (("annealed",), ("annealed.survivor=1",), "no setting 'survivor'"),
-        (("annealed",), ("survivor=1",), "No tracker that takes part has a setting 'survivor'"),
+        (("annealed",), ("survivor=1",), "No tracker of the comparison has a setting 'survivor'"),
         (("annealed",), ("weighting=bodytrack",), "not a knob"),
         (("annealed",), ("annealed.particles=500",), "5000 poses a frame instead of 1000"),
         (("annealed",), ("annealed.weighting=nothing",), "no weighting 'nothing'"),
