@@ -41,7 +41,7 @@ def socket(studio: Studio, path: str, origin: str, cookie: str) -> str:
         return str(refused.response.status_code)
 
 
-@row("Who has no printed address gets nothing", "`GET /api/sessions` without a cookie", "403 access")
+@row("A person without a printed address gets nothing", "`GET /api/sessions` without a cookie", "403 access")
 def _(studio: Studio) -> str:
     return said(httpx.get(f"{studio.base}/api/sessions"))
 
@@ -109,7 +109,7 @@ def _(studio: Studio) -> str:
 
 
 @row(
-    "A viewer moves nobody else's scene",
+    "A viewer cannot move another viewer's scene",
     "`POST /api/scene/show` in the name of another window",
     "204, in a window of its own",
 )
@@ -151,7 +151,7 @@ def _(studio: Studio) -> str:
 
 
 @row(
-    "Who opens the viewers' address stays the owner",
+    "The owner stays the owner after opening the viewers' address",
     "`POST …/duplicate` with both cookies",
     "201",
 )
@@ -198,7 +198,7 @@ def _(studio: Studio) -> str:
 
 
 @row(
-    "Who watches over the server learns whether it works, and no name",
+    "A monitor learns whether the server works, and no name",
     "`GET /health` without a cookie",
     '200 {"status":"ok"}',
 )
