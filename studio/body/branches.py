@@ -29,13 +29,13 @@ def within_limits(body: BodyModel, pose: Array) -> Array:
     """
     lower, upper = _limits(body)
     best = _wound(np.asarray(pose, dtype=np.float64), lower, upper)
-    here = _attitude(body, best)
+    attitude = _attitude(body, best)
     for spellings in _joint_branches(body):
         written = best
         for spelling in spellings:
             other = _wound(spelling(written), lower, upper)
             better = _excess(other, lower, upper) < _excess(best, lower, upper)
-            if better and np.allclose(_attitude(body, other), here, rtol=0.0, atol=SAME):
+            if better and np.allclose(_attitude(body, other), attitude, rtol=0.0, atol=SAME):
                 best = other
     return best
 

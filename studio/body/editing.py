@@ -243,10 +243,10 @@ def _mirrored_limbs(definition: BodyDefinition, side: str) -> BodyDefinition:
         if limbs[at].side != side or twin == at:
             continue
         for key in SIZES:
-            wanted, there = abs(size(limbs[at], key)), size(limbs[twin], key)
-            if abs(abs(there) - wanted) > SAME_MM:
+            wanted, present = abs(size(limbs[at], key)), size(limbs[twin], key)
+            if abs(abs(present) - wanted) > SAME_MM:
                 # The twin's own way of writing it cannot follow: it gets the number.
-                number = math.copysign(wanted, there)
+                number = math.copysign(wanted, present)
                 limbs[twin] = msgspec.structs.replace(limbs[twin], **{key: number})
     return msgspec.structs.replace(definition, limbs=tuple(limbs))
 
@@ -272,10 +272,10 @@ def _mirrored_markers(body: BodyModel, mirror: Mirror, side: str, notes: list[st
     names = [joint.name for joint in body.joints]
     joint_twins = name_twins(names).tolist()
     markers = {one.name: one for one in definition.markers}
-    there = {one.name: one for one in body.markers}
+    by_name = {one.name: one for one in body.markers}
     for marker in body.markers:
         other = other_side(marker.name, side)
-        known = there.get(other)
+        known = by_name.get(other)
         if not other or (known is None and joint_twins[marker.joint] == marker.joint):
             continue
         if known is not None and np.allclose(np.abs(known.offset), np.abs(marker.offset), atol=SAME_MM):

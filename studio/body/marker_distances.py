@@ -41,12 +41,12 @@ class MarkerDistances:
         self.index = {name: place for place, name in enumerate(self.names)}
         self.start = np.array([body.dimensions[name] for name in self.names])
         self.markers = {marker.name: place for place, marker in enumerate(body.markers)}
-        here = marker_points(body, body.neutral)[0]
-        self._directions = np.zeros((len(self.names), *here.shape))
+        neutral = marker_points(body, body.neutral)[0]
+        self._directions = np.zeros((len(self.names), *neutral.shape))
         for place, name in enumerate(self.names):
             longer = with_dimensions(body, {name: self.start[place] + 1.0})
-            self._directions[place] = marker_points(longer, body.neutral)[0] - here
-        self._origin = here - np.tensordot(self.start, self._directions, axes=1)
+            self._directions[place] = marker_points(longer, body.neutral)[0] - neutral
+        self._origin = neutral - np.tensordot(self.start, self._directions, axes=1)
 
     def usable(
         self, lengths: Mapping[str, float], fixed: frozenset[str]

@@ -139,10 +139,10 @@ class Mirror:
         scale = np.where(self.body.angles[free], 1.0, MM_PER_RADIAN)
         lower, upper = self.body.lower[free] / scale, self.body.upper[free] / scale
         begin = strictly_inside(pose[free] / scale, lower, upper)
-        which = slice(None) if limbs is None else limbs
+        chosen = slice(None) if limbs is None else limbs
 
         def offsets(poses: Array) -> Array:
-            return (limb_ends(self.body, poses)[:, which] - target).reshape(len(poses), -1)
+            return (limb_ends(self.body, poses)[:, chosen] - target).reshape(len(poses), -1)
 
         return fitted_parameters(
             pose,

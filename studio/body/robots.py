@@ -163,8 +163,8 @@ def _floating(root: ElementTree.Element, path: Path) -> tuple[str, str]:
     """
     joints = root.findall("joint")
 
-    def end(joint: ElementTree.Element, which: str) -> str:
-        element = joint.find(which)
+    def end(joint: ElementTree.Element, tag: str) -> str:
+        element = joint.find(tag)
         return element.get("link", "") if element is not None else ""
 
     for joint in joints:
@@ -293,11 +293,11 @@ class _Robot:
             self.notes.append(
                 f"links without geometry ({', '.join(self.thin)}) have a radius of {THIN:g} of their length"
             )
-        said = "; ".join(self.notes)
+        notes = "; ".join(self.notes)
         title = _words(self.model.names[: self.model.names.find(b"\0")].decode("utf-8", "replace"))
         return BodyDefinition(
             title=f"{title or self.path.stem}, {len(self.parameters)} parameters",
-            source=f"Made of {self.path.name}, metres as mm.{f' {sentence(said)}.' if said else ''}",
+            source=f"Made of {self.path.name}, metres as mm.{f' {sentence(notes)}.' if notes else ''}",
             parameters=tuple(self.parameters),
             joints=tuple(self.joints),
             limbs=tuple(self.limbs),

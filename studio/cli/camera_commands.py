@@ -59,19 +59,19 @@ def align_command(call: Call, undo: bool) -> dict[str, object]:
         return {"session": name, "changed": True, "text": text}
     aligned: Alignment = call()
     if aligned.changed:
-        said = "The session uses the turned cameras from now on; the calibration before is kept (--undo)."
+        words = "The session uses the turned cameras from now on; the calibration before is kept (--undo)."
     elif not aligned.needed:
-        said = "The cameras agree: nothing was changed."
+        words = "The cameras agree: nothing was changed."
     elif not aligned.better:
-        said = "Turning cameras does not explain it: nothing was changed. Look at masks and calibration."
+        words = "Turning cameras does not explain it: nothing was changed. Look at masks and calibration."
     else:
-        said = ""
+        words = ""
     return {
         "session": name,
         "changed": aligned.changed,
         "frames": list(aligned.frames),
         "cameras": [asdict(one) for one in aligned.cameras],
-        "text": "\n".join([*aligned.alignment.in_words(), *([said] if said else [])]),
+        "text": "\n".join([*aligned.alignment.in_words(), *([words] if words else [])]),
     }
 
 
@@ -79,7 +79,7 @@ def align_command(call: Call, undo: bool) -> dict[str, object]:
 def level_command(call: Call) -> dict[str, object]:
     levelled: Levelled = call()
     done = "The world was turned" if levelled.changed else "The world would be turned"
-    said = (
+    words = (
         f"{done} by {levelled.tilted:.1f} degrees, its old origin lies {levelled.lowered:.0f} mm above the floor: by"
         f" {levelled.how}."
     )
@@ -89,5 +89,5 @@ def level_command(call: Call) -> dict[str, object]:
         "changed": levelled.changed,
         "tilted_degrees": levelled.tilted,
         "lowered_mm": levelled.lowered,
-        "text": said + kept,
+        "text": words + kept,
     }

@@ -168,7 +168,7 @@ def _json(value: object, words: Callable[[str], str]) -> str:
 
 
 def _environment(root: Path) -> dict[str, object]:
-    there = next(folder for folder in (root, *root.parents) if folder.exists())
+    existing = next(folder for folder in (root, *root.parents) if folder.exists())
     return {
         "made": datetime.datetime.now(datetime.UTC).strftime("%Y %m %d %H %M"),
         "system": f"{platform.system()} {platform.release()} {platform.machine()}",
@@ -180,7 +180,7 @@ def _environment(root: Path) -> dict[str, object]:
         },
         "cores": os.cpu_count(),
         "memory": _memory(),
-        "free on disk": shutil.disk_usage(there).free,
+        "free on disk": shutil.disk_usage(existing).free,
         "served": bool(served_at(root)),
         "variables": {
             name: float(value) if _is_number(value) else "set"

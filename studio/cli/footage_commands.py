@@ -22,17 +22,17 @@ from studio.sessions.session import Session
 @command_of(import_footage, name="import")
 def import_command(call: Call) -> dict[str, object]:
     session: Session = call()
-    said = session.manifest
+    manifest = session.manifest
     return {
         "session": str(session.path),
-        "layout": said.layout,
-        "cameras": [f"{match.footage} → {match.camera} ({match.how})" for match in said.matching],
-        "notes": list(said.notes),
-        "warnings": list(said.warnings),
+        "layout": manifest.layout,
+        "cameras": [f"{match.footage} → {match.camera} ({match.how})" for match in manifest.matching],
+        "notes": list(manifest.notes),
+        "warnings": list(manifest.warnings),
         "text": "\n".join(
             [
                 f"Session {session.name} in {session.path}",
-                *(f"  {match.footage} → {match.camera}" for match in said.matching),
+                *(f"  {match.footage} → {match.camera}" for match in manifest.matching),
             ]
         ),
     }

@@ -188,14 +188,14 @@ def progress(title: str) -> Generator[Progress]:
 
 def progress_lines(title: str, clock: Callable[[], float] = time.monotonic) -> Progress:
     """A reporter that prints a line at most every SECONDS_BETWEEN."""
-    said, left = clock(), TimeLeft(clock)
+    shown_at, left = clock(), TimeLeft(clock)
 
     def report(step: str, done: int, total: int) -> None:
-        nonlocal said
+        nonlocal shown_at
         estimate, now = left.after(step, done, total), clock()
-        if now - said < SECONDS_BETWEEN:
+        if now - shown_at < SECONDS_BETWEEN:
             return
-        said = now
+        shown_at = now
         note(", ".join(filter(None, (f"{step or title}: {done} of {total}", left_in_words(estimate)))))
 
     return report

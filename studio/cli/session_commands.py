@@ -43,9 +43,9 @@ def bodies_command(call: Call) -> dict[str, object]:
 def inspect_command(call: Call) -> dict[str, object]:
     inspection: Inspection = call()
     lines = [f"{one.place}: {one.what}." for one in inspection.oddities]
-    said = "nothing is odd" if not lines else counted(len(lines), "oddity", "oddities")
+    verdict = "nothing is odd" if not lines else counted(len(lines), "oddity", "oddities")
     lines.append(
-        f"{inspection.kind}: {counted(inspection.files, 'file')}, {inspection.bytes / 1e6:.1f} MB; {said}."
+        f"{inspection.kind}: {counted(inspection.files, 'file')}, {inspection.bytes / 1e6:.1f} MB; {verdict}."
     )
     return {
         EXIT_CODE: 0 if inspection.harmless else FOUND_FAULTS,
@@ -59,7 +59,7 @@ def inspect_command(call: Call) -> dict[str, object]:
 
 @command_of(gallery)
 def gallery_command(call: Call) -> dict[str, object]:
-    there: Gallery = call()
+    listed: Gallery = call()
     cards: list[dict[str, object]] = [
         {
             "name": one.card.name,
@@ -70,13 +70,17 @@ def gallery_command(call: Call) -> dict[str, object]:
             "data": one.card.data,
             "commands": list(one.card.commands),
         }
-        for one in there.cards
+        for one in listed.cards
     ]
-    if there.made is not None:
-        return {"session": there.made.name, "cards": cards, "text": f"Session '{there.made.name}' is there."}
+    if listed.made is not None:
+        return {
+            "session": listed.made.name,
+            "cards": cards,
+            "text": f"Session '{listed.made.name}' is there.",
+        }
     how = {"sample": "bundled", "recipe": "rendered", "elsewhere": "imported"}
     lines: list[str] = []
-    for one in there.cards:
+    for one in listed.cards:
         card = one.card
         state = "there" if one.there else (one.missing and "data missing") or how[card.kind]
         lines.append(f"{card.name:18} {state:14} {card.title}. {card.words}")
@@ -104,9 +108,9 @@ def edit_body_command(call: Call) -> dict[str, object]:
 @command
 def runs_command(session: str | None) -> dict[str, object]:
     """List the runs of a session, or of all sessions in the workspace; at an address those of a store."""
-    there = runs_there(session)
-    if there.stored is not None:
-        return _stored(there.place, there.stored)
+    listed = runs_there(session)
+    if listed.stored is not None:
+        return _stored(listed.place, listed.stored)
     entries: list[dict[str, object]] = [
         {
             "session": run.session,
@@ -120,15 +124,15 @@ def runs_command(session: str | None) -> dict[str, object]:
             "status": run.status,
             "damaged": list(run.damaged),
         }
-        for run in there.runs
+        for run in listed.runs
     ]
     lines = [
         f"{run.session:18} {run.name:12} {run.tracker:14} {run.weighting:14} "
         f"{run.done:>5} of {run.last - run.first} frames  {run.status}"
         + (f"  {run.damage}" if run.damage else "")
-        for run in there.runs
+        for run in listed.runs
     ]
-    return {"workspace": there.place, "runs": entries, "text": "\n".join(lines) or "No runs yet."}
+    return {"workspace": listed.place, "runs": entries, "text": "\n".join(lines) or "No runs yet."}
 
 
 def _stored(address: str, sessions: Sequence[RemoteSession]) -> dict[str, object]:
@@ -150,6 +154,6 @@ def workflow_command(call: Call) -> dict[str, object]:
         f"{MARKS[step.state]} {step.step:12} {step.words}{f'  ({step.why})' if step.why else ''}"
         for step in now.steps
     ]
-    said = f"Next: {now.next}." if now.next else "Nothing is left to do."
+    next_step = f"Next: {now.next}." if now.next else "Nothing is left to do."
     steps = [asdict(step) for step in now.steps]
-    return {"steps": steps, "next": now.next, "text": "\n".join((*lines, said))}
+    return {"steps": steps, "next": now.next, "text": "\n".join((*lines, next_step))}

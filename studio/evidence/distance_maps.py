@@ -71,10 +71,10 @@ def distances_of(
     size = (mask.shape[1], mask.shape[0])
     left, top, right, bottom = box_of(mask, np.uint8(FOREGROUND))
     if right and hidden is not None:
-        there = box_of(hidden, np.uint8(1))
-        if there[2]:
-            left, top = min(left, there[0]), min(top, there[1])
-            right, bottom = max(right, there[2]), max(bottom, there[3])
+        box = box_of(hidden, np.uint8(1))
+        if box[2]:
+            left, top = min(left, box[0]), min(top, box[1])
+            right, bottom = max(right, box[2]), max(bottom, box[3])
     if not right:
         return SilhouetteDistances(
             size, (0, 0), np.zeros((0, 0), np.float32), np.zeros((0, 2)), np.zeros((0, 2))
@@ -133,9 +133,9 @@ def signed_of(inside: Bytes, within: Floats, beyond: Floats) -> Floats:
     """
     half = np.float32(0.5)
     for y in range(inside.shape[0]):
-        here, one, signed = inside[y], within[y], beyond[y]
+        row_inside, one, signed = inside[y], within[y], beyond[y]
         for x in range(inside.shape[1]):
-            signed[x] = half - one[x] if here[x] else signed[x] - half
+            signed[x] = half - one[x] if row_inside[x] else signed[x] - half
     return beyond
 
 

@@ -87,9 +87,9 @@ def edge_pixels(image: Bytes, least: float) -> Bytes:
     right, left = smooth[2:], smooth[: width - 2]
     before, middle, after = slope[: width - 2], slope[1 : width - 1], slope[2:]
     for y in range(1, height - 1):
-        above, here, below, row = image[y - 1], image[y], image[y + 1], out[y, 1 : width - 1]
+        above, centre, below, row = image[y - 1], image[y], image[y + 1], out[y, 1 : width - 1]
         for x in range(width):
-            smooth[x] = np.int16(np.int16(above[x]) + np.int16(2) * np.int16(here[x]) + np.int16(below[x]))
+            smooth[x] = np.int16(np.int16(above[x]) + np.int16(2) * np.int16(centre[x]) + np.int16(below[x]))
             slope[x] = np.int16(np.int16(below[x]) - np.int16(above[x]))
         for x in range(width - 2):
             across = np.int32(np.int16(right[x] - left[x]))

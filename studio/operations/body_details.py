@@ -140,13 +140,13 @@ def list_with_own(workspace: Workspace, session: Session | None) -> BodyList:
     own, shared = (_names(workspace, one) for one in (session, None))
     entries: list[BodyEntry] = []
     for name in list_bodies(folders):
-        whose = "session" if session and name in own else "workspace" if name in shared else ""
+        owner = "session" if session and name in own else "workspace" if name in shared else ""
         try:
             body = load_body(name, folders)
         except StudioError as problem:
-            entries.append(BodyEntry(name, name, 0, 0, whose, str(problem)))
+            entries.append(BodyEntry(name, name, 0, 0, owner, str(problem)))
         else:
-            entries.append(BodyEntry(name, body.title, len(body.parameters), len(body.drawn), whose))
+            entries.append(BodyEntry(name, body.title, len(body.parameters), len(body.drawn), owner))
     return BodyList(entries, session.manifest.body if session else "")
 
 

@@ -243,14 +243,14 @@ def card_of(name: str) -> Card:
 
 def standing_of(card: Card, workspace: Workspace) -> CardStanding:
     """A card as it stands in a workspace."""
-    there = (workspace.root / card.name / FILE_NAME).is_file()
+    exists = (workspace.root / card.name / FILE_NAME).is_file()
     if card.kind == "recipe":
-        return CardStanding(card, there, missing_data(find_recipe(card.recipe or card.name)))
+        return CardStanding(card, exists, missing_data(find_recipe(card.recipe or card.name)))
     if card.kind == "elsewhere" and real_footage(card.footage) is None:
         return CardStanding(
-            card, there, f"There is no '{card.footage}' in the folder that STUDIO_REAL_DATA names."
+            card, exists, f"There is no '{card.footage}' in the folder that STUDIO_REAL_DATA names."
         )
-    return CardStanding(card, there)
+    return CardStanding(card, exists)
 
 
 def card_view(card: Card, workspace: Workspace, job: GalleryState | None) -> CardView:

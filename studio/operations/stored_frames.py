@@ -230,7 +230,7 @@ def frames_summary(
     errors = dict(zip(measured.frames, measured.per_frame_mm, strict=True)) if measured else {}
     lost = dict(zip(measured.frames, measured.lost_by_frame, strict=True)) if measured else {}
     with run.results() as results:
-        said = verdicts(results, run.folder, timeline, lost, run.body())
+        verdict_of = verdicts(results, run.folder, timeline, lost, run.body())
     lines = tuple(
         FrameLine(
             frame=frame,
@@ -240,11 +240,11 @@ def frames_summary(
             layers=int(timeline.layers[at]),
             settings_version=int(timeline.settings_versions[at]),
             error_mm=errors.get(frame),
-            lost=bool(said[frame].by_truth),
-            lost_limbs=said[frame].by_truth,
-            tracking=said[frame].tracking,
-            limbs_off=said[frame].by_silhouettes,
-            fits=said[frame].fits,
+            lost=bool(verdict_of[frame].by_truth),
+            lost_limbs=verdict_of[frame].by_truth,
+            tracking=verdict_of[frame].tracking,
+            limbs_off=verdict_of[frame].by_silhouettes,
+            fits=verdict_of[frame].fits,
         )
         for at, frame in enumerate(timeline.frames.tolist())
     )

@@ -221,8 +221,8 @@ class RunWatch:
         masks: FrameEvidence,
     ) -> ParticleSet:
         assert self._problems is not None
-        body, there = self._problems.body, {view.camera for view in masks.views}
-        cameras = tuple(camera for camera in self._problems.cameras if camera.name in there)
+        body, seeing = self._problems.body, {view.camera for view in masks.views}
+        cameras = tuple(camera for camera in self._problems.cameras if camera.name in seeing)
         hull, box, _ = hull_of(body, cameras, masks)
         prototypes = None if space.behaviour is None else space.behaviour.prototypes.poses
         problem = whole_problem(body, cameras, _seeking(settings), masks)

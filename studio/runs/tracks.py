@@ -81,10 +81,10 @@ class BestTrack:
         """A sentence on the outdated tracks; "" for none."""
         if not self.outdated:
             return ""
-        which = " and ".join(f"'{name}'" for name in self.outdated)
+        names = " and ".join(f"'{name}'" for name in self.outdated)
         one = len(self.outdated) == 1
         return (
-            f"Track{'' if one else 's'} {which} {'was' if one else 'were'} made before the run changed: '{self.name}'"
+            f"Track{'' if one else 's'} {names} {'was' if one else 'were'} made before the run changed: '{self.name}'"
             f" is taken. Make {'it' if one else 'them'} again, or name {'it' if one else 'one'}."
         )
 

@@ -205,10 +205,10 @@ def _changed(
 
 def _check_mask_count(session: Session, camera: CameraSource, needed: int) -> None:
     """Raises FootageError for a camera with fewer masks than that."""
-    there = _masks_of(session, camera)
-    if 0 < there < needed:
+    present = _masks_of(session, camera)
+    if 0 < present < needed:
         raise FootageError(
-            f"Camera {camera.name} has {there} masks, and with these offsets {needed} are needed.",
+            f"Camera {camera.name} has {present} masks, and with these offsets {needed} are needed.",
             "Import the session again with masks of all frames, or without masks.",
         )
 

@@ -260,13 +260,13 @@ def sessions_at(address: str) -> tuple[RemoteSession, ...]:
 def upload_unless_there(session: Session, address: str) -> None:
     """Put a session at an address, in place of another one there; files of the same names and sizes are the same."""
     store = Store(address)
-    there, here = store.listed(), dict(_own_files(session.path))
+    stored, own = store.listed(), dict(_own_files(session.path))
     # These say when it was made.
     dated = {MANIFEST, CHECKSUMS}
-    sizes = {name: path.stat().st_size for name, path in here.items() if name not in dated}
-    if MANIFEST in there and sizes == {name: one.size for name, one in there.items() if name not in dated}:
+    sizes = {name: path.stat().st_size for name, path in own.items() if name not in dated}
+    if MANIFEST in stored and sizes == {name: one.size for name, one in stored.items() if name not in dated}:
         return
-    store.remove([MANIFEST, *there])
+    store.remove([MANIFEST, *stored])
     upload(session, address)
 
 

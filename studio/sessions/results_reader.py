@@ -347,8 +347,10 @@ class ResultsReader:
             known = self._has_table(table)
             columns += "".join(f", {name if known else 'NULL'}" for name in names)
             joined += f" LEFT JOIN {table} USING (frame)" if known else ""
-        which = f"> {int(after)}" if frame is None else f"= {int(frame)}"
-        return self._query(f"{columns} FROM frames{joined} WHERE frames.frame {which} ORDER BY frames.frame")
+        condition = f"> {int(after)}" if frame is None else f"= {int(frame)}"
+        return self._query(
+            f"{columns} FROM frames{joined} WHERE frames.frame {condition} ORDER BY frames.frame"
+        )
 
     def _sums(self, what: str, number: int | None = None, after: int = -1) -> dict[int, str]:
         """The stored checksums of what has a number above `after`, or this one; nothing in stores that are older than
@@ -356,9 +358,9 @@ class ResultsReader:
         """
         if not self._has_table("checksums"):
             return {}
-        which = f"> {int(after)}" if number is None else f"= {int(number)}"
+        condition = f"> {int(after)}" if number is None else f"= {int(number)}"
         return dict(
-            self._query(f"SELECT number, sums FROM checksums WHERE what = '{what}' AND number {which}")
+            self._query(f"SELECT number, sums FROM checksums WHERE what = '{what}' AND number {condition}")
         )
 
     def _damaged_blobs(self, frame: int, text: str) -> str:

@@ -80,7 +80,7 @@ def _copy(broken: sqlite3.Connection, whole: sqlite3.Connection, first: int, las
         _put(whole, table, _rows(broken, f"SELECT * FROM {table}") or [])
     sums = _rows(broken, "SELECT * FROM checksums WHERE what = 'settings'")
     _put(whole, "checksums", sums or [])
-    there: list[int] = []
+    copied: list[int] = []
     for frame in range(first, last):
         by_table = {
             table: _rows(broken, f"SELECT * FROM {table} WHERE frame = {frame}") for table in OF_A_FRAME
@@ -93,16 +93,16 @@ def _copy(broken: sqlite3.Connection, whole: sqlite3.Connection, first: int, las
                 _put(whole, table, rows or [])
             _put(whole, "checksums", of_it or [])
         if by_table["frames"] or of_it:
-            there.append(frame)
+            copied.append(frame)
     lost: list[int] = []
     for frame in range(first, last):
         row = whole.execute("SELECT 1 FROM frames WHERE frame = ?", (frame,)).fetchone()
-        if row is None and there and frame < max(there):
+        if row is None and copied and frame < max(copied):
             _put(whole, "checksums", [(FRAME, frame, GIVEN_UP)])
             lost.append(frame)
     whole.execute(
         "DELETE FROM checksums WHERE what = ? AND number > ? AND sums = ?",
-        (FRAME, max(there, default=first - 1), GIVEN_UP),
+        (FRAME, max(copied, default=first - 1), GIVEN_UP),
     )
     return lost
 

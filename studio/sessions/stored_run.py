@@ -60,8 +60,8 @@ def damage_in_words(frames: Sequence[int]) -> str:
         return ""
     named = ", ".join(str(frame) for frame in list(frames)[:NAMED])
     more = f" and {len(frames) - NAMED} more" if len(frames) > NAMED else ""
-    which = f"Frame {named} is" if len(frames) == 1 else f"Frames {named}{more} are"
-    return f"{which} damaged on the disk and left out: resume the run to track them again."
+    subject = f"Frame {named} is" if len(frames) == 1 else f"Frames {named}{more} are"
+    return f"{subject} damaged on the disk and left out: resume the run to track them again."
 
 
 class StoredRun:

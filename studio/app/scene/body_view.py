@@ -95,10 +95,10 @@ def limb_mesh(limb: Limb, sections: int = SECTIONS) -> trimesh.Trimesh:
     circle = np.stack([limb.scale_x * np.cos(turn), limb.scale_y * np.sin(turn)], axis=-1)
     start = np.column_stack([limb.radius_start * circle, np.zeros(sections)])
     end = np.column_stack([limb.radius_end * circle, np.full(sections, limb.length)])
-    here = np.arange(sections)
-    after = np.roll(here, -1)
-    lower = np.column_stack([here, after, after + sections])
-    upper = np.column_stack([here, after + sections, here + sections])
+    ring = np.arange(sections)
+    after = np.roll(ring, -1)
+    lower = np.column_stack([ring, after, after + sections])
+    upper = np.column_stack([ring, after + sections, ring + sections])
     parts = [
         trimesh.Trimesh(np.concatenate([start, end]), np.concatenate([lower, upper]), process=False),
         _cap(start, np.array([0.0, 0.0, 0.0]), facing_up=False),
@@ -112,8 +112,8 @@ def limb_mesh(limb: Limb, sections: int = SECTIONS) -> trimesh.Trimesh:
 
 
 def _cap(rim: Array, centre: Array, facing_up: bool) -> trimesh.Trimesh:
-    here = np.arange(len(rim))
-    after = np.roll(here, -1)
+    ring = np.arange(len(rim))
+    after = np.roll(ring, -1)
     hub = np.full(len(rim), len(rim))
-    faces = np.column_stack([hub, here, after] if facing_up else [hub, after, here])
+    faces = np.column_stack([hub, ring, after] if facing_up else [hub, after, ring])
     return trimesh.Trimesh(np.concatenate([rim, centre[None]]), faces, process=False)

@@ -155,8 +155,8 @@ def rendered(name: str, title: str, in_course: bool = False) -> dict[str, str]:
 def _course_link(page: str, shown: str) -> str:
     """A page of the course among the contents of one of them."""
     file, title = TEXTS[page]
-    here = ' aria-current="page"' if file == shown else ""
-    return f'<a href="/guide/{page}"{here}>{html.escape(title)}</a>'
+    current = ' aria-current="page"' if file == shown else ""
+    return f'<a href="/guide/{page}"{current}>{html.escape(title)}</a>'
 
 
 @cache

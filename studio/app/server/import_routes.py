@@ -129,15 +129,15 @@ async def begin_taking(app: AppState, name: str, arguments: Arguments, take: Tak
     def work(job: Job) -> dict[str, object]:
         folder = unpacked_upload(place, progress=job.report) if upload else place
         taken = take(folder, job.report_or_stop)
-        said = taken.manifest if isinstance(taken, Session) else taken
+        result = taken.manifest if isinstance(taken, Session) else taken
         if upload:
             forget(app, upload)
         return {
             # An upload's folder is named by a number that is shown nowhere.
-            "notes": [note.replace(f"'{upload}'", "what was uploaded") for note in said.notes],
-            "warnings": list(said.warnings),
-            "layout": said.layout,
-            "matching": said.matching,
+            "notes": [note.replace(f"'{upload}'", "what was uploaded") for note in result.notes],
+            "warnings": list(result.warnings),
+            "layout": result.layout,
+            "matching": result.matching,
         }
 
     return app.jobs.begin(IMPORT, ImportState(session=name, name=name, step="reading"), work)

@@ -21,20 +21,20 @@ class LeftRequests:
             await self.app(scope, receive, send)
             return
         has_left = asyncio.Event()
-        asked: asyncio.Queue[Message] = asyncio.Queue()
+        messages: asyncio.Queue[Message] = asyncio.Queue()
 
         async def listen() -> None:
             while not has_left.is_set():
                 message = await receive()
                 if message["type"] == "http.disconnect":
                     has_left.set()
-                asked.put_nowait(message)
+                messages.put_nowait(message)
 
         kept = IS_WANTED.set(lambda: not has_left.is_set())
         listening = asyncio.create_task(listen())
         try:
             with contextlib.suppress(LeftError):
-                await self.app(scope, asked.get, send)
+                await self.app(scope, messages.get, send)
         finally:
             IS_WANTED.reset(kept)
             listening.cancel()

@@ -92,8 +92,10 @@ def read_acclaim(motion: Path, skeleton: Path | None = None) -> RecordedMotion:
 def _skeleton_beside(motion: Path) -> Path:
     """The ASF beside an AMC: the subject's or the motion's own name, its ending in any case."""
     names = [f"{motion.stem.split('_')[0]}.asf", f"{motion.stem}.asf"]
-    there = {path.name.lower(): path for path in motion.parent.iterdir() if path.suffix.lower() == ".asf"}
-    return next((there[name.lower()] for name in names if name.lower() in there), motion.with_name(names[0]))
+    skeletons = {path.name.lower(): path for path in motion.parent.iterdir() if path.suffix.lower() == ".asf"}
+    return next(
+        (skeletons[name.lower()] for name in names if name.lower() in skeletons), motion.with_name(names[0])
+    )
 
 
 def _turns(axes: list[int], angles: Array) -> Array:

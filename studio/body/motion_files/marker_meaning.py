@@ -68,9 +68,9 @@ def up_of_markers(names: Sequence[str], positions: Array) -> str:
 
 def _middle(points: Array) -> Array:
     """(F, 3) means of the points (F, K, 3) that are there, NaN where none is."""
-    there = np.asarray(np.isfinite(points).all(axis=2))
-    count = there.sum(axis=1)
-    total = np.where(there[..., None], points, 0.0).sum(axis=1)
+    present = np.asarray(np.isfinite(points).all(axis=2))
+    count = present.sum(axis=1)
+    total = np.where(present[..., None], points, 0.0).sum(axis=1)
     return np.where(count[:, None] > 0, total / np.maximum(count, 1)[:, None], np.nan)
 
 

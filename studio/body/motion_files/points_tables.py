@@ -70,8 +70,8 @@ def _deeplabcut(path: Path, rows: list[list[str]]) -> Rows:
 
 def _motive(path: Path, rows: list[list[str]]) -> Rows:
     start = rows[0]
-    said = {start[at].lower(): start[at + 1] for at in range(0, len(start) - 1, 2)}
-    unit = UNITS.get(said.get("length units", "").lower(), "")
+    entries = {start[at].lower(): start[at + 1] for at in range(0, len(start) - 1, 2)}
+    unit = UNITS.get(entries.get("length units", "").lower(), "")
     at = next((number for number, row in enumerate(rows) if row[0].lower() == "frame"), -1)
     named = [row for row in rows[:at] if len(row) > 2 and "name" in (row[0].lower(), row[1].lower())]
     kinds = [row for row in rows[:at] if len(row) > 2 and "type" in (row[0].lower(), row[1].lower())]

@@ -40,10 +40,10 @@ def _counted_from_0(path: Path, motion: MarkerMotion, fps: float, frame_count: i
     """Rows that count the footage's frames from 1, as its last one shows, a frame earlier; a note where it is
     unknown.
     """
-    there = np.flatnonzero(np.asarray(np.isfinite(motion.positions).all(axis=2)).any(axis=1))
-    if not len(there):
+    rows = np.flatnonzero(np.asarray(np.isfinite(motion.positions).all(axis=2)).any(axis=1))
+    if not len(rows):
         return motion
-    first, last = (round(float(motion.times[at]) * fps) for at in (there[0], there[-1]))
+    first, last = (round(float(motion.times[at]) * fps) for at in (rows[0], rows[-1]))
     if first == 0:
         return motion
     if first == 1 and last == frame_count:

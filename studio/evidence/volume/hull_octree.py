@@ -122,12 +122,12 @@ def summed_areas(
     for x in range(row_length):
         sums[x] = 0
     for y in range(height):
-        before, here = y * row_length, (y + 1) * row_length
+        before, current = y * row_length, (y + 1) * row_length
         along = np.int32(0)
-        sums[here] = 0
+        sums[current] = 0
         for x in range(width):
             along += np.int32(mask[y, x] >= 128)
-            sums[here + x + 1] = sums[before + x + 1] + along
+            sums[current + x + 1] = sums[before + x + 1] + along
 
 
 @njit(**EXACT)

@@ -197,9 +197,9 @@ class _Followed:
 
     def apart(self, centres: Array, moved: Array) -> Array:
         """(K,) mm of places (K, 3) from its voxels, moved on by (2,) mm over the floor; inf out of its reach."""
-        there = centres - np.array([*moved, 0.0])
-        distances = np.asarray(self._tree.query(there)[0], dtype=np.float64)
-        away = np.linalg.norm(there[:, :2] - self.middle, axis=1)
+        offsets = centres - np.array([*moved, 0.0])
+        distances = np.asarray(self._tree.query(offsets)[0], dtype=np.float64)
+        away = np.linalg.norm(offsets[:, :2] - self.middle, axis=1)
         return np.where(away <= self._farthest, distances, np.inf)
 
     def keep(self, centres: Array, moved: Array) -> None:

@@ -40,8 +40,8 @@ def carried(points: Array, own: Sequence[Camera], others: Sequence[Camera]) -> t
             "Give a calibration of the same cameras, with the same names.",
         )
     flat = points.reshape(-1, 3)
-    there = np.isfinite(flat).all(axis=1)
-    given = flat[there]
+    finite = np.isfinite(flat).all(axis=1)
+    given = flat[finite]
     seen = np.stack([sees(camera, given) for camera, _ in pairs])
     enough = np.asarray(seen.sum(axis=0) >= FEWEST_CAMERAS)
     if not len(given) or enough.mean() < LEAST_SEEN:
@@ -64,7 +64,7 @@ def carried(points: Array, own: Sequence[Camera], others: Sequence[Camera]) -> t
             "Check that both are of these cameras, in the same place, with pictures of the same size.",
         )
     positions = np.full_like(flat, np.nan)
-    positions[np.flatnonzero(there)[enough]] = placed[enough]
+    positions[np.flatnonzero(finite)[enough]] = placed[enough]
     return positions.reshape(points.shape), missed
 
 

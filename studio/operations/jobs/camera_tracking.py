@@ -95,9 +95,9 @@ def track_cameras(
         except BaseException:
             discard_recording(recording)
             raise
-        said = _Words(recording, report)
+        words = _Words(recording, report)
         try:
-            summary = track_live(recording.session, made, said, send_to=request.send_to)
+            summary = track_live(recording.session, made, words, send_to=request.send_to)
         finally:
             session = recording.close()
     return TrackedCameras(session, session.run(made.name), summary, recording.standing)

@@ -316,11 +316,11 @@ _wait = wait  # where a parameter is called `wait`
 
 def _check_software(needs: _Needs, who: str) -> None:
     """Raises RunError where this machine has other versions."""
-    here = _software()
+    installed = _software()
     for name, wanted in needs.software.items():
-        if here.get(name) != wanted:
+        if installed.get(name) != wanted:
             raise RunError(
-                f"{who} has {name} {here.get(name, 'missing')}, this machine has {wanted}.",
+                f"{who} has {name} {installed.get(name, 'missing')}, this machine has {wanted}.",
                 "Install the same versions on all machines: other ones may give other results.",
             )
 

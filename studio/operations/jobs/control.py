@@ -160,28 +160,28 @@ class StudioControl:
 
     def _restart(self, resume: bool) -> None:
         with self._lock:
-            said, old = self._said, self._process
+            before, old = self._said, self._process
             self._process = None
             answers, self._answers = self._answers, {}
-            self._said = self._state = nothing_open(said.seconds_a_layer)
+            self._said = self._state = nothing_open(before.seconds_a_layer)
         if old is not None:
             old.end(0.0)
         _leave_unanswered(answers)
         self.start()
-        if said.seconds_a_layer:
-            self.request(commands.SetPace(seconds_a_layer=said.seconds_a_layer))
-        place = self._places.get((said.session, said.run))
+        if before.seconds_a_layer:
+            self.request(commands.SetPace(seconds_a_layer=before.seconds_a_layer))
+        place = self._places.get((before.session, before.run))
         if place is not None:
             about: commands.About = {"session": place[0], "run": place[1]}
             # What was renamed or deleted meanwhile stays closed.
             with contextlib.suppress(NotFoundError):
-                if resume and said.state.searches:
+                if resume and before.state.searches:
                     # Refused if the process died just after its last frame: then nothing is left to go on with.
                     with contextlib.suppress(RunError):
                         self.request(commands.Start(**about))
                 else:
                     self.request(commands.Open(**about))
-        for names in said.waiting:
+        for names in before.waiting:
             session, run = self._places[names]
             with contextlib.suppress(NotFoundError):
                 self.request(commands.Start(session=session, run=run))

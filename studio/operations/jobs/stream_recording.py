@@ -62,20 +62,20 @@ class RecordingStanding:
     @property
     def notes(self) -> tuple[str, ...]:
         """What a person should know of it, sentences."""
-        said = [f"The recording ended early: {self.ended}."] if self.ended not in ("", OVER) else []
+        notes = [f"The recording ended early: {self.ended}."] if self.ended not in ("", OVER) else []
         for name, one in self.figures.items():
             if one.repeated:
-                said.append(
+                notes.append(
                     f"Camera {name} lost {one.repeated} of {one.pictures} pictures; the one before stands in."
                 )
             if self.missed[name]:
-                said.append(f"The disk was too slow for {self.missed[name]} pictures of camera {name}.")
+                notes.append(f"The disk was too slow for {self.missed[name]} pictures of camera {name}.")
         for camera in self.cameras:
             if camera.state == "stopped":
-                said.append(
+                notes.append(
                     f"Camera {camera.name} stopped {camera.seconds:.1f} s before the end. {camera.message}"
                 )
-        return tuple(said)
+        return tuple(notes)
 
 
 class StreamRecording:

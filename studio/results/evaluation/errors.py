@@ -394,17 +394,17 @@ def _root_aligned(tracked_points: Array, truth_points: Array, seen: NDArray[np.b
     order) laid on the true one.
     """
     means: list[float] = []
-    for points, goal, there in zip(tracked_points, truth_points, seen, strict=True):
-        laid = moved_to_root(points[there], goal[there], 0)
-        means.append(float(np.linalg.norm(laid - goal[there], axis=1).mean()))
+    for points, goal, present in zip(tracked_points, truth_points, seen, strict=True):
+        laid = moved_to_root(points[present], goal[present], 0)
+        means.append(float(np.linalg.norm(laid - goal[present], axis=1).mean()))
     return float(np.mean(means))
 
 
 def _procrustes(tracked_points: Array, truth_points: Array, seen: NDArray[np.bool_]) -> float | None:
     """Mean over frames of the markers' mean distance, mm, after the best similarity of each frame."""
     means: list[float] = []
-    for points, goal, there in zip(tracked_points, truth_points, seen, strict=True):
-        if there.sum() >= FEWEST_POINTS:
-            laid = similarity_aligned(points[there], goal[there])
-            means.append(float(np.linalg.norm(laid - goal[there], axis=1).mean()))
+    for points, goal, present in zip(tracked_points, truth_points, seen, strict=True):
+        if present.sum() >= FEWEST_POINTS:
+            laid = similarity_aligned(points[present], goal[present])
+            means.append(float(np.linalg.norm(laid - goal[present], axis=1).mean()))
     return float(np.mean(means)) if means else None

@@ -154,8 +154,8 @@ def _between(body: BodyModel, places: Array, poses: Array, wanted: Array) -> tup
 def _gap_notes(missing: int, far: int) -> tuple[str, ...]:
     if not missing:
         return ()
-    which = "1 frame has no pose of its" if missing == 1 else f"{missing} frames have no pose of their"
-    note = f"{which} own (not tracked, or lost)."
+    frames = "1 frame has no pose of its" if missing == 1 else f"{missing} frames have no pose of their"
+    note = f"{frames} own (not tracked, or lost)."
     return (note, _far_note(far)) if far else (note,)
 
 

@@ -192,9 +192,9 @@ def _aims(body: BodyModel) -> dict[int, tuple[Array, Array]]:
     aims: dict[int, tuple[Array, Array]] = {}
     for side, outwards in (("L", across), ("R", -across)):
         for start, end in CHAINS:
-            here, there = index[side + start], index[side + end]
+            near, far = index[side + start], index[side + end]
             aim = outwards if start in ("Shoulder", "Elbow") else DOWN
-            aims[body.markers[here].joint] = (points[there] - points[here], aim)
+            aims[body.markers[near].joint] = (points[far] - points[near], aim)
     return aims
 
 

@@ -23,15 +23,15 @@ def cone(limb: Limb) -> tuple[Array, Array, Indices]:
     vertices = np.concatenate([near, far, near, np.zeros((1, 3)), far, top[None]])
     down = np.tile([0.0, 0.0, -up], (SECTIONS + 1, 1))
     normals = np.concatenate([_sides(limb, turn, 0.0), _sides(limb, turn, 1.0), down, -down])
-    here = np.arange(SECTIONS)
-    after, first, second = np.roll(here, -1), 2 * SECTIONS, 3 * SECTIONS + 1
+    ring = np.arange(SECTIONS)
+    after, first, second = np.roll(ring, -1), 2 * SECTIONS, 3 * SECTIONS + 1
     near_hub, far_hub = np.full(SECTIONS, first + SECTIONS), np.full(SECTIONS, second + SECTIONS)
     faces = np.concatenate(
         [
-            np.column_stack([here, after, after + SECTIONS]),
-            np.column_stack([here, after + SECTIONS, here + SECTIONS]),
-            np.column_stack([near_hub, first + after, first + here]),
-            np.column_stack([far_hub, second + here, second + after]),
+            np.column_stack([ring, after, after + SECTIONS]),
+            np.column_stack([ring, after + SECTIONS, ring + SECTIONS]),
+            np.column_stack([near_hub, first + after, first + ring]),
+            np.column_stack([far_hub, second + ring, second + after]),
         ]
     )
     # A limb of negative length is the same cone mirrored along z: its faces turn the other way round.

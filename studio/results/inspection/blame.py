@@ -143,12 +143,12 @@ def rows(frame: InspectedFrame, selection: Selection) -> ViewResult:
     pose, reference = explained_pose(frame, selection.track), reference_pose(frame, selection.track)
     limbs, swapped = limbs_swapped(run, pose, reference.pose)
     shares = evaluation.shares(np.concatenate([pose[None], reference.pose[None], swapped]))
-    here, there, by_limb = shares.values[0], shares.values[1], shares.values[2:]
+    pose_terms, reference_terms, by_limb = shares.values[0], shares.values[1], shares.values[2:]
     matrix: list[Row] = []
     for view, camera in enumerate(shares.cameras):
         for number, term in enumerate(shares.terms):
-            own = float(here[view, number])
-            others = [(WHOLE_BODY, float(there[view, number]))]
+            own = float(pose_terms[view, number])
+            others = [(WHOLE_BODY, float(reference_terms[view, number]))]
             others += [
                 (limb, float(values[view, number])) for limb, values in zip(limbs, by_limb, strict=True)
             ]
@@ -161,7 +161,7 @@ def rows(frame: InspectedFrame, selection: Selection) -> ViewResult:
     return ViewResult(
         {
             "matrix": matrix,
-            "left_out": _left_out(shares, here, there),
+            "left_out": _left_out(shares, pose_terms, reference_terms),
             "pulls": [
                 (*label, camera, term, float(pulls[at, view, number]))
                 for at, label in enumerate(run.labels)
@@ -177,13 +177,13 @@ def rows(frame: InspectedFrame, selection: Selection) -> ViewResult:
     )
 
 
-def _left_out(shares: Shares, here: Array, there: Array) -> list[Row]:
+def _left_out(shares: Shares, pose_terms: Array, reference_terms: Array) -> list[Row]:
     """Preference of the pose over the reference when a camera or a term counts less; "" stands for all of them."""
-    whole = float((here - there).sum())
-    table: list[Row] = [("", "", 1.0, float(here.sum()), float(there.sum()), whole, 0.0)]
+    whole = float((pose_terms - reference_terms).sum())
+    table: list[Row] = [("", "", 1.0, float(pose_terms.sum()), float(reference_terms.sum()), whole, 0.0)]
     for name_at, names in ((0, shares.cameras), (1, shares.terms)):
         for at, name in enumerate(names):
-            own, other = (np.take(part, at, axis=name_at).sum() for part in (here, there))
+            own, other = (np.take(part, at, axis=name_at).sum() for part in (pose_terms, reference_terms))
             for factor in FACTORS:
                 less = 1.0 - factor
                 table.append(
@@ -191,8 +191,8 @@ def _left_out(shares: Shares, here: Array, there: Array) -> list[Row]:
                         name if name_at == 0 else "",
                         name if name_at == 1 else "",
                         factor,
-                        float(here.sum() - less * own),
-                        float(there.sum() - less * other),
+                        float(pose_terms.sum() - less * own),
+                        float(reference_terms.sum() - less * other),
                         whole - less * float(own - other),
                         -less * float(own - other),
                     )

@@ -87,10 +87,10 @@ def limb_rows(run: InspectedRun, selection: Selection) -> dict[str, list[Row]]:
     body of that size.
     """
     distances = _distances(run, selection.track)
-    errors, shares, said = _means(run, distances), disagreements_of(run), _verdicts(run, distances)
+    errors, shares, verdicts = _means(run, distances), disagreements_of(run), _verdicts(run, distances)
     table: list[Row] = []
     for frame in sorted(shares.keys() | errors.keys()):
-        off, share, own = errors.get(frame, {}), shares.get(frame, {}), said.get(frame, UNKNOWN)
+        off, share, own = errors.get(frame, {}), shares.get(frame, {}), verdicts.get(frame, UNKNOWN)
         for limb in dict.fromkeys((*off, *share)):
             mm, area = off.get(limb, float("nan")), share.get(limb, float("nan"))
             table.append((frame, limb, no_value(mm), no_value(area), limb in own.lost, own.lost_by(limb)))

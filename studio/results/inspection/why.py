@@ -254,11 +254,11 @@ class Case:
         """
         if not self.wrong:
             return ""
-        here = exchanged_in(self.run.body, self.reference.pose, self.pose)
+        exchange = exchanged_in(self.run.body, self.reference.pose, self.pose)
         began = self.stretch[0]
         others = sorted({began, (began + self.frame.number) // 2} - {self.frame.number})
-        if here or len(others) < 2:
-            return here
+        if exchange or len(others) < 2:
+            return exchange
         exchanges = {self._exchanged_in_frame(number) for number in others}
         return exchanges.pop() if len(exchanges) == 1 else ""
 
@@ -543,7 +543,7 @@ def _compared_with(case: Case) -> str:
 def _first_finding(case: Case) -> FrameFinding:
     """Whether the frame fits, in the words of timeline and badge, and how far the limbs are off."""
     numbers, reference = dict(case.errors), _of(case.reference.kind)
-    said, mended = _verdict_sentences(case), _mended(case)
+    sentences, mended = _verdict_sentences(case), _mended(case)
     worst = max(case.errors, key=lambda name: case.errors[name])
     if case.wrong:
         named = sorted(case.wrong, key=lambda name: -case.errors[name])
@@ -552,7 +552,7 @@ def _first_finding(case: Case) -> FrameFinding:
         if case.verdict.fits and not mended:
             words += f" No limb counts as lost: that begins at a marker {_mm(lost_mm(case.run.body))} off."
         kind = "mended" if mended and case.verdict.fits else "wrong limb"
-        return FrameFinding(kind, " ".join([*said, words]), named[0], numbers=numbers)
+        return FrameFinding(kind, " ".join([*sentences, words]), named[0], numbers=numbers)
     farthest = _mm(case.errors[worst])
     if case.verdict.fits and case.drifting:
         parts = [f"the {limb} by {_mm(case.errors[limb])}" for limb in case.drifting]
@@ -562,11 +562,11 @@ def _first_finding(case: Case) -> FrameFinding:
         words = f"The frame fits: no limb is farther than {farthest} from {reference}."
         return FrameFinding("fits", words, worst, numbers=numbers)
     if case.reference.kind == "truth":
-        said.append(f"On average no limb's points are farther than {farthest} from the truth.")
+        sentences.append(f"On average no limb's points are farther than {farthest} from the truth.")
     elif case.verdict.lost:
-        said.append(f"No better place is known: {reference} is nowhere farther than {farthest} away.")
+        sentences.append(f"No better place is known: {reference} is nowhere farther than {farthest} away.")
     limb = case.verdict.lost[0] if case.verdict.lost else worst
-    return FrameFinding("lost", " ".join(said), limb, numbers=numbers)
+    return FrameFinding("lost", " ".join(sentences), limb, numbers=numbers)
 
 
 def _verdict_sentences(case: Case) -> list[str]:

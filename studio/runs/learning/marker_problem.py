@@ -73,9 +73,9 @@ class MarkerProblem:
 
     def searched(self, frame: int, start: Array) -> Array:
         """The pose (D,) of one frame from many starts."""
-        there = self.present[frame]
-        names = tuple(name for name, seen in zip(self.names, there, strict=True) if seen)
-        pose, _ = pose_from_markers(self.body, names, self.points[frame, there], start * self.scale)
+        present = self.present[frame]
+        names = tuple(name for name, seen in zip(self.names, present, strict=True) if seen)
+        pose, _ = pose_from_markers(self.body, names, self.points[frame, present], start * self.scale)
         return self.next(np.clip(pose / self.scale, self.lower, self.upper), frame)
 
     def next(self, before: Array, frame: int) -> Array:

@@ -130,8 +130,8 @@ def summary_of(run: StoredRun) -> LiveSummary:
     if sets and tracked:
         # Of a recording, only the sets that exist: numbers between them only mark the time.
         came = [one.frame for one in sets if one.frame >= tracked[0]]
-        there = set(came)
-        incomplete = tuple(frame for frame in range(tracked[0], came[-1]) if frame not in there)
+        arrived = set(came)
+        incomplete = tuple(frame for frame in range(tracked[0], came[-1]) if frame not in arrived)
     return LiveSummary(
         tracked=tuple(tracked),
         dropped=tuple(frame for frame in came if frame not in known),

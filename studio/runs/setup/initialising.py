@@ -150,8 +150,8 @@ def initialise(
         progress=lambda done, total: progress("searching for the pose", done, total),
     )
     progress("checking each limb", 0, 1)
-    said = facing_agreement(tree, cameras, pictures, start.pose)
-    start = facing_as_said(start, len(cameras), said)
+    votes = facing_agreement(tree, cameras, pictures, start.pose)
+    start = facing_as_said(start, len(cameras), votes)
     if start.margin < 0.0:
         note = f"{note} {TURNED}".strip()
     stands = limbs_put_right(tree, cameras, masks, start.pose, seed, draw=len(cameras) >= FEWEST_VIEWS)
@@ -175,12 +175,12 @@ def initialise(
     )
 
 
-def facing_as_said(start: FoundStart, cameras: int, said: float) -> FoundStart:
+def facing_as_said(start: FoundStart, cameras: int, votes: float) -> FoundStart:
     """The start pose or its rival, whichever faces the right way by its weight and by what the network says of the
     pictures (`facing_agreement` of the start pose), with the confidence of both together.
     """
-    weighed = 0.0 if start.rival is None and said < 0.0 else facing_odds(start.margin, cameras)
-    odds = weighed + NETWORK_ODDS * said
+    weighed = 0.0 if start.rival is None and votes < 0.0 else facing_odds(start.margin, cameras)
+    odds = weighed + NETWORK_ODDS * votes
     if odds < 0.0 and start.rival is not None:
         return dataclasses.replace(
             start, pose=start.rival, rival=start.pose, log_weight=start.log_weight - start.margin,

@@ -251,9 +251,9 @@ def preview_mask(session: Session, camera: str, frame: int, strokes: Sequence[St
         return None
     with closing(session.footage()) as footage:
         earlier = made_of_strokes(session)
-        here = own.get(frame, ())
+        on_frame = own.get(frame, ())
         if frame == first:
-            return StrokeCut().begin(footage.picture(camera, frame), here)
+            return StrokeCut().begin(footage.picture(camera, frame), on_frame)
         if earlier is not None:
             kept = kept_frames(own, by_frame(earlier.made.strokes, camera), footage.frame_count)
             if frame in kept:
@@ -263,7 +263,7 @@ def preview_mask(session: Session, camera: str, frame: int, strokes: Sequence[St
                 cut = _begun(session, footage, camera, first, own[first])
                 if beside != first:
                     cut.learn(footage.picture(camera, beside), earlier.mask(camera, beside), False)
-                return cut.cut(footage.picture(camera, frame), here)
-        if any(stroke.kind == "inside" for stroke in here):
-            return StrokeCut().begin(footage.picture(camera, frame), here)
+                return cut.cut(footage.picture(camera, frame), on_frame)
+        if any(stroke.kind == "inside" for stroke in on_frame):
+            return StrokeCut().begin(footage.picture(camera, frame), on_frame)
         return None

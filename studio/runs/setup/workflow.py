@@ -110,9 +110,9 @@ def calibration_step(session: Session) -> StepStatus:
             words,
             f"The footage of camera {enumerated(other)} is of another size now.",
         )
-    asked = (UNIT,) if floor_was_set(session) else (UNIT, TILTED, NO_FLOOR)
+    codes = (UNIT,) if floor_was_set(session) else (UNIT, TILTED, NO_FLOOR)
     findings = (*check_calibration(cameras), *room_findings(cameras, _size_mm(session)))
-    if tilted := [finding for finding in findings if finding.code in asked]:
+    if tilted := [finding for finding in findings if finding.code in codes]:
         why = " ".join([*(finding.message for finding in tilted), tilted[0].remedy])
         return StepStatus("calibration", "stale", words, why)
     if faults := known_faults(session):

@@ -506,10 +506,10 @@ def _one_of(source: Path, names: tuple[str, ...], trial: str | None) -> str:
         return str(trial)
     if trial is None and len(names) == 1:
         return names[0]
-    there = f"'{source.name}' holds {len(names)} trials: {listed(names)}"
+    listing = f"'{source.name}' holds {len(names)} trials: {listed(names)}"
     if trial is None:
-        raise FootageError(f"{there}.", f"Choose one with --trial {sorted(names, key=natural_key)[0]}.")
-    raise FootageError(f"There is no trial '{trial}'; {there}.", "Choose one of them with --trial NAME.")
+        raise FootageError(f"{listing}.", f"Choose one with --trial {sorted(names, key=natural_key)[0]}.")
+    raise FootageError(f"There is no trial '{trial}'; {listing}.", "Choose one of them with --trial NAME.")
 
 
 def _calibration(source: Path, places: tuple[Path, ...], choice: Path | str | None) -> Path:
@@ -518,8 +518,10 @@ def _calibration(source: Path, places: tuple[Path, ...], choice: Path | str | No
         for path in (Path(choice), *(place / choice for place in places)):
             if path.exists():
                 return path
-        there = listed(path.name for place in places for path in find_calibrations(place))
-        raise CalibrationError(f"There is no calibration '{choice}'.", f"Found in '{source.name}': {there}.")
+        listing = listed(path.name for place in places for path in find_calibrations(place))
+        raise CalibrationError(
+            f"There is no calibration '{choice}'.", f"Found in '{source.name}': {listing}."
+        )
     for place in places:
         files = find_calibrations(place)
         if len(files) == 1:

@@ -114,8 +114,8 @@ def carried_truth(
         path = plan.points.path
         try:
             own = read_calibration(plan.calibration, unit)
-            truths[path.stem], said = _of_tool(plan.points, own, calibration, fps, frame_count)
-            notes += said
+            truths[path.stem], more_notes = _of_tool(plan.points, own, calibration, fps, frame_count)
+            notes += more_notes
         except StudioError as problem:
             notes.append(f"The points '{path.name}' were not taken for the truth: {problem}")
     for path in plan.truth:
@@ -182,10 +182,10 @@ def _in_unit_of(own: Calibration, motion: MarkerMotion, name: str) -> MarkerMoti
 def _spread(motion: MarkerMotion) -> float:
     """How far a frame's points lie apart along an axis, in the median."""
     known = np.isfinite(motion.positions).sum(axis=2) == 3
-    there = motion.positions[known.sum(axis=1) > 0]
-    if not len(there):
+    positions = motion.positions[known.sum(axis=1) > 0]
+    if not len(positions):
         return math.inf
-    return float(np.median(np.nanmax(there, axis=1) - np.nanmin(there, axis=1), axis=0).max())
+    return float(np.median(np.nanmax(positions, axis=1) - np.nanmin(positions, axis=1), axis=0).max())
 
 
 def check_room(plan: SourcePlan, into: Path) -> None:
