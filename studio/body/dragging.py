@@ -94,15 +94,19 @@ class Dragger:
                 "Give a finite pose in the order of its parameters, and x, y, z in mm.",
             )
         start = np.clip(within_limits(self.body, given), self._lower, self._upper)
-        fitted = self._pulled(start, start, grip, goal)
-        if not self._reached(fitted, grip, goal):
-            bent = self._pulled(self._bent(start, grip), start, grip, goal)
-            fitted = bent if self._left(bent, grip, goal) < self._left(fitted, grip, goal) else fitted
-        if not self._reached(fitted, grip, goal):
+        fitted = self._pull(start, start, grip, goal)
+        if not self._reaches(fitted, grip, goal):
+            bent = self._pull(self._bend(start, grip), start, grip, goal)
+            fitted = (
+                bent
+                if self._distance_left(bent, grip, goal) < self._distance_left(fitted, grip, goal)
+                else fitted
+            )
+        if not self._reaches(fitted, grip, goal):
             everything = np.arange(len(start))
-            fitted = self._fitted(fitted, start, everything, self._whole_pull(), grip, goal, self._ends)
-            fitted = self._pulled(fitted, fitted, grip, goal)
-        return Dragged(fitted, self._left(fitted, grip, goal))
+            fitted = self._fit(fitted, start, everything, self._whole_pull(), grip, goal, self._ends)
+            fitted = self._pull(fitted, fitted, grip, goal)
+        return Dragged(fitted, self._distance_left(fitted, grip, goal))
 
     def root_frame(self, pose: Array) -> Array | None:
         """(3, 4) world from root, mm; None for a body that is fixed to the world."""
@@ -131,19 +135,19 @@ class Dragger:
         answer = least_squares(residuals, begin, bounds=limits, max_nfev=MOST_STEPS)
         return full(answer.x[None])[0]
 
-    def _pulled(self, pose: Array, start: Array, grip: Grip, goal: Array) -> Array:
+    def _pull(self, pose: Array, start: Array, grip: Grip, goal: Array) -> Array:
         """Only the chain moves."""
         chain = self._chains[grip.limb]
         if not len(chain):
             return pose
         inwards = np.arange(len(chain))[::-1] / max(1, len(chain) - 1)
         pull = PULL + (PULL_INWARDS - PULL) * inwards
-        return self._fitted(pose, start, chain, pull, grip, goal, ())
+        return self._fit(pose, start, chain, pull, grip, goal, ())
 
-    def _reached(self, pose: Array, grip: Grip, goal: Array) -> bool:
-        return not grip.root and self._left(pose, grip, goal) < REACHED
+    def _reaches(self, pose: Array, grip: Grip, goal: Array) -> bool:
+        return not grip.root and self._distance_left(pose, grip, goal) < REACHED
 
-    def _bent(self, start: Array, grip: Grip) -> Array:
+    def _bend(self, start: Array, grip: Grip) -> Array:
         """The pose with the chain part of the way to the middle of its limits: a stretched one cannot bend."""
         chain = self._chains[grip.limb]
         bounded = chain[np.isfinite(self._lower[chain]) & np.isfinite(self._upper[chain])]
@@ -154,10 +158,10 @@ class Dragger:
     def _whole_pull(self) -> Array:
         return np.where(self._root, ROOT_PULL, PULL_INWARDS)
 
-    def _left(self, pose: Array, grip: Grip, goal: Array) -> float:
+    def _distance_left(self, pose: Array, grip: Grip, goal: Array) -> float:
         return float(np.linalg.norm(self.points(pose)[grip.limb] - goal))
 
-    def _fitted(
+    def _fit(
         self,
         pose: Array,
         start: Array,

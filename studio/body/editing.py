@@ -68,13 +68,13 @@ def edited(
         definition = _with_marker(definition, text)
     if title:
         definition = msgspec.structs.replace(definition, title=title)
-    definition_now = _checked(definition, body.name)
+    definition_now = _check(definition, body.name)
     if mirror:
         definition_now = _mirrored(definition_now, mirror, notes)
     return BodyEdit(definition_now, tuple(notes))
 
 
-def _checked(definition: BodyDefinition, name: str) -> BodyModel:
+def _check(definition: BodyDefinition, name: str) -> BodyModel:
     """The body of a definition, read from its text: what is saved is what was checked."""
     bare = BodyModel(name, definition.title, (), (), (), (), _values(definition), definition)
     return parse_body(body_text(bare), name, f"{name}.toml")
@@ -150,13 +150,13 @@ def _with_limits(definition: BodyDefinition, limits: Mapping[str, float], notes:
             _fail(f"Parameter '{parameter}'", f"has {key} nan", "Give a number.")
         changes.setdefault(parameter, {})[key] = value
     parameters = tuple(
-        _limited(entry, changes[entry.name], notes) if entry.name in changes else entry
+        _limit(entry, changes[entry.name], notes) if entry.name in changes else entry
         for entry in definition.parameters
     )
     return msgspec.structs.replace(definition, parameters=parameters)
 
 
-def _limited(entry: ParameterEntry, changes: Mapping[str, float], notes: list[str]) -> ParameterEntry:
+def _limit(entry: ParameterEntry, changes: Mapping[str, float], notes: list[str]) -> ParameterEntry:
     changed = msgspec.structs.replace(entry, **changes)
     rest = changed.neutral
     if isinstance(rest, tuple) or "neutral" in changes or changed.lower >= changed.upper:
@@ -217,10 +217,10 @@ def _mirrored(body: BodyModel, side: str, notes: list[str]) -> BodyModel:
         if side in own.limb and twin != at:
             parameters[twin] = _mirrored_limits(own, parameters[twin], sign)
     definition = msgspec.structs.replace(definition, parameters=tuple(parameters))
-    whole = _checked(definition, body.name)
+    whole = _check(definition, body.name)
     # Its sides are even now: so is the plane between them.
     changed = _mirrored_markers(whole, Mirror(whole), side, notes)
-    return _checked(changed, body.name)
+    return _check(changed, body.name)
 
 
 def _with_value(entry: Any, value: float) -> Any:  # noqa: ANN401 - a DimensionEntry

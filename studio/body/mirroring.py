@@ -64,7 +64,7 @@ class Mirror:
     def mirrored(self, pose: Array) -> Array:
         """The pose (D,) mirrored, with the same place and facing."""
         ends, sideways = limb_ends(self.body, pose)[0], self.sideways(pose)
-        return self._placed(self._exchanged(pose), self._reflected(ends, sideways))
+        return self._place_root(self._exchanged(pose), self._reflected(ends, sideways))
 
     def turned_round(self, pose: Array) -> Array:
         """The pose (D,) facing the other way, left and right exchanged: from front and back it looks the same."""
@@ -72,7 +72,7 @@ class Mirror:
         ahead = np.cross(sideways, [0.0, 0.0, 1.0])
         if np.linalg.norm(ahead) < SMALL:
             ahead = np.array([1.0, 0.0, 0.0])
-        return self._placed(self._exchanged(pose), self._reflected(ends, ahead / np.linalg.norm(ahead)))
+        return self._place_root(self._exchanged(pose), self._reflected(ends, ahead / np.linalg.norm(ahead)))
 
     @property
     def turns(self) -> bool:
@@ -86,14 +86,14 @@ class Mirror:
         target = limb_ends(self.body, pose)[0][self.limb_twins[limbs]]
         start = pose.copy()
         start[own] = self._exchanged(pose)[own]
-        return self._fitted(start, target, own, limbs)[0]
+        return self._fit(start, target, own, limbs)[0]
 
     def about_face(self, pose: Array) -> Array:
         """The pose (D,) facing the other way with every limb where its twin is, as near as joint limits allow."""
         target = limb_ends(self.body, pose)[0][self.limb_twins]
         rest = self.body.neutral
         rest[self._root] = pose[self._root]
-        return self._placed(rest, target, whole=True)
+        return self._place_root(rest, target, whole=True)
 
     def _exchanged(self, pose: Array) -> Array:
         rest = self.body.neutral
@@ -116,19 +116,19 @@ class Mirror:
         level = own * [1.0, 1.0, 0.0]
         return level / np.linalg.norm(level) if np.linalg.norm(level) > LEVEL else own
 
-    def _placed(self, pose: Array, target: Array, *, whole: bool = False) -> Array:
+    def _place_root(self, pose: Array, target: Array, *, whole: bool = False) -> Array:
         """The pose with its root where the limbs are nearest to `target`; an asymmetric body is fitted as a whole."""
         best, least = pose, math.inf
         for begin in self._beginnings(pose):
-            fitted, cost = self._fitted(begin, target, self._root)
+            fitted, cost = self._fit(begin, target, self._root)
             if cost < least:
                 best, least = fitted, cost
         best = within_limits(self.body, best)
         if whole or math.sqrt(least / len(target)) > UNEVEN:
-            best = self._fitted(best, target, np.arange(len(best)))[0]
+            best = self._fit(best, target, np.arange(len(best)))[0]
         return best
 
-    def _fitted(
+    def _fit(
         self, pose: Array, target: Array, free: Indices, limbs: Indices | None = None
     ) -> tuple[Array, float]:
         """The pose with its `free` parameters where the limbs are nearest to `target`, limits kept, and half the sum of

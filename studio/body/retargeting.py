@@ -133,7 +133,7 @@ def on_skeleton(recorded: RecordedMotion, skeleton: Skeleton) -> PersonMotion:
     source_legs, legs = 0.0, 0.0
     for index, side in enumerate(SIDES):
         for bone in family.bones:
-            turns[f"{side}_{bone.segment}"] = _followed(recorded, family, bone, index)
+            turns[f"{side}_{bone.segment}"] = _follow(recorded, family, bone, index)
         turns[f"{side}_clavicle"] = _clavicle(recorded, family, turns["thorax"], index)
         source_legs += _rest_length(recorded, family, "thigh", index)
         source_legs += _rest_length(recorded, family, "shin", index)
@@ -216,7 +216,7 @@ def _clavicle(recorded: RecordedMotion, family: Family, thorax: Array, side: int
     return thorax @ np.swapaxes(carrier, 1, 2) @ own
 
 
-def _followed(recorded: RecordedMotion, family: Family, bone: Bone, side: int) -> Array:
+def _follow(recorded: RecordedMotion, family: Family, bone: Bone, side: int) -> Array:
     """(F, 3, 3) rotations of a segment that turns with a joint, from its frame in the rest pose."""
     joint, begin, end = (
         recorded.index(family.named(name, side)) for name in (bone.joint, bone.begin, bone.end)

@@ -103,7 +103,7 @@ def _definition(path: Path, _digest: bytes) -> BodyDefinition:
 def robot_definition(path: Path) -> BodyDefinition:
     """The body file's entries of a robot's file. To be called through `isolated`: MuJoCo is native code."""
     mujoco = _mujoco()
-    mujoco.set_mju_user_warning(_ignored)
+    mujoco.set_mju_user_warning(_ignore)
     notes: list[str] = []
     try:
         root = ElementTree.fromstring(read_file(path))
@@ -128,7 +128,7 @@ def robot_definition(path: Path) -> BodyDefinition:
     return _Robot(compiled, path, _speeds(root), notes, is_urdf=root.tag == "robot").definition()
 
 
-def _ignored(_warning: str) -> None:
+def _ignore(_warning: str) -> None:
     """Takes MuJoCo's warnings, which it would else append to a file in the working directory."""
 
 
@@ -276,7 +276,7 @@ class _Robot:
 
     def definition(self) -> BodyDefinition:
         self._refuse_loops()
-        kept = self._kept()
+        kept = self._robot_bodies()
         if not kept:
             raise BodyError(
                 f"Robot file {self.path.name} has no joint that moves.", "Give a file of a robot that moves."
@@ -317,7 +317,7 @@ class _Robot:
                     "A body is an open tree: take the constraint out, or describe one side of the loop only.",
                 )
 
-    def _kept(self) -> list[int]:
+    def _robot_bodies(self) -> list[int]:
         """The bodies of the robot, parents first: surroundings and single things that lie about are left out."""
         model = self.model
         moving = {body: int(model.body_jntnum[body]) for body in range(1, model.nbody)}
@@ -366,7 +366,7 @@ class _Robot:
         self.link[body] = name
         parent = self.link.get(int(model.body_parentid[body]), WORLD)
         kinds, first = self._kinds(body), int(model.body_jntadr[body])
-        steps = _placed(1e3 * model.body_pos[body], _rotation(model.body_quat[body]))
+        steps = _fixed_steps(1e3 * model.body_pos[body], _rotation(model.body_quat[body]))
         if FREE in kinds:
             steps = []
         if not kinds:
@@ -501,7 +501,7 @@ class _Robot:
         for number, part in enumerate(parts, 1):
             own = self._unique("limb", name if len(parts) == 1 else f"{name} {number}")
             joint = self._unique("joint", f"{own} part")
-            self.joints.append(JointEntry(joint, name, "fixed", tuple(_placed(part.start, part.turn))))
+            self.joints.append(JointEntry(joint, name, "fixed", tuple(_fixed_steps(part.start, part.turn))))
             sizes: list[float | str] = [_rounded(value, ROUND_MM) for value in part.radii]
             if part.guessed:
                 for place, ending in enumerate(("radius_start", "radius_end")):
@@ -687,7 +687,7 @@ def _turns(rotation: Array) -> tuple[float, float, float]:
     return math.degrees(yaw), math.degrees(pitch), math.degrees(roll)
 
 
-def _placed(position: Array, rotation: Array) -> list[StepEntry]:
+def _fixed_steps(position: Array, rotation: Array) -> list[StepEntry]:
     """The steps of a fixed motion, mm."""
     return [*_moves(position), *_fixed_turns(zip("zyx", _turns(rotation), strict=True))]
 

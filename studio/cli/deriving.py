@@ -44,19 +44,19 @@ class Call:
         self._verb = verb
         self.given: dict[str, Any] = {}
         for entry in entries:
-            self.given |= _given(entry, options)
+            self.given |= _read_option(entry, options)
 
     def __call__(self, **more: object) -> Any:  # noqa: ANN401 - what the verb returns
         """Do it, with progress on standard error."""
-        return self._done(self._verb, {**self.given, **more})
+        return self._call(self._verb, {**self.given, **more})
 
     def do(self, verb: Callable[..., object], **given: object) -> Any:  # noqa: ANN401 - what the verb returns
         """Do another verb to the same session or run."""
         about = [entry.name for entry in declared(verb).parameters.values() if entry.target]
-        return self._done(verb, {name: self.given[name] for name in about if name in self.given} | given)
+        return self._call(verb, {name: self.given[name] for name in about if name in self.given} | given)
 
     @staticmethod
-    def _done(verb: Callable[..., object], given: Mapping[str, object]) -> object:
+    def _call(verb: Callable[..., object], given: Mapping[str, object]) -> object:
         takes = inspect.signature(verb).parameters
         return verb(**given, **({PROGRESS: shown_progress} if PROGRESS in takes else {}))
 
@@ -175,7 +175,7 @@ def _session(place: str, entry: Parameter) -> Session:
         return Workspace().resolve(place, remote=True, progress=report)
 
 
-def _given(entry: Parameter, options: Mapping[str, Any]) -> dict[str, object]:
+def _read_option(entry: Parameter, options: Mapping[str, Any]) -> dict[str, object]:
     """What was given for a parameter, {} for nothing. Raises StudioError for what cannot be read."""
     if entry.terminal.left_out:
         return {}

@@ -74,7 +74,7 @@ def _answer(
 ) -> dict[str, object]:
     if file is not None:
         write_tables(tables, caption, file)
-    shown = [_drawn(table) for table in tables if table.rows] if file is None else [f"{file}"]
+    shown = [_draw(table) for table in tables if table.rows] if file is None else [f"{file}"]
     return {
         "caption": caption,
         "notes": list(notes),
@@ -83,7 +83,7 @@ def _answer(
     }
 
 
-def _drawn(table: Table) -> str:
+def _draw(table: Table) -> str:
     """A table for a terminal, its first rows."""
     drawn = Drawn(title=table.title, title_justify="left")
     for column in table.columns:

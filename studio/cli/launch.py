@@ -115,7 +115,7 @@ def serve(
     log_path = _log_to_file(workspace.root / STATE_NAME)
     tokens = Tokens(new_token(), new_token())
     with _alone_on(workspace.root) as show_address, _listening(host, listening.port) as listener:
-        show_address(f"http://{_named(host)}:{listener.getsockname()[1]}")
+        show_address(f"http://{_host_of(host)}:{listener.getsockname()[1]}")
         control = StudioControl(workspace)
         try:
             # The other process loads what it needs, and compiles the run's kernels, while this one loads the server.
@@ -124,7 +124,7 @@ def serve(
             if opening is not None:
                 control.send(Open(**about(opening.run.folder), warm=True))
             app = _app(workspace, control, tokens, hosts, log_path)
-            at = f"https://{name}" if name else f"http://{_named(host)}:{listener.getsockname()[1]}"
+            at = f"https://{name}" if name else f"http://{_host_of(host)}:{listener.getsockname()[1]}"
             place: Mapping[str, str] = {} if opening is None else opening.query
             shown = (address(at, key, place) for key in tokens)
             announce(printed(*shown, plainly=listening.allow_remote and not name))
@@ -158,7 +158,7 @@ def address(at: str, token: str, shown: Mapping[str, str] = MappingProxyType({})
     return f"{at}/?{urlencode({'token': token, **shown})}"
 
 
-def _named(host: str) -> str:
+def _host_of(host: str) -> str:
     """The host for a URL: this machine's name if it listens on all addresses."""
     name = socket.gethostname() if host in ("0.0.0.0", "::", "") else host
     return f"[{name}]" if ":" in name else name

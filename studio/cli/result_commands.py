@@ -29,7 +29,7 @@ def refine_command(call: Call) -> dict[str, object]:
         f"{made.moved} of {len(made.track.frames)} frames moved; the silhouettes agree by"
         f" {made.agreement_before:.3f} before, {made.agreement_after:.3f} after."
     )
-    return _made(call, made, {"moved": made.moved, **agreement}, words)
+    return _describe_track(call, made, {"moved": made.moved, **agreement}, words)
 
 
 @command_of(smooth)
@@ -39,10 +39,10 @@ def smooth_command(call: Call) -> dict[str, object]:
         f"second difference of the markers {made.jitter_before:.1f} -> {made.jitter_after:.1f} mm RMS,"
         f" {len(made.filled)} frames filled, {len(made.left_out)} left out."
     )
-    return _made(call, made, {"filled": list(made.filled), "left_out": list(made.left_out)}, words)
+    return _describe_track(call, made, {"filled": list(made.filled), "left_out": list(made.left_out)}, words)
 
 
-def _made(call: Call, made: MadeTrack, more: dict[str, object], words: str) -> dict[str, object]:
+def _describe_track(call: Call, made: MadeTrack, more: dict[str, object], words: str) -> dict[str, object]:
     """A track that was made."""
     run = call.given["run"]
     source = made.track.made_by["from"]

@@ -110,7 +110,7 @@ def runs_command(session: str | None) -> dict[str, object]:
     """List the runs of a session, or of all sessions in the workspace; at an address those of a store."""
     listed = runs_there(session)
     if listed.stored is not None:
-        return _stored(listed.place, listed.stored)
+        return _list_stored(listed.place, listed.stored)
     entries: list[dict[str, object]] = [
         {
             "session": run.session,
@@ -135,7 +135,7 @@ def runs_command(session: str | None) -> dict[str, object]:
     return {"workspace": listed.place, "runs": entries, "text": "\n".join(lines) or "No runs yet."}
 
 
-def _stored(address: str, sessions: Sequence[RemoteSession]) -> dict[str, object]:
+def _list_stored(address: str, sessions: Sequence[RemoteSession]) -> dict[str, object]:
     lines = [
         f"{one.name:18} {one.bytes / 1e6:10.1f} MB  {', '.join(one.runs) if one.whole else 'half written'}"
         for one in sessions

@@ -168,7 +168,7 @@ class PersonNetwork:
 
         quarter_turns : as of the camera; the tried crops are upright in the picture turned by them.
         """
-        crops = _tried(picture.shape[1], picture.shape[0], -0.5 * math.pi * quarter_turns)
+        crops = _crops_over(picture.shape[1], picture.shape[0], -0.5 * math.pi * quarter_turns)
         first = [seen for seen in (self.look(picture, crop) for crop in crops) if seen.presence >= PRESENT]
         persons: list[Sighting] = []
         # How much of a crop the person fills tells a crop around him from one that cuts him off.
@@ -185,7 +185,7 @@ class PersonNetwork:
         return persons
 
 
-def _tried(width: int, height: int, angle: float) -> Iterator[Crop]:
+def _crops_over(width: int, height: int, angle: float) -> Iterator[Crop]:
     """Crops of several sizes over a picture; along a side that a crop spans there is one."""
     for share in SIZES:
         side = share * max(width, height)

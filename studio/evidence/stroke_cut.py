@@ -127,7 +127,7 @@ class StrokeCut:
             known = known | np.where(marks == 1, np.uint8(255), np.uint8(0))
         place = (0, 0, *size) if not known.any() else _grown(_box(known), size)
         part = np.s_[place[1] : place[3], place[0] : place[2]]
-        moved = _moved(self._mask[part], self._grey[part], grey[part])
+        moved = _flow_mask(self._mask[part], self._grey[part], grey[part])
         odds = _of_place(moved)
         if expected is not None:
             projected = _reduced_mask(expected, size)[part]
@@ -135,7 +135,7 @@ class StrokeCut:
         odds = odds + self._of_colour(small[part], part)
         out = np.zeros(size[::-1], np.uint8)
         foreground = _graph_cut(small[part], odds, marks[part])
-        out[part] = _connected(foreground, moved, marks[part])
+        out[part] = _connect(foreground, moved, marks[part])
         return self._refined(picture, out, strokes)
 
     def learn(self, picture: Bytes, mask: Bytes, is_key: bool) -> None:
@@ -288,7 +288,7 @@ def _first_mask(
             (1.0 - STRAY) * anything.ravel()[cells] + STRAY / BINS**3
         )
         odds = np.clip(colour, -MOST_COLOUR, MOST_COLOUR).astype(np.float32) + nearness
-        mask = _connected(_graph_cut(picture, odds, marks), np.zeros_like(marks), marks)
+        mask = _connect(_graph_cut(picture, odds, marks), np.zeros_like(marks), marks)
         known = np.ones(marks.shape, np.bool_)
     return mask
 
@@ -360,7 +360,7 @@ def _blurred(counts: Floats) -> Floats:
     return counts
 
 
-def _moved(mask: Bytes, before: Bytes, now: Bytes) -> Bytes:
+def _flow_mask(mask: Bytes, before: Bytes, now: Bytes) -> Bytes:
     """(h, w) 0 or 255: a mask of the picture before, moved by optical flow to where it is now."""
     if not mask.any() or min(mask.shape) < 16:
         return mask
@@ -414,7 +414,7 @@ def _one_gaussian(mean: float, variance: float) -> NDArray[np.float64]:
     return model
 
 
-def _connected(mask: Bytes, moved: Bytes, marks: Bytes) -> Bytes:
+def _connect(mask: Bytes, moved: Bytes, marks: Bytes) -> Bytes:
     """The pieces of a mask that an expected one, or a stroke inside, touches, without specks; small holes filled."""
     labels, areas = _pieces(mask)
     if len(areas) <= 1:

@@ -233,7 +233,7 @@ def parts_of(value: object, within: tuple[FunctionType, ...] = ()) -> Iterator[b
         yield from parts_of(value.py_func, within)
     elif isinstance(value, _Intrinsic):
         yield from parts_of(value._defn, within)
-    elif isinstance(value, FunctionType) and not _known(value.__module__) and value not in within:
+    elif isinstance(value, FunctionType) and not _is_versioned(value.__module__) and value not in within:
         yield from parts_of(
             (value.__defaults__, *(one.cell_contents for one in value.__closure__ or ())), within
         )
@@ -271,18 +271,18 @@ def _parts_of_code(
             yield from parts_of(constant, within)
     for value in (function.__globals__[name] for name in code.co_names if name in function.__globals__):
         yield from parts_of(value, within)
-        if isinstance(value, ModuleType) and not _known(value.__name__):
+        if isinstance(value, ModuleType) and not _is_versioned(value.__name__):
             for name in code.co_names:
                 yield from parts_of(getattr(value, name, None), within)
 
 
-def _known(module: str | None) -> bool:
+def _is_versioned(module: str | None) -> bool:
     return (module or "").partition(".")[0] in KNOWN_BY_NAME
 
 
 def _rebuilt(place: Path, context: CPUContext) -> CompileResult | None:
     """The kernel that is kept there; None where there is none that can be used."""
-    data = _kept(place)
+    data = _read_kernel(place)
     if data is None:
         return None
     try:
@@ -292,7 +292,7 @@ def _rebuilt(place: Path, context: CPUContext) -> CompileResult | None:
         return None
 
 
-def _kept(place: Path) -> bytes | None:
+def _read_kernel(place: Path) -> bytes | None:
     """What is kept there; None where there is nothing, it is damaged, or it is not this user's alone."""
     try:
         if not _is_ours(place.parent):

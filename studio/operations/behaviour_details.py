@@ -154,7 +154,7 @@ def _model(path: Path, _changed: int) -> BehaviourModel:
     return read_model(path)
 
 
-def _read(path: Path) -> BehaviourModel:
+def _read_model(path: Path) -> BehaviourModel:
     return _model(path, path.stat().st_mtime_ns)
 
 
@@ -163,7 +163,7 @@ def behaviour_detail(path: Path, workspace: Workspace) -> BehaviourDetail:
 
     `problem` says so if the model's body no longer exists or has changed; there are no poses to show then.
     """
-    model = _read(path)
+    model = _read_model(path)
     contexts = model.automaton.contexts
     lengths = np.array([len(context) for context in contexts])
     most = int(lengths.max()) + 1
@@ -183,8 +183,8 @@ def behaviour_detail(path: Path, workspace: Workspace) -> BehaviourDetail:
 
 def entropies_of(path: Path) -> Entropies:
     """Entropies (Eq. 2) of a model over memory, at its own ε and at a larger one."""
-    model = _read(path)
-    train, test = _parted(model.making.labels)
+    model = _read_model(path)
+    train, test = _split(model.making.labels)
     settings = model.making.settings
     lines: list[EntropyLine] = []
     for epsilon in dict.fromkeys(max(settings.epsilon, 0.01) * factor for factor in EPSILON_FACTORS):
@@ -204,7 +204,7 @@ def entropies_of(path: Path) -> Entropies:
     return Entropies(lines)
 
 
-def _parted(recordings: tuple[IntArray, ...]) -> tuple[list[IntArray], list[IntArray]]:
+def _split(recordings: tuple[IntArray, ...]) -> tuple[list[IntArray], list[IntArray]]:
     """Labels to learn from and to test on: every fifth recording, or the last fifth of each if there are few."""
     if len(recordings) >= FIFTH:
         kept = [labels for place, labels in enumerate(recordings) if place % FIFTH != FIFTH - 1]
@@ -221,7 +221,7 @@ def walk_of(path: Path, workspace: Workspace, frames: int, seed: int) -> Generat
 
     Raises BehaviourError where the model's body no longer exists.
     """
-    model = _read(path)
+    model = _read_model(path)
     body = _body_of(model, workspace)
     poses, states = generate(np.random.default_rng(seed), model, frames)
     contexts = model.automaton.contexts

@@ -166,12 +166,12 @@ def compare(
     bring_comparisons(opened)
     plan = CompareRequest(**options).plan(opened)
     with chosen_executor(cluster, place_in_words(opened)) as executor:
-        kept = _kept(opened, plan, name, Path(out) if out else None)
+        kept = _folder_for(opened, plan, name, Path(out) if out else None)
         before = done_before(kept, plan)
         lines = [executor.in_words] if executor else []
         if before:
             lines.append(f"{before} of {len(plan.seeds) * len(plan.candidates)} trials are there already.")
-        comparison = _measured(kept, opened, conclude, processes, executor, lines, progress)
+        comparison = _measure(kept, opened, conclude, processes, executor, lines, progress)
     return Compared(comparison, kept)
 
 
@@ -273,7 +273,7 @@ def sweep(
         lines = [*([executor.in_words] if executor else []), wait.in_words]
         if before := done_before(kept, plan):
             lines.append(f"{before} of {wait.runs} runs are there already.")
-        swept = _measured(kept, opened, conclude_sweep, processes, executor, lines, progress)
+        swept = _measure(kept, opened, conclude_sweep, processes, executor, lines, progress)
     return SweptGrid(swept, kept)
 
 
@@ -284,7 +284,7 @@ def expected_sweep(session: Session, request: SweepRequest) -> SweepExpected:
     return expected(session, request.plan(session), processes_beside(), cores())
 
 
-def _measured(
+def _measure(
     kept: KeptComparison,
     session: Session,
     conclude: Callable[[Plan, Sequence[Outcome]], Result],
@@ -323,7 +323,7 @@ def kept_sweep(session: Session, plan: Plan, name: str = "") -> KeptComparison:
     return new_comparison(folder, plan, session)
 
 
-def _kept(session: Session, plan: Plan, name: str, out: Path | None) -> KeptComparison:
+def _folder_for(session: Session, plan: Plan, name: str, out: Path | None) -> KeptComparison:
     """The folder to work in: of an unfinished comparison with the same request, else a new one.
 
     Raises SessionError for a folder that holds something else, or cannot be written.

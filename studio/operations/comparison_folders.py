@@ -36,13 +36,13 @@ def new_comparison(folder: Path, plan: Plan, of: Session | None = None) -> KeptC
     Raises SessionError if it exists, NotFoundError if the session was moved meanwhile.
     """
     if of is None:
-        return _begun(folder, plan)
+        return _begin(folder, plan)
     with one_at_a_time(of.path):
         check_there(of.path)
-        return _begun(folder, plan)
+        return _begin(folder, plan)
 
 
-def _begun(folder: Path, plan: Plan) -> KeptComparison:
+def _begin(folder: Path, plan: Plan) -> KeptComparison:
     record = ComparisonRecord(name=folder.name, created=now(), software=software_version(), plan=plan)
     made = atomic_files.new_folder_beside(folder)
     try:
@@ -74,7 +74,7 @@ def place_of(session: Session, name: str = "", *, sweep: bool = False) -> Path:
 
 def kept_comparisons(session: Session) -> tuple[KeptComparison, ...]:
     """A session's comparisons, newest first."""
-    return tuple(KeptComparison(path) for path in sorted(_folders(session), key=_made, reverse=True))
+    return tuple(KeptComparison(path) for path in sorted(_folders(session), key=_age_key, reverse=True))
 
 
 def comparison_count(session: Session) -> int:
@@ -160,7 +160,7 @@ def _is_comparison(path: Path) -> bool:
     return not path.name.startswith(".") and (path / RECORD_NAME).is_file()
 
 
-def _made(path: Path) -> tuple[str, int, str]:
+def _age_key(path: Path) -> tuple[str, int, str]:
     """Sort key of folders by age; one that cannot be read counts as oldest."""
     try:
         created = KeptComparison(path).record().created

@@ -374,7 +374,7 @@ def record(
         calibration.path if isinstance(calibration, Session) else calibration, Workspace()
     )
     if finish is not None:
-        return _kept(Path(finish), place, known, None, progress)
+        return _make_session(Path(finish), place, known, None, progress)
     addresses = addresses_of(cameras)
     check_cameras(known, [address.name for address in addresses])
     folder = recording_folder(place)
@@ -393,7 +393,7 @@ def record(
             say(progress, ["Stopped."])
         finally:
             standing = recording.close()
-    return _kept(folder, place, known, standing, progress)
+    return _make_session(folder, place, known, standing, progress)
 
 
 def addresses_of(cameras: Mapping[str, str] | Sequence[str]) -> list[CameraAddress]:
@@ -428,7 +428,7 @@ def _until(recording: StreamRecording, seconds: float | None, report: Progress, 
         report(standing.in_words, min(total, round(standing.seconds)), total)
 
 
-def _kept(
+def _make_session(
     folder: Path, place: Path, calibration: Path, standing: RecordingStanding | None, progress: Reporting
 ) -> Recorded:
     """The session made of a recording."""

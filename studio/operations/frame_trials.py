@@ -117,12 +117,12 @@ def trial_layers(run: InspectedRun, kept: TriedFrames, name: str) -> TrialLayers
 
 def _view(run: InspectedRun, tried: TriedFrame) -> TrialView:
     numbers = _numbers(run, tried.number, tried.result)
-    moved = _moved(run.settings(tried.number), tried.settings)
+    moved = _moved_knobs(run.settings(tried.number), tried.settings)
     same: dict[str, Any] = {entry.name: getattr(numbers, entry.name) for entry in fields(numbers)}
     return TrialView(**same, name=tried.name, moved=moved)
 
 
-def _moved(stored: RunSettings, tried: RunSettings) -> tuple[KnobMoved, ...]:
+def _moved_knobs(stored: RunSettings, tried: RunSettings) -> tuple[KnobMoved, ...]:
     before, after = values(stored), values(tried)
     return tuple(
         KnobMoved(knob.name, knob.label, knob.unit, before[knob.name], after[knob.name])

@@ -82,16 +82,16 @@ def view(
 
     Raises NotFoundError for an unknown view, frame, layer or name.
     """
-    return _viewed(inspected(run), name, frame, Selection(**selected))
+    return _look(inspected(run), name, frame, Selection(**selected))
 
 
-def _viewed(run: InspectedRun, name: str, frame: int | None, selection: Selection) -> Viewed:
+def _look(run: InspectedRun, name: str, frame: int | None, selection: Selection) -> Viewed:
     return look_over(run, name, selection) if frame is None else look(run, frame, name, selection)
 
 
 def view_answer(run: InspectedRun, name: str, selection: Selection, frame: int | None = None) -> ViewAnswer:
     """A view with what a page writes beside it: its question, and a caption of run and frame. Raises NotFoundError."""
-    shown, entry = _viewed(run, name, frame, selection), view_named(name)
+    shown, entry = _look(run, name, frame, selection), view_named(name)
     return ViewAnswer(
         view=name,
         title=entry.title,

@@ -219,14 +219,14 @@ def list_lines(workspace: Workspace) -> SessionList:
 
 def _line(workspace: Workspace, entry: SessionSummary) -> SessionLine:
     try:
-        return session_line(entry, _opened(workspace, entry))
+        return session_line(entry, _open(workspace, entry))
     except Exception as error:  # whatever a foreign session holds, the others are listed
         log.exception("session '%s' cannot be summed up", entry.name)
         reason = str(error) if isinstance(error, StudioError) else f"{type(error).__name__}: {error}"
         return session_line(unusable(entry.name, f"The session cannot be summed up ({reason})."), None)
 
 
-def _opened(workspace: Workspace, entry: SessionSummary) -> Session | None:
+def _open(workspace: Workspace, entry: SessionSummary) -> Session | None:
     try:
         return None if entry.problem else workspace.session(entry.name)
     except StudioError:

@@ -96,7 +96,7 @@ def _own(folder: Path) -> dict[str, Preset]:
     says why.
     """
     try:
-        kept = _read(folder)
+        kept = _read_kept(folder)
     except StudioError:
         return {}
     # One may be older than a knob's name.
@@ -135,7 +135,7 @@ def keep_preset(
         if setting not in known:
             raise PresetError(f"There is no setting '{setting[:64]}'.", "Compare it with /api/knobs.")
     with _lock:
-        kept = _read(folder) | {words: _Kept(help_text, wanted, tracker, weighting, body)}
+        kept = _read_kept(folder) | {words: _Kept(help_text, wanted, tracker, weighting, body)}
         if len(kept) > MOST:
             raise PresetError(f"There are {MOST} presets already.", "Delete one first.")
         _write(folder, kept)
@@ -144,7 +144,7 @@ def keep_preset(
 def drop_preset(name: str, folder: Path) -> None:
     """Delete a preset of a person's own. Raises NotFoundError."""
     with _lock:
-        kept = _read(folder)
+        kept = _read_kept(folder)
         if name not in kept:
             raise NotFoundError(f"There is no preset '{name[:64]}' of your own.", "Choose one that you kept.")
         del kept[name]
@@ -156,7 +156,7 @@ def _view(entry: Preset, *, own: bool) -> PresetView:
     return PresetView(entry.name, entry.name, entry.help, entry.values, *made_for, own)
 
 
-def _read(folder: Path) -> dict[str, _Kept]:
+def _read_kept(folder: Path) -> dict[str, _Kept]:
     """The kept presets. Raises SessionError for a damaged file."""
     return _KEPT.read(folder / FILE_NAME, _File({})).presets
 

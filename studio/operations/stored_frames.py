@@ -226,7 +226,7 @@ def frames_summary(
     with run.results() as results:
         damaged, timeline = results.damaged(blobs=check), results.timeline(blobs=check)
         partial, checked = results.partial(), check or results.is_checked()
-    measured, problem = _measured(session, run, track, check=check)
+    measured, problem = _errors_of(session, run, track, check=check)
     errors = dict(zip(measured.frames, measured.per_frame_mm, strict=True)) if measured else {}
     lost = dict(zip(measured.frames, measured.lost_by_frame, strict=True)) if measured else {}
     with run.results() as results:
@@ -420,7 +420,7 @@ def _quantiles(values: Array) -> list[float]:
     return np.quantile(values, QUANTILES).tolist() if values.size else []
 
 
-def _measured(session: Session, run: StoredRun, track: str, *, check: bool) -> tuple[Evaluation | None, str]:
+def _errors_of(session: Session, run: StoredRun, track: str, *, check: bool) -> tuple[Evaluation | None, str]:
     """The track's errors, None without a truth; and why the truth cannot be used, if so."""
     try:
         return evaluation_of(session, run, track, blobs=check), ""

@@ -111,7 +111,7 @@ def subjects(
         raise SessionError(
             f"{len(into)} names were given for {len(at)} places.", "Give one --into for each --at."
         )
-    places = [Workspace().place_for(name) for name in into] or _numbered(opened, len(at))
+    places = [Workspace().place_for(name) for name in into] or _numbered_places(opened, len(at))
     if len(set(places)) < len(places):
         raise SessionError("Two new sessions have the same name.", "Give each --into another one.")
     with reporting(progress, f"{opened.name}: subjects") as report:
@@ -147,7 +147,7 @@ def together(
         return track_together(opened, report)
 
 
-def _numbered(session: Session, count: int) -> list[Path]:
+def _numbered_places(session: Session, count: int) -> list[Path]:
     """Folders beside a session's, named after it."""
     taken = {path.name for path in session.path.parent.iterdir()}
     places: list[Path] = []

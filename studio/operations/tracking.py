@@ -124,7 +124,7 @@ def go_on(run: RunName, *, progress: Reporting = None) -> Tracked:
                 put_run(session, stored)
             raise
         put_run(session, stored)
-        return _tracked(stored, batch)
+        return _as_tracked(stored, batch)
 
 
 @contextmanager
@@ -346,7 +346,7 @@ def correct(
 
     with _reporting(new, progress, how_far) as report:
         track_back(new, counted)
-    return _tracked(new, None)
+    return _as_tracked(new, None)
 
 
 @keeping_in_place
@@ -437,7 +437,7 @@ def _say_notes(run: StoredRun, progress: Reporting) -> None:
     say(progress, accepted)
 
 
-def _tracked(run: StoredRun, result: BatchResult | None) -> Tracked:
+def _as_tracked(run: StoredRun, result: BatchResult | None) -> Tracked:
     fresh = StoredRun(run.folder)
     record = fresh.record
     return Tracked(

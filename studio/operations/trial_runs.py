@@ -81,10 +81,10 @@ def run_of_trial(session: Session, kept: KeptComparison, tracker: str, seed: int
             f"It has {names}, seeds {plan.seeds[0]} to {plan.seeds[-1]}.",
         )
     note = _note(kept, tracker, seed)
-    return runs_of(session, kept).get(note) or _made(session, kept, plan, candidate, seed, note)
+    return runs_of(session, kept).get(note) or _make_run(session, kept, plan, candidate, seed, note)
 
 
-def _made(
+def _make_run(
     session: Session, kept: KeptComparison, plan: Plan, candidate: Candidate, seed: int, note: str
 ) -> StoredRun:
     settings = candidate.settings()

@@ -92,7 +92,7 @@ def model_path(folders: Sequence[Path], name_or_path: str) -> Path:
     path = Path(name_or_path).expanduser()
     if not is_name(name_or_path) and "\0" not in name_or_path and path.is_file():
         return path.absolute()
-    raise NotFoundError(f"There is no behaviour model '{name_or_path}'.", _known(models_in(folders)))
+    raise NotFoundError(f"There is no behaviour model '{name_or_path}'.", _known_in_words(models_in(folders)))
 
 
 def fitting(model: BehaviourModel, body: BodyModel, fps: float) -> BehaviourModel:
@@ -159,7 +159,7 @@ def chosen_model(
         )
     raise BehaviourError(
         f"{wants} needs a behaviour model, and there is none of body '{body.name}'.",
-        f"Learn one with 'studio learn SOURCES… --body {body.name} --into MODEL'. {_known(models)}",
+        f"Learn one with 'studio learn SOURCES… --body {body.name} --into MODEL'. {_known_in_words(models)}",
     )
 
 
@@ -193,7 +193,7 @@ def _line(path: Path, _written: int, _size: int) -> ModelSummary:
         return ModelSummary(path.stem, path, problem=error.message)
 
 
-def _known(models: Sequence[ModelSummary]) -> str:
+def _known_in_words(models: Sequence[ModelSummary]) -> str:
     if not models:
         return "There are no models yet; 'studio learn' makes them."
     words = (f"'{line.name}' ({line.problem or f'of {line.body}'})" for line in models)

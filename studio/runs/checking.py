@@ -203,7 +203,7 @@ def check_run(
             frame, pose = evidence.frame, chosen.poses[row]
             shares.append(frame_shares(body, cameras, pose, evidence))
             hidden: Mapping[str, Array] = results.result(frame).carried.memory if frame in known else {}
-            off = _denied(agreement, pose, evidence, hidden)
+            off = _contradicted(agreement, pose, evidence, hidden)
             if off is not None:
                 changed = changed_pixels(evidence, with_shadows.evidence(frame))
                 denied += _with_elsewhere(frame, off, elsewhere.lost(pose, changed))
@@ -261,7 +261,7 @@ def frame_shares(
     return tuple(inside), tuple(covered)
 
 
-def _denied(
+def _contradicted(
     agreement: Agreement, pose: Array, evidence: FrameEvidence, hidden: Mapping[str, Array]
 ) -> dict[str, float] | None:
     """By limb the share of its area that disagrees with a frame's masks, for a pose (D,); None where not all cameras
@@ -275,7 +275,7 @@ def _denied(
 
 
 def _with_elsewhere(frame: int, off: Mapping[str, float], lost: Sequence[str]) -> list[DeniedLimb]:
-    """The limbs that masks or pictures contradict. off : as of `_denied`. lost : of `LimbsElsewhere`."""
+    """The limbs that masks or pictures contradict. off : as of `_contradicted`. lost : of `LimbsElsewhere`."""
     return [
         DeniedLimb(frame, limb, round(share, 3), limb in lost)
         for limb, share in off.items()

@@ -179,9 +179,9 @@ def prepare_run(
     start, source = start_of(session, tree, given, start_source)
     if own_start and start is not None and first != of:
         notes = (*notes, f"The run begins in frame {first}, the session's start pose is of frame {of}.")
-    if start is None and not _limited(tree):
+    if start is None and not _has_limits(tree):
         path = str(model.path) if model else ""
-        begin = _found(session, first, tree, path, seed, progress)
+        begin = _find_start(session, first, tree, path, seed, progress)
         start, source = within_limits(tree, begin.pose), begin.source
         notes = (*notes, *([begin.note] if begin.note else []))
     if is_first and start is not None:
@@ -272,7 +272,7 @@ def start_of(
     return None, "uniform over the limits"
 
 
-def _found(
+def _find_start(
     session: Session, frame: int, body: BodyModel, model: str, seed: int, progress: Progress
 ) -> InitialPose:
     """The start pose found in a run's first frame. Raises RunError if there is none."""
@@ -285,5 +285,5 @@ def _found(
         ) from None
 
 
-def _limited(body: BodyModel) -> bool:
+def _has_limits(body: BodyModel) -> bool:
     return all(np.isfinite(entry.lower) and np.isfinite(entry.upper) for entry in body.parameters)

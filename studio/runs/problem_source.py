@@ -90,11 +90,11 @@ class ProblemSource:
     def evidence(self, frame: int, settings: RunSettings) -> FrameEvidence:
         """The frame's evidence for the settings' likelihood. Raises FootageError, NotFoundError."""
         key = evidence_key(frame, settings)
-        evidence = self._kept(self._evidence, key)
+        evidence = self._get(self._evidence, key)
         if evidence is not None:
             return evidence
         with self._making:
-            evidence = self._kept(self._evidence, key)
+            evidence = self._get(self._evidence, key)
             if evidence is None:
                 maker = EvidenceMaker(
                     self.cameras_in(frame),
@@ -125,13 +125,13 @@ class ProblemSource:
             self.footage.close()
 
     def _problem(self, frame: int, settings: RunSettings, key: Hashable) -> FrameLikelihood:
-        problem = self._kept(self._problems, key)
+        problem = self._get(self._problems, key)
         if problem is not None:
             return problem
         with span("prepare", frame):
-            return self._made(frame, settings, key)
+            return self._make(frame, settings, key)
 
-    def _made(self, frame: int, settings: RunSettings, key: Hashable) -> FrameLikelihood:
+    def _make(self, frame: int, settings: RunSettings, key: Hashable) -> FrameLikelihood:
         evidence = self.evidence(frame, settings)
         if settings.refinement.refine_frames:
             with span("distances", frame):
@@ -147,7 +147,7 @@ class ProblemSource:
 
     def _likelihood(self, settings: RunSettings, cameras: tuple[Camera, ...]) -> Any:  # noqa: ANN401 - as weightings are
         key = (settings.weighting_name, settings.weighting, tuple(camera.name for camera in cameras))
-        likelihood = self._kept(self._likelihoods, key)
+        likelihood = self._get(self._likelihoods, key)
         if likelihood is None:
             weighting = WEIGHTINGS[settings.weighting_name]
             made = weighting.prepare(self.body, cameras, settings.weighting)
@@ -174,7 +174,7 @@ class ProblemSource:
             except CancelledError:
                 return
 
-    def _kept(self, store: LRUCache[Hashable, T], key: Hashable) -> T | None:
+    def _get(self, store: LRUCache[Hashable, T], key: Hashable) -> T | None:
         with self._keeping:
             return store.get(key)
 

@@ -158,14 +158,14 @@ class _Work:
         seen: list[_SeenFrame] = []
         for first, after, kept in windows(len(rows)):
             while first + len(seen) < after:
-                seen.append(self._seen(int(rows[first + len(seen)])))
+                seen.append(self._look_at(int(rows[first + len(seen)])))
             held = self._poses[rows[max(0, first - HELD) : first]]
-            poses = self._moved(mover, seen, held)
+            poses = self._move(mover, seen, held)
             for row, pose, of_frame in zip(rows[first:kept], poses, seen, strict=False):
                 self._keep(int(row), pose, of_frame.sight)
             seen = seen[kept - first :]
 
-    def _moved(self, mover: MovementRefiner, seen: list[_SeenFrame], held: Array) -> Array:
+    def _move(self, mover: MovementRefiner, seen: list[_SeenFrame], held: Array) -> Array:
         """The poses of a window; computed again without the frames whose masks prove poor."""
         starts, losses = np.array([one.start for one in seen]), [one.loss for one in seen]
         poses = mover.refine(Window(starts, losses, held))
@@ -181,7 +181,7 @@ class _Work:
         ]
         return mover.refine(Window(starts, losses, held))
 
-    def _seen(self, row: int) -> _SeenFrame:
+    def _look_at(self, row: int) -> _SeenFrame:
         frame, pose = int(self._track.frames[row]), self._track.poses[row]
         evidence = self._problems.evidence(frame, self._settings.of(frame))
         refiner = self._refiner_of(tuple(view.camera for view in evidence.views))

@@ -77,7 +77,7 @@ def refine_run(
     SessionError where `into` is taken, RunError for a run without frames, and what reading the footage raises.
     """
     knobs = settings or RefinementSettings()
-    track = _begun(run, source or RAW, into, replace)
+    track = _begin(run, source or RAW, into, replace)
     step, total = f"refining {run.name}", len(track.frames)
     progress(step, 0, total)
     if not source and into != SIDES:
@@ -115,7 +115,7 @@ def smooth_run(
     """
     knobs = settings or SmoothingSettings()
     chosen = source or best_track(run, (SIDES,) if into == REFINED else (REFINED, SIDES)).name
-    track = _begun(run, chosen, into, replace)
+    track = _begin(run, chosen, into, replace)
     body, record = run.body(), run.record
     smoothed = smooth(
         track.frames,
@@ -170,7 +170,7 @@ def check_making(run: StoredRun, source: str, into: str, replace: bool) -> None:
         read_track(run, source)
 
 
-def _begun(run: StoredRun, source: str, into: str, replace: bool) -> Track:
+def _begin(run: StoredRun, source: str, into: str, replace: bool) -> Track:
     """The track to start from, after checking that the result can be stored."""
     check_making(run, source, into, replace)
     track = read_track(run, source)

@@ -44,14 +44,14 @@ class RunBehaviour:
         """The search space of a frame; all frames before it have results."""
         if self._learner is None:
             return self.space
-        model = self._learner.model_in(frame - self._run.record.first, self._tracked)
+        model = self._learner.model_in(frame - self._run.record.first, self._poses_so_far)
         return dataclasses.replace(self.space, behaviour=model)
 
     def carried_into(self, frame: int, carried: FilterState) -> FilterState:
         """The state from the frame before, in terms of this frame's model."""
         if self._learner is None:
             return carried
-        return self._learner.carried_into(frame - self._run.record.first, carried, self._tracked)
+        return self._learner.carried_into(frame - self._run.record.first, carried, self._poses_so_far)
 
     def keep_missing(self) -> None:
         """As `keep`, if that failed before."""
@@ -65,7 +65,7 @@ class RunBehaviour:
         if self._learner is not None and model is not None:
             write_model(model, self._run.folder / LEARNT_NAME)
 
-    def _tracked(self, count: int) -> tuple[Array, Array, Array]:
+    def _poses_so_far(self, count: int) -> tuple[Array, Array, Array]:
         """Poses (K, D), log-weights (K,) and overlaps (K,) of the run's first frames; no overlap where the run itself
         says that the body, or a limb, was lost.
         """

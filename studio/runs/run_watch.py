@@ -116,7 +116,7 @@ class RunWatch:
             return carried, False
         key = (frame, settings.recovery.recovery, settings.evidence)
         if self._restart is None or self._restart[0] != key:
-            self._restart = (key, self._found(frame, carried, space, settings, masks))
+            self._restart = (key, self._find(frame, carried, space, settings, masks))
         return FilterState(self._restart[1], memory=carried.memory), True
 
     def searches_for_lost(self, frame: int) -> bool:
@@ -144,8 +144,8 @@ class RunWatch:
         if self._restarted(result.frame):
             before = dataclasses.replace(before, state=TRACKED, doubts=0)
         if not sight.seen:
-            return _held(result, carried)
-        watch = before.watch if before.weighed == _weighed(settings) else _watch(settings)
+            return _hold(result, carried)
+        watch = before.watch if before.weighed == _weighting_of(settings) else _watch(settings)
         if not watch.is_lost(result.estimate.log_weight, sight):
             back = for_lost or before.state in (LOST, NO_EVIDENCE)
             state = RECOVERED if back else LIMB_LOST if result.limbs_lost else TRACKED
@@ -194,8 +194,8 @@ class RunWatch:
         self, standing: Standing, frame: int, state: str, misses: int, log_weight: float, overlap: float
     ) -> None:
         settings = self._settings_in(frame)
-        if standing.weighed != _weighed(settings):
-            standing.watch, standing.weighed = _watch(settings), _weighed(settings)
+        if standing.weighed != _weighting_of(settings):
+            standing.watch, standing.weighed = _watch(settings), _weighting_of(settings)
         if state in (TRACKED, RECOVERED) and not misses:
             standing.watch.well_tracked(log_weight, overlap)
         standing.streak = standing.streak + 1 if state == standing.state else 1
@@ -212,7 +212,7 @@ class RunWatch:
 
     # ------------------------------------------------------------------ the search
 
-    def _found(
+    def _find(
         self,
         frame: int,
         carried: FilterState,
@@ -261,11 +261,11 @@ def _watch(settings: RunSettings) -> WeightWatch:
     return WeightWatch(WEIGHTINGS[settings.weighting_name].loss)
 
 
-def _weighed(settings: RunSettings) -> tuple[object, ...]:
+def _weighting_of(settings: RunSettings) -> tuple[object, ...]:
     return settings.weighting_name, settings.weighting, settings.evidence
 
 
-def _held(result: FrameResult, carried: FilterState) -> FrameResult:
+def _hold(result: FrameResult, carried: FilterState) -> FrameResult:
     """The frame's result with the incoming pose and particles, at rest."""
     estimate, pose = result.estimate, carried.estimate
     if pose is None and carried.particles is not None:

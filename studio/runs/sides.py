@@ -52,7 +52,7 @@ def put_sides_right(
     if known := exchanged_sides(run):
         return known
     track = read_track(run, RAW)
-    evidence = partial(_seen, problems, MaskSettings(run), read)
+    evidence = partial(_look_at, problems, MaskSettings(run), read)
     body, cameras, poses = problems.body, problems.cameras, dict(zip(track.frames, track.poses, strict=True))
     with run.results() as results:
 
@@ -113,7 +113,7 @@ def in_words(words: tuple[str, ...]) -> str:
     return f"Sides were corrected in track '{SIDES}': {'; '.join(words)}. The tracked poses stay in '{RAW}'."
 
 
-def _seen(
+def _look_at(
     problems: Sightings, settings: MaskSettings, read: Callable[[int], None], frame: int
 ) -> FrameEvidence:
     read(frame)

@@ -71,7 +71,7 @@ def track_together(sessions: Sequence[Session], progress: Progress = unheard) ->
     Each begins in its session's start pose; one without is searched for in the masks that it has. The result depends
     on nothing else: seeds are 0. Raises RunError for sessions that do not belong together; then nothing is changed.
     """
-    first = _checked(sessions)
+    first = _check(sessions)
     bodies = [_Body(session, first, progress) for session in sessions]
     with contextlib.ExitStack() as stack:
         whole = stack.enter_context(closing(WholeMasks(sessions[0], WEIGHTINGS[WEIGHTING].edge_kind)))
@@ -125,11 +125,11 @@ class _Work:
             progress("", done, len(frames))
             masks = self.masks(frame)
             seeing = self._seeing(frame)
-            parts = self._parted(frame, masks, [body.expected() for body in self._bodies])
+            parts = self._share_masks(frame, masks, [body.expected() for body in self._bodies])
             for body, part in zip(self._bodies, parts, strict=True):
                 body.step(frame, self._evidence(frame, seeing, part))
             poses = [body.following.poses[-1] for body in self._bodies]
-            parts = self._parted(frame, masks, poses, learn=True)
+            parts = self._share_masks(frame, masks, poses, learn=True)
             both = sum(
                 np.count_nonzero(sum(part[name].mask > 0 for part in parts) > 1)
                 for name in self._whole.footage.cameras
@@ -155,7 +155,7 @@ class _Work:
             seen: list[FrameEvidence] = []
             for frame in chosen:
                 at = [shape[int(np.searchsorted(frames, frame))] for shape in poses]
-                part = self._parted(frame, self.masks(frame), at)[number]
+                part = self._share_masks(frame, self.masks(frame), at)[number]
                 seen.append(self._evidence(frame, self._seeing(frame), part))
             if any(len(one.views) < len(self._cameras) for one in seen):
                 continue
@@ -174,7 +174,7 @@ class _Work:
         views = [of_mask(name, frame, shares[name].mask, shares[name].hidden) for name in names]
         return FrameEvidence(frame, tuple(views))
 
-    def _parted(
+    def _share_masks(
         self, frame: int, masks: Masks, poses: Sequence[Array], learn: bool = False
     ) -> list[dict[str, Share]]:
         """The masks of all by camera, shared among bodies in poses (D,). learn : their colours too."""
@@ -238,7 +238,7 @@ class _Body:
         self.following.step(frame, likelihood.problem(evidence), evidence)
 
 
-def _checked(sessions: Sequence[Session]) -> int:
+def _check(sessions: Sequence[Session]) -> int:
     """The frame that all begin in. Raises RunError for sessions that do not belong together."""
     if len(sessions) < 2:
         raise RunError("One body is tracked alone.", "Name the sessions of the others too.")

@@ -344,7 +344,7 @@ class TrackingRun:
     def latest_settings(self) -> tuple[int, RunSettings]:
         """The run's latest settings and their version."""
         entry = self.history.entries[-1]
-        return entry.version, self._read(entry)
+        return entry.version, self._read_settings(entry)
 
     def _settings_for(self, frame: int, layer: int) -> tuple[int, RunSettings, bool]:
         """The settings of a layer: new ones if there are any, else those of the history."""
@@ -357,7 +357,7 @@ class TrackingRun:
 
     def _settings_at(self, frame: int, layer: int = 0) -> tuple[int, RunSettings]:
         entry = self.history.in_use(frame, layer) or self.history.entries[0]
-        return entry.version, self._read(entry)
+        return entry.version, self._read_settings(entry)
 
     def _held_in(self, frame: int, settings: RunSettings) -> RunSettings:
         """The settings, with those that cannot change inside a frame as at its first layer."""
@@ -375,7 +375,7 @@ class TrackingRun:
         self._writer.write_settings(version, frame, layer, history.entries[-1].values)
         self.history = history
 
-    def _read(self, entry: SettingsEntry) -> RunSettings:
+    def _read_settings(self, entry: SettingsEntry) -> RunSettings:
         """The settings of a history entry; those in use are read once."""
         if entry.version not in self._settings:
             recorded = settings_from_values(self.record.tracker, self.record.weighting, entry.values)

@@ -93,7 +93,7 @@ def unpack(archive: Path, folder: Path, limits: ArchiveLimits | None = None) -> 
     allowed = limits or ArchiveLimits()
     words = ("an archive that can be unpacked", "Pack the folder again.")
     with foreign_file(archive, ArchiveError, *words), _entries(archive) as listed_entries:
-        entries = _checked(listed_entries, allowed)
+        entries = _check(listed_entries, allowed)
         most = min(allowed.total, max(allowed.free, int(archive.stat().st_size * allowed.ratio)))
         most = min(most, shutil.disk_usage(folder).free - GIGABYTE)
         written = 0
@@ -113,7 +113,7 @@ def check_archive(archive: Path, limits: ArchiveLimits) -> tuple[int, int]:
     """
     words = ("an archive that can be unpacked", "Pack the folder again.")
     with foreign_file(archive, ArchiveError, *words), _entries(archive) as listed_entries:
-        entries = [entry for entry in _checked(listed_entries, limits) if not entry.is_folder]
+        entries = [entry for entry in _check(listed_entries, limits) if not entry.is_folder]
         size = sum(entry.claimed for entry in entries)
         if size > max(limits.free, int(archive.stat().st_size * limits.ratio)):
             raise _too_much(max(entries, key=lambda entry: entry.claimed))
@@ -190,7 +190,7 @@ def _tar_entry(tar: tarfile.TarFile, member: tarfile.TarInfo) -> _Entry:
     return _Entry(name, member.isdir(), mode, False, member.size, content)
 
 
-def _checked(listed_entries: Iterator[_Entry], limits: ArchiveLimits) -> list[_Entry]:
+def _check(listed_entries: Iterator[_Entry], limits: ArchiveLimits) -> list[_Entry]:
     """All entries. A tar's index is spread over the file, so it is refused as soon as it claims too much."""
     entries: list[_Entry] = []
     seen: set[str] = set()

@@ -111,7 +111,7 @@ def _replaced(session: Session, new: NewCalibration) -> CalibrationChange:
         session.path, (part.relative_to(session.path).as_posix() for part in _own_parts(place.parent))
     )
     _write(place, new)
-    manifest = _described(session.manifest, new)
+    manifest = _describe(session.manifest, new)
     (session.path / THUMBNAIL_NAME).unlink(missing_ok=True)
     changed = described_anew(session, manifest)
     stale = stale_runs(changed)
@@ -233,7 +233,7 @@ def _own_parts(folder: Path) -> list[Path]:
     return [path for path in folder.iterdir() if path.name.startswith(OWN_PARTS)]
 
 
-def _described(manifest: SessionManifest, new: NewCalibration) -> SessionManifest:
+def _describe(manifest: SessionManifest, new: NewCalibration) -> SessionManifest:
     crops = tuple(crop.words(name) for name, crop in new.crops.items())
     return msgspec.structs.replace(
         manifest,

@@ -73,12 +73,12 @@ class CheckedFiles:
 
 def note_files(folder: Path) -> None:
     """Store the checksums of all files. Raises OSError."""
-    _write(folder, {name: _noted(path) for name, path in _files(folder)})
+    _write(folder, {name: _note(path) for name, path in _files(folder)})
 
 
 def forget_files(folder: Path, places: Iterable[str]) -> None:
     """Drop the checksums of files that were removed on purpose. places : paths in the folder, of files or folders."""
-    known, readable = _read(folder)
+    known, readable = _read_sums(folder)
     gone = tuple(places)
     kept = {name: one for name, one in known.items() if not any(_is_at(name, place) for place in gone)}
     if readable and len(kept) < len(known):
@@ -87,9 +87,9 @@ def forget_files(folder: Path, places: Iterable[str]) -> None:
 
 def note_again(folder: Path, name: str) -> None:
     """Store the checksum of a file that was written again on purpose, where the folder has checksums."""
-    known, readable = _read(folder)
+    known, readable = _read_sums(folder)
     if readable and known:
-        _write(folder, known | {name: _noted(folder / name)})
+        _write(folder, known | {name: _note(folder / name)})
 
 
 def _is_at(name: str, place: str) -> bool:
@@ -98,7 +98,7 @@ def _is_at(name: str, place: str) -> bool:
 
 def check_files(folder: Path, *, note: bool = True) -> CheckedFiles:
     """Compare the files with their checksums. note : store checksums of files that are new or were written again."""
-    known, readable = _read(folder)
+    known, readable = _read_sums(folder)
     now: dict[str, Noted] = {}
     damaged: dict[str, str] = {} if readable else {NAME: "the checksums cannot be read"}
     again: list[str] = []
@@ -108,7 +108,7 @@ def check_files(folder: Path, *, note: bool = True) -> CheckedFiles:
             if path.suffix.lower() in BOUNDED and path.stat().st_size > LARGEST:
                 damaged[name] = f"is larger than the {LARGEST >> 20} MB that such a file can have"
                 continue
-            current = _noted(path)
+            current = _note(path)
         except FileNotFoundError:
             # Removed since the folder was listed, by other work in it.
             continue
@@ -145,14 +145,14 @@ def _files(folder: Path) -> Iterator[tuple[str, Path]]:
             yield "/".join(parts), path
 
 
-def _noted(path: Path) -> Noted:
+def _note(path: Path) -> Noted:
     status = path.stat()
     with open_file(path) as stream:
         digest = hashlib.file_digest(stream, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
     return Noted(status.st_size, status.st_mtime_ns, digest)
 
 
-def _read(folder: Path) -> tuple[dict[str, Noted], bool]:
+def _read_sums(folder: Path) -> tuple[dict[str, Noted], bool]:
     """The stored checksums, and whether they can be read; empty without any."""
     try:
         return _RECORD.read(folder / NAME, NotedFiles()).files, True

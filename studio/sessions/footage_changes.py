@@ -70,7 +70,7 @@ def change_footage(
     if not session.has_footage:
         raise SessionError(f"Session '{session.name}' has no footage yet.", "Add it first.")
     before = session.manifest.footage
-    return _used(session, before, _changed(session, before, dict(offsets or {}), dict(rotations or {})))
+    return _use(session, before, _change(session, before, dict(offsets or {}), dict(rotations or {})))
 
 
 def pair_by_time(
@@ -104,10 +104,10 @@ def pair_by_time(
         cameras = without_made_masks(session, cameras)
     for camera in cameras:
         _check_mask_count(session, camera, camera.file_frame(count - 1) + 1)
-    return _used(session, before, dataclasses.replace(before, cameras=cameras, frame_count=count))
+    return _use(session, before, dataclasses.replace(before, cameras=cameras, frame_count=count))
 
 
-def _used(session: Session, before: FootageSource, after: FootageSource) -> FootageChange:
+def _use(session: Session, before: FootageSource, after: FootageSource) -> FootageChange:
     """Make a description the session's."""
     if after == before:
         return FootageChange(session, ("Nothing changes.",), stale_runs(session))
@@ -167,7 +167,7 @@ def _recorded_times(session: Session, path: Path) -> dict[str, Array]:
     return recorded | {name: times_of_fields(recorded[name], count) for name, count in split.items()}
 
 
-def _changed(
+def _change(
     session: Session, source: FootageSource, offsets: dict[str, int], rotations: dict[str, int]
 ) -> FootageSource:
     """The footage's description with the change. Raises FootageError."""

@@ -168,7 +168,7 @@ def _oddities(
     if path.name == RESULTS_NAME:
         yield from _store(path, name)
     if path.name == RUN_RECORD and name.startswith("runs/"):
-        with _said(path) as problems:
+        with _in_clauses(path) as problems:
             read_run_record(path.parent)
         yield from (Oddity(name, words) for words in problems)
     if status.st_mode & 0o111 and not is_picture(path) and suffix not in FOOTAGE:
@@ -208,13 +208,13 @@ def _arrays(path: Path, name: str) -> Iterator[Oddity]:
 
 
 def _store(path: Path, name: str) -> Iterator[Oddity]:
-    with _said(path) as problems, contextlib.closing(open_database(path, "immutable")) as store:
+    with _in_clauses(path) as problems, contextlib.closing(open_database(path, "immutable")) as store:
         check_tables(store, path)
     yield from (Oddity(name, words) for words in problems)
 
 
 @contextlib.contextmanager
-def _said(path: Path) -> Generator[list[str]]:
+def _in_clauses(path: Path) -> Generator[list[str]]:
     """What is raised inside, as clauses."""
     problems: list[str] = []
     try:

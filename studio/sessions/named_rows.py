@@ -31,7 +31,7 @@ def read_pose(path: Path, names: tuple[str, ...], frame: int | None = None) -> A
     A file with several rows needs a column `frame`, from which the row of `frame` (else the first) is taken.
     Raises BodyError naming file, entry and remedy.
     """
-    header, rows = _read(path)
+    header, rows = _read_rows(path)
     row = rows[0]
     if len(rows) > 1:
         if FRAME not in header:
@@ -58,13 +58,13 @@ def check_radians(path: Path, body: BodyModel, pose: Array) -> None:
 
 def pose_frame(path: Path) -> int | None:
     """The frame of the (first) pose in a CSV file; None if the file has no such column. Raises BodyError."""
-    header, rows = _read(path)
+    header, rows = _read_rows(path)
     return int(rows[0][header.index(FRAME)]) if FRAME in header else None
 
 
 def named_columns(path: Path) -> tuple[str, ...]:
     """The names of a CSV file's columns. Raises BodyError."""
-    return tuple(_read(path)[0])
+    return tuple(_read_rows(path)[0])
 
 
 def write_pose(path: Path, names: tuple[str, ...], pose: Array, frame: int | None = None) -> None:
@@ -79,7 +79,7 @@ def read_sigma(path: Path, names: tuple[str, ...], fps: float) -> Array:
     The largest movement between two frames grows with the time between them, so σ scales with 1 / fps.
     Raises BodyError.
     """
-    header, rows = _read(path)
+    header, rows = _read_rows(path)
     if FPS not in header:
         raise BodyError(
             f"'{path.name}' has no column 'fps'.", "Add the frame rate at which its σ were measured."
@@ -98,7 +98,7 @@ def write_sigma(path: Path, names: tuple[str, ...], sigma: Array, fps: float) ->
     write_text(path, as_csv([[FPS, *names], [repr(float(fps)), *(repr(float(value)) for value in sigma)]]))
 
 
-def _read(path: Path) -> tuple[list[str], list[list[float]]]:
+def _read_rows(path: Path) -> tuple[list[str], list[list[float]]]:
     """Header and rows of numbers; at least one row."""
     with foreign_file(path, BodyError, "a CSV file", "Save it as comma-separated text in UTF-8."):
         text = read_foreign_text(path).splitlines()

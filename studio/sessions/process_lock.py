@@ -24,14 +24,14 @@ class ProcessLock:
         written.
         """
         # Nothing is ever written, so nothing has to be undone from a file.
-        return _begun(path, patience, "PRAGMA journal_mode = MEMORY", "BEGIN EXCLUSIVE")
+        return _begin(path, patience, "PRAGMA journal_mode = MEMORY", "BEGIN EXCLUSIVE")
 
     @staticmethod
     def share(path: Path, patience: float = 0.0) -> "ProcessLock | None":
         """Keep others from taking the lock of the file `path` (created if missing), which many may do at once; None
         while another holds it, after so many seconds. Raises SessionError.
         """
-        return _begun(path, patience, "BEGIN", "SELECT 1 FROM sqlite_master")
+        return _begin(path, patience, "BEGIN", "SELECT 1 FROM sqlite_master")
 
     @staticmethod
     def is_held(path: Path) -> bool:
@@ -55,7 +55,7 @@ class ProcessLock:
         self.connection.close()
 
 
-def _begun(path: Path, patience: float, *statements: str) -> ProcessLock | None:
+def _begin(path: Path, patience: float, *statements: str) -> ProcessLock | None:
     """The lock once statements were executed; None while another holds it."""
     connection = None
     try:

@@ -74,19 +74,19 @@ def note(
     """Record that a part was made now from the current inputs. part : a key of INPUTS; the rest as in `Origin`."""
     origin = Origin(_own(session, part), digests(session, INPUTS[part]), words, good, stops)
     with one_at_a_time(session.path):
-        _write(session, {**_read(session).parts, part: origin})
+        _write(session, {**_read_origins(session).parts, part: origin})
 
 
 def remember(session: Session, part: str, words: str, good: bool, stops: tuple[str, ...] = ()) -> None:
     """Note what was measured, if the disk can be written: a measurement is said also where it cannot be kept."""
-    _read(session)  # raises where it is damaged
+    _read_origins(session)  # raises where it is damaged
     with suppress(SessionError):
         note(session, part, words, good, stops)
 
 
 def origin_of(session: Session, part: str) -> Origin | None:
     """The provenance of a part; None if it was given, or its file has changed since."""
-    origin = _read(session).parts.get(part)
+    origin = _read_origins(session).parts.get(part)
     return origin if origin is not None and origin.content == _own(session, part) else None
 
 
@@ -101,7 +101,7 @@ def changed_inputs(session: Session, part: str, among: Iterable[str] = ALL_INPUT
 
 def adopt(session: Session) -> None:
     """Call before a change: given parts then count as made from the current inputs."""
-    known = _read(session).parts
+    known = _read_origins(session).parts
     given = {
         part: Origin(_own(session, part), digests(session, INPUTS[part]))
         for part in FILES
@@ -172,7 +172,7 @@ _RECORD = RecordFile(
 )
 
 
-def _read(session: Session) -> MadeFrom:
+def _read_origins(session: Session) -> MadeFrom:
     return _RECORD.read(session.path / FILE_NAME, MadeFrom())
 
 

@@ -91,14 +91,14 @@ def remote_session(address: str, progress: Progress = unheard) -> Session:
     store = Store(address)
     name = checked_name(PurePosixPath(store.address).name)
     for _ in range(TRIES):
-        files = _wanted(store)
+        files = _needed_files(store)
         key = _key(store.address, files)
         place = cache_folder() / key
         if not (place / name / MANIFEST).is_file():
             _bring(store, files, key, name, progress)
-            if _key(store.address, _wanted(store)) != key:
+            if _key(store.address, _needed_files(store)) != key:
                 continue
-        if _held(place) and (place / name / MANIFEST).is_file():
+        if _hold(place) and (place / name / MANIFEST).is_file():
             (place / ORIGIN_NAME).touch()
             return Session(place / name)
     raise SessionError(
@@ -123,7 +123,9 @@ def remote_runs(session: Session) -> frozenset[str]:
     """Names of the runs that lie beside a copy's original; none for any other session."""
     address = address_of(session)
     return (
-        frozenset(_whole(Store(below(address, RUNS_NAME)).listed(), RUN_RECORD)) if address else frozenset()
+        frozenset(_complete_folders(Store(below(address, RUNS_NAME)).listed(), RUN_RECORD))
+        if address
+        else frozenset()
     )
 
 
@@ -169,7 +171,7 @@ def bring_comparisons(session: Session) -> None:
         return
     store = Store(below(address, COMPARISONS))
     files = store.listed()
-    for name in _whole(files, COMPARISON_RECORD):
+    for name in _complete_folders(files, COMPARISON_RECORD):
         place = session.path / COMPARISONS / name
         if not place.is_dir():
             bring_part(session, COMPARISONS, name)
@@ -226,10 +228,10 @@ def download(address: str, place: Path, progress: Progress = unheard) -> Session
     """
     store = Store(address)
     files = store.listed()
-    wanted = _wanted(store, files)
+    wanted = _needed_files(store, files)
     for kind, record in ((RUNS_NAME, RUN_RECORD), (COMPARISONS, COMPARISON_RECORD)):
         parts = {name: one for name, one in files.items() if name.startswith(f"{kind}/")}
-        whole = _whole({name.partition("/")[2]: one for name, one in parts.items()}, record)
+        whole = _complete_folders({name.partition("/")[2]: one for name, one in parts.items()}, record)
         wanted |= {name: one for name, one in parts.items() if name.split("/")[1] in whole}
     with made_whole(place) as folder:
         _bring_checked(store, wanted, folder, progress)
@@ -241,10 +243,10 @@ def sessions_at(address: str) -> tuple[RemoteSession, ...]:
     store = Store(address)
     files = store.listed()
     if MANIFEST in files:
-        return (_described(store.address, files),)
+        return (_describe(store.address, files),)
     names = store.folders()
     sessions = [
-        _described(
+        _describe(
             below(store.address, name),
             {
                 path.removeprefix(f"{name}/"): one
@@ -306,21 +308,21 @@ def remote_file(address: str) -> str:
     return str(place)
 
 
-def _described(address: str, files: Mapping[str, Listed]) -> RemoteSession:
+def _describe(address: str, files: Mapping[str, Listed]) -> RemoteSession:
     runs = {
         name.removeprefix(f"{RUNS_NAME}/"): one
         for name, one in files.items()
         if name.startswith(f"{RUNS_NAME}/")
     }
     total = sum(one.size for one in files.values())
-    whole = tuple(sorted(_whole(runs, RUN_RECORD)))
+    whole = tuple(sorted(_complete_folders(runs, RUN_RECORD)))
     return RemoteSession(PurePosixPath(address).name, address, MANIFEST in files, total, whole)
 
 
 # ------------------------------------------------------------------ copies
 
 
-def _wanted(store: Store, files: Mapping[str, Listed] | None = None) -> dict[str, Listed]:
+def _needed_files(store: Store, files: Mapping[str, Listed] | None = None) -> dict[str, Listed]:
     """The files of a session without its runs and comparisons. Raises NotFoundError, SessionError."""
     files = store.listed() if files is None else files
     if MANIFEST not in files:
@@ -401,7 +403,7 @@ _holds: "OrderedDict[Path, ProcessLock]" = OrderedDict()
 _changing = threading.Lock()
 
 
-def _held(place: Path) -> bool:
+def _hold(place: Path) -> bool:
     """Keep a copy from being removed while this process is likely to use it; False where it is gone."""
     with _changing:
         if place not in _holds:
@@ -499,7 +501,7 @@ def _own_files(folder: Path) -> Generator[tuple[str, Path]]:
             yield name, path
 
 
-def _whole(files: Iterable[str], record: str) -> frozenset[str]:
+def _complete_folders(files: Iterable[str], record: str) -> frozenset[str]:
     """Names of the folders that have their record."""
     return frozenset(
         name.split("/")[0] for name in files if name.count("/") == 1 and name.endswith(f"/{record}")

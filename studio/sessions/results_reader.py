@@ -330,7 +330,7 @@ class ResultsReader:
             for frame, layer, blob in stored:
                 layers.setdefault(frame, {})[layer] = blob
             for frame in frames:
-                parts[frame] = _wrong(Sums(due[frame]), results.get(frame), layers.get(frame, {}))
+                parts[frame] = _damaged_parts(Sums(due[frame]), results.get(frame), layers.get(frame, {}))
         for frame, part in parts.items():
             if part:
                 known.add_damage(frame, due[frame], part)
@@ -370,7 +370,7 @@ class ResultsReader:
             layers = dict(self._query("SELECT layer, blob FROM layers WHERE frame = ?", (frame,)))
         except SessionError:
             return LOST
-        return _wrong(Sums(text), blob[0][0] if blob else None, layers)
+        return _damaged_parts(Sums(text), blob[0][0] if blob else None, layers)
 
     def _layer_blobs(self, frame: int) -> dict[int, bytes]:
         """The intact layers of a frame. Raises DamagedError."""
@@ -384,7 +384,7 @@ class ResultsReader:
         blobs = dict(rows)
         wrong = Sums(text).wrong_layers(blobs) if text is not None and blobs else []
         if wrong:
-            raise self._is_damaged(frame, _named(wrong))
+            raise self._is_damaged(frame, _layers_in_words(wrong))
         return blobs
 
     def _layer(self, frame: int, layer: int, blob: bytes) -> LayerRecord:
@@ -621,26 +621,26 @@ def _known_damage(known: CheckedStore, due: Mapping[int, str]) -> dict[int, str]
     }
 
 
-def _wrong(sums: Sums, result: bytes | None, layers: Mapping[int, bytes]) -> str:
+def _damaged_parts(sums: Sums, result: bytes | None, layers: Mapping[int, bytes]) -> str:
     """The blobs of a frame that do not match its checksums, as text; "" if all do. result : None where it has none."""
     if result is None or not sums.fits("result", result):
         return LOST if result is None else RESULT
-    return _named(sums.wrong_layers(layers))
+    return _layers_in_words(sums.wrong_layers(layers))
 
 
-def _named(layers: Iterable[int]) -> str:
+def _layers_in_words(layers: Iterable[int]) -> str:
     return ", ".join(f"layer {layer + 1}" for layer in layers)
 
 
 def _open_to_read(path: Path) -> sqlite3.Connection:
     """A read-only connection; also to a store in a read-only folder."""
     try:
-        return _opened(path, "rw")
+        return _open(path, "rw")
     except sqlite3.OperationalError:
-        return _opened(path, "immutable")
+        return _open(path, "immutable")
 
 
-def _opened(path: Path, way: str) -> sqlite3.Connection:
+def _open(path: Path, way: str) -> sqlite3.Connection:
     connection = open_database(path, way, patience=10.0, shared=True)
     try:
         connection.execute("PRAGMA query_only = ON")

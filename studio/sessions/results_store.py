@@ -160,12 +160,12 @@ class ResultsWriter:
         self._path = run_folder / FILE_NAME
         self._one_at_a_time, self._within = threading.RLock(), False
         try:
-            self._connection = self._opened()
+            self._connection = self._open()
         except BaseException:
             lock.free()
             raise
 
-    def _opened(self) -> sqlite3.Connection:
+    def _open(self) -> sqlite3.Connection:
         """A connection to the store, its tables made where they are missing. Raises SessionError."""
         try:
             connection = open_database(self._path, patience=30.0, shared=True)
@@ -341,7 +341,7 @@ class ResultsWriter:
         if self._connection.in_transaction:
             # An earlier one could not even be rolled back: closing does that.
             self._connection.close()
-            self._connection = self._opened()
+            self._connection = self._open()
         self._connection.execute("BEGIN IMMEDIATE")
         try:
             yield

@@ -77,9 +77,9 @@ def salvage(run_folder: Path, first: int, last: int) -> list[int]:
 
 def _copy(broken: sqlite3.Connection, whole: sqlite3.Connection, first: int, last: int) -> list[int]:
     for table in WHOLE:
-        _put(whole, table, _rows(broken, f"SELECT * FROM {table}") or [])
+        _insert(whole, table, _rows(broken, f"SELECT * FROM {table}") or [])
     sums = _rows(broken, "SELECT * FROM checksums WHERE what = 'settings'")
-    _put(whole, "checksums", sums or [])
+    _insert(whole, "checksums", sums or [])
     copied: list[int] = []
     for frame in range(first, last):
         by_table = {
@@ -87,18 +87,18 @@ def _copy(broken: sqlite3.Connection, whole: sqlite3.Connection, first: int, las
         }
         of_it = _rows(broken, f"SELECT * FROM checksums WHERE what = '{FRAME}' AND number = {frame}")
         if any(rows is None for rows in (*by_table.values(), of_it)):
-            _put(whole, "checksums", [(FRAME, frame, GIVEN_UP)])
+            _insert(whole, "checksums", [(FRAME, frame, GIVEN_UP)])
         else:
             for table, rows in by_table.items():
-                _put(whole, table, rows or [])
-            _put(whole, "checksums", of_it or [])
+                _insert(whole, table, rows or [])
+            _insert(whole, "checksums", of_it or [])
         if by_table["frames"] or of_it:
             copied.append(frame)
     lost: list[int] = []
     for frame in range(first, last):
         row = whole.execute("SELECT 1 FROM frames WHERE frame = ?", (frame,)).fetchone()
         if row is None and copied and frame < max(copied):
-            _put(whole, "checksums", [(FRAME, frame, GIVEN_UP)])
+            _insert(whole, "checksums", [(FRAME, frame, GIVEN_UP)])
             lost.append(frame)
     whole.execute(
         "DELETE FROM checksums WHERE what = ? AND number > ? AND sums = ?",
@@ -115,7 +115,7 @@ def _rows(connection: sqlite3.Connection, sql: str) -> list[tuple[Any, ...]] | N
         return [] if "no such table" in str(error) else None
 
 
-def _put(connection: sqlite3.Connection, table: str, rows: list[tuple[Any, ...]]) -> None:
+def _insert(connection: sqlite3.Connection, table: str, rows: list[tuple[Any, ...]]) -> None:
     for row in rows:
         with contextlib.suppress(sqlite3.DatabaseError):
             connection.execute(f"INSERT OR REPLACE INTO {table} VALUES ({', '.join('?' * len(row))})", row)

@@ -18,10 +18,10 @@ PREPARED = "prepared"
 
 def sample_folder(name: str = "walk") -> Path:
     """Where a sample lies. Raises NotFoundError if it is not there."""
-    return _found(f"{name}/{FILE_NAME}", f"The sample '{name}'").parent
+    return _find(f"{name}/{FILE_NAME}", f"The sample '{name}'").parent
 
 
-def _found(path: str, words: str) -> Path:
+def _find(path: str, words: str) -> Path:
     """A file of the samples: in an installed package beside the sessions room, in a checkout in `sample_sessions`."""
     package = package_folder()
     for place in (package / "sessions" / "samples" / path, package.parent / "sample_sessions" / path):
@@ -35,7 +35,7 @@ def install_prepared_runs(session: Session, sample: str) -> None:
 
     Raises NotFoundError, SessionError.
     """
-    packed = _found(f"{PREPARED}/{sample}.tar.xz", f"The runs of sample '{sample}'")
+    packed = _find(f"{PREPARED}/{sample}.tar.xz", f"The runs of sample '{sample}'")
     runs = session.path / RUNS_NAME
     runs.mkdir(exist_ok=True)
     folder = atomic_files.new_folder_beside(runs / sample)

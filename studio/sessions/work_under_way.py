@@ -80,7 +80,7 @@ def working_on(session: Path, verb: str, run: str = "") -> Generator[None]:
     """
     with one_at_a_time(session):
         check_there(session, run)
-        lock = _begun(session, verb, run)
+        lock = _begin(session, verb, run)
     own: set[Path] = _mine.__dict__.setdefault("work", set())
     if lock is not None:
         own.add(lock.path)
@@ -102,7 +102,7 @@ class _Held(NamedTuple):
             self.path.unlink()
 
 
-def _begun(session: Path, verb: str, run: str) -> _Held | None:
+def _begin(session: Path, verb: str, run: str) -> _Held | None:
     words = (session.name, run, verb, str(os.getpid()), str(next(_numbers)))
     path = session.parent / STATE_NAME / FOLDER / f"{BETWEEN.join(words)}{ENDING}"
     try:

@@ -179,7 +179,7 @@ def test_a_workspace_that_is_a_file_is_named(tmp_path: Path) -> None:
     ],
 )
 def test_addresses(host: str, shown: str) -> None:
-    assert launch._named(host) == shown
+    assert launch._host_of(host) == shown
     assert address(f"http://{shown}:80", "t") == f"http://{shown}:80/?token=t"
     shown = {"session": "walk", "run": "run-1"}
     assert address("https://a.example", "t", shown).endswith("/?token=t&session=walk&run=run-1")

@@ -233,7 +233,7 @@ def test_what_a_killed_copy_left_is_made_anew_and_many_wait_for_one(
 ) -> None:
     upload(toy, address)
     store = Store(address)
-    key = remote_sessions._key(address, remote_sessions._wanted(store))
+    key = remote_sessions._key(address, remote_sessions._needed_files(store))
     left = remote_sessions.cache_folder() / f".partial-{key}" / "toy"
     left.mkdir(parents=True)
     (left / "session.json").write_text("half")

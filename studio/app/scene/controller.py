@@ -136,7 +136,7 @@ class SceneController:
         self._theme, self._has_shadows = "", True
         self.bare = False
         """Whether it has no controls."""
-        self.viewers = Viewers(server, self._placed)
+        self.viewers = Viewers(server, self._move_with_viewer)
         self._centre: Array | None = None
         self._frames_next = False
         self._twin: SceneController | None = None
@@ -171,7 +171,7 @@ class SceneController:
         """Draw, after the changes that are posted already, and call `drawn` with the number of layers there are."""
 
         def draw(model: Model) -> Model:
-            self._guarded(self._draw)
+            self._run_safely(self._draw)
             drawn(self._layers_so_far())
             return model
 
@@ -214,7 +214,7 @@ class SceneController:
         for client in self._server.get_clients().values():
             place_viewer(client, eye)
 
-    def _placed(self, eye: Eye) -> None:
+    def _move_with_viewer(self, eye: Eye) -> None:
         """Viewers were put somewhere: the other scene's come along."""
         self._places.note(eye)
         if self._twin is not None:
@@ -228,7 +228,7 @@ class SceneController:
             return
         self.viewers.looking, self.viewers.is_answer = camera, not is_own
         if is_own:
-            self._placed(eye)
+            self._move_with_viewer(eye)
 
     # Changes that need more than the model.
 
@@ -499,7 +499,7 @@ class SceneController:
         self, model: Model, at: tuple[float, float] | None, choose: bool, answer: Future[Pointed | None]
     ) -> Model:
         """Draw the line of the particle at `at` (shares of the view; None: the pointer left), or choose it."""
-        pointed = None if at is None else self._pointed(model, at)
+        pointed = None if at is None else self._particle_at(model, at)
         answer.set_result(pointed)
         if not choose:
             return point_at(model, None if pointed is None else pointed.particle)
@@ -509,7 +509,7 @@ class SceneController:
         same = pointed.particle == model.selection.particle
         return select(model, layer=pointed.layer, particle=None if same else pointed.particle)
 
-    def _pointed(self, model: Model, at: tuple[float, float]) -> Pointed | None:
+    def _particle_at(self, model: Model, at: tuple[float, float]) -> Pointed | None:
         if self.views is None or not model.is_looking_at_layers:
             return None
         reach = POINTED_PIXELS / self.viewers.height()
@@ -517,7 +517,7 @@ class SceneController:
 
     def _click_limb(self, model: Model, limb: str, at: tuple[float, float]) -> Model:
         """Choose a limb, or let it go; of a body of glass a particle before or behind it comes first."""
-        return model if self._pointed(model, at) is not None else limb_clicked(model, limb)
+        return model if self._particle_at(model, at) is not None else limb_clicked(model, limb)
 
     def _leave_camera(self, model: Model) -> Model:
         """Look through no camera any more, from where the viewers are."""
@@ -605,7 +605,7 @@ class SceneController:
                 if drawing.is_due(now):
                     drawing.done(now)
                     began = time.thread_time()
-                    self._guarded(draw)
+                    self._run_safely(draw)
                     drawing.took = time.thread_time() - began
 
     def _pace(self) -> None:
@@ -677,7 +677,7 @@ class SceneController:
 
     def _happen(self, change: Change, values: tuple[Any, ...], *, announce: bool = True) -> None:
         before = self.model
-        after = self._guarded(lambda: change(before, *values))
+        after = self._run_safely(lambda: change(before, *values))
         if after is not None:
             self.model = after
         if self.model is before or same_drawing(before, self.model):
@@ -705,7 +705,7 @@ class SceneController:
         if is_moved or self.model.layers.state != before.layers.state:
             self._moved(self.model.selection, self.model.layers)
 
-    def _guarded(self, action: Callable[[], Any]) -> Any:  # noqa: ANN401 - what the action gives
+    def _run_safely(self, action: Callable[[], Any]) -> Any:  # noqa: ANN401 - what the action gives
         """Call an action and handle its errors, so that an unreadable file does not end the thread."""
         try:
             return action()

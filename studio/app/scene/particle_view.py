@@ -55,7 +55,7 @@ class ParticleView:
         weights = _weight_range(list(by_layer.values()), style.layer) if style.colour_by == "weight" else None
         look = (style.limbs, style.layer_count, style.point_size, tokens.name, weights, style.glows)
         for layer in range(len(self.handles), max(by_layer, default=-1) + 1):
-            self.handles.append(self._added(layer))
+            self.handles.append(self._add_cloud(layer))
         for layer, handle in enumerate(self.handles):
             record = by_layer.get(layer)
             is_shown = record is not None and style.layer in (None, layer) and bool(style.limbs)
@@ -83,7 +83,7 @@ class ParticleView:
             handle.points = moved
             self._away.add(record.layer)
 
-    def _added(self, layer: int) -> viser.PointCloudHandle:
+    def _add_cloud(self, layer: int) -> viser.PointCloudHandle:
         return add_cloud(self._server, f"/particles/layer {layer}")
 
     def _draw(

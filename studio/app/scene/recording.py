@@ -64,7 +64,7 @@ def record_scene(task: ExportTask) -> Written:
             task.place.write_bytes(serializer.serialize())
     finally:
         server.stop()
-    checked = _checked(task, read_recording(task.place))
+    checked = _check(task, read_recording(task.place))
     hidden = int((~task.motion.known).sum())
     return Written((task.place,), checked, (f"The body is hidden in {hidden} frames.",) if hidden else ())
 
@@ -109,7 +109,7 @@ def _build(server: GuardedServer, task: ExportTask) -> None:
     server.initial_camera.look_at = tuple(target)
 
 
-def _checked(task: ExportTask, recording: Recording) -> str:
+def _check(task: ExportTask, recording: Recording) -> str:
     """Compare where the limbs are in each frame of the file with where they were."""
     motion = task.motion
     places = {f"{BODY}/{limb.name}": index for index, limb in enumerate(motion.body.drawn)}

@@ -227,7 +227,7 @@ class SearchView:
     def _draw_shells(self, made: _Drawing) -> None:
         self.shells.visible = len(made.shells) > 0
         if self.shells.visible:
-            _put(self.shells, made.shells, made.shades, made.tokens)
+            _place_points(self.shells, made.shells, made.shades, made.tokens)
             self.shells.point_size = made.look.size * SHELL_SIZE
 
     def _draw_ways(self, upto: Sequence[LayerRecord], look: SearchLook, tokens: ColourTokens) -> None:
@@ -293,7 +293,7 @@ def _far_ends(places: Array, limbs: tuple[int, ...]) -> NDArray[np.float32]:
     return places[:, list(limbs), FAR_END].reshape(-1, 3).astype(np.float32)
 
 
-def _put(
+def _place_points(
     handle: viser.PointCloudHandle, points: NDArray[np.float32], colours: Bytes, tokens: ColourTokens
 ) -> None:
     # A colour array of another length must never meet the old points: a single colour goes in between.

@@ -105,9 +105,9 @@ class Viewers:
             place_viewer(client, eye)
             return
         self._ease = None
-        self._put(eye)
+        self._place_eye(eye)
 
-    def _put(self, eye: Eye) -> None:
+    def _place_eye(self, eye: Eye) -> None:
         for client in self._server.get_clients().values():
             place_viewer(client, eye)
         self._placed(eye)
@@ -136,7 +136,7 @@ class Viewers:
             return
         share = (now - self._ease.began) / EASE_SECONDS
         eye = self._ease.end if share >= 1.0 else between(self._ease.start, self._ease.end, share)
-        self._put(eye)
+        self._place_eye(eye)
         if share >= 1.0:
             self._ease, self._settles = None, now + SETTLE_SECONDS
 

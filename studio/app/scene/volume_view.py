@@ -139,9 +139,9 @@ class _Instances:
             handle.remove()
             self.handle = None
         if len(positions):
-            self.handle = self._added(positions, turns, scales, colours)
+            self.handle = self._add_boxes(positions, turns, scales, colours)
 
-    def _added(
+    def _add_boxes(
         self, positions: Array, turns: Array, scales: Array, colours: Bytes
     ) -> viser.BatchedMeshHandle:
         return self._server.scene.add_batched_meshes_simple(

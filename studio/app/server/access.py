@@ -172,7 +172,7 @@ class AccessGuard:
         if redirect is not None:
             await redirect(scope, receive, send)
             return
-        viewing, refusal = self._judged(scope)
+        viewing, refusal = self._check_request(scope)
         if refusal is None:
             before = VIEWING.set(viewing)
             try:
@@ -204,7 +204,7 @@ class AccessGuard:
         answer.headers["cache-control"] = "no-store"
         return answer
 
-    def _judged(self, scope: Scope) -> tuple[bool, AccessError | None]:
+    def _check_request(self, scope: Scope) -> tuple[bool, AccessError | None]:
         """Whether a request is a viewer's, and why it is not answered, if it is not."""
         headers = Headers(scope=scope)
         host = headers.get("host", "")

@@ -104,7 +104,7 @@ async def keep(session: OpenSession, app: App) -> AlignmentAnswer:
     release(app, session.name)
     change = await asyncio.to_thread(use_turned, session, aligned)
     app.jobs.change(ALIGNMENT, session.name, kept=True)
-    return _changed(change, app)
+    return _changed_answer(change, app)
 
 
 @router.post("/undo")
@@ -114,10 +114,10 @@ async def undo(session: OpenSession, app: App) -> AlignmentAnswer:
     change = await asyncio.to_thread(use_unturned, session)
     if app.jobs.known(ALIGNMENT, session.name) is not None:
         app.jobs.change(ALIGNMENT, session.name, kept=False)
-    return _changed(change, app)
+    return _changed_answer(change, app)
 
 
-def _changed(change: CalibrationChange, app: AppState) -> AlignmentAnswer:
+def _changed_answer(change: CalibrationChange, app: AppState) -> AlignmentAnswer:
     app.events.session_changed(change.session.name)
     return _answer(change.session, app, change.notes)
 

@@ -160,7 +160,7 @@ async def begin_setup(
 
     def work(job: Job) -> dict[str, object]:
         made = set_background(session, **arguments, progress=job.report_or_stop)
-        quality = _measured(Session(session.path), job)
+        quality = _measure(Session(session.path), job)
         return {"notes": list(made.notes), "knobs": made.knobs, "quality": quality, "choice": made.choice}
 
     return app.jobs.begin(BACKGROUND, BackgroundJob(session=session.name, source=arguments["source"]), work)
@@ -173,7 +173,7 @@ def cancel_setup(session: OpenSession, app: App) -> BackgroundAnswer:
     return background(session, app)
 
 
-def _measured(session: Session, job: Job) -> MaskQuality | None:
+def _measure(session: Session, job: Job) -> MaskQuality | None:
     """The quality of the masks that are in use now, remembered; None where views cannot be compared, or where the job
     was cancelled meanwhile.
     """

@@ -92,7 +92,7 @@ def calibration(session: OpenSession) -> CalibrationView:
 @router.post(HERE + "/proposals", status_code=201)
 async def read_file(session: OpenSession, request: CalibrationFileRequest, app: App) -> ProposalView:
     """Read a calibration file: unit, up axis, cameras, findings. It is not used before it is applied."""
-    return proposal_view(app.proposals.keep(await asyncio.to_thread(_read, session, request, app)))
+    return proposal_view(app.proposals.keep(await asyncio.to_thread(_read_proposal, session, request, app)))
 
 
 @router.get(HERE + "/proposals/{identifier}")
@@ -168,7 +168,7 @@ def board_pdf(
     return files.download(content, f"{plain}.pdf", "application/pdf", x_studio_board=made.text)
 
 
-def _read(session: Session, request: CalibrationFileRequest, app: AppState) -> Proposal:
+def _read_proposal(session: Session, request: CalibrationFileRequest, app: AppState) -> Proposal:
     if request.earlier:
         return propose_earlier(session, request.earlier, request.unit, request.up)
     if not request.path and request.upload is None:

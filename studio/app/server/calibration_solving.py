@@ -100,7 +100,7 @@ async def begin_solving(
 
     def work(job: Job) -> dict[str, object]:
         report = _Progress(job, footage.recordings).report
-        return _kept(app, propose_boards(session, footage, board, options, report))
+        return _keep(app, propose_boards(session, footage, board, options, report))
 
     return app.jobs.begin(CALIBRATION, SolveState(session=session.name), work)
 
@@ -117,7 +117,7 @@ def begin_levelling(
     run = session.run(arguments["run"]).name if arguments.get("run") else ""
 
     def work(job: Job) -> dict[str, object]:
-        return _kept(app, propose_level(session, run, job.report_or_stop))
+        return _keep(app, propose_level(session, run, job.report_or_stop))
 
     return app.jobs.begin(CALIBRATION, SolveState(session=session.name), work)
 
@@ -154,5 +154,5 @@ def _footage(app: AppState, session: Session, request: Mapping[str, Any]) -> Boa
     return named.completed(place("footage") or session.path)
 
 
-def _kept(app: AppState, proposal: Proposal) -> dict[str, object]:
+def _keep(app: AppState, proposal: Proposal) -> dict[str, object]:
     return {"proposal": app.proposals.keep(proposal).identifier, "share": 1.0}

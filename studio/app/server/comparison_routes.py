@@ -135,7 +135,7 @@ def begin_sweep(
 ) -> ComparisonLine:
     """Begin a sweep: runs of the session for every combination of some knobs' values. 409 while a comparison runs."""
     session = app.workspace.session(arguments.more["session"])
-    plan = SweepRequest(**_unnamed(arguments)).plan(session)
+    plan = SweepRequest(**_without_name(arguments)).plan(session)
     app.jobs.check_free(COMPARISON)
     return _start(app, session, kept_sweep(session, plan, arguments.get("name", "")))
 
@@ -146,7 +146,7 @@ def expected_of_sweep(
 ) -> SweepExpected:
     """How many runs a sweep has and about how long they take; 422 for what cannot be swept."""
     session = app.workspace.session(arguments.more["session"])
-    return expected_sweep(session, SweepRequest(**_unnamed(arguments)))
+    return expected_sweep(session, SweepRequest(**_without_name(arguments)))
 
 
 @router.get(ONE)
@@ -219,10 +219,10 @@ def _plan(session: Session, arguments: Arguments) -> Plan:
         if own:
             changes[candidate.name] = own
     names = [candidate.name for candidate in candidates]
-    return CompareRequest(trackers=names, changes=changes, **_unnamed(arguments)).plan(session)
+    return CompareRequest(trackers=names, changes=changes, **_without_name(arguments)).plan(session)
 
 
-def _unnamed(arguments: Arguments) -> dict[str, Any]:
+def _without_name(arguments: Arguments) -> dict[str, Any]:
     """What a comparison is made of, without its name."""
     return {name: value for name, value in arguments.items() if name != "name"}
 

@@ -34,17 +34,17 @@ def _member(name: str, value: Any) -> str:  # noqa: ANN401 - whatever is public
     head = f'<h2 id="{name}"><code>{name}</code></h2>'
     if inspect.isclass(value):
         methods = [
-            _described(f"{method}{_signature(function)}", function)
+            _describe(f"{method}{_signature(function)}", function)
             for method, function in vars(value).items()
             if inspect.isfunction(function) and not method.startswith("_")
         ]
         return "\n".join([head, text_of(inspect.getdoc(value) or ""), *methods])
     if inspect.isfunction(value):
-        return f"{head}\n{_described(f'{name}{_signature(value)}', value)}"
+        return f"{head}\n{_describe(f'{name}{_signature(value)}', value)}"
     return f"{head}\n<p><code>{html.escape(repr(value))}</code></p>"
 
 
-def _described(call: str, function: Callable[..., object]) -> str:
+def _describe(call: str, function: Callable[..., object]) -> str:
     return f"<h3><code>{html.escape(call)}</code></h3>\n{text_of(inspect.getdoc(function) or '')}"
 
 

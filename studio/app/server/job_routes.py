@@ -78,12 +78,12 @@ def _line(job: Job) -> JobLine:
         key=state.key,
         **{name: str(fields.get(name) or "") for name in ("name", "run", "verb")},
         began=job.began,
-        at=_filled(kind.at, fields),
-        page=_filled(kind.page, fields),
+        at=_fill(kind.at, fields),
+        page=_fill(kind.page, fields),
     )
 
 
-def _filled(address: str, fields: dict[str, object]) -> str:
+def _fill(address: str, fields: dict[str, object]) -> str:
     """An address with fields of the state in it."""
     parts = {
         name: quote(str(fields.get(name) or ""), safe="")

@@ -153,14 +153,14 @@ def put_start_pose(session: OpenSession, request: StartPoseRequest, app: App) ->
 @router.post(SESSION + "/pose/drag")
 def drag(session: OpenSession, request: DragRequest) -> PoseView:
     """The pose with a limb's end at a place; the rest of the body follows where it must."""
-    body, pose, _ = _posed(session, request)
+    body, pose, _ = _read_pose(session, request)
     return dragged_pose(body, pose, request.limb, request.target)
 
 
 @router.post(SESSION + "/pose/mirror")
 def mirror(session: OpenSession, request: MirrorRequest) -> PoseView:
     """The pose with left and right exchanged."""
-    body, pose, _ = _posed(session, request)
+    body, pose, _ = _read_pose(session, request)
     other = Mirror(body)
     turned = other.mirrored(pose) if request.how == "in place" else other.turned_round(pose)
     return pose_view(body, turned)
@@ -170,7 +170,7 @@ def mirror(session: OpenSession, request: MirrorRequest) -> PoseView:
 async def begin_refining_pose(session: OpenSession, request: BetterPoseRequest, app: App) -> TrackJobState:
     """Begin a short search around the pose, with the weighting in use. `track` events report it."""
     session.checked_frames(request.frame, request.frame + 1)
-    _, pose, run = _posed(session, request)
+    _, pose, run = _read_pose(session, request)
     search = PoseSearch(request.frame, pose, run, request.seed, request.keep)
 
     def work(job: Job) -> dict[str, object]:
@@ -218,7 +218,7 @@ def leave(scene: Scene) -> None:
     scene.poses.leave()
 
 
-def _posed(session: Session, request: PoseRequest) -> tuple[BodyModel, Array, StoredRun | None]:
+def _read_pose(session: Session, request: PoseRequest) -> tuple[BodyModel, Array, StoredRun | None]:
     """The body and (D,) pose of a request, and the run that they are of. Raises SettingsError, NotFoundError."""
     run = session.run(request.run) if request.run else None
     body = run.body() if run else session.body()

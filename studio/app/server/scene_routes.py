@@ -183,10 +183,10 @@ def play_layers(request: LayerPlaying, scene: Scene) -> None:
 @router.get("/play-layers")
 def layers_played(scene: Scene) -> LayersPlayed:
     """Whether and how layers are played."""
-    return LayersPlayed.model_validate(_played(scene.layers))
+    return LayersPlayed.model_validate(_layers_answer(scene.layers))
 
 
-def _played(layers: LayerPlayback) -> dict[str, object]:
+def _layers_answer(layers: LayerPlayback) -> dict[str, object]:
     return {"playing": layers.playing, "rate": layers.rate, "mode": layers.mode}
 
 
@@ -236,7 +236,7 @@ def report_moves(app: AppState) -> None:
             {
                 "type": "scene",
                 **dataclasses.asdict(shown),
-                "layers": _played(layers),
+                "layers": _layers_answer(layers),
             },
             window,
         )

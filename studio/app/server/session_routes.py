@@ -76,13 +76,13 @@ def change_session(session: OpenSession, change: SessionChange, app: App) -> New
     if change.name is not None and change.name != name:
         with moving(app, name):
             name = app.workspace.rename(name, change.name).name
-    return _changed(app, name)
+    return _tell_watchers(app, name)
 
 
 @router.post("/sessions/{session}/duplicate", status_code=201)
 def duplicate(session: OpenSession, app: App, request: NewName | None = None) -> NewName:
     """A copy with its runs, under the given name or a free one."""
-    return _changed(app, app.workspace.duplicate(session.name, request.name if request else None).name)
+    return _tell_watchers(app, app.workspace.duplicate(session.name, request.name if request else None).name)
 
 
 @router.delete("/sessions/{session}")
@@ -90,7 +90,7 @@ def delete(session: OpenSession, app: App) -> TrashEntry:
     """Move a session to the trash. Refused while a run of it is being tracked."""
     with moving(app, session.name):
         place = app.workspace.trash(session.name)
-    _changed(app, session.name)
+    _tell_watchers(app, session.name)
     return trash_entry(place)
 
 
@@ -108,7 +108,7 @@ def restore(choice: TrashChoice, app: App) -> Restored:
     return restored
 
 
-def _changed(app: AppState, name: str) -> NewName:
+def _tell_watchers(app: AppState, name: str) -> NewName:
     """Tell all watchers that the list of sessions is another one."""
     app.events.session_changed(name)
     return NewName(name=name)

@@ -131,7 +131,7 @@ add_job_routes(router, "/subject-fits/{identifier}", SUBJECT)
 @router.post("/subject-fits/{identifier}/keep")
 def keep_fit(identifier: str, app: App) -> FitSubjectState:
     """Keep what a fit found as the session's subject; the old one stays beside it."""
-    fitted = _fitted(identifier, app)
+    fitted = _fit_of(identifier, app)
     state = app.jobs.state(SUBJECT, identifier)
     kept = keep_fitted(app.workspace.session(state.session), fitted)
     state = app.jobs.change(SUBJECT, identifier, file=kept.file.name if kept.file else "")
@@ -143,12 +143,12 @@ def keep_fit(identifier: str, app: App) -> FitSubjectState:
 def fitted_picture(identifier: str, frame: int, camera: str, app: App, height: Height = None) -> Response:
     """The fitted body, or the one that is so far, over what a camera saw in a frame that was looked at."""
     known = app.jobs.result(SUBJECT, identifier)
-    fit = known if isinstance(known, FitSoFar) else _fitted(identifier, app)
+    fit = known if isinstance(known, FitSoFar) else _fit_of(identifier, app)
     session = app.workspace.session(app.jobs.state(SUBJECT, identifier).session)
     return files.picture(fit_picture(session, fit, View(frame, camera, height=height)))
 
 
-def _fitted(identifier: str, app: AppState) -> FittedSubject:
+def _fit_of(identifier: str, app: AppState) -> FittedSubject:
     """What a fit gave. Raises NotFoundError."""
     fitted = app.jobs.result(SUBJECT, identifier)
     if not isinstance(fitted, FittedSubject):

@@ -29,10 +29,10 @@ def read_c3d(path: Path) -> MarkerMotion:
     if not path.is_file():
         raise StudioError(f"'{path}' does not exist.", "Check the path.")
     check_regular(path, StudioError)
-    return isolated(StudioError, _read, path)
+    return isolated(StudioError, _read_points, path)
 
 
-def _read(path: Path) -> MarkerMotion:
+def _read_points(path: Path) -> MarkerMotion:
     with foreign_file(path, StudioError, "a C3D file that can be read", REMEDY):
         content: Any = ezc3d.c3d(str(path))
         settings = content["parameters"]["POINT"]

@@ -41,17 +41,17 @@ def read_humanoid_arrays(path: Path) -> RecordedMotion:
     }
     for name, (wanted, shape) in shapes.items():
         if wanted != shape or 0 in shape:
-            raise _wrong(path, name, f"has shape {shape}, not {wanted}")
+            raise _error_of(path, name, f"has shape {shape}, not {wanted}")
     if any(parent >= joint or (parent < 0) != (joint == 0) for joint, parent in enumerate(parents)):
-        raise _wrong(path, "parent_indices", "must name earlier joints, and -1 for the first alone")
+        raise _error_of(path, "parent_indices", "must name earlier joints, and -1 for the first alone")
     sizes = np.linalg.norm(turns, axis=-1)
     if not (np.all(np.isfinite(turns)) and np.all(np.abs(sizes - 1.0) < 1e-3)):
-        raise _wrong(path, "rotation_local_xyzw", "holds quaternions that are not of length 1")
+        raise _error_of(path, "rotation_local_xyzw", "holds quaternions that are not of length 1")
     if not (np.all(np.isfinite(root)) and np.all(np.isfinite(offsets))):
-        raise _wrong(path, "root_translation_m or local_translation_m", "holds what is no number")
+        raise _error_of(path, "root_translation_m or local_translation_m", "holds what is no number")
     fps = float(entries["fps"]) if entries["fps"].shape == () else 0.0
     if not 1.0 <= fps <= 1000.0:
-        raise _wrong(path, "fps", "is not one number from 1 to 1000")
+        raise _error_of(path, "fps", "is not one number from 1 to 1000")
     repeated = _repetitions(turns, root)
     turns, root = turns[::repeated], root[::repeated]
     return moved_skeleton(
@@ -82,11 +82,11 @@ def _entries(path: Path) -> dict[str, NDArray[np.generic]]:
         arrays = read_archive(path)
     for name in ENTRIES:
         if name not in arrays:
-            raise _wrong(path, name, "is missing")
+            raise _error_of(path, name, "is missing")
     return arrays
 
 
-def _wrong(path: Path, entry: str, what: str) -> StudioError:
+def _error_of(path: Path, entry: str, what: str) -> StudioError:
     return StudioError(
         f"'{path.name}': entry '{entry}' {what}.", f"Write the entries {', '.join(ENTRIES)} as described."
     )

@@ -110,14 +110,14 @@ def _motion(path: Path, rows: Iterable[Sequence[str]], fps: float) -> MarkerMoti
             positions[frame, point] = _place(path, number, point, [cells[at] for at in axes])
     if columns is None or not positions:
         raise TruthError(f"'{path.name}' has no rows of points.", SHAPE)
-    motion = _filled(path, positions, tuple(names), columns.unit, fps)
+    motion = _motion_of(path, positions, tuple(names), columns.unit, fps)
     if columns.place >= 0:
         return motion
     note = f"'{path.name}' has no column of frames: its rows were counted from 0."
     return replace(motion, notes=(*motion.notes, note))
 
 
-def _filled(
+def _motion_of(
     path: Path,
     by_frame: Mapping[tuple[int, str], tuple[float, float, float]],
     names: tuple[str, ...],

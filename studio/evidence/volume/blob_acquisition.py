@@ -108,7 +108,7 @@ def blobs_of(body: BodyModel, profiles: Profiles, split: float, most_parts: int 
     volumes = np.array([sums[0] + unseen for _, sums, unseen in rows])
     limb = np.array([row[0] for row in rows], dtype=np.int64)
     described = [
-        _described(sums) if sums[0] > 0.0 else (cones.offset[place], cones.eigenvalues[place], *_unknown())
+        _describe(sums) if sums[0] > 0.0 else (cones.offset[place], cones.eigenvalues[place], *_unknown())
         for place, sums, _ in rows
     ]
     offset, eigenvalues, colour, variance = (np.array(column) for column in zip(*described, strict=True))
@@ -119,7 +119,7 @@ def _unknown() -> tuple[Array, Array]:
     return np.full(3, np.nan), np.full(3, np.nan)
 
 
-def _described(sums: Array) -> tuple[float, Array, Array, Array]:
+def _describe(sums: Array) -> tuple[float, Array, Array, Array]:
     """Offset, eigenvalues (3,), colour (3,) and its variance (3,) of a part's sums (SUMS,)."""
     volume = sums[0]
     means, squares = sums[1:4] / volume, sums[4:7] / volume

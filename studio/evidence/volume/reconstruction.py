@@ -85,7 +85,7 @@ class Reconstructor:
         Raises FootageError where the evidence does not fit the cameras.
         """
         self._check(evidence)
-        seen = self._seen(evidence)
+        seen = self._sights_of(evidence)
         return self._coloured(self._carved(seen), seen)
 
     def shape(self, masks: Sequence[Bytes]) -> Hull:
@@ -100,7 +100,7 @@ class Reconstructor:
         for camera, mask in zip(self.cameras, masks, strict=True):
             self._check_size(camera, mask)
         kept = self._carved(self._seen_masks(masks, np.zeros((1, 3), np.uint8)))
-        centres, edges = self._placed(kept)
+        centres, edges = self._place_voxels(kept)
         unseen = np.float32(np.nan)
         return Hull(
             centres,
@@ -127,7 +127,7 @@ class Reconstructor:
                 nodes, states = octree.children(nodes, states, verdicts, grid_limits(self.box, depth + 1))
         return kept
 
-    def _placed(self, kept: list[Nodes]) -> tuple[Array, Array]:
+    def _place_voxels(self, kept: list[Nodes]) -> tuple[Array, Array]:
         """Centres and edges of the kept voxels of each depth."""
         sizes = [self.box.edge / 2.0 ** (FIRST_DEPTH + step) for step in range(len(kept))]
         edges = np.repeat(sizes, [len(nodes) for nodes in kept])
@@ -135,14 +135,14 @@ class Reconstructor:
 
     def _coloured(self, kept: list[Nodes], seen: kernels.Sights) -> Hull:
         """The kept voxels of each depth as a hull."""
-        centres, edges = self._placed(kept)
+        centres, edges = self._place_voxels(kept)
         views = np.empty((len(edges), len(self.cameras), 3), dtype=np.float32)
         means = np.empty((len(edges), 3), dtype=np.float32)
         given = centres, edges, seen, self._rules, views, means
         parallel_blocks(octree.colour, len(edges), VOXELS_A_THREAD, *given)
         return Hull(centres, edges, means, views, self.settings.hull_depth, self.box)
 
-    def _seen(self, evidence: FrameEvidence) -> kernels.Sights:
+    def _sights_of(self, evidence: FrameEvidence) -> kernels.Sights:
         """The frame's pictures, and summed masks or Gaussians, one after the other for the kernels."""
         picture = np.concatenate([view.picture.reshape(-1, 3) for view in evidence.views])
         backgrounds = tuple(view.background for view in evidence.views if view.background is not None)

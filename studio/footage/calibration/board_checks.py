@@ -130,7 +130,7 @@ def board_disagreement(cameras: Sequence[Camera], board: Board, sightings: Seque
     """Pixels per 1000 of width by which two-view intersections miss the corners: mean over pairs of the clipped median;
     NaN if no two cameras share a frame.
     """
-    pairs = _shared(cameras, sightings)
+    pairs = _shared_frames(cameras, sightings)
     values: list[float] = []
     for one, two, frames in pairs:
         errors = [_two_views(cameras[one], cameras[two], *couple, board)[1] for couple in frames]
@@ -141,7 +141,7 @@ def board_disagreement(cameras: Sequence[Camera], board: Board, sightings: Seque
 def square_size(cameras: Sequence[Camera], board: Board, sightings: Sequence[Sighting]) -> float | None:
     """Side of a square as these cameras measure it, mm (median); None if no two share a frame."""
     sizes: list[Array] = []
-    for one, two, frames in _shared(cameras, sightings):
+    for one, two, frames in _shared_frames(cameras, sightings):
         for first, second in frames:
             points, _, ids = _two_views(cameras[one], cameras[two], first, second, board)
             apart = np.linalg.norm(points[:, None] - points[None], axis=-1)
@@ -152,7 +152,7 @@ def square_size(cameras: Sequence[Camera], board: Board, sightings: Sequence[Sig
     return float(np.median(np.concatenate(sizes))) if sizes else None
 
 
-def _shared(
+def _shared_frames(
     cameras: Sequence[Camera], sightings: Sequence[Sighting]
 ) -> list[tuple[int, int, list[tuple[Sighting, Sighting]]]]:
     """Pairs of cameras with the frames that both saw, with four common corners or more."""

@@ -116,7 +116,7 @@ def look_for_lens(
     """
     count = frame_count(footage)
     frames = np.arange(count) if footage.video is None else frames_in_step([count], LENS_FRAMES)
-    return _examined(finder, camera, footage, count, frames, progress, taken)
+    return _examine(finder, camera, footage, count, frames, progress, taken)
 
 
 def look_together(
@@ -144,7 +144,7 @@ def look_together(
     frames = np.union1d(frames, [frame for frame in also if first <= frame < least]).astype(np.int64)
     seen: list[Seen] = []
     for camera, entry in footage.items():
-        seen += _examined(finder, camera, entry, counts[camera], frames, progress, taken, begins[camera])
+        seen += _examine(finder, camera, entry, counts[camera], frames, progress, taken, begins[camera])
     return seen
 
 
@@ -191,7 +191,7 @@ def _cells(sighting: Sighting) -> set[int]:
     return {int(place) + 64 * lean for place in 8 * places[:, 1] + places[:, 0]}
 
 
-def _examined(
+def _examine(
     finder: BoardFinder,
     camera: str,
     footage: BoardFootage,

@@ -82,9 +82,9 @@ def solve_lens(board: Board, sightings: Sequence[Sighting]) -> Lens:
 
     Raises CalibrationError for fewer than three pictures, or pictures of several sizes.
     """
-    camera, size = _checked(sightings)
+    camera, size = _check(sightings)
     used, dropped = list(sightings), dict[int, str]()
-    solution, model = _fitted(board, used, size)
+    solution, model = _fit(board, used, size)
     least = max(FEWEST_PICTURES, int(np.ceil(KEPT_SHARE * len(sightings))))
     for _ in range(DROP_ROUNDS):
         limit = max(OUTLYING * float(np.median(solution.rms_of)), LEAST_OUTLYING_PX * size[0] / 1000.0)
@@ -95,7 +95,7 @@ def solve_lens(board: Board, sightings: Sequence[Sighting]) -> Lens:
             f"its residual is {solution.rms_of[worst]:.2f} px, the others' {np.median(solution.rms_of):.2f} px"
         )
         del used[worst]
-        solution, model = _fitted(board, used, size)
+        solution, model = _fit(board, used, size)
     profiled = _profiled_deviation(board, used, size, solution)
     turns: list[Array] = list(solution.turns)
     upright = [abs(float(np.asarray(cv2.Rodrigues(turn)[0], dtype=np.float64)[2, 2])) for turn in turns]
@@ -126,7 +126,7 @@ def solve_lens(board: Board, sightings: Sequence[Sighting]) -> Lens:
     )
 
 
-def _checked(sightings: Sequence[Sighting]) -> tuple[str, tuple[int, int]]:
+def _check(sightings: Sequence[Sighting]) -> tuple[str, tuple[int, int]]:
     names = sorted({sighting.camera for sighting in sightings})
     sizes = sorted({sighting.size for sighting in sightings})
     name = names[0] if names else "?"
@@ -143,7 +143,7 @@ def _checked(sightings: Sequence[Sighting]) -> tuple[str, tuple[int, int]]:
     return name, sizes[0]
 
 
-def _fitted(board: Board, sightings: Sequence[Sighting], size: tuple[int, int]) -> tuple[_Solution, str]:
+def _fit(board: Board, sightings: Sequence[Sighting], size: tuple[int, int]) -> tuple[_Solution, str]:
     """The richest model that the pictures carry, and its name in words."""
     share, count = coverage_of(sightings, size).share, len(sightings)
     flags = cv2.CALIB_FIX_K3

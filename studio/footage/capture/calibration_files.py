@@ -144,7 +144,7 @@ def _calibration(path: Path, unit: str, up: str) -> Calibration:
     if unit:
         mm_of(unit)
     calibration = with_up(calibration, up)
-    return _finished(calibration, content.unit, unit, turned=is_canonical(path) and up == "z")
+    return _finish(calibration, content.unit, unit, turned=is_canonical(path) and up == "z")
 
 
 def with_up(calibration: Calibration, up: str) -> Calibration:
@@ -250,7 +250,7 @@ def _read_folder(folder: Path) -> FoundCameras:
     )
 
 
-def _finished(read: Calibration, unit: str, requested: str, turned: bool = False) -> Calibration:
+def _finish(read: Calibration, unit: str, requested: str, turned: bool = False) -> Calibration:
     """In mm, sorted, upright (unless the file says how far to turn); names checked."""
     names = [camera.name for camera in read.cameras]
     if len(set(names)) != len(names):

@@ -67,7 +67,7 @@ def open_stream(
         yield from _decoded(address, mjpeg_parts(address, wait, (SECONDS_TO_OPEN, SECONDS_TO_READ)), clock)
         return
     try:
-        with _opened(address) as container:
+        with _open(address) as container:
             stream = container.streams.video[0]
             stream.thread_type = "NONE"
             stream.codec_context.options = {"max_pixels": str(MAX_PIXELS)}
@@ -128,7 +128,7 @@ def replayed_video(
 
 
 @contextmanager
-def _opened(address: CameraAddress) -> Generator[av.container.InputContainer]:
+def _open(address: CameraAddress) -> Generator[av.container.InputContainer]:
     opened = partial(
         av.open, mode="r", format=FORMATS[address.kind], timeout=(SECONDS_TO_OPEN, SECONDS_TO_READ)
     )

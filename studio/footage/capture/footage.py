@@ -93,17 +93,17 @@ class Footage:
 
     def picture(self, camera: str, frame: int) -> Bytes:
         """(H, W, 3) uint8 BGR of one camera; read-only. Raises NotFoundError, FootageError."""
-        return self._pictures[camera].read(self._checked(frame))
+        return self._pictures[camera].read(self._check_frame(frame))
 
     def mask(self, camera: str, frame: int) -> Bytes | None:
         """(H, W) uint8, 0 or 255, the mask that came with the data, or None where the camera has none."""
         kept = self._masks.get(camera)
-        return None if kept is None else kept.read(self._checked(frame))
+        return None if kept is None else kept.read(self._check_frame(frame))
 
     def hidden(self, camera: str, frame: int) -> Bytes | None:
         """(H, W) uint8, 255 where a camera's mask says nothing of the subject, or None where it does everywhere."""
         kept = self._hidden.get(camera)
-        return None if kept is None else kept.read(self._checked(frame))
+        return None if kept is None else kept.read(self._check_frame(frame))
 
     def pictures(self, frame: int) -> FramePictures:
         """All cameras' pictures of a frame."""
@@ -111,7 +111,7 @@ class Footage:
 
     def masks(self, frame: int) -> dict[str, Bytes] | None:
         """The masks that came with the data by camera, or None if no camera has any."""
-        masks = {name: kept.read(self._checked(frame)) for name, kept in self._masks.items()}
+        masks = {name: kept.read(self._check_frame(frame)) for name, kept in self._masks.items()}
         return masks or None
 
     def has_masks(self, camera: str) -> bool:
@@ -134,7 +134,7 @@ class Footage:
         numbered = [camera for camera in self.source.cameras if camera.kind == "numbered"]
         if not numbered:
             return frozenset()
-        index = self._checked(frame)
+        index = self._check_frame(frame)
         missing = {
             camera.name
             for camera in numbered
@@ -180,7 +180,7 @@ class Footage:
         if sum(kept.read_count for kept in self._pictures.values()) >= MANY_PICTURES:
             give_back_freed_memory()
 
-    def _checked(self, frame: int) -> int:
+    def _check_frame(self, frame: int) -> int:
         if not 0 <= frame < self.frame_count:
             raise NotFoundError(
                 f"There is no frame {frame}.", f"The footage has frames 0 to {self.frame_count - 1}."
@@ -375,7 +375,7 @@ class PingPong(Footage):
     def picture(self, camera: str, frame: int) -> Bytes:
         """As `Footage.picture`; on the way back with the frames that come next."""
         reached = self._reached = {} if self._reached is None else self._reached
-        index = self._checked(frame)
+        index = self._check_frame(frame)
         before = reached.get(camera, -1)
         if index < before:
             source = self._by_name[camera]
@@ -383,11 +383,11 @@ class PingPong(Footage):
             before = max(0, index - max(1, min(STRETCH, room // 2)) + 1)
             for earlier in range(before, index):
                 super().picture(camera, earlier)
-        turning = self._checked(frame + 1) > index
+        turning = self._check_frame(frame + 1) > index
         reached[camera] = index if turning else before
         return super().picture(camera, index)
 
-    def _checked(self, frame: int) -> int:
+    def _check_frame(self, frame: int) -> int:
         if frame < 0:
             raise NotFoundError(f"There is no frame {frame}.", "Frames are counted from 0.")
         return folded(frame, self.frame_count)

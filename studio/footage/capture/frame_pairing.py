@@ -66,7 +66,7 @@ def drifts(times: Mapping[str, Array], fps: float) -> tuple[Drift, ...]:
         return ()
     count = min(map(len, times.values()))
     since = {name: moments[:count] - moments[0] for name, moments in times.items()}
-    lost = {name: _lost(moments) for name, moments in since.items()}
+    lost = {name: _gaps_of(moments) for name, moments in since.items()}
     common = _common(since, lost)
     drifting: list[Drift] = []
     for name, moments in since.items():
@@ -110,7 +110,7 @@ def paired_by_time(times: Mapping[str, Array], fps: float) -> tuple[dict[str, St
     return steps, count
 
 
-def _lost(moments: Array) -> tuple[tuple[int, int], ...]:
+def _gaps_of(moments: Array) -> tuple[tuple[int, int], ...]:
     """(frame, how many) of the gaps before frames."""
     steps = np.diff(moments)
     usual = float(np.median(steps)) if len(steps) else 0.0

@@ -295,7 +295,7 @@ class LiveCameras:
         self._changed = threading.Condition()
         self._spreads: deque[tuple[float, str]] = deque(maxlen=LAST_SPREADS)
         for camera in cameras:
-            camera.listen(self._heard)
+            camera.listen(self._take_shot)
 
     def start(self, start: Callable[[Callable[[], None], str], None]) -> None:
         """Start every camera's reader. start : makes a thread of a function and a name."""
@@ -356,6 +356,6 @@ class LiveCameras:
         with self._changed:
             self._changed.wait(seconds)
 
-    def _heard(self, name: str, shot: Shot) -> None:
+    def _take_shot(self, name: str, shot: Shot) -> None:
         with self._changed:
             self._changed.notify_all()

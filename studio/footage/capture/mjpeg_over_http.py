@@ -45,21 +45,23 @@ def mjpeg_parts(
             client.stream("GET", url, headers=headers, auth=password, extensions=extensions) as response,
         ):
             if response.is_redirect:
-                raise _wrong(address, "it leads to another address, which is not followed")
+                raise _error_of(address, "it leads to another address, which is not followed")
             if response.status_code != HTTPStatus.OK:
-                raise _wrong(address, f"it answers {response.status_code} {response.reason_phrase}".strip())
+                raise _error_of(
+                    address, f"it answers {response.status_code} {response.reason_phrase}".strip()
+                )
             named = BOUNDARY.search(response.headers.get("content-type", ""))
             boundary = named[1].strip().lstrip("-").encode("latin-1", "replace") if named else b""
             try:
                 yield from _parts(response.iter_raw(), wait, boundary)
             except ValueError as problem:
-                raise _wrong(address, str(problem)) from None
+                raise _error_of(address, str(problem)) from None
     except httpx.TimeoutException as problem:
         seconds = opening if isinstance(problem, httpx.ConnectTimeout) else reading
-        raise _wrong(address, f"no data for {seconds:g} s") from None
+        raise _error_of(address, f"no data for {seconds:g} s") from None
     except (httpx.HTTPError, httpx.InvalidURL) as problem:
         # A library's own words may hold the address with its password.
-        raise _wrong(address, type(problem).__name__) from None
+        raise _error_of(address, type(problem).__name__) from None
 
 
 class _Password(httpx.Auth):
@@ -126,5 +128,5 @@ def _end_of_header(buffer: bytearray, mark: bytes) -> int | None:
     return None
 
 
-def _wrong(address: CameraAddress, why: str) -> FootageError:
+def _error_of(address: CameraAddress, why: str) -> FootageError:
     return FootageError(f"Camera {address.name} ({address.shown}) gives no pictures ({why}).", REMEDY)

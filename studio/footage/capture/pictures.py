@@ -102,10 +102,10 @@ def measure_pictures(folder: Path, on_frame: Callable[[int, int], None] | None =
     on_frame : called with pictures read and pictures in all; may raise to stop. Raises FootageError if there are none,
     one is damaged or sizes differ.
     """
-    return isolated(FootageError, _measured, folder, on_frame or silent)
+    return isolated(FootageError, _measure, folder, on_frame or silent)
 
 
-def _measured(folder: Path, on_frame: Callable[[int, int], None]) -> PicturesMeasure:
+def _measure(folder: Path, on_frame: Callable[[int, int], None]) -> PicturesMeasure:
     paths = list_pictures(folder)
     if not paths:
         raise FootageError(f"'{folder.name}' holds no pictures.", "Put the frames in it as PNG, JPEG or BMP.")

@@ -234,10 +234,10 @@ def measure_video(path: Path, on_frame: Callable[[int, int], None] | None = None
     Raises FootageError naming the file and the frame where it is damaged or cut.
     """
     check_regular(path, FootageError)
-    return isolated(FootageError, _measured, path, on_frame or silent)
+    return isolated(FootageError, _measure, path, on_frame or silent)
 
 
-def _measured(path: Path, on_frame: Callable[[int, int], None]) -> VideoMeasure:
+def _measure(path: Path, on_frame: Callable[[int, int], None]) -> VideoMeasure:
     times: list[float] = []
     width = height = turned = marked = 0
     motion = FieldMotion()

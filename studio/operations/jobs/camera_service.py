@@ -181,7 +181,7 @@ class CameraService:
         recording = StreamRecording(readers, folder, readers.await_rate())
         try:
             began = time.monotonic()
-            while not self._ended(job) and (seconds is None or time.monotonic() - began < seconds):
+            while not self._is_over(job) and (seconds is None or time.monotonic() - began < seconds):
                 standing = recording.standing
                 job.change(step=RECORDING, seconds=standing.seconds, words=standing.in_words)
                 if recording.wait(TELL_SECONDS):
@@ -209,7 +209,7 @@ class CameraService:
             raise
         job.change(run=run.name)
         try:
-            while not self._ended(job) and not recording.standing.ended:
+            while not self._is_over(job) and not recording.standing.ended:
                 standing = recording.standing
                 step = RECORDING if standing.seconds else GETTING_READY
                 job.change(step=step, seconds=standing.seconds, words=standing.in_words)
@@ -222,7 +222,7 @@ class CameraService:
         )
         return {"step": "", "words": words, "notes": [notice.in_words for notice in standing.notices]}
 
-    def _ended(self, job: Job) -> bool:
+    def _is_over(self, job: Job) -> bool:
         return self._stop.is_set() or job.cancelled()
 
     # ------------------------------------------------------------------ state

@@ -97,14 +97,14 @@ class ClusterExecutor(Executor):
         self._changed = threading.Lock()
         self._tasks: dict[Future[Any], Any] = {}
         self._closed = False
-        self._client = _connected(address, patience)
+        self._client = _connect(address, patience)
         self._marker: _Marker | None = None
         try:
             self._marker = _marked(folder)
             topic = f"studio-{uuid4().hex}" if on_report else ""
             self._needs = _Needs(_software(), self._marker, topic)
             if on_report:
-                self._client.subscribe_topic(topic, partial(_heard, on_report))
+                self._client.subscribe_topic(topic, partial(_pass_report, on_report))
             self._check_machines()
             threads = self._client.nthreads().values()
             self.workers, self.threads = len(threads), sum(threads)
@@ -249,7 +249,7 @@ class _Needs:
     topic: str
 
 
-def _connected(address: str, patience: float) -> Any:  # noqa: ANN401 - of a package that need not be there
+def _connect(address: str, patience: float) -> Any:  # noqa: ANN401 - of a package that need not be there
     if importlib.util.find_spec("distributed") is None:
         raise RunError("Work on a cluster needs Dask.distributed, which is not installed.", INSTALL)
     try:
@@ -299,7 +299,7 @@ def _useless(who: str, problem: BaseException) -> RunError:
     )
 
 
-def _heard(on_report: Callable[..., None], event: tuple[float, tuple[object, ...]]) -> None:
+def _pass_report(on_report: Callable[..., None], event: tuple[float, tuple[object, ...]]) -> None:
     """An event of the scheduler: when it came, and the words of a report."""
     on_report(*event[1])
 

@@ -78,8 +78,8 @@ def run_comparison(
     However it ends, finished trials stay, and of runs the finished frames. Raises RunError where another process works
     at it or a trial fails.
     """
-    with _held(kept):
-        plan, outcomes = _measured(kept, session, report, processes, executor, checkpoint)
+    with _hold(kept):
+        plan, outcomes = _measure(kept, session, report, processes, executor, checkpoint)
         result = conclusion(plan, outcomes)
         kept.finish(result)
     return result
@@ -122,7 +122,7 @@ def done_before(kept: KeptComparison, plan: Plan) -> int:
 
 
 @contextmanager
-def _held(kept: KeptComparison) -> Generator[None]:
+def _hold(kept: KeptComparison) -> Generator[None]:
     """While it is worked at. Raises RunError where another process does."""
     lock = kept.lock()
     if lock is None:
@@ -136,7 +136,7 @@ def _held(kept: KeptComparison) -> Generator[None]:
         lock.free()
 
 
-def _measured(
+def _measure(
     kept: KeptComparison,
     session: Session,
     report: Progress,

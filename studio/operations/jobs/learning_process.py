@@ -149,7 +149,9 @@ def learn_to_order(order: LearningOrder) -> dict[str, object]:
 
     report(READING, 0, PARTS)
     read = [
-        read_sources([source], body, fps=options.fps, workspace=workspace, progress=_named(reading, number))
+        read_sources(
+            [source], body, fps=options.fps, workspace=workspace, progress=_naming_sources(reading, number)
+        )
         for number, source in enumerate(sources)
     ]
     training = [one for group in read[: len(order.sources)] for one in group]
@@ -162,5 +164,5 @@ def learn_to_order(order: LearningOrder) -> dict[str, object]:
     return {**dataclasses.asdict(numbers), "bad_frames": bad}
 
 
-def _named(reading: Progress, number: int) -> Progress:
+def _naming_sources(reading: Progress, number: int) -> Progress:
     return lambda words, done, parts: reading(f"{number} {words}", done, parts)

@@ -180,7 +180,7 @@ class _Seat:
                     break
                 self._on_report(*answer)
         except (EOFError, OSError, pickle.UnpicklingError):
-            raise self._lost() from None
+            raise self._death() from None
         if kind == "raised":
             raise answer
         return answer
@@ -216,7 +216,7 @@ class _Seat:
         self._process, self._pipe = process, ours
         return ours
 
-    def _lost(self) -> RunError:
+    def _death(self) -> RunError:
         """That the process ended, and how."""
         assert self._process is not None
         self._process.join(PATIENCE)

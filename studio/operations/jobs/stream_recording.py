@@ -164,10 +164,10 @@ class _Track:
         broken = False
         while (shot := self.waiting.get()) is not None:
             if not broken:
-                broken = not self._done(lambda shot=shot: self.writer.write(shot))
-        self._done(self.writer.close)
+                broken = not self._write_safely(lambda shot=shot: self.writer.write(shot))
+        self._write_safely(self.writer.close)
 
-    def _done(self, act: Callable[[], None]) -> bool:
+    def _write_safely(self, act: Callable[[], None]) -> bool:
         try:
             act()
         except OSError as problem:

@@ -26,7 +26,7 @@ def measure_run(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, 
     """
     session = cache.session(arguments["footage"])
     bring_runs(session, arguments["run"])
-    run = _begun(session, arguments) or _new(session, arguments)
+    run = _earlier_attempt(session, arguments) or _new(session, arguments)
     if run.summary(blobs=False).done < run.record.frame_count:
         track_to_end(session, run, report)
     if run.name not in remote_runs(session):
@@ -51,7 +51,7 @@ def measure_run_of_batch(arguments: Mapping[str, Any], cache: FootageCache) -> d
     return measure_run({**arguments, **filled}, cache)
 
 
-def _begun(session: Session, arguments: Mapping[str, Any]) -> StoredRun | None:
+def _earlier_attempt(session: Session, arguments: Mapping[str, Any]) -> StoredRun | None:
     """The run that an earlier attempt at this trial left, None without one. Its record has the trial's note, if any."""
     wanted = session_settings(session, arguments["tracker"], arguments["weighting"], arguments["changes"])
     for run in session.runs():

@@ -241,7 +241,7 @@ class TrackingJob:
         if self._is_open(command.run):
             return
         if self._tracking:
-            now = self._opened()
+            now = self._require_open()
             raise RunError(
                 f"Run '{now.run_name}' of session '{now.session_name}' is being tracked.",
                 "Pause it first, or wait.",
@@ -291,7 +291,7 @@ class TrackingJob:
         self._say.state_again(self._run)
 
     def _begin(self, goal: str, requested_at: float = math.nan) -> None:
-        run = self._opened()
+        run = self._require_open()
         if run.tracking.finished:
             raise RunError(f"Run '{run.run_name}' has no frame left.", "Re-anneal one, or start a new run.")
         run.drop_reannealing()
@@ -302,13 +302,13 @@ class TrackingJob:
         self._state(RunState.TRACKING)
 
     def _pause(self, _: commands.Pause) -> None:
-        run = self._opened()
+        run = self._require_open()
         run.drop_reannealing()
         if self._say.state_name in (RunState.TRACKING, RunState.REANNEALING):
             self._settle(run)
 
     def _seek(self, command: commands.Seek) -> None:
-        self._opened().select(command.frame)
+        self._require_open().select(command.frame)
         self._say.state_again(self._run)
 
     def _set_pace(self, command: commands.SetPace) -> None:
@@ -316,14 +316,14 @@ class TrackingJob:
         self._say.state_again(self._run)
 
     def _reanneal(self, command: commands.Reanneal) -> None:
-        run = self._opened()
+        run = self._require_open()
         run.selected = run.reanneal(command.frame)
         run.tracking.save()
         run.keep_result, run.reanneal_again, self._requested_at = command.keep, False, command.requested_at
         self._state(RunState.REANNEALING)
 
     def _cancel(self, _: commands.Cancel) -> None:
-        run = self._opened()
+        run = self._require_open()
         if run.tracking.finished:
             raise RunError(f"Run '{run.run_name}' is finished.", "Delete it if it is not wanted.")
         run.drop_reannealing()
@@ -333,7 +333,7 @@ class TrackingJob:
         self._begin_waiting()
 
     def _change_settings(self, command: commands.ChangeSettings) -> None:
-        run = self._opened()
+        run = self._require_open()
         if command.frame >= 0 and not self._tracking:
             run.select(command.frame)
         moved = run.mailbox.change(command.changes)
@@ -353,7 +353,7 @@ class TrackingJob:
             run.reanneal_again = True
 
     def _put_back_settings(self, _: commands.PutBackSettings) -> None:
-        run = self._opened()
+        run = self._require_open()
         run.put_back_moved()
         self._say_settings(run)
         if not self._tracking:
@@ -367,7 +367,7 @@ class TrackingJob:
         ):
             return
         if self._tracking:
-            raise RunError(f"Run '{self._opened().run_name}' is being tracked.", "Cancel it first.")
+            raise RunError(f"Run '{self._require_open().run_name}' is being tracked.", "Cancel it first.")
         self._close_run()
         self._state(RunState.IDLE)
 
@@ -377,7 +377,7 @@ class TrackingJob:
 
     # ------------------------------------------------------------------ in common
 
-    def _opened(self) -> OpenRun:
+    def _require_open(self) -> OpenRun:
         if self._run is None:
             raise RunError("No run is open.", "Open one, or start a new one.")
         return self._run

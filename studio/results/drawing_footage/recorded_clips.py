@@ -58,7 +58,7 @@ def performance(
     """`frames` frames at `fps` of another performance of the whole motion."""
     seconds = (motion.frame_count - 1) / motion.fps
     shown = sampled(motion, warped_times(rng, frames, seconds, variation.tempo, TEMPO_PERIOD_S), fps)
-    turned = from_local(shown, _changed(to_local(shown), fps, np.radians(variation.degrees), rng))
+    turned = from_local(shown, _vary(to_local(shown), fps, np.radians(variation.degrees), rng))
     return above_floor(_standing_as(turned, shown))
 
 
@@ -79,7 +79,7 @@ def from_local(motion: PersonMotion, local: dict[str, Array]) -> PersonMotion:
     return PersonMotion(motion.skeleton, motion.fps, motion.root, turns)
 
 
-def _changed(local: dict[str, Array], fps: float, size: float, rng: np.random.Generator) -> dict[str, Array]:
+def _vary(local: dict[str, Array], fps: float, size: float, rng: np.random.Generator) -> dict[str, Array]:
     """The local turns with slow changes of about `size` radians; joints that hardly move change less."""
     changed: dict[str, Array] = {}
     for name, turn in local.items():

@@ -103,7 +103,7 @@ def export_run(
     try:
         written = writer(ExportTask(session, run, motion, options, folder / place.name, progress))
         progress("finishing", 1, 1)
-        files = _packed(written, place) if pack and len(written.files) > 1 else written.files
+        files = _pack(written, place) if pack and len(written.files) > 1 else written.files
         moved = tuple(_in_place(path, place.parent) for path in files)
     except OSError as error:
         raise ExportError(
@@ -136,7 +136,7 @@ def _working_folder(place: Path, run: StoredRun) -> Path:
     return new_folder_beside(place, parents=not place.is_relative_to(run.folder))
 
 
-def _packed(written: Written, place: Path) -> tuple[Path, ...]:
+def _pack(written: Written, place: Path) -> tuple[Path, ...]:
     """The files as one zip, stored as they are: what is in them is packed already."""
     archive = written.files[0].parent / f"{place.stem}-{place.suffix.removeprefix('.')}.zip"
     with zipfile.ZipFile(archive, "w", zipfile.ZIP_STORED) as packed:

@@ -79,12 +79,12 @@ def even_motion(body: BodyModel, fps: float, track: Track, options: ExportOption
             f"Track '{track.name}' has no frame from {options.first} to {last - 1}; it has {had}.",
             "Choose frames that were tracked, or track further.",
         )
-    filled = _filled(body, fps, track, np.flatnonzero(chosen), options.lost)
+    filled = _fill(body, fps, track, np.flatnonzero(chosen), options.lost)
     wanted = options.fps or fps
     return filled if abs(wanted - fps) < LATE * fps else _at_rate(filled, wanted)
 
 
-def _filled(body: BodyModel, fps: float, track: Track, rows: Indices, lost: str) -> Motion:
+def _fill(body: BodyModel, fps: float, track: Track, rows: Indices, lost: str) -> Motion:
     """Every frame from the first to the last of the chosen rows. Lost frames that a smoother filled are poses."""
     first, count = int(track.frames[rows[0]]), int(track.frames[rows[-1]] - track.frames[rows[0]]) + 1
     states = [""] * count

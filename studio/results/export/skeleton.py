@@ -169,7 +169,7 @@ def skeleton_of(body: BodyModel, rest: str = "tpose") -> Skeleton:
     neutral = body.neutral[None]
     pivots, frames = (part[0] for part in tree.placed(neutral))
     aims = _aims(body) if rest == "tpose" else {}
-    turns = _aimed(body, tree, frames, aims)
+    turns = _aim(body, tree, frames, aims)
     offsets = np.zeros_like(pivots)
     for joint, parent in enumerate(tree.parents):
         if parent >= 0:
@@ -198,7 +198,7 @@ def _aims(body: BodyModel) -> dict[int, tuple[Array, Array]]:
     return aims
 
 
-def _aimed(body: BodyModel, tree: JointTree, frames: Array, aims: dict[int, tuple[Array, Array]]) -> Array:
+def _aim(body: BodyModel, tree: JointTree, frames: Array, aims: dict[int, tuple[Array, Array]]) -> Array:
     """The frames' rotations at rest: each follows its parent, and those with an aim turn to it the short way."""
     wanted = {tree.whole[joint]: aim for joint, aim in aims.items()}
     turns = frames.copy()

@@ -75,7 +75,7 @@ def _set_up(stage: Any, task: ExportTask) -> None:  # noqa: ANN401
     root.SetCustomDataByKey("gaps", "; ".join(f"{first} to {last - 1}" for first, last in task.motion.gaps))
 
 
-def _moved(place: Array) -> Any:  # noqa: ANN401 - Gf.Matrix4d
+def _translation(place: Array) -> Any:  # noqa: ANN401 - Gf.Matrix4d
     gf = load_extra("pxr.Gf", EXTRA)
     return gf.Matrix4d(1.0).SetTranslate(gf.Vec3d(*map(float, place)))
 
@@ -86,11 +86,11 @@ def _add_skeleton(stage: Any, skeleton: Skeleton, names: tuple[str, ...], standi
     prim = skeletons.Skeleton.Define(stage, SKELETON)
     prim.CreateJointsAttr(joint_paths(parents, names))
     prim.CreateJointNamesAttr(list(names))
-    prim.CreateBindTransformsAttr([_moved(place) for place in AXES.points(standing)])
+    prim.CreateBindTransformsAttr([_translation(place) for place in AXES.points(standing)])
     rest = [
         standing[joint] if parent < 0 else skeleton.offsets[joint] for joint, parent in enumerate(parents)
     ]
-    prim.CreateRestTransformsAttr([_moved(place) for place in AXES.points(np.array(rest))])
+    prim.CreateRestTransformsAttr([_translation(place) for place in AXES.points(np.array(rest))])
     binding = skeletons.BindingAPI.Apply(prim.GetPrim())
     binding.CreateAnimationSourceRel().SetTargets([MOTION])
 

@@ -84,7 +84,7 @@ def view_fits(
 def _fit(name: str, mask: Floats, quads: Array, pixels: float) -> ViewFit:
     """The fit of outlines (L, 4, 2) in a small mask (H, W). pixels : of the picture in one of these."""
     high, wide = (int(size) for size in mask.shape)
-    drawn = _drawn(quads, high, wide)
+    drawn = _draw(quads, high, wide)
     both, body, silhouette = float((drawn * mask).sum()), float(drawn.sum()), float(mask.sum())
     centre, overlap = quads.reshape(-1, 2).mean(axis=0), _share(both, body + silhouette - both)
     best, shift, reach = overlap, (0.0, 0.0), round(FARTHEST * high)
@@ -95,7 +95,7 @@ def _fit(name: str, mask: Floats, quads: Array, pixels: float) -> ViewFit:
         for scale in SCALES:
             angle = np.radians(turn)
             matrix = scale * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-            moved = _drawn((quads - centre) @ matrix.T + centre, high, wide)
+            moved = _draw((quads - centre) @ matrix.T + centre, high, wide)
             common = np.fft.irfft2(spectrum * np.conj(np.fft.rfft2(moved, size)), size)
             common = np.roll(common, (reach, reach), axis=(0, 1))[: 2 * reach + 1, : 2 * reach + 1]
             shares: Array = common / np.maximum(float(moved.sum()) + silhouette - common, 1e-9)
@@ -106,7 +106,7 @@ def _fit(name: str, mask: Floats, quads: Array, pixels: float) -> ViewFit:
     return ViewFit(name, overlap, best, shift, _share(both, silhouette), _share(both, body))
 
 
-def _drawn(quads: Array, high: int, wide: int) -> Floats:
+def _draw(quads: Array, high: int, wide: int) -> Floats:
     """(H, W) 1 where any limb's outline is."""
     picture = np.zeros((high, wide), np.uint8)
     corners: NDArray[np.int32] = np.round(quads).astype(np.int32)

@@ -99,8 +99,8 @@ def rows(frame: InspectedFrame, selection: Selection) -> ViewResult:
             (
                 layer,
                 at,
-                _known(first[at]),
-                _known(second[at]),
+                _parent_or_none(first[at]),
+                _parent_or_none(second[at]),
                 int(lines[layer][at]),
                 int(children[at]),
                 bool(alive[layer][at]),
@@ -132,5 +132,5 @@ def spread_out(frame: InspectedFrame, layer: int) -> tuple[Array, Array]:
     return log_weights, weights
 
 
-def _known(parent: int) -> int | None:
+def _parent_or_none(parent: int) -> int | None:
     return None if parent == NO_PARENT else int(parent)

@@ -62,7 +62,7 @@ class Retracking:
         for frame in self.frames:
             stop_if_left()
             settings = changed_settings(self._settings[frame], change.settings)
-            results.append(self._tracked(frame, carried, settings, seed, refiner))
+            results.append(self._track(frame, carried, settings, seed, refiner))
             carried = results[-1].carried
         return results
 
@@ -90,7 +90,7 @@ class Retracking:
             repeats=repeats,
         )
 
-    def _tracked(
+    def _track(
         self, frame: int, carried: FilterState, settings: RunSettings, seed: int, refiner: FrameRefiner
     ) -> FrameResult:
         """The frame searched, and refined where the settings say so."""

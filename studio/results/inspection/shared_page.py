@@ -174,16 +174,16 @@ def _cloud(run: InspectedRun, frame: int) -> dict[str, Any]:
             {
                 "layer": record.layer,
                 "beta": _number(record.beta),
-                "points": _packed(steps.astype("<i2")),
+                "points": _pack(steps.astype("<i2")),
                 "parents": [place_of.get(int(before[row]), -1) if row < len(before) else -1 for row in rows],
-                "weights": _packed(np.rint(255.0 * heavy).astype(np.uint8)),
+                "weights": _pack(np.rint(255.0 * heavy).astype(np.uint8)),
                 "of": len(record.poses),
             }
         )
     return {"frame": frame, "offset": offset.tolist(), "step": step, "tips": len(tips), "layers": layers}
 
 
-def _packed(numbers: NDArray[Any]) -> str:
+def _pack(numbers: NDArray[Any]) -> str:
     return base64.b64encode(numbers.tobytes()).decode("ascii")
 
 
@@ -357,7 +357,7 @@ def _scene(shown: _Shown) -> dict[str, Any]:
     packed: NDArray[np.int16] = np.round((ends - offset) / step).astype("<i2")
     return {
         "frames": track.frames[known].tolist(),
-        "ends": _packed(packed),
+        "ends": _pack(packed),
         "offset": offset.tolist(),
         "step": step,
         "limbs": [

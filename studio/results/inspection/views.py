@@ -71,7 +71,7 @@ def look(run: InspectedRun, frame: int, name: str, selection: Selection) -> View
     """A view's tables of a frame. Raises NotFoundError for a frame, layer, parameter … that is none."""
     entry, opened = _entry(name), run.frame(frame)
     answer = entry.of_frame(opened, selection)
-    viewed = _viewed(run, entry.view, entry.view.frame_tables, answer, opened.notes())
+    viewed = _fill_view(run, entry.view, entry.view.frame_tables, answer, opened.notes())
     return replace(viewed, search_layers=opened.search_layers, searches=opened.searches)
 
 
@@ -79,7 +79,7 @@ def look_over(run: InspectedRun, name: str, selection: Selection) -> Viewed:
     """A view's tables of the whole run; none for a view that shows single frames only."""
     entry = _entry(name)
     answer = entry.of_run(run, selection) if entry.of_run else ViewResult({})
-    return _viewed(run, entry.view, entry.view.run_tables, answer, ())
+    return _fill_view(run, entry.view, entry.view.run_tables, answer, ())
 
 
 def view_named(name: str) -> View:
@@ -93,7 +93,7 @@ def _entry(name: str) -> _Entry:
     return _ENTRIES[name]
 
 
-def _viewed(
+def _fill_view(
     run: InspectedRun,
     view: View,
     kinds: Sequence[TableKind],

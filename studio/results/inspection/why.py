@@ -176,13 +176,13 @@ class Case:
         self.pose = explained_pose(frame, track)
         self.verdict = self._verdict()
         self.reference = self._reference()
-        self.errors, self.wrong = self._compared()
+        self.errors, self.wrong = self._compare()
         if not self.wrong and not self.verdict.fits and self.reference.kind not in ("truth", REFINED_NOW):
             # The later track has the same fault; a search of its own may know a better place.
             self.reference = ReferencePose(REFINED_NOW, self._refined_now(frame.number))
-            self.errors, self.wrong = self._compared()
+            self.errors, self.wrong = self._compare()
 
-    def _compared(self) -> tuple[dict[str, float], list[str]]:
+    def _compare(self) -> tuple[dict[str, float], list[str]]:
         """mm by limb from the reference, and the limbs that are off."""
         errors = self.all_errors(self.pose)
         return errors, [limb for limb, mm in errors.items() if mm > WRONG_MM * self.size]
@@ -285,7 +285,9 @@ class Case:
 
     def _off(self, number: int, place: Array) -> dict[str, float]:
         """mm by limb that is wrong, from where the body was in another frame."""
-        away = np.linalg.norm(body_points(self.run.body, self._judged(number)[None])[0] - place, axis=1)
+        away = np.linalg.norm(
+            body_points(self.run.body, self._pose_of_frame(number)[None])[0] - place, axis=1
+        )
         errors = by_limb(self.run.body, away)
         return {limb: float(errors[limb]) for limb in self.wrong}
 
@@ -297,7 +299,7 @@ class Case:
         limb = max(off, key=lambda name: off[name])
         return limb, off[limb]
 
-    def _judged(self, number: int) -> Array:
+    def _pose_of_frame(self, number: int) -> Array:
         """(D,) the pose that is asked about, of another frame."""
         return explained_pose(self.run.frame(number), self.track)
 
@@ -357,7 +359,7 @@ class Case:
     @cached_property
     def preference(self) -> Preference:
         """Which of pose and reference the likelihood prefers, both settled nearby."""
-        ours, theirs = (self._settled(pose) for pose in (self.pose, self.reference.pose))
+        ours, theirs = (self._settle(pose) for pose in (self.pose, self.reference.pose))
         shares = self.evaluation.shares(np.stack([ours, theirs]))
         off = shares.values[0] - shares.values[1]
         view, term = np.unravel_index(int(np.argmax(off)), off.shape)
@@ -366,7 +368,7 @@ class Case:
             float(off.sum()), TELLS * usual, shares.cameras[view], shares.terms[term], float(off[view, term])
         )
 
-    def _settled(self, pose: Array) -> Array:
+    def _settle(self, pose: Array) -> Array:
         """The best of poses drawn about a pose, none of whose limbs goes farther than KEPT_WITHIN_MM."""
         rng, sigma = np.random.default_rng(0), np.array(self.run.run.record.sigma)
         goal, best = body_points(self.run.body, pose[None])[0], pose
@@ -476,7 +478,7 @@ def rows(frame: InspectedFrame, selection: Selection) -> ViewResult:
     with _lock:
         if key in _known:
             return _known[key]
-    explained = _explained(Case(frame, track))
+    explained = _explain(Case(frame, track))
     with _lock:
         _known[key] = explained
     return explained
@@ -494,7 +496,7 @@ _lock = threading.Lock()
 _known = LRUCache[tuple[object, ...], ViewResult](KEPT)
 
 
-def _explained(case: Case) -> ViewResult:
+def _explain(case: Case) -> ViewResult:
     findings, remedies = [_first_finding(case)], list[Remedy]()
     fault = case.camera_fault
     if fault is not None:
@@ -543,7 +545,7 @@ def _compared_with(case: Case) -> str:
 def _first_finding(case: Case) -> FrameFinding:
     """Whether the frame fits, in the words of timeline and badge, and how far the limbs are off."""
     numbers, reference = dict(case.errors), _of(case.reference.kind)
-    sentences, mended = _verdict_sentences(case), _mended(case)
+    sentences, mended = _verdict_sentences(case), _refinement_note(case)
     worst = max(case.errors, key=lambda name: case.errors[name])
     if case.wrong:
         named = sorted(case.wrong, key=lambda name: -case.errors[name])
@@ -591,7 +593,7 @@ def _share(share: float | None) -> str:
     )
 
 
-def _mended(case: Case) -> str:
+def _refinement_note(case: Case) -> str:
     """That the refinement after the search put it right, where it did; "" else."""
     result = case.frame.result
     if case.track or case.reference.kind == "refined" or result is None or result.estimate.searched is None:
@@ -654,7 +656,7 @@ def _add_search(
     trials = case.trials([SAME, (remedy.title, remedy.settings)])
     for trial in trials:
         words = (
-            f"Tracked again from frame {case.stretch[1]} with {_lowered(trial.what)}: the error of what is off goes"
+            f"Tracked again from frame {case.stretch[1]} with {_lower_first(trial.what)}: the error of what is off goes"
             f" from {_mm(before)} to {_mm(trial.left)}."
         )
         findings.append(FrameFinding("trial", words, limb, numbers={"before": before, "after": trial.left}))
@@ -778,17 +780,19 @@ def _by_trial(case: Case, limb: str, remedies: list[Remedy]) -> FrameFinding:
     numbers = {"before": before, "after": best.left}
     if best.left > HELPS * before:
         titles = [*([spread.title] if layers else []), *(title for title, _ in wanted)]
-        tried = f"Tracked again with {' or '.join(_lowered(title) for title in titles)}, {errors} at best."
+        tried = (
+            f"Tracked again with {' or '.join(_lower_first(title) for title in titles)}, {errors} at best."
+        )
         if case.preference.is_for_the_reference:
             words = f"{_preference_words(case)} Why it does is unknown. {tried}"
             return FrameFinding("missed", words, limb, numbers=numbers, is_cause=True)
         return FrameFinding("unknown", f"The cause is unknown. {tried}", limb, numbers=numbers, is_cause=True)
     if best.what == more.title:
         remedies.append(more)
-        words = f"There are too few particles for this frame: with {_lowered(more.title)} {errors}."
+        words = f"There are too few particles for this frame: with {_lower_first(more.title)} {errors}."
         return FrameFinding("particles", words, limb, is_cause=True)
     remedies.append(Remedy(best.what, "The first layer's particles reach farther then.", best.settings))
-    words = f"The search did not look far enough: with {_lowered(best.what)} {errors}."
+    words = f"The search did not look far enough: with {_lower_first(best.what)} {errors}."
     return FrameFinding("noise", words, limb, is_cause=True)
 
 
@@ -798,7 +802,7 @@ def _few_layers_words(case: Case, before: float, trial: Trial) -> str:
     layers = "One layer is" if count == 1 else f"{count} layers are"
     return (
         f"{layers} too few: one step leads from the broad cloud to the narrow peak, and most of the particles miss it."
-        f" With {_lowered(trial.what)} the error of what is off goes from {_mm(before)} to {_mm(trial.left)}."
+        f" With {_lower_first(trial.what)} the error of what is off goes from {_mm(before)} to {_mm(trial.left)}."
     )
 
 
@@ -882,5 +886,5 @@ def _percent(share: float) -> str:
     return f"{100.0 * share:.0f} %"
 
 
-def _lowered(text: str) -> str:
+def _lower_first(text: str) -> str:
     return text[:1].lower() + text[1:]

@@ -61,12 +61,12 @@ class MarkerProblem:
 
     def costs(self, path: Array) -> Array:
         """(F,) sums of the squared residuals of the frames, mm²."""
-        residuals, _ = self._measured(path, np.arange(len(path)), slopes=False)
+        residuals, _ = self._residuals(path, np.arange(len(path)), slopes=False)
         return (residuals**2).sum(axis=1)
 
     def rms(self, path: Array) -> Array:
         """(F,) RMS in mm over the markers present; NaN where they are too few."""
-        residuals, _ = self._measured(path, np.arange(len(path)), slopes=False)
+        residuals, _ = self._residuals(path, np.arange(len(path)), slopes=False)
         squares = (residuals[:, : 3 * len(self.names)] ** 2).sum(axis=1)
         mean = squares / np.maximum(self.present.sum(axis=1), 1)
         return np.where(self.usable, np.sqrt(mean), np.nan)
@@ -97,7 +97,7 @@ class MarkerProblem:
         return pose
 
     def _cost(self, pose: Array, before: Array, rows: Rows) -> float:
-        residuals, _ = self._measured(pose[None], rows, slopes=False)
+        residuals, _ = self._residuals(pose[None], rows, slopes=False)
         return float((residuals**2).sum()) + PULL**2 * float(((pose - before) ** 2).sum())
 
     def _stepped(self, pose: Array, before: Array, rows: Rows, damping: float) -> Array:
@@ -110,7 +110,7 @@ class MarkerProblem:
         return np.clip(pose + step, self.lower, self.upper)
 
     def _normal(self, poses: Array, rows: Rows) -> tuple[Array, Array]:
-        now, slopes = self._measured(poses, rows, slopes=True)
+        now, slopes = self._residuals(poses, rows, slopes=True)
         return slopes @ slopes.transpose(0, 2, 1), (slopes @ now[..., None])[..., 0]
 
     def _fix(self, markers: list[Marker], targets: Targets) -> None:
@@ -128,7 +128,7 @@ class MarkerProblem:
         self._seen: Flags = np.all(np.isfinite(self._goals), axis=2)
         self._goals = np.where(self._seen[..., None], self._goals, 0.0)
 
-    def _measured(self, poses: Array, rows: Rows, *, slopes: bool) -> tuple[Array, Array]:
+    def _residuals(self, poses: Array, rows: Rows, *, slopes: bool) -> tuple[Array, Array]:
         """Residuals (N, R) in mm of poses (N, D) in the frames `rows`, and their slopes (N, D, R) if `slopes`.
 
         Missing targets have residual 0.

@@ -59,7 +59,7 @@ def fit_poses(body: BodyModel, targets: Targets, fps: float, progress: Progress 
             done += more
             progress("fitting the body", min(done, total), total)
 
-        start = _followed(problem, backwards, report)
+        start = _follow(problem, backwards, report)
         others = [on_branch(body, start * problem.scale, beyond) / problem.scale for beyond in (False, True)]
         for grades, path in (
             *((grades, start) for grades in STRICTER),
@@ -87,7 +87,7 @@ def _refined(problem: MarkerProblem, path: Array, steadiness: Steadiness, steps:
     return smooth.refined(path, steps)
 
 
-def _followed(problem: MarkerProblem, backwards: bool, report: Callable[[int], None]) -> Array:
+def _follow(problem: MarkerProblem, backwards: bool, report: Callable[[int], None]) -> Array:
     """(F, D) each frame from its neighbour, beginning with the first (or last) frame that can be fitted."""
     frames = np.arange(len(problem.usable))[:: -1 if backwards else 1]
     first = int(np.argmax(problem.usable[frames]))

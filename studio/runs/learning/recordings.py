@@ -72,10 +72,10 @@ def fitted_person(
     motion: PersonMotion, body: BodyModel, name: str, progress: Progress = unheard
 ) -> Recording:
     """The body moving as a synthetic person does, at the motion's rate."""
-    return _fitted(of_person(motion), body, name, motion.fps, progress)
+    return _fit(of_person(motion), body, name, motion.fps, progress)
 
 
-def _fitted(targets: Targets, body: BodyModel, name: str, fps: float, progress: Progress) -> Recording:
+def _fit(targets: Targets, body: BodyModel, name: str, fps: float, progress: Progress) -> Recording:
     fit = fit_poses(body, targets, fps, progress)
     rms = float(np.sqrt(np.nanmean(fit.rms_mm**2)))
     return Recording(name, fps, fit.poses, rms, tuple(bad_frames(fit.rms_mm).tolist()))
@@ -136,7 +136,7 @@ def _from_points(
     if len(new_times) < FEWEST_FRAMES:
         return Recording(path.stem, fps, np.repeat(body.neutral[None], len(new_times), axis=0))
     targets = Targets(names, points_at(times, points, new_times), {})
-    return _fitted(targets, _sized(body, targets), path.stem, fps, progress)
+    return _fit(targets, _in_size(body, targets), path.stem, fps, progress)
 
 
 def _leg(names: tuple[str, ...], points: Array) -> float:
@@ -150,7 +150,7 @@ def _leg(names: tuple[str, ...], points: Array) -> float:
     return float(sum(np.nanmedian(np.linalg.norm(at[one] - at[other], axis=1)) for one, other in pairs))
 
 
-def _sized(body: BodyModel, targets: Targets) -> BodyModel:
+def _in_size(body: BodyModel, targets: Targets) -> BodyModel:
     """The body in the size given by its markers' distances, medians over the frames."""
     at = {name: place for place, name in enumerate(targets.names)}
     lengths: dict[str, float] = {}
@@ -178,4 +178,4 @@ def read_run(run: StoredRun, body: BodyModel, fps: float, progress: Progress) ->
     marker_names(own)
     marker_names(body)
     targets = of_poses(own, moved)
-    return _fitted(targets, _sized(body, targets), name, fps, progress)
+    return _fit(targets, _in_size(body, targets), name, fps, progress)

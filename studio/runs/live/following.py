@@ -48,14 +48,14 @@ class Following:
         """The behaviour model of the next frame."""
         if self._learner is None:
             return self.space.behaviour
-        return self._learner.model_in(len(self.poses), self._tracked)
+        return self._learner.model_in(len(self.poses), self._poses_so_far)
 
     def step(self, frame: int, problem: FrameLikelihood, seen: FrameEvidence | None = None) -> FrameResult:
         """Search a frame. seen : its masks, if it is to be refined."""
         settings, number, space = self.settings, len(self.poses), self.space
         if self._learner is not None:
             space = dataclasses.replace(space, behaviour=self.model)
-            self.carried = self._learner.carried_into(number, self.carried, self._tracked)
+            self.carried = self._learner.carried_into(number, self.carried, self._poses_so_far)
         if self.refiner is not None:
             space = space_after(space, self.carried, settings.refinement)
         result = search_frame(
@@ -80,7 +80,7 @@ class Following:
         self.overlaps.append(float("nan") if known is None else known(frame, result.estimate.pose))
         return result
 
-    def _tracked(self, count: int) -> tuple[Array, Array, Array]:
+    def _poses_so_far(self, count: int) -> tuple[Array, Array, Array]:
         poses, log_weights, overlaps = (
             np.array(known[:count]) for known in (self.poses, self.log_weights, self.overlaps)
         )

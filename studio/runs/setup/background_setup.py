@@ -321,7 +321,7 @@ def _set_up(
     if tune and not MASK_SOURCES[source].has_knobs:
         quality = _agreement(session, own, progress)
     elif tune and len(session.manifest.footage.cameras) > 1:
-        own, quality = _tuned(session, own, _trials(source), progress)
+        own, quality = _tune(session, own, _trials(source), progress)
     write_evidence(session, msgspec.structs.replace(read_evidence(session), knobs=own))
     return BackgroundSetup(source, own, tuple(notes), quality)
 
@@ -380,7 +380,7 @@ def candidates(session: Session) -> list[BackgroundSource]:
             continue
         if source in ("median", "combined") and session.manifest.frame_count < FEWEST_FRAMES:
             continue
-        if source == "combined" and not any(_given(session).values()) and not _cleanable(session):
+        if source == "combined" and not any(_given_paths(session).values()) and not _cleanable(session):
             continue
         sources.append(source)
     return sources
@@ -513,7 +513,7 @@ def _trials(source: BackgroundSource) -> tuple[dict[str, Knob], ...]:
     )
 
 
-def _tuned(
+def _tune(
     session: Session, own: dict[str, Knob], wanted: Sequence[dict[str, Knob]], report: Progress
 ) -> tuple[dict[str, Knob], MaskQuality]:
     """The knobs of the wanted trials, then TRIED_CLEANING (`own` stay fixed) whose worst camera agrees best, and its
@@ -616,7 +616,7 @@ def _settings(session: Session, knobs: Mapping[str, Knob]) -> EvidenceSettings:
     return changed_settings(bare, knobs).evidence
 
 
-def _given(session: Session) -> dict[str, str]:
+def _given_paths(session: Session) -> dict[str, str]:
     """Camera to the path of the background that was given for it, "" for none."""
     given = read_evidence(session).given
     return {one.name: given.get(one.name, one.background) for one in session.manifest.footage.cameras}
@@ -659,7 +659,7 @@ def _check_source(session: Session, source: str, strokes: Sequence[Stroke]) -> N
             "Sources are compared by the agreement of two calibrated cameras or more.",
             "Calibrate the cameras, or choose a source yourself.",
         )
-    given = _given(session)
+    given = _given_paths(session)
     for camera in session.manifest.footage.cameras:
         path = given[camera.name]
         if source in ("plate", "clip") and not path:

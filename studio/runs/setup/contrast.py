@@ -115,11 +115,11 @@ class Contrast:
         """
         return {
             name: tuple(camera for camera, share in seen.items() if share > limit)
-            for name, seen, limit in self._seen()
+            for name, seen, limit in self._limbs_in_view()
             if 2 * sum(share > limit for share in seen.values()) >= max(len(seen), min(4, len(self.views)))
         }
 
-    def _seen(self) -> Iterator[tuple[str, dict[str, float], float]]:
+    def _limbs_in_view(self) -> Iterator[tuple[str, dict[str, float], float]]:
         if not self.pose:
             yield "subject", {view.camera: view.share for view in self.views}, ALIKE_SUBJECT
             return
@@ -390,7 +390,7 @@ def _middles(corners: Array, lens: Camera) -> Iterator[tuple[int, Flags]]:
     drawn = np.asarray(np.isfinite(corners).all(axis=(1, 2)))
     times = np.zeros((lens.height, lens.width), np.uint8)
     for limb in np.flatnonzero(drawn):
-        times += _filled(corners[limb], lens)
+        times += _fill(corners[limb], lens)
     for limb, quad in enumerate(corners):
         if drawn[limb]:
             first, last = 0.5 * (quad[0] + quad[3]), 0.5 * (quad[1] + quad[2])
@@ -402,10 +402,10 @@ def _middles(corners: Array, lens: Camera) -> Iterator[tuple[int, Flags]]:
                 b1 + WITHIN * (b0 - b1),
                 b0 + WITHIN * (b1 - b0),
             ]
-            yield limb, (_filled(np.array(short), lens) > 0) & (times == 1)
+            yield limb, (_fill(np.array(short), lens) > 0) & (times == 1)
 
 
-def _filled(quad: Array, lens: Camera) -> Bytes:
+def _fill(quad: Array, lens: Camera) -> Bytes:
     """(h, w) 1 inside a quadrilateral (4, 2) of pixels."""
     picture = np.zeros((lens.height, lens.width), np.uint8)
     limit = 4.0 * max(lens.height, lens.width)

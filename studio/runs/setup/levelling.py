@@ -78,7 +78,7 @@ def level_by_run(session: Session, run: StoredRun) -> LevelWorld:
         vertical, how = Vertical(up / np.linalg.norm(up), 5.0, level=True), "the body's vertical"
     turn = level_world(_certain(vertical).up)
     feet = limb_ends(body, track.poses).reshape(len(track.poses), -1, 3) @ turn[2]
-    return _lowered(session, turn, feet.min(axis=1), f"{how} and the feet of run {run.name}")
+    return _lower(session, turn, feet.min(axis=1), f"{how} and the feet of run {run.name}")
 
 
 def level_by_silhouettes(
@@ -101,7 +101,7 @@ def level_by_silhouettes(
         raise CalibrationError(
             "No frame shows the whole person in two cameras, so the silhouettes do not show the floor.", CLICK
         )
-    return _lowered(session, turn, np.array(lowest), "the cameras' vertical and the silhouettes")
+    return _lower(session, turn, np.array(lowest), "the cameras' vertical and the silhouettes")
 
 
 def use_level_world(session: Session, level: LevelWorld) -> CalibrationChange:
@@ -140,7 +140,7 @@ def _certain(vertical: Vertical | None) -> Vertical:
     return vertical
 
 
-def _lowered(session: Session, turn: Array, lowest: Array, how: str) -> LevelWorld:
+def _lower(session: Session, turn: Array, lowest: Array, how: str) -> LevelWorld:
     floor = float(np.quantile(lowest, LOWEST_SHARE))
     return _level(session, rigid(turn, np.array([0.0, 0.0, -floor])), how)
 

@@ -164,7 +164,7 @@ class MaskQuality:
     def in_words(self) -> str:
         """The agreement of the worst camera, as text."""
         if stops := blocking(self.doubts):
-            return _doubted(stops[0])
+            return _in_doubt(stops[0])
         if self.subjects > 1:
             return f"{self.subjects} subjects are in view: say which of them the masks shall be of"
         least = min(float(np.nan_to_num(view.agreement)) for view in self.views)
@@ -181,7 +181,7 @@ class MaskQuality:
         return f"least agreement {least:.3f}, below the mark of {USABLE:g}: check camera {self.worst}"
 
 
-def _doubted(finding: Finding) -> str:
+def _in_doubt(finding: Finding) -> str:
     return f"the calibration is in doubt: {finding.message}"
 
 
@@ -277,7 +277,7 @@ def look_before_the_first_run(session: Session, progress: Progress = unheard) ->
     except StudioError:
         return True
     if stops := blocking(doubts):
-        remember(session, MEASURED, _doubted(stops[0]), False, tuple(map(str, stops)))
+        remember(session, MEASURED, _in_doubt(stops[0]), False, tuple(map(str, stops)))
     return True
 
 

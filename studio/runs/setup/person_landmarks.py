@@ -88,7 +88,7 @@ def _joints(cameras: Mapping[str, Camera], seen: Sightings, before: Array | None
         points = _meeting(cameras, pixels)
         if points is None:
             continue
-        missed = float(np.mean([np.median(_missed(cameras[name], points, pixels[name])) for name in names]))
+        missed = float(np.mean([np.median(_misses(cameras[name], points, pixels[name])) for name in names]))
         if best is None or missed < best[0]:
             kept = len(names) - 2 * sum(exchanged.values())
             best = missed, _without_outliers(cameras, pixels, seen, points), kept
@@ -96,7 +96,7 @@ def _joints(cameras: Mapping[str, Camera], seen: Sightings, before: Array | None
         return None
     placed, vote = best[1:]
     other = _exchanged(placed)
-    if before is None or _moved(placed, before) <= _moved(other, before):
+    if before is None or _movement(placed, before) <= _movement(other, before):
         return placed, vote
     return other, -vote
 
@@ -109,12 +109,12 @@ def _exchanged(points: Array) -> Array:
     return points.reshape(-1, 2, 3)[:, ::-1].reshape(points.shape)
 
 
-def _moved(points: Array, before: Array) -> float:
+def _movement(points: Array, before: Array) -> float:
     with np.errstate(invalid="ignore"):
         return float(np.nanmedian(np.linalg.norm(points - before, axis=1)))
 
 
-def _missed(camera: Camera, points: Array, pixels: Array) -> Array:
+def _misses(camera: Camera, points: Array, pixels: Array) -> Array:
     """(12,) pixels."""
     return np.asarray(np.linalg.norm(project(camera, points)[0] - pixels, axis=1))
 
@@ -146,7 +146,7 @@ def _of_those_that_agree(
 
     def contradiction(among: Mapping[str, Array], at: Array) -> float:
         return max(
-            float(_missed(cameras[name], at, among[name])[0]) / seen[name].next_crop.side for name in among
+            float(_misses(cameras[name], at, among[name])[0]) / seen[name].next_crop.side for name in among
         )
 
     left: dict[str, Array] = dict(rays)

@@ -73,7 +73,7 @@ def person_masks(cameras: Sequence[Camera], footage: Footage, progress: Progress
     """
     with _network_threads(cameras) as threads:
         anybody = False
-        for done, (frame, pictures, seen) in enumerate(_followed(cameras, footage, threads, progress), 1):
+        for done, (frame, pictures, seen) in enumerate(_follow_all(cameras, footage, threads, progress), 1):
             anybody = anybody or bool(seen)
             masks = _each(threads, seen, partial(_mask, seen, pictures))
             absent = footage.absent(frame)
@@ -98,7 +98,7 @@ def followed_person(
 ) -> Iterator[tuple[int, Sightings]]:
     """Of every frame who is seen in each camera, frames in the order in which that is known."""
     with _network_threads(cameras) as threads:
-        for done, (frame, _, seen) in enumerate(_followed(cameras, footage, threads, progress), 1):
+        for done, (frame, _, seen) in enumerate(_follow_all(cameras, footage, threads, progress), 1):
             yield frame, seen
             progress(FOLLOWING, done, footage.frame_count)
 
@@ -113,7 +113,7 @@ Followed = tuple[int, Mapping[str, Bytes], Sightings]
 """A frame, its pictures by camera, and who is seen in them."""
 
 
-def _followed(
+def _follow_all(
     cameras: Sequence[Camera], footage: Footage, threads: ThreadPoolExecutor, progress: Progress
 ) -> Iterator[Followed]:
     """Each frame once."""
@@ -175,15 +175,15 @@ class _Follower:
 
         searches : whether all pictures are searched, now and then, while only one of several cameras sees him.
         """
-        seen = self._looked(pictures, {name: crop for name, crop in self._crops.items() if name in pictures})
-        agreed, points = _agreed(self._cameras, seen)
+        seen = self._look(pictures, {name: crop for name, crop in self._crops.items() if name in pictures})
+        agreed, points = _agreeing(self._cameras, seen)
         if len(seen) == 1 and not agreed:
             if searches and len(pictures) > 1 and frame - self._searched >= self._step:
                 persons = self.search(frame, pictures)
                 if len(persons) > 1:
                     return persons
             agreed = dict(seen)
-        return self._completed(pictures, agreed, points)
+        return self._complete(pictures, agreed, points)
 
     def search(self, frame: int, pictures: Mapping[str, Bytes]) -> Sightings:
         """The person in pictures of which nothing is known: first who is where he was last, then whom most cameras see,
@@ -197,8 +197,8 @@ class _Follower:
         persons = _each(self._threads, pictures, find)
         if len(pictures) == 1:
             ((name, candidates),) = persons.items()
-            largest = max(candidates, key=lambda one: _filled(one, pictures[name]), default=None)
-            return self._completed(pictures, {} if largest is None else {name: largest}, None)
+            largest = max(candidates, key=lambda one: _share_of(one, pictures[name]), default=None)
+            return self._complete(pictures, {} if largest is None else {name: largest}, None)
         best: tuple[tuple[bool, int, float], Sightings, Array | None] = ((False, 0, 0.0), {}, None)
         for one, other in itertools.combinations(pictures, 2):
             for pair in itertools.product(persons[one], persons[other]):
@@ -215,12 +215,12 @@ class _Follower:
                     self._place is not None
                     and float(np.linalg.norm(points[HIPS_ROW] - self._place)) < SAME_PLACE
                 )
-                score = near, len(seen), sum(_filled(one, pictures[name]) for name, one in seen.items())
+                score = near, len(seen), sum(_share_of(one, pictures[name]) for name, one in seen.items())
                 if len(seen) >= 2 and score > best[0]:
                     best = score, seen, points
-        return self._completed(pictures, best[1], best[2])
+        return self._complete(pictures, best[1], best[2])
 
-    def _completed(self, pictures: Mapping[str, Bytes], agreed: Sightings, points: Array | None) -> Sightings:
+    def _complete(self, pictures: Mapping[str, Bytes], agreed: Sightings, points: Array | None) -> Sightings:
         """These sightings, and those of cameras that saw nobody, or another, where the others' points (5, 3) lie."""
         if points is not None:
             size = _size(self._cameras, agreed, points)
@@ -229,8 +229,8 @@ class _Follower:
                 for name in pictures
                 if name not in agreed and (crop := _projected(self._cameras[name], points, size)) is not None
             }
-            rough = self._looked(pictures, again, 0.0)
-            fine = self._looked(pictures, {name: one.next_crop for name, one in rough.items()}, 0.0)
+            rough = self._look(pictures, again, 0.0)
+            fine = self._look(pictures, {name: one.next_crop for name, one in rough.items()}, 0.0)
             for name, one in fine.items():
                 better = max(rough[name], one, key=lambda look: look.presence)
                 if better.presence >= PRESENT_BESIDE and _beside(better.next_crop, again[name]):
@@ -239,7 +239,7 @@ class _Follower:
         self._crops = {name: one.next_crop for name, one in agreed.items()}
         return {name: agreed[name] for name in pictures if name in agreed}
 
-    def _looked(
+    def _look(
         self, pictures: Mapping[str, Bytes], crops: Mapping[str, Crop], least: float = PRESENT
     ) -> Sightings:
         def look(name: str) -> Sighting:
@@ -259,7 +259,7 @@ def _mask(seen: Sightings, pictures: Mapping[str, Bytes], name: str) -> Bytes:
     return seen[name].mask(pictures[name])
 
 
-def _agreed(cameras: Mapping[str, Camera], seen: Sightings) -> tuple[Sightings, Array | None]:
+def _agreeing(cameras: Mapping[str, Camera], seen: Sightings) -> tuple[Sightings, Array | None]:
     """The largest set of sightings that are of one person, and his points; all of them where there is one camera."""
     if len(cameras) == 1:
         return dict(seen), None
@@ -331,6 +331,6 @@ def _beside(one: Crop, expected: Crop) -> bool:
     return apart < BESIDE and abs(math.log(one.side / expected.side)) < math.log(SIZE_RATIO)
 
 
-def _filled(seen: Sighting, picture: Bytes) -> float:
+def _share_of(seen: Sighting, picture: Bytes) -> float:
     """Share of the picture that somebody fills."""
     return float((seen.logits > 0.0).mean()) * seen.crop.side**2 / (picture.shape[0] * picture.shape[1])

@@ -119,7 +119,7 @@ _cuts = LRUCache[tuple[object, ...], StrokeCut](KEPT_CUTS)
 _cuts_lock = threading.Lock()
 
 
-def _begun(
+def _begin(
     session: Session, footage: Footage, camera: str, first: int, strokes: tuple[Stroke, ...]
 ) -> StrokeCut:
     """A cut of the first picture, to go on from; those of the last few are kept."""
@@ -176,7 +176,7 @@ class _Work:
         cut = StrokeCut()
         mask = cut.begin(self._footage.picture(name, first), strokes[first])
         if first not in kept:
-            self._put(name, first, mask)
+            self._write(name, first, mask)
         if kept.start > 0 or not kept:
             self._follow(name, cut.copy(), strokes, self._backwards(name, first), kept)
         if kept.stop < count:
@@ -199,7 +199,7 @@ class _Work:
             if picture is None:
                 width, height = self._footage.size(name)
                 if frame not in kept:
-                    self._put(name, frame, np.zeros((height, width), np.uint8))
+                    self._write(name, frame, np.zeros((height, width), np.uint8))
                 continue
             painted = strokes.get(frame, ())
             if frame in kept:
@@ -208,7 +208,7 @@ class _Work:
             else:
                 expected = None if self._projected is None else self._projected.of(name, frame)
                 mask = cut.cut(picture, painted, expected)
-                self._put(name, frame, mask)
+                self._write(name, frame, mask)
             cut.learn(picture, mask, bool(painted))
 
     def _forwards(self, name: str, begin: int) -> Iterator[tuple[int, Bytes | None]]:
@@ -227,7 +227,7 @@ class _Work:
     def _picture(self, name: str, frame: int) -> Bytes | None:
         return None if name in self._footage.absent(frame) else self._footage.picture(name, frame)
 
-    def _put(self, name: str, frame: int, mask: Bytes) -> None:
+    def _write(self, name: str, frame: int, mask: Bytes) -> None:
         self._made.put(name, frame, mask)
         self._tick()
 
@@ -260,7 +260,7 @@ def preview_mask(session: Session, camera: str, frame: int, strokes: Sequence[St
                 return earlier.mask(camera, frame)
             beside = frame - 1 if frame > first else frame + 1
             if beside in kept:
-                cut = _begun(session, footage, camera, first, own[first])
+                cut = _begin(session, footage, camera, first, own[first])
                 if beside != first:
                     cut.learn(footage.picture(camera, beside), earlier.mask(camera, beside), False)
                 return cut.cut(footage.picture(camera, frame), on_frame)

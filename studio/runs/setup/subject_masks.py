@@ -141,7 +141,7 @@ def seen_subjects(session: Session, frame: int = 0) -> tuple[SeenSubject, ...]:
     with closing(WholeMasks(session)) as whole:
         masks = whole.by_camera(carver.cameras, frame)
         hull, seen, cameras = carver.hull(masks, whole.footage.absent(frame))
-    return () if hull.empty else tuple(map(_seen, subjects_of(hull, seen, cameras)[1]))
+    return () if hull.empty else tuple(map(_as_seen, subjects_of(hull, seen, cameras)[1]))
 
 
 def count_subjects(masks: Sequence[Bytes], cameras: Sequence[Camera], scale: float = 1.0) -> int:
@@ -153,7 +153,7 @@ def count_subjects(masks: Sequence[Bytes], cameras: Sequence[Camera], scale: flo
     return 0 if hull.empty else len(subjects_of(hull, seen, small)[1])
 
 
-def _seen(one: HullSubject) -> SeenSubject:
+def _as_seen(one: HullSubject) -> SeenSubject:
     x, y = (round(float(value) / MM, 3) for value in one.place)
     return SeenSubject((x, y), one.volume * 1e-6, one.top / MM)
 
@@ -206,7 +206,7 @@ def _first(
     named, number = labels_at(hull, labels, subjects, MM * np.array(places), scale)
     if named is None:
         x, y = places[number]
-        seen = "; ".join(_seen(one).in_words() for one in subjects)
+        seen = "; ".join(_as_seen(one).in_words() for one in subjects)
         raise FootageError(
             f"Nobody stands at {x:g},{y:g} (metres) in the first frame.", f"There is a person at {seen}."
         )

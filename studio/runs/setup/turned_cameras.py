@@ -36,12 +36,12 @@ class Turned(msgspec.Struct, frozen=True):
 
 def remember_alignment(session: Session, aligned: SessionAlignment) -> None:
     """Store how far the silhouettes miss with the calibration in use, for the guided set-up."""
-    remember(session, PART, _missed(aligned, aligned.aligned.before), not aligned.needed)
+    remember(session, PART, _misses_in_words(aligned, aligned.aligned.before), not aligned.needed)
 
 
 def alignment_words(aligned: SessionAlignment) -> str:
     """How far the silhouettes miss and the remedy, as a sentence."""
-    angles, missed = aligned.aligned, _missed(aligned, aligned.aligned.before)
+    angles, missed = aligned.aligned, _misses_in_words(aligned, aligned.aligned.before)
     if not aligned.needed:
         return f"{missed}: the cameras agree."
     if not aligned.better:
@@ -60,7 +60,7 @@ def misses_in_words(session: Session) -> str:
     return f"{known.words}: see step Background, “Do the cameras agree?”"
 
 
-def _missed(aligned: SessionAlignment, pixels: NDArray[np.float64]) -> str:
+def _misses_in_words(aligned: SessionAlignment, pixels: NDArray[np.float64]) -> str:
     worst, most = int(np.nanargmax(pixels)), float(np.nanmax(pixels))
     return f"The silhouettes miss by up to {most:.1f} px ({aligned.names[worst]})"
 

@@ -103,30 +103,30 @@ def recognise(source: Path) -> Layout:
     if (source / FILE_NAME).is_file():
         return Layout("studio session", source, footage or loose_footage(source), own)
     if (source / "videos" / "synchronized").is_dir():
-        return _timed(
+        return _with_times(
             "FreeMoCap recording", source, entries(source / "videos" / "synchronized"), (source, *own)
         )
     if (source / "synchronized_videos").is_dir():
-        return _timed(
+        return _with_times(
             "FreeMoCap recording (older layout)",
             source,
             entries(source / "synchronized_videos"),
             (source, *own),
         )
     if (source / "videos-raw").is_dir():
-        return _timed("anipose session", source, entries(source / "videos-raw"), own)
+        return _with_times("anipose session", source, entries(source / "videos-raw"), own)
     if is_easymocap(source):
-        return _timed("EasyMocap data set", source, footage or loose_footage(source), (source,))
+        return _with_times("EasyMocap data set", source, footage or loose_footage(source), (source,))
     snapshots = tuple(path.parent for path in sorted(source.glob(f"*/{CALISCOPE_ARRAY}")))
     if (snapshots and loose_footage(source)) or (source / CALISCOPE_ARRAY).is_file():
-        return _timed(
+        return _with_times(
             "Caliscope recording", source, loose_footage(source) or footage, (source, *snapshots[-1:])
         )
     if (source / DANNCE_PROJECT).is_file():
-        return _timed("DANNCE project", source, footage or loose_footage(source), own)
+        return _with_times("DANNCE project", source, footage or loose_footage(source), own)
     if (source / "Config.toml").is_file():
-        return _timed("Pose2Sim trial", source, footage or loose_footage(source), own)
-    return _timed("folder in the studio's layout", source, footage or loose_footage(source), own)
+        return _with_times("Pose2Sim trial", source, footage or loose_footage(source), own)
+    return _with_times("folder in the studio's layout", source, footage or loose_footage(source), own)
 
 
 def trials_of(source: Path) -> dict[str, Layout]:
@@ -353,13 +353,17 @@ def _caliscope_takes(source: Path) -> list[Layout]:
         key=lambda folder: natural_key(folder.name),
     )
     return [
-        _timed("Caliscope recording", take, entries(take), tuple(place for place in places if place.is_dir()))
+        _with_times(
+            "Caliscope recording", take, entries(take), tuple(place for place in places if place.is_dir())
+        )
         for take in takes
         if entries(take)
     ]
 
 
-def _timed(title: str, folder: Path, footage: tuple[Path, ...], calibrations: tuple[Path, ...]) -> Layout:
+def _with_times(
+    title: str, folder: Path, footage: tuple[Path, ...], calibrations: tuple[Path, ...]
+) -> Layout:
     """A layout with the times that lie beside its footage."""
     beside = [folder, *{path.parent for path in footage}]
     times = [place / name for place in beside for name in TIMESTAMP_NAMES if (place / name).is_file()]

@@ -258,10 +258,10 @@ def add_footage(
     check_alone(session.path)
     source = source.resolve()
     with _staying(source, session.path), folder_of(source, FOOTAGE_PARTS, session.path / "take") as folder:
-        return _added(session, folder, options, progress)
+        return _add(session, folder, options, progress)
 
 
-def _added(session: Session, source: Path, options: ImportOptions, report: Progress) -> ImportReport:
+def _add(session: Session, source: Path, options: ImportOptions, report: Progress) -> ImportReport:
     plan = _plan(source, options, bare=True)
     takes_over = plan.calibration is not None and not session.is_calibrated
     if not takes_over:
@@ -287,7 +287,7 @@ def _added(session: Session, source: Path, options: ImportOptions, report: Progr
             check_unchanged(session, "footage", "calibration_changed")
             adopt(session)
             placed = _moved_in(session, staged, footage, without_made_masks(session, stay))
-            manifest = _described(session, plan, read, measured, placed, person.body if takes_over else "")
+            manifest = _describe(session, plan, read, measured, placed, person.body if takes_over else "")
             changed = described_anew(session, manifest)
             _forget_old(changed, session.manifest.footage)
             forget_unused_masks(changed)
@@ -410,7 +410,7 @@ def _moved_in(
         for part in parts:
             if (staged / part).exists() and not (target / part).exists():
                 (staged / part).rename(target / part)
-    cameras = (*stay, *(_placed(camera, prefix) for camera in added.cameras))
+    cameras = (*stay, *(_place(camera, prefix) for camera in added.cameras))
     names = [camera.name for camera in session.manifest.footage.cameras]
     ranked = sorted(
         cameras, key=lambda camera: names.index(camera.name) if camera.name in names else len(names)
@@ -418,7 +418,7 @@ def _moved_in(
     return FootageSource(added.fps, min(camera.last for camera in ranked), tuple(ranked))
 
 
-def _placed(camera: CameraSource, prefix: str) -> CameraSource:
+def _place(camera: CameraSource, prefix: str) -> CameraSource:
     """A camera's source where it lies in the session; places elsewhere stay."""
     if not prefix:
         return camera
@@ -448,7 +448,7 @@ def _forget_old(session: Session, before: FootageSource) -> None:
             place.unlink(missing_ok=True)
 
 
-def _described(
+def _describe(
     session: Session,
     plan: SourcePlan,
     read: Calibration,

@@ -118,13 +118,13 @@ class MaskPictures:
         self._video = None if path.is_dir() else VideoReader(path, frame_count)
 
     def __enter__(self) -> Callable[[int], Levels]:
-        return self._read
+        return self._read_levels
 
     def __exit__(self, *_: object) -> None:
         if self._video is not None:
             self._video.close()
 
-    def _read(self, frame: int) -> Levels:
+    def _read_levels(self, frame: int) -> Levels:
         if self._video is not None:
             return self._video.read(frame)
         path = self._folder[frame]

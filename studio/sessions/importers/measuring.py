@@ -259,8 +259,8 @@ def measure_source(
     )
     by_camera = {match.camera: path for match, path in zip(matching, plan.footage, strict=True)}
     used = [camera for camera in calibration.cameras if camera.name in by_camera]
-    masks = _matched(plan.masks, used, "masks")
-    backgrounds = _matched(plan.backgrounds, used, "backgrounds")
+    masks = _match(plan.masks, used, "masks")
+    backgrounds = _match(plan.backgrounds, used, "backgrounds")
     turns = requested_turns(plan, by_camera)
     split = _by_camera(plan.fields, by_camera)
     # Of fields, videos announce the rate of their pictures.
@@ -495,7 +495,7 @@ def _measure_camera(
     measure = _measure(footage, f"reading {footage.name}", progress)
     entry = MeasuredCamera(camera, footage, measure, None, masks, background, turned)
     if not calibration.sizes_known:
-        return dataclasses.replace(entry, camera=_sized(camera, *entry.size))
+        return dataclasses.replace(entry, camera=_in_size(camera, *entry.size))
     bars = _bars(entry) if entry.size != (camera.width, camera.height) else NO_BARS
     fitted, crop = fit_camera(camera, *entry.size, bars)
     return dataclasses.replace(entry, camera=fitted, crop=crop or calibration.crops.get(camera.name))
@@ -517,7 +517,7 @@ def _bars(entry: MeasuredCamera) -> Margins:
         reader.close()
 
 
-def _matched(parts: tuple[Path, ...], cameras: list[Camera], what: str) -> dict[str, Path]:
+def _match(parts: tuple[Path, ...], cameras: list[Camera], what: str) -> dict[str, Path]:
     """Masks or backgrounds by camera; those of cameras without footage are passed over."""
     if not parts:
         return {}
@@ -526,7 +526,7 @@ def _matched(parts: tuple[Path, ...], cameras: list[Camera], what: str) -> dict[
     return {match.camera: path for match, path in zip(matches, parts, strict=True)}
 
 
-def _sized(camera: Camera, width: int, height: int) -> Camera:
+def _in_size(camera: Camera, width: int, height: int) -> Camera:
     """A camera whose file gives no size, with the footage's. Raises CalibrationError if it cannot be."""
     x, y = camera.matrix[0, 2] / width, camera.matrix[1, 2] / height
     if not (CENTRAL[0] < x < CENTRAL[1] and CENTRAL[0] < y < CENTRAL[1]):

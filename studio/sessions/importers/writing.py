@@ -271,15 +271,15 @@ def write_footage(folder: Path, measured: MeasuredSource, copy: bool, progress: 
             write_meant_masks(entry.masks, entry.mask_count, entry.mask_form, folder / masks, report)
         elif entry.masks is not None:
             suffix = "" if entry.masks.is_dir() else entry.masks.suffix.lower()
-            masks = _put(entry.masks, folder, f"masks/{plain}{suffix}", copy, progress)
+            masks = _copy_in(entry.masks, folder, f"masks/{plain}{suffix}", copy, progress)
         if entry.background is not None:
             target = f"background/{plain}{entry.background.suffix.lower()}"
-            background = _put(entry.background, folder, target, copy, progress)
+            background = _copy_in(entry.background, folder, target, copy, progress)
         sources.append(
             CameraSource(
                 entry.camera.name,
                 "pictures" if is_folder else "video",
-                _put(entry.footage, folder, place, copy, progress),
+                _copy_in(entry.footage, folder, place, copy, progress),
                 *entry.size,
                 entry.measure.frame_count,
                 masks,
@@ -293,7 +293,7 @@ def write_footage(folder: Path, measured: MeasuredSource, copy: bool, progress: 
     return FootageSource(measured.fps, measured.frame_count, tuple(sources))
 
 
-def _put(source: Path, folder: Path, place: str, copy: bool, progress: Progress) -> str:
+def _copy_in(source: Path, folder: Path, place: str, copy: bool, progress: Progress) -> str:
     if not copy:
         return str(source.resolve())
     target = folder / place

@@ -112,7 +112,7 @@ def test_the_octree_keeps_the_voxels_of_a_full_grid(scene: Scene, kind: str) -> 
     evidence = scene.masks if kind == "masks" else scene.pixels
     hull = reconstructor.hull(evidence)
     nodes, edge = grid_within(scene.box, 6), scene.box.edge / 64.0
-    seen = reconstructor._seen(evidence)
+    seen = reconstructor._sights_of(evidence)
     verdicts, states = np.zeros(len(nodes), np.uint8), np.zeros((len(nodes), 3), np.uint32)
     given = nodes, states, verdicts, scene.box.corner, edge, seen, reconstructor._rules._replace(last=True)
     kernels.judge(0, len(nodes), *given)

@@ -81,7 +81,7 @@ def test_mirroring_is_refused(plain: Path, matrix: tuple[int, ...]) -> None:
 
 def _measured_here(path: Path) -> object:
     """In this process, where the limits are patched."""
-    return video._measured(path, silent)
+    return video._measure(path, silent)
 
 
 def test_limits_hold_before_anything_is_decoded(plain: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -85,7 +85,7 @@ def test_a_fit_that_began_on_the_wrong_branch_finds_the_other(monkeypatch) -> No
     def pressed_to_limits(problem, *_) -> np.ndarray:
         return on_branch(body, poses, beyond=True) / problem.scale
 
-    monkeypatch.setattr(pose_fitting, "_followed", pressed_to_limits)
+    monkeypatch.setattr(pose_fitting, "_follow", pressed_to_limits)
     found = pose_fitting.fit_poses(body, of_poses(body, poses), 30.0)
     assert np.sqrt(np.mean(found.rms_mm**2)) < 5.0
     monkeypatch.setattr(pose_fitting, "on_branch", lambda body, path, beyond: path)
