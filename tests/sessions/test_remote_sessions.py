@@ -153,7 +153,7 @@ def test_what_an_upload_broke_off_is_no_session(
     (line,) = sessions_at(above(address))
     assert not line.whole
     for use in (lambda: remote_session(address), lambda: download(address, tmp_path / "x" / "toy")):
-        with pytest.raises(SessionError, match=r"no whole session: it has no 'session\.json'") as no:
+        with pytest.raises(SessionError, match=r"no complete session: it has no 'session\.json'") as no:
             use()
         assert "broken off" in no.value.hint
     assert not (tmp_path / "x" / "toy").exists()

@@ -103,7 +103,7 @@ def test_nothing_whole_is_said(tmp_path: Path, times: TimesFile) -> None:
     path = tmp_path / "cam1.mp4"
     path.write_bytes(b"\0\0\1\0ftyp")
     assert whole_boxes(path) == 0
-    with pytest.raises(FootageError, match="no whole piece"):
+    with pytest.raises(FootageError, match="no complete piece"):
         mend_recording(path)
 
 

@@ -175,7 +175,7 @@ def test_a_batch_compares_and_tracks_at_addresses(
 
     # One that is half there stops the batch before anything is tracked.
     Store(f"{store}/second").remove(["session.json"])
-    with pytest.raises(SessionError, match=r"second' is no whole session"):
+    with pytest.raises(SessionError, match=r"second' is no complete session"):
         studio.batch([store], cluster=scheduler, **options)
 
 

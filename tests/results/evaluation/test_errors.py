@@ -106,7 +106,7 @@ def test_a_truth_of_other_axes_or_units_is_told_from_a_bad_run(turn: tuple[int, 
     poses, truth = moving()
     other = changed(truth, positions=truth.positions[:, :, turn] * unit)
     words = meant_axes(poses, np.arange(FRAMES), load_body("human31"), other, 60.0)
-    assert "others than the session's" in words
+    assert "differ from the session's" in words
     assert "0.0 mm" in words
     assert ("--align similarity" if unit != 1.0 else "--align rigid") in words
     assert not meant_axes(poses, np.arange(FRAMES), load_body("human31"), truth, 60.0)

@@ -145,7 +145,7 @@ def test_unreadable_sources_are_named(tmp_path: Path, session_on_disk: Session) 
         "labels.c3d": r"no points for RHip.*\*0, \*1",
         "broken.c3d": "not a C3D file",
         "words.txt": "not a motion that can be read",
-        "lonely_01.amc": "'lonely.asf', is not there",
+        "lonely_01.amc": "'lonely.asf', is missing",
         "empty.bvh": "has no MOTION",
     }
     write_c3d(tmp_path / "short.c3d", labels, points, 120.0)
