@@ -1,5 +1,5 @@
-"""A run that leaves another one at a frame: the frames before it are that run's, it and all after it are tracked with
-other knobs. The other run stays as it is.
+"""A run that leaves another one at a frame: earlier frames are that run's, this one and all later ones are tracked with
+other knobs. The other run is not changed.
 
 The frame is searched from the same start with the same random numbers, so its result is the one that annealing it again
 with these knobs has shown.
@@ -26,11 +26,12 @@ from studio.sessions.stored_run import StoredRun
 def prepare_branch(
     session: Session, run: StoredRun, frame: int, knobs: Mapping[str, object] | None = None, name: str = ""
 ) -> StoredRun:
-    """Make the run's folder with the frames before `frame`; then track it as any other.
+    """Make the run's folder with the frames before `frame`; then track it like any other.
 
-    frame : of the run, or the one after its last. knobs : what is changed, by name; what is left out is as the run
-    would go on with, the knobs that were moved in it included. Raises RunError, SessionError, SettingsError; then
-    nothing was made.
+    frame : of the run, or the one after its last.
+    knobs : changes by name; all others are as the run would continue, with the knobs that were moved in it.
+
+    Raises RunError, SessionError, SettingsError; then nothing was made.
     """
     record = run.record
     check_branching_frame(run, frame)
@@ -72,7 +73,7 @@ MOST_NAMED = 2
 
 
 def _name_of(session: Session, run: StoredRun, moved: Mapping[str, object]) -> str:
-    """What the run is called after: the one it leaves, and what was changed, such as "walk-1-survival-0-8"."""
+    """The name of the run: the one it leaves, and the changes, such as "walk-1-survival-0-8"."""
     changed = [part for knob, value in moved.items() for part in (knob, value)]
     if len(moved) > MOST_NAMED:
         changed = [len(moved), "knobs"]

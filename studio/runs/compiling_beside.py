@@ -1,8 +1,8 @@
-"""Kernels of what follows a frame's first layer, compiled in a process of their own while that layer's are here.
+"""Kernels of what follows a frame's first layer, compiled in another process while this one compiles that layer's.
 
 Numba compiles one kernel at a time in a process, and half of a frame's kernels are those that compare and refine the
-pose that was found. They are compiled by being called, with a frame whose masks are the body itself; this process
-finds them kept (`kernel_cache`), or waits for the one that is in hand.
+pose that was found. They are compiled by being called with a frame whose masks are the body itself; this process finds
+them stored (`kernel_cache`), or waits for the one in progress.
 """
 
 import contextlib
@@ -47,7 +47,7 @@ COMMAND = "import sys; from studio.runs.compiling_beside import compile_for; com
 
 @contextlib.contextmanager
 def compiling_beside(run: StoredRun) -> Generator[None]:
-    """Where something has to be compiled within, another process compiles what follows a frame's search of the run."""
+    """Compile what follows a frame's search in another process, if anything has to be compiled inside."""
     if numba.get_num_threads() < 2:
         yield
         return

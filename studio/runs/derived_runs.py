@@ -1,4 +1,4 @@
-"""Runs that are made from another one, which stays as it is: corrected, or tracked with other knobs from a frame on."""
+"""Runs made from another one, which is not changed: corrected, or tracked with other knobs from a frame on."""
 
 import shutil
 from collections.abc import Callable

@@ -43,8 +43,10 @@ REACH = 1.05
 
 @dataclass(frozen=True, slots=True)
 class Elsewhere:
-    """Of one limb. unexplained : volume within its reach that changed and that the pose leaves bare, as a share of the
-    limb's own. explained : share of its projection, where no other limb lies, that changed; 1 where it has none.
+    """Of one limb.
+
+    unexplained : volume within its reach that changed and that the pose leaves bare, as a share of the limb's own.
+    explained : share of its projection, where no other limb lies, that changed; 1 without such a projection.
     """
 
     unexplained: float
@@ -60,7 +62,7 @@ def changed_pixels(evidence: FrameEvidence, with_shadows: FrameEvidence) -> list
 
 
 class LimbsElsewhere:
-    """Looks for the limbs of a body in what changed; immutable."""
+    """Looks for the limbs of a body in what changed in the pictures; immutable."""
 
     def __init__(self, body: BodyModel, cameras: tuple[Camera, ...]) -> None:
         self._body, self._cameras, self._agreement = body, cameras, Agreement(body, cameras)

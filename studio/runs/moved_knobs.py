@@ -41,7 +41,7 @@ def stored_settings(run: StoredRun) -> tuple[int, RunSettings]:
 
 
 def settings_with_moved(run: StoredRun) -> RunSettings:
-    """The settings that the run goes on with: the newest stored ones with the knobs that were moved since."""
+    """The settings that the run continues with: the newest stored ones with the knobs that were moved since."""
     version, stored = stored_settings(run)
     return with_moved(run, version, stored)
 
@@ -69,9 +69,9 @@ def moved_between(stored: RunSettings, now: RunSettings) -> dict[str, Value]:
 
 
 def keep_moved(run: StoredRun, version: int, moved: Mapping[str, Value]) -> None:
-    """Keep the knobs that were moved since the stored settings of a version; none: forget those that were kept.
+    """Keep the knobs that were moved since the stored settings of a version; with none, forget the kept ones.
 
-    Raises SessionError where the disk refuses it.
+    Raises SessionError where the disk refuses.
     """
     path = _path(run)
     if moved:

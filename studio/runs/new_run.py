@@ -225,8 +225,12 @@ def prepare_run(
 def given_pose(
     pose: Pose, source: str, body: BodyModel, fps: float, frame: int | None = None
 ) -> tuple[Array, str, int | None]:
-    """A pose (D,) of a body, where it came from in words, and the frame that it is of. frame : as far as it is known,
-    of footage of so many frames a second. Raises BodyError, TruthError.
+    """A pose (D,) of a body, where it came from in words, and its frame.
+
+    frame : if known.
+    fps : of the footage.
+
+    Raises BodyError, TruthError.
     """
     if isinstance(pose, InitialPose):
         return pose.pose, pose.source, pose.frame if frame is None else frame

@@ -47,13 +47,14 @@ def notes_of(run: StoredRun) -> tuple[Note, ...]:
 
 
 def notes_by_frame(run: StoredRun) -> Mapping[int, str]:
-    """Frame to what is written of it, "bookmark" where that is nothing."""
+    """Frame to its note, "bookmark" for one without text."""
     return {note.frame: note.text or "bookmark" for note in notes_of(run)}
 
 
 def write_note(run: StoredRun, frame: int, text: str = "") -> tuple[Note, ...]:
-    """Put a note on a frame, in place of the one it has; all notes. Raises NotFoundError for a frame that the run does
-    not span, SettingsError for a text that is too long.
+    """Put a note on a frame in place of the old one, and return all notes.
+
+    Raises NotFoundError for a frame that the run does not span, SettingsError for a text that is too long.
     """
     record = run.record
     if not record.first <= frame < record.last:
@@ -67,7 +68,7 @@ def write_note(run: StoredRun, frame: int, text: str = "") -> tuple[Note, ...]:
 
 
 def remove_note(run: StoredRun, frame: int) -> tuple[Note, ...]:
-    """Take a frame's note away, if it has one; those that are left."""
+    """Remove a frame's note, if it has one, and return the others."""
     with one_at_a_time(run.folder.parent.parent):
         return _keep(run, _others(run, frame))
 

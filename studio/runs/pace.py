@@ -1,4 +1,4 @@
-"""The rate of a run and its time left, measured over its last frames; what a run would take, judged by a stored one."""
+"""The rate of a run and its time left, measured over its last frames; the expected time of a run, from a stored one."""
 
 import math
 from collections import deque

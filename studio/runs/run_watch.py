@@ -65,8 +65,12 @@ class Sightings(Protocol):
 
 @dataclass(slots=True)
 class Standing:
-    """The state before a frame. state : of the last frame. streak : number of frames in a row with it. doubts : of the
-    last. weighed : settings of likelihood and evidence that the distribution holds for.
+    """The state before a frame.
+
+    state : of the last frame.
+    streak : number of consecutive frames with it.
+    doubts : of the last frame: how many frames in a row looked lost.
+    weighed : settings of likelihood and evidence that the distribution holds for.
     """
 
     watch: WeightWatch

@@ -64,14 +64,14 @@ def is_archive(path: Path) -> bool:
 
 
 def only_archive(folder: Path) -> Path | None:
-    """The archive that is all a folder holds, None where it is none or there is more."""
+    """The archive that is the only content of a folder, else None."""
     files = [path for path in folder.rglob("*") if path.is_file()]
     return files[0] if len(files) == 1 and is_archive(files[0]) else None
 
 
 def unwrapped(folder: Path, parts: Collection[str]) -> Path:
-    """The folder without wrapping folders that contain only one folder. parts : name patterns (lower case) that are no
-    wrapping, even alone.
+    """The folder without wrapping folders that contain only one folder. parts : name patterns (lower case) of folders
+    that do not wrap, even alone.
     """
     while len(inside := [path for path in folder.iterdir() if not is_litter(path.name)]) == 1:
         if not inside[0].is_dir() or any(fnmatch(inside[0].name.lower(), part) for part in parts):
@@ -81,7 +81,7 @@ def unwrapped(folder: Path, parts: Collection[str]) -> Path:
 
 
 def is_litter(name: str) -> bool:
-    """Whether a name is something that systems leave in folders."""
+    """Whether a name is one of the files that systems leave in folders."""
     return name.startswith(".") or name in LITTER
 
 

@@ -235,9 +235,7 @@ def unwritable(what: str, path: Path, error: OSError | sqlite3.Error | UnicodeDe
 
 @contextmanager
 def writing(what: str, path: Path) -> Generator[None]:
-    """What the disk refuses inside, in words; that something is there already passes. what : as of `unwritable`. Raises
-    SessionError.
-    """
+    """Report what the disk refuses inside as a SessionError; an existing file passes. what : as of `unwritable`."""
     try:
         yield
     except FileExistsError:

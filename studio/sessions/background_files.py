@@ -32,7 +32,7 @@ from studio.foundations.foreign_files import read_file
 from studio.sessions import atomic_files
 from studio.sessions.names import free_name, name_from
 from studio.sessions.record_files import RecordFile
-from studio.sessions.session import Session, described_anew
+from studio.sessions.session import Session, redescribe
 
 EVIDENCE_NAME, BACKGROUND_NAME = "evidence.json", "background"
 PERSON_MASKS, STROKE_MASKS, CHOSEN_MASKS, SUBJECT_MASKS = HOMES = (
@@ -74,12 +74,12 @@ _RECORD = RecordFile(
 
 
 def read_evidence(session: Session) -> SessionEvidence:
-    """How masks of a session are made; nothing special where that was not set. Raises SessionError."""
+    """How masks of a session are made; the defaults if nothing was set. Raises SessionError."""
     return _RECORD.read(session.path / EVIDENCE_NAME, SessionEvidence())
 
 
 def given_backgrounds(session: Session) -> Session:
-    """The session with the backgrounds in use that were given, where cleaned ones were."""
+    """The session with its given backgrounds in use, where cleaned ones were."""
     evidence = read_evidence(session)
     if not evidence.given:
         return session
@@ -149,7 +149,7 @@ def use_backgrounds(session: Session, names: Mapping[str, str]) -> Session:
         for source in footage.cameras
     )
     changed = dataclasses.replace(footage, cameras=cameras)
-    return described_anew(session, msgspec.structs.replace(session.manifest, footage=changed))
+    return redescribe(session, msgspec.structs.replace(session.manifest, footage=changed))
 
 
 class MadeMasks:
@@ -182,7 +182,7 @@ class MadeMasks:
             (self.folder / self._places[camera] / name).write_bytes(png_of(stored))
 
     def take_over(self, camera: str, frame: int, stored: Path) -> None:
-        """Put a mask that lies in the session as this would write it."""
+        """Copy a mask of the session that is already in the right form."""
         with atomic_files.writing("The masks in", self.folder):
             self._path(camera, frame).write_bytes(read_file(stored))
 
@@ -266,8 +266,8 @@ def use_given_masks(session: Session) -> Session:
 
 
 def forget_unused_masks(session: Session) -> None:
-    """Remove masks of the studio's own that no camera refers to any more, and unfinished ones. The newest made of
-    strokes stay, for later strokes change but a part of them.
+    """Remove the studio's own masks that no camera refers to any more, and unfinished ones. The newest masks from
+    strokes stay, since later strokes change only part of them.
     """
     cameras = session.manifest.footage.cameras
     used = {Path(*Path(source.masks).parts[:2]) for source in cameras if has_made_masks(source)}
@@ -289,7 +289,7 @@ def use_masks(session: Session, names: Mapping[str, str]) -> Session:
         dataclasses.replace(source, masks=names.get(source.name, source.masks)) for source in footage.cameras
     )
     changed = dataclasses.replace(footage, cameras=cameras)
-    return described_anew(session, msgspec.structs.replace(session.manifest, footage=changed))
+    return redescribe(session, msgspec.structs.replace(session.manifest, footage=changed))
 
 
 def set_exclusion(session: Session, camera: str, content: bytes) -> int:

@@ -43,7 +43,7 @@ from studio.sessions.session import (
     THUMBNAIL_NAME,
     Session,
     check_unchanged,
-    described_anew,
+    redescribe,
 )
 from studio.sessions.work_under_way import one_at_a_time
 
@@ -84,7 +84,7 @@ class CalibrationChange:
 
 
 def replace_calibration(session: Session, new: NewCalibration) -> CalibrationChange:
-    """Make another calibration a session's own.
+    """Put another calibration in use.
 
     Raises SessionError while a run is being tracked, CalibrationError where a camera of the footage is missing.
     """
@@ -113,7 +113,7 @@ def _replaced(session: Session, new: NewCalibration) -> CalibrationChange:
     _write(place, new)
     manifest = _describe(session.manifest, new)
     (session.path / THUMBNAIL_NAME).unlink(missing_ok=True)
-    changed = described_anew(session, manifest)
+    changed = redescribe(session, manifest)
     stale = stale_runs(changed)
     return CalibrationChange(changed, tuple(_consequences(changed, before, new.cameras, stale)), stale, kept)
 
@@ -153,7 +153,7 @@ def stale_runs(session: Session) -> tuple[str, ...]:
 
 
 def earlier_calibrations(session: Session) -> tuple[str, ...]:
-    """Names of those that were replaced, newest first."""
+    """The names of the earlier calibrations, newest first."""
     folder = session.path / CAMERAS_PATH.parent / EARLIER
     if not folder.is_dir():
         return ()
@@ -162,7 +162,7 @@ def earlier_calibrations(session: Session) -> tuple[str, ...]:
 
 
 def earlier_calibration(session: Session, name: str) -> Path:
-    """The folder of one that was replaced. Raises NotFoundError, NameRefused."""
+    """The folder of an earlier calibration. Raises NotFoundError, NameRefused."""
     folder = inside(session.path / CAMERAS_PATH.parent / EARLIER, name, "calibration")
     if not (folder / CAMERAS_PATH.name).is_file():
         raise NotFoundError(

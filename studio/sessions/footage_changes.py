@@ -38,7 +38,7 @@ from studio.sessions.session import (
     THUMBNAIL_NAME,
     Session,
     check_unchanged,
-    described_anew,
+    redescribe,
     start_pose_files,
 )
 from studio.sessions.stored_run import StoredRun
@@ -118,7 +118,7 @@ def _use(session: Session, before: FootageSource, after: FootageSource) -> Foota
             session.manifest, footage=after, footage_changed=datetime.datetime.now(datetime.UTC).isoformat()
         )
         (session.path / THUMBNAIL_NAME).unlink(missing_ok=True)
-        changed = described_anew(session, manifest)
+        changed = redescribe(session, manifest)
         forget_unused_masks(changed)
     stale = stale_runs(changed)
     return FootageChange(changed, tuple(_consequences(changed, before, after, stale)), stale)

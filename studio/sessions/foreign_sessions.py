@@ -68,7 +68,7 @@ class Inspection:
 
 
 def inspect_place(place: Path) -> Inspection:
-    """Look at a folder or an archive. Raises NotFoundError where there is neither."""
+    """Look at a folder or an archive. Raises NotFoundError where there is none."""
     if place.is_dir():
         return _inspected(place)
     if place.is_file() and is_archive(place):

@@ -38,7 +38,7 @@ from studio.sessions.session import (
     SIGMA_NAME,
     SUBJECT_NAME,
     Session,
-    described_anew,
+    redescribe,
     start_pose_files,
 )
 
@@ -236,7 +236,7 @@ def finish_recording(session: Session, notes: tuple[str, ...] = ()) -> Session:
         notes=(*session.manifest.notes, *ending, *notes),
         warnings=(*session.manifest.warnings, *(ending[:1] if recorded.spreads.apart else ())),
     )
-    return described_anew(session, manifest)
+    return redescribe(session, manifest)
 
 
 def check_size(source: CameraSource, width: int, height: int) -> None:

@@ -136,12 +136,12 @@ class Store:
                 ) from None
 
     def write(self, name: str, content: bytes) -> None:
-        """Put a small file; on an object store it is there whole or not at all."""
+        """Write a small file; on an object store it appears completely or not at all."""
         with self._talking():
             self._files.pipe_file(below(self._root, name), content)
 
     def remove(self, names: Iterable[str]) -> None:
-        """Take files away; those that are not there are passed over."""
+        """Delete files; missing ones are ignored."""
         with self._talking():
             for name in names:
                 try:

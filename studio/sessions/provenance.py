@@ -78,7 +78,7 @@ def note(
 
 
 def remember(session: Session, part: str, words: str, good: bool, stops: tuple[str, ...] = ()) -> None:
-    """Note what was measured, if the disk can be written: a measurement is said also where it cannot be kept."""
+    """Note a measurement if the disk can be written; it is reported also if it cannot be kept."""
     _read_origins(session)  # raises where it is damaged
     with suppress(SessionError):
         note(session, part, words, good, stops)

@@ -18,7 +18,7 @@ from studio.foundations.words import sentence
 from studio.sessions.importers.importing import ImportReport, import_source
 from studio.sessions.manifest import FILE_NAME as MANIFEST_NAME
 from studio.sessions.names import is_name
-from studio.sessions.session import CAMERAS_PATH, Session, described_anew
+from studio.sessions.session import CAMERAS_PATH, Session, redescribe
 from studio.sessions.workspace import Workspace
 
 TIMES_NAME = "timestamps.csv"
@@ -84,7 +84,7 @@ def import_recording(
     shutil.copyfile(folder / TIMES_NAME, report.session.path / TIMES_NAME)
     spread_note = f"{sentence(spreads.in_words)}."
     manifest = report.session.manifest
-    described = described_anew(
+    described = redescribe(
         report.session,
         msgspec.structs.replace(
             manifest,

@@ -165,7 +165,7 @@ def bring_part(session: Session, kind: str, name: str) -> None:
 
 
 def bring_comparisons(session: Session) -> None:
-    """Bring a copy its original's comparisons, of those that are there what is new; nothing for any other session."""
+    """Bring a copy the new comparisons of its original; nothing for any other session."""
     address = address_of(session)
     if not address:
         return
@@ -188,7 +188,7 @@ def put_run(session: Session, run: StoredRun) -> None:
 
 @contextmanager
 def comparison_put_back(session: Session, folder: Path) -> Generator[None]:
-    """A copy's comparison put beside its original before and after it is worked at, whatever ends that."""
+    """Put a copy's comparison beside its original before and after work on it, however that ends."""
     _put_part(session, folder, COMPARISON_RECORD)
     try:
         yield
@@ -200,7 +200,7 @@ def upload(session: Session, address: str, progress: Progress = unheard) -> str:
     """Put a session with its runs at an address, from which any machine works on it; returns the address.
 
     Raises SessionError where there is a session already, where footage lies outside the session's folder, or where the
-    store refuses. One that was broken off is begun again.
+    store refuses. An interrupted upload is begun again.
     """
     store = Store(address)
     checked_name(PurePosixPath(store.address).name)
@@ -345,7 +345,7 @@ def _key(address: str, files: Mapping[str, Listed]) -> str:
 
 
 def _bring(store: Store, files: Mapping[str, Listed], key: str, name: str, progress: Progress) -> None:
-    """Make the copy of a key, or wait for whoever does. Raises SessionError."""
+    """Make the copy of a key, or wait for the process that does. Raises SessionError."""
     cache = cache_folder()
     with writing("The copy", cache):
         cache.mkdir(parents=True, exist_ok=True)

@@ -286,8 +286,8 @@ class Sums:
 
 
 class CheckedStore:
-    """What is known of a store: which frames were found whole, and which damaged. Every method is one step of a
-    dictionary, so threads may share it.
+    """Which frames of a store were found intact, and which damaged. Every method is one step of a dictionary, so
+    threads may share it.
     """
 
     def __init__(self) -> None:
@@ -296,24 +296,24 @@ class CheckedStore:
         self._damage: dict[int, tuple[int, str]] = {}
 
     def holds(self, frame: int, text: str) -> bool:
-        """Whether the frame's blobs were found to fit these checksums."""
+        """Whether the frame's blobs were found to match these checksums."""
         return self._blobs.get(frame) == hash(text)
 
     def holds_row(self, frame: int, text: str, row: tuple[object, ...]) -> bool:
-        """Whether the frame's numbers were found to fit these checksums."""
+        """Whether the frame's numbers were found to match these checksums."""
         return self._rows.get(frame) == hash((text, row))
 
     def add(self, frame: int, text: str) -> None:
-        """The frame's blobs fit these checksums."""
+        """Note that the frame's blobs match these checksums."""
         self._blobs[frame] = hash(text)
         self._damage.pop(frame, None)
 
     def add_row(self, frame: int, text: str, row: tuple[object, ...]) -> None:
-        """The frame's numbers fit these checksums."""
+        """Note that the frame's numbers match these checksums."""
         self._rows[frame] = hash((text, row))
 
     def add_damage(self, frame: int, text: str, part: str) -> None:
-        """A blob of the frame does not fit these checksums. part : which, as text."""
+        """Note that a blob of the frame does not match its checksum. part : which, as text."""
         self._blobs.pop(frame, None)
         self._damage[frame] = hash(text), part
 
@@ -323,7 +323,7 @@ class CheckedStore:
 
 
 class Verified:
-    """What is known of which stores, so that a list need not read every blob again. Thread-safe."""
+    """What was found of which stores, so that a list need not read every blob again. Thread-safe."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -331,7 +331,7 @@ class Verified:
         self._reading: dict[Path, threading.Lock] = {}
 
     def of(self, path: Path) -> CheckedStore:
-        """What is known of a store until it is forgotten."""
+        """What was found of a store, until it is forgotten."""
         with self._lock:
             entries = self._stores.setdefault(path, CheckedStore())
             self._stores.move_to_end(path)
@@ -340,7 +340,7 @@ class Verified:
             return entries
 
     def reading(self, path: Path) -> threading.Lock:
-        """Held by who reads a whole store to check it: whoever comes later finds it checked."""
+        """Held by the thread that checks a whole store: the next one finds it checked."""
         with self._lock:
             return self._reading.setdefault(path, threading.Lock())
 

@@ -158,7 +158,7 @@ class ResultsReader:
         return self._state(blobs).damaged
 
     def is_checked(self) -> bool:
-        """Whether this process found every finished frame intact, or knows all that is damaged."""
+        """Whether this process found every finished frame intact, or knows all damage."""
         due, known = self._state(False).due, VERIFIED.of(self._folder)
         return all(known.holds(frame, text) for frame, text in due.items())
 
@@ -501,7 +501,7 @@ class ResultsReader:
 
     @contextmanager
     def _snapshot(self) -> Generator[None]:
-        """All that is read inside is of one moment; a writer may go on meanwhile."""
+        """Everything that is read inside is of one moment, even if a writer continues."""
         with self._lock:
             opened = not self._within and (self._connection is not None or bool(self._query("SELECT 1")))
             if not opened:

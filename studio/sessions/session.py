@@ -337,8 +337,9 @@ def start_pose_files(folder: Path) -> tuple[Path, ...]:
 def numbered(
     session: Session, record: RunRecord, name: str, make: Callable[[RunRecord], StoredRun]
 ) -> StoredRun:
-    """The run that is made of a record. name : that was requested; without one, another number is taken where
-    somebody else took the record's meanwhile. Raises what `make` raises.
+    """The run made of a record. name : that was requested; without one, the next free number is taken.
+
+    Raises what `make` raises.
     """
     while True:
         try:
@@ -356,9 +357,11 @@ def free_run_name(session: Session) -> str:
     return free_name(f"run-{len(taken) + 1}", taken)
 
 
-def described_anew(session: Session, manifest: SessionManifest) -> Session:
-    """Write what differs from a session's description, and return the new session; what others have changed since it
-    was opened stays. Raises SessionError where they have changed the same.
+def redescribe(session: Session, manifest: SessionManifest) -> Session:
+    """Write changed entries of a session's description, and return the new session; changes that others made since it
+    was opened are kept.
+
+    Raises SessionError where they changed the same entries.
     """
     with one_at_a_time(session.path):
         now = _described_now(session)

@@ -48,9 +48,11 @@ def open_database(
 ) -> SessionDatabase:
     """A connection to a file of a session, without transactions of its own.
 
-    mode : of SQLite's addresses: "ro", "rw", "rwc" (made where missing), "immutable" for a folder that cannot be
-    written. patience : seconds to wait for others. shared : among threads. Raises SessionError for what is no store of
-    a session, sqlite3.DatabaseError for a damaged one.
+    mode : of SQLite's addresses: "ro", "rw", "rwc" (made if missing), "immutable" for a read-only folder.
+    patience : seconds to wait for others.
+    shared : among threads.
+
+    Raises SessionError for a file that is no store of a session, sqlite3.DatabaseError for a damaged one.
     """
     for beside in ("", "-journal", "-wal", "-shm"):
         check_file(path.with_name(path.name + beside), SessionError)

@@ -96,7 +96,7 @@ def replace_strokes(session: Session, camera: str, strokes: Sequence[Stroke]) ->
 
 
 def restore_strokes(session: Session, strokes: Sequence[Stroke]) -> None:
-    """Store strokes that the session had, whether or not they still fit it."""
+    """Store earlier strokes again, whether or not they still fit."""
     path = session.path / STROKES_NAME
     if not strokes:
         path.unlink(missing_ok=True)
@@ -129,7 +129,7 @@ def _sources(session: Session) -> dict[str, CameraSource]:
 
 
 def _misfit(stroke: Stroke, sources: Mapping[str, CameraSource], count: int) -> str:
-    """Why a stroke cannot be of this footage, "" if it can. count : of frames."""
+    """Why a stroke does not fit the footage, "" if it does. count : of frames."""
     source = sources.get(stroke.camera)
     if source is None:
         return f"there is no camera '{stroke.camera[:64]}'; the session has {', '.join(sources)}"
@@ -172,7 +172,7 @@ class StrokeMasks:
 
 
 def made_of_strokes(session: Session, run: str = "") -> StrokeMasks | None:
-    """The newest masks made of strokes of the footage as it is, by the projection of `run`; None without any."""
+    """The newest masks made of strokes on the present footage, with the projection of `run`; None without any."""
     footage = session.manifest.footage
     for place in reversed(made_folders(session, STROKE_MASKS)):
         try:

@@ -1,8 +1,8 @@
-"""What goes on in a session, said to all processes: while it does, the session is neither renamed nor deleted.
+"""Work in a session, announced to all processes: meanwhile the session is neither renamed nor deleted.
 
 Beside a session, in `.studio/under-way`, each piece of work holds the lock of a file whose name says what it is; the
 system frees it when its process dies. To begin work, to move a session or a run, and to change a record that was read
-before, takes a turn (`one_at_a_time`): a moment in which nobody else does.
+before, a process takes a turn (`one_at_a_time`), in which no other process does any of these.
 """
 
 import contextlib
@@ -44,10 +44,10 @@ class Work(NamedTuple):
 
 @contextmanager
 def one_at_a_time(session: Path) -> Generator[None]:
-    """Inside, no other process and no other thread is here, of all sessions in the folder in which this one lies.
+    """Keep all other processes and threads out, for all sessions in the folder of this one.
 
     Where nothing can be written nothing is changed either, and no other is waited for. Raises RunError where another
-    one stays here.
+    one stays inside.
     """
     folder = session.parent / STATE_NAME / FOLDER
     held: set[Path] = _mine.__dict__.setdefault("held", set())
@@ -74,9 +74,11 @@ def one_at_a_time(session: Path) -> Generator[None]:
 
 @contextmanager
 def working_on(session: Path, verb: str, run: str = "") -> Generator[None]:
-    """Inside, a session (or one run of it) stays where it is, whatever other processes do.
+    """Keep a session (or one run of it) in its place inside, whatever other processes do.
 
-    verb : what is done, for others to read. Raises NotFoundError where it is no longer there.
+    verb : what is done, for others to read.
+
+    Raises NotFoundError where it no longer exists.
     """
     with one_at_a_time(session):
         check_there(session, run)
@@ -114,9 +116,9 @@ def _begin(session: Path, verb: str, run: str) -> _Held | None:
 
 @contextmanager
 def moving(session: Path, run: str = "") -> Generator[None]:
-    """Inside, a session (or one run of it) may be renamed or deleted: nothing goes on in it, and nothing begins.
+    """Rename or delete a session (or one run of it) inside: no work on it is under way, and none begins.
 
-    Raises RunError naming what goes on, NotFoundError where it is no longer there.
+    Raises RunError naming the work, NotFoundError where it no longer exists.
     """
     with one_at_a_time(session):
         check_there(session, run)
@@ -130,7 +132,7 @@ def moving(session: Path, run: str = "") -> Generator[None]:
 
 
 def check_there(session: Path, run: str = "") -> None:
-    """Raise NotFoundError where a session, or a run of it, is no longer where it was."""
+    """Raise NotFoundError where a session, or a run of it, no longer exists."""
     if not (session / MANIFEST_NAME).is_file():
         raise gone(f"Session '{session.name}'")
     if run and not (session / "runs" / run / RECORD_NAME).is_file():
@@ -138,7 +140,7 @@ def check_there(session: Path, run: str = "") -> None:
 
 
 def gone(what: str) -> NotFoundError:
-    """The error for what was there a moment ago. what : begins the sentence."""
+    """The error for something that was there a moment ago. what : begins the sentence."""
     return NotFoundError(f"{what} was renamed or deleted meanwhile.", "Do it again under its new name.")
 
 
@@ -154,7 +156,7 @@ def check_alone(session: Path) -> None:
 
 
 def under_way(session: Path) -> Iterator[Work]:
-    """What goes on in a session, of all processes. What ended without saying so is removed."""
+    """The work in a session, of all processes. Work that ended without saying so is removed."""
     return (work for _, work in _at_work(session))
 
 

@@ -27,7 +27,7 @@ from studio.sessions.remote_sessions import remote_session
 from studio.sessions.results_reader import FILE_NAME as RESULTS_NAME
 from studio.sessions.run_record import FILE_NAME as RECORD_NAME
 from studio.sessions.run_record import read_run_record, write_run_record
-from studio.sessions.session import BODIES_NAME, RUNS_NAME, THUMBNAIL_NAME, Session, described_anew
+from studio.sessions.session import BODIES_NAME, RUNS_NAME, THUMBNAIL_NAME, Session, redescribe
 from studio.sessions.stored_run import RunSummary, StoredRun
 from studio.sessions.work_under_way import moving, one_at_a_time, working_on
 
@@ -152,7 +152,7 @@ class Workspace:
             atomic_files.sync_folder(self.root)
             moved = Session(place)
             title = new_name if moved.manifest.title in ("", name) else moved.manifest.title
-            return described_anew(moved, msgspec.structs.replace(moved.manifest, name=new_name, title=title))
+            return redescribe(moved, msgspec.structs.replace(moved.manifest, name=new_name, title=title))
 
     def retitle(self, name: str, title: str) -> Session:
         """Change the text that people see. Raises SessionError if it is empty or longer than 200
@@ -164,7 +164,7 @@ class Workspace:
             )
         with one_at_a_time(self.session(name).path):
             session = self.session(name)
-            return described_anew(session, msgspec.structs.replace(session.manifest, title=words))
+            return redescribe(session, msgspec.structs.replace(session.manifest, title=words))
 
     def duplicate(self, name: str, new_name: str | None = None) -> Session:
         """Copy a session with its runs, atomically; results being written are copied in their current state."""
@@ -220,7 +220,7 @@ class Workspace:
             return session.run(new_name)
 
     def to_trash(self, path: Path, label: str) -> Path:
-        """Move a folder to the trash under a free name that begins with `label`; where it lies then."""
+        """Move a folder to the trash under a free name that begins with `label`; returns where it lies then."""
         trash = self.root / TRASH_NAME
         trash.mkdir(exist_ok=True)
         stamp = time.strftime("%Y%m%d-%H%M%S", time.gmtime())
@@ -346,8 +346,7 @@ def _check_idle(run: StoredRun) -> None:
 
 
 def _transient(folder: str, names: list[str]) -> set[str]:
-    """What a copy leaves out: locks, unfinished files, and databases, which are copied by the database
-    itself."""
+    """The files that a copy omits: locks, unfinished files, and databases, which are copied by SQLite itself."""
     left_out = {name for name in names if name.startswith((RESULTS_NAME, "results.lock"))}
     return left_out | {name for name in names if name.startswith(atomic_files.PARTIAL_PREFIX)}
 

@@ -8,7 +8,7 @@ import pytest
 
 from studio.runs.setup.background_setup import set_up_background
 from studio.sessions.importers.importing import ImportOptions, import_source
-from studio.sessions.session import Session, described_anew
+from studio.sessions.session import Session, redescribe
 
 FRAMES = 4
 
@@ -21,7 +21,7 @@ def test_the_balancing_man_is_cut_out_without_a_plate(real_data: Path, tmp_path:
         real_data / "pose2sim-balance", tmp_path / "balance", ImportOptions(copy=False)
     ).session
     footage = replace(session.manifest.footage, frame_count=FRAMES)
-    session = described_anew(session, msgspec.structs.replace(session.manifest, footage=footage))
+    session = redescribe(session, msgspec.structs.replace(session.manifest, footage=footage))
     made = set_up_background(session, "person")
     assert made.notes == ()
     assert made.quality is not None

@@ -8,7 +8,7 @@ import pytest
 
 from studio.runs.setup.background_setup import set_up_background
 from studio.sessions.importers.importing import ImportOptions, import_source
-from studio.sessions.session import Session, described_anew
+from studio.sessions.session import Session, redescribe
 from studio.sessions.stroke_files import strokes_of_file
 
 FRAMES = 4
@@ -21,7 +21,7 @@ def mouse(real_data: Path, tmp_path: Path) -> Session:
     options = ImportOptions(copy=False, allow_inconsistent=True)
     session = import_source(real_data / "mouse", tmp_path / "mouse", options).session
     footage = replace(session.manifest.footage, frame_count=FRAMES)
-    return described_anew(session, msgspec.structs.replace(session.manifest, footage=footage))
+    return redescribe(session, msgspec.structs.replace(session.manifest, footage=footage))
 
 
 @pytest.mark.real_data

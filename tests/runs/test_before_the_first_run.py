@@ -11,12 +11,12 @@ from studio.footage.capture.calibration_files import write_calibration
 from studio.foundations.errors import CalibrationError
 from studio.runs.setup.mask_quality import look_before_the_first_run
 from studio.runs.setup.silhouette_faults import accepted_faults, known_faults
-from studio.sessions.session import CAMERAS_PATH, Session, described_anew
+from studio.sessions.session import CAMERAS_PATH, Session, redescribe
 
 
 def imported(folder: Path) -> Session:
     session = make_nudged_session(folder, 0.0)
-    return described_anew(
+    return redescribe(
         session, msgspec.structs.replace(session.manifest, layout="folder in the studio's layout")
     )
 

@@ -13,13 +13,13 @@ from studio.runs.new_run import prepare_run
 from studio.runs.search_space import default_sigma, parameter_names
 from studio.runs.setup.start_pose_file import keep_start_pose
 from studio.sessions.named_rows import write_pose, write_sigma
-from studio.sessions.session import Session, described_anew
+from studio.sessions.session import Session, redescribe
 
 
 def test_defaults_come_from_the_session(session_on_disk: Session) -> None:
     names = parameter_names(session_on_disk.body())
     write_pose(session_on_disk.path / "start_pose.csv", names, np.array([0.1, 0.2, 0.3, 0.4]))
-    session = described_anew(
+    session = redescribe(
         session_on_disk,
         msgspec.structs.replace(session_on_disk.manifest, tracker="condensation", weighting="template"),
     )

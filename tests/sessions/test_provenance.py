@@ -12,7 +12,7 @@ from studio.runs.setup.workflow import workflow_of
 from studio.sessions import provenance
 from studio.sessions.named_rows import write_pose
 from studio.sessions.results_store import ResultsWriter
-from studio.sessions.session import CAMERAS_PATH, START_POSE_NAME, Session, described_anew
+from studio.sessions.session import CAMERAS_PATH, START_POSE_NAME, Session, redescribe
 
 
 @pytest.fixture
@@ -85,6 +85,6 @@ def test_a_missing_footage_file_is_reported(session):
     source = session.manifest.footage
     lost = tuple(dataclasses.replace(camera, path="pictures/nowhere") for camera in source.cameras)
     manifest = msgspec.structs.replace(session.manifest, footage=dataclasses.replace(source, cameras=lost))
-    changed = described_anew(session, manifest)
+    changed = redescribe(session, manifest)
     assert step(changed, "footage").state == "stale"
     assert "front" in step(changed, "footage").why

@@ -34,7 +34,7 @@ from studio.sessions.calibration_changes import (
 from studio.sessions.footage_changes import change_footage
 from studio.sessions.importers import importing
 from studio.sessions.results_store import ResultsWriter
-from studio.sessions.session import Session, described_anew
+from studio.sessions.session import Session, redescribe
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.work_under_way import one_at_a_time, under_way, working_on
 from studio.sessions.workspace import VARIABLE, Workspace
@@ -105,7 +105,7 @@ def test_work_on_a_session_that_was_moved_says_so(workspace: Workspace, run: Sto
     for work in (
         lambda: studio.note(run, 0, "a"),
         lambda: studio.background(opened, "masks"),
-        lambda: described_anew(opened, opened.manifest),
+        lambda: redescribe(opened, opened.manifest),
     ):
         with pytest.raises(NotFoundError, match=r"toy|one"):
             work()
@@ -176,7 +176,7 @@ def test_a_store_is_not_opened_while_its_run_is_moved(workspace: Workspace, run:
 def test_what_others_changed_in_a_description_stays(workspace: Workspace) -> None:
     opened = workspace.session("toy")
     workspace.retitle("toy", "Another title")
-    changed = described_anew(opened, msgspec.structs.replace(opened.manifest, notes=("a note",)))
+    changed = redescribe(opened, msgspec.structs.replace(opened.manifest, notes=("a note",)))
     assert (changed.manifest.title, changed.manifest.notes) == ("Another title", ("a note",))
 
 

@@ -37,7 +37,7 @@ class SetFollower:
         self._ended, self._checked = False, clock()
 
     def begin(self, frame: int) -> None:
-        """Start the sets; one that came before, for warming up, is not tracked."""
+        """Start the sets; an earlier one, for warming up, is not tracked."""
         self._look()
         self._before = self._newest.frame if self._newest else -1
         start_sets(self._folder)

@@ -66,7 +66,7 @@ from studio.sessions.background_files import (
     write_evidence,
 )
 from studio.sessions.manifest import SessionManifest
-from studio.sessions.session import Session, changed_meanwhile, described_anew
+from studio.sessions.session import Session, changed_meanwhile, redescribe
 from studio.sessions.stroke_files import read_strokes, restore_strokes, stored_strokes, write_strokes
 
 BackgroundSource = Literal[
@@ -408,7 +408,7 @@ def _with_footage(session: Session, footage: FootageSource) -> Session:
     now = Session(session.path)
     if _filmed(now.manifest.footage) != _filmed(footage):
         raise changed_meanwhile(session, "footage")
-    return described_anew(now, msgspec.structs.replace(now.manifest, footage=footage))
+    return redescribe(now, msgspec.structs.replace(now.manifest, footage=footage))
 
 
 def _filmed(footage: FootageSource) -> FootageSource:

@@ -10,7 +10,7 @@ from studio.body.subject import Subject, fit_subject, write_subject
 from studio.foundations.errors import BodyError
 from studio.runs.setup.subject_fitting import FittedSubject, keep_subject, replace_subject
 from studio.sessions.provenance import note
-from studio.sessions.session import SUBJECT_NAME, Session, described_anew
+from studio.sessions.session import SUBJECT_NAME, Session, redescribe
 
 LEAST_HEIGHT, MOST_HEIGHT = 300.0, 3000.0
 
@@ -54,4 +54,4 @@ def keep_fitted(session: Session, fitted: FittedSubject) -> Path:
 def _with_body(session: Session, body: str) -> Session:
     if session.manifest.body == body:
         return session
-    return described_anew(session, msgspec.structs.replace(session.manifest, body=body))
+    return redescribe(session, msgspec.structs.replace(session.manifest, body=body))

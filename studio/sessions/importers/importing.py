@@ -56,7 +56,7 @@ from studio.sessions.importers.writing import (
 from studio.sessions.manifest import FASTEST, SessionManifest
 from studio.sessions.names import free_name
 from studio.sessions.provenance import adopt
-from studio.sessions.session import CAMERAS_PATH, THUMBNAIL_NAME, Session, check_unchanged, described_anew
+from studio.sessions.session import CAMERAS_PATH, THUMBNAIL_NAME, Session, check_unchanged, redescribe
 from studio.sessions.stroke_files import OUTDATED, STROKES_NAME
 from studio.sessions.work_under_way import check_alone, one_at_a_time, working_on
 
@@ -288,7 +288,7 @@ def _add(session: Session, source: Path, options: ImportOptions, report: Progres
             adopt(session)
             placed = _moved_in(session, staged, footage, without_made_masks(session, stay))
             manifest = _describe(session, plan, read, measured, placed, person.body if takes_over else "")
-            changed = described_anew(session, manifest)
+            changed = redescribe(session, manifest)
             _forget_old(changed, session.manifest.footage)
             forget_unused_masks(changed)
     except OSError as problem:

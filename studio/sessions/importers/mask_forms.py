@@ -1,6 +1,4 @@
-"""How other programs write masks, and what is meant: white where the person is, labels, an alpha channel, or
-inverted.
-"""
+"""How other programs write masks: white where the person is, labels, an alpha channel, or inverted."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -45,7 +43,7 @@ class MaskForm:
         return self.reading == "white" and not self.inverted
 
     def words(self, camera: str) -> tuple[str, ...]:
-        """What was taken to be meant, sentences."""
+        """How the masks were read, sentences."""
         if self.reading == "alpha":
             return (f"The masks of camera {camera} lie in the alpha channel and are taken from there.",)
         if self.reading != "labels":
@@ -68,7 +66,7 @@ class MaskForm:
 
 
 def form_of_masks(path: Path, frame_count: int, inverted: bool = False) -> MaskForm:
-    """How a video or folder of masks is meant, by some of its frames. Raises FootageError."""
+    """How a video or folder of masks marks the person, by some of its frames. Raises FootageError."""
     with MaskPictures(path, frame_count) as read:
         chosen = np.unique(np.linspace(0, frame_count - 1, min(SAMPLES, frame_count)).astype(int))
         pictures = [read(int(frame)) for frame in chosen]

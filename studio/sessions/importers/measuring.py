@@ -598,7 +598,7 @@ def checked_turn(camera: str, degrees: int) -> Turn:
 
 
 def in_step(offsets: Mapping[str, int]) -> dict[str, int]:
-    """Offsets by camera, the smallest 0. Raises FootageError for one that cannot be."""
+    """Offsets by camera, the smallest 0. Raises FootageError for an impossible one."""
     for camera, offset in offsets.items():
         if abs(offset) > MOST_OFFSET:
             raise FootageError(

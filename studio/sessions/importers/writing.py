@@ -102,11 +102,16 @@ def _body_of(plan: SourcePlan, subject: Subject | None) -> str:
 def carried_truth(
     plan: SourcePlan, calibration: Calibration, fps: float, frame_count: int, unit: str
 ) -> tuple[Mapping[str, MarkerMotion], tuple[str, ...]]:
-    """The truths that are in a world of their own, or mean more than they say, by their files' names, in the session's
-    world; and notes on them.
+    """The truths that are in a world or unit of their own, by their files' names, in the session's world; and notes on
+    them.
 
     That world is of a calibration beside them (truth/*.toml and the like), else of the source's calibration as its file
-    has it. frame_count : of the footage. unit : of that one, as requested. Raises TruthError, CalibrationError.
+    has it.
+
+    frame_count : of the footage.
+    unit : of that calibration, as requested.
+
+    Raises TruthError, CalibrationError.
     """
     truths: dict[str, MarkerMotion] = {}
     notes: list[str] = []
