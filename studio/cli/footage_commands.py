@@ -116,7 +116,7 @@ def synchronise_command(call: Call) -> Mapping[str, object]:
             "notes": list(done.synchrony.notes)
         }
     elif done.synchrony is not None:
-        answer["recorded"] = {"offsets": done.synchrony.offsets, "apart": done.found.apart}
+        answer["recorded"] = {"offsets": done.synchrony.offsets, "apart": done.synchrony.apart}
     if done.change is None:
         note("Nothing was changed; write it with --apply, or by hand with --offset CAMERA=FRAMES.")
     else:
