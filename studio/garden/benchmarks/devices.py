@@ -1,6 +1,10 @@
-"""Speed of edge and region on a graphics card, from a thousand poses to a million; in words where there is none."""
+"""What a graphics card does: poses weighed, frames searched, many runs at once, beside what the card can do at most.
 
-from collections.abc import Sequence
+In words where there is no card.
+"""
+
+import importlib
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -8,40 +12,62 @@ from studio.body.catalogue import load_body
 from studio.foundations.errors import StudioError
 from studio.foundations.progress import Progress
 from studio.garden.benchmarks.kernels import made_evidence, poses_around, ring_of_cameras
-from studio.garden.benchmarks.timing import quickest
-from studio.search.likelihood.edge_region import GPU, EdgeRegionLikelihood, EdgeRegionSettings
+from studio.runs.search_space import default_sigma, search_space
+from studio.search.likelihood.edge_region import CPU, GPU
+from studio.search.likelihood.edge_region_silhouette import (
+    EdgeRegionSilhouetteLikelihood,
+    EdgeRegionSilhouetteSettings,
+)
 
 SIZES = (1_000, 10_000, 100_000, 1_000_000)
-COMPARED = 1_000
+PARTICLES, RUNS = (1_000, 10_000, 100_000), 64
+COMPARED = 2_000
+FRAMES_PER_SECOND = 60.0
+MEASURES = "studio.garden.benchmarks.card_measures"
 
 
 def run_device_benchmark(
-    sizes: Sequence[int] = SIZES, repeats: int = 5, progress: Progress | None = None
+    sizes: Sequence[int] = SIZES,
+    particles: Sequence[int] = PARTICLES,
+    runs: int = RUNS,
+    repeats: int = 5,
+    progress: Progress | None = None,
 ) -> dict[str, object]:
-    """Evaluations a second of each number of poses, the poses' way to the card and the sums' way back included, and by
-    how much a log-weight differs from the processor's at most; "none": why there is no card.
+    """Evaluations a second of each number of poses, milliseconds a frame of each number of particles, and how much more
+    many runs do at once; "none": why there is no card.
     """
     body = load_body("human31")
     cameras = ring_of_cameras(body)
     try:
-        there = EdgeRegionLikelihood(body, cameras, EdgeRegionSettings(device=GPU))
+        there = EdgeRegionSilhouetteLikelihood(body, cameras, EdgeRegionSilhouetteSettings(device=GPU))
     except StudioError as error:
         return {"none": f"{error.message} {error.hint}"}
+    measures = importlib.import_module(MEASURES)
+    report = progress or (lambda words, done, total: None)
     rng = np.random.default_rng(0)
     poses = poses_around(body, max(*sizes, COMPARED), rng)
     evidence = made_evidence(body, cameras, rng)["proximity"]
     problem = there.problem(evidence)
-    here = EdgeRegionLikelihood(body, cameras, EdgeRegionSettings()).problem(evidence)
-    best = quickest(
-        {size: lambda size=size: problem.log_likelihood(poses[:size]) for size in sizes},
-        repeats,
-        on_round=lambda done: progress("Weighing on the card", done, repeats) if progress else None,
-    )
-    difference = np.abs(
-        problem.log_likelihood(poses[:COMPARED]) - here.log_likelihood(poses[:COMPARED])
-    ).max()
-    return {
-        "evaluations_per_second": {str(size): round(size / best[size]) for size in sizes},
-        "samples": there.samples_per_evaluation,
-        "largest_difference": float(difference),
+    here = EdgeRegionSilhouetteLikelihood(body, cameras, EdgeRegionSilhouetteSettings(device=CPU))
+    on_host = here.problem(evidence)
+    space = search_space(body, default_sigma(body, FRAMES_PER_SECOND))
+    steps: dict[str, Callable[[], object]] = {
+        "card": lambda: measures.card_limits(repeats),
+        "resident": lambda: {
+            str(size): measures.resident_rates(problem, poses[:size], repeats) for size in sizes
+        },
+        "evaluations_per_second": lambda: measures.called_rates(problem, poses, sizes, repeats),
+        "host_evaluations_per_second": lambda: measures.called_rates(on_host, poses, sizes[:1], repeats),
+        "agreement": lambda: measures.agreement(problem, on_host, poses[:COMPARED]),
+        "frame_ms": lambda: {
+            str(count): measures.frame_time(problem, space, body.neutral, count, repeats)
+            for count in particles
+        },
+        "many_runs": lambda: measures.many_runs(problem, space, body.neutral, runs, repeats),
+        "copies_ms": lambda: measures.copy_times(there, evidence, repeats),
     }
+    found: dict[str, object] = {"samples": there.edge_region.samples_per_evaluation}
+    for done, (name, measure) in enumerate(steps.items()):
+        report("Measuring the card", done, len(steps))
+        found[name] = measure()
+    return found

@@ -17,9 +17,9 @@ any finite pose. Leaving such samples out instead, as the benchmark does, reward
 doing so is small: with all four Lee-walk pictures cut off below the hips the best root position moves by 20
 mm.
 
-**On a device.** `device` has the sums of Eq. 14 and 15 found on a graphics card (`edge_region_device`, which also says
-how equal they are); occlusion-aware edges are the processor's alone. With `auto` a card that is not there, or that
-fails in compiling or launching a kernel, leaves the work to the processor, and a frame's notes say why, once.
+**On a device.** `device` has the poses weighed on a graphics card (`device_weighing`; `device_kernels` says
+how equal the sums are). With `auto` a card that is not there, or that fails in compiling or launching a kernel, leaves
+the work to the processor, and a frame's notes say why, once.
 
 **Occlusion-aware edges.** A side that passes behind a nearer limb makes no edge in the picture. With the
 option on, such samples are left out of Eq. 14 and its N (of that view and pose) counts the others; if none is
@@ -28,7 +28,7 @@ left, Σe = 1.
 
 import importlib
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.foundations.arrays import Array
-from studio.foundations.errors import SettingsError, StudioError
+from studio.foundations.errors import BodyError, StudioError
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.knobs import next_frame_knob
 from studio.foundations.numba_in_threads import parallel_blocks
@@ -52,16 +52,17 @@ from studio.search.likelihood.evidence_check import check_views
 from studio.search.likelihood.outline_kernels import LANES
 from studio.search.likelihood.picture_maps import Maps, joined_maps
 from studio.search.likelihood.problem import BaseFrameLikelihood, Preparation, Shares
+from studio.search.likelihood.silhouette_areas import Areas, Silhouettes
 from studio.search.likelihood.visible_edges import hidden_samples, limb_sides
 
 if TYPE_CHECKING:
-    from studio.search.likelihood.edge_region_device import EdgeRegionDevice
+    from studio.search.likelihood.device_weighing import FrameOnDevice, ProblemOnDevice, WeighingDevice
 
 IntArray = NDArray[np.int64]
 Words = NDArray[np.uint32]
 
 CPU, AUTO, GPU = "cpu", "auto", "gpu"
-DEVICE_MODULE = "studio.search.likelihood.edge_region_device"
+DEVICE_MODULE = "studio.search.likelihood.device_weighing"
 NO_DEVICE_HINT = (
     "It needs an NVIDIA card, its driver and the extra `gpu` (pip install 'capture-studio[gpu]'), which `studio doctor`"
     " tries; set device to cpu, or to auto, which takes a card only where one works."
@@ -106,8 +107,8 @@ class EdgeRegionSettings:
     device: str = next_frame_knob(
         CPU,
         choices=(CPU, AUTO, GPU),
-        help="What evaluates edges and region: the processor, or an NVIDIA card with CUDA (extra `gpu`), which agrees"
-        " but for a sample in thousands; auto takes a card where there is one.",
+        help="What weighs poses: the processor, or an NVIDIA card with CUDA (extra `gpu`), which agrees but for a"
+        " sample in thousands; auto takes a card where there is one.",
     )
 
     @property
@@ -122,16 +123,19 @@ class EdgeRegionSettings:
 
 
 class EdgeRegionLikelihood(Preparation):
-    """Makes that of any frame. device : what finds the sums in place of the processor. unsaid : why the processor finds
+    """Makes that of any frame. device : what weighs poses in place of the processor. unsaid : why the processor weighs
     them where a card was to be taken if there is one; the next frame's notes say it.
     """
 
-    def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: EdgeRegionSettings) -> None:
+    def __init__(
+        self, body: BodyModel, cameras: tuple[Camera, ...], settings: EdgeRegionSettings, areas: bool = False
+    ) -> None:
+        """areas : whether a device finds the areas of silhouettes, too."""
         super().__init__(body, cameras, settings)
-        self.device: EdgeRegionDevice | None = None
+        self.device: WeighingDevice | None = None
         self.unsaid: tuple[str, ...] = ()
         try:
-            self.device = device_for(settings, self)
+            self.device = device_for(settings, self, areas)
         except StudioError as error:
             self.unsaid = without_device(settings, error)
 
@@ -142,50 +146,55 @@ class EdgeRegionLikelihood(Preparation):
         chunks = EDGE_LINES * settings.edge_chunks + REGION_LINES * settings.region_chunks
         return chunks * CHUNK * self.projector.limb_count * len(self.cameras)
 
-    def problem(self, evidence: FrameEvidence) -> "EdgeRegionFrameLikelihood":
-        """One frame as a function of poses. Raises FootageError where views do not fit the cameras."""
+    def problem(
+        self, evidence: FrameEvidence, silhouettes: Silhouettes | None = None
+    ) -> "EdgeRegionFrameLikelihood":
+        """One frame as a function of poses. silhouettes : of the frame, where a device finds areas, too.
+
+        Raises FootageError where views do not fit the cameras.
+        """
         check_views(self.cameras, evidence)
-        return EdgeRegionFrameLikelihood(self, weighting_maps(evidence))
+        return EdgeRegionFrameLikelihood(self, weighting_maps(evidence), silhouettes)
 
 
 class EdgeRegionFrameLikelihood(BaseFrameLikelihood):
     """One frame as a function of poses."""
 
-    def __init__(self, likelihood: EdgeRegionLikelihood, maps: Maps) -> None:
+    def __init__(self, likelihood: EdgeRegionLikelihood, maps: Maps, silhouettes: Silhouettes | None) -> None:
         self.likelihood, self.priors, self.maps = likelihood, likelihood.priors, maps
         self._notes, likelihood.unsaid = likelihood.unsaid, ()
         device = likelihood.device
+        self._on_device: FrameOnDevice | None = None
         try:
-            self._there = None if device is None else device.maps(maps)
+            self._on_device = None if device is None else device.frame(maps, silhouettes)
         except Exception as error:
-            self._give_up(error)
+            self.give_up_device(error)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Why the processor finds the sums, in the first frame after a card was not there or failed."""
+        """Why the processor weighs poses, in the first frame after a card was not there or failed."""
         return self._notes
 
     def log_likelihood(self, poses: Array, stage: int = 0) -> Array:
         """(N, D) poses to (N,) log-weights, Eq. 17. Raises BodyError for poses that are no finite (N, D)."""
-        there = self.terms_there(poses)
-        if there is not None:
-            return self._shares(*there).values.sum(axis=(1, 2))
+        settings = self.likelihood.settings
+        weights = self.device_weights(poses, (settings.edge_weight, settings.region_weight, 0.0))
+        if weights is not None:
+            return weights[1]
         outlines = self.likelihood.projector.blocks(poses)
         return self._evaluated(outlines, self.hidden(outlines), len(poses))[1]
 
     def terms(self, poses: Array) -> tuple[Array, Array]:
         """Σe and Σr, each (N, V), of poses (N, D)."""
-        there = self.terms_there(poses)
-        if there is not None:
-            return there
+        terms = self.device_terms(poses)
+        if terms is not None:
+            return terms[:2]
         outlines = self.likelihood.projector.blocks(poses)
         return self.terms_of(outlines, self.hidden(outlines), len(poses))
 
     def shares(self, poses: Array) -> Shares:
         """-a Σe and -b Σr of every camera."""
-        return self._shares(*self.terms(poses))
-
-    def _shares(self, edge: Array, region: Array) -> Shares:
+        edge, region = self.terms(poses)
         settings, names = self.likelihood.settings, tuple(camera.name for camera in self.likelihood.cameras)
         values = np.stack([-settings.edge_weight * edge, -settings.region_weight * region], axis=2)
         return Shares(names, ("edge", "region"), values)
@@ -199,34 +208,58 @@ class EdgeRegionFrameLikelihood(BaseFrameLikelihood):
         terms = self._evaluated(outlines, hidden, count)[0]
         return terms[..., 0], terms[..., 1]
 
-    def terms_there(self, poses: Array, limbs: NDArray[np.int64] | None = None) -> tuple[Array, Array] | None:
-        """Σe and Σr, each (N, V), of poses (N, D) over some limbs by number (None: all), found on the device; None
-        where the processor is to find them.
+    def device_terms(
+        self, poses: Array, limbs: NDArray[np.int64] | None = None
+    ) -> tuple[Array, Array, Areas] | None:
+        """Σe over the edges of some limbs by number (None: all) and Σr, each (N, V), and the areas of poses (N, D),
+        found on the device; None where the processor is to find them.
 
         Raises BodyError for poses that are no finite (N, D), StudioError where a card that was asked for fails.
         """
-        device, settings = self.likelihood.device, self.likelihood.settings
-        if device is None or self._there is None:
+        return self._from_device("terms", poses, limbs)
+
+    def device_weights(
+        self, poses: Array, factors: tuple[float, float, float], limbs: NDArray[np.int64] | None = None
+    ) -> tuple[Array, Array] | None:
+        """(N,) fitness and (N,) log-weights of poses (N, D), as `device_terms`. factors : of the edge, the region and
+        the silhouette term.
+        """
+        return self._from_device("weights", poses, limbs, factors)
+
+    def on_device(self) -> "ProblemOnDevice | None":
+        """This frame's weighting there, for a search that keeps its particles there; None where there is no device."""
+        settings = self.likelihood.settings
+        return self.problem_there((settings.edge_weight, settings.region_weight, 0.0))
+
+    def problem_there(self, factors: tuple[float, float, float]) -> "ProblemOnDevice | None":
+        """As `on_device`, with the terms' factors."""
+        device, frame = self.likelihood.device, self._on_device
+        if device is None or frame is None:
             return None
-        finite = self.likelihood.projector.checked(poses)
+        return importlib.import_module(DEVICE_MODULE).ProblemOnDevice(device, frame, factors)
+
+    def _from_device(self, method: str, poses: Array, *further: Any) -> Any:  # noqa: ANN401 - the method's own
+        device, frame = self.likelihood.device, self._on_device
+        if device is None or frame is None:
+            return None
+        shaped = self.likelihood.projector.shaped(poses)
         try:
             # Kernels are compiled by a process's first launch.
-            chosen = device.limbs(limbs)
-            sums = device.sums(finite, self._there, chosen)
+            return getattr(device, method)(shaped, frame, *further)
+        except BodyError:
+            self.likelihood.projector.checked(poses)
+            raise
         except Exception as error:
-            self._give_up(error)
+            self.give_up_device(error)
             return None
-        samples = CHUNK * np.array([EDGE_LINES * settings.edge_chunks, REGION_LINES * settings.region_chunks])
-        terms = sums / (WORST * samples * len(chosen.frame))
-        return terms[..., 0], terms[..., 1]
 
-    def _give_up(self, error: Exception) -> None:
+    def give_up_device(self, error: Exception) -> None:
         """The processor from now on, in this frame and the next. Raises StudioError where the card was asked for."""
         refused = StudioError(f"The card failed: {in_a_line(error)}.", NO_DEVICE_HINT)
         note = without_device(self.likelihood.settings, refused)
         # Another frame's failure has said it already.
         self._notes += note if self.likelihood.device is not None else ()
-        self.likelihood.device = self._there = None
+        self.likelihood.device = self._on_device = None
 
     def _evaluated(
         self, outlines: NDArray[np.float32], hidden: NDArray[np.uint64], count: int
@@ -264,25 +297,22 @@ class EdgeRegionFrameLikelihood(BaseFrameLikelihood):
         return hidden.reshape(blocks, views, limbs, EDGE_LINES, LANES)
 
 
-def device_for(settings: EdgeRegionSettings, likelihood: Preparation) -> "EdgeRegionDevice | None":
+def device_for(settings: EdgeRegionSettings, likelihood: Preparation, areas: bool) -> "WeighingDevice | None":
     """What the setting `device` asks for; None is the processor.
 
-    Raises SettingsError for what is not computed there, StudioError where there is no device or it cannot be used.
+    Raises StudioError where there is no device or it cannot be used.
     """
     if settings.device == CPU:
         return None
     projector = likelihood.projector
-    if settings.occlusion_aware:
-        raise SettingsError(
-            "Occlusion-aware edges are not found on a GPU.",
-            "Set device to cpu, or occlusion_aware to false.",
-        )
-    samples = settings.edge_chunks * CHUNK, settings.region_chunks * CHUNK
+    chunks = settings.edge_chunks, settings.region_chunks
     try:
         module = importlib.import_module(DEVICE_MODULE)
         why = module.missing()
         if not why:
-            return module.EdgeRegionDevice(projector.program, projector.camera_table, samples)
+            return module.WeighingDevice(
+                projector.program, projector.camera_table, chunks, areas, settings.occlusion_aware
+            )
     except StudioError:
         raise
     except Exception as error:
@@ -294,7 +324,7 @@ def without_device(settings: EdgeRegionSettings, error: StudioError) -> tuple[st
     """A note that says why the processor evaluates. Raises the error where the settings ask for the card."""
     if settings.device == GPU:
         raise error
-    return (f"The processor evaluates edges and region. {error.message}",)
+    return (f"The processor weighs the poses. {error.message}",)
 
 
 def in_a_line(error: Exception) -> str:

@@ -6,6 +6,8 @@ interval, found by clipping the edge against four half-planes. Limbs are ordered
 middles. Sixteen poses at a time, like the outlines; pairs of limbs that lie apart in all of them are left out.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -48,8 +50,8 @@ def hidden_interval(side, near):
 @njit(**FAST_INLINED)
 def sample_bits(interval, samples):
     """Bits of the samples at (j + 1/2) / samples that lie in an interval."""
-    first = np.int64(np.ceil(max(interval[0], ZERO) * samples - HALF))
-    last = np.int64(np.floor(min(interval[1], ONE) * samples - HALF))
+    first = np.int64(math.ceil(max(interval[0], ZERO) * samples - HALF))
+    last = np.int64(math.floor(max(min(interval[1], ONE), -ONE) * samples - HALF))
     count = np.uint64(max(last - first + 1, 0))
     ones = ~np.uint64(0) if count > np.uint64(63) else (np.uint64(1) << count) - np.uint64(1)
     return ones << np.uint64(min(first, 63))

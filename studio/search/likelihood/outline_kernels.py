@@ -257,15 +257,22 @@ def sideways(x, y, scale_x, scale_y):
 
 
 @njit(**FAST_INLINED)
-def outline_of(frame, shape, view):
-    """The ten numbers of a limb's outline in one view, from its frame (rows of (3, 4)) and its five measures."""
+def limb_axes(frame, shape, view):
+    """Where a limb starts, its whole axis and the unit vector across it as the camera sees it, in the camera's axes."""
     x0, x1, x2, x3, y0, y1, y2, y3, z0, z1, z2, z3 = frame
-    length, r0, r1, scale_x, scale_y = shape
+    length, _, _, scale_x, scale_y = shape
     dx, dy, dz = view.eye[0] - x3, view.eye[1] - y3, view.eye[2] - z3
     ux, uy = sideways(x0 * dx + y0 * dy + z0 * dz, x1 * dx + y1 * dy + z1 * dz, scale_x, scale_y)
     across = turned(view.rotation, x0 * ux + x1 * uy, y0 * ux + y1 * uy, z0 * ux + z1 * uy)
     axis = turned(view.rotation, x2 * length, y2 * length, z2 * length)
-    start = turned(view.rotation, -dx, -dy, -dz)
+    return turned(view.rotation, -dx, -dy, -dz), axis, across
+
+
+@njit(**FAST_INLINED)
+def outline_of(frame, shape, view):
+    """The ten numbers of a limb's outline in one view, from its frame (rows of (3, 4)) and its five measures."""
+    start, axis, across = limb_axes(frame, shape, view)
+    r0, r1 = shape[1], shape[2]
     ax, ay, a_state = projected(view, start, axis, across, ZERO, -r0)
     bx, by, b_state = projected(view, start, axis, across, ONE, -r1)
     cx, cy, c_state = projected(view, start, axis, across, ONE, r1)

@@ -48,14 +48,19 @@ class OutlineProjector:
         """Number of drawn limbs."""
         return len(self.program.limb_frame)
 
-    def checked(self, poses: Array) -> Array:
-        """Poses (N, D) in a row. Raises BodyError where they are not (N, D) with enough parameters, or not finite."""
+    def shaped(self, poses: Array) -> Array:
+        """Poses (N, D) in a row. Raises BodyError where they are not (N, D) with enough parameters."""
         poses = np.ascontiguousarray(poses, dtype=np.float64)
         if poses.ndim != 2 or poses.shape[1] < self.program.dimension:
             need = f"(N, {self.program.dimension})"
             raise BodyError(
                 f"Poses of shape {poses.shape} do not fit the body.", f"Give an array of shape {need}."
             )
+        return poses
+
+    def checked(self, poses: Array) -> Array:
+        """As `shaped`; raises BodyError also where a number is not finite."""
+        poses = self.shaped(poses)
         if not np.isfinite(poses.sum()) and not np.isfinite(poses).all():
             row, column = np.argwhere(~np.isfinite(poses))[0]
             raise BodyError(

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,9 @@ from studio.foundations.geometry.camera import Camera
 from studio.search.likelihood.evidence_check import check_sizes
 from studio.search.likelihood.hard_priors import HardPriors
 from studio.search.likelihood.outlines import OutlineProjector
+
+if TYPE_CHECKING:
+    from studio.search.likelihood.device_weighing import ProblemOnDevice
 
 # Stages of a search: which part of the body a weighting uses.
 WHOLE_BODY, TRUNK_FIRST = 0, 1
@@ -113,6 +116,19 @@ class FittedToPoses(Protocol):
 
     def remembered(self, pose: Array) -> Mapping[str, Array]:
         """Memory for the next frame's `expecting`, named arrays, given this frame's pose (D,)."""
+        ...
+
+
+@runtime_checkable
+class WeighedOnDevice(Protocol):
+    """A frame whose poses a card may weigh, so that a search can keep its particles there."""
+
+    def on_device(self) -> "ProblemOnDevice | None":
+        """The frame's weighting there; None where the processor weighs."""
+        ...
+
+    def give_up_device(self, error: Exception) -> None:
+        """Leave the work to the processor from now on. Raises StudioError where the card was asked for."""
         ...
 
 

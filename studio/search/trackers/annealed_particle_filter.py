@@ -31,6 +31,7 @@ from studio.search.trackers.diffusion import (
 )
 from studio.search.trackers.guided_particles import STATES, foreseen, is_guided
 from studio.search.trackers.guided_start import arrived, descended, guided_set, settled_set
+from studio.search.trackers.layer_plan import LayerPlan, Noise
 from studio.search.trackers.layer_record import layer_record
 from studio.search.trackers.model_free import judged, share_in
 from studio.search.trackers.particle_kernels import Moments, moments
@@ -48,6 +49,7 @@ from studio.search.trackers.resampling import draw, equal_draw
 from studio.search.trackers.settings import PRESETS, VARIANTS, AnnealedSettings, layer_survivals
 from studio.search.trackers.tracker import (
     NO_PARENT,
+    Arrays,
     FilterState,
     FrameLikelihood,
     LayerRecord,
@@ -131,6 +133,16 @@ class AnnealedParticleFilter(ParticleFilter[AnnealedSettings]):
         )
         return unweighted(poses, descended(extra, first) if guided else extra), record
 
+    def plan_layer(
+        self, layer: int, space: SearchSpace, settings: AnnealedSettings, extra: Arrays
+    ) -> LayerPlan | None:
+        """The layer's α, children and noise; None where a behaviour model guides the particles."""
+        if STATES in extra or is_guided(space, settings.prediction):
+            return None
+        survival = layer_survivals(settings, layer + 1)[-1]
+        noise = _noise(layer, space, settings) if layer < settings.layers - 1 else None
+        return LayerPlan(survival, noise, crossed=settings.crossover)
+
     def expectations(self, particles: ParticleSet, space: SearchSpace, settings: AnnealedSettings) -> Array:
         """(S, D) poses that the first layer's set expects: one unless a behaviour model guides it (`foreseen`)."""
         return foreseen(particles, space)
@@ -167,10 +179,23 @@ def _spread(
     survivors: Array, own: Moments, layer: int, space: SearchSpace, settings: AnnealedSettings
 ) -> Spread:
     """Survivors (N, D), whose moments these are, plus B_m: planned (Eq. 13) or by their own covariance (Eq. 18)."""
-    if not settings.adaptive_diffusion:
-        survivals = layer_survivals(settings, layer + 2)
-        sigma = planned_sigma(space.sigma * settings.diffusion_scale, survivals, settings.diffusion_decay)
-        return noise_about(survivors, sigma)
+    noise = _noise(layer, space, settings)
+    if noise.sigma is not None:
+        return noise_about(survivors, noise.sigma)
     if settings.diffusion_form == "shrink":
         return shrunk_noise(survivors, own, settings.diffusion_fraction, settings.diffusion_covariance)
     return proportional_noise(survivors, own, settings.diffusion_constant, settings.diffusion_covariance)
+
+
+def _noise(layer: int, space: SearchSpace, settings: AnnealedSettings) -> Noise:
+    """B_m in numbers."""
+    if not settings.adaptive_diffusion:
+        survivals = layer_survivals(settings, layer + 2)
+        return Noise(
+            planned_sigma(space.sigma * settings.diffusion_scale, survivals, settings.diffusion_decay)
+        )
+    correlated = settings.diffusion_covariance == "full"
+    if settings.diffusion_form == "shrink":
+        fraction = settings.diffusion_fraction
+        return Noise(None, fraction, float(np.sqrt(1.0 - fraction * fraction)), correlated)
+    return Noise(None, float(np.sqrt(settings.diffusion_constant)), 1.0, correlated)

@@ -15,11 +15,12 @@ import numpy as np
 
 from studio.foundations.arrays import Array
 from studio.search.trackers.annealing import Annealed, anneal, at_exponent
+from studio.search.trackers.layer_plan import LayerPlan
 from studio.search.trackers.one_layer_filter import OneLayerFilter
 from studio.search.trackers.particles import expected, first_set, uniform_poses, unweighted
 from studio.search.trackers.resampling import draw
 from studio.search.trackers.settings import CondensationSettings
-from studio.search.trackers.tracker import Arrays, FilterState, ParticleSet, SearchSpace
+from studio.search.trackers.tracker import Arrays, FilterState, LayerRecord, ParticleSet, SearchSpace
 
 SCALES = "log_scales"
 
@@ -47,6 +48,22 @@ class Condensation(OneLayerFilter[CondensationSettings]):
         predicted = expected(last.poses[drawn], previous, settings.dynamics)
         first = first_set(rng, predicted, space, settings)
         return ParticleSet(first.poses, first.log_weights, extra=last.extra | first.extra)
+
+    def plan_layer(
+        self, layer: int, space: SearchSpace, settings: CondensationSettings, extra: Arrays
+    ) -> LayerPlan | None:
+        """The likelihood's scale, or the share that is to survive while it is chosen."""
+        scales = extra.get(SCALES, np.zeros(0))
+        if len(scales) >= settings.scale_frames:
+            return LayerPlan(math.nan, None, beta=float(np.exp(np.mean(scales))))
+        return LayerPlan(settings.scale_survival, None)
+
+    def kept_of_layer(self, extra: Arrays, record: LayerRecord, settings: CondensationSettings) -> Arrays:
+        """With the scale that the layer chose."""
+        scales = extra.get(SCALES, np.zeros(0))
+        if len(scales) >= settings.scale_frames:
+            return extra
+        return extra | {SCALES: np.append(scales, np.log(record.beta))}
 
     def selected(
         self, log_weights: Array, extra: Arrays, settings: CondensationSettings

@@ -7,16 +7,17 @@ settings, wherever it was interrupted.
 """
 
 import dataclasses
+import importlib
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from studio.foundations.errors import RunError
+from studio.foundations.errors import RunError, StudioError
 from studio.foundations.knobs import knobs_of
-from studio.search.likelihood.problem import FittedToPoses
+from studio.search.likelihood.problem import FittedToPoses, WeighedOnDevice
 from studio.search.trackers.particles import WeightError
 from studio.search.trackers.tracker import (
     HIDDEN,
@@ -32,6 +33,16 @@ from studio.search.trackers.tracker import (
     generator,
     keyed_generator,
 )
+
+DEVICE_MODULE = "studio.search.trackers.device_search"
+DEVICE_PARAMETERS = 128
+"""Most of a body whose particles a card keeps."""
+BEGINNINGS = 1 << 31
+"""Numbers of layers from here on are those of the sets that a frame's searches begin with."""
+SEEDS = (1 << 64) - 1
+
+if TYPE_CHECKING:
+    from studio.search.trackers.device_search import DeviceSearch
 
 # The current version of the settings and the tracker's own settings.
 SettingsSource = Callable[[], tuple[int, Any]]
@@ -80,8 +91,16 @@ class FrameSearch:
     ) -> None:
         self.tracker, self.previous, self.space = tracker, previous, space
         self.seed, self.frame, self.repeats = seed, frame, repeats
-        self.state = state or SearchState()
+        self._state = state or SearchState()
+        self._on_device: DeviceSearch | None = None
         self._prepared: tuple[FrameLikelihood, int, FrameLikelihood] | None = None
+
+    @property
+    def state(self) -> SearchState:
+        """All that is needed to go on elsewhere; particles that are on a card are copied now."""
+        if self._on_device is not None and self._state.particles is None:
+            self._state = dataclasses.replace(self._state, particles=self._on_device.particles())
+        return self._state
 
     @property
     def problem(self) -> FrameLikelihood | None:
@@ -91,12 +110,12 @@ class FrameSearch:
     @property
     def layer_count(self) -> int:
         """Layers of one of its searches; 0 before the first layer."""
-        return self.state.layer_count
+        return self._state.layer_count
 
     @property
     def finished(self) -> bool:
         """Whether all layers of all repeats are done."""
-        state = self.state
+        state = self._state
         return state.layer_count > 0 and state.layers_done == self.repeats * state.layer_count
 
     def step(self, problem: FrameLikelihood, version: int, settings: Any) -> LayerRecord:  # noqa: ANN401
@@ -107,37 +126,30 @@ class FrameSearch:
         if self.finished:
             raise RunError(f"Frame {self.frame} has no layer left.", "Continue with the next frame.")
         began = time.perf_counter()
-        state = self.state
+        state = self._state
         held = state.settings if state.layers_done else settings
         in_use = held_over(settings, held)
         count = self.tracker.layer_count(in_use)
         repeat, layer = divmod(state.layers_done, count)
-        particles, expected = state.particles, state.expected
-        if layer == 0:
-            particles = self._beginning(repeat, in_use)
-            expected = self._expected(particles, in_use)
-        assert particles is not None
-        informed = problem if expected is None else self._with_expectations(problem, repeat, expected)
-        rng = generator(self.seed, self.frame, state.layers_done)
-        try:
-            following, record = self.tracker.step_layer(rng, particles, layer, informed, self.space, in_use)
-        except WeightError as error:
-            raise WeightError(
-                f"Frame {self.frame}, layer {state.layers_done + 1}: {error.message}", error.hint
-            ) from None
+        record = self._step_on_device(problem, repeat, layer, in_use)
+        particles, expected = None, state.expected
+        evaluations = self.tracker.evaluations(in_use) // count
+        memory: Mapping[str, Array] = self.previous.memory
+        if record is None:
+            particles, expected, record, memory = self._step_here(problem, repeat, layer, in_use)
+            evaluations = len(record.poses)
         is_last = state.layers_done + 1 == self.repeats * count
-        memory: Mapping[str, Array] = self._remembered(informed, following, in_use) if is_last else {}
         milliseconds = 1000.0 * (time.perf_counter() - began)
-        self.state = SearchState(
+        self._state = SearchState(
             layers_done=state.layers_done + 1,
             layer_count=count,
-            particles=following,
+            particles=particles,
             settings=held,
             settings_version=version,
-            evaluations=state.evaluations + len(record.poses),
+            evaluations=state.evaluations + evaluations,
             milliseconds=state.milliseconds + milliseconds,
             expected=expected,
-            memory=memory,
+            memory=memory if is_last else {},
         )
         return dataclasses.replace(
             record,
@@ -166,6 +178,96 @@ class FrameSearch:
             milliseconds=state.milliseconds,
             carried=FilterState(state.particles, estimate.pose, self.previous.estimate, state.memory),
         )
+
+    def _step_here(
+        self,
+        problem: FrameLikelihood,
+        repeat: int,
+        layer: int,
+        settings: Any,  # noqa: ANN401
+    ) -> tuple[ParticleSet, Array | None, LayerRecord, Mapping[str, Array]]:
+        """A layer by the processor: the set that follows, the poses that the search expected, the record, and the
+        memory for the next frame where this is the last layer.
+        """
+        state = self.state
+        particles, expected = state.particles, state.expected
+        if layer == 0:
+            particles = self._beginning(repeat, settings)
+            expected = self._expected(particles, settings)
+        assert particles is not None
+        informed = problem if expected is None else self._with_expectations(problem, repeat, expected)
+        rng = generator(self.seed, self.frame, state.layers_done)
+        try:
+            following, record = self.tracker.step_layer(rng, particles, layer, informed, self.space, settings)
+        except WeightError as error:
+            raise WeightError(
+                f"Frame {self.frame}, layer {state.layers_done + 1}: {error.message}", error.hint
+            ) from None
+        is_last = state.layers_done + 1 == self.repeats * self.tracker.layer_count(settings)
+        return (
+            following,
+            expected,
+            record,
+            self._remembered(informed, following, settings) if is_last else {},
+        )
+
+    def _step_on_device(
+        self,
+        problem: FrameLikelihood,
+        repeat: int,
+        layer: int,
+        settings: Any,  # noqa: ANN401
+    ) -> LayerRecord | None:
+        """A layer by a card, on which the particles stay; None where the processor is to do it.
+
+        Raises StudioError where a card that was asked for fails.
+        """
+        state = self._state
+        there = problem.on_device() if isinstance(problem, WeighedOnDevice) else None
+        if there is None or not self._fits_device(layer, settings):
+            # The processor goes on from what the card has done.
+            self._state, self._on_device = self.state, None
+            return None
+        try:
+            if self._on_device is None or layer == 0:
+                start = self.previous if repeat == 0 else FilterState(self.state.particles)
+                module = importlib.import_module(DEVICE_MODULE)
+                self._on_device = module.DeviceSearch(self.tracker, there, self.space, settings)
+                if layer > 0:
+                    self._on_device.take(state.particles)
+                elif start.particles is None:
+                    self._on_device.take(self._beginning(repeat, settings))
+                else:
+                    self._on_device.begin(start, self._key(BEGINNINGS + repeat), settings)
+            record = self._on_device.step(layer, self._key(state.layers_done), settings)
+        except StudioError:
+            raise
+        except Exception as error:
+            assert isinstance(problem, WeighedOnDevice)
+            problem.give_up_device(error)
+            if layer > 0 and state.particles is None:
+                raise RunError(
+                    f"The card failed in layer {layer + 1} of frame {self.frame}: {error}.",
+                    "Track the frame again; the processor searches it.",
+                ) from None
+            self._on_device = None
+            return None
+        self._prepared = problem, repeat, problem
+        return record
+
+    def _fits_device(self, layer: int, settings: Any) -> bool:  # noqa: ANN401
+        """Whether a card can do a layer: the tracker has a plan for it, and no pose has to be drawn again."""
+        if settings.limbs_apart or settings.constraints not in ("clamp", "ignore"):
+            return False
+        extra = self._state.particles.extra if self._state.particles is not None else {}
+        return (
+            len(self.space.names) <= DEVICE_PARAMETERS
+            and self.tracker.plan_layer(layer, self.space, settings, extra) is not None
+        )
+
+    def _key(self, number: int) -> tuple[int, int, int]:
+        """What a card's random numbers are counted from."""
+        return self.seed & SEEDS, self.frame, number
 
     def _beginning(self, repeat: int, settings: Any) -> ParticleSet:  # noqa: ANN401
         """The unweighted set of a search's first layer."""

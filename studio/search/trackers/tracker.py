@@ -18,6 +18,7 @@ from studio.foundations.arrays import Array, Indices
 from studio.foundations.knobs import Value
 from studio.search.behaviour.model import BehaviourModel
 from studio.search.likelihood.problem import FrameLikelihood
+from studio.search.trackers.layer_plan import LayerPlan
 
 Arrays = dict[str, NDArray[Any]]
 """What a tracker keeps of each particle, by name."""
@@ -354,6 +355,17 @@ class Tracker(ABC, Generic[S]):
         space : limits, σ0 and structure of the pose vector (mm, radians).
         settings : of the layer; a slider may have moved since the last one.
         """
+
+    def plan_layer(self, layer: int, space: SearchSpace, settings: S, extra: Arrays) -> LayerPlan | None:
+        """What `step_layer` does in numbers, so that a card can do it; None where no plan says it.
+
+        extra : the set's arrays.
+        """
+        return None
+
+    def kept_of_layer(self, extra: Arrays, record: LayerRecord, settings: S) -> Arrays:
+        """The set's arrays after a layer that a card did."""
+        return extra
 
     @abstractmethod
     def end_frame(self, particles: ParticleSet, space: SearchSpace, settings: S) -> Estimate:

@@ -1,0 +1,380 @@
+"""Filters whose particles stay on a CUDA device: weights, survivors, children and noise are found there.
+
+`DeviceFilter` searches R runs side by side that have one body, one space and as many particles each; their seeds,
+frames, knobs and pictures may differ. The host says what a layer is to do and, where somebody looks, reads its record:
+moments of the whole set, and all particles or every k-th of many. A run's numbers depend on its own seed, frame and
+layer alone (`counted_numbers`), so beside others it is searched as alone.
+
+Not here: behaviour models, redrawn or rejected poses and limbs kept apart, which the processor's search has.
+"""
+
+import functools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.foundations.arrays import Array
+from studio.foundations.numba_on_devices import cuda, record_launches
+from studio.search.likelihood.device_weighing import (
+    ProblemOnDevice,
+    WeighingDevice,
+)
+from studio.search.trackers import device_kernels
+from studio.search.trackers.device_kernels import (
+    ANNEALED,
+    BETA,
+    CORRELATED,
+    CROSSED,
+    DIFFUSED,
+    KEPT,
+    KNOWN,
+    LOG_WEIGHT,
+    MOMENTS,
+    MOST,
+    OF_SAMPLE,
+    SCALE,
+    SIGMA,
+    SUMMING,
+    SURVIVAL,
+    SURVIVING,
+    WANTED,
+    WEIGHED,
+    WEIGHTED,
+)
+from studio.search.trackers.layer_plan import LayerPlan, Noise
+from studio.search.trackers.particle_kernels import places
+from studio.search.trackers.tracker import (
+    AnyTracker,
+    Arrays,
+    FilterState,
+    LayerRecord,
+    ParticleSet,
+    SearchSpace,
+)
+
+THREADS = 128
+RECORDED = 4096
+"""Particles of a layer's record at most."""
+CARRIED = {"weighted": 0, "resampled": 1, "mode": 2}
+
+
+@functools.cache
+def kernel(name: str) -> Any:  # noqa: ANN401 - Numba's
+    """A kernel of `device_kernels`, compiled by its first launch in a process."""
+    return cuda.jit(getattr(device_kernels, name))
+
+
+class Moment(NamedTuple):
+    """Which random numbers a run's layer uses."""
+
+    seed: int
+    frame: int
+    layer: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DeviceSet:
+    """Particles of R runs there: poses (D, R N), of `count` = N a run. cumulated : weights (R N,).
+    weights : (2, R N) fitness and log-weights; None: not weighed. annealed : (R, 5).
+    """
+
+    poses: Any
+    count: int
+    cumulated: Any = None
+    weights: Any = None
+    annealed: Any = None
+
+
+class DeviceFilter:
+    """R runs of one body, side by side. A weighed set that it returns is valid until the next is weighed, another until
+    the next but one is made.
+    """
+
+    def __init__(
+        self,
+        device: WeighingDevice,
+        space: SearchSpace,
+        runs: int = 1,
+        by_limbs: bool = True,
+        clamped: bool = True,
+    ) -> None:
+        """by_limbs : whether children take whole limbs. clamped : whether poses are set on the limits."""
+        self.device, self.space, self.runs = device, space, runs
+        self._arrays = device.lend_arrays(self)
+        self._stream = self._arrays.setdefault("stream", None) or cuda.stream()
+        self._arrays["stream"] = self._stream
+        size = len(space.names)
+        limits = np.array([[-np.inf], [np.inf]]).repeat(size, axis=1)
+        if clamped:
+            limits = np.stack([inwards(space.lower, np.inf), inwards(space.upper, -np.inf)])
+        self._limits = self._copied("limits", limits)
+        self._place = self._copied("place", places(space.limb) if by_limbs else np.arange(1, size + 1))
+        self._root = self._memory("root", (runs, size, size), np.float64)
+        self._moments = self._memory("moments", (MOMENTS, runs, size), np.float64)
+        self._turn = 0
+
+    def take(self, sets: Sequence[ParticleSet]) -> DeviceSet:
+        """Sets of the host, one a run and of as many particles each, there. Raises BodyError where a pose is not
+        finite.
+        """
+        poses = sets[0].poses if len(sets) == 1 else np.concatenate([one.poses for one in sets])
+        cumulated = np.concatenate([np.cumsum(np.exp(one.log_weights)) for one in sets])
+        there = self._memory("last poses", poses.shape[::-1], np.float32)
+        self.device.bring(np.ascontiguousarray(poses, np.float64), there)
+        return DeviceSet(there, len(sets[0].poses), self._copied("last weights", cumulated))
+
+    def begin(
+        self,
+        last: DeviceSet,
+        moments: Sequence[Moment],
+        count: int,
+        sigma: Array,
+        carry: str = "weighted",
+        systematic: bool = True,
+        shift: Array | None = None,
+    ) -> DeviceSet:
+        """The set of `count` particles a run that a frame's first layer weighs: the last frame's, moved by shift (R, D)
+        and spread by sigma (D,) (Eq. 9, 10). carry : how the last frame's are taken.
+        """
+        size, whole = len(self.space.names), self.runs * count
+        keys, dials = self._uploaded(moments, [LayerPlan(1.0, Noise(sigma))] * self.runs)
+        moved = self._copied("shift", np.zeros((self.runs, size)) if shift is None else shift)
+        carried = self._memory("carried", (size, whole), np.float32)
+        poses = self._next_poses(count)
+        grid = -(-whole // THREADS), THREADS, self._stream
+        kernel("carry_over")[grid](
+            last.poses, last.count, last.cumulated, keys, CARRIED[carry], systematic, moved, count, carried
+        )
+        kernel("spread")[grid](carried, self._moments, self._root, dials, keys, self._limits, count, poses)
+        return DeviceSet(poses, count)
+
+    def step(
+        self,
+        given: DeviceSet,
+        problem: ProblemOnDevice,
+        moments: Sequence[Moment],
+        plans: Sequence[LayerPlan],
+        systematic: bool = True,
+    ) -> tuple[DeviceSet, DeviceSet]:
+        """Weigh a set and make the next one: the set with its weights, and what follows from it (the same where the
+        plans have no noise). The problem's pictures are those of all runs, or one frame for each.
+        """
+        size, count, noise = len(self.space.names), given.count, plans[0].noise
+        whole = self.runs * count
+        keys, dials = self._uploaded(moments, plans)
+        weights = self._memory("weights", (2, whole), np.float64)
+        annealed = self._memory("annealed", (self.runs, ANNEALED), np.float64)
+        cumulated = self._memory("cumulated", (whole,), np.float64)
+        survivors = self._memory("survivors", (size, whole), np.float32)
+        parents = self._memory("parents", (2, whole), np.int32)
+        every = count if len(problem.frame.observed) > 1 else whole
+        edges = self.device.edges_of(None)
+        poses = given.poses if noise is None else self._next_poses(count)
+        grid = -(-whole // THREADS), THREADS, self._stream
+        blocks = (size, self.runs), SUMMING, self._stream
+        found = self._moments
+
+        def launch() -> None:
+            self.device.weigh(given.poses, problem, edges, every, weights, self._stream, self._memory)
+            kernel("anneal_weights")[self.runs, SUMMING, self._stream](
+                weights, count, dials, annealed, cumulated
+            )
+            kernel("find_moments")[blocks](given.poses, count, WEIGHED, found)
+            kernel("find_weighted_moments")[blocks](given.poses, cumulated, count, found)
+            if noise is None:
+                return
+            kernel("draw_survivors")[grid](
+                given.poses, cumulated, keys, count, systematic, dials, self._place, survivors, parents
+            )
+            kernel("find_moments")[blocks](survivors, count, SURVIVING, found)
+            if noise.correlated:
+                pairs = (size, size, self.runs), SUMMING, self._stream
+                kernel("find_correlations")[pairs](survivors, count, found, self._root)
+                kernel("find_root")[-(-self.runs // 32), 32, self._stream](self._root)
+            kernel("spread")[grid](survivors, found, self._root, dials, keys, self._limits, count, poses)
+            kernel("find_moments")[blocks](poses, count, DIFFUSED, found)
+
+        correlated = noise is not None and noise.correlated
+        place = id(given.poses), id(poses), problem.frame.memory, every
+        self._launch((*place, problem.factors, problem.frame.scale, count, correlated, systematic), launch)
+        weighed = DeviceSet(given.poses, count, cumulated, weights, annealed)
+        return weighed, weighed if noise is None else DeviceSet(poses, count)
+
+    def _launch(self, key: tuple[object, ...], launch: Callable[[], None]) -> None:
+        """Launches one by one at their first time, recorded and made at once from the second on."""
+        key = "recorded", *key
+        again = self._arrays.get(key, False)
+        if again is False:
+            launch()
+            self._arrays[key] = None
+            return
+        if again is None:
+            again = self._arrays[key] = record_launches(launch, self._stream) or launch
+        again()
+
+    def record(self, weighed: DeviceSet, plan: LayerPlan, layer: int, run: int = 0) -> LayerRecord:
+        """The record of a run's layer, which `step` has just done with what was measured."""
+        count, is_last = weighed.count, plan.noise is None
+        step = -(-count // RECORDED)
+        poses, values, best = self._rows(weighed, run, step)
+        annealed = self._fetched(weighed.annealed)[run]
+        found = self._fetched(self._moments)[:, run]
+        parents = np.zeros((2, 0), dtype=np.int64)
+        if not is_last:
+            everyones = self._fetched(self._memory("parents", (2, self.runs * count), np.int32))
+            parents = everyones[:, run * count : (run + 1) * count].astype(np.int64)
+        kept = found[WEIGHTED + 1]
+        return LayerRecord(
+            layer=layer,
+            beta=float(annealed[BETA]),
+            alpha_wanted=plan.survival,
+            alpha_reached=float(annealed[SURVIVAL]),
+            variance_weighed=found[WEIGHED + 1],
+            variance_resampled=kept if is_last else found[SURVIVING + 1],
+            variance_diffused=kept if is_last else found[DIFFUSED + 1],
+            best=best,
+            best_log_weight=float(annealed[MOST]),
+            mean=found[WEIGHTED],
+            poses=poses,
+            log_weights=values[LOG_WEIGHT],
+            parents=parents,
+            rows=np.arange(0, count, step) if step > 1 else np.zeros(0, dtype=np.int64),
+        )
+
+    def give(self, there: DeviceSet, run: int = 0) -> ParticleSet:
+        """A run's particles on the host, with their weights where they have been weighed."""
+        if there.weights is None:
+            first = run * there.count
+            poses = self._fetched(there.poses)[:, first : first + there.count]
+            return ParticleSet(
+                np.ascontiguousarray(poses.T, np.float64), np.full(there.count, -math.log(there.count))
+            )
+        poses, values, _ = self._rows(there, run, 1)
+        beta, _, most, total, _ = self._fetched(there.annealed)[run]
+        raw = values[LOG_WEIGHT]
+        return ParticleSet(poses, -beta * (most - raw) - math.log(total), raw)
+
+    def means(self) -> Array:
+        """(R, D) weighted means (Eq. 8) of the layer last done, where it was measured."""
+        return self._fetched(self._moments)[WEIGHTED]
+
+    def _fetched(self, there: Any) -> NDArray[Any]:  # noqa: ANN401
+        """An array on the host, when all that was launched is done."""
+        found = there.copy_to_host(stream=self._stream)
+        self._stream.synchronize()
+        return found
+
+    def _rows(self, weighed: DeviceSet, run: int, step: int) -> tuple[Array, Array, Array]:
+        """Every step-th particle (K, D), what these weigh (2, K), and the heaviest (D,)."""
+        count = -(-weighed.count // step)
+        poses = self._memory("rows", (count + 1, len(self.space.names)), np.float64)
+        values = self._memory("values", (2, count + 1), np.float64)
+        kernel("take_rows")[-(-(count + 1) // THREADS), THREADS, self._stream](
+            weighed.poses, weighed.weights, weighed.annealed, run, weighed.count, step, poses, values
+        )
+        found = self._fetched(poses)
+        return found[:-1], np.ascontiguousarray(self._fetched(values)[:, :-1]), found[-1]
+
+    def _uploaded(self, moments: Sequence[Moment], plans: Sequence[LayerPlan]) -> tuple[Any, Any]:
+        size = len(self.space.names)
+        keys = np.array([tuple(moment) for moment in moments], dtype=np.uint64)
+        rows = np.zeros((self.runs, SIGMA + size))
+        for row, one in zip(rows, plans, strict=True):
+            row[WANTED], row[KNOWN], row[CROSSED] = one.survival, one.beta, one.crossed
+            if one.noise is not None:
+                own = one.noise.sigma is None
+                row[KEPT], row[SCALE] = one.noise.kept, one.noise.scale
+                row[OF_SAMPLE], row[CORRELATED] = own, one.noise.correlated
+                row[SIGMA:] = 0.0 if one.noise.sigma is None else one.noise.sigma
+        return self._copied("keys", keys), self._copied("dials", rows)
+
+    def _copied(self, name: str, values: NDArray[Any]) -> Any:  # noqa: ANN401
+        there = self._memory(name, values.shape, values.dtype.type)
+        there.copy_to_device(values, stream=self._stream)
+        return there
+
+    def _memory(self, name: str, shape: tuple[int, ...], kind: type[np.generic]) -> Any:  # noqa: ANN401
+        key = name, shape, kind
+        if key not in self._arrays:
+            self._arrays[key] = cuda.device_array(shape, kind)
+        return self._arrays[key]
+
+    def _next_poses(self, count: int) -> Any:  # noqa: ANN401
+        """Where the next set goes: never where the last one is."""
+        self._turn = 1 - self._turn
+        return self._memory(f"poses {self._turn}", (len(self.space.names), self.runs * count), np.float32)
+
+
+def inwards(limits: Array, towards: float) -> Array:
+    """Limits (D,) as single precision has them, none of them wider."""
+    rounded = limits.astype(np.float32)
+    wider = rounded < limits if towards > 0 else rounded > limits
+    return np.where(wider, np.nextafter(rounded, np.float32(towards)), rounded).astype(np.float64)
+
+
+class DeviceSearch:
+    """One frame's search on a device, a layer at a time, for `frame_loop`."""
+
+    def __init__(
+        self,
+        tracker: AnyTracker,
+        problem: ProblemOnDevice,
+        space: SearchSpace,
+        settings: Any,  # noqa: ANN401
+    ) -> None:
+        """settings : those that the frame begins with."""
+        self._tracker, self._space = tracker, space
+        self._problem = problem
+        by_limbs = getattr(settings, "crossover_by", "limbs") == "limbs"
+        self._filter = DeviceFilter(problem.device, space, 1, by_limbs, settings.constraints == "clamp")
+        self._set: DeviceSet | None = None
+        self._extra: Arrays = {}
+
+    def begin(self, previous: FilterState, key: tuple[int, int, int], settings: Any) -> None:  # noqa: ANN401
+        """Make the first layer's set from what the last frame left. key : seed, frame, and a number below those of
+        layers, one for each search of the frame.
+        """
+        last = previous.particles
+        assert last is not None
+        self._extra = last.extra
+        start = previous.estimate if settings.dynamics != "none" else None
+        shift = (
+            None
+            if start is None or previous.previous_estimate is None
+            else (start - previous.previous_estimate)[None]
+        )
+        self._set = self._filter.begin(
+            self._filter.take([last]),
+            [Moment(*key)],
+            settings.particles,
+            self._space.sigma * settings.diffusion_scale,
+            getattr(settings, "carry", "resampled"),
+            settings.resampling == "systematic",
+            shift,
+        )
+
+    def take(self, particles: ParticleSet) -> None:
+        """Go on from a set of the host."""
+        self._set, self._extra = self._filter.take([particles]), particles.extra
+
+    def step(self, layer: int, key: tuple[int, int, int], settings: Any) -> LayerRecord:  # noqa: ANN401
+        """Do a layer and return its record. key : seed, frame and layer."""
+        assert self._set is not None
+        plan = self._tracker.plan_layer(layer, self._space, settings, self._extra)
+        assert plan is not None
+        weighed, self._set = self._filter.step(
+            self._set, self._problem, [Moment(*key)], [plan], settings.resampling == "systematic"
+        )
+        record = self._filter.record(weighed, plan, layer)
+        self._extra = self._tracker.kept_of_layer(self._extra, record, settings)
+        return record
+
+    def particles(self) -> ParticleSet:
+        """The set that the next layer weighs, or the last layer's with its weights, on the host."""
+        assert self._set is not None
+        there = self._filter.give(self._set)
+        return ParticleSet(there.poses, there.log_weights, there.raw_log_weights, self._extra)
