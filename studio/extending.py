@@ -53,5 +53,4 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    """The names."""
     return sorted(_MODULE_OF)

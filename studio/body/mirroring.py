@@ -28,7 +28,6 @@ LEVEL = 0.3
 
 
 def has_sides(body: BodyModel) -> bool:
-    """Whether a body has a left and a right."""
     try:
         Mirror(body)
     except BodyError:

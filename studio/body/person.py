@@ -68,7 +68,6 @@ class PersonMotion:
 
     @property
     def frame_count(self) -> int:
-        """Number of frames."""
         return len(self.root)
 
 

@@ -50,7 +50,6 @@ def why_command(call: Call) -> dict[str, object]:
 
 
 def _set(settings: Mapping[str, object]) -> str:
-    """Settings as options of a command."""
     pairs = [f"--set {name}={value}" for name, value in settings.items()]
     return f" ({' '.join(pairs)})" if pairs else ""
 

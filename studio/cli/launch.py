@@ -253,7 +253,6 @@ class _EndingServer(uvicorn.Server):
     """
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """Begin to end."""
         if not self.should_exit:
             timer = threading.Timer(SECONDS_TO_END, _end_now, (sig,))
             timer.daemon = True

@@ -73,7 +73,6 @@ NO_MEMORY = re.compile(r"failed to map segment|cannot allocate memory", re.IGNOR
 
 
 def load(name: str) -> click.Command:
-    """A command, imported."""
     module, _ = COMMANDS[name]
     # What is imported stays: to look for garbage in it meanwhile is a sixth of the time.
     gc.disable()

@@ -47,7 +47,6 @@ class MemberChoice(click.Choice):  # pyright: ignore[reportMissingTypeArgument] 
         self._registry = registry
 
     def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """The name itself."""
         try:
             self._registry[value]
         except StudioError as problem:

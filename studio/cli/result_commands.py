@@ -43,7 +43,6 @@ def smooth_command(call: Call) -> dict[str, object]:
 
 
 def _describe_track(call: Call, made: MadeTrack, more: dict[str, object], words: str) -> dict[str, object]:
-    """A track that was made."""
     run = call.given["run"]
     source = made.track.made_by["from"]
     return {

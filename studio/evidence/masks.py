@@ -74,7 +74,6 @@ class PackedMask:
 
     @property
     def nbytes(self) -> int:
-        """Bytes held."""
         return self._bits.nbytes
 
     def unpacked(self) -> Bytes:

@@ -72,7 +72,6 @@ class EvidenceMaker:
         return FrameEvidence(frame, tuple(views))
 
     def view(self, camera: str, frame: int) -> ViewEvidence:
-        """One camera's evidence."""
         with span("decode", frame):
             picture = self.footage.picture(camera, frame)
         if self.hull_of_pixels:

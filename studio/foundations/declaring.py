@@ -187,7 +187,6 @@ class Operation:
 
     @property
     def name(self) -> str:
-        """As Python calls it."""
         return self.function.__name__
 
     @cached_property

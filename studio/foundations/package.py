@@ -9,7 +9,6 @@ INSTALLED_ASSETS = PurePosixPath("app/assets")
 
 
 def software_version() -> str:
-    """The studio's version."""
     try:
         return metadata.version(DISTRIBUTION)
     except metadata.PackageNotFoundError:
@@ -17,7 +16,6 @@ def software_version() -> str:
 
 
 def package_folder() -> Path:
-    """The folder of the package `studio`."""
     return Path(__file__).resolve().parents[1]
 
 

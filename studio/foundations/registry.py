@@ -18,8 +18,6 @@ from studio.foundations.errors import SettingsError, StudioError
 
 
 class Named(Protocol):
-    """What has a name."""
-
     @property
     def name(self) -> str:
         """Its key in the registry."""

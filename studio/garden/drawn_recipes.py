@@ -371,7 +371,6 @@ def _colour(rng: np.random.Generator, low: float, high: float, spread: float) ->
 
 
 def _with_motion(recipe: Recipe, stretch: Stretch, rng: np.random.Generator) -> Recipe:
-    """The recipe with its stretch of motion."""
     options: dict[str, Any] = {}
     for name, value in stretch.options.items():
         options[name] = round(float(rng.uniform(*value)), 3) if isinstance(value, tuple) else value

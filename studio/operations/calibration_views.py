@@ -142,7 +142,6 @@ def calibration_view(session: Session, notes: tuple[str, ...] = ()) -> Calibrati
 
 
 def proposal_view(proposal: Proposal) -> ProposalView:
-    """A proposal and what the checks say of it."""
     report = report_of(proposal.calibrated) if proposal.calibrated is not None else {}
     return extended(
         ProposalView,

@@ -78,7 +78,6 @@ def kept_comparisons(session: Session) -> tuple[KeptComparison, ...]:
 
 
 def comparison_count(session: Session) -> int:
-    """Number of a session's comparisons."""
     return len(_folders(session))
 
 

@@ -153,7 +153,6 @@ def course_view(workspace: Workspace, job: CourseState | None) -> CourseView:
 
 
 def finished(session: Session, run: CourseRun) -> bool:
-    """Whether a run of the course is complete."""
     known = {one.name: one for one in session.runs()}
     return run.name in known and known[run.name].summary(blobs=False).status == "finished"
 

@@ -431,7 +431,6 @@ def _until(recording: StreamRecording, seconds: float | None, report: Progress, 
 def _make_session(
     folder: Path, place: Path, calibration: Path, standing: RecordingStanding | None, progress: Reporting
 ) -> Recorded:
-    """The session made of a recording."""
     with reporting(progress, f"{place.name}: importing") as report:
         imported, spread = import_recording(
             folder, place, calibration, standing.notes if standing else (), report

@@ -242,7 +242,6 @@ def card_of(name: str) -> Card:
 
 
 def standing_of(card: Card, workspace: Workspace) -> CardStanding:
-    """A card as it stands in a workspace."""
     exists = (workspace.root / card.name / FILE_NAME).is_file()
     if card.kind == "recipe":
         return CardStanding(card, exists, missing_data(find_recipe(card.recipe or card.name)))

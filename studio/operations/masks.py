@@ -212,7 +212,6 @@ class MaskKnobs:
 
 
 def mask_knobs(session: Session) -> MaskKnobs:
-    """The session's own knobs of masks."""
     return MaskKnobs(read_evidence(session).knobs)
 
 

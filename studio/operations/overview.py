@@ -358,7 +358,6 @@ def run_log(run: StoredRun, last: int = 200) -> LogLines:
 
 
 def camera_view(camera: Camera, source: CameraSource) -> CameraView:
-    """A camera with the size of its footage."""
     return CameraView(
         name=camera.name,
         width=camera.width,
@@ -378,7 +377,6 @@ def camera_view(camera: Camera, source: CameraSource) -> CameraView:
 
 
 def body_view(body: BodyModel) -> BodyView:
-    """A body's tables."""
     return BodyView(
         name=body.name,
         title=body.title,

@@ -79,7 +79,6 @@ def _new_in(folder: Path, lines: list[str]) -> list[str]:
 
 @contextmanager
 def bar(console: Console, title: str) -> Generator[Progress]:
-    """A bar with the time that is left."""
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),

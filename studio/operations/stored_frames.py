@@ -389,7 +389,6 @@ def layer_summary(record: LayerRecord) -> dict[str, Any]:
 
 
 def frame_summary(result: FrameResult) -> dict[str, object]:
-    """What the timeline needs of a frame."""
     return {
         "frame": result.frame,
         "pose": result.estimate.pose,

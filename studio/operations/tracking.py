@@ -202,7 +202,6 @@ class LiveRequest:
     send: Annotated[SendTo, Web(left_out=True)] = ()
 
     def of_run(self) -> dict[str, Any]:
-        """What `prepare_run` takes of it."""
         return {name: getattr(self, name) for name in OF_RUN} | {"live": True}
 
 

@@ -75,7 +75,6 @@ def restore(workspace: Workspace, identifier: str) -> Restored:
 
 
 def trash_entry(place: Path) -> TrashEntry:
-    """An entry of the trash, by its own record."""
     try:
         if (place / FILE_NAME).is_file():
             return TrashEntry(place.name, read_manifest(place).name, "session")

@@ -127,7 +127,6 @@ class ViewComposer:
         return draw_view(view, marks, tuple(layers), colour_tokens(dark=True), scale=scale)
 
     def close(self) -> None:
-        """Release the footage."""
         with self._lock:
             self._footage.close()
 

@@ -81,7 +81,6 @@ class Repair:
 
 
 def verify(session: Session, progress: Progress = unheard) -> Verification:
-    """Read all that is stored."""
     runs = session.runs()
     faults: list[Fault] = []
     again: list[str] = []

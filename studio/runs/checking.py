@@ -317,7 +317,6 @@ def _path(run: StoredRun, track: str) -> Path:
 
 
 def _settings(run: StoredRun) -> RunSettings:
-    """The run's latest settings."""
     with run.results() as results:
         history = results.settings_history()
     values = history[-1].values if history else run.record.settings

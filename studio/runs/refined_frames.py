@@ -83,7 +83,6 @@ class MaskSettings:
             self._history = SettingsHistory(tuple(results.settings_history()))
 
     def of(self, frame: int) -> RunSettings:
-        """The settings in use in a frame."""
         entry = self._history.in_use(frame, 0)
         values = self._record.settings if entry is None else entry.values
         settings: RunSettings = settings_from_values(self._record.tracker, self._record.weighting, values)
@@ -125,7 +124,6 @@ class _Work:
         self._read = 0
 
     def close(self) -> None:
-        """Close footage and store."""
         self._problems.close()
         self._results.close()
 
@@ -136,11 +134,9 @@ class _Work:
         return RefinedFrames(self._poses, self._agreement, before, after)
 
     def leave(self) -> None:
-        """Leave a frame unchanged."""
         self._count_read()
 
     def refine_alone(self, row: int) -> None:
-        """Refine one frame alone."""
         frame, pose = int(self._track.frames[row]), self._track.poses[row]
         settings = self._settings.of(frame)
         evidence = self._problems.evidence(frame, settings)
@@ -153,7 +149,6 @@ class _Work:
         self._count_read()
 
     def refine_together(self, rows: NDArray[np.int64]) -> None:
-        """Refine consecutive frames together."""
         mover = MovementRefiner(self._refiner, self._record.fps, self._knobs.refinement_acceleration)
         seen: list[_SeenFrame] = []
         for first, after, kept in windows(len(rows)):

@@ -161,7 +161,6 @@ class RunWatch:
         )
 
     def stored(self, result: FrameResult) -> None:
-        """Add a stored result."""
         if self._known is not None and self._known[0] == result.frame:
             standing = self._known[1]
             self._update(
@@ -179,7 +178,6 @@ class RunWatch:
     # ------------------------------------------------------------------ the frames before
 
     def _standing(self, frame: int) -> Standing:
-        """The state before a frame."""
         if self._known is None or self._known[0] != frame:
             line, standing = self._results.timeline(), Standing(WeightWatch(LossLimit()))
             for at in np.flatnonzero(line.frames < frame):

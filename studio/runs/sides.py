@@ -109,7 +109,6 @@ def notes_of(run: StoredRun) -> tuple[str, ...]:
 
 
 def in_words(words: tuple[str, ...]) -> str:
-    """The exchanges as a sentence."""
     return f"Sides were corrected in track '{SIDES}': {'; '.join(words)}. The tracked poses stay in '{RAW}'."
 
 

@@ -223,7 +223,6 @@ class _Body:
         return 2.0 * poses[-1] - poses[-2]
 
     def maps(self, pose: Array) -> dict[str, LimbMap | None]:
-        """Where its limbs are, by camera."""
         seen = overlay_points(self.body, self._cameras, pose, self._settings.weighting)
         return {
             camera.name: limb_map(self.body, camera, pose, view, self._scale)

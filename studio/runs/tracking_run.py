@@ -342,7 +342,6 @@ class TrackingRun:
         return self._pace.progress(self.done, self.record.frame_count, least)
 
     def latest_settings(self) -> tuple[int, RunSettings]:
-        """The run's latest settings and their version."""
         entry = self.history.entries[-1]
         return entry.version, self._read_settings(entry)
 

@@ -191,7 +191,6 @@ class NameTakenError(SessionError):
 
 
 def taken(place: Path) -> NameTakenError:
-    """The error for a place where something is."""
     return NameTakenError(
         f"There is something at '{place}' already.", "Choose another name, or delete the old one first."
     )

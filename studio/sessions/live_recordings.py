@@ -72,7 +72,6 @@ class RecordedSets:
 
     @property
     def spreads(self) -> SpreadFigures:
-        """The time spread of the pictures."""
         return spread_figures(np.array([one.spread for one in self.sets]), [one.lagging for one in self.sets])
 
 
@@ -199,12 +198,10 @@ def recorded_set(row: list[str]) -> RecordedSet:
 
 
 def is_being_recorded(folder: Path) -> bool:
-    """Whether it is being recorded now."""
     return ProcessLock.is_held(folder / LIVE / LOCK_NAME)
 
 
 def start_sets(folder: Path) -> None:
-    """Start the sets after the first."""
     (folder / LIVE / GO_NAME).touch()
 
 

@@ -116,5 +116,4 @@ def read_manifest(session_folder: Path) -> SessionManifest:
 
 
 def write_manifest(session_folder: Path, manifest: SessionManifest) -> None:
-    """Write `session.json` in one step."""
     _RECORD.write(session_folder / FILE_NAME, manifest)

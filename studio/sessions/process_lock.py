@@ -51,7 +51,6 @@ class ProcessLock:
         return False
 
     def free(self) -> None:
-        """Release the lock."""
         self.connection.close()
 
 

@@ -285,7 +285,6 @@ def bring_work(address: str, *left_out: str) -> Path:
 
 
 def put_work(address: str, *left_out: str) -> None:
-    """Put all that the folder has to the address."""
     files = {
         name: path for name, path in _own_files(work_folder(address)) if name.split("/")[0] not in left_out
     }
@@ -502,7 +501,6 @@ def _own_files(folder: Path) -> Generator[tuple[str, Path]]:
 
 
 def _complete_folders(files: Iterable[str], record: str) -> frozenset[str]:
-    """Names of the folders that have their record."""
     return frozenset(
         name.split("/")[0] for name in files if name.count("/") == 1 and name.endswith(f"/{record}")
     )

@@ -270,11 +270,9 @@ class Sums:
             self._sums = {}
 
     def row_fits(self, row: Iterable[object]) -> bool:
-        """Whether a row is intact."""
         return self._sums.get("row") == checksum(row)
 
     def fits(self, name: str, blob: bytes) -> bool:
-        """Whether a blob is intact."""
         return self._sums.get(name) == checksum([blob])
 
     def wrong_layers(self, blobs: Mapping[int, bytes]) -> list[int]:

@@ -107,5 +107,4 @@ def read_run_record(run_folder: Path) -> RunRecord:
 
 
 def write_run_record(run_folder: Path, record: RunRecord) -> None:
-    """Write `run.json` in one step."""
     _RECORD.write(run_folder / FILE_NAME, record)

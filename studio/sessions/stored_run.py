@@ -78,7 +78,6 @@ class StoredRun:
 
     @property
     def session_name(self) -> str:
-        """Name of the session that the run belongs to."""
         return self.folder.parent.parent.name
 
     @property

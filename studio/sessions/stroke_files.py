@@ -42,8 +42,6 @@ FORMAT = (
 
 
 class SessionStrokes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """All strokes of a session."""
-
     schema: int = 1
     strokes: tuple[Stroke, ...] = ()
 

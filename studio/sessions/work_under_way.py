@@ -37,7 +37,6 @@ class Work(NamedTuple):
     process: str
 
     def in_words(self) -> str:
-        """As a part of a sentence."""
         of = f"run '{self.run}'" if self.run else "it"
         return f"'{self.verb}' works on {of} (process {self.process})"
 

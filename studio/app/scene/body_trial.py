@@ -22,7 +22,6 @@ class TrialView:
         self._view = BodyView(server, trial.body, name="/trial")
 
     def show(self, tokens: ColourTokens, visible: bool) -> None:
-        """Draw it, or hide it."""
         self._view.show(self.trial.pose if visible else None, tokens)
 
     def remove(self) -> None:

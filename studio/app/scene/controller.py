@@ -148,7 +148,6 @@ class SceneController:
         server.on_client_connect(self._greet)
 
     def start(self) -> None:
-        """Start drawing."""
         self.post(lambda model: hear(model, self._process.state))
         self._thread.start()
 
@@ -289,7 +288,6 @@ class SceneController:
         return edit_pose(model, lambda edit: begun(edit, pose, frame if run else None))
 
     def end_edit(self, model: Model) -> Model:
-        """Stop editing."""
         return edit_pose(model, ended)
 
     def request_knobs(self, model: Model, changes: Mapping[str, Value]) -> Model:
@@ -816,7 +814,6 @@ class Due:
         return max(0.0, self._from() - now)
 
     def done(self, now: float) -> None:
-        """Note that it was drawn."""
         self._last, self.is_wanted = now, False
 
     def _from(self) -> float:

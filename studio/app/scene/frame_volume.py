@@ -60,7 +60,6 @@ class _Request:
 
 
 def has_blobs(settings: RunSettings) -> bool:
-    """Whether a run with these settings has blobs to show."""
     return isinstance(settings.weighting, BlobSettings)
 
 

@@ -41,7 +41,6 @@ class GuardedServer(viser.ViserServer):
 
     @property
     def is_viewed(self) -> bool:
-        """Whether a browser is connected."""
         return bool(self._connections())
 
     def request_share_url(self, verbose: bool = True) -> str | None:

@@ -471,7 +471,6 @@ def set_playback(
 
 
 def advance(model: Model, seconds: float) -> Model:
-    """Advance the playback by `seconds`."""
     if model.subject is None or not model.playback.playing:
         return model
     after, frame = played(model.playback, seconds * model.subject.fps, model.selection.frame, model.frames)
@@ -640,7 +639,6 @@ def searched_on(live: LiveSearch, event: LayerFinished | FrameFinished) -> LiveS
 
 
 def request(model: Model, identifier: str, changes: Mapping[str, Value]) -> Model:
-    """Note requested knobs."""
     assert model.knobs is not None
     waiting = dict([*model.knobs.requested.items(), (identifier, changes)][-REMEMBERED:])
     drafts = {name: value for name, value in model.knobs.drafts.items() if name not in changes}
@@ -672,7 +670,6 @@ def refuse(model: Model, changes: Mapping[str, Value]) -> Model:
 
 
 def edit_pose(model: Model, change: Callable[[PoseEdit], PoseEdit]) -> Model:
-    """Change the pose that is edited, or whether one is."""
     if model.edit is None:
         return model
     edit = change(model.edit)

@@ -222,7 +222,6 @@ class OpenedRun:
         return Moment(frame, made, pose, records, count, truth, tracking_of(stored))
 
     def close(self) -> None:
-        """Release the files."""
         if self.results is not None:
             self.results.close()
 

@@ -49,7 +49,6 @@ class Panel:
         self.pose = PosePanel(gui, pose, post, refine, save)
 
     def show(self, model: Model, moment: Moment | None, tokens: ColourTokens) -> None:
-        """Show a model in every control."""
         self.status.content = status_html(model)
         self.mark.content = mark_html(model, moment, tokens)
         self.mark.visible = bool(self.mark.content)

@@ -79,7 +79,6 @@ class SceneServer:
 
     @property
     def is_viewed(self) -> bool:
-        """Whether a browser is connected."""
         return self._server.is_viewed
 
     def relay_headers(self) -> Mapping[str, str]:
@@ -88,12 +87,10 @@ class SceneServer:
 
     @property
     def shown(self) -> Selection:
-        """The current selection."""
         return self._controller.model.selection
 
     @property
     def layers(self) -> LayerPlayback:
-        """Whether and how layers are played."""
         return self._controller.model.layers
 
     def show_run(
@@ -225,7 +222,6 @@ class ScenePoses:
 
     @property
     def editing(self) -> Editing | None:
-        """The pose being edited, or None."""
         model = self._controller.model
         edit, selection = model.edit, model.selection
         if edit is None or not edit.active:
@@ -252,5 +248,4 @@ class ScenePoses:
         self._controller.post(edit_pose, _undone)
 
     def leave(self) -> None:
-        """Stop editing."""
         self._controller.post(self._controller.end_edit)

@@ -146,7 +146,6 @@ class SearchView:
         return _Drawing(key, record, journey, look, tokens, heaviest, colours, *shells)
 
     def hide(self) -> None:
-        """Draw nothing."""
         self._shown = None
         self._made.clear()
         for view in (self.skeletons, self.ways, self.lineage):

@@ -47,7 +47,6 @@ class SettingsPanel:
         self.preset: Control | None = None
 
     def show(self, knobs: Knobs) -> None:
-        """Show the values in use and requested; the controls are rebuilt only for other knobs."""
         made_for = (knobs.settings.tracker_name, knobs.settings.weighting_name, *values(knobs.settings))
         if made_for != self._made_for:
             self._build(knobs.settings)
@@ -149,7 +148,6 @@ class KnobInput:
         on_press(self.reset, post, put_back)
 
     def show(self, value: Value) -> None:
-        """Show the knob's value."""
         knob, handle = self.knob, self.handle
         if isinstance(handle, viser.GuiSliderHandle) and knob.high is not None:
             number = float(value)

@@ -147,5 +147,4 @@ def legend_html(tokens: ColourTokens, colour_by: str, layers: int, truth: bool) 
 
 
 def css(colour: tuple[int, int, int]) -> str:
-    """An RGB colour in CSS notation."""
     return "#{:02x}{:02x}{:02x}".format(*colour)

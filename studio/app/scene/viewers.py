@@ -64,7 +64,6 @@ class Viewers:
 
     @property
     def is_moving(self) -> bool:
-        """Whether viewers are on their way."""
         return self._ease is not None
 
     @property
@@ -131,7 +130,6 @@ class Viewers:
             self.framed = _shifted(self.framed, by)
 
     def tick(self, now: float) -> None:
-        """Move those who are on their way."""
         if self._ease is None:
             return
         share = (now - self._ease.began) / EASE_SECONDS

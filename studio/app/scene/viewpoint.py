@@ -89,7 +89,6 @@ def is_well_framed(points: Array, eye: Eye, fov: float, aspect: float) -> bool:
 
 
 def is_in_sight(points: Array, eye: Eye, fov: float, aspect: float) -> bool:
-    """Whether any of a body is seen."""
     seen = on_screen(points, eye, fov, aspect)
     inside = (seen[:, 0] > 0.0) & (seen[:, 0] < 1.0) & (seen[:, 1] > 0.0) & (seen[:, 1] < 1.0)
     return bool((inside & (seen[:, 2] > 0.0)).any())

@@ -100,7 +100,6 @@ class WindowScenes:
         self._entries[window + TWIN].is_led = True
 
     def open_scenes(self) -> dict[str, SceneServer]:
-        """The open scenes by window."""
         return {window: entry.scene for window, entry in list(self._entries.items())}
 
     def close_unused(self, windows: Collection[str]) -> None:

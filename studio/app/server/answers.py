@@ -44,7 +44,6 @@ class Router(APIRouter):
         response_model: Kind = OF_ANNOTATION,
         **more: Any,  # noqa: ANN401 - as FastAPI takes it
     ) -> None:
-        """Add a route, as APIRouter does."""
         if isinstance(response_model, DefaultPlaceholder):
             returned = get_type_hints(endpoint, include_extras=True).get("return")
             if not (isinstance(returned, type) and issubclass(returned, Response)):

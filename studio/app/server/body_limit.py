@@ -20,7 +20,6 @@ class BodyLimit:
         self.limit = limit
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass on, counting what is received."""
         if scope["type"] != "http" or scope["path"].startswith(UPLOAD_PREFIX):
             await self.app(scope, receive, send)
             return

@@ -223,7 +223,6 @@ def _plan(session: Session, arguments: Arguments) -> Plan:
 
 
 def _without_name(arguments: Arguments) -> dict[str, Any]:
-    """What a comparison is made of, without its name."""
     return {name: value for name, value in arguments.items() if name != "name"}
 
 

@@ -45,7 +45,6 @@ def plain(message: dict[str, object]) -> dict[str, object]:
 
 
 def message_of(event: Event) -> dict[str, object]:
-    """An event as a flat dictionary."""
     head: dict[str, object] = {"type": TYPES[type(event)], "session": event.session, "run": event.run}
     if isinstance(event, LayerFinished):
         more = {

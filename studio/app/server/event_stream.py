@@ -60,7 +60,6 @@ class EventStream:
         self._task = asyncio.create_task(self._pump(self._control.subscribe()))
 
     async def stop(self) -> None:
-        """End at once."""
         if self._task is not None:
             self._task.cancel()
             await asyncio.gather(self._task, return_exceptions=True)
@@ -77,12 +76,10 @@ class EventStream:
         return watcher
 
     def leave(self, watcher: Watcher) -> None:
-        """Forget a watcher."""
         with self._lock:
             self._watchers.pop(watcher, None)
 
     def windows(self) -> set[str]:
-        """The windows that watch."""
         with self._lock:
             return set(self._watchers.values())
 

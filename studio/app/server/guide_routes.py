@@ -292,7 +292,6 @@ def all_knob_tables() -> str:
 
 
 def knob_table(title: str, knobs: tuple[Knob, ...]) -> str:
-    """One table of declarations."""
     head = "".join(f"<th>{name}</th>" for name in COLUMNS)
     rows = "\n".join(f"<tr>{_row(entry)}</tr>" for entry in knobs)
     return (

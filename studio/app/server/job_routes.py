@@ -84,7 +84,6 @@ def _line(job: Job) -> JobLine:
 
 
 def _fill(address: str, fields: dict[str, object]) -> str:
-    """An address with fields of the state in it."""
     parts = {
         name: quote(str(fields.get(name) or ""), safe="")
         for _, name, _, _ in Formatter().parse(address)

@@ -16,7 +16,6 @@ class LeftRequests:
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass on."""
         if scope["type"] != "http" or scope["method"] != "GET" or not COMPUTED.search(scope["path"]):
             await self.app(scope, receive, send)
             return

@@ -84,7 +84,6 @@ def body_of(
 
 
 def _field(entry: Parameter, key: str) -> tuple[Any, Any]:
-    """A parameter as an entry of a body."""
     kind, default = entry.web.kind or _kind(entry.kind), entry.default
     if kind is RunName and default is not REQUIRED:
         kind, default = MaybeName, None

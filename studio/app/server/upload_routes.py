@@ -55,7 +55,6 @@ class DiskFullError(StudioError, status=507, code="disk-full"):
 
 
 def uploads_folder(app: AppState) -> Path:
-    """Where unfinished uploads lie."""
     return app.state_folder / UPLOADS_NAME
 
 
@@ -95,7 +94,6 @@ def state(identifier: str, app: App) -> UploadState:
 
 @router.delete("/{identifier}", status_code=204)
 def give_up(identifier: str, app: App) -> None:
-    """Remove an upload."""
     forget(app, identifier)
 
 

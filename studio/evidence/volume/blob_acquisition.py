@@ -56,7 +56,6 @@ class Profiles:
 
     @classmethod
     def none(cls, body: BodyModel) -> "Profiles":
-        """Profiles of no frame."""
         return cls(np.zeros((len(body.drawn), BINS, SUMS)), 0)
 
     def with_frame(self, body: BodyModel, model: BlobModel, hull: Hull, pose: Array) -> "Profiles":

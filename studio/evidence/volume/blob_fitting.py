@@ -71,7 +71,6 @@ class Voxels:
         return cls(rows, shares, extents, centre, mean, np.maximum(variance, LEAST_COLOUR_VARIANCE))
 
     def no_labels(self) -> Labels:
-        """An array for a label of each voxel."""
         return np.empty(int(self.rows.shape[1]), dtype=np.int32)
 
 

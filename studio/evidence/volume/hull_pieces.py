@@ -108,7 +108,6 @@ def root_of(parents, run):
 
 
 def largest_piece(hull: Hull) -> Hull:
-    """The hull's largest piece alone."""
     numbers, _ = piece_numbers(hull)
     return chosen_voxels(hull, numbers == 0)
 

@@ -134,7 +134,6 @@ class Reconstructor:
         return self.box.corner + (np.concatenate(kept) + 0.5) * edges[:, None], edges
 
     def _coloured(self, kept: list[Nodes], seen: kernels.Sights) -> Hull:
-        """The kept voxels of each depth as a hull."""
         centres, edges = self._place_voxels(kept)
         views = np.empty((len(edges), len(self.cameras), 3), dtype=np.float32)
         means = np.empty((len(edges), 3), dtype=np.float32)

@@ -218,7 +218,6 @@ def footage_picture(footage: BoardFootage, frame: int) -> Bytes:
 
 
 def _pictures(footage: BoardFootage, count: int, frames: Indices) -> Iterator[tuple[int, str, Bytes]]:
-    """Frame number, name and picture."""
     if footage.video is None:
         for frame in map(int, frames):
             yield frame, footage.pictures[frame].name, read_picture(footage.pictures[frame])

@@ -87,7 +87,6 @@ class Board:
 
     @property
     def marker_count(self) -> int:
-        """Markers of a ChArUco board."""
         return self.columns * self.rows // 2
 
     @property

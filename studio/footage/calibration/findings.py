@@ -28,5 +28,4 @@ class Finding:
 
 
 def blocking(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Those that block."""
     return tuple(finding for finding in findings if finding.severity == "blocks")

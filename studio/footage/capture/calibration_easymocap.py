@@ -22,7 +22,6 @@ NO_SIZE = "The calibration gives no picture size: it is taken from the footage."
 
 
 def is_easymocap(folder: Path) -> bool:
-    """Whether a folder holds the pair."""
     return (folder / INTRINSICS).is_file() and (folder / EXTRINSICS).is_file()
 
 

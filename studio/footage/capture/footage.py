@@ -54,9 +54,7 @@ class Reader(Protocol):
         """(H, W, 3) uint8 BGR."""
         ...
 
-    def close(self) -> None:
-        """Close the files."""
-        ...
+    def close(self) -> None: ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,7 +104,6 @@ class Footage:
         return None if kept is None else kept.read(self._check_frame(frame))
 
     def pictures(self, frame: int) -> FramePictures:
-        """All cameras' pictures of a frame."""
         return FramePictures(frame, self.cameras, tuple(self.picture(name, frame) for name in self.cameras))
 
     def masks(self, frame: int) -> dict[str, Bytes] | None:
@@ -174,7 +171,6 @@ class Footage:
         give_back_freed_memory(of_late=True)
 
     def close(self) -> None:
-        """Close all files."""
         for kept in (*self._pictures.values(), *self._masks.values(), *self._hidden.values()):
             kept.close()
         if sum(kept.read_count for kept in self._pictures.values()) >= MANY_PICTURES:
@@ -242,7 +238,6 @@ def background_turn(turned: int, footage: tuple[int, int], background: tuple[int
 
 
 def colour_as_it_is(picture: Bytes) -> Bytes:
-    """The picture itself."""
     return picture
 
 
@@ -333,7 +328,6 @@ class _KeptPictures:
                     self._drop(key)
 
     def forget(self, reader: int) -> None:
-        """Drop all pictures of a reader."""
         with self._lock:
             self._drop_all(reader)
 

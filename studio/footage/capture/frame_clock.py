@@ -32,9 +32,7 @@ class Arrival:
 class LiveSource(Protocol):
     """The source of sets of a live run; the pictures come from a `Footage`."""
 
-    def begin(self, frame: int) -> None:
-        """Start the sets, the first of them numbered `frame`."""
-        ...
+    def begin(self, frame: int) -> None: ...
 
     def newest(self, after: int) -> Arrival | None:
         """The newest complete set, None unless its number is above `after`. Never waits."""
@@ -71,7 +69,6 @@ class ReplayClock:
         self._began: float | None = None
 
     def begin(self, frame: int) -> None:
-        """Start the clock with `frame`."""
         self._first, self._began = frame, self._clock()
 
     def newest(self, after: int) -> Arrival | None:

@@ -185,7 +185,6 @@ class LiveCamera:
 
     @property
     def name(self) -> str:
-        """Its name in the calibration."""
         return self.address.name
 
     def run(self) -> None:
@@ -212,7 +211,6 @@ class LiveCamera:
                 return
 
     def stop(self) -> None:
-        """Read no further; `run` returns soon, at the latest when its read times out."""
         self._stopping.set()
 
     def release(self) -> None:
@@ -243,7 +241,6 @@ class LiveCamera:
 
     @property
     def standing(self) -> CameraStanding:
-        """The camera's state."""
         with self._lock:
             now, last = self._clock(), self._recent[-1] if self._recent else None
             age = now - last.came if last else 0.0
@@ -303,7 +300,6 @@ class LiveCameras:
             start(camera.run, f"camera-{camera.name}")
 
     def stop(self) -> None:
-        """Stop all readers."""
         for camera in self.cameras:
             camera.stop()
         with self._changed:
@@ -311,7 +307,6 @@ class LiveCameras:
 
     @property
     def standings(self) -> tuple[CameraStanding, ...]:
-        """The state of each camera, in their order."""
         return tuple(camera.standing for camera in self.cameras)
 
     @property

@@ -71,7 +71,6 @@ class _Password(httpx.Auth):
         self._given = unquote(name), unquote(password or "")
 
     def auth_flow(self, request: httpx.Request) -> Generator[httpx.Request, httpx.Response, None]:
-        """As httpx calls it."""
         digest = httpx.DigestAuth(*self._given).auth_flow(request)
         response = yield next(digest)
         try:

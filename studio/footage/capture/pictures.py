@@ -49,7 +49,6 @@ def list_pictures(folder: Path) -> tuple[Path, ...]:
 
 
 def is_picture(path: Path) -> bool:
-    """Whether a file is a picture by its name."""
     return path.suffix.lower() in PICTURE_SUFFIXES
 
 

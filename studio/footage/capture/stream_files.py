@@ -87,7 +87,6 @@ class StreamWriter:
 
     @property
     def figures(self) -> StreamFigures:
-        """So far."""
         return StreamFigures(self._cadence.count, self._repeated, self._left_out)
 
     def write(self, shot: Shot) -> None:
@@ -118,7 +117,6 @@ class StreamWriter:
         self._last = content
 
     def close(self) -> None:
-        """End the file. Raises OSError where the disk refuses."""
         if self._container is not None:
             container, self._container = self._container, None
             with _disk_errors():
@@ -159,7 +157,6 @@ class TimesFile:
             self._file.write(line.getvalue())
 
     def close(self) -> None:
-        """End the file."""
         self._file.close()
 
 

@@ -338,7 +338,6 @@ class VideoReader:
         return _turned_up(whole_picture(lines, below, frame.height), frame.rotation)
 
     def close(self) -> None:
-        """Close the file."""
         with self._lock:
             if self._container is not None:
                 self._container.close()

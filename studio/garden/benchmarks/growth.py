@@ -149,7 +149,6 @@ def _opened(session: Session, last: int, knobs: Mapping[str, Any]) -> Generator[
 
 
 def _frame(opened: OpenRun) -> None:
-    """Track one frame."""
     while True:
         stepped = opened.step_layer()
         if stepped is not None and stepped.result is not None:

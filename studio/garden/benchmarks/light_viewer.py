@@ -55,7 +55,6 @@ class LightViewer:
             raise StudioError("The scene sends nothing to a viewer.", "See the log.")
 
     def close(self) -> None:
-        """Disconnect."""
         self._socket.close()
         self._thread.join()
 

@@ -68,7 +68,6 @@ class StageClock:
     _since: float = 0.0
 
     def start(self) -> None:
-        """Start a frame."""
         self._since = time.thread_time()
         for times in self.spent.values():
             times.append(0.0)
@@ -143,7 +142,6 @@ def stage_rows(found: Mapping[str, float]) -> list[dict[str, object]]:
 
 
 def live_figures(found: LiveSummary) -> dict[str, object]:
-    """The figures of a live run."""
     return {
         "frames_per_second": round(found.frames_per_second, 2),
         "tracked": len(found.tracked),

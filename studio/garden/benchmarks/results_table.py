@@ -164,7 +164,6 @@ class Machine:
 
 
 def this_machine() -> Machine:
-    """The machine that this runs on."""
     return Machine(
         _processor(),
         os.cpu_count() or 1,

@@ -463,7 +463,6 @@ class TimedFrameLikelihood:
         return self.problem.log_likelihood(poses, stage)
 
     def fitness(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
-        """The fitness, timed."""
         began = time.perf_counter()
         found = self.problem.fitness(poses, stage)
         self.fitness_seconds += time.perf_counter() - began

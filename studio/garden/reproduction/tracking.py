@@ -54,7 +54,6 @@ class Line:
     wanted: Mapping[str, Any] | Callable[[int], Mapping[str, Any]] = field(default_factory=dict[str, Any])
 
     def trial(self, seed: int) -> Trial:
-        """The trial of a seed."""
         wanted = self.wanted(seed) if callable(self.wanted) else self.wanted
         attempt = self.candidate.attempt(self.footage, seed, self.evaluations, **wanted)
         return tracking_trial(self.name, attempt)

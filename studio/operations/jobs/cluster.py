@@ -231,7 +231,6 @@ class _Marker:
         return (Path(self.folder) / self.name).is_file()
 
     def remove(self) -> None:
-        """Take it away."""
         if is_address(self.folder):
             Store(self.folder).remove([self.name])
         else:

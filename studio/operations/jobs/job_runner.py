@@ -49,7 +49,6 @@ class JobState(StrEnum):
 
     @property
     def is_going(self) -> bool:
-        """Whether it is not over."""
         return self in GOING
 
 

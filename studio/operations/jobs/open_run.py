@@ -44,7 +44,6 @@ class SettingsMailbox:
         self._latest = (version, settings)
 
     def latest(self) -> tuple[int, RunSettings]:
-        """The newest version and settings."""
         return self._latest
 
     def reset(self, version: int, settings: RunSettings) -> None:
@@ -113,12 +112,10 @@ class OpenRun:
 
     @property
     def session_name(self) -> str:
-        """Name of the session."""
         return self.session.name
 
     @property
     def run_name(self) -> str:
-        """Name of the run."""
         return self.stored.name
 
     @property

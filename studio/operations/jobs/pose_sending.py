@@ -61,12 +61,10 @@ class PoseSender:
             raise
 
     def send(self, result: FrameResult) -> None:
-        """Send the pose of a finished frame to all."""
         for receiver in self._receivers:
             receiver.send(result, result.frame / self._fps)
 
     def close(self) -> None:
-        """End all connections."""
         for receiver in self._receivers:
             receiver.close()
         self._receivers.clear()

@@ -37,7 +37,6 @@ class CameraNotice:
 
     @property
     def in_words(self) -> str:
-        """A sentence."""
         if self.state == "running":
             return f"Camera {self.camera} came back at {self.seconds:.1f} s."
         word = "stopped" if self.state == "stopped" else "ended"
@@ -67,7 +66,6 @@ class SetStanding:
 
     @property
     def in_words(self) -> str:
-        """As a status line says it."""
         words = [
             f"{counted(self.sets, 'set')}",
             f"{self.spreads.median:.0f} ms apart" if self.spreads.sets else "",
@@ -96,7 +94,6 @@ class SetRecording:
 
     @property
     def standing(self) -> SetStanding:
-        """How it stands."""
         seconds = 0.0 if self._went is None else self._clock() - self._went
         return SetStanding(
             self._sets,

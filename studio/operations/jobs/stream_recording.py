@@ -101,7 +101,6 @@ class StreamRecording:
 
     @property
     def standing(self) -> RecordingStanding:
-        """How it stands."""
         return RecordingStanding(
             self._clock() - self._began,
             {track.camera.name: track.writer.figures for track in self._tracks},

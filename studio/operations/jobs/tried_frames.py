@@ -31,7 +31,6 @@ class _Tried:
 
     @property
     def size(self) -> int:
-        """Bytes, nearly."""
         return sum(record.poses.nbytes + record.log_weights.nbytes for record in self.layers)
 
 

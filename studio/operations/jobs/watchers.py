@@ -80,7 +80,6 @@ class Subscription(Generic[T]):
             await future
 
     def close(self) -> None:
-        """Take no more events; those that wait can still be read. Whoever said what is wanted is let go."""
         with self._something:
             self.closed, self._wanted = True, _nothing
             self._wake()
@@ -116,7 +115,6 @@ class Watchers:
                 entry.put(event, event.key)
 
     def close(self) -> None:
-        """Close all subscriptions."""
         with self._lock:
             for entry in self._subscriptions:
                 entry.close()

@@ -134,12 +134,10 @@ def pair_words(pair: PairTest) -> str:
 
 
 def p_words(p: float) -> str:
-    """A probability as text."""
     return "p < 0.0001" if p < 1e-4 else f"p = {p:.2g}"
 
 
 def table_text(comparison: Comparison) -> str:
-    """The table and the text for a terminal."""
     rows = [[str(cell) for cell in row] for row in ([*COLUMNS], *_table(comparison).rows)]
     widths = [max(len(row[column]) for row in rows) for column in range(len(COLUMNS))]
     lines = [

@@ -42,7 +42,6 @@ class Making:
 
 
 def as_document(heading: Heading, findings: Findings, making: Making) -> Document:
-    """The document of a finished experiment."""
     numbers = [_without_nan(asdict(number)) for number in findings.numbers]
     for number, entry in zip(findings.numbers, numbers, strict=True):
         entry["firm"] = number.seeds >= FIRM_SEEDS

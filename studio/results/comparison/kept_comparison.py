@@ -79,7 +79,6 @@ class KeptComparison:
 
     @property
     def name(self) -> str:
-        """The folder's name."""
         return self.folder.name
 
     def note_of(self, trial: str) -> str:
@@ -91,7 +90,6 @@ class KeptComparison:
 
     @property
     def kept_trials(self) -> KeptTrials:
-        """The measured outcomes."""
         return KeptTrials(self.folder / TRIALS_NAME)
 
     def record(self) -> ComparisonRecord:
@@ -122,7 +120,6 @@ class KeptComparison:
         return self.record().ended or "interrupted"
 
     def is_running(self) -> bool:
-        """Whether a process works on it."""
         return ProcessLock.is_held(self.folder / LOCK_NAME)
 
     def lock(self) -> ProcessLock | None:
@@ -174,7 +171,6 @@ def result_of(comparison: Comparison) -> dict[str, Any]:
 
 
 def _findings_document(comparison: Comparison) -> dict[str, Any]:
-    """The comparison as an experiment's document."""
     plan = comparison.plan
     names = ", ".join(candidate.name for candidate in plan.candidates)
     heading = Heading(

@@ -236,7 +236,6 @@ def _chosen_model(
 
 
 def tracking_trial_of(plan: Plan, candidate: Candidate, seed: int) -> TrackingTrial:
-    """What a trial tracks."""
     guided = plan.behaviour_path and needs_model(candidate.tracker, candidate.settings().tracker)
     return TrackingTrial(
         plan.footage,

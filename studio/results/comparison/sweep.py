@@ -96,7 +96,6 @@ class Sweep:
 
     @property
     def measures(self) -> tuple[Measure, ...]:
-        """Those that any run has."""
         return tuple(one for one in MEASURES if any(getattr(run, one.key) is not None for run in self.runs))
 
     @property
@@ -123,7 +122,6 @@ class SweepExpected:
 
     @property
     def in_words(self) -> str:
-        """As a sentence."""
         count = f"{counted(self.runs, 'run')} of {self.frames} frames"
         words = f"{count}, {self.evaluations:,} evaluations"
         if self.seconds is None:
@@ -176,7 +174,6 @@ def plan_sweep(
 
 
 def point_name(point: Mapping[str, Value]) -> str:
-    """A point of the grid in words."""
     return ", ".join(f"{name} {value}" for name, value in point.items())
 
 

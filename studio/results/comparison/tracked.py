@@ -147,7 +147,6 @@ def track(
         raise NotFoundError(f"There is no frame {frames[-1]}. '{trial.footage}' has 0 to {count - 1}.", "")
 
     def evidence(frame: int, name: str = trial.weighting) -> FrameEvidence:
-        """The evidence of a frame for a weighting."""
         kind, pictures = WEIGHTINGS[name].edge_kind, WEIGHTINGS[name].reads_pictures
         return spoilt.evidence(cache.evidence(session, cameras, frame, settings.evidence, kind, pictures))
 

@@ -14,7 +14,6 @@ Plain = Any
 
 
 def is_mapping(value: Plain) -> TypeGuard[Mapping[str, Plain]]:
-    """Whether a plain value is a dictionary."""
     return isinstance(value, Mapping)
 
 

@@ -108,7 +108,6 @@ def _upright_frame(axis: Array) -> Array:
 
 
 def _grown(piece: Piece, scale: float) -> Piece:
-    """The piece with its girth scaled."""
     first, last = piece.radius
     return replace(piece, radius=(first * scale, last * scale), bulge=piece.bulge * scale)
 

@@ -98,7 +98,6 @@ def recipe_renderer(
 def _writers(
     folder: Path, cameras: tuple[Camera, ...], fps: float, quality: float, open_clips: ExitStack
 ) -> list[ClipWriter]:
-    """One open clip a camera."""
     folder.mkdir()
     return [
         open_clips.enter_context(

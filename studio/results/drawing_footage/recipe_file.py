@@ -160,7 +160,6 @@ def named_recipe(name: str, folder: Path) -> Path:
 
 
 def recipe_names() -> tuple[str, ...]:
-    """The names of the bundled recipes."""
     return tuple(sorted(path.stem for path in RECIPES.glob(f"*{SUFFIX}")))
 
 

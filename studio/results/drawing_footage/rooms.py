@@ -234,7 +234,6 @@ def _furniture(rng: np.random.Generator, half: tuple[float, float]) -> Block:
 
 
 def _picture(rng: np.random.Generator, half: tuple[float, float]) -> Block:
-    """Something on a wall."""
     axis, sign = int(rng.integers(2)), float(rng.choice([-1.0, 1.0]))
     centre = [0.0, 0.0, float(rng.uniform(1350, 1750))]
     size = [0.0, 0.0, float(rng.uniform(200, 450))]

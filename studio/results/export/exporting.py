@@ -42,7 +42,6 @@ class ExportReport:
 
     @property
     def size(self) -> int:
-        """Bytes of all files."""
         return sum(path.stat().st_size for path in self.files)
 
 

@@ -48,7 +48,6 @@ class JointTree:
 
 
 def joint_tree(body: BodyModel) -> JointTree:
-    """The tree of a body."""
     roots = sum(joint.parent < 0 for joint in body.joints)
     names: list[str] = [BASE] if roots > 1 else []
     parents: list[int] = [-1] * len(names)
@@ -135,7 +134,6 @@ class Skeleton:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The joints' own names."""
         return self.tree.names
 
     @property

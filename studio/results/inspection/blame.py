@@ -138,7 +138,6 @@ def pulls_at(frame: InspectedFrame, evaluation: FrameEvaluation, pose: Array) ->
 
 
 def rows(frame: InspectedFrame, selection: Selection) -> ViewResult:
-    """The tables of view `blame`."""
     run, evaluation = frame.of, evaluation_of(frame)
     pose, reference = explained_pose(frame, selection.track), reference_pose(frame, selection.track)
     limbs, swapped = limbs_swapped(run, pose, reference.pose)

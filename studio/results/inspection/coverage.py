@@ -61,12 +61,10 @@ NO_TRUTH = "The session has no truth: there is no error to compare the spread wi
 
 
 def of_frame(frame: InspectedFrame, selection: Selection) -> ViewResult:
-    """No tables of one frame."""
     return ViewResult({}, ("Coverage is measured over a whole run.",))
 
 
 def over_run(run: InspectedRun, selection: Selection) -> ViewResult:
-    """The tables of view `coverage`."""
     by_frame, errors = summaries(run), errors_of(run, selection.track)
     limbs = list(dict.fromkeys(limbs_of_points(run.body)))
     frames: list[Row] = []

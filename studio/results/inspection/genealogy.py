@@ -77,7 +77,6 @@ def children_of(frame: InspectedFrame, layer: int) -> Indices:
 
 
 def rows(frame: InspectedFrame, selection: Selection) -> ViewResult:
-    """The tables of view `genealogy`."""
     layers, count = frame.layers, len(frame.layers)
     parents, sizes = [record.parents for record in layers], [frame.size(at) for at in range(count)]
     alive, lines = living(parents, sizes), first_lines(parents, sizes)

@@ -172,7 +172,6 @@ def _least_settled(frame: InspectedFrame) -> int:
 
 
 def rows(frame: InspectedFrame, selection: Selection) -> ViewResult:
-    """The tables of view `landscape`."""
     run, evaluation = frame.of, evaluation_of(frame)
     line = line_of(frame, selection)
     shares = evaluation.shares(line.poses)

@@ -49,7 +49,6 @@ class FrameEvaluation:
 
     @property
     def cameras(self) -> tuple[str, ...]:
-        """Names of the cameras."""
         return tuple(view.camera for view in self.evidence.views)
 
     def log_weights(self, poses: Array) -> Array:

@@ -244,7 +244,6 @@ def over_run(run: InspectedRun, selection: Selection) -> ViewResult:
 
 
 def _stamp_of(tried: TriedFrame) -> tuple[float, float, int]:
-    """As of a stored frame (`stamps_of`)."""
     result = tried.result
     return result.estimate.log_weight, result.milliseconds, result.settings_version
 

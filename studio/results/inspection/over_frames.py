@@ -51,7 +51,6 @@ class FrameSummary:
 
     @property
     def size(self) -> int:
-        """Bytes."""
         parts = (self.variances, self.betas, self.alphas, self.effective, self.spread, self.ranks)
         return sum(part.nbytes for part in parts)
 

@@ -54,12 +54,10 @@ class InspectedRun:
 
     @cached_property
     def body(self) -> BodyModel:
-        """The run's body."""
         return self.run.body()
 
     @cached_property
     def history(self) -> SettingsHistory:
-        """All settings that the run has used."""
         with self.run.results() as results:
             return SettingsHistory(tuple(results.settings_history()))
 
@@ -109,7 +107,6 @@ class InspectedRun:
         return self._read[version]
 
     def frames(self) -> list[int]:
-        """The finished frames that are whole."""
         with self.run.results() as results:
             return results.frames()
 
@@ -184,7 +181,6 @@ class InspectedFrame:
 
     @cached_property
     def _weights(self) -> dict[int, Array]:
-        """What `log_weights` has found."""
         return {}
 
     def _weighted(self, layer: int) -> Array:

@@ -77,7 +77,6 @@ class Retracking:
         return np.stack([result.estimate.pose for result in self.results(change, start)])
 
     def _search(self, frame: int, carried: FilterState, settings: RunSettings, seed: int) -> FrameResult:
-        """The frame searched from a state."""
         repeats = settings.tracker.start_repeats if self._begins and frame == self.frames[0] else 1
         return search_frame(
             TRACKERS[settings.tracker_name],

@@ -188,7 +188,6 @@ def _pack(numbers: NDArray[Any]) -> str:
 
 
 def _remarks(shown: _Shown) -> list[str]:
-    """The notes on frames."""
     return [f"Frame {frame}: {words}" for frame, words in notes_by_frame(shown.run.run).items()]
 
 

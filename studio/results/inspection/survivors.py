@@ -61,7 +61,6 @@ def surviving(frame: InspectedFrame, layer: int) -> Mask:
 
 
 def rows(frame: InspectedFrame, selection: Selection) -> ViewResult:
-    """The tables of view `survivors`."""
     run, layer = frame.of, frame.layer(selection)
     record, weights, numbers = frame.layers[layer], frame.weights(layer), frame.particles(layer)
     survives, children = surviving(frame, layer), children_of(frame, layer)[numbers]

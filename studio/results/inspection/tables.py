@@ -93,12 +93,10 @@ class View:
 
     @property
     def frame_tables(self) -> tuple[TableKind, ...]:
-        """The tables of one frame."""
         return tuple(kind for kind in self.tables if not kind.of_run)
 
     @property
     def run_tables(self) -> tuple[TableKind, ...]:
-        """The tables of the whole run."""
         return tuple(kind for kind in self.tables if kind.of_run)
 
 
@@ -140,7 +138,6 @@ class Table:
     _repr_html_ = as_html
 
     def records(self) -> list[dict[str, Cell]]:
-        """The rows by key."""
         return [dict(zip((entry.key for entry in self.columns), row, strict=True)) for row in self.rows]
 
 

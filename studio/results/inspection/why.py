@@ -232,7 +232,6 @@ class Case:
 
     @cached_property
     def settings(self) -> RunSettings:
-        """The frame's."""
         return self.frame.settings
 
     @cached_property
@@ -390,7 +389,6 @@ class Case:
 
     @cached_property
     def clouds(self) -> list[Row]:
-        """The rows of table "nearest"."""
         goal = body_points(self.run.body, self.reference.pose[None])[0]
         table: list[Row] = []
         for layer, record in enumerate(self.frame.layers):
@@ -529,7 +527,6 @@ BY_HAND = Remedy(
 
 
 def _compared_with(case: Case) -> str:
-    """What is compared with what."""
     ours = {"": "the pose that the search found"}.get(case.track, f"track '{case.track}'")
     result = case.frame.result
     if not case.track and result is not None and result.estimate.searched is not None:
@@ -635,7 +632,6 @@ def _add_camera(case: Case, fault: CameraFault, findings: list[FrameFinding], re
 def _add_search(
     case: Case, limb: str, findings: list[FrameFinding], remedies: list[Remedy], *, cause_known: bool
 ) -> None:
-    """Where and why the search lost the limb."""
     # Refining earlier frames on bad evidence takes long and shows nothing.
     known = case.reference.kind != REFINED_NOW or not cause_known
     began = case.stretch[0] if known else case.frame.number

@@ -104,7 +104,6 @@ def projected_silhouette(contours: tuple[Array, ...], height: int, width: int, s
 
 
 def encode_jpeg(picture: Bytes) -> bytes:
-    """A BGR picture as a JPEG file."""
     _, encoded = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     return encoded.tobytes()
 

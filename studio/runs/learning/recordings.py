@@ -64,7 +64,6 @@ class Recording:
 
     @property
     def frame_count(self) -> int:
-        """Number of frames."""
         return len(self.poses)
 
 

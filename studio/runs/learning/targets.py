@@ -48,7 +48,6 @@ class Targets:
 
     @property
     def frame_count(self) -> int:
-        """Number of frames."""
         return len(self.points)
 
 

@@ -45,7 +45,6 @@ class Following:
 
     @property
     def model(self) -> BehaviourModel | None:
-        """The behaviour model of the next frame."""
         if self._learner is None:
             return self.space.behaviour
         return self._learner.model_in(len(self.poses), self._poses_so_far)

@@ -58,7 +58,6 @@ class LiveRun(TrackingRun):
 
     @property
     def between_frames(self) -> bool:
-        """Whether a frame can be taken."""
         return self._astray or self._search is None
 
     def take(self, ready: Ready) -> None:
@@ -83,7 +82,6 @@ class LiveRun(TrackingRun):
         self._writer.mark_ended(OVER)
 
     def save(self) -> None:
-        """As `TrackingRun.save`."""
         self._came = None
         self.meter.paused()
         super().save()

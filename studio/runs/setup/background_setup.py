@@ -293,7 +293,6 @@ class _Wanted:
 def _set_up(
     session: Session, source: BackgroundSource, wanted: _Wanted, progress: Progress
 ) -> BackgroundSetup:
-    """`set_up_background` with checked arguments."""
     chosen, tune = wanted.knobs, wanted.tune
     notes: list[str] = []
     model = MASK_SOURCES[source].model

@@ -61,11 +61,9 @@ class SourceTried:
 
     @property
     def worst(self) -> Annotated[float, Field()]:
-        """The score of the worst camera."""
         return min(self.scores.values(), default=0.0)
 
     def in_words(self) -> str:
-        """Its numbers as a sentence."""
         least, border = min(self.agreements.values()), min(self.borders.values())
         words = (
             f"least agreement {least:.2f}, least edge along the border {border:.2f}, score {self.worst:.2f}"

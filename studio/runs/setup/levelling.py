@@ -110,7 +110,6 @@ def use_level_world(session: Session, level: LevelWorld) -> CalibrationChange:
 
 
 def level_calibration(session: Session, level: LevelWorld) -> NewCalibration:
-    """The session's calibration in a levelled world."""
     source = session.manifest.calibration_source
     note = (
         f"The world was levelled by {level.how}: turned by {level.tilted:.1f} degrees, the old origin lies"

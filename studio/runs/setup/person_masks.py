@@ -116,7 +116,6 @@ Followed = tuple[int, Mapping[str, Bytes], Sightings]
 def _follow_all(
     cameras: Sequence[Camera], footage: Footage, threads: ThreadPoolExecutor, progress: Progress
 ) -> Iterator[Followed]:
-    """Each frame once."""
     step = max(1, round(SEARCHED_EVERY * footage.fps))
     follower = _Follower(tuple(cameras), threads, step)
     count, frame = footage.frame_count, 0
@@ -250,7 +249,6 @@ class _Follower:
 
 
 def _each(threads: ThreadPoolExecutor, names: Iterable[str], make: Callable[[str], Made]) -> dict[str, Made]:
-    """What is made of each name, in threads."""
     chosen = list(names)
     return dict(zip(chosen, threads.map(make, chosen), strict=True))
 
@@ -332,5 +330,4 @@ def _beside(one: Crop, expected: Crop) -> bool:
 
 
 def _share_of(seen: Sighting, picture: Bytes) -> float:
-    """Share of the picture that somebody fills."""
     return float((seen.logits > 0.0).mean()) * seen.crop.side**2 / (picture.shape[0] * picture.shape[1])

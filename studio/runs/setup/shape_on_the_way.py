@@ -119,7 +119,6 @@ def session_shape(
 
 
 def can_be_fitted(body: BodyModel) -> bool:
-    """Whether a body has named radii."""
     return body.definition is not None and "radius" in dimension_kinds(body.definition).values()
 
 

@@ -71,7 +71,6 @@ def check_all_cameras(session: Session, strokes: Sequence[Stroke]) -> None:
 
 
 def unpainted_cameras(session: Session, strokes: Sequence[Stroke]) -> list[str]:
-    """The cameras without a stroke inside."""
     names = [source.name for source in session.manifest.footage.cameras]
     return [name for name in names if first_frame(by_frame(strokes, name)) is None]
 

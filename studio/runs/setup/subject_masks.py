@@ -104,7 +104,6 @@ class WholeMasks:
         }
 
     def close(self) -> None:
-        """Close the files."""
         self.footage.close()
 
 

@@ -300,7 +300,6 @@ def track_step(session: Session) -> StepStatus:
 
 
 def check_step(session: Session) -> StepStatus:
-    """The check of the run that is used."""
     run = run_to_use(session)
     if run is None:
         return StepStatus("check", "blocked", "", "It needs a run that has frames.")

@@ -157,7 +157,6 @@ def trials_of(source: Path) -> dict[str, Layout]:
 
 
 def is_caliscope(source: Path) -> bool:
-    """Whether a folder is a Caliscope workspace."""
     marks = (
         source / "calibration" / "extrinsic",
         source / "calibration" / "intrinsic",
@@ -259,7 +258,6 @@ def entries(folder: Path) -> tuple[Path, ...]:
 
 
 def entries_of_first(source: Path, places: tuple[str, ...]) -> tuple[Path, ...]:
-    """The entries of the first place that has any."""
     return next((inside for place in places if (inside := entries(source / place))), ())
 
 
@@ -273,7 +271,6 @@ def loose_footage(source: Path) -> tuple[Path, ...]:
 
 
 def calibration_folders(source: Path) -> tuple[Path, ...]:
-    """Folders with 'calib' in their name."""
     return tuple(
         folder for folder in sorted(source.iterdir()) if folder.is_dir() and "calib" in folder.name.lower()
     )

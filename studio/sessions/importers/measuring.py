@@ -213,7 +213,6 @@ def common_rate(
 
 
 def different_rates(rates: Mapping[str, float]) -> FootageError:
-    """The error where footage was taken at several rates."""
     words = ", ".join(f"{name}: {rate:g}" for name, rate in rates.items())
     return FootageError(
         f"The videos' frame rates differ ({words}), so frames with one number were taken at different moments.",

@@ -374,7 +374,6 @@ def write_person(
 
 
 def _write_truths(place: Path, plan: SourcePlan, truths: Mapping[str, MarkerMotion]) -> None:
-    """All true motions as TRC."""
     kept = [path for path in plan.truth if path.suffix.lower() not in ANY_WORLD and path.stem not in truths]
     if kept or truths:
         place.mkdir()

@@ -122,11 +122,9 @@ class Training:
         return cls(**words)
 
     def settings(self) -> LearningSettings:
-        """The knobs of learning."""
         return LearningSettings(memory=self.memory, epsilon=self.epsilon, **self.clusters)
 
     def material(self) -> OversamplingSettings:
-        """The knobs of oversampling."""
         return OversamplingSettings(smoothings=self.smoothings)
 
 

@@ -45,7 +45,6 @@ def _label(name: str, clip: str, count: int) -> str:
 
 
 def _with(one: Candidate, clip: str) -> bool:
-    """Whether a candidate tracks a clip."""
     return one.name != GUIDED or clip in WALKS
 
 
