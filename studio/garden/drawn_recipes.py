@@ -359,11 +359,11 @@ def _clothes(rng: np.random.Generator) -> dict[str, Colour]:
     shirt, trousers = _colour(rng, 0.10, 0.75, 0.14), _colour(rng, 0.05, 0.45, 0.10)
     shoes, hair = _colour(rng, 0.05, 0.6, 0.05), rng.uniform(0.05, 0.5) * np.array([1.0, 0.75, 0.5])
     stripes = shirt if rng.random() < 0.5 else _colour(rng, 0.15, 0.75, 0.14)
-    found: dict[str, Colour] = {}
+    colours: dict[str, Colour] = {}
     for name, colour in zip(MATERIALS, (skin, shirt, trousers, shoes, hair, stripes), strict=True):
         values = [round(float(value), 3) for value in np.clip(colour, 0.03, 0.9)]
-        found[name] = (values[0], values[1], values[2])
-    return found
+        colours[name] = (values[0], values[1], values[2])
+    return colours
 
 
 def _colour(rng: np.random.Generator, low: float, high: float, spread: float) -> Array:
@@ -394,7 +394,7 @@ def _cameras(
     inside = np.array(room.half) - OFF_WALL_MM
     middle: Array = 0.5 * (motion.root.min(axis=0) + motion.root.max(axis=0))
     start = float(rng.uniform(0.0, 2.0 * np.pi))
-    found: list[Placed] = []
+    cameras: list[Placed] = []
     for number in range(count):
         angle = start + 2.0 * np.pi * number / count + float(rng.uniform(-TURNED_ASIDE, TURNED_ASIDE))
         towards = np.array([np.cos(angle), np.sin(angle)])
@@ -414,8 +414,8 @@ def _cameras(
             roll_degrees=round(float(rng.normal(0.0, 1.5)), 2),
             distortion=_lens(rng),
         )
-        found.append(_wide_enough(recipe, motion, camera))
-    return tuple(found)
+        cameras.append(_wide_enough(recipe, motion, camera))
+    return tuple(cameras)
 
 
 def _lens(rng: np.random.Generator) -> tuple[float, float, float, float, float]:
@@ -441,7 +441,7 @@ def _wide_enough(recipe: Recipe, motion: PersonMotion, camera: Placed) -> Placed
 
 def _unusual(entries: dict[str, Any], usual: Mapping[str, Any]) -> dict[str, Any]:
     """The entries that differ from the defaults."""
-    found: dict[str, Any] = {}
+    unusual: dict[str, Any] = {}
     for name, value in entries.items():
         known = usual.get(name)
         if is_table(value) and is_table(known) and known:
@@ -450,10 +450,10 @@ def _unusual(entries: dict[str, Any], usual: Mapping[str, Any]) -> dict[str, Any
                 continue
         elif value == known:
             continue
-        found[name] = value
-    if "clips" in found:
-        found["clips"] = [_unusual(entry, _USUAL_CLIP) for entry in found["clips"]]
-    return found
+        unusual[name] = value
+    if "clips" in unusual:
+        unusual["clips"] = [_unusual(entry, _USUAL_CLIP) for entry in unusual["clips"]]
+    return unusual
 
 
 _USUAL_CLIP = {name: value for name, value in msgspec.to_builtins(Clip("")).items() if name != "file"}

@@ -31,9 +31,9 @@ def measure_starts(progress: Progress, starts: int = STARTS) -> dict[str, object
     cold, warm = list[float](), list[float]()
     for _ in range(starts):
         with tempfile.TemporaryDirectory(prefix="studio-bench-") as folder:
-            for found in (cold, warm):
+            for times in (cold, warm):
                 progress(STEP, len(cold) + len(warm), 2 * starts)
-                found.append(_seconds(Path(folder), "first" if found is cold else "second"))
+                times.append(_seconds(Path(folder), "first" if times is cold else "second"))
     progress(STEP, 2 * starts, 2 * starts)
     medians = {"cold_s": statistics.median(cold), "warm_s": statistics.median(warm)}
     return {**medians, "cold": cold, "warm": warm}

@@ -198,12 +198,12 @@ def _stored(run: StoredRun) -> int:
 
 def busy(work: Callable[[], object], rounds: int = ROUNDS) -> float:
     """Seconds of all threads' work on a task in its quickest round; a first one, which compiles, does not count."""
-    found = list[float]()
+    times = list[float]()
     for _ in range(rounds + 1):
         began = time.process_time()
         work()
-        found.append(time.process_time() - began)
-    return min(found[1:])
+        times.append(time.process_time() - began)
+    return min(times[1:])
 
 
 def _of_frames(
@@ -347,8 +347,8 @@ def _of_limbs(sizes: Sequence[int], poses: int = 496) -> Curve:
             problem = likelihood.problem(evidence)
             drawn = body.neutral + 0.02 * rng.normal(size=(poses, limbs))
             works[limbs] = lambda problem=problem, drawn=drawn: problem.log_likelihood(drawn)
-        found = {size: busy(work) for size, work in works.items()}
-    return Curve("limbs", f"{poses} poses weighed", tuple(sizes), tuple(found[size] for size in sizes))
+        seconds = {size: busy(work) for size, work in works.items()}
+    return Curve("limbs", f"{poses} poses weighed", tuple(sizes), tuple(seconds[size] for size in sizes))
 
 
 # ------------------------------------------------------------------ frames and runs that are stored
@@ -438,10 +438,10 @@ def as_json(curves: Sequence[Curve], usual: Mapping[str, float]) -> dict[str, An
     return {"machine": dataclasses.asdict(this_machine()), "curves": rows, "usual_frame": dict(usual)}
 
 
-def table(found: Mapping[str, Any]) -> str:
+def table(document: Mapping[str, Any]) -> str:
     """A row a curve."""
     lines = [f"{'':26}{'from':>10}{'to':>12}{'cost grows':>12}{'exponent':>10}{'memory':>8}"]
-    for row in found["curves"]:
+    for row in document["curves"]:
         memory = "" if row["memory_growth"] is None else f"× {row['memory_growth']:.2f}"
         growth = row["seconds"][-1] / row["seconds"][0]
         sizes = f"{row['sizes'][0]:>10}{row['sizes'][-1]:>12}"
@@ -463,13 +463,13 @@ def main() -> int:
     def report(step: str, done: int, total: int) -> None:
         sys.stderr.write(f"{step}: {done} of {total}\n")
 
-    found = as_json(*measure_growth(Sizes(), report))
-    sys.stdout.write(table(found) + "\n")
+    grown = as_json(*measure_growth(Sizes(), report))
+    sys.stdout.write(table(grown) + "\n")
     if asked.json:
-        asked.json.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+        asked.json.write_text(json.dumps(grown, indent=1) + "\n", encoding="utf-8")
     if asked.document:
-        asked.document.write_text(document(found, asked.machine), encoding="utf-8")
-    return 0 if all(row["holds"] for row in found["curves"]) else 1
+        asked.document.write_text(document(grown, asked.machine), encoding="utf-8")
+    return 0 if all(row["holds"] for row in grown["curves"]) else 1
 
 
 if __name__ == "__main__":

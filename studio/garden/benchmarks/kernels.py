@@ -114,7 +114,7 @@ def run_benchmark(
         "limits_per_second": {name: round(limit) for name, limit in limits.items()},
         "fractions": {name: round(rates[name] / limit, 3) for name, limit in limits.items()},
         "others_evaluations_per_second": {
-            name: round(found) for name, found in rates.items() if name != "edge_region"
+            name: round(measured) for name, measured in rates.items() if name != "edge_region"
         },
         "body": body.name,
         "cameras": len(cameras),
@@ -171,28 +171,28 @@ def weighing_contests(
         "template": TemplateLikelihood(body, cameras, TemplateSettings()).problem(evidence["proximity"]),
         **silhouette_problems(body, cameras, evidence["proximity"]),
     }
-    found = [Contest(name, _weighing(entry, poses), len(poses)) for name, entry in problems.items()]
+    contests = [Contest(name, _weighing(entry, poses), len(poses)) for name, entry in problems.items()]
     if numba.get_num_threads() > 1:
         many = np.concatenate([poses] * 4)
-        found.append(Contest("edge_region_two_threads", _weighing(problem, many), len(many), threads=2))
-    return found
+        contests.append(Contest("edge_region_two_threads", _weighing(problem, many), len(many), threads=2))
+    return contests
 
 
 def silhouette_problems(
     body: BodyModel, cameras: tuple[Camera, ...], evidence: FrameEvidence
 ) -> dict[str, FrameLikelihood]:
     """The weightings with the bidirectional silhouette, at half and at full resolution."""
-    found: dict[str, FrameLikelihood] = {}
+    problems: dict[str, FrameLikelihood] = {}
     for resolution in (HALF, FULL):
         edges = EdgeSilhouetteSettings(silhouette_resolution=resolution)
         three = EdgeRegionSilhouetteSettings(silhouette_resolution=resolution)
-        found[f"edge_silhouette_{resolution}"] = EdgeSilhouetteLikelihood(body, cameras, edges).problem(
+        problems[f"edge_silhouette_{resolution}"] = EdgeSilhouetteLikelihood(body, cameras, edges).problem(
             evidence
         )
-        found[f"edge_region_silhouette_{resolution}"] = EdgeRegionSilhouetteLikelihood(
+        problems[f"edge_region_silhouette_{resolution}"] = EdgeRegionSilhouetteLikelihood(
             body, cameras, three
         ).problem(evidence)
-    return found
+    return problems
 
 
 def limit_contest(problem: EdgeRegionFrameLikelihood, poses: Array) -> Contest:

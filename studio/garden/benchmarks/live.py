@@ -147,7 +147,7 @@ def run_live_benchmark(report: Progress, minutes: float | None = None) -> dict[s
         stages = measure_stages(session, model, report)
         request = live_request(model, seconds)
         watched = track_watched(workspace, session, prepare_run(session, **request), report)
-        found: dict[str, object] = {
+        figures: dict[str, object] = {
             "setting": f"five 320x240 views at {WANTED:g} Hz, {seconds:g} s of video, hulls of depth "
             f"{CHANGES['hull_depth']}, blob fitting, {CHANGES['particles']} particles, {os.cpu_count()} cores",
             "stages": stage_rows(stages),
@@ -160,7 +160,7 @@ def run_live_benchmark(report: Progress, minutes: float | None = None) -> dict[s
         }
         sustained = watched.live.frames_per_second >= WANTED * ENOUGH
         if minutes is not None:
-            return {**found, "sustained": sustained}
+            return {**figures, "sustained": sustained}
         pressed = _pressed(workspace, session, {**request, "name": "pressed", "last": None}, report)
         alone_run = prepare_run(session, **dict[str, Any](request, name="alone"))
         alone = track_watched(workspace, session, alone_run, report, scene=False)
@@ -172,7 +172,7 @@ def run_live_benchmark(report: Progress, minutes: float | None = None) -> dict[s
             lambda run, cameras: ReplayClock(FASTER * run.record.fps, run.record.last, cameras),
         )
     return {
-        **found,
+        **figures,
         "scene_open_pressed": pressed.figures(),
         "alone": alone.figures(),
         "at_60_hz": live_figures(fast),

@@ -81,8 +81,8 @@ class StageClock:
     def medians(self, begin: int) -> dict[str, float]:
         """Medians of each stage over the frames from `begin` on, and of whole frames."""
         table = np.array(list(self.spent.values()))[:, begin:]
-        found = dict(zip(self.spent, np.median(table, axis=1).tolist(), strict=True))
-        return found | {"whole frame": float(np.median(table.sum(axis=0)))}
+        medians = dict(zip(self.spent, np.median(table, axis=1).tolist(), strict=True))
+        return medians | {"whole frame": float(np.median(table.sum(axis=0)))}
 
 
 def measure_stages(session: Session, model: Path, progress: Progress | None = None) -> dict[str, float]:
@@ -135,22 +135,22 @@ def _measured(session: Session, model: Path, progress: Progress | None) -> dict[
     return clock.medians(min(LEARNING, frames // 2))
 
 
-def stage_rows(found: Mapping[str, float]) -> list[dict[str, object]]:
+def stage_rows(medians: Mapping[str, float]) -> list[dict[str, object]]:
     """The stages beside Table 1."""
     paper = {**STAGES, "whole frame": sum(value for value in STAGES.values() if value)}
-    return [{"stage": name, "ms": round(found[name], 2), "paper_ms": paper[name]} for name in found]
+    return [{"stage": name, "ms": round(medians[name], 2), "paper_ms": paper[name]} for name in medians]
 
 
-def live_figures(found: LiveSummary) -> dict[str, object]:
+def live_figures(summary: LiveSummary) -> dict[str, object]:
     return {
-        "frames_per_second": round(found.frames_per_second, 2),
-        "tracked": len(found.tracked),
-        "dropped": len(found.dropped),
-        "dropped_share": round(found.dropped_share, 4),
+        "frames_per_second": round(summary.frames_per_second, 2),
+        "tracked": len(summary.tracked),
+        "dropped": len(summary.dropped),
+        "dropped_share": round(summary.dropped_share, 4),
         "latency_ms": {
-            "median": round(found.latency(0.5), 1),
-            "p95": round(found.latency(0.95), 1),
-            "worst": round(found.latency(1.0), 1),
+            "median": round(summary.latency(0.5), 1),
+            "p95": round(summary.latency(0.95), 1),
+            "worst": round(summary.latency(1.0), 1),
         },
     }
 

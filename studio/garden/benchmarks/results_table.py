@@ -109,7 +109,7 @@ def rows_of(document: Mapping[str, Any]) -> list[dict[str, object]]:
     """A row for each of the MEASURES that the document holds. reached : 1 where the aim is, less below it. limit,
     of_limit : what was measured in the same run and the ratio to it, None where there is none.
     """
-    found: list[dict[str, object]] = []
+    rows: list[dict[str, object]] = []
     for measure in MEASURES:
         figure = _at(document, measure.figure)
         if figure is None:
@@ -120,7 +120,7 @@ def rows_of(document: Mapping[str, Any]) -> list[dict[str, object]]:
         ratio = judged / measure.aim if measure.better == MORE else measure.aim / max(judged, 1e-9)
         if measure.better == LESS and judged <= measure.aim:
             ratio = 1.0
-        found.append(
+        rows.append(
             {
                 "name": measure.name,
                 "value": round(value, 3),
@@ -133,7 +133,7 @@ def rows_of(document: Mapping[str, Any]) -> list[dict[str, object]]:
                 "of_limit": None if of_limit is None else round(of_limit, 3),
             }
         )
-    return found
+    return rows
 
 
 def in_lines(rows: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -206,9 +206,9 @@ def _processor() -> str:
 
 
 def _at(document: Mapping[str, Any], keys: Sequence[str]) -> float | None:
-    found: Any = document
+    value: Any = document
     for key in keys:
-        if not is_table(found) or key not in found:
+        if not is_table(value) or key not in value:
             return None
-        found = found[key]
-    return float(found)
+        value = value[key]
+    return float(value)

@@ -8,9 +8,9 @@ MACHINES, CORES = (1, 10, 100), 16
 """Machines that are reckoned with, and cores of each."""
 
 
-def document(found: Mapping[str, Any], machine: str = "") -> str:
+def document(measured: Mapping[str, Any], machine: str = "") -> str:
     """The page. found : as `growth.as_json` makes it. machine : it in words; default: its cores and system."""
-    about, usual = found["machine"], found["usual_frame"]
+    about, usual = measured["machine"], measured["usual_frame"]
     words = machine or f"a machine with {about['cores']} cores ({about['system']})"
     frames = HOURS * 3600 * FPS
     hours = usual["busy"] * frames / 3600
@@ -23,7 +23,7 @@ def document(found: Mapping[str, Any], machine: str = "") -> str:
             "",
             "| size | from | to | cost of | grows | exponent | memory |",
             "|---|---|---|---|---|---|---|",
-            *(_curve(row) for row in found["curves"]),
+            *(_curve(row) for row in measured["curves"]),
             "",
             "An exponent is the slope of log time over log size at the upper half of the sizes (asked: at most 1.05);"
             " times are of all threads together. Memory is the peak of the largest size over that of the one before.",

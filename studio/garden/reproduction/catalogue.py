@@ -72,12 +72,12 @@ RESERVED = (ALL, "list", "footage", "trials")
 
 def by_name(experiments: Iterable[Experiment]) -> dict[str, Experiment]:
     """Experiments by name. Raises ValueError for duplicate or reserved names."""
-    found: dict[str, Experiment] = {}
+    named: dict[str, Experiment] = {}
     for experiment in experiments:
-        if experiment.name in (*found, *RESERVED):
+        if experiment.name in (*named, *RESERVED):
             raise ValueError(f"The name '{experiment.name}' is taken.")
-        found[experiment.name] = experiment
-    return found
+        named[experiment.name] = experiment
+    return named
 
 
 _LISTED = by_name(experiment for module in MODULES for experiment in module.EXPERIMENTS)

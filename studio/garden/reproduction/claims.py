@@ -79,29 +79,29 @@ def ratio(name: str, ours: Sequence[float], theirs: Sequence[float], claim: str 
     (no larger than 1 by that margin), LOWER (`beyond` 1), or none.
     """
     paper = 1.0 if claim in (EQUAL, NO_WORSE) else None
-    found = ratio_number(name, ours, theirs, "×", paper=paper, better="" if claim == EQUAL else "lower")
+    number = ratio_number(name, ours, theirs, "×", paper=paper, better="" if claim == EQUAL else "lower")
     if claim == LOWER:
-        return beyond(found, 1.0, LOWER)
-    enough = paper is None or found.seeds >= FEWEST_SEEDS or found.verdict != "reproduced"
-    return found if enough else replace(found, verdict="undecided")
+        return beyond(number, 1.0, LOWER)
+    enough = paper is None or number.seeds >= FEWEST_SEEDS or number.verdict != "reproduced"
+    return number if enough else replace(number, verdict="undecided")
 
 
-def beyond(found: Number, bound: float, side: str) -> Number:
+def beyond(number: Number, bound: float, side: str) -> Number:
     """The number with the verdict on the claim that it is lower (or higher) than a bound: reproduced where the whole
     interval is, not reproduced where none of it is by more than the margin of equality, else undecided.
     """
-    if not (math.isfinite(found.low) and math.isfinite(found.high)):
-        return replace(found, better=side, verdict="not reproduced")
+    if not (math.isfinite(number.low) and math.isfinite(number.high)):
+        return replace(number, better=side, verdict="not reproduced")
     lower_end, upper_end = equal_to(bound)
-    shown = found.high < bound if side == LOWER else found.low > bound
-    denied = found.low >= lower_end if side == LOWER else found.high <= upper_end
+    shown = number.high < bound if side == LOWER else number.low > bound
+    denied = number.low >= lower_end if side == LOWER else number.high <= upper_end
     verdict = "reproduced" if shown else "not reproduced" if denied else "undecided"
-    return replace(found, better=side, verdict=verdict)
+    return replace(number, better=side, verdict=verdict)
 
 
-def beside(found: Number) -> Number:
+def beside(number: Number) -> Number:
     """The number beside the paper's, without a verdict: no claim rests on it."""
-    return replace(found, verdict="answered")
+    return replace(number, verdict="answered")
 
 
 def geometric_mean(values: Any, axis: int = -1) -> Any:  # noqa: ANN401 - what NumPy's own mean takes and gives

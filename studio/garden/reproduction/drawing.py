@@ -92,7 +92,7 @@ def table_over(
     def cell(value: Any) -> Any:  # noqa: ANN401
         return round(value, 1) if isinstance(value, float) else value
 
-    rows = ((name, *(cell(of(found)) for of in columns.values())) for name, found in groups.items())
+    rows = ((name, *(cell(of(entries)) for of in columns.values())) for name, entries in groups.items())
     return Table(title, (head, *columns), tuple(rows))
 
 

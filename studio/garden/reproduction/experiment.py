@@ -110,10 +110,10 @@ def grouped(outcomes: Iterable[Outcome], made: Callable[..., T] = dict) -> dict[
     """The measurements by the label of `each_seed` in the order of the trials, seeds in order. made : type made from
     the measured fields.
     """
-    found: dict[str, list[T]] = {}
+    groups: dict[str, list[T]] = {}
     for outcome in outcomes:
-        found.setdefault(group_of(outcome.trial), []).append(made(**outcome.measured))
-    return found
+        groups.setdefault(group_of(outcome.trial), []).append(made(**outcome.measured))
+    return groups
 
 
 def measured(outcomes: Iterable[Outcome], name: str) -> NDArray[np.float64]:

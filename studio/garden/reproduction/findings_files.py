@@ -80,11 +80,11 @@ def write_overview(out: Path, experiments: Iterable[Experiment], software: str, 
 
     Raises OSError, and SessionError for findings that cannot be read.
     """
-    found = [read_findings(out, experiment.name) for experiment in experiments]
+    documents = [read_findings(out, experiment.name) for experiment in experiments]
     results = {
         "software": software,
         "date": date,
-        "experiments": [document for document in found if document is not None],
+        "experiments": [document for document in documents if document is not None],
     }
     write_text(out / RESULTS, json.dumps(results, allow_nan=False) + "\n")
     write_text(out / SUMMARY, summary_markdown(results))

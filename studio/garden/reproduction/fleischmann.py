@@ -176,9 +176,9 @@ def _fig_3(groups: Groups) -> Iterator[Part]:
     yield SETTINGS
 
 
-def _lasting(found: Iterable[Spell], fps: int) -> tuple[float, float]:
+def _lasting(spells: Iterable[Spell], fps: int) -> tuple[float, float]:
     """The median and the longest time of spells, ms."""
-    times = [1000.0 * spell.frames / fps for spell in found]
+    times = [1000.0 * spell.frames / fps for spell in spells]
     return float(np.median(times)), max(times)
 
 
@@ -198,22 +198,22 @@ def _figs_4_5(groups: Groups) -> Iterator[Part]:
         back = number("spells that end with the limb found again, 20 frames a second", again, "of all")
         yield beyond(back, HALF, HIGHER)
     rows: list[tuple[Plain, ...]] = []
-    for fps, found in every.items():
-        for limb, count in sorted(Counter(spell.limb for spell in found).items()):
-            of_limb = [spell for spell in found if spell.limb == limb]
+    for fps, of_rate in every.items():
+        for limb, count in sorted(Counter(spell.limb for spell in of_rate).items()):
+            of_limb = [spell for spell in of_rate if spell.limb == limb]
             returned = sum(spell.found_again for spell in of_limb)
             rows.append((fps, limb, count, returned, *map(round, _lasting(of_limb, fps))))
     heads = ("frames a second", "limb", "spells, all runs", "found again", "median (ms)", "longest (ms)")
     yield Table("Limbs lost", heads, tuple(rows))
-    limbs = sorted({spell.limb for found in every.values() for spell in found})
+    limbs = sorted({spell.limb for of_rate in every.values() for spell in of_rate})
     series = [
         Series(
             NAMES[fps],
             places(len(limbs)),
-            tuple(sum(spell.limb == limb for spell in found) / len(by_run[fps]) for limb in limbs),
+            tuple(sum(spell.limb == limb for spell in of_rate) / len(by_run[fps]) for limb in limbs),
             group=NAMES[fps],
         )
-        for fps, found in every.items()
+        for fps, of_rate in every.items()
     ]
     yield bar_chart("How often limbs are lost", "limb", "spells a run", series, limbs)
     yield curves("Error at 20 frames a second", {NAMES[20]: groups[NAMES[20]]}, 20)
@@ -376,8 +376,8 @@ def _prior_claims(groups: Groups) -> Iterator[Part]:
         claim = LOWER if name.startswith(f"{SWARM.name},") else ""
         yield error_ratio(f"{name}: error with over without priors", ours, theirs, claim)
     for name in names:
-        for kept, found in zip(runs, (groups[f"{name}, {kept}"] for kept in runs), strict=True):
-            broken = [100.0 * run.impossible_frames / len(run.frames) for run in found]
+        for kept, tracked in zip(runs, (groups[f"{name}, {kept}"] for kept in runs), strict=True):
+            broken = [100.0 * run.impossible_frames / len(run.frames) for run in tracked]
             yield number(f"{name}, {kept}: frames whose pose breaks a prior", broken, "%")
     yield (
         "The claim is about the swarm. A prior can help only where poses break it without: the frames whose reported "
@@ -464,17 +464,17 @@ class TimedFrameLikelihood:
 
     def fitness(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
         began = time.perf_counter()
-        found = self.problem.fitness(poses, stage)
+        values = self.problem.fitness(poses, stage)
         self.fitness_seconds += time.perf_counter() - began
         self.batches.append(poses.copy())
-        return found
+        return values
 
     def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
         """Whether the poses are possible, timed."""
         began = time.perf_counter()
-        found = self.problem.feasible(poses, limbs_apart)
+        possible = self.problem.feasible(poses, limbs_apart)
         self.priors_seconds += time.perf_counter() - began
-        return found
+        return possible
 
 
 def trials(scale: Scale) -> tuple[Trial, ...]:

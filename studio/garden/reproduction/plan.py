@@ -85,11 +85,11 @@ def footage_of(experiment: Experiment, trial: Trial) -> tuple[str, ...]:
 
 def each_once(planned: Iterable[PlannedExperiment]) -> dict[str, TrialJob]:
     """All jobs by key, in the order in which they were planned."""
-    found: dict[str, TrialJob] = {}
+    jobs: dict[str, TrialJob] = {}
     for entry in planned:
         for job in entry.jobs:
-            found.setdefault(job.key, job)
-    return found
+            jobs.setdefault(job.key, job)
+    return jobs
 
 
 def recipe_digest(name: str) -> str:

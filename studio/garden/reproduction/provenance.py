@@ -17,10 +17,10 @@ def commit() -> str:
     CHANGED follows where a file of the package differs from it.
     """
     package = package_folder()
-    found = _git(package, "rev-parse", f"--short={DIGITS}", "HEAD")
-    if not found or _git(package, "ls-files", "--error-unmatch", "__init__.py") is None:
+    digits = _git(package, "rev-parse", f"--short={DIGITS}", "HEAD")
+    if not digits or _git(package, "ls-files", "--error-unmatch", "__init__.py") is None:
         return ""
-    return found + (CHANGED if _git(package, "status", "--porcelain", "--", ".") else "")
+    return digits + (CHANGED if _git(package, "status", "--porcelain", "--", ".") else "")
 
 
 def _git(folder: Path, *words: str) -> str | None:

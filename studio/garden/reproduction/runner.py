@@ -235,16 +235,16 @@ def conclude(planned: PlannedExperiment, kept: Mapping[str, KeptOutcome]) -> Doc
 
 def _findings(planned: PlannedExperiment, outcomes: list[KeptOutcome]) -> Findings:
     """The experiment's findings. Raises the errors of its conclusion, and StudioError for an unknown verdict."""
-    found = planned.experiment.conclude(
+    findings = planned.experiment.conclude(
         [
             Outcome(Trial(trial.label, job.arguments), outcome.measured or {})
             for trial, job, outcome in zip(planned.trials, planned.jobs, outcomes, strict=True)
         ]
     )
-    for verdict in (found.verdict, *(number.verdict for number in found.numbers)):
+    for verdict in (findings.verdict, *(number.verdict for number in findings.numbers)):
         if verdict not in VERDICTS:
             raise StudioError(f"'{verdict}' is not a verdict.", f"Use one of {', '.join(VERDICTS)}.")
-    return found
+    return findings
 
 
 def _taken(out: Path) -> ProcessLock:

@@ -72,7 +72,7 @@ def tracked_experiment(
         return tuple(line.trial(seed) for line in lines(scale.quick) for seed in scale.seeds)
 
     footage = tuple(dict.fromkeys(line.footage for line in lines(False)))
-    return listed(name, trials, measure_tracking, lambda found: shown(by_group(found)), footage=footage)
+    return listed(name, trials, measure_tracking, lambda outcomes: shown(by_group(outcomes)), footage=footage)
 
 
 def by_group(outcomes: Sequence[Outcome]) -> dict[str, list[Tracked]]:

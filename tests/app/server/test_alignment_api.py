@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 from nudged_camera import NUDGED, make_nudged_session
-from waiting import PATIENCE
 from web_doubles import Studio
 
 from studio.operations import cameras
@@ -29,17 +28,6 @@ def session(made: Path, studio: Studio) -> Session:
     return Session(shutil.copytree(made, studio.workspace.root / "nudged"))
 
 
-def ended(studio: Studio) -> dict:
-    """How measuring ended."""
-    deadline = time.monotonic() + PATIENCE
-    while time.monotonic() < deadline:
-        job = studio.client.get(PLACE).json()["job"]
-        if job is not None and job["state"] not in ("queued", "running", "cancelling"):
-            return job
-        time.sleep(0.02)
-    raise AssertionError("measuring did not end")
-
-
 def calibration_why(studio: Studio) -> str:
     """What the guided set-up says of the calibration."""
     steps = studio.client.get("/api/sessions/nudged/way").json()["steps"]
@@ -53,7 +41,7 @@ def test_cameras_are_measured_turned_and_turned_back(studio: Studio, session: Se
     response = studio.client.get(PLACE).json()
     assert (response["possible"], response["job"], response["turned"]) == (True, None, False)
     assert studio.client.post(PLACE, json={}).status_code == 202
-    job = ended(studio)
+    job = studio.ended(PLACE, "job")
     assert job["state"] == "done", job
     lines = {line["camera"]: line for line in job["cameras"]}
     assert lines[NUDGED]["after_px"] < 0.4 * lines[NUDGED]["before_px"]
@@ -73,7 +61,7 @@ def test_cameras_are_measured_turned_and_turned_back(studio: Studio, session: Se
 def test_what_was_measured_of_another_calibration_is_not_used(studio: Studio, session: Session) -> None:
     assert studio.client.post(f"{PLACE}/keep").status_code == 404
     studio.client.post(PLACE, json={"frames": [0, 1, 2, 3, 4, 5]})
-    assert ended(studio)["state"] == "done"
+    assert studio.ended(PLACE, "job")["state"] == "done"
     other = make_nudged_session(studio.workspace.root / "other", degrees=3.0)
     shutil.copyfile(other.path / CAMERAS_PATH, session.path / CAMERAS_PATH)
     assert studio.client.get(PLACE).json()["job"] is None
@@ -94,10 +82,10 @@ def test_measuring_is_cancelled_and_fails_in_words(
     assert studio.client.post(PLACE, json={}).status_code == 202
     assert studio.client.post(PLACE, json={}).json()["code"] == "run"
     studio.client.delete(PLACE)
-    assert ended(studio)["state"] == "cancelled"
+    assert studio.ended(PLACE, "job")["state"] == "cancelled"
     monkeypatch.undo()
     studio.client.post(PLACE, json={"frames": [0]})
-    failed = ended(studio)
+    failed = studio.ended(PLACE, "job")
     assert failed["state"] == "failed"
     assert "Too few silhouettes" in failed["message"]
     assert studio.client.get("/api/sessions/take1/alignment").json()["possible"]

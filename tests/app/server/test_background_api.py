@@ -25,16 +25,6 @@ from studio.sessions.stroke_files import write_strokes
 PLACE = "/api/sessions/take1"
 
 
-def ended(studio: Studio, place: str = PLACE) -> dict:
-    """The set-up's state when it has ended."""
-    deadline = time.monotonic() + PATIENCE
-    while time.monotonic() < deadline:
-        job = studio.client.get(f"{place}/background").json()["job"]
-        if job["state"] not in ("queued", "running", "cancelling"):
-            return job
-    raise AssertionError("the set-up did not end")
-
-
 def plate_upload(studio: Studio, name: str, picture: np.ndarray) -> str:
     """An upload of one picture."""
     identifier = studio.client.post("/api/uploads").json()["identifier"]
@@ -54,7 +44,7 @@ def test_the_median_is_set_up_and_said(studio: Studio) -> None:
     assert {"mask_threshold", "background_model"} <= set(before["settings"])
     begun = studio.client.post(f"{PLACE}/background", json={"source": "median", "tune": False})
     assert begun.status_code == 202
-    assert ended(studio)["state"] == "done"
+    assert studio.ended(f"{PLACE}/background", "job")["state"] == "done"
     after = studio.client.get(f"{PLACE}/background").json()
     assert after["source"] == "median"
     assert after["own"] == {"background_model": "median"}
@@ -65,7 +55,7 @@ def test_a_person_is_looked_for_and_nobody_found(studio: Studio) -> None:
     assert "person" in before["possible"]
     assert "masks" not in before["possible"]
     assert studio.client.post(f"{PLACE}/background", json={"source": "person"}).status_code == 202
-    job = ended(studio)
+    job = studio.ended(f"{PLACE}/background", "job")
     assert job["state"] == "failed"
     assert "No camera sees a person" in job["message"]
     after = studio.client.get(f"{PLACE}/background").json()
@@ -100,7 +90,7 @@ def test_progress_cancel_and_a_second_one_at_once(studio: Studio, monkeypatch: p
     again = studio.client.post(f"{PLACE}/background", json={"source": "median"})
     assert again.status_code == 409
     assert studio.client.delete(f"{PLACE}/background").status_code == 202
-    assert ended(studio)["state"] == "cancelled"
+    assert studio.ended(f"{PLACE}/background", "job")["state"] == "cancelled"
 
 
 def test_what_cannot_be_is_refused_in_words(studio: Studio) -> None:
@@ -108,7 +98,7 @@ def test_what_cannot_be_is_refused_in_words(studio: Studio) -> None:
     wrong = studio.client.post(f"{PLACE}/background", json={"source": "median", "knobs": {"mask_x": 1}})
     assert wrong.status_code == 422
     studio.client.post(f"{PLACE}/background", json={"source": "plate"})
-    job = ended(studio)
+    job = studio.ended(f"{PLACE}/background", "job")
     assert job["state"] == "failed"
     assert "has no plate" in job["message"]
 
@@ -119,7 +109,7 @@ def test_a_failure_leaves_backgrounds_as_they_were(studio: Studio, monkeypatch: 
 
     monkeypatch.setattr("studio.runs.setup.background_setup.given_backgrounds", fails)
     studio.client.post(f"{PLACE}/background", json={"source": "median"})
-    assert ended(studio)["message"] == "The clip ends."
+    assert studio.ended(f"{PLACE}/background", "job")["message"] == "The clip ends."
     assert not (studio.workspace.session("take1").path / "evidence.json").exists()
 
 
@@ -188,7 +178,7 @@ def test_strokes_are_painted_tried_kept_and_carried(studio: Studio) -> None:
     assert (
         studio.client.post(f"{here}/background", json={"source": "strokes", "tune": False}).status_code == 202
     )
-    assert ended(studio, here)["state"] == "done"
+    assert studio.ended(f"{here}/background", "job")["state"] == "done"
     after = studio.client.get(f"{here}/background").json()
     assert after["source"] == "strokes"
     assert "best" in after["possible"]
@@ -222,11 +212,11 @@ def test_one_of_several_is_chosen_by_where_he_stands(studio: Studio) -> None:
     assert "subject" in before["possible"]
     nobody = studio.client.post(f"{place}/background", json={"source": "subject"})
     assert nobody.status_code == 202
-    assert "Nobody was chosen" in ended(studio, place)["message"]
+    assert "Nobody was chosen" in studio.ended(f"{place}/background", "job")["message"]
     chosen = min(seen, key=lambda one: abs(one["at"][0] - made.places()[1][0]))
     request = {"source": "subject", "subject_at": chosen["at"]}
     assert studio.client.post(f"{place}/background", json=request).status_code == 202
-    job = ended(studio, place)
+    job = studio.ended(f"{place}/background", "job")
     assert job["state"] == "done", job
     assert job["quality"]["subjects"] == 1
     assert studio.client.get(f"{place}/background").json()["source"] == "subject"

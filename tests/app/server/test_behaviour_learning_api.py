@@ -1,12 +1,10 @@
 """Models learnt over the API: from runs and uploads, with progress, one at a time, cancelled and refused in words."""
 
 import io
-import time
 import zipfile
 
 import pytest
 from swaying_person import swaying
-from waiting import PATIENCE
 from web_doubles import Studio
 
 from studio.foundations.knobs import knobs_of
@@ -24,16 +22,6 @@ def uploaded(studio: Studio, name: str, content: bytes) -> str:
     answer = studio.client.put(f"/api/uploads/{identifier}/files", params={"path": name}, content=content)
     assert answer.status_code == 200, answer.text
     return identifier
-
-
-def ended(studio: Studio) -> dict:
-    """How it stands when it is over."""
-    deadline = time.monotonic() + PATIENCE
-    while time.monotonic() < deadline:
-        response = studio.client.get("/api/learning").json()["progress"]
-        if response["state"] not in ("queued", "running", "cancelling"):
-            return response
-    raise AssertionError("the learning did not end")
 
 
 def begin(studio: Studio, **wish: object):
@@ -62,7 +50,7 @@ def test_uploaded_motion_becomes_a_model(studio: Studio, tmp_path, archive: bool
     answer = begin(studio, upload=upload, settings=FEW)
     assert answer.status_code == 202, answer.text
     assert begin(studio, name="other", sources=["walk"]).status_code == 409, "one at a time"
-    response = ended(studio)
+    response = studio.ended("/api/learning", "progress")
     assert response["state"] == "done", response
     (line,) = studio.client.get("/api/behaviours").json()["models"]
     assert (line["name"], line["body"], line["memory"]) == ("sway", "human31", 3)
@@ -79,7 +67,7 @@ def test_uploaded_motion_becomes_a_model(studio: Studio, tmp_path, archive: bool
 def test_what_goes_wrong_inside_is_reported_in_words(studio: Studio, tracked: StoredRun) -> None:
     answer = begin(studio, sources=["take1/first"])
     assert answer.status_code == 202, answer.text
-    response = ended(studio)
+    response = studio.ended("/api/learning", "progress")
     assert response["state"] == "failed"
     assert "take1/first" in response["message"]
     assert "frames" in response["message"] + response["hint"]
@@ -90,12 +78,12 @@ def test_cancelled_nothing_is_kept(studio: Studio) -> None:
     assert studio.client.delete("/api/learning").status_code == 404
     assert begin(studio, sources=["walk"]).status_code == 202
     assert studio.client.delete("/api/learning").status_code == 202
-    assert ended(studio)["state"] == "cancelled"
+    assert studio.ended("/api/learning", "progress")["state"] == "cancelled"
     folder = models_folder(studio.workspace.root)
     assert not folder.is_dir() or not list(folder.iterdir())
     assert begin(studio, sources=["walk"]).status_code == 202, "and another one can begin"
     studio.client.delete("/api/learning")
-    ended(studio)
+    studio.ended("/api/learning", "progress")
 
 
 @pytest.mark.parametrize(

@@ -55,18 +55,7 @@ def solved(studio: Studio, wish: dict, session: str = "fresh") -> dict:
     """The state of a calibration from boards when it has ended."""
     begun = studio.client.post(f"/api/sessions/{session}/calibration/solve", json=wish)
     assert begun.status_code == 202, begun.text
-    return ended_calibration(studio, begun.json())
-
-
-def ended_calibration(studio: Studio, begun: dict) -> dict:
-    """The state of a calibration when it has ended."""
-    deadline = time.monotonic() + PATIENCE
-    while time.monotonic() < deadline:
-        response = studio.client.get(f"/api/calibrations/{begun['identifier']}").json()
-        if response["state"] not in ("queued", "running", "cancelling"):
-            return response
-        time.sleep(0.05)
-    raise AssertionError("the calibration did not end")
+    return studio.ended(f"/api/calibrations/{begun.json()['identifier']}")
 
 
 @pytest.mark.slow
@@ -78,7 +67,7 @@ def test_a_tilted_world_is_levelled_as_a_proposal(studio: Studio) -> None:
     assert "tilted-world" in {one["code"] for one in studio.client.get(here).json()["present"]["findings"]}
     begun = studio.client.post(f"{here}/level", json={})
     assert begun.status_code == 202, begun.text
-    ended = ended_calibration(studio, begun.json())
+    ended = studio.ended(f"/api/calibrations/{begun.json()['identifier']}")
     assert ended["state"] == "done", ended
     proposal = studio.client.get(f"{here}/proposals/{ended['proposal']}").json()
     assert proposal["findings"] == []

@@ -12,20 +12,10 @@ from studio.sessions.stored_run import StoredRun
 RUN = "/api/sessions/take1/runs/first"
 
 
-def finished(studio: Studio, identifier: str) -> dict:
-    """The state of an export once it is no longer running."""
-    for _ in range(600):
-        response = studio.client.get(f"/api/exports/{identifier}").json()
-        if response["state"] not in ("queued", "running", "cancelling"):
-            return response
-        time.sleep(0.05)
-    raise AssertionError("the export never ended")
-
-
 def exported(studio: Studio, form: str, **options: object) -> dict:
     answer = studio.client.post(f"{RUN}/exports", json={"format": form, "options": options})
     assert answer.status_code == 202, answer.text
-    return finished(studio, answer.json()["identifier"])
+    return studio.ended(f"/api/exports/{answer.json()['identifier']}")
 
 
 def test_choices_say_what_opens_each_format(studio: Studio) -> None:
@@ -124,7 +114,7 @@ def test_a_run_without_frames_has_nothing_to_export(studio: Studio, tracked: Sto
     made = studio.client.post("/api/sessions/take1/runs", json={"name": "fresh"})
     assert made.status_code == 201, made.text
     answer = studio.client.post("/api/sessions/take1/runs/fresh/exports", json={"format": "csv"})
-    response = finished(studio, answer.json()["identifier"])
+    response = studio.ended(f"/api/exports/{answer.json()['identifier']}")
     assert response["state"] == "failed"
     assert "it has none" in response["message"]
 
@@ -144,7 +134,7 @@ def test_an_export_can_be_cancelled(
     listed = studio.client.get(f"{RUN}/exports").json()
     assert [entry["identifier"] for entry in listed["running"]] == [begun["identifier"]]
     assert studio.client.delete(f"/api/exports/{begun['identifier']}").status_code == 202
-    assert finished(studio, begun["identifier"])["state"] == "cancelled"
+    assert studio.ended(f"/api/exports/{begun['identifier']}")["state"] == "cancelled"
     assert list((tracked.folder / "exports").iterdir()) == []
 
 

@@ -24,15 +24,6 @@ FOUND = Synchrony(
 )  # fmt: skip
 
 
-def ended(studio: Studio) -> dict:
-    deadline = time.monotonic() + PATIENCE
-    while time.monotonic() < deadline:
-        response = studio.client.get(SYNCHRONY).json()
-        if response["state"] not in ("queued", "running", "cancelling"):
-            return response
-    raise AssertionError("the estimate did not end")
-
-
 def test_the_footage_as_it_is(studio: Studio) -> None:
     response = studio.client.get(HERE).json()
     assert (response["frame_count"], response["fps"], response["stale_runs"]) == (4, 25.0, [])
@@ -97,7 +88,7 @@ def test_an_estimate_is_shown_and_not_applied(studio: Studio, monkeypatch: pytes
     monkeypatch.setattr(footage, "synchrony_of", estimate)
     assert studio.client.get(SYNCHRONY).json() is None
     assert studio.client.post(SYNCHRONY, json={"within": 2.0}).status_code == 202
-    response = ended(studio)
+    response = studio.ended(SYNCHRONY)
     assert (response["state"], response["offsets"], response["sure"]) == (
         "done",
         {"cam1": 0, "cam2": 3},
@@ -112,7 +103,7 @@ def test_an_estimate_is_shown_and_not_applied(studio: Studio, monkeypatch: pytes
 
 def test_a_real_estimate_of_too_few_frames_says_why(studio: Studio) -> None:
     studio.client.post(SYNCHRONY)
-    response = ended(studio)
+    response = studio.ended(SYNCHRONY)
     assert response["state"] == "failed"
     assert "Camera cam1 has 4 frames" in response["message"]
     assert response["hint"]
@@ -133,7 +124,7 @@ def test_an_estimate_can_be_stopped(studio: Studio, monkeypatch: pytest.MonkeyPa
     assert begun.wait(PATIENCE)
     studio.client.delete(SYNCHRONY)
     stopped.set()
-    response = ended(studio)
+    response = studio.ended(SYNCHRONY)
     assert (response["state"], response["code"]) == ("cancelled", "cancelled")
 
 

@@ -21,17 +21,6 @@ def card(studio: Studio, name: str) -> dict:
     return next(one for one in studio.client.get("/api/gallery").json()["cards"] if one["name"] == name)
 
 
-def done(studio: Studio, name: str) -> dict:
-    state: dict = {}
-
-    def is_over() -> bool:
-        state.update(studio.client.get(f"/api/gallery/{name}").json())
-        return state["state"] in ("done", "failed", "cancelled")
-
-    until(is_over, 120.0)
-    return state
-
-
 def test_every_card_can_be_opened_made_or_tells_where_its_footage_is(studio: Studio) -> None:
     names = [one["name"] for one in studio.client.get("/api/gallery").json()["cards"]]
     assert names == [one.name for one in CARDS]
@@ -52,11 +41,11 @@ def test_a_bundled_session_is_opened_and_stays(studio: Studio) -> None:
     assert studio.client.get("/api/gallery/planar_arm/picture.jpg").headers["content-type"] == "image/jpeg"
     assert card(studio, "planar_arm")["there"] is False
     assert studio.client.post("/api/gallery/planar_arm").status_code == 202
-    assert done(studio, "planar_arm")["state"] == "done"
+    assert studio.ended("/api/gallery/planar_arm")["state"] == "done"
     assert card(studio, "planar_arm")["there"] is True
     assert studio.client.get("/api/sessions/planar_arm").status_code == 200
     studio.client.post("/api/gallery/planar_arm")
-    assert done(studio, "planar_arm")["state"] == "done"
+    assert studio.ended("/api/gallery/planar_arm")["state"] == "done"
 
 
 def test_what_can_be_rendered_has_a_picture_before_it_is(studio: Studio) -> None:
@@ -87,7 +76,7 @@ def test_a_recipe_is_rendered_as_a_job(
     real = gallery.synthesize
     monkeypatch.setattr(gallery, "synthesize", lambda recipe, into, report, _: real(recipe, into, report, 2))
     assert studio.client.post("/api/gallery/stand").status_code == 202
-    assert done(studio, "stand")["state"] == "done"
+    assert studio.ended("/api/gallery/stand")["state"] == "done"
     assert studio.client.get("/api/sessions/stand").json()["frame_count"] == 2
 
 
@@ -95,7 +84,7 @@ def test_rendering_that_is_cancelled_leaves_nothing(studio: Studio, standing: No
     studio.client.post("/api/gallery/stand")
     until(lambda: studio.client.get("/api/gallery/stand").json()["done"] > 0, 120.0)
     assert studio.client.delete("/api/gallery/stand").status_code == 202
-    assert done(studio, "stand")["state"] == "cancelled"
+    assert studio.ended("/api/gallery/stand")["state"] == "cancelled"
     assert not (studio.workspace.root / "stand").exists()
 
 
@@ -109,14 +98,14 @@ def test_footage_that_is_not_shipped_is_imported_where_there_is_a_copy(
     (videos / "back.mp4").write_bytes(b"no video")
     assert card(studio, "mouse")["missing"] == ""
     studio.client.post("/api/gallery/mouse")
-    assert done(studio, "mouse")["state"] == "failed"
+    assert studio.ended("/api/gallery/mouse")["state"] == "failed"
     assert not (studio.workspace.root / "mouse").exists(), "what failed leaves nothing"
     for name in ("back", "top"):
         with ClipWriter(videos / f"{name}.mp4", (64, 48), 30.0, 12) as clip:
             for level in range(4):
                 clip.add(np.full((48, 64, 3), 40 * level, np.uint8))
     studio.client.post("/api/gallery/mouse")
-    assert done(studio, "mouse")["state"] == "done"
+    assert studio.ended("/api/gallery/mouse")["state"] == "done"
     assert card(studio, "mouse")["there"] is True
     assert studio.client.get("/api/sessions/mouse").json()["frame_count"] == 4
 
@@ -126,7 +115,7 @@ def test_what_cannot_be_made_says_why(
 ) -> None:
     monkeypatch.setenv("STUDIO_REAL_DATA", str(tmp_path / "nowhere"))
     studio.client.post("/api/gallery/mouse")
-    state = done(studio, "mouse")
+    state = studio.ended("/api/gallery/mouse")
     assert state["state"] == "failed"
     assert "sleap-anipose" in state["hint"]
     assert studio.client.post("/api/gallery/nothing").status_code == 404

@@ -1,13 +1,11 @@
 """Importing by path and by upload, through the API."""
 
 import io
-import time
 import zipfile
 from pathlib import Path
 
 import httpx
 import pytest
-from waiting import PATIENCE
 from web_doubles import Studio, cookie_header
 
 from studio.app.server import body_limit, upload_routes
@@ -15,21 +13,11 @@ from studio.foundations.progress import Progress
 from studio.operations import footage
 
 
-def finished(studio: Studio, identifier: str) -> dict:
-    """The import's state when it has ended."""
-    deadline = time.monotonic() + PATIENCE
-    while time.monotonic() < deadline:
-        response = studio.client.get(f"/api/imports/{identifier}").json()
-        if response["state"] not in ("queued", "running", "cancelling"):
-            return response
-    raise AssertionError("the import did not end")
-
-
 def imported(studio: Studio, **wish: object) -> dict:
     """Begin an import and wait for its end."""
     answer = studio.client.post("/api/imports", json=wish)
     assert answer.status_code == 202, answer.text
-    return finished(studio, answer.json()["identifier"])
+    return studio.ended(f"/api/imports/{answer.json()['identifier']}")
 
 
 def uploaded(studio: Studio, files: dict[str, bytes]) -> str:
@@ -203,7 +191,7 @@ def test_an_import_can_be_cancelled(studio: Studio, source: Path, monkeypatch: p
         "identifier"
     ]
     assert studio.client.delete(f"/api/imports/{identifier}").status_code == 202
-    response = finished(studio, identifier)
+    response = studio.ended(f"/api/imports/{identifier}")
     assert response["state"] == "cancelled"
     assert "cancelled" in response["message"]
     assert not (studio.workspace.root / "x").exists()

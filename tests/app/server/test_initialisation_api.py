@@ -37,16 +37,6 @@ def found_in(session: Session, frame: int, body: BodyModel) -> InitialPose:
     )
 
 
-def ended(studio: Studio, identifier: str) -> dict:
-    """The search's state when it has ended."""
-    deadline = time.monotonic() + PATIENCE
-    while time.monotonic() < deadline:
-        response = studio.client.get(f"/api/initialisations/{identifier}").json()
-        if response["state"] not in ("queued", "running", "cancelling"):
-            return response
-    raise AssertionError("the search did not end")
-
-
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> dict[str, object]:
     """The search replaced by an answer; what it was asked."""
@@ -69,7 +59,7 @@ def test_what_is_found_is_reported_kept_and_shown(studio: Studio, session: Sessi
     before = (session.path / "start_pose.csv").read_text()
     answer = studio.client.post("/api/sessions/take1/initialise", json={"frame": 2, "seed": 5})
     assert answer.status_code == 202, answer.text
-    response = ended(studio, answer.json()["identifier"])
+    response = studio.ended(f"/api/initialisations/{answer.json()['identifier']}")
     assert response["state"] == "done", response
     assert (quick["frame"], quick["seed"]) == (2, 5)
     neutral = session.body().neutral
@@ -93,7 +83,7 @@ def test_replacing_keeps_the_old_pose_beside_the_new_one(
 ) -> None:
     before = (session.path / "start_pose.csv").read_text()
     response = studio.client.post("/api/sessions/take1/initialise", json={"replace": True}).json()
-    assert ended(studio, response["identifier"])["file"] == "start_pose.csv"
+    assert studio.ended(f"/api/initialisations/{response['identifier']}")["file"] == "start_pose.csv"
     stored = session.start_pose()
     assert stored is not None
     assert np.allclose(stored, session.body().neutral + 0.25)
@@ -121,7 +111,7 @@ def test_failure_is_reported_in_words(studio: Studio, monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(person, "initialise_session", fails)
     response = studio.client.post("/api/sessions/take1/initialise", json={}).json()
-    response = ended(studio, response["identifier"])
+    response = studio.ended(f"/api/initialisations/{response['identifier']}")
     assert (response["state"], response["message"], response["hint"]) == (
         "failed", "Nothing is to be seen.", "Choose another frame.",
     )  # fmt: skip
@@ -141,5 +131,5 @@ def test_a_search_can_be_cancelled(studio: Studio, monkeypatch: pytest.MonkeyPat
     identifier = studio.client.post("/api/sessions/take1/initialise", json={}).json()["identifier"]
     assert begun.wait(PATIENCE)
     assert studio.client.delete(f"/api/initialisations/{identifier}").status_code == 202
-    assert ended(studio, identifier)["code"] == "cancelled"
+    assert studio.ended(f"/api/initialisations/{identifier}")["code"] == "cancelled"
     assert studio.client.get("/api/initialisations/none").status_code == 404

@@ -1,12 +1,10 @@
 """Poses set by hand, over the API: start poses, drags, mirrors, the search around a pose, the editor in the scene."""
 
 import csv
-import time
 
 import numpy as np
 import pytest
 from toy_session import make_session, true_poses
-from waiting import PATIENCE
 from web_doubles import Studio
 
 from studio.body.catalogue import load_body
@@ -26,16 +24,6 @@ def toy(workspace: Workspace) -> Session:
     session = make_session(workspace.root / "toy")
     prepare_run(session, name="one", start_pose=true_poses()[0])
     return session
-
-
-def ended(studio: Studio, identifier: str) -> dict:
-    deadline = time.monotonic() + PATIENCE
-    while True:
-        state = studio.client.get(f"/api/track-jobs/{identifier}").json()
-        if state["state"] not in ("queued", "running", "cancelling"):
-            return state
-        assert time.monotonic() < deadline, state
-        time.sleep(0.05)
 
 
 def test_a_start_pose_is_kept_and_the_old_one_stays_beside_it(studio: Studio, toy: Session) -> None:
@@ -84,7 +72,7 @@ def test_the_search_around_a_pose_ends_nearer_to_the_truth(studio: Studio, toy: 
     path = f"{TOY}/pose/refine"
     begun = studio.client.post(path, json={"pose": off, "frame": 3})
     assert begun.status_code == 202
-    state = ended(studio, begun.json()["identifier"])
+    state = studio.ended(f"/api/track-jobs/{begun.json()['identifier']}")
     assert state["state"] == "done", state
     assert state["verb"] == "pose"
     assert state["gain"] > 0.0

@@ -18,16 +18,6 @@ from studio.sessions.session import Session
 SESSION = "take1"
 
 
-def ended(studio: Studio, identifier: str) -> dict:
-    """The fit's state when it has ended."""
-    deadline = time.monotonic() + PATIENCE
-    while time.monotonic() < deadline:
-        response = studio.client.get(f"/api/subject-fits/{identifier}").json()
-        if response["state"] not in ("queued", "running", "cancelling"):
-            return response
-    raise AssertionError("the fit did not end")
-
-
 def answer(session: Session, request: FitRequest, **_: object) -> FittedSubject:
     """A subject that somebody fitted."""
     body = session.body()
@@ -45,7 +35,7 @@ def test_a_fit_runs_in_the_background_and_is_kept(studio: Studio, monkeypatch: p
     monkeypatch.setattr(person, "fit_session_subject", answer)
     begun = studio.client.post(f"/api/sessions/{name}/fit-subject", json={"count": 2})
     assert begun.status_code == 202
-    response = ended(studio, begun.json()["identifier"])
+    response = studio.ended(f"/api/subject-fits/{begun.json()['identifier']}")
     assert response["state"] == "done"
     assert response["sizes"][0]["after"] == 425.0
     assert response["file"] == "subject.toml"
@@ -59,7 +49,9 @@ def test_a_failure_and_a_cancellation_are_in_words(studio: Studio, monkeypatch: 
 
     monkeypatch.setattr(person, "fit_session_subject", fails)
     begun = studio.client.post(f"/api/sessions/{SESSION}/fit-subject", json={})
-    assert ended(studio, begun.json()["identifier"])["message"] == "Nothing is to be seen."
+    assert (
+        studio.ended(f"/api/subject-fits/{begun.json()['identifier']}")["message"] == "Nothing is to be seen."
+    )
 
     def waits(*_: object, progress: Callable[[str, int, int], None], **__: object) -> FittedSubject:
         while True:
@@ -70,7 +62,7 @@ def test_a_failure_and_a_cancellation_are_in_words(studio: Studio, monkeypatch: 
     begun = studio.client.post(f"/api/sessions/{SESSION}/fit-subject", json={})
     identifier = begun.json()["identifier"]
     assert studio.client.delete(f"/api/subject-fits/{identifier}").status_code == 202
-    assert ended(studio, identifier)["code"] == "cancelled"
+    assert studio.ended(f"/api/subject-fits/{identifier}")["code"] == "cancelled"
 
 
 def test_a_height_gives_every_length(studio: Studio) -> None:
@@ -143,7 +135,7 @@ def test_a_fit_shows_the_poses_that_it_has(studio: Studio, monkeypatch: pytest.M
         assert studio.client.get(f"{place}/frames/3/views/cam1.jpg").status_code == 404
     finally:
         go.set()
-    assert ended(studio, begun["identifier"])["frames"] == [3, 7]
+    assert studio.ended(f"/api/subject-fits/{begun['identifier']}")["frames"] == [3, 7]
 
 
 def test_all_work_is_listed_and_stopped_by_its_name(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -160,7 +152,7 @@ def test_all_work_is_listed_and_stopped_by_its_name(studio: Studio, monkeypatch:
     assert line["page"] == f"/way?session={SESSION}&step=subject"
     assert studio.client.get("/api/jobs", params={"session": "other"}).json()["jobs"] == []
     assert studio.client.delete(f"/api/jobs/subject/{line['key']}").status_code == 202
-    assert ended(studio, begun["identifier"])["state"] == "cancelled"
+    assert studio.ended(f"/api/subject-fits/{begun['identifier']}")["state"] == "cancelled"
     assert studio.client.delete("/api/jobs/subject/none").status_code == 404
     # Another height makes a fit's answer void.
     assert studio.client.put(f"/api/sessions/{SESSION}/subject", json={"height_mm": 1700}).is_success

@@ -1,12 +1,9 @@
 """Tracks over the API: listed, made in the background, downloaded; runs corrected. On the toy arm, with no doubles."""
 
-import time
-
 import numpy as np
 import pytest
 from toy_session import make_session, true_poses
 from tracked_runs import finish
-from waiting import PATIENCE
 from web_doubles import Studio
 
 from studio.body.forward_kinematics import marker_points
@@ -34,13 +31,7 @@ def begun(studio: Studio, verb: str, wish: dict) -> dict:
     """The job's state when it has ended."""
     answer = studio.client.post(f"{RUN}/{verb}", json=wish)
     assert answer.status_code == 202, answer.text
-    identifier = answer.json()["identifier"]
-    deadline = time.monotonic() + PATIENCE
-    while time.monotonic() < deadline:
-        response = studio.client.get(f"/api/track-jobs/{identifier}").json()
-        if response["state"] not in ("queued", "running", "cancelling"):
-            return response
-    raise AssertionError("it did not end")
+    return studio.ended(f"/api/track-jobs/{answer.json()['identifier']}")
 
 
 def test_refined_smoothed_listed_and_downloaded(studio: Studio, run: StoredRun) -> None:

@@ -7,17 +7,6 @@ import pytest
 from web_doubles import Studio
 
 
-def ended(studio: Studio, identifier: str) -> dict:
-    """An import's state when it has ended."""
-    while (response := studio.client.get(f"/api/imports/{identifier}").json())["state"] in (
-        "queued",
-        "running",
-        "cancelling",
-    ):
-        pass
-    return response
-
-
 def steps(studio: Studio, name: str) -> dict[str, dict]:
     """Step to how it stands."""
     return {one["step"]: one for one in studio.client.get(f"/api/sessions/{name}/way").json()["steps"]}
@@ -82,7 +71,7 @@ def test_footage_is_added_and_the_way_goes_on(studio: Studio, empty: str, source
     wish = {"source": str(folder), "fps": 30}
     answer = studio.client.post(f"/api/sessions/{empty}/footage", json=wish)
     assert answer.status_code == 202, answer.text
-    response = ended(studio, answer.json()["identifier"])
+    response = studio.ended(f"/api/imports/{answer.json()['identifier']}")
     assert response["state"] == "done", response
     found = steps(studio, empty)
     assert found["footage"]["state"] == "done"

@@ -55,11 +55,11 @@ def _name(floor: float) -> str:
 
 def trials(scale: Scale) -> tuple[Trial, ...]:
     """What is learnt with each floor, and what is tracked with it."""
-    found: list[Trial] = []
+    planned: list[Trial] = []
     for floor in QUICK_FLOORS if scale.quick else FLOORS:
         knobs: Mapping[str, Any] = {"cluster_floor": floor}
         base = training_with(MEMORY, scale.quick, knobs)
-        found += each_seed(
+        planned += each_seed(
             f"learnt, {_name(floor)}",
             scale.seeds[:LEARNT_SEEDS],
             # The last frame as of the tracked trials: no more is to be rendered.
@@ -74,7 +74,7 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
         )
         for clip, footage in EXERCISES.items():
             for kind, one, learning in pairs:
-                found += [
+                planned += [
                     follow_trial(
                         one,
                         f"{kind}, {clip}, {_name(floor)}",
@@ -86,7 +86,7 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
                     )
                     for seed in scale.seeds
                 ]
-    return tuple(found)
+    return tuple(planned)
 
 
 @kept_as("caillette.cluster_floor.measure")
@@ -123,13 +123,13 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
         return runs[f"{kind}, {clip}, {name}"]
 
     rows: list[tuple[Any, ...]] = []
-    for name, found in learning.items():
-        yield number(f"clusters, {name}", [one["clusters"] for one in found])
+    for name, learnt in learning.items():
+        yield number(f"clusters, {name}", [one["clusters"] for one in learnt])
         for clip in EXERCISES:
-            inside = [100.0 * one["inside"][clip] for one in found]
+            inside = [100.0 * one["inside"][clip] for one in learnt]
             yield number(f"frames of the {clip} inside a cluster, {name}", inside, "%")
         for place, memory in enumerate(MEMORIES):
-            cells = [[one["rows"][place][key] for one in found] for key in ("states", "train", *EXERCISES)]
+            cells = [[one["rows"][place][key] for one in learnt] for key in ("states", "train", *EXERCISES)]
             rows.append((name, memory, *(round(float(np.mean(cell)), 3) for cell in cells)))
     for kind in (PRINTED, OURS):
         for clip in EXERCISES:
@@ -158,7 +158,8 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
                 f"memory {memory}",
                 places,
                 tuple(
-                    float(np.mean([one["rows"][place][clip] for one in found])) for found in learning.values()
+                    float(np.mean([one["rows"][place][clip] for one in learnt]))
+                    for learnt in learning.values()
                 ),
             )
             for place, memory in enumerate(MEMORIES)

@@ -68,14 +68,14 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
     trained_on = Training.of_plain(arguments["training"])
     lesson = learnt(cache, trained_on)
     model = lesson.model
-    found: dict[str, Any] = {
+    figures: dict[str, Any] = {
         "clusters": model.clusters,
         "frames": lesson.frames,
         "seconds": lesson.seconds,
         "kept": model.reduction.kept,
     }
     if arguments["kind"] != DANCE:
-        return found
+        return figures
     body = load_body(trained_on.body)
     tests = (TEST, TEST_2)[: len(trained_on.sources)]
     poses = {
@@ -83,7 +83,7 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
         TEST_SET: [recorded(cache, name, body).poses for name in tests],
         NEVER: [recorded(cache, UNSEEN, body).poses],
     }
-    found["inside"] = {name: frames_inside(model, own) for name, own in poses.items()}
+    figures["inside"] = {name: frames_inside(model, own) for name, own in poses.items()}
     labels = {name: [model.labels(one) for one in poses[name]] for name in (TEST_SET, NEVER)}
     cells: list[dict[str, Any]] = []
     for epsilon in EPSILONS:
@@ -93,7 +93,7 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
             entropies = {name: other.automaton.entropy(own) for name, own in labels.items()}
             entropies[TRAIN] = other.making.entropy_train
             cells.append({"memory": memory, "epsilon": epsilon, "states": other.states, **entropies})
-    return {**found, "cells": cells}
+    return {**figures, "cells": cells}
 
 
 def frames_inside(model: BehaviourModel, recordings: Sequence[Array]) -> float:

@@ -100,8 +100,8 @@ TWO_TRACKERS = (
 def side_by_side(rows: Iterable[tuple[str, Number, Number]]) -> Table:
     """A line a claim: the number and the verdict with the printed tracker, and with ours."""
 
-    def cells(found: Number) -> tuple[str, str]:
-        return f"{found.ours:.3g} {found.unit} [{found.low:.3g}, {found.high:.3g}]", found.verdict
+    def cells(number: Number) -> tuple[str, str]:
+        return f"{number.ours:.3g} {number.unit} [{number.low:.3g}, {number.high:.3g}]", number.verdict
 
     heads = ("claim", "as printed", "verdict", "ours", "verdict of ours")
     return Table(SIDE_BY_SIDE, heads, tuple((name, *cells(one), *cells(other)) for name, one, other in rows))

@@ -378,8 +378,8 @@ def _spreads(outcomes: Sequence[Outcome]) -> Iterator[Part]:
                     yield ratio(f"{name} over {usual}, {words}, {clip}", ours, theirs, "", of)
         if name != usual:
             for words, of in (("limb direction", limb), ("joint position", position)):
-                found = sign_test(*([of(run) for pair in pairs for run in pair[side]] for side in (0, 1)))
-                cells = (f"{found.better} : {found.worse}", float(f"{found.p:.2g}"))
+                signs = sign_test(*([of(run) for pair in pairs for run in pair[side]] for side in (0, 1)))
+                cells = (f"{signs.better} : {signs.worse}", float(f"{signs.p:.2g}"))
                 tests.append((f"{name} against {usual}, {words}", *cells))
     yield from errors("limb direction, RMS", groups, limb)
     yield from errors("joint position, RMS", groups, position, "mm")

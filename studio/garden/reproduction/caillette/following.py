@@ -125,7 +125,7 @@ def known_problems(
 
     def informed() -> Sequence[FrameLikelihood]:
         memory: Mapping[str, Array] = {}
-        found: list[FrameLikelihood] = []
+        likelihoods: list[FrameLikelihood] = []
         of_frame = problems(cache, session, settings, last)
         for frame, pose in enumerate(true_poses):
             problem = of_frame(frame)
@@ -136,8 +136,8 @@ def known_problems(
                 )
             expecting = problem.expecting(pose[None], memory)
             memory = cast("FittedToPoses", expecting).remembered(pose)
-            found.append(occluded(body, frame, expecting) if covered else Known(expecting))
-        return found
+            likelihoods.append(occluded(body, frame, expecting) if covered else Known(expecting))
+        return likelihoods
 
     key = ("known", session.path, settings.weighting, settings.evidence, last, covered)
     kept = cache.prepared(key, informed)
@@ -391,18 +391,18 @@ def _overlap_of(
 def followed(session: Session, truth: TrueMotion, way: FollowedRun) -> Followed:
     """The errors of a run."""
     body = session.body()
-    found = joint_errors(body, feature_space(body, session.manifest.fps).columns, way.poses, truth)
+    errors = joint_errors(body, feature_space(body, session.manifest.fps).columns, way.poses, truth)
     return Followed(
-        _rounded(found.angle_deg),
-        _rounded(found.limb_deg),
-        _rounded(found.position_mm),
-        found.lost.tolist(),
+        _rounded(errors.angle_deg),
+        _rounded(errors.limb_deg),
+        _rounded(errors.position_mm),
+        errors.lost.tolist(),
         [round(value, 4) for value in way.free],
-        round(float(found.mean_mm.mean()), 4),
+        round(float(errors.mean_mm.mean()), 4),
         way.evaluations,
         round(1000.0 * way.seconds / max(1, len(way.poses) - 1), 3),
         way.resets,
-        _rounded(found.centre_mm),
+        _rounded(errors.centre_mm),
     )
 
 

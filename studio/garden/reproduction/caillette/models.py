@@ -103,22 +103,22 @@ def _group(kind: str, evidence: str, memory: int) -> str:
 def _memory_trials(scale: Scale) -> tuple[Trial, ...]:
     """Both trackers with every memory, with whole and occluded evidence; and each automaton's entropy of the test."""
     last, memories = last_frame(TEST, scale.quick, FRAMES_13), QUICK_MEMORIES if scale.quick else MEMORIES
-    found: list[Trial] = []
+    planned: list[Trial] = []
     for kind, (one, learning) in TRACKERS_13.items():
         for memory in memories:
             model = training_with(memory, scale.quick, learning)
             for evidence in (WHOLE, COVERED):
                 hidden = {"covered": True} if evidence == COVERED else {}
                 name = _group(kind, evidence, memory)
-                found += [
+                planned += [
                     follow_trial(one, name, TEST, seed, last, from_truth=True, training=model, **hidden)
                     for seed in scale.seeds
                 ]
             if kind == OURS:
-                found.append(
+                planned.append(
                     Trial(f"entropy, memory {memory}", {"entropy_of": TEST, "last": last, **model.plain()})
                 )
-    return tuple(found)
+    return tuple(planned)
 
 
 @kept_as("caillette.fig_13.measure")
@@ -273,8 +273,8 @@ def measure_online(arguments: Mapping[str, Any], cache: FootageCache) -> dict[st
 
 
 def _online(outcomes: Sequence[Outcome]) -> Iterator[Part]:
-    found = [outcome.measured for outcome in outcomes]
-    groups = {name: [Followed(**one["passes"][name]) for one in found] for name in PASSES}
+    measured = [outcome.measured for outcome in outcomes]
+    groups = {name: [Followed(**one["passes"][name]) for one in measured] for name in PASSES}
     plain = groups[PLAIN]
     for gate in (GATED, UNGATED, TRUTH):
         second = groups[SECOND.format(gate)]
@@ -287,10 +287,12 @@ def _online(outcomes: Sequence[Outcome]) -> Iterator[Part]:
         yield ratio(name, groups[FIRST.format(gate)], plain)
     yield from errors("limb direction, RMS", groups)
     yield from errors("joint position, RMS", groups, position, "mm")
-    yield number("frames that agree with the pictures", [100.0 * one["agreeing"] for one in found], "%")
+    yield number("frames that agree with the pictures", [100.0 * one["agreeing"] for one in measured], "%")
     for what in ("clusters", "states"):
         for gate in (*GATES, TRUTH):
-            yield number(f"{what} learnt from {gate}", [one[what][gate] - one[what][PLAIN] for one in found])
+            yield number(
+                f"{what} learnt from {gate}", [one[what][gate] - one[what][PLAIN] for one in measured]
+            )
     yield (
         f"A lesson every {INTERVAL} frames, of what was tracked, its errors included: a frame is learnt where it is "
         "well tracked beside the rest of the run and, by default, where its silhouettes agree with the masks. Taught "

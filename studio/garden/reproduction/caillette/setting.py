@@ -102,10 +102,10 @@ NOTHING: Mapping[str, Any] = {}
 
 def training_with(memory: int, quick: bool, learning: Mapping[str, Any] = NOTHING) -> Training:
     """The training set, for an automaton with a memory. learning : further knobs of learning."""
-    found = training(quick)
+    usual = training(quick)
     clusters = {name: value for name, value in learning.items() if name != "epsilon"}
     return dataclasses.replace(
-        found, memory=memory, epsilon=learning.get("epsilon", found.epsilon), clusters=clusters
+        usual, memory=memory, epsilon=learning.get("epsilon", usual.epsilon), clusters=clusters
     )
 
 

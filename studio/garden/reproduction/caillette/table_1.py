@@ -93,18 +93,18 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
     session, last = cache.session(arguments["footage"]), int(arguments["last"])
     truth = true_motion(cache, session, last).poses
     model = learnt(cache, Training.of_plain(arguments["training"])).model
-    found: dict[str, Any] = {"threads": int(numba.get_num_threads())}
+    figures: dict[str, Any] = {"threads": int(numba.get_num_threads())}
     hulls: list[Hull] = []
     for depth in DEPTHS:
         for views in VIEWS:
-            found[f"hull {depth} {views}"], hulls = carving(cache, session, last, depth, views)
-        found[f"voxels {depth}"] = float(np.mean([len(hull.centres) for hull in hulls]))
-        found[f"fit {depth}"] = blob_fitting(session, hulls, truth)
+            figures[f"hull {depth} {views}"], hulls = carving(cache, session, last, depth, views)
+        figures[f"voxels {depth}"] = float(np.mean([len(hull.centres) for hull in hulls]))
+        figures[f"fit {depth}"] = blob_fitting(session, hulls, truth)
         if depth == DEPTHS[1]:
             for count in PARTICLES:
                 spent = searching(session, hulls, truth, count, model, int(arguments["seed"]))
-                found[f"particles {count}"] = spent
-    return found
+                figures[f"particles {count}"] = spent
+    return figures
 
 
 def carving(

@@ -162,8 +162,8 @@ def recorded(
         np.save(folder / POSES, fitted_person(shown, body, source).poses)
 
     making = {"recipe": msgspec.to_builtins(recipe), "body": body.name, "frames": frames, "fps": FPS}
-    found = Recording(source, FPS, np.load(made_once(cache, "motion", making, make) / POSES))
-    return found if own else _performed(found, body, performance)
+    recording = Recording(source, FPS, np.load(made_once(cache, "motion", making, make) / POSES))
+    return recording if own else _performed(recording, body, performance)
 
 
 def _performed(recording: Recording, body: BodyModel, performance: int) -> Recording:
@@ -269,15 +269,15 @@ def pointing_poses(body: BodyModel, fps: float) -> Array:
     """(F, D) the body pointing at each target in turn, ROUNDS times over."""
     names = [entry.name for entry in body.parameters]
     resting = body.neutral
-    found = [resting[None]]
+    poses = [resting[None]]
     for _ in range(ROUNDS):
         for target in TARGETS:
             pointed = resting.copy()
             for name, degrees in target.items():
                 pointed[names.index(name)] = np.radians(degrees)
-            found += [_reach(resting, pointed, fps), _held(pointed, fps)]
-            found += [_reach(pointed, resting, fps), _held(resting, fps)]
-    return np.concatenate(found)
+            poses += [_reach(resting, pointed, fps), _held(pointed, fps)]
+            poses += [_reach(pointed, resting, fps), _held(resting, fps)]
+    return np.concatenate(poses)
 
 
 def _reach(start: Array, end: Array, fps: float) -> Array:

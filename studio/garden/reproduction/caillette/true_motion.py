@@ -105,8 +105,8 @@ def joint_errors(body: BodyModel, columns: NDArray[np.int64], poses: Array, trut
     away = np.degrees((poses - true + np.pi) % (2.0 * np.pi) - np.pi)[:, columns]
     axes, true_axes = (limb_frames(body, each)[..., 2] for each in (poses, true))
     turned = np.degrees(np.arccos(np.clip((axes * true_axes).sum(axis=2), -1.0, 1.0)))
-    found = marker_points(body, poses)[:, truth.markers]
-    away_mm = found - truth.points[: len(poses)]
+    points = marker_points(body, poses)[:, truth.markers]
+    away_mm = points - truth.points[: len(poses)]
     apart = np.linalg.norm(away_mm, axis=2)
     return JointErrors(
         np.sqrt((away**2).mean(axis=1)),

@@ -134,11 +134,11 @@ def links_before(body: BodyModel) -> NDArray[np.int64]:
 
 def absolute(values: Array, before: NDArray[np.int64]) -> Array:
     """(D,) values of the links added up from the root outwards."""
-    found = np.array(values, dtype=np.float64)
+    angles = np.array(values, dtype=np.float64)
     for index, parent in enumerate(before):
         if parent >= 0:
-            found[index] += found[parent]
-    return found
+            angles[index] += angles[parent]
+    return angles
 
 
 def localise_absolute(scene: TemplateArm, seed: int, **changes: Any) -> Array:  # noqa: ANN401

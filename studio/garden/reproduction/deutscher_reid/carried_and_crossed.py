@@ -83,8 +83,8 @@ def _results(groups: Groups, names: Sequence[str], pairs: Sequence[tuple[str, st
             yield error_ratio(f"{ours} over {theirs}, {clip}", runs, rest, "")
             better += mean_errors(runs)
             other += mean_errors(rest)
-        found = sign_test(better, other)
-        tests.append((f"{ours} against {theirs}", f"{found.better} : {found.worse}", float(f"{found.p:.2g}")))
+        signs = sign_test(better, other)
+        tests.append((f"{ours} against {theirs}", f"{signs.better} : {signs.worse}", float(f"{signs.p:.2g}")))
     for name in names:
         runs = [run for clip in CLIPS for run in groups[f"{name}, {clip}"]]
         by_clip = zip(*(groups[f"{name}, {clip}"] for clip in CLIPS), strict=True)

@@ -44,12 +44,12 @@ def _tracked_layers(
     """The attempt, its frames, every frame's layers, and the mean error, mm."""
     attempt = TrackingTrial.of_plain(arguments)
     records: list[LayerRecord] = []
-    found = track(attempt, cache, on_layer=records.append)
+    tracked = track(attempt, cache, on_layer=records.append)
     return (
         attempt,
-        found.frames,
-        [[record for record in records if record.frame == frame] for frame in found.frames],
-        found.mean_mm,
+        tracked.frames,
+        [[record for record in records if record.frame == frame] for frame in tracked.frames],
+        tracked.mean_mm,
     )
 
 
@@ -90,14 +90,14 @@ def measure_fig_3(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str
     spreads, covered, distances, clouds = list[list[float]](), list[bool](), list[float](), list[Any]()
     last = layers[0][-1].mean[columns]
     for row in range(1, len(frames)):
-        found: list[Array] = [record.poses[:, columns] for record in layers[row]]
+        clouds_of_layers: list[Array] = [record.poses[:, columns] for record in layers[row]]
         place: Array = truth[row]
-        spreads.append([np.sqrt(cloud.var(axis=0).sum()) for cloud in found])
-        covered.append(covers(found[0], last + truth[row] - truth[row - 1]))
+        spreads.append([np.sqrt(cloud.var(axis=0).sum()) for cloud in clouds_of_layers])
+        covered.append(covers(clouds_of_layers[0], last + truth[row] - truth[row - 1]))
         last = layers[row][-1].mean[columns]
         distances.append(float(np.linalg.norm(last - truth[row])))
         if row == len(frames) // 2:
-            clouds = [np.round(found[layer] - place, 2).tolist() for layer in DRAWN_LAYERS]
+            clouds = [np.round(clouds_of_layers[layer] - place, 2).tolist() for layer in DRAWN_LAYERS]
     return {
         "spreads": np.mean(spreads, axis=0).tolist(),
         "covered": float(np.mean(covered)),

@@ -136,11 +136,11 @@ def scene(body: str) -> TemplateArm:
 
 def reductions(outcomes: Sequence[Outcome]) -> dict[str, Reduction]:
     """By kind, in the order of the trials."""
-    found: dict[str, list[Mapping[str, Any]]] = {}
+    by_kind: dict[str, list[Mapping[str, Any]]] = {}
     for outcome in outcomes:
         kind = outcome.trial.label.partition(f", {outcome.trial.arguments['body']}")[0]
-        found.setdefault(kind, []).append(outcome.measured)
-    return {name: reduction(entries) for name, entries in found.items()}
+        by_kind.setdefault(kind, []).append(outcome.measured)
+    return {name: reduction(entries) for name, entries in by_kind.items()}
 
 
 def reduction(searches: Sequence[Mapping[str, Any]]) -> Reduction:
@@ -162,32 +162,32 @@ def crossing_layers(values: Array, limit: float = FALLEN) -> NDArray[np.int64]:
     return np.where(below.any(axis=1), first, int(values.shape[1]))
 
 
-def _reduction_chart(title: str, found: Reduction, names: Sequence[str]) -> Chart:
+def _reduction_chart(title: str, reduction: Reduction, names: Sequence[str]) -> Chart:
     """Variance of each parameter over the layers."""
-    layers = places(found.shares.shape[1], first=1)
+    layers = places(reduction.shares.shape[1], first=1)
     series = (
         entry
         for column, name in enumerate(names)
-        for entry in seeds_and_mean(name, layers, found.shares[:, :, column])
+        for entry in seeds_and_mean(name, layers, reduction.shares[:, :, column])
     )
     return line_chart(title, "layer", "variance over the first cloud's", series, log_y=True)
 
 
 def _crossing_table(groups: Mapping[str, Reduction], names: Sequence[str]) -> Table:
     rows = tuple(
-        (name, *(round(float(value) + 1.0, 1) for value in found.crossings.mean(axis=0)))
-        for name, found in groups.items()
+        (name, *(round(float(value) + 1.0, 1) for value in reduced.crossings.mean(axis=0)))
+        for name, reduced in groups.items()
     )
     return Table(f"Mean layer in which the variance falls below {FALLEN:.0%}", ("filter", *names), rows)
 
 
-def _crossing_numbers(found: Reduction, names: Sequence[str]) -> Iterator[Number]:
-    for name, layers in zip(names, found.crossings.T, strict=True):
+def _crossing_numbers(reduction: Reduction, names: Sequence[str]) -> Iterator[Number]:
+    for name, layers in zip(names, reduction.crossings.T, strict=True):
         yield number(f"layer in which {name} falls", layers + 1.0)
 
 
-def _error(name: str, found: Reduction) -> Number:
-    return number(name, found.errors.mean(axis=1), "rad")
+def _error(name: str, reduction: Reduction) -> Number:
+    return number(name, reduction.errors.mean(axis=1), "rad")
 
 
 def fig_12(outcomes: Sequence[Outcome]) -> Iterator[Part]:
@@ -232,18 +232,18 @@ def fig_12(outcomes: Sequence[Outcome]) -> Iterator[Part]:
 def fig_13(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     """The joints fall one after the other, from the root outwards."""
     groups = reductions(outcomes)
-    found, ours = groups[WITH], groups[SHRINKING]
-    yield share("joints fall strictly one after the other", found.strictly_rising)
-    yield from _crossing_numbers(found, CHAIN_JOINTS)
-    yield _error("mean error of the reported pose", found)
+    adaptive, ours = groups[WITH], groups[SHRINKING]
+    yield share("joints fall strictly one after the other", adaptive.strictly_rising)
+    yield from _crossing_numbers(adaptive, CHAIN_JOINTS)
+    yield _error("mean error of the reported pose", adaptive)
     yield share("joints fall strictly one after the other, shrunk (ours)", ours.strictly_rising, None)
     yield _error("mean error of the reported pose, shrunk (ours)", ours)
     yield (
         f"{NEVER} {ARM_EQ18_WORDS} The paper prints no survival rate for the arm; with {SETTINGS['survival']} the last "
         "joint falls within its six layers, with 0.5 it does not."
     )
-    yield _reduction_chart("Variance reduction with adaptive diffusion", found, CHAIN_JOINTS)
-    yield _crossing_table({WITH: found, SHRINKING: ours}, CHAIN_JOINTS)
+    yield _reduction_chart("Variance reduction with adaptive diffusion", adaptive, CHAIN_JOINTS)
+    yield _crossing_table({WITH: adaptive, SHRINKING: ours}, CHAIN_JOINTS)
     yield {**SETTINGS, **ARM_EQ_18}
 
 
@@ -256,9 +256,9 @@ def slopes(shares: Array) -> Array:
     return np.tensordot(logs, layers, axes=(1, 0)) / float((layers**2).sum())
 
 
-def _slope_spread(found: Reduction) -> Array:
+def _slope_spread(reduction: Reduction) -> Array:
     """(S,) the steepest parameter's slope over the flattest's: 1 where all fall evenly."""
-    fall = -slopes(found.shares)
+    fall = -slopes(reduction.shares)
     return fall.max(axis=1) / np.maximum(fall.min(axis=1), 1e-3)
 
 
@@ -276,9 +276,9 @@ def fig_14(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     adaptive, planned, loud = groups[WITH], groups[WITHOUT], groups[WITH_LOUD]
     claim = share("all joints fall within one layer", planned.even)
     yield claim
-    for kind, found in (("planned", planned), ("adaptive", adaptive)):
+    for kind, reduced in (("planned", planned), ("adaptive", adaptive)):
         name = f"layers between the first and the last joint, {kind} noise"
-        yield number(name, np.ptp(found.crossings, axis=1), "layers")
+        yield number(name, np.ptp(reduced.crossings, axis=1), "layers")
     for survival in (SETTINGS["survival"], *MILDER):
         words = "" if survival == SETTINGS["survival"] else f", α {survival:g}"
         steep = {kind: _slope_spread(groups[f"{kind}{words}"]) for kind in (WITHOUT, WITH)}
@@ -361,7 +361,7 @@ def measure_fig_16(arguments: Mapping[str, Any], cache: FootageCache) -> dict[st
     arm = scene(arguments["body"])
     ssd: list[float] = []
     for share_crossed in arguments["shares"]:
-        found: list[float] = []
+        differences: list[float] = []
         for picture in arguments["pictures"]:
             knobs = {**arguments["knobs"], "crossover": float(share_crossed)}
             if arguments["cut"].startswith(ABSOLUTE):
@@ -369,8 +369,8 @@ def measure_fig_16(arguments: Mapping[str, Any], cache: FootageCache) -> dict[st
             else:
                 pose = localise(arm, int(picture), **knobs)[0].estimate.pose
             observed = arm.observed(true_pose(arm.space, int(picture)))
-            found.append(float(-observed.log_likelihood(pose[None])[0]))
-        ssd.append(float(np.mean(found)))
+            differences.append(float(-observed.log_likelihood(pose[None])[0]))
+        ssd.append(float(np.mean(differences)))
     return {"ssd": ssd}
 
 
@@ -417,15 +417,15 @@ def _rises(crossings: NDArray[np.int64]) -> list[bool]:
 
 def fig_17(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     """In each arm the joints fall in order, and the arms keep step."""
-    found = reductions(outcomes)[CROSSING]
-    steps = np.abs(found.crossings[:, ARMS[0]] - found.crossings[:, ARMS[1]])
-    yield share("joints of both arms fall strictly from the hinge outwards", _rises(found.crossings))
+    reduced = reductions(outcomes)[CROSSING]
+    steps = np.abs(reduced.crossings[:, ARMS[0]] - reduced.crossings[:, ARMS[1]])
+    yield share("joints of both arms fall strictly from the hinge outwards", _rises(reduced.crossings))
     yield share("joints of equal rank fall within one layer", steps.max(axis=1) <= 1)
-    yield from _crossing_numbers(found, BRANCHED_JOINTS)
-    yield _error("mean error of the reported pose", found)
+    yield from _crossing_numbers(reduced, BRANCHED_JOINTS)
+    yield _error("mean error of the reported pose", reduced)
     yield f"{NEVER} {ARM_EQ18_WORDS}"
-    yield _reduction_chart("Variance reduction of the branched arms", found, BRANCHED_JOINTS)
-    yield _crossing_table({CROSSING: found}, BRANCHED_JOINTS)
+    yield _reduction_chart("Variance reduction of the branched arms", reduced, BRANCHED_JOINTS)
+    yield _crossing_table({CROSSING: reduced}, BRANCHED_JOINTS)
     yield {**SETTINGS, **KINDS[CROSSING]}
 
 

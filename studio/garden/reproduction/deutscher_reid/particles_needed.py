@@ -128,8 +128,8 @@ def needs(title: str, groups: Groups) -> Iterator[Part]:
     """Common results of the experiments on particles needed: needs, shares of success, each seed's.
     title : of the chart of needs.
     """
-    for name, found in groups.items():
-        needed = [entry.particles for entry in found]
+    for name, entries in groups.items():
+        needed = [entry.particles for entry in entries]
         yield number(f"particles needed: {name}", needed, "particles", statistic=geometric_mean)
     yield "> : even the most particles tried failed (a lower bound is taken); ≤ : the fewest succeeded (an upper one)."
     yield bars(title, groups)
@@ -139,7 +139,7 @@ def needs(title: str, groups: Groups) -> Iterator[Part]:
 
 def bars(title: str, groups: Groups) -> Chart:
     """The particles that each filter needs, with intervals over the seeds."""
-    rows = ([entry.particles for entry in found] for found in groups.values())
+    rows = ([entry.particles for entry in entries] for entries in groups.values())
     series = intervals("particles needed", places(len(groups)), rows, geometric_mean)
     return bar_chart(title, "filter", "particles needed for success", (series,), groups)
 
@@ -149,9 +149,9 @@ def successes(title: str, groups: Groups) -> Chart:
     so neighbouring sizes rest on different seeds).
     """
     series: list[Series] = []
-    for name, found in groups.items():
+    for name, entries in groups.items():
         won: dict[int, list[int]] = {}
-        for particles, good, runs in (row for entry in found for row in entry.tried):
+        for particles, good, runs in (row for entry in entries for row in entry.tried):
             total = won.setdefault(particles, [0, 0])
             total[0], total[1] = total[0] + good, total[1] + runs
         order = sorted(won)
@@ -162,10 +162,10 @@ def successes(title: str, groups: Groups) -> Chart:
 def per_seed(title: str, groups: Groups) -> Table:
     """A line a filter, a column a seed."""
     mark = {ABOVE: "> ", BELOW: "≤ ", "": ""}
-    count = max(len(found) for found in groups.values())
+    count = max(len(entries) for entries in groups.values())
     rows = tuple(
-        (name, *(f"{mark[entry.censored]}{entry.particles:.0f}" for entry in found))
-        for name, found in groups.items()
+        (name, *(f"{mark[entry.censored]}{entry.particles:.0f}" for entry in entries))
+        for name, entries in groups.items()
     )
     return Table(title, ("filter", *(f"seed {index}" for index in range(count))), rows)
 
@@ -230,8 +230,8 @@ def is_tracked(sequence: ArmSequence, settings: AnnealedSettings, seed: int) -> 
             settings_source=lambda: (1, settings),
         )
         carried = result.carried
-        found = marker_points(body, result.estimate.pose[None])[0]
-        if np.linalg.norm(found - truth[frame], axis=1).max() > LOST_MM:
+        points = marker_points(body, result.estimate.pose[None])[0]
+        if np.linalg.norm(points - truth[frame], axis=1).max() > LOST_MM:
             return False
     return True
 
@@ -330,7 +330,7 @@ def _crossed(base: str, cut: str) -> str:
 
 
 def _crossover_trials(scale: Scale) -> tuple[Trial, ...]:
-    found: list[Trial] = []
+    planned: list[Trial] = []
     for body, cuts in CUTS.items():
         filters: dict[str, Knobs] = {}
         for base, knobs in list(ADDED_TO.items())[: 1 if scale.quick else None]:
@@ -338,8 +338,8 @@ def _crossover_trials(scale: Scale) -> tuple[Trial, ...]:
             filters |= {
                 _crossed(base, cut): {**knobs, "crossover": SHARE, "crossover_by": cut} for cut in cuts
             }
-        found += arm_trials(scale, filters, body, RATE)
-    return tuple(found)
+        planned += arm_trials(scale, filters, body, RATE)
+    return tuple(planned)
 
 
 def _crossing_label(base: str, body: str, cut: str) -> str:

@@ -73,8 +73,8 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
 
     def milliseconds(work: Callable[[], object]) -> list[float]:
         every = dict.fromkeys(threads, work)
-        found = quickest(every, arguments["rounds"], {count: count for count in threads})
-        return [1000.0 * found[count] for count in threads]
+        seconds = quickest(every, arguments["rounds"], {count: count for count in threads})
+        return [1000.0 * seconds[count] for count in threads]
 
     return {
         "threads": threads,

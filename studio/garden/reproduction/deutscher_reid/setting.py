@@ -71,6 +71,6 @@ def annealing_as_ten(layers: int) -> float:
     return float(0.5 ** (10 / layers))
 
 
-def succeeded(found: Tracked) -> bool:
+def succeeded(tracked: Tracked) -> bool:
     """Whether every frame stays below LIMIT_MM and no limb is ever lost."""
-    return found.worst_mm < LIMIT_MM and not found.lost_limbs
+    return tracked.worst_mm < LIMIT_MM and not tracked.lost_limbs

@@ -115,15 +115,17 @@ def _fig_8_lines(quick: bool) -> Iterable[Line]:
     )
 
 
-def terminal_failure(found: Tracked) -> float:
+def terminal_failure(tracked: Tracked) -> float:
     """Seconds from the first frame to the final failure: a frame's mean is LIMIT_MM or more, or a limb is lost, in
     every frame from there on. The footage's length where the last frame is good.
     """
-    good = [error < LIMIT_MM and not lost for error, lost in zip(found.per_frame_mm, found.lost, strict=True)]
+    good = [
+        error < LIMIT_MM and not lost for error, lost in zip(tracked.per_frame_mm, tracked.lost, strict=True)
+    ]
     if good[-1]:
         return len(good) / FPS
     since = len(good) - good[::-1].index(True) if True in good else 0
-    return (found.frames[since] - found.frames[0]) / FPS
+    return (tracked.frames[since] - tracked.frames[0]) / FPS
 
 
 def _fig_8(groups: Groups) -> Iterator[Part]:

@@ -103,14 +103,14 @@ def true_poses(session: Session, body: BodyModel, frames: list[int]) -> Array:
         raise TruthError(f"The truth has no row for frame {missing[0]}.", "Take frames that it has.")
     kept, names = known_markers(body, truth.names)
     own = session.start_pose(body) if body.name == session.manifest.body else None
-    pose, found = body.neutral if own is None else own, list[Array]()
+    pose, poses = body.neutral if own is None else own, list[Array]()
     # From the start onwards, so that large changes of heading are followed.
     for frame in range(max(frames) + 1):
         if frame in rows and (frame in frames or frame % 4 == 0):
             pose = pose_from_markers(body, names, truth.positions[rows[frame], kept], pose)[0]
         if frame in frames:
-            found.append(pose)
-    return np.array(found)
+            poses.append(pose)
+    return np.array(poses)
 
 
 def modes(weights: Array) -> list[tuple[int, float]]:
@@ -123,8 +123,8 @@ def modes(weights: Array) -> list[tuple[int, float]]:
         return []
     padded = np.concatenate([[weights.min()], weights, [weights.min()]])
     places = find_peaks(padded, prominence=PROMINENT * height)[0] - 1
-    found = [(int(place), float((weights[place] - weights.min()) / height)) for place in places]
-    return sorted(found, key=lambda mode: -mode[1])
+    minima = [(int(place), float((weights[place] - weights.min()) / height)) for place in places]
+    return sorted(minima, key=lambda mode: -mode[1])
 
 
 def half_width(angles: Array, weights: Array) -> float:
@@ -144,12 +144,12 @@ def _read(outcome: Outcome, name: str, around: float = math.inf) -> dict[str, An
     near = np.abs(angles - outcome.measured["truth"]) <= around
     angles = angles[near]
     weights = np.exp(np.array(outcome.measured["log_weights"][name]))[near]
-    found = modes(weights)
+    minima = modes(weights)
     return {
         "off": abs(float(angles[int(np.argmax(weights))]) - outcome.measured["truth"]),
         "width": half_width(angles, weights),
-        "modes": len(found),
-        "dominant": bool(found) and all(height <= DOMINANT for _, height in found[1:]),
+        "modes": len(minima),
+        "dominant": bool(minima) and all(height <= DOMINANT for _, height in minima[1:]),
     }
 
 
@@ -166,13 +166,13 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield share("with the silhouette: one dominant mode", full, None)
     near = [row["off"] <= NEAR_DEGREES for row in rows["both"]]
     yield share(f"both: peak within {NEAR_DEGREES:g}° of the true angle", near)
-    for name, found in rows.items():
+    for name, read in rows.items():
         for words, key, unit in (
             ("peak from the true angle", "off", "°"),
             ("width at half height", "width", "°"),
             ("modes that stand out", "modes", ""),
         ):
-            yield number(f"{name}: {words}", [row[key] for row in found], unit)
+            yield number(f"{name}: {words}", [row[key] for row in read], unit)
     yield (
         "A seed is a frame; the paper shows one, and only the combined function (both), on an axis without numbers. "
         f"The claim is judged over the knee's whole range; within {AROUND_DEGREES:g}° of the true angle, and with the "
@@ -183,9 +183,9 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
         (
             frame,
             round(outcome.measured["truth"], 1),
-            *(cell for row in found for cell in (round(row["off"], 1), row["modes"])),
+            *(cell for row in read for cell in (round(row["off"], 1), row["modes"])),
         )
-        for frame, outcome, *found in zip(frames, outcomes, *rows.values(), strict=True)
+        for frame, outcome, *read in zip(frames, outcomes, *rows.values(), strict=True)
     )
     heads = (head for name in TERMS for head in (f"{name}: off (°)", f"{name}: modes"))
     yield Table("The highest peak of each term", ("frame", "true angle (°)", *heads), lines)

@@ -41,18 +41,18 @@ def _lines(quick: bool) -> Iterator[Line]:
             yield Line(f"{one.name}, {clip}", one, clip, evaluations, {**wanted, **last})
 
 
-def _shown(found: Groups) -> Iterable[Part]:
+def _shown(groups: Groups) -> Iterable[Part]:
     """Of every clip: error and lost limbs of both, their ratio paired by seed; sign tests over seeds and frames."""
     for clip in CLIPS:
-        former, today = found[f"{FORMER}, {clip}"], found[f"{TODAY}, {clip}"]
+        former, today = groups[f"{FORMER}, {clip}"], groups[f"{TODAY}, {clip}"]
         for name, runs in ((FORMER, former), (TODAY, today)):
             yield number(f"mean error, {name}, {clip}", mean_errors(runs), "mm", better="lower")
             lost = [lost_percent(run) for run in runs]
             yield number(f"frames with a limb lost, {name}, {clip}", lost, "%", better="lower")
         yield error_ratio(f"mean error of today's by the first round's, {clip}", today, former, "")
-    yield summary_table("Over seeds", found)
-    yield error_tests(found, [(f"{TODAY}, {clip}", f"{FORMER}, {clip}") for clip in CLIPS])
-    yield {"frames": max(len(runs[0].frames) for runs in found.values())}
+    yield summary_table("Over seeds", groups)
+    yield error_tests(groups, [(f"{TODAY}, {clip}", f"{FORMER}, {clip}") for clip in CLIPS])
+    yield {"frames": max(len(runs[0].frames) for runs in groups.values())}
 
 
 EXPERIMENTS = (tracked_experiment("defaults", lines=_lines, shown=_shown),)

@@ -46,12 +46,12 @@ def _lines(quick: bool) -> Iterator[Line]:
                 yield Line(f"{one.name}, {half} {kind}", one, clip_name(half, kind), wanted=wanted)
 
 
-def _shown(found: dict[str, list[Tracked]]) -> Iterable[Part]:
+def _shown(groups: dict[str, list[Tracked]]) -> Iterable[Part]:
     """By half: the mean error of every size over its clips, its limbs lost, and sign tests against the default."""
     usual, added = _name(*SIZES[0]), list[str]()
     for half in HALVES:
         runs = {
-            _name(*size): [found[f"{_name(*size)}, {half} {kind}"] for kind in KIND_OF_CLIPS]
+            _name(*size): [groups[f"{_name(*size)}, {half} {kind}"] for kind in KIND_OF_CLIPS]
             for size in SIZES
         }
         for name, clips in runs.items():
@@ -83,7 +83,7 @@ def _shown(found: dict[str, list[Tracked]]) -> Iterable[Part]:
     yield {
         "tracker": DEFAULT_TRACKER,
         "weighting": DEFAULT_WEIGHTING,
-        "frames": max(len(runs[0].frames) for runs in found.values()),
+        "frames": max(len(runs[0].frames) for runs in groups.values()),
         "refined": "every frame, the shape after its first frames",
     }
 

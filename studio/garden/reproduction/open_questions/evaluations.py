@@ -51,14 +51,14 @@ def _with(one: Candidate, clip: str) -> bool:
 def trials(scale: Scale) -> tuple[Trial, ...]:
     """Every tracker with every number of evaluations, clip by clip so that a clip's evidence is computed once."""
     last = QUICK_FRAMES if scale.quick else FRAMES
-    found: list[Trial] = []
+    planned: list[Trial] = []
     for clip, footage in CLIPS.items():
         for one in (one for one in CANDIDATES if _with(one, clip)):
             for count in QUICK_COUNTS if scale.quick else COUNTS:
                 arguments = partial(_arguments, one, footage, count, last)
                 seeds = scale.seeds[: SEEDS if count <= MANY else SEEDS_OF_MANY]
-                found += each_seed(_label(one.name, clip, count), seeds, arguments)
-    return tuple(found)
+                planned += each_seed(_label(one.name, clip, count), seeds, arguments)
+    return tuple(planned)
 
 
 def _arguments(one: Candidate, footage: str, count: int, last: int, seed: int) -> dict[str, Any]:

@@ -112,14 +112,14 @@ COLUMNS: Mapping[str, Callable[[Runs], float]] = {
 
 def trials(scale: Scale) -> tuple[Trial, ...]:
     """Every candidate on every clip with every seed, clip by clip so that a clip's evidence is computed once."""
-    found: list[Trial] = []
+    planned: list[Trial] = []
     for clip, kind in ((clip_name(half, kind), kind) for half in HALVES for kind in KINDS):
         last = QUICK_FRAMES if scale.quick else KINDS[kind].frames
         for entry in ENTRIES:
             if kind in (entry.kinds or KINDS) and (kind in QUICK_KINDS or not scale.quick):
                 arguments = partial(_arguments, entry, clip, last)
-                found += each_seed(f"{entry.name} on {clip}", scale.seeds, arguments)
-    return tuple(found)
+                planned += each_seed(f"{entry.name} on {clip}", scale.seeds, arguments)
+    return tuple(planned)
 
 
 def _arguments(entry: Entry, clip: str, last: int, seed: int) -> dict[str, Any]:
@@ -142,11 +142,11 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     groups = by_group(outcomes)
     for half in HALVES:
         # By candidate and kind, the runs of the half.
-        found: dict[str, dict[str, list[Tracked]]] = {}
+        by_entry: dict[str, dict[str, list[Tracked]]] = {}
         for entry in ENTRIES:
             clips = {kind: groups.get(f"{entry.name} on {clip_name(half, kind)}") for kind in KINDS}
-            found[entry.name] = {kind: runs for kind, runs in clips.items() if runs}
-        yield from _half(half, found)
+            by_entry[entry.name] = {kind: runs for kind, runs in clips.items() if runs}
+        yield from _half(half, by_entry)
     yield {
         "evaluations": EVALUATIONS,
         "near (mm)": NEAR_MM,
@@ -155,14 +155,14 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     }
 
 
-def _half(half: str, found: Mapping[str, Mapping[str, Runs]]) -> Iterator[Part]:
+def _half(half: str, by_entry: Mapping[str, Mapping[str, Runs]]) -> Iterator[Part]:
     """Of each candidate over its clips: mean, share of near clips, frames with a limb lost, one value a seed; a short
     table (mean / mean of worst frames / % frames with a limb lost), a long one, heat maps, and the nearest of those
     that track all clips.
     """
     called = "Half to choose by" if half == CHOOSING else "Half only reported"
-    kinds = [kind for kind in KINDS if any(kind in clips for clips in found.values())]
-    for name, clips in found.items():
+    kinds = [kind for kind in KINDS if any(kind in clips for clips in by_entry.values())]
+    for name, clips in by_entry.items():
         by_seed, words = list(zip(*clips.values(), strict=True)), f"{name}, {half}"
         near = [100.0 * float(np.mean([run.mean_mm <= NEAR_MM for run in runs])) for runs in by_seed]
         yield number(f"mean error, {words}", map(MEAN, by_seed), "mm", better="lower")
@@ -175,7 +175,7 @@ def _half(half: str, found: Mapping[str, Mapping[str, Runs]]) -> Iterator[Part]:
             share = [named_percent(runs, lost=lost) for runs in by_seed]
             yield number(f"named of {of}, {words}", share, "%", better=better)
     means = {
-        entry.name: float(np.mean([MEAN(runs) for runs in found[entry.name].values()]))
+        entry.name: float(np.mean([MEAN(runs) for runs in by_entry[entry.name].values()]))
         for entry in ENTRIES
         if not entry.kinds
     }
@@ -183,7 +183,7 @@ def _half(half: str, found: Mapping[str, Mapping[str, Runs]]) -> Iterator[Part]:
     yield f"{called}: {best} is the nearest, {means[best]:.1f} mm on average over {len(kinds)} clips."
     short, long = list[tuple[Plain, ...]](), list[tuple[Plain, ...]]()
     for kind in kinds:
-        on_clip = {name: clips.get(kind, ()) for name, clips in found.items()}
+        on_clip = {name: clips.get(kind, ()) for name, clips in by_entry.items()}
         cells = (
             f"{MEAN(runs):.1f} / {WORST(runs):.0f} / {LOST(runs):.0f}" if runs else "–"
             for runs in on_clip.values()
@@ -193,12 +193,12 @@ def _half(half: str, found: Mapping[str, Mapping[str, Runs]]) -> Iterator[Part]:
             if runs:
                 long.append((kind, name, len(runs), *(round(of(runs), 1) for of in COLUMNS.values())))
     title = f"{called}: mean (mm) / mean of worst frames (mm) / frames with a limb lost (%)"
-    yield Table(title, ("clip", *found), tuple(short))
+    yield Table(title, ("clip", *by_entry), tuple(short))
     yield Table(f"{called}: over seeds", ("clip", "tracker", "seeds", *COLUMNS), tuple(long))
     for title, of in (("mean error (mm)", MEAN), ("frames with a limb lost (%)", LOST)):
         rows = {
             name: [of(clips[kind]) if kind in clips else float("nan") for kind in kinds]
-            for name, clips in found.items()
+            for name, clips in by_entry.items()
         }
         yield heat_chart(f"{called}: {title}", "clip", "tracker", kinds, rows)
 

@@ -70,7 +70,7 @@ CHOICES = (
 
 def trials(scale: Scale) -> tuple[Trial, ...]:
     """Every choice on every clip with every seed, clip by clip."""
-    found: list[Trial] = []
+    planned: list[Trial] = []
     for half in HALVES:
         choices = [one for one in CHOICES if half == CHOOSING or one.reported]
         kinds = [kind for kind in KINDS if kind in QUICK_KINDS or not scale.quick]
@@ -81,8 +81,8 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
             last = QUICK_FRAMES if scale.quick else frames
             for one in choices:
                 arguments = partial(_arguments, one, clip, last)
-                found += each_seed(f"{one.name} on {clip}", scale.seeds, arguments)
-    return tuple(found)
+                planned += each_seed(f"{one.name} on {clip}", scale.seeds, arguments)
+    return tuple(planned)
 
 
 def _arguments(choice: Choice, clip: str, last: int, seed: int) -> dict[str, Any]:
@@ -126,13 +126,13 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     }
     for called, clips in sets.items():
         # By choice and clip, a run a seed.
-        found: dict[str, dict[str, list[Tracked]]] = {}
+        by_choice: dict[str, dict[str, list[Tracked]]] = {}
         for one in CHOICES:
             runs = {name: groups.get(f"{one.name} on {clip}", []) for clip, name in clips.items()}
-            found[one.name] = {name: tracked for name, tracked in runs.items() if tracked}
-        found = {name: tracked for name, tracked in found.items() if tracked}
-        if found:
-            yield from _set(called, found)
+            by_choice[one.name] = {name: tracked for name, tracked in runs.items() if tracked}
+        by_choice = {name: tracked for name, tracked in by_choice.items() if tracked}
+        if by_choice:
+            yield from _set(called, by_choice)
     yield {
         "tracker": DEFAULT_TRACKER,
         "weighting": DEFAULT_WEIGHTING,
@@ -141,10 +141,10 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     }
 
 
-def _set(called: str, found: Mapping[str, Mapping[str, Runs]]) -> Iterator[Part]:
+def _set(called: str, by_choice: Mapping[str, Mapping[str, Runs]]) -> Iterator[Part]:
     rows: list[tuple[Plain, ...]] = []
-    names = list(dict.fromkeys(clip for clips in found.values() for clip in clips))
-    for choice, clips in found.items():
+    names = list(dict.fromkeys(clip for clips in by_choice.values() for clip in clips))
+    for choice, clips in by_choice.items():
         by_seed, words = list(zip(*clips.values(), strict=True)), f"{choice}, {called}"
         every = [run for runs in clips.values() for run in runs]
         lost = [float(np.mean([lost_percent(run) for run in runs])) for runs in by_seed]
@@ -171,7 +171,7 @@ def _set(called: str, found: Mapping[str, Mapping[str, Runs]]) -> Iterator[Part]
         ("choice", *names),
         tuple(rows),
     )
-    cells = {choice: [MEAN(clips[name]) for name in names] for choice, clips in found.items()}
+    cells = {choice: [MEAN(clips[name]) for name in names] for choice, clips in by_choice.items()}
     yield heat_chart(f"{called}: mean error (mm)", "clip", "choice", names, cells)
 
 

@@ -64,13 +64,13 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
     """Two trials a clip: losses that are planted, and a run with too few evaluations."""
     drawn = [clip_name(CHOOSING, kind) for kind in KINDS]
     others = [PREFIX + place for place in ELSEWHERE.values() if (real_data_folder() / place).is_dir()]
-    found: list[Trial] = []
+    planned: list[Trial] = []
     for clip in drawn[:1] if scale.quick else [*others, *drawn]:
         frames = QUICK_FRAMES if scale.quick else FRAMES
-        found += each_seed(f"planted in {clip}", scale.seeds, partial(_planted, clip, frames))
+        planned += each_seed(f"planted in {clip}", scale.seeds, partial(_planted, clip, frames))
         if not scale.quick:
-            found += each_seed(f"{FEW} in {clip}", scale.seeds, partial(_searched, clip))
-    return tuple(found)
+            planned += each_seed(f"{FEW} in {clip}", scale.seeds, partial(_searched, clip))
+    return tuple(planned)
 
 
 def _planted(clip: str, frames: int, seed: int) -> dict[str, Any]:
@@ -94,19 +94,19 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
         clip = str(imported(clip, cache))
     counts = {cause: [0] * 5 for cause in (*CAUSES, SOUND)}
     if attempt:
-        found = track(TrackingTrial.of_plain({**attempt, "footage": clip}), cache)
-        _count_run(counts, found)
+        tracked = track(TrackingTrial.of_plain({**attempt, "footage": clip}), cache)
+        _count_run(counts, tracked)
     else:
         for cause, lost, by_run, by_check in plant(
             clip, int(arguments["frames"]), int(arguments["seed"]), cache
         ):
-            found = (1, bool(by_run), lost in by_run, bool(by_check), lost in by_check)
-            counts[cause] = [before + int(more) for before, more in zip(counts[cause], found, strict=True)]
+            tracked = (1, bool(by_run), lost in by_run, bool(by_check), lost in by_check)
+            counts[cause] = [before + int(more) for before, more in zip(counts[cause], tracked, strict=True)]
     return counts
 
 
-def _count_run(counts: dict[str, list[int]], found: Tracked) -> None:
-    for lost, named in zip(found.lost, found.named, strict=True):
+def _count_run(counts: dict[str, list[int]], tracked: Tracked) -> None:
+    for lost, named in zip(tracked.lost, tracked.named, strict=True):
         cause = counts[FEW if lost else SOUND]
         cause[0] += 1
         cause[1] += bool(named)
@@ -223,7 +223,7 @@ class Looking:
     def erased(self, evidence: FrameEvidence, pose: Array, limb: str) -> list[Bytes]:
         """Each view's mask (H, W) without a limb of a pose, where no other limb of it lies."""
         corners = self._agreement.corners(pose)
-        found: list[Bytes] = []
+        erased_masks: list[Bytes] = []
         for view, quads, mm in zip(evidence.views, corners, self._agreement.mm_per_pixel(pose), strict=True):
             own, others = np.zeros_like(view.mask), np.zeros_like(view.mask)
             for name, quad in zip(limb_names(self.body), quads, strict=True):
@@ -231,8 +231,8 @@ class Looking:
                     cv2.fillPoly(own if name == limb else others, [np.rint(quad).astype(np.int32)], (255,))
             reach = 2 * round(FAR_MM / mm) + 1
             own = np.asarray(cv2.dilate(own, np.ones((reach, reach), np.uint8)), np.uint8)
-            found.append(np.where((own > 0) & (others == 0), np.uint8(0), view.mask))
-        return found
+            erased_masks.append(np.where((own > 0) & (others == 0), np.uint8(0), view.mask))
+        return erased_masks
 
 
 WHO = {"a run": 1, "a check": 3}

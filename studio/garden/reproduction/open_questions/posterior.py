@@ -101,7 +101,7 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
     truth = dict(zip(frames, true_poses(session, body, frames), strict=True))
     records: dict[int, list[LayerRecord]] = {frame: [] for frame in frames}
     track(attempt, cache, on_layer=lambda record: records.get(record.frame, []).append(record))
-    found: dict[str, dict[str, list[Any]]] = {}
+    samples: dict[str, dict[str, list[Any]]] = {}
     for frame, layers in records.items():
         clouds = {f"layer {record.layer + 1}": (record, record.beta) for record in layers}
         clouds[LAST] = clouds.pop(f"layer {layers[-1].layer + 1}")
@@ -111,7 +111,7 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
             weights = weights_of(record, beta)
             mean = weights @ record.poses
             variance = np.maximum(weights @ (record.poses - mean) ** 2, 1e-18)
-            own = found.setdefault(name, {"ranks": [], "squares": [], "particles": []})
+            own = samples.setdefault(name, {"ranks": [], "squares": [], "particles": []})
             columns = range(record.poses.shape[1])
             own["ranks"].append([rank(record.poses[:, at], weights, truth[frame][at]) for at in columns])
             own["squares"].append(((truth[frame] - mean) ** 2 / variance).tolist())
@@ -124,7 +124,7 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
                 "squares": np.round(np.minimum(own["squares"], 1e6), 3).tolist(),
                 "particles": float(np.mean(own["particles"])),
             }
-            for name, own in found.items()
+            for name, own in samples.items()
         },
     }
 
@@ -154,10 +154,10 @@ NORMAL_95 = float(chi2.ppf(1.0 - CONFIDENCE, 1))
 def _calibrated(name: str, clips: Mapping[str, Sequence[Mapping[str, Any]]]) -> Iterator[Part]:
     """Errors outside the 95 % of spreads that are calibrated on the other clips, for each clip."""
     squares = {
-        clip: [np.array(one["layers"][LAST]["squares"]) for one in found] for clip, found in clips.items()
+        clip: [np.array(one["layers"][LAST]["squares"]) for one in entries] for clip, entries in clips.items()
     }
     for clip, own in squares.items():
-        others = [each for other, found in squares.items() if other != clip for each in found]
+        others = [each for other, entries in squares.items() if other != clip for each in entries]
         if not others:
             return
         times = factor(np.concatenate(others))
@@ -175,12 +175,12 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
         by_tracker.setdefault(name, []).append(outcome.measured)
         by_clip.setdefault(name, {}).setdefault(clip, []).append(outcome.measured)
     rows: list[tuple[Any, ...]] = []
-    for name, found in by_tracker.items():
-        layers = list(found[0]["layers"])
+    for name, entries in by_tracker.items():
+        layers = list(entries[0]["layers"])
         series: list[Series] = []
         for layer in layers:
-            ranks = [np.array(one["layers"][layer]["ranks"]) for one in found]
-            squares = [np.array(one["layers"][layer]["squares"]) for one in found]
+            ranks = [np.array(one["layers"][layer]["ranks"]) for one in entries]
+            squares = [np.array(one["layers"][layer]["squares"]) for one in entries]
             # The median over parameters: one parameter that a cloud has fixed would hide the rest.
             ratios = [float(np.sqrt(np.median(each.mean(axis=0)))) for each in squares]
             outer = [100.0 * float(((each < 0.025) | (each > 0.975)).mean()) for each in ranks]
@@ -191,7 +191,7 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
                 series.append(
                     Series(layer, LEVELS, tuple(distribution(np.concatenate(ranks)).tolist()), group=layer)
                 )
-            particles = float(np.mean([one["layers"][layer]["particles"] for one in found]))
+            particles = float(np.mean([one["layers"][layer]["particles"] for one in entries]))
             rows.append(
                 (
                     name,
@@ -201,7 +201,7 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
                 )
             )
         yield from _calibrated(name, by_clip[name])
-        frames = len(found[0]["layers"][layers[0]]["ranks"])
+        frames = len(entries[0]["layers"][layers[0]]["ranks"])
         half = band(frames)
         for sign, word in ((-1.0, "lower"), (1.0, "upper")):
             edge = tuple(min(max(level + sign * half, 0.0), 1.0) for level in LEVELS)

@@ -55,10 +55,10 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
     if session.truth_path is None:
         raise TruthError(f"Session '{session.name}' has no truth.", "Take one made by 'studio synthesize'.")
     frame = int(arguments["frame"])
-    found = initialise(session, frame, seed=int(arguments["seed"]))
+    start = initialise(session, frame, seed=int(arguments["seed"]))
     truth, frames = read_trc(session.truth_path), np.array([frame])
-    errors = evaluate(found.pose[None], frames, session.body(), truth, session.manifest.fps)
-    return {"confidence": found.confidence, "mean_mm": errors.mean_mm, "worst_mm": errors.worst_mm}
+    errors = evaluate(start.pose[None], frames, session.body(), truth, session.manifest.fps)
+    return {"confidence": start.confidence, "mean_mm": errors.mean_mm, "worst_mm": errors.worst_mm}
 
 
 def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
