@@ -30,9 +30,10 @@ def body_files(folder: Path) -> tuple[Path, ...]:
 
 
 def load_body(name_or_path: str, extra_folders: tuple[Path, ...] = ()) -> BodyModel:
-    """The body of a name (a user's folder goes before the package) or of a path (.toml, .urdf, .xml, .mjcf).
+    """The body of a name (searched in a user's folder first, then in the package) or of a path (.toml, .urdf, .xml,
+    .mjcf).
 
-    Raises BodyError when there is none of that name, or when its file is wrong.
+    Raises BodyError for an unknown name or a wrong file.
     """
     path = body_path(name_or_path, extra_folders)
     if path is not None:

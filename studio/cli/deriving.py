@@ -36,7 +36,7 @@ Shown = Callable[..., Mapping[str, object]]
 
 
 class Call:
-    """A verb with what the command line gave it. Called, it is done; arguments go before what was given."""
+    """A verb with its arguments from the command line. A call runs it; arguments of the call override them."""
 
     def __init__(
         self, verb: Callable[..., object], entries: Sequence[Parameter], options: Mapping[str, Any]

@@ -1,4 +1,4 @@
-"""One archive about an installation and its workspace for whoever helps: no footage, no poses, no secrets, no names.
+"""One archive about an installation and its workspace for a helper: no footage, no poses, no secrets, no names.
 
 Every text in it is written with the studio's own words: a word that occurs neither in the studio's source nor among the
 messages of the system becomes "…", and sessions, runs and cameras are numbered. What a log or a remark quotes of a

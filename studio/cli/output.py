@@ -40,7 +40,7 @@ messages = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
 class MemberChoice(click.Choice):  # pyright: ignore[reportMissingTypeArgument] - not generic before click 8.2
-    """A member of a registry by name; what is wrong with one that a package adds is said where it is chosen."""
+    """A member of a registry by name; faults of members that packages add are reported when they are chosen."""
 
     def __init__(self, registry: Registry[Any]) -> None:
         super().__init__(sorted(registry))

@@ -4,7 +4,7 @@ The network is Google's pose landmark model (MediaPipe Pose, "full"; `models/REA
 square crop of 256 pixels around one person and gives whether there is one, 39 points of him, and for each pixel how
 likely it shows him. Two of the points, the middle of the hips and one above it at the body's reach, say where the next
 crop lies, so that a person is followed from frame to frame; in the first, crops of several sizes are tried (`found`).
-The points are coarse (several centimetres) and left and right are at times exchanged: they show where somebody is and
+The points are coarse (several centimetres) and left and right are at times exchanged: they show where a person is and
 which way is up, they are no pose.
 
 The mask is refined at its border by the guided filter (`evidence.guided_filter`), so that it ends where the picture's
@@ -37,8 +37,8 @@ REACH = 1.25
 PRESENT = 0.5
 """Presence from which a crop counts as showing the person who is followed."""
 FOUND = 0.99
-"""Presence from which somebody is found where nobody was known, in two looks one after the other. People in rendered
-rooms have 0.9995 and more; furniture passes for somebody at 0.5 to 0.998, mostly in one look of two."""
+"""Presence from which a new person is accepted, in two consecutive looks. People in rendered
+rooms have 0.9995 and more; furniture passes for a person at 0.5 to 0.998, mostly in one look of two."""
 SIZES = (1.1, 0.8, 0.55, 0.4)
 """Sides of the crops that are tried, as shares of the picture's longer side."""
 STEP = 0.35
@@ -90,7 +90,7 @@ class Sighting:
         return Crop(float(middle[0]), float(middle[1]), side, math.atan2(up[0], -up[1]))
 
     def is_person(self, least: float = PRESENT) -> bool:
-        """Whether there is somebody, of a size that makes sense. least : presence."""
+        """Whether it shows a person of a plausible size. least : presence."""
         return self.presence >= least and self.next_crop.side > 16.0 and bool((self.logits > 0.0).any())
 
     def middles(self) -> Array:

@@ -28,7 +28,7 @@ SUBJECT_SIDE, COARSE_SIDE = 240.0, 320.0
 AS_IT_IS = 1.25
 """Factor up to which pictures are not reduced at all."""
 ROUNDS = 3
-"""In which the colours of a first mask are learnt anew."""
+"""In which the colours of a first mask are learnt again."""
 MARGIN = 0.25
 """Around the last mask, as a share of its longer side: where the subject may be in the next picture."""
 BINS = 32
@@ -80,7 +80,7 @@ class StrokeCut:
         self._last: tuple[Bytes, Bytes] | None = None
 
     def copy(self) -> "StrokeCut":
-        """One that goes on from here by itself."""
+        """A copy that continues from here independently."""
         self._last = None
         return copy.deepcopy(self)
 

@@ -110,7 +110,7 @@ class Parameter:
     any_name: bool = False
 
     def mark(self, kind: type[R]) -> R | None:
-        """The last mark of a kind, which goes before those of the types that it is made of."""
+        """The last mark of a kind, which overrides those of the types that it is made of."""
         return next((mark for mark in reversed(self.marks) if isinstance(mark, kind)), None)
 
     @property
@@ -283,7 +283,7 @@ def operation(function: Callable[P, R]) -> Callable[P, R]:
 
 def taking(declares: Callable[..., object], without: Sequence[str] = ()) -> Callable[[F], F]:
     """Let a function that takes any keyword take what another one, or a dataclass, declares after its own first
-    parameters. without : of these. What the function declares itself goes before them.
+    parameters. without : of these. What the function declares itself overrides them.
     """
 
     def take(function: F) -> F:

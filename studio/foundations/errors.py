@@ -61,7 +61,7 @@ class TruthError(StudioError, status=422, code="truth"):
 
 
 class RunError(StudioError, status=409, code="run"):
-    """A run that cannot start or go on."""
+    """A run that cannot start or continue."""
 
 
 class AccessError(StudioError, status=403, code="access"):

@@ -2,8 +2,9 @@
 """Compiled kernels, kept on this machine and found by what they are made of.
 
 A kernel's key is its bytecode, options and argument types, with every function, constant and array that it names, and
-what those name. So a kernel that a change reaches is compiled anew, wherever the change was (Numba's own cache looks at
-the kernel's file alone), and one that none reaches is found: by another process, another checkout, the next version.
+what those name. So a kernel that a change reaches is compiled again, wherever the change was (Numba's own cache looks
+at the kernel's file alone), and one that none reaches is found: by another process, another checkout, the next
+version.
 """
 
 import contextlib

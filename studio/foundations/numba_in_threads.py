@@ -46,7 +46,7 @@ for _place in ("function_type", "jitclass.boxing"):
     importlib.import_module(f"numba.experimental.{_place}")
 
 KERNEL: dict[str, Any] = {"nogil": True}
-"""Options of every kernel: other threads go on meanwhile."""
+"""Options of every kernel: other threads run meanwhile."""
 EXACT: dict[str, Any] = {**KERNEL, "error_model": "numpy"}
 """Dividing by zero gives infinity, as in NumPy."""
 CONTRACTED: dict[str, Any] = {**EXACT, "fastmath": {"contract", "nsz"}}

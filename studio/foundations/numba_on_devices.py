@@ -1,4 +1,4 @@
-"""Numba's CUDA target, loaded by who computes on a device: it takes a second that nobody else should pay.
+"""Numba's CUDA target, loaded only where a device computes, since it takes a second.
 
 Kernels come from the package numba-cuda (extra `gpu`), which puts itself in the place of Numba's own, older target.
 Scalar helpers that `numba_in_threads.njit` compiles for the processor are compiled for the device from the same source

@@ -91,7 +91,7 @@ def time_left(taken: Sequence[tuple[float, float]], left: float) -> float | None
 class TimeLeft:
     """The time that work will still take, from its reports. clock : seconds, rising.
 
-    Work is measured anew when its total changes, when it begins again at 0, or falls back.
+    Measuring begins again when the total changes, when the work begins again at 0, or falls back.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:

@@ -47,7 +47,7 @@ EVERY = 10
 GOOD_SHARE = 0.85
 """A frame with a smaller share of the model's pixels in the masks does not fit."""
 EXPLAINED_SHARE = 0.7
-"""Of all masks' pixels: where the body explains fewer, something else is in the masks: somebody else, a shadow."""
+"""Of all masks' pixels: where the body explains fewer, something else is in the masks: another person, a shadow."""
 DOUBTFUL = 0.6
 """Agreement of the silhouettes (f_s) below which a frame is marked."""
 FASTEST_TURN = 2700.0

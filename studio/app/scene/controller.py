@@ -242,7 +242,7 @@ class SceneController:
         is_scrubbed: bool = True,
     ) -> Model:
         """Show a session ("" : none) and one of its runs ("" : none), a frame (None: as it is), a layer. is_scrubbed :
-        whether the layer was chosen by hand, else layers that are played go on.
+        whether the layer was chosen by hand, else playing layers continue.
         """
         model = show_frame(replace(self._open(model, session, run), trial=None), frame)
         return scrub(model, layer) if is_scrubbed or not model.layers.playing else model
@@ -562,7 +562,7 @@ class SceneController:
             self.viewers.shift(shift, self.model.selection.eye is None)
 
     def _note_eye(self, model: Model) -> Model:
-        """Note from where a viewer looks; one who is dragged out of a camera's place looks through it no longer."""
+        """Note from where a viewer looks; one who is dragged out of a camera no longer looks through it."""
         if self.viewers.is_answer:
             self.viewers.looking = None
             return model
@@ -769,7 +769,7 @@ class SceneController:
             self.panel.tabs.visible = has_controls
 
     def _draw_trial(self, model: Model, tokens: ColourTokens) -> None:
-        """Draw the body that is being made, anew where it changed."""
+        """Draw the body that is being made, again where it changed."""
         trial = model.trial
         with self._server.atomic():
             if self._trial is not None and (trial is None or self._trial.trial is not trial):

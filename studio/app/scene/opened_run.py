@@ -180,7 +180,7 @@ class OpenedRun:
         return self.body.neutral if stored is None else stored
 
     def settings(self) -> RunSettings:
-        """The settings that the run goes on with, else the defaults."""
+        """The settings that the run continues with, else the defaults."""
         return default_settings() if self.run is None else settings_with_moved(self.run)
 
     def moment(

@@ -127,7 +127,7 @@ def add_cloud(server: viser.ViserServer, name: str) -> viser.PointCloudHandle:
 def keep_programs(server: viser.ViserServer) -> None:
     """Two points under the floor that never change, in one colour and in one each.
 
-    viser makes a cloud's material anew whenever its points change. What draws it is compiled again then, unless another
+    viser makes a new material whenever a cloud's points change. What draws it is compiled again then, unless another
     cloud is drawn by the same: for a browser without a card that takes longer than the picture.
     """
     hidden = np.array([[0.0, 0.0, -0.01]] * 2, dtype=np.float32)

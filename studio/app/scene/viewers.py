@@ -92,7 +92,7 @@ class Viewers:
         return self.usual_eye if camera is None else _eye_of(camera)
 
     def _camera(self) -> viser.CameraHandle | None:
-        """That of a viewer who has come."""
+        """The camera of a viewer who has arrived."""
         for client in self._server.get_clients().values():
             if client.camera.update_timestamp and not is_browsers_own(_eye_of(client.camera)):
                 return client.camera
@@ -165,7 +165,7 @@ class Viewers:
         return away > DRAGGED and self._arrived == name
 
     def entered(self) -> None:
-        """Note that another camera is looked through, or none: who is on the way elsewhere stops."""
+        """Note that viewers look through another camera, or none: any other move stops."""
         self._arrived = self._ease = None
 
 

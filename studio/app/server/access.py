@@ -43,7 +43,7 @@ HOST = re.compile(
 )
 LAST_PORT = 65535
 HEALTH_PATH = "/health"
-"""Answered to whoever asks by the right name."""
+"""The answer to requests with the right name."""
 LOOPBACK_NAMES = frozenset(("localhost", "127.0.0.1", "::1"))
 VIEWING: ContextVar[bool] = ContextVar("viewing", default=False)
 """Whether the request that is being answered is a viewer's."""
@@ -54,7 +54,7 @@ MAKING_PAGES = frozenset(("/way", "/recording"))
 OWNERS_READING = ("/api/folders", "/api/uploads", "/api/trash")
 """Addresses that are about the owner's machine, beside the sessions."""
 VIEWERS_WINDOW = "view-"
-"""Begins the names of viewers' windows, whatever they call themselves: nobody else's scene is theirs to move."""
+"""Begins the names of viewers' windows, whatever they call themselves: they cannot move the scenes of others."""
 WINDOW_HEADER = b"x-studio-window"
 
 

@@ -95,7 +95,7 @@ def cancel(session: OpenSession, app: App) -> AlignmentAnswer:
 
 @router.post("/keep")
 async def keep(session: OpenSession, app: App) -> AlignmentAnswer:
-    """Use the turned cameras from now on; the calibration before is kept, what becomes stale is said. Refused while a
+    """Use the turned cameras from now on; the earlier calibration is kept, stale runs are named. Refused while a
     run of the session is being tracked, or where the calibration is another one than that which was measured.
     """
     aligned = _aligned(session, app)

@@ -1,4 +1,4 @@
-"""The API's own description, for whoever makes types of it: `python -m studio.app.server.api_document` prints it."""
+"""The API's own description, to make types of: `python -m studio.app.server.api_document` prints it."""
 
 import json
 import sys

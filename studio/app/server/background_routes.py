@@ -116,7 +116,7 @@ def evidence(session: OpenSession) -> MaskKnobs:
 
 @router.put("/evidence")
 def put_evidence(session: OpenSession, request: dict[str, Value]) -> MaskKnobs:
-    """Let new runs of the session begin with these knobs; runs that are there keep theirs."""
+    """Let new runs of the session begin with these knobs; existing runs keep theirs."""
     return keep_mask_knobs(session, request)
 
 

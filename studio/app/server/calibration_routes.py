@@ -111,7 +111,7 @@ def set_floor(session: OpenSession, request: FloorRequest, app: App) -> Proposal
 
 @router.post(HERE + "/proposals/{identifier}/apply")
 def apply(session: OpenSession, identifier: str, request: ApplyRequest, app: App) -> CalibrationView:
-    """Use a proposal from now on; the calibration before is kept, and what becomes stale is said. 422 with the first
+    """Use a proposal from now on; the earlier calibration is kept, and stale runs are named. 422 with the first
     finding that blocks, unless `anyway`; refused while a run of the session is being tracked.
     """
     proposal = _proposal(session, identifier, app)

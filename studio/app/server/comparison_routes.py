@@ -1,4 +1,4 @@
-"""Comparing trackers and sweeping knobs: start in the background, look, cancel, go on, throw away, download.
+"""Comparing trackers and sweeping knobs: start in the background, look, cancel, continue, delete, download.
 
 A comparison lies in its session's folder and is measured by processes of its own, or by the cluster that STUDIO_CLUSTER
 names, one comparison at a time; how far it is comes as `comparison` events and in every list.
@@ -54,7 +54,7 @@ router = Router(prefix="/api/comparisons", tags=["comparisons"])
 
 
 class CandidateRequest(Request):
-    """A tracker that takes part. name: a tracker, tracker:label, or a line-up; settings: its own knobs."""
+    """A tracker of the comparison. name: a tracker, tracker:label, or a line-up; settings: its own knobs."""
 
     name: str = Field(pattern=r"^[A-Za-z0-9_-]{1,64}(:[A-Za-z0-9_-]{1,40})?$")
     weighting: RunName | None = Field(None, description="Null: that of all.")
@@ -171,7 +171,7 @@ def open_trial(session: OpenSession, kept: Kept, request: TrialRequest, app: App
 
 @router.post(ONE + "/cancel", status_code=202)
 def cancel(session: OpenSession, kept: Kept, app: App) -> ComparisonLine:
-    """Stop it; what is measured stays, and it can go on."""
+    """Stop it; finished trials are kept, and it can be continued."""
     app.jobs.cancel(COMPARISON, f"{session.name}/{kept.name}")
     return _line(app, session, kept)
 

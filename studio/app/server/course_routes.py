@@ -1,4 +1,4 @@
-"""The guide's course: which of its runs are there, and making them in the background."""
+"""The guide's course: which of its runs exist, and making them in the background."""
 
 from studio.app.server.answers import Router
 from studio.app.server.app_state import App
@@ -11,7 +11,7 @@ router = Router(prefix="/api/course", tags=["course"])
 
 @router.get("")
 def course_runs(app: App) -> CourseView:
-    """The course's runs, and whether they are there."""
+    """The course's runs, and whether they exist."""
     return course_view(app.workspace, app.jobs.known(COURSE, SAMPLE))
 
 

@@ -79,7 +79,7 @@ def exports(session: OpenSession, run: OpenRun, app: App) -> ExportList:
 
 @router.post(RUN + "/exports", status_code=202)
 async def begin_export(session: OpenSession, run: OpenRun, request: ExportRequest, app: App) -> ExportState:
-    """Begin an export. 422 for a format or option that there is not; ask for its state, or wait for `export` events."""
+    """Begin an export. 422 for an unknown format or option; ask for its state, or wait for `export` events."""
     form = requested_format(request.format, request.options)
 
     def work(job: Job) -> dict[str, object]:

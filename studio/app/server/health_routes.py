@@ -1,4 +1,4 @@
-"""Whether the server can work, for whoever watches over it: `GET /health`, which needs no cookie and names nothing."""
+"""Whether the server can work, for a monitor: `GET /health`, which needs no cookie and names nothing."""
 
 import shutil
 from typing import Annotated

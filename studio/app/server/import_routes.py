@@ -148,7 +148,7 @@ add_job_routes(router, "/imports/{identifier}", IMPORT)
 
 @router.post("/samples", status_code=201)
 def add_sample(request: SampleRequest, app: App) -> NewName:
-    """Copy a sample session into the workspace (if it is not there) and return its name."""
+    """Copy a sample session into the workspace (if it has none) and return its name."""
     session = install_sample(app.workspace, request.name)
     app.events.session_changed(session.name)
     return NewName(name=session.name)

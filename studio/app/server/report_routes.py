@@ -76,7 +76,7 @@ def experiments(app: App) -> ExperimentList:
 @router.post("/api/reports/experiments", status_code=202)
 def begin_experiment(request: ReproductionRequest, app: App) -> ReproductionState:
     """Begin to run an experiment again, in the background (`reproduction` events). What is measured is kept as it
-    comes: begun again it goes on where it was stopped.
+    comes: when begun again it continues where it was stopped.
     """
     if request.name != ALL and request.name not in [one.name for one in known_experiments().lines()]:
         raise NotFoundError(f"There is no experiment '{request.name}'.", "Choose one of the list.")

@@ -1,6 +1,6 @@
 """Uploading a folder, file by file, straight to the disk.
 
-A file comes as the raw body of a PUT (nothing is held in memory, no form is parsed); `offset` goes on where
+A file comes as the raw body of a PUT (nothing is held in memory, no form is parsed); `offset` continues where
 a broken transfer stopped. The server counts what arrives. An upload is used by `POST /api/imports` and then
 removed.
 """
@@ -88,7 +88,7 @@ def begin(app: App) -> UploadState:
 
 @router.get("/{identifier}")
 def state(identifier: str, app: App) -> UploadState:
-    """What has arrived, so that a broken upload can go on."""
+    """What has arrived, so that a broken upload can be continued."""
     return _state(app, upload_folder(app, identifier))
 
 

@@ -32,7 +32,7 @@ STRETCH = 250.0
 """mm (of a person) that a subject may reach farther from his middle, over the floor, than in the first frame: no label
 creeps along ghosts."""
 ROUNDS = 2
-"""In each the way that a subject goes from one frame to the next is found anew."""
+"""Each estimates again how a subject moves from one frame to the next."""
 NEARLY_ALL = 0.97
 """Share of a piece from which all of it is one subject's."""
 PLACE_REACH = 600.0
@@ -53,7 +53,7 @@ class HullSubject:
 def real_pieces(hull: Hull, masks: Sequence[Bytes], cameras: Sequence[Camera]) -> tuple[Labels, list[int]]:
     """(K,) the piece of each voxel, and the numbers of those that are no ghosts, the largest first.
 
-    masks : (h, w), of the size of the cameras. The smallest are judged first: of two that explain the same, the larger
+    masks : (h, w), of the size of the cameras. The smallest are tested first: of two that explain the same, the larger
     stays.
     """
     numbers, volumes = piece_numbers(hull)

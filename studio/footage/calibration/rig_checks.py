@@ -383,9 +383,7 @@ def _true_size(ratio: float, board: Board | None) -> str:
 def distance_findings(
     cameras: Sequence[Camera], distances_mm: Mapping[tuple[str, str], float], board: Board | None = None
 ) -> tuple[Finding, ...]:
-    """Distances between lenses that were measured in the room, against the calibration's; names that are not there are
-    passed over.
-    """
+    """Distances between lenses that were measured in the room, against the calibration's; unknown names are ignored."""
     centres = {camera.name: camera.centre for camera in cameras}
     ratios = {
         pair: float(np.linalg.norm(centres[pair[0]] - centres[pair[1]])) / length

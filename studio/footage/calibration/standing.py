@@ -53,7 +53,9 @@ class Posture:
 
     @property
     def stands(self) -> bool:
-        """Whether this can only be somebody upright: legs under the trunk, nothing over the head, on the floor."""
+        """Whether this can only be a person who stands upright: legs under the trunk, nothing over the head, on the
+        floor.
+        """
         return (
             abs(self.feet) <= FEET
             and self.legs <= LEGS

@@ -1,7 +1,7 @@
 """The vertical, as the cameras show it: people set cameras up level, so that the rows of all pictures are horizontal.
 
 A world's axes say nothing of it where the world is a camera's own frame, as aniposelib and FreeMoCap leave it. What the
-rows leave over is judged by how well they agree; where they do not, the pictures' common up is a rough guess.
+rows leave over follows from how well they agree; where they do not, the pictures' common up is a rough guess.
 """
 
 from collections.abc import Sequence

@@ -95,7 +95,7 @@ def _lens(where: str, name: str, entry: Element) -> Intrinsics:
 
 
 def _numbers(where: str, entry: Element, *names: str, missing: float | None = None) -> Array:
-    """Attributes as finite numbers. missing : what stands for one that is not there. Raises CalibrationError."""
+    """Attributes as finite numbers. missing : the value of a missing one. Raises CalibrationError."""
     values: list[float] = []
     for name in names:
         text = entry.get(name)

@@ -83,7 +83,7 @@ class Storage:
         return values.reshape(shape)
 
     def text(self, name: str) -> str:
-        """An entry's text, "" if it is none or not there."""
+        """An entry's text, "" if it is missing or no text."""
         entry = self._entries.get(name, "")
         return _unquoted(entry) if isinstance(entry, str) and not _is_number(entry) else ""
 

@@ -56,7 +56,7 @@ def open_stream(
     clock: Callable[[], float] = time.monotonic,
     released: Callable[[], bool] = lambda: True,
 ) -> Iterator[Shot]:
-    """The pictures of a camera as they come; released : whether a replayed video may go on from its first one.
+    """The pictures of a camera as they come; released : whether a replayed video may continue after its first one.
 
     Raises FootageError, also in the middle.
     """

@@ -33,7 +33,7 @@ FRAGMENT_MICROSECONDS = 500_000
 TOLERANCE = 0.6
 """Frames that a picture may be late or early before one is repeated or left out."""
 LONGEST_GAP = 600
-"""Pictures put in at most at once; after a longer silence the recording goes on where it is."""
+"""Pictures put in at most at once; after a longer silence the recording continues without them."""
 TIME_COLUMNS = ("cam_id", "frame_index", "frame_time")
 FRAGMENTS = {"movflags": "frag_keyframe+empty_moov+default_base_moof", "frag_duration": str(FRAGMENT_MICROSECONDS),
              "flush_packets": "1"}  # fmt: skip

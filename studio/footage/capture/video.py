@@ -203,7 +203,7 @@ where a file does not say how long it is."""
 LOWER_FIRST = frozenset(("dvvideo",))
 """Codecs whose interlaced pictures begin with the lower field where nothing says otherwise."""
 FORWARD = 24
-"""A jump forward of up to this many frames is decoded through instead of sought."""
+"""A jump forward of up to this many frames is decoded through instead of a seek."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -296,7 +296,7 @@ class VideoReader:
         self._lock = threading.Lock()
         self._container: av.container.InputContainer | None = None
         self._frames: Iterator[av.VideoFrame] = iter(())
-        # Kept with its tables: making them anew costs as much as the conversion itself.
+        # Kept with its tables: making them again costs as much as the conversion itself.
         self._reformatter = VideoReformatter()
         self._next = 0
         self._times: list[int] | None = None

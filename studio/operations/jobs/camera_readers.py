@@ -70,7 +70,7 @@ class CameraReaders:
         return usual if abs(usual / measured - 1.0) < NEAR_RATE else round(measured, 2)
 
     def release(self) -> None:
-        """Let replayed videos go on from their first picture."""
+        """Let replayed videos continue after their first picture."""
         for camera in self.cameras.cameras:
             camera.release()
 

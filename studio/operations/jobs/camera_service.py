@@ -139,7 +139,7 @@ class CameraService:
     def track(
         self, base: Session, request: LiveRecordingRequest, wanted: Mapping[str, Any], on_run: OnRun
     ) -> RecordingState:
-        """Record the cameras into a session and hand its live run to whoever tracks. Raises RunError, FootageError."""
+        """Record the cameras into a session and hand its live run to the tracker. Raises RunError, FootageError."""
         readers = self._free_readers(request.into)
         return self._begin(
             RecordingState(kind="track", session=request.into.name, limit=request.seconds),

@@ -175,7 +175,7 @@ class ClusterExecutor(Executor):
             task.cancel()
 
     def _answer(self, future: Future[Any], task: Any) -> None:  # noqa: ANN401 - a future of Dask
-        """Called in a thread of Dask's: what became of a task."""
+        """Called in a thread of Dask's with the outcome of a task."""
         if not future.set_running_or_notify_cancel():
             return
         try:

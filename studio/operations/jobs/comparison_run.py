@@ -1,6 +1,4 @@
-"""A comparison worked at until all of its trials are done: outcomes are kept one by one, those that are there are not
-measured again.
-"""
+"""A comparison run until all of its trials are done: outcomes are kept one by one and not measured again."""
 
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Executor
@@ -112,12 +110,12 @@ def run_in_background(
 
 
 def processes_beside() -> int:
-    """How many trials go on at once beside the studio, for which one core stays free."""
+    """How many trials run at once beside the studio, for which one core stays free."""
     return max(1, cores() - 1)
 
 
 def done_before(kept: KeptComparison, plan: Plan) -> int:
-    """How many of a comparison's trials are there."""
+    """How many of a comparison's trials are done."""
     return len(_outcomes(kept, _Work.of(plan)))
 
 
@@ -144,7 +142,7 @@ def _measure(
     executor: Executor | None,
     checkpoint: Callable[[], None],
 ) -> tuple[Plan, list[Outcome]]:
-    """The outcomes of all trials, in their order; those that are not there yet are measured."""
+    """The outcomes of all trials, in their order; missing ones are measured."""
     work = _Work.of(kept.plan(session))
     outcomes = _outcomes(kept, work)
     jobs = [_job(kept, work, key) for key in work.trials if key not in outcomes]

@@ -59,7 +59,7 @@ class StudioControl:
 
     @property
     def state(self) -> StateChanged:
-        """Where the search stands, or stood when the process was last heard of."""
+        """Where the search stands, or stood at the process's last event."""
         return self._state
 
     @property
@@ -221,7 +221,7 @@ class StudioControl:
             self._publish(self._said)
 
     def take_end(self, process: OwnedProcess) -> None:
-        """Say that the process is gone, unless it was closed; whoever waits for an answer gets one."""
+        """Say that the process is gone, unless it was closed; callers that wait for an answer get one."""
         with self._lock:
             if process is not self._process:
                 return

@@ -1,6 +1,6 @@
 """Work in the background of a server: one life for every job, one runner for all of them.
 
-A job is queued, runs in a thread, and is done, failed or cancelled; whoever wants its processes runs them there through
+A job is queued, runs in a thread, and is done, failed or cancelled; work that needs processes runs them through
 an executor. How it stands is one value that is replaced whenever something becomes of it, and sent as an event.
 """
 
@@ -126,7 +126,7 @@ class JobKind(Generic[SomeState]):
 
 
 During = Callable[[JobKind[Any], SessionJob], AbstractContextManager[None]]
-"""during(kind, state) is entered while a job goes on."""
+"""during(kind, state) is entered while a job runs."""
 
 
 class Job:
@@ -382,7 +382,7 @@ def _busy(kind: JobKind[State], state: State) -> RunError:
 def keep_in_place(
     workspace: Workspace, kind: JobKind[Any], state: SessionJob
 ) -> AbstractContextManager[None]:
-    """Entered while a job goes on: other processes do not move its session, unless that is only being made."""
+    """Entered while a job runs: other processes do not move its session, unless that is only being made."""
     session = workspace.root / state.session
     if not state.session or (kind.makes_session and not (session / MANIFEST_NAME).is_file()):
         return nullcontext()

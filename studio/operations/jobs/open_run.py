@@ -28,7 +28,7 @@ from studio.sessions.workspace import Workspace
 
 
 class SettingsMailbox:
-    """Latest wins: whoever reads gets the newest settings, however many changes came since it last looked.
+    """Latest wins: a reader gets the newest settings, however many changes came since its last look.
 
     check : raises SettingsError for settings that the run cannot have.
     """
@@ -210,7 +210,7 @@ class OpenRun:
         return append_to_log(self.stored.folder, level, text).time
 
     def keep_moved(self) -> None:
-        """Keep the knobs that were moved and that no frame uses yet for whoever opens the run next."""
+        """Keep the knobs that were moved and that no frame uses yet, for the next opening of the run."""
         version, stored = self.tracking.latest_settings()
         # A disk that refuses them is no reason to refuse the knobs.
         with contextlib.suppress(SessionError):

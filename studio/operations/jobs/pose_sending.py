@@ -71,7 +71,7 @@ class PoseSender:
 
 
 class _Osc:
-    """Datagrams: those that nobody takes are lost, as they should be."""
+    """Datagrams: without a receiver they are lost, as they should be."""
 
     def __init__(self, address: SendAddress, body: BodyModel) -> None:
         self._messages = load_extra("pythonosc.osc_message_builder", EXTRA).OscMessageBuilder

@@ -231,7 +231,7 @@ class _Seat:
 
 
 def ending(exit_code: int | None) -> str:
-    """How a process ended, as a sentence goes on: "ended by signal 9, SIGKILL"."""
+    """How a process ended, as the end of a sentence: "ended by signal 9, SIGKILL"."""
     if exit_code is not None and exit_code < 0:
         return f"ended by signal {-exit_code}, {signal.Signals(-exit_code).name}"
     return f"ended with exit code {exit_code}"
@@ -292,7 +292,7 @@ def answered(content: bytes) -> bytes:
 
 
 def _end_with_parent() -> None:
-    """The result is of no use once whoever submitted the task was killed."""
+    """The result is of no use once the process that submitted the task was killed."""
     parent = parent_process()
     if parent is not None:
         wait([parent.sentinel])

@@ -21,8 +21,8 @@ from studio.sessions.stored_run import StoredRun
 
 @kept_as("swept_runs.measure_run")
 def measure_run(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
-    """Track a run and measure it; the fields of `Swept`. One of the same name that was begun so is gone on with; of a
-    session in a store also one that another machine put there, and what is tracked is put there.
+    """Track a run and measure it; the fields of `Swept`. An earlier attempt of the same name is continued; for a
+    session in a store also one of another machine, and the tracked run is put there.
     """
     session = cache.session(arguments["footage"])
     bring_runs(session, arguments["run"])
@@ -36,7 +36,7 @@ def measure_run(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, 
 
 @kept_as("swept_runs.measure_run_of_batch")
 def measure_run_of_batch(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
-    """The same of a session that whoever asks has not opened: what is left out is the session's own."""
+    """The same for a session that the caller has not opened: what is left out is the session's own."""
     session = cache.session(arguments["footage"])
     about, first = session.manifest, arguments["first"]
     first, last = session.checked_frames(

@@ -265,7 +265,7 @@ class TrackingJob:
         self._state(following.resting)
 
     def _say_settings(self, run: OpenRun) -> None:
-        """Say which settings the run goes on with, and since when the stored ones of them are in use."""
+        """Say which settings the run continues with, and since when the stored ones of them are in use."""
         version, settings = run.mailbox.latest()
         entry = run.tracking.history.entries[-1]
         self._say.settings(run, version, settings, entry.frame, entry.layer)

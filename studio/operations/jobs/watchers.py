@@ -1,4 +1,4 @@
-"""The queue of whoever watches: newest wins, so a slow watcher loses what is out of date and holds up nothing.
+"""The queue of a watcher: newest wins, so a slow watcher loses what is out of date and holds up nothing.
 
 An entry takes the place of an older one of the same key (one state, one settings message, one result, one record for
 each layer), so what waits is bounded however long a watcher sleeps; those without a key (acknowledgements, log lines)

@@ -1,7 +1,8 @@
 """A sweep: every combination of some knobs' values, tracked with several seeds, each as a run of the session.
 
 A sweep is a comparison whose candidates are the points of a grid (`Plan.vary`). Its trials are runs that are kept with
-their frames, so that any of them can be opened; a session needs no truth for it: without one the silhouettes judge.
+their frames, so that any of them can be opened; a session needs no truth for it: without one the silhouettes are the
+measure.
 """
 
 import math
@@ -56,7 +57,7 @@ MEASURES = (
     Measure("evaluations", "Evaluations a frame", "", None),
     Measure("milliseconds", "Time a frame, among others at once", "ms"),
 )
-"""What is known of runs; the first that all runs of a sweep have judges its points."""
+"""What is known of runs; the first that all runs of a sweep have ranks its points."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -292,7 +293,7 @@ def sweep_csv(sweep: Sweep) -> str:
 
 
 def sweep_text(sweep: Sweep) -> str:
-    """The points for a terminal, the best first, by the measure that judges them."""
+    """The points for a terminal, the best first, by the measure that ranks them."""
     chief = sweep.chief
     shown = [one for one in sweep.measures if one.key != chief.key and one.key != "worst"]
     head = [*sweep.plan.vary, f"{chief.label} [95 %]", *(one.label for one in shown)]

@@ -37,13 +37,13 @@ def located(reference: str, recipe_folder: Path) -> Path:
 
 
 def real_footage(place: str) -> Path | None:
-    """A folder of the real data, by its place in it; None where it is not there."""
+    """A folder of the real data, by its place in it; None where it is missing."""
     path = real_data_folder() / place
     return path if path.is_dir() else None
 
 
 def missing_data(recipe: Path) -> str:
-    """Which file of the real data a recipe names that is not there, in words; "" where all are."""
+    """Which file of the real data that a recipe names is missing, in words; "" for none."""
     for reference in re.findall(rf"[\"']({PREFIX}[^\"']+)[\"']", recipe.read_text(encoding="utf-8")):
         try:
             located(reference, recipe.parent)

@@ -193,7 +193,7 @@ def people_beside(
 
 
 def _write_beside(person: Recipe, motion: PersonMotion, folder: Path) -> None:
-    """Truth, measures and start pose of somebody beside, as a session of him alone would have them."""
+    """Truth, measures and start pose of another person, as a session of that person alone would have them."""
     folder.mkdir(parents=True)
     truth, subject = marker_motion(motion), person_subject(person, motion)
     write_trc(folder / "truth.trc", truth)

@@ -167,7 +167,7 @@ class Renderer:
 
 
 class SurfaceRenderer(Renderer):
-    """Renders a surface of swept spheres that is nobody's: a robot, a hand."""
+    """Renders a surface of swept spheres that is no person's: a robot, a hand."""
 
     def __init__(
         self,

@@ -82,7 +82,7 @@ class Points:
 
 @cache
 def name_map(name: str) -> NameMap:
-    """A map by its name. Raises ExportError for one that there is not."""
+    """A map by its name. Raises ExportError for an unknown one."""
     file = Path(str(files("studio.results.export") / "name_maps" / f"{name}.toml"))
     if not name.isalnum() or not file.is_file():
         raise ExportError(

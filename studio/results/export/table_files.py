@@ -158,7 +158,7 @@ def write_parquet(task: ExportTask) -> Written:
 
 
 def _remark(remarks: Mapping[int, str], frame: float) -> str:
-    """The note on a frame; "" between frames, where the motion is sampled anew."""
+    """The note on a frame; "" between frames, where the motion is resampled."""
     return remarks.get(int(frame), "") if frame.is_integer() else ""
 
 

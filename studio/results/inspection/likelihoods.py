@@ -29,7 +29,7 @@ from studio.search.likelihood.problem import (
 KEPT = 2
 """Runs whose footage, backgrounds and last frames are kept open."""
 REST_SECONDS = 60.0
-"""Those that nobody has looked at for so long are closed."""
+"""Evaluations that were not looked at for so long are closed."""
 NATS_SCALE = table(
     "scale",
     "Colours of maps of log weights",
@@ -89,7 +89,7 @@ def forget_evaluations() -> None:
 
 
 def let_evaluations_rest(seconds: float = REST_SECONDS) -> None:
-    """Close the footage of runs that nobody has looked at for so long."""
+    """Close the footage of runs that were not looked at for so long."""
     before = time.monotonic() - seconds
     with _lock:
         for key in [key for key, (_, used) in _sources.items() if used < before]:

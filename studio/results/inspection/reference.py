@@ -145,7 +145,7 @@ def refined_pose(
     run: InspectedRun, evidence: FrameEvidence, frame: int, pose: Array, near: Array | None = None
 ) -> Array:
     """The pose (D,) refined as a run refines its frames, and with the sides that fit best; itself where no silhouette
-    shows anything. near : (D,) the body in the next frame, from where limbs that are lost are sought instead of anew.
+    shows anything. near : (D,) the body in the next frame, from where lost limbs are searched for.
     """
     points = FrameRefinementSettings().refine_frame_points
     seen = {name: view for name, view in silhouettes_by_camera(evidence, points).items() if len(view.border)}

@@ -41,7 +41,7 @@ class Verdict:
         return self.tracking in (TRACKED, RECOVERED) and not self.lost
 
     def lost_by(self, limb: str) -> str:
-        """Who says that a limb is lost, in words; "" for nobody."""
+        """Which of truth and silhouettes says that a limb is lost, in words; "" for neither."""
         sources = {"truth": self.by_truth, "silhouettes": self.by_silhouettes}
         return " and ".join(source for source, limbs in sources.items() if limb in limbs)
 

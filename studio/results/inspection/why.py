@@ -262,7 +262,7 @@ class Case:
         return exchanges.pop() if len(exchanges) == 1 else ""
 
     def _exchanged_in_frame(self, number: int) -> str:
-        """The same of another frame, in which the run's own pose is judged."""
+        """The same for another frame, with the run's own pose."""
         frame = self.run.frame(number)
         reference = reference_pose(frame, self.track)
         pose = self._refined_now(number) if self.reference.kind == REFINED_NOW else reference.pose

@@ -26,9 +26,9 @@ SIDES = (("left_upper_arm", "right_upper_arm", 11, 12), ("left_thigh", "right_th
 MARGIN = 1.5
 """Side of the first crop, in extents of the body's joints."""
 SAME_SIZE = 2.0
-"""Ratio of the sides of the person's crop and the first one beyond which somebody else is seen."""
+"""Ratio of the sides of the person's crop and the first one beyond which it shows another person."""
 NETWORK_ODDS = 6.0
-"""Log odds that somebody faces as all cameras' points say; set before the three wrong ones above were known."""
+"""Log odds that a person faces as all cameras' points say; set before the three wrong ones above were known."""
 
 
 def facing_agreement(

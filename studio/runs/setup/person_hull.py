@@ -1,4 +1,4 @@
-"""The visual hull of whoever a few frames' masks show, and which frames and sizes of pictures it is carved in."""
+"""The visual hull of the subject in a few frames' masks, and which frames and sizes of pictures it is carved in."""
 
 import dataclasses
 from collections.abc import Sequence

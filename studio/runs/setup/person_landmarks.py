@@ -45,7 +45,7 @@ MOST_EXCHANGED = 6
 
 def person_landmarks(cameras: Sequence[Camera], footage: Footage, progress: Progress) -> MarkerMotion:
     """Twelve joints of the person whom the network follows, mm in the session's world; NaN where fewer than two cameras
-    see one. Raises FootageError for one camera, or where nobody is seen.
+    see one. Raises FootageError for one camera, or where no person is seen.
     """
     if len(cameras) < 2:
         raise FootageError(

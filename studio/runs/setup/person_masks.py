@@ -1,8 +1,9 @@
-"""Masks of a person from the network, for all frames of a session: no picture of the empty room, nobody who must move.
+"""Masks of a person from the network, for all frames of a session: without a picture of the empty room, and without
+movement.
 
 Frame by frame the network looks where each camera last saw the person. Cameras must agree on where he is: the middles
 of his shoulders, hips, knees and ankles, which left and right exchanged do not move, are triangulated, and a camera
-that saw somebody else, or nobody, looks again where the others' points lie in its picture. In the first frame, and
+that saw another person, or none, looks again where the others' points lie in its picture. In the first frame, and
 where he is lost, all pictures are searched; of several persons the one is followed that most cameras see, then the
 largest; after he was lost, first of all the one who is where he was.
 """
@@ -40,14 +41,15 @@ FOLLOWING = "cutting the person out"
 SEARCHED_EVERY = 0.25
 """Seconds between two searches of whole pictures."""
 SAME_PLACE = 1000.0
-"""Distance (mm) from where the person was last within which somebody who is found is taken for him."""
+"""Distance (mm) from where the person was last within which a person is taken for the same one."""
 APART = 0.12
-"""Mean distance of a camera's points from the others', as a share of its crop's side, from which it sees somebody else.
-On the balancing man the right person's lie within 0.05, the bystander's beyond 0.3."""
+"""Mean distance of a camera's points from the others', as a share of its crop's side, from which it sees another
+person. On the balancing man the right person's lie within 0.05, the bystander's beyond 0.3.
+"""
 
 BESIDE, SIZE_RATIO = 0.2, 1.6
 """Of a person who is looked for where the others' points lie: distance of the crops' middles as a share of their side,
-and the ratio of their sides. Points of somebody upside down are too coarse for `APART`."""
+and the ratio of their sides. Points of a person upside down are too coarse for `APART`."""
 PRESENT_BESIDE = 0.2
 """Presence from which he counts as seen where the others' points lie, in the better of two looks: that of people upside
 down falls, while their masks stay good."""
@@ -58,7 +60,9 @@ Made = TypeVar("Made")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PersonMasks:
-    """One frame. masks : (H, W) uint8, 0 or 255, by camera. unseen : cameras that see nobody; their masks are empty."""
+    """One frame. masks : (H, W) uint8, 0 or 255, by camera. unseen : cameras that see no person; their masks are
+    empty.
+    """
 
     frame: int
     masks: Mapping[str, Bytes]
@@ -158,7 +162,7 @@ class _Follower:
         self._searched = -step
 
     def copy(self) -> "_Follower":
-        """One that goes on from here by itself, with the same networks."""
+        """A copy that continues from here independently, with the same networks."""
         other = copy(self)
         other._crops = dict(self._crops)
         return other
@@ -220,7 +224,7 @@ class _Follower:
         return self._complete(pictures, best[1], best[2])
 
     def _complete(self, pictures: Mapping[str, Bytes], agreed: Sightings, points: Array | None) -> Sightings:
-        """These sightings, and those of cameras that saw nobody, or another, where the others' points (5, 3) lie."""
+        """These sightings, and those of cameras that saw no person, or another, where the others' points (5, 3) lie."""
         if points is not None:
             size = _size(self._cameras, agreed, points)
             again = {

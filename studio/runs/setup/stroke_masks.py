@@ -121,7 +121,7 @@ _cuts_lock = threading.Lock()
 def _begin(
     session: Session, footage: Footage, camera: str, first: int, strokes: tuple[Stroke, ...]
 ) -> StrokeCut:
-    """A cut of the first picture, to go on from; those of the last few are kept."""
+    """A cut of the first picture, to continue from; those of the last few are kept."""
     key = (session.path, camera, pictures_of(session.manifest.footage)[camera], first, strokes)
     with _cuts_lock:
         cut = _cuts.get(key)

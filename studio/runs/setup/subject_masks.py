@@ -173,7 +173,7 @@ class CutFrame:
 def cut_frames(session: Session, places: Sequence[Place], progress: Progress = unheard) -> Iterator[CutFrame]:
     """Every frame's masks of the subjects at some places in the first frame, in order.
 
-    Raises FootageError where nobody stands at a place, or masks cannot be made.
+    Raises FootageError where no subject stands at a place, or masks cannot be made.
     """
     carver = _Carver(session)
     follower: HullFollower | None = None

@@ -46,7 +46,7 @@ def make_subject_sessions(
 ) -> tuple[tuple[Session, ...], tuple[str, ...]]:
     """A session for the subject at each place of the first frame, and notes. into : their new folders.
 
-    Their masks are the session's, cut by the visual hull. Raises FootageError where nobody stands at a place,
+    Their masks are the session's, cut by the visual hull. Raises FootageError where no subject stands at a place,
     SessionError for a folder that is taken; then nothing is made.
     """
     known = [session.path, *sorted((session.path / BESIDE).glob("*"))]
@@ -118,7 +118,7 @@ def _linked(session: Session, place: Path, number: int, owner: Path | None) -> S
 
 
 def _knows(session: Session) -> bool:
-    """Whether a session's measures are those of somebody whose place is known."""
+    """Whether a session's measures are of a person whose place is known."""
     return (session.path / START_POSE_NAME).exists()
 
 

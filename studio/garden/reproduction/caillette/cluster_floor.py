@@ -123,13 +123,13 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
         return runs[f"{kind}, {clip}, {name}"]
 
     rows: list[tuple[Any, ...]] = []
-    for name, learnt in learning.items():
-        yield number(f"clusters, {name}", [one["clusters"] for one in learnt])
+    for name, of_name in learning.items():
+        yield number(f"clusters, {name}", [one["clusters"] for one in of_name])
         for clip in EXERCISES:
-            inside = [100.0 * one["inside"][clip] for one in learnt]
+            inside = [100.0 * one["inside"][clip] for one in of_name]
             yield number(f"frames of the {clip} inside a cluster, {name}", inside, "%")
         for place, memory in enumerate(MEMORIES):
-            cells = [[one["rows"][place][key] for one in learnt] for key in ("states", "train", *EXERCISES)]
+            cells = [[one["rows"][place][key] for one in of_name] for key in ("states", "train", *EXERCISES)]
             rows.append((name, memory, *(round(float(np.mean(cell)), 3) for cell in cells)))
     for kind in (PRINTED, OURS):
         for clip in EXERCISES:
