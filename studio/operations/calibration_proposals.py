@@ -32,7 +32,7 @@ from studio.foundations.arrays import Bytes
 from studio.foundations.errors import CalibrationError, NotFoundError, StudioError
 from studio.foundations.foreign_files import read_file
 from studio.foundations.geometry.camera import Camera
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.runs.setup.levelling import level_by_run, level_by_silhouettes, level_calibration
 from studio.sessions.archives import is_litter
 from studio.sessions.board_calibration import BoardOptions, BoardPlace, how_taken, solve_boards
@@ -217,7 +217,11 @@ def checked_board(session: Session, text: str, options: BoardOptions) -> Board:
 
 
 def propose_boards(
-    session: Session, footage: BoardFootage, board: Board, options: BoardOptions, progress: Progress = unheard
+    session: Session,
+    footage: BoardFootage,
+    board: Board,
+    options: BoardOptions,
+    progress: Progress = no_progress,
 ) -> Proposal:
     """A session's calibration from board footage. Lenses alone give no cameras, and a finding that blocks.
 
@@ -273,7 +277,7 @@ def proposal_in_use(session: Session) -> Proposal:
     )
 
 
-def propose_level(session: Session, run: str = "", progress: Progress = unheard) -> Proposal:
+def propose_level(session: Session, run: str = "", progress: Progress = no_progress) -> Proposal:
     """The calibration in use, its world levelled by a run's feet, else by the silhouettes.
 
     Raises NotFoundError, CalibrationError where nothing shows the vertical or the floor.

@@ -14,7 +14,7 @@ from studio.footage.capture.calibration_files import CALIBRATION_FORMATS
 from studio.foundations.declaring import Web
 from studio.foundations.errors import NotFoundError, SessionError
 from studio.foundations.knobs import Knob, knobs_of
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.results.export.exporting import ExportReport, export_run, settled
 from studio.results.export.formats import FORMATS, ExportFormat, format_of
 from studio.results.export.options import ExportOptions
@@ -138,7 +138,7 @@ def export_into_run(
     form: ExportFormat,
     requested: Mapping[str, str | int | float | bool],
     *,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
 ) -> KeptExport:
     """Export a run into its own folder; several files become one zip. The same request replaces its file.
 

@@ -13,7 +13,7 @@ from studio.footage.capture.synchrony import MOST_SECONDS, Synchrony, in_words
 from studio.footage.capture.timestamps import TimedOffsets
 from studio.foundations.declaring import Body, Target, Terminal, Web, operation, taking
 from studio.foundations.errors import FootageError, SessionError
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.foundations.records import extended
 from studio.operations.jobs.camera_readers import CameraReaders
 from studio.operations.jobs.stream_recording import RecordingStanding, StreamRecording, recording_folder
@@ -199,7 +199,9 @@ def footage_state(session: Session, notes: tuple[str, ...] = ()) -> FootageState
     )
 
 
-def unpacked_upload(folder: Path, parts: Sequence[str] = FOOTAGE_PARTS, progress: Progress = unheard) -> Path:
+def unpacked_upload(
+    folder: Path, parts: Sequence[str] = FOOTAGE_PARTS, progress: Progress = no_progress
+) -> Path:
     """The uploaded folder: out of its archive, and without folders that only wrap it.
 
     parts : patterns of what the folder in question holds.

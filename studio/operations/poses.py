@@ -10,7 +10,7 @@ from studio.body.mirroring import has_sides
 from studio.body.model import BodyModel, checked_pose
 from studio.foundations.arrays import Array
 from studio.foundations.errors import SettingsError
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.operations.overview import ParameterView, parameter_views
 from studio.runs.setup.pose_search import BetterPose, better_pose
 from studio.runs.setup.start_pose_file import keep_start_pose
@@ -100,7 +100,7 @@ class PoseSearch:
     keep: bool = False
 
 
-def improve_pose(session: Session, search: PoseSearch, progress: Progress = unheard) -> BetterPose:
+def improve_pose(session: Session, search: PoseSearch, progress: Progress = no_progress) -> BetterPose:
     """The best pose near a given one in a frame. Raises RunError where nothing is to be seen in the frame."""
     better = better_pose(
         session, search.frame, search.pose, run=search.run, seed=search.seed, progress=progress

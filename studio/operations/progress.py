@@ -12,7 +12,7 @@ from rich.progress import Progress as Bar
 
 from studio.foundations.errors import StudioError
 from studio.foundations.foreign_files import read_file
-from studio.foundations.progress import Progress, TimeLeft, left_in_words, unheard
+from studio.foundations.progress import Progress, TimeLeft, left_in_words, no_progress
 from studio.foundations.typed_decoding import decode_json
 from studio.foundations.words import printable
 from studio.sessions.atomic_files import write_bytes
@@ -50,7 +50,7 @@ def reporting(progress: Reporting, title: str) -> Generator[Progress]:
         with bar(console, title) as report:
             yield report
     else:
-        yield unheard
+        yield no_progress
 
 
 def say(progress: Reporting, lines: Iterable[str], once_in: Path | None = None) -> None:

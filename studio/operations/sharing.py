@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import Field
 
 from studio.foundations.declaring import Terminal, operation
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.operations.inspecting import inspected, worst_frame
 from studio.operations.opening import RunName, keeping_in_place, open_run
 from studio.operations.progress import Reporting, reporting
@@ -74,7 +74,7 @@ def page_text(
     track: str = "",
     clouds: Sequence[int] = (),
     *,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
 ) -> tuple[int, str]:
     """The frame that the page of a run looks into (default: the worst one), and the page. Raises as `share`."""
     opened = inspected(run)

@@ -22,7 +22,7 @@ from studio.foundations.declaring import (
     taking,
 )
 from studio.foundations.errors import RunError, SettingsError, StudioError
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.operations.footage import Cameras, addresses_of
 from studio.operations.jobs.batch import BatchResult, track_to_end
 from studio.operations.jobs.camera_tracking import LiveRecordingRequest, track_cameras
@@ -350,7 +350,7 @@ def correct(
 
 @keeping_in_place
 def track_back(
-    run: RunName, progress: Progress = unheard, cancelled: Callable[[], bool] | None = None
+    run: RunName, progress: Progress = no_progress, cancelled: Callable[[], bool] | None = None
 ) -> int:
     """Track a corrected run backwards from its corrected frame; the number of frames with new poses.
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from studio.foundations.knobs import changed
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.operations.exports import keep_file, kept_file
 from studio.operations.opening import session_of
 from studio.operations.person import landmarks
@@ -172,7 +172,7 @@ def _check_line(check: RunCheck) -> CheckLine:
     )
 
 
-def measure_by_landmarks(run: StoredRun, track: str, *, progress: Progress = unheard) -> LandmarksLine:
+def measure_by_landmarks(run: StoredRun, track: str, *, progress: Progress = no_progress) -> LandmarksLine:
     """Measure a track against the joints that a network sees of a person, which are kept among the run's exports.
 
     Raises as `landmarks` and `evaluate`.
@@ -186,5 +186,5 @@ def measure_by_landmarks(run: StoredRun, track: str, *, progress: Progress = unh
         return len(made.motion.times)
 
     kept = keep_file(run, LANDMARKS, "trc", session.manifest.fps, write, "A network's joints")
-    errors = evaluate(run, truth=kept_file(run, kept.file), track=track, progress=unheard)
+    errors = evaluate(run, truth=kept_file(run, kept.file), track=track, progress=no_progress)
     return LandmarksLine(kept.file, seen, errors.mean_mm, errors.without_offsets_mm)

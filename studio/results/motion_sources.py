@@ -6,7 +6,7 @@ from pathlib import Path
 from studio.body.model import BodyModel
 from studio.body.person import sampled
 from studio.foundations.errors import StudioError
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.results.drawing_footage.recipe_file import recipe_names
 from studio.results.drawing_footage.recipes import person_of_recipe
 from studio.runs.learning.recordings import (
@@ -35,7 +35,7 @@ def read_sources(
     *,
     fps: float = FPS,
     workspace: Workspace | None = None,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
 ) -> tuple[Recording, ...]:
     """The recordings of all sources in order, folders expanded. progress : called with the source's name. Raises
     StudioError.
@@ -61,7 +61,7 @@ def read_source(
     *,
     fps: float = FPS,
     workspace: Workspace | None = None,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
 ) -> Recording:
     """The motion of a source on `body`, at `fps`.
 
@@ -109,7 +109,7 @@ def recipe_recording(
     fps: float = FPS,
     options: Mapping[str, float] | None = None,
     frames: int | None = None,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
 ) -> Recording:
     """The motion of a footage's recipe (a file or a bundled name) on the body's own proportions; nothing is rendered.
 

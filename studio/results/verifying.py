@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.foundations.errors import SessionError, StudioError
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.runs.problem_source import ProblemSource
 from studio.runs.run_footage import footage_of
 from studio.runs.tracking_run import TrackingRun
@@ -80,7 +80,7 @@ class Repair:
     problem: str = ""
 
 
-def verify(session: Session, progress: Progress = unheard) -> Verification:
+def verify(session: Session, progress: Progress = no_progress) -> Verification:
     runs = session.runs()
     faults: list[Fault] = []
     again: list[str] = []
@@ -176,7 +176,9 @@ def _is_live(run: StoredRun) -> bool:
     return False
 
 
-def repair(session: Session, faults: tuple[Fault, ...], progress: Progress = unheard) -> tuple[Repair, ...]:
+def repair(
+    session: Session, faults: tuple[Fault, ...], progress: Progress = no_progress
+) -> tuple[Repair, ...]:
     """Track the damaged frames of each run again from the stored frames before them. Other faults stay."""
     names = dict.fromkeys(fault.run for fault in faults if fault.run)
     return tuple(_repair_run(session, session.run(name), faults, progress) for name in names)

@@ -22,7 +22,7 @@ from studio.evidence.pipeline import EvidenceMaker
 from studio.foundations.arrays import Array
 from studio.foundations.errors import RunError, SessionError
 from studio.foundations.geometry.camera import Camera
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.foundations.words import counted
 from studio.runs.drawing.overlay_drawing import projected_silhouette
 from studio.runs.jumps import Jump, jumps_of
@@ -175,7 +175,7 @@ def check_run(
     track: str = BEST,
     every: int = EVERY,
     *,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
 ) -> RunCheck:
     """Measure a track in every `every`-th of its frames and store the result, if the disk can be written.
 

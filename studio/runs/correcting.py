@@ -17,7 +17,7 @@ from studio.body.branches import within_limits
 from studio.body.model import checked_pose
 from studio.foundations.arrays import Array
 from studio.foundations.errors import RunError
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.runs.derived_runs import check_branching_frame, derived_record, new_folder
 from studio.runs.problem_source import ProblemSource
 from studio.runs.reannealing import Reannealing
@@ -64,7 +64,7 @@ def prepare_correction(
 def track_backwards(
     session: Session,
     run: StoredRun,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
     cancelled: Callable[[], bool] | None = None,
 ) -> int:
     """Track a prepared correction backwards; returns the number of frames with new poses.

@@ -34,7 +34,7 @@ from studio.foundations.errors import BodyError, RunError, StudioError
 from studio.foundations.geometry.reach import within_reach
 from studio.foundations.knobs import Knob
 from studio.foundations.package import software_version
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.runs.behaviour_models import chosen_model
 from studio.runs.live.live_request import check_live, live_changes
 from studio.runs.search_space import parameter_names, session_sigma
@@ -145,7 +145,7 @@ def prepare_run(
         Terminal(left_out=True),
         Web(left_out=True),
     ] = "",
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
 ) -> StoredRun:
     """A new run, ready to be tracked; what is left out is the session's own or the studio's default.
 

@@ -11,7 +11,7 @@ import numpy as np
 from studio.body.forward_kinematics import marker_points
 from studio.foundations.arrays import Array
 from studio.foundations.errors import RunError
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.runs.problem_source import ProblemSource
 from studio.runs.refined_frames import refined_frames
 from studio.runs.search_space import search_space
@@ -68,7 +68,7 @@ def refine_run(
     into: str = REFINED,
     settings: RefinementSettings | None = None,
     replace: bool = False,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
 ) -> MadeTrack:
     """Refine every frame of a track and store the result as another (see `runs.refined_frames`).
 

@@ -21,7 +21,7 @@ from studio.evidence.frame_evidence import FrameEvidence
 from studio.foundations.arrays import Array, Bytes
 from studio.foundations.errors import RunError
 from studio.foundations.geometry.camera import Camera
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.runs.live.following import Following
 from studio.runs.search_space import search_space, session_sigma
 from studio.runs.setup.initialising import initialise
@@ -65,7 +65,7 @@ class BodiesTogether:
     poses: tuple[Array, ...]
 
 
-def track_together(sessions: Sequence[Session], progress: Progress = unheard) -> BodiesTogether:
+def track_together(sessions: Sequence[Session], progress: Progress = no_progress) -> BodiesTogether:
     """Track the subjects of sessions that share their footage, and give each the masks that its body explains.
 
     Each begins in its session's start pose; one without is searched for in the masks that it has. The result depends

@@ -24,7 +24,7 @@ from studio.footage.capture.timestamps import TimedOffsets, offsets_from_times, 
 from studio.footage.capture.video import measure_video, probe_video
 from studio.foundations.arrays import Array
 from studio.foundations.errors import FootageError, SessionError
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.sessions.background_files import (
     MASKS_GONE,
     forget_unused_masks,
@@ -74,7 +74,7 @@ def change_footage(
 
 
 def pair_by_time(
-    session: Session, timestamps: Path | None = None, progress: Progress = unheard
+    session: Session, timestamps: Path | None = None, progress: Progress = no_progress
 ) -> FootageChange:
     """Pair a session's frames by their times from its frame 0 on: a recorder's, else those of its videos.
 

@@ -13,7 +13,7 @@ from studio.footage.capture.stream_files import mend_recording
 from studio.footage.capture.timestamps import read_timestamps
 from studio.foundations.arrays import Array
 from studio.foundations.errors import FootageError
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.foundations.words import sentence
 from studio.sessions.importers.importing import ImportReport, import_source
 from studio.sessions.manifest import FILE_NAME as MANIFEST_NAME
@@ -63,7 +63,7 @@ def import_recording(
     into: Path,
     calibration: Path,
     notes: Sequence[str] = (),
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
 ) -> tuple[ImportReport, SpreadFigures]:
     """Make a session at `into` from a recording, which is then removed; an interrupted recording is repaired first.
 

@@ -27,7 +27,7 @@ import platformdirs
 
 from studio.foundations.errors import NotFoundError, SessionError
 from studio.foundations.foreign_files import LARGEST_RECORD, check_inside, read_file, read_text
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.sessions.atomic_files import (
     PARTIAL_PREFIX,
     copy_database,
@@ -83,7 +83,7 @@ def work_folder(address: str) -> Path:
     return cache_folder() / "work" / f"{name_from(PurePosixPath(address).name)}-{key}"
 
 
-def remote_session(address: str, progress: Progress = unheard) -> Session:
+def remote_session(address: str, progress: Progress = no_progress) -> Session:
     """A copy of the session at an address, of its present footage; brought where there is none yet.
 
     Raises NotFoundError, SessionError where it is half written, damaged, or the store refuses.
@@ -196,7 +196,7 @@ def comparison_put_back(session: Session, folder: Path) -> Generator[None]:
         _put_part(session, folder, COMPARISON_RECORD)
 
 
-def upload(session: Session, address: str, progress: Progress = unheard) -> str:
+def upload(session: Session, address: str, progress: Progress = no_progress) -> str:
     """Put a session with its runs at an address, from which any machine works on it; returns the address.
 
     Raises SessionError where there is a session already, where footage lies outside the session's folder, or where the
@@ -221,7 +221,7 @@ def upload(session: Session, address: str, progress: Progress = unheard) -> str:
     return store.address
 
 
-def download(address: str, place: Path, progress: Progress = unheard) -> Session:
+def download(address: str, place: Path, progress: Progress = no_progress) -> Session:
     """The session at an address with its runs and comparisons as a folder of this machine, made whole.
 
     Raises NotFoundError, SessionError.
@@ -456,7 +456,7 @@ def _bytes(folder: Path) -> int:
 def _put_part(session: Session, folder: Path, record: str) -> None:
     address = address_of(session)
     if address and folder.is_relative_to(session.path):
-        _put_whole(Store(below(address, folder.parent.name, folder.name)), folder, record, unheard)
+        _put_whole(Store(below(address, folder.parent.name, folder.name)), folder, record, no_progress)
 
 
 def _put_whole(store: Store, folder: Path, record: str, progress: Progress) -> None:

@@ -16,7 +16,7 @@ from studio.body.catalogue import body_file_text, body_path, load_body
 from studio.body.subject import DEFAULT_BODY
 from studio.footage.capture.footage_source import FootageSource
 from studio.foundations.errors import NotFoundError, SessionError, StudioError
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.sessions import atomic_files
 from studio.sessions.atomic_files import made_whole, write_text
 from studio.sessions.file_checksums import forget_files, note_again
@@ -98,7 +98,7 @@ class Workspace:
         return Session(path)
 
     def resolve(
-        self, name_or_path: str | Path, *, remote: bool = False, progress: Progress = unheard
+        self, name_or_path: str | Path, *, remote: bool = False, progress: Progress = no_progress
     ) -> Session:
         """The session of that name, else the one in that folder (commands only: it may lie anywhere). remote : an
         address of a store is brought, too.

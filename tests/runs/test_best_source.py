@@ -11,7 +11,7 @@ from rendered_people import overlap
 from studio.foundations.arrays import Bytes
 from studio.foundations.errors import FootageError
 from studio.foundations.geometry.projection import project
-from studio.foundations.progress import unheard
+from studio.foundations.progress import no_progress
 from studio.results.drawing_footage.cameras import placed_camera
 from studio.runs.setup.background_setup import candidates, set_up_background
 from studio.runs.setup.best_source import SampledMasks, can_be_subject, choose_sources
@@ -50,7 +50,7 @@ def test_each_camera_gets_the_source_that_suits_it() -> None:
         "person": sampled(noise, ball(1), ball(2)),
         "combined": sampled(ball(0) | noise, ball(1) | noise, ball(2) | noise),
     }
-    found = choose_sources(CAMERAS, (0,), sources, unheard)
+    found = choose_sources(CAMERAS, (0,), sources, no_progress)
     assert {found.by_camera[name] for name in ("cam0", "cam1")} <= {"median", "person"}
     assert (found.by_camera["cam0"], found.by_camera["cam2"]) == ("median", "person")
     assert found.mixed.worst > 0.8 > max(one.worst for one in found.tried)
@@ -61,7 +61,7 @@ def test_a_shadow_that_all_masks_hold_is_seen_by_their_borders() -> None:
         "combined": sampled(*(ball(n, 600.0) for n in range(3)), borders=(0.6, 0.6, 0.6)),
         "strokes": sampled(*(ball(n) for n in range(3)), borders=(0.9, 0.9, 0.9)),
     }
-    found = choose_sources(CAMERAS, (0,), sources, unheard)
+    found = choose_sources(CAMERAS, (0,), sources, no_progress)
     assert set(found.by_camera.values()) == {"strokes"}
 
 
@@ -69,7 +69,7 @@ def test_what_is_all_around_is_no_subject() -> None:
     around = [np.where(ball(n) > 0, np.uint8(0), np.uint8(255)) for n in range(3)]
     assert not can_be_subject(around[0])
     with pytest.raises(FootageError, match="no source"):
-        choose_sources(CAMERAS, (0,), {"threshold": sampled(*around)}, unheard)
+        choose_sources(CAMERAS, (0,), {"threshold": sampled(*around)}, no_progress)
 
 
 def test_borders_on_edges_are_supported() -> None:

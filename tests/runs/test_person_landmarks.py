@@ -12,7 +12,7 @@ from studio.foundations.arrays import Array, Bytes
 from studio.foundations.errors import FootageError
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.projection import project
-from studio.foundations.progress import unheard
+from studio.foundations.progress import no_progress
 from studio.results.drawing_footage.cameras import RIGS
 from studio.runs.setup.person_landmarks import (
     LEFT_AND_RIGHT,
@@ -70,7 +70,7 @@ def test_the_left_side_is_what_most_cameras_call_left_in_all_frames(
     frames = [(frame, seen(frame)) for frame in range(FRAMES)]
     monkeypatch.setattr("studio.runs.setup.person_landmarks.followed_person", lambda *_: iter(frames))
     footage = RenderedFootage(None)  # pyright: ignore[reportArgumentType]
-    motion = person_landmarks(CAMERAS, footage, unheard)  # pyright: ignore[reportArgumentType]
+    motion = person_landmarks(CAMERAS, footage, no_progress)  # pyright: ignore[reportArgumentType]
     np.testing.assert_allclose(motion.positions, np.broadcast_to(JOINTS, (FRAMES, 12, 3)), atol=0.1)
 
 
@@ -114,7 +114,7 @@ class RenderedFootage:
 
 def test_a_rendered_persons_joints_are_near_the_true_ones() -> None:
     walk = rendered_walk(FRAMES)
-    motion = person_landmarks(walk.cameras, RenderedFootage(walk), unheard)  # pyright: ignore[reportArgumentType]
+    motion = person_landmarks(walk.cameras, RenderedFootage(walk), no_progress)  # pyright: ignore[reportArgumentType]
     assert walk.motion is not None
     truth = marker_motion(walk.motion)
     true = truth.positions[:, [truth.names.index(name) for name in NAMES]]
@@ -127,4 +127,4 @@ def test_a_rendered_persons_joints_are_near_the_true_ones() -> None:
 def test_one_camera_shows_no_place() -> None:
     walk = rendered_walk(1)
     with pytest.raises(FootageError, match="One camera"):
-        person_landmarks(walk.cameras[:1], RenderedFootage(walk), unheard)  # pyright: ignore[reportArgumentType]
+        person_landmarks(walk.cameras[:1], RenderedFootage(walk), no_progress)  # pyright: ignore[reportArgumentType]

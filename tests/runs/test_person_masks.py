@@ -18,7 +18,7 @@ from studio.footage.capture.footage_source import CameraSource, FootageSource
 from studio.foundations.arrays import Bytes
 from studio.foundations.errors import FootageError, SessionError, WorkCancelledError
 from studio.foundations.geometry.camera import Camera
-from studio.foundations.progress import unheard
+from studio.foundations.progress import no_progress
 from studio.runs.setup.background_setup import frames_in_words, set_up_background
 from studio.runs.setup.person_masks import PersonMasks, person_masks
 from studio.runs.setup.session_settings import session_settings
@@ -187,7 +187,7 @@ class Shown:
     def size(self, _: str) -> tuple[int, int]:
         return SIZE
 
-    def masks(self, progress: Callable[[str, int, int], None] = unheard) -> dict[int, PersonMasks]:
+    def masks(self, progress: Callable[[str, int, int], None] = no_progress) -> dict[int, PersonMasks]:
         found = person_masks(self.cameras, self, progress)  # pyright: ignore[reportArgumentType]
         return {one.frame: one for one in found}
 

@@ -6,7 +6,7 @@ from toy_session import true_poses
 from tracked_runs import abandon, finish, opened
 
 from studio.foundations.errors import NotFoundError, RunError, SettingsError
-from studio.foundations.progress import unheard
+from studio.foundations.progress import no_progress
 from studio.operations.jobs.batch import track_to_end
 from studio.runs.branching import prepare_branch
 from studio.runs.new_run import prepare_run
@@ -179,7 +179,7 @@ def test_an_answer_can_be_kept_in_a_run_of_its_own(session_on_disk: Session, fra
         )
     made = prepare_branch(session_on_disk, run, frame, {"survival": 0.2})
     assert made.summary().done == frame
-    track_to_end(session_on_disk, made, unheard)
+    track_to_end(session_on_disk, made, no_progress)
     with made.results() as results, run.results() as before:
         _, poses = results.poses()
         assert np.array_equal(poses[:frame], old[:frame])

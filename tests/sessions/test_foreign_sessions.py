@@ -253,7 +253,7 @@ def test_oddities_are_named_and_nothing_is_changed(taken: Session) -> None:
     assert found["pipe"] == "a pipe and no regular file"
     assert "control characters" in found["a\x1b[31mb"]
     assert "leads out" in found["runs/done/body"]
-    assert "broken off" in found[".partial-abc"]
+    assert "interrupted" in found[".partial-abc"]
     assert "1024 MB" in found["large.json"]
     assert sorted(path.as_posix() for path in taken.path.rglob("*")) == before
 

@@ -285,7 +285,7 @@ def test_causes_are_named(tmp_path: Path) -> None:
     linked = video_source(tmp_path / "linked")
     (linked / "videos" / "cam02.mp4").unlink()
     (linked / "videos" / "cam02.mp4").symlink_to("/nowhere/cam02.mp4")
-    with pytest.raises(FootageError, match="a link to a file that is not there"):
+    with pytest.raises(FootageError, match="a link to a file that does not exist"):
         imported(linked)
     motive = tmp_path / "Calibration.cal"
     motive.write_bytes(bytes(range(256)) * 4)

@@ -18,7 +18,7 @@ from studio.app.server.schemas import Request
 from studio.app.server.session_routes import NewName, OpenSession, SessionChange
 from studio.foundations.declaring import LARGEST
 from studio.foundations.errors import RunError
-from studio.foundations.progress import unheard
+from studio.foundations.progress import no_progress
 from studio.operations.jobs import commands
 from studio.operations.jobs.search_pace import MOST_SECONDS, PaceView, pace_view
 from studio.operations.overview import LogLines, RunDetail, RunLine, RunList, run_line, run_lines, run_log
@@ -91,7 +91,7 @@ def make_run(
         **arguments,
         "start_source": arguments.get("start_source") or "set in the studio",
     }
-    made = new_run(session, **options, progress=unheard)
+    made = new_run(session, **options, progress=no_progress)
     app.events.session_changed(session.name, made.name)
     return run_line(made.summary(), session)
 

@@ -19,7 +19,7 @@ from studio.body.subject import SHORTEST_MM, TALLEST_MM
 from studio.body.upright import LimbDrawing, limb_drawings
 from studio.foundations.arrays import Array
 from studio.foundations.errors import BodyError, NotFoundError
-from studio.foundations.progress import unheard
+from studio.foundations.progress import no_progress
 from studio.operations.jobs.job_runner import Job, JobKind, NumberedJob
 from studio.operations.person import FitSoFar, SubjectInUse, fit_subject, subject_in_use
 from studio.operations.person import keep_fit as keep_fitted
@@ -97,7 +97,7 @@ def set_subject(
     """
     if arguments.more["height_mm"] is None and not (arguments.get("body") or arguments.get("lengths_mm")):
         raise BodyError("Neither a height nor a body is given.", "Give one of them.")
-    write_subject(session, **arguments, **arguments.more, progress=unheard)
+    write_subject(session, **arguments, **arguments.more, progress=no_progress)
     app.jobs.forget(SUBJECT, session.name)
     app.events.session_changed(session.name)
     return subject(Session(session.path))

@@ -15,7 +15,7 @@ from studio.footage.capture.pictures import is_picture, list_pictures, read_pict
 from studio.footage.capture.video import VIDEO_SUFFIXES, VideoReader, measure_video
 from studio.foundations.arrays import Bytes, Indices
 from studio.foundations.errors import CalibrationError
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 
 LENS_FRAMES, RIG_FRAMES = 60, 120
 LENS_PICTURES = 30
@@ -108,7 +108,7 @@ def look_for_lens(
     finder: BoardFinder,
     camera: str,
     footage: BoardFootage,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
     taken: HowTaken = AS_IT_IS,
 ) -> list[Seen]:
     """The board in one camera's pictures, or in up to 60 frames of its video spread over all of it; frames count as
@@ -122,7 +122,7 @@ def look_for_lens(
 def look_together(
     finder: BoardFinder,
     footage: dict[str, BoardFootage],
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
     also: Sequence[int] = (),
     taken: HowTaken = AS_IT_IS,
 ) -> list[Seen]:

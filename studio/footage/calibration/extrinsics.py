@@ -20,7 +20,7 @@ from studio.foundations.errors import CalibrationError
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.rigid import compose, inverse, rigid
 from studio.foundations.geometry.rotations import rotation_from_vector, vector_from_rotation
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 
 MOST_FRAMES = 90
 CLIPPED_PX = 30.0
@@ -61,7 +61,7 @@ def solve_rig(
     lenses: Mapping[str, Lens],
     *,
     refine_lenses: bool = False,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
 ) -> Rig:
     """The cameras named by `lenses`, from their sightings at the same frame numbers.
 

@@ -30,7 +30,7 @@ from studio.footage.capture.sanity import common_target, quarter_turns
 from studio.foundations.arrays import Array
 from studio.foundations.errors import CalibrationError
 from studio.foundations.geometry.rigid import rigid
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,7 +81,7 @@ def calibrate(
     names = tuple(names) or _names(extrinsics or intrinsics)
 
     def solved(pattern: Board) -> Calibrated:
-        solving = _Solving(pattern, names, floor, taken, progress or unheard)
+        solving = _Solving(pattern, names, floor, taken, progress or no_progress)
         return _solved(
             solving, intrinsics, extrinsics, lenses, footage_sizes, distances_mm, refine_lenses=refine_lenses
         )
@@ -144,7 +144,7 @@ def _meant_board(
     first = list_footage(folder)[0]
     for meant in _other_spellings(board):
         finder = BoardFinder(meant, thorough=False, mirrored_too=False)
-        if len(look_for_lens(finder, first.name, first, unheard, taken)) >= FEWEST_PICTURES:
+        if len(look_for_lens(finder, first.name, first, no_progress, taken)) >= FEWEST_PICTURES:
             return meant
     raise problem
 

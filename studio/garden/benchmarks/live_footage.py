@@ -13,7 +13,7 @@ import numpy as np
 from studio.body.catalogue import load_body
 from studio.footage.capture.footage import folded
 from studio.footage.capture.footage_source import CameraSource
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.results.drawing_footage.clips import ClipWriter
 from studio.results.drawing_footage.recipes import synthesize
 from studio.results.motion_sources import recipe_recording
@@ -27,14 +27,14 @@ RECIPE = "walk-five-cameras"
 QUALITY = 19.0
 
 
-def make_footage(place: Path, seconds: float, progress: Progress = unheard) -> Session:
+def make_footage(place: Path, seconds: float, progress: Progress = no_progress) -> Session:
     """The session, made in the new folder `place`. progress : called with (step, done, total)."""
     synthesize(RECIPE, place, progress)
     lengthen(Session(place), seconds, progress)
     return Session(place)
 
 
-def lengthen(session: Session, seconds: float, progress: Progress = unheard) -> None:
+def lengthen(session: Session, seconds: float, progress: Progress = no_progress) -> None:
     """Extend a session's videos to `seconds` by playing them forwards and backwards, unless they are long enough."""
     manifest = session.manifest
     source, count = manifest.footage, round(seconds * manifest.fps)

@@ -9,7 +9,7 @@ import cv2
 
 from studio.body.person import PersonMotion
 from studio.foundations.geometry.camera import Camera
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.results.drawing_footage.clips import ClipWriter
 from studio.results.drawing_footage.damage import cameras_left, clutter_in_front
 from studio.results.drawing_footage.motions import stool
@@ -28,7 +28,7 @@ def render_person(
     motion: PersonMotion,
     cameras: tuple[Camera, ...],
     source: Path,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
     beside: Sequence[RenderedPerson] = (),
 ) -> None:
     """Write videos/, and background/ and masks/ as the recipe includes them, into `source`; nothing for missing

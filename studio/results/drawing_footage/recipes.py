@@ -17,7 +17,7 @@ from studio.body.subject import Subject, fit_subject, write_subject
 from studio.footage.capture.calibration_files import read_calibration, write_calibration
 from studio.foundations.errors import BodyError, SessionError, StudioError
 from studio.foundations.geometry.camera import Camera
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.results.drawing_footage.arm_footage import render_arm
 from studio.results.drawing_footage.body_footage import TRUE_POSES, render_body
 from studio.results.drawing_footage.damage import cameras_left, misplaced
@@ -57,7 +57,7 @@ SUBJECT_OF_SHAPE, SUBJECT_OF_HEIGHT, SIGMA_NAME = "subject_shape.toml", "subject
 
 
 def synthesize(
-    recipe: Path | str, into: Path, progress: Progress = unheard, frames: int | None = None
+    recipe: Path | str, into: Path, progress: Progress = no_progress, frames: int | None = None
 ) -> Path:
     """Render a recipe's footage and make a session of it; returns the session's folder.
 
@@ -124,7 +124,7 @@ def render_source(
     recipe: Recipe,
     recipe_folder: Path,
     source: Path,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
     frames: int | None = None,
 ) -> None:
     """Write a folder for `import`: videos, background, masks, calibration, truth, subject, start pose.

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from studio.foundations.errors import ExportError
 from studio.foundations.knobs import changed
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.foundations.registry import plugged_in
 from studio.results.export.formats import ExportFormat
 from studio.results.export.motion import motion_of, no_motion
@@ -83,7 +83,7 @@ def export_run(
     requested: Mapping[str, object],
     place: Path,
     *,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
     pack: bool = False,
 ) -> ExportReport:
     """Export a run to `place`, which is replaced only after the new file has been read back and checked.

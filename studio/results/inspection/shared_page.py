@@ -19,7 +19,7 @@ from studio.foundations.arrays import Array
 from studio.foundations.errors import NotFoundError, RunError, StudioError
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.package import software_version
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.results.evaluation.errors import Evaluation, evaluate
 from studio.results.inspection.reading import InspectedRun, no_value
 from studio.results.inspection.tables import Selection, Table, Viewed
@@ -72,7 +72,7 @@ def shared_page(
     *,
     track: str = "",
     clouds: Sequence[int] = (),
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
 ) -> str:
     """The page's text. frame : that is looked into. track : whose poses are drawn and measured, the search's own by
     default. clouds : frames whose particles are in the page, beside those of `frame`; at most MOST_CLOUDS.

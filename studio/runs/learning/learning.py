@@ -9,7 +9,7 @@ import numpy as np
 from studio.body.model import BodyModel
 from studio.foundations.arrays import Array
 from studio.foundations.errors import StudioError
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.runs.learning.oversampling import OversamplingSettings, oversampled
 from studio.runs.learning.recordings import Recording
 from studio.search.behaviour.model import BehaviourModel
@@ -57,7 +57,7 @@ def learn(
     test: Sequence[Recording] | None = None,
     *,
     seed: int = 0,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
 ) -> tuple[BehaviourModel, Learnt]:
     """The behaviour of recordings on one body, all at one rate.
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from studio.body.model import BodyModel
 from studio.foundations.arrays import Array
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.runs.learning.marker_problem import MarkerProblem
 from studio.runs.learning.other_spellings import on_branch
 from studio.runs.learning.path_splicing import spliced
@@ -42,7 +42,7 @@ class Fitted:
     rms_mm: Array
 
 
-def fit_poses(body: BodyModel, targets: Targets, fps: float, progress: Progress = unheard) -> Fitted:
+def fit_poses(body: BodyModel, targets: Targets, fps: float, progress: Progress = no_progress) -> Fitted:
     """The poses of `body` whose markers and pointers come closest to the targets, steady over time.
 
     progress : called with (step, done, total). Raises StudioError where no frame has

@@ -21,7 +21,7 @@ from studio.body.retargeting import family_of, on_skeleton
 from studio.body.subject import Subject, fit_subject
 from studio.foundations.arrays import Array
 from studio.foundations.errors import StudioError
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.runs.learning.marker_labels import person_markers
 from studio.runs.learning.pose_fitting import bad_frames, fit_poses
 from studio.runs.learning.resampling import frame_times, points_at, poses_at
@@ -68,7 +68,7 @@ class Recording:
 
 
 def fitted_person(
-    motion: PersonMotion, body: BodyModel, name: str, progress: Progress = unheard
+    motion: PersonMotion, body: BodyModel, name: str, progress: Progress = no_progress
 ) -> Recording:
     """The body moving as a synthetic person does, at the motion's rate."""
     return _fit(of_person(motion), body, name, motion.fps, progress)

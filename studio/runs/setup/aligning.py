@@ -9,7 +9,7 @@ from studio.footage.calibration.silhouette_alignment import AlignedCameras, alig
 from studio.footage.calibration.silhouette_checks import outlines_of
 from studio.foundations.arrays import Bytes
 from studio.foundations.errors import CalibrationError
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.runs.setup.person_hull import spread_frames
 from studio.runs.setup.session_settings import masks_of
 from studio.runs.setup.silhouette_faults import person_alone
@@ -66,7 +66,7 @@ class SessionAlignment:
 
 
 def align_cameras(
-    session: Session, frames: Sequence[int] = (), *, progress: Progress = unheard
+    session: Session, frames: Sequence[int] = (), *, progress: Progress = no_progress
 ) -> SessionAlignment:
     """The turns that make a session's silhouettes agree; nothing is written (see `keep_alignment`).
 

@@ -34,7 +34,7 @@ from studio.footage.capture.pictures import is_picture, png_of
 from studio.foundations.arrays import Bytes
 from studio.foundations.errors import FootageError, RunError, SessionError, StudioError, WorkCancelledError
 from studio.foundations.geometry.camera import Camera
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.foundations.words import sentence
 from studio.runs.setup.best_source import SampledMasks, SourceChoice, can_be_subject, choose_sources
 from studio.runs.setup.clean_plates import clean_plates
@@ -216,7 +216,7 @@ def set_up_background(
     strokes: Sequence[Stroke] | None = None,
     run: str = "",
     subject_at: Place | None = None,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
 ) -> BackgroundSetup:
     """Set a session's background and store it. knobs : of the masks, fixed. tune : try values for the others.
 
@@ -439,7 +439,7 @@ def _set_up_best(session: Session, wanted: _Wanted, progress: Progress) -> Backg
         now = Session(session.path)
         sampled: dict[str, SampledMasks] = {}
         for lens in small:
-            views = [view for _, view in _views_of(now, frames, [lens.name], unheard)]
+            views = [view for _, view in _views_of(now, frames, [lens.name], no_progress)]
             border = sum(border_support(view.picture, view.mask) for view in views) / len(views)
             sampled[lens.name] = SampledMasks(tuple(reduced(view.mask, lens) for view in views), border)
         tried[source] = _SetUp(now.manifest, read_evidence(now), made, sampled)

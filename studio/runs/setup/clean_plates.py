@@ -38,7 +38,7 @@ from studio.foundations.arrays import Bytes, evenly_spread
 from studio.foundations.errors import RunError
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.numba_in_threads import KERNEL, njit
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.sessions.session import Session
 
 Part = TypeVar("Part")
@@ -83,7 +83,7 @@ def clean_plates(
     session: Session,
     settings: EvidenceSettings,
     *,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
 ) -> Mapping[str, CleanPlate]:
     """Clean backgrounds by camera, from the session's plates, clips or medians.
 

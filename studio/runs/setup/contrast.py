@@ -42,7 +42,7 @@ from studio.foundations.arrays import Array, Bytes
 from studio.foundations.errors import StudioError
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.projection import nearest_pixels
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.foundations.words import enumerated, sentence
 from studio.runs.setup.person_hull import FINE, JUDGED_SIDE, covered, large_hull, person_box, spread_frames
 from studio.runs.tracks import BEST, read_track
@@ -218,7 +218,7 @@ def measure_contrast(
     session: Session,
     settings: EvidenceSettings,
     known: KnownPoses | None = None,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
 ) -> Contrast | None:
     """The contrast of a session's subject under some knobs. known : poses; default: `known_poses`.
 

@@ -24,7 +24,7 @@ from studio.evidence.volume.reconstruction import HullSettings, check_views, rec
 from studio.evidence.volume.tracking_space import HEIGHT, Box
 from studio.foundations.arrays import Array
 from studio.foundations.geometry.camera import Camera
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.foundations.words import enumerated
 from studio.runs.behaviour_models import fitting, model_folders, model_path
 from studio.runs.problem_source import ProblemSource, check_seen
@@ -115,7 +115,7 @@ def initialise(
     behaviour: str = "",
     weighting: str = WEIGHTING,
     seed: int = 0,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
 ) -> InitialPose:
     """The pose of the session's body in a frame.
 

@@ -20,7 +20,7 @@ from studio.foundations.arrays import Array
 from studio.foundations.errors import CalibrationError
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.rigid import rigid
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.runs.setup.person_hull import spread_frames
 from studio.runs.setup.session_settings import masks_of
 from studio.runs.setup.silhouette_faults import person_alone
@@ -82,7 +82,7 @@ def level_by_run(session: Session, run: StoredRun) -> LevelWorld:
 
 
 def level_by_silhouettes(
-    session: Session, frames: Sequence[int] = (), progress: Progress = unheard
+    session: Session, frames: Sequence[int] = (), progress: Progress = no_progress
 ) -> LevelWorld:
     """By the cameras' vertical and the lowest of the person's hull, to some centimetres. Raises CalibrationError."""
     turn = level_world(_certain(common_vertical(session.cameras())).up)

@@ -29,7 +29,7 @@ from studio.footage.calibration.findings import Finding, blocking
 from studio.foundations.arrays import Bytes
 from studio.foundations.errors import FootageError, RunError, StudioError
 from studio.foundations.geometry.camera import Camera
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.foundations.words import enumerated
 from studio.runs.setup.contrast import Contrast, border_support, measure_contrast
 from studio.runs.setup.person_hull import (
@@ -191,7 +191,7 @@ def mask_quality(
     frames: Sequence[int] = (),
     *,
     blame: bool = True,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
 ) -> MaskQuality:
     """The quality of a session's masks in some frames (default: five, evenly spread).
 
@@ -250,7 +250,9 @@ def _each_view(
         maker.release(camera.name)
 
 
-def measure_masks(session: Session, frames: Sequence[int] = (), progress: Progress = unheard) -> MaskQuality:
+def measure_masks(
+    session: Session, frames: Sequence[int] = (), progress: Progress = no_progress
+) -> MaskQuality:
     """The quality of the session's masks. For the default frames it is stored: a blocking finding then refuses new runs
     (`silhouette_faults.accepted_faults`). Raises as `mask_quality` does.
     """
@@ -262,7 +264,7 @@ def measure_masks(session: Session, frames: Sequence[int] = (), progress: Progre
     return quality
 
 
-def look_before_the_first_run(session: Session, progress: Progress = unheard) -> bool:
+def look_before_the_first_run(session: Session, progress: Progress = no_progress) -> bool:
     """Whether nothing was tracked yet of imported footage. Its masks are measured then, unless that was done: exchanged
     cameras, a mirrored video or a wrong unit refuse the run, instead of losing its frames. Masks that cannot be
     compared say nothing.

@@ -13,7 +13,7 @@ from studio.body.model import checked_pose
 from studio.evidence.distance_maps import silhouette_distances
 from studio.foundations.arrays import Array
 from studio.foundations.errors import RunError
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.runs.problem_source import ProblemSource, check_seen
 from studio.runs.refined_frames import JUDGE
 from studio.runs.search_space import search_space, session_sigma
@@ -54,7 +54,7 @@ def better_pose(
     *,
     run: StoredRun | None = None,
     seed: int = 0,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
 ) -> BetterPose:
     """The best pose near a given one (D,) in a frame. run : whose body, cameras and likelihood are used; None: the
     session's.

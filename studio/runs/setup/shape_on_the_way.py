@@ -29,7 +29,7 @@ from studio.evidence.settings import EvidenceSettings
 from studio.foundations.arrays import Array
 from studio.foundations.errors import NotFoundError, SessionError
 from studio.foundations.geometry.camera import Camera
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.runs.live.following import Following
 from studio.runs.problem_source import ProblemSource
 from studio.runs.search_space import search_space, session_sigma
@@ -95,7 +95,7 @@ def session_shape(
     settings: RunSettings,
     start: Array,
     first: int,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
 ) -> tuple[BodyModel, Array, str]:
     """The body with the shape of a session's frames from `first` on, its pose there (D,), and a text for the notes.
 
@@ -163,7 +163,7 @@ def shaped_body(
     start: Array,
     sigma: Array,
     *,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
 ) -> FittedShape:
     """The shape of a body in the first frames. evidence : of a frame, with edge proximity maps. start : (D,) of
     the first of `frames`. sigma : (D,) σ0 from frame to frame.

@@ -26,7 +26,7 @@ from studio.evidence.frame_evidence import FrameEvidence
 from studio.foundations.arrays import Array
 from studio.foundations.declaring import Body, Seed, Terminal
 from studio.foundations.errors import RunError
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.runs.problem_source import check_seen
 from studio.runs.search_space import parameter_names
 from studio.runs.setup.initialising import initialise
@@ -130,7 +130,7 @@ def fit_session_subject(
     session: Session,
     request: FitRequest | None = None,
     *,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
     shown: Shown = _unshown,
 ) -> FittedSubject:
     """The subject of a session, fitted to its silhouettes. Nothing is written: see `keep_subject`.

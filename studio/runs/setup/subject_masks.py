@@ -36,7 +36,7 @@ from studio.footage.capture.pictures import read_picture
 from studio.foundations.arrays import Bytes
 from studio.foundations.errors import FootageError
 from studio.foundations.geometry.camera import Camera
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.runs.setup.session_settings import session_settings
 from studio.sessions.background_files import (
     SUBJECT_MASKS,
@@ -170,7 +170,9 @@ class CutFrame:
     lost: tuple[int, ...]
 
 
-def cut_frames(session: Session, places: Sequence[Place], progress: Progress = unheard) -> Iterator[CutFrame]:
+def cut_frames(
+    session: Session, places: Sequence[Place], progress: Progress = no_progress
+) -> Iterator[CutFrame]:
     """Every frame's masks of the subjects at some places in the first frame, in order.
 
     Raises FootageError where no subject stands at a place, or masks cannot be made.
@@ -261,7 +263,7 @@ def subject_masks_of(
         yield put
 
 
-def make_subject_masks(session: Session, place: Place, progress: Progress = unheard) -> list[int]:
+def make_subject_masks(session: Session, place: Place, progress: Progress = no_progress) -> list[int]:
     """Cut a session's masks down to the subject at a place in the first frame, and use them; returns the frames in
     which it is not seen. Raises FootageError, SessionError; then nothing is changed.
     """

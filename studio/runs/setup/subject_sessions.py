@@ -18,7 +18,7 @@ from studio.body.forward_kinematics import limb_ends
 from studio.body.subject import read_subject
 from studio.foundations.arrays import Array
 from studio.foundations.errors import SessionError, StudioError
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.runs.search_space import parameter_names
 from studio.runs.setup.subject_masks import MM, Place, cut_frames, subject_masks_of
 from studio.sessions import atomic_files
@@ -42,7 +42,7 @@ SAME = 600.0
 
 
 def make_subject_sessions(
-    session: Session, places: Sequence[Place], into: Sequence[Path], progress: Progress = unheard
+    session: Session, places: Sequence[Place], into: Sequence[Path], progress: Progress = no_progress
 ) -> tuple[tuple[Session, ...], tuple[str, ...]]:
     """A session for the subject at each place of the first frame, and notes. into : their new folders.
 

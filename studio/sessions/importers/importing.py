@@ -24,7 +24,7 @@ from studio.foundations.declaring import Terminal, Web
 from studio.foundations.errors import CalibrationError, FootageError, SessionError
 from studio.foundations.foreign_files import MANIFEST_NAME, leads_out
 from studio.foundations.geometry.camera import Camera
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.sessions.archives import FOOTAGE_PARTS, folder_of, is_archive
 from studio.sessions.atomic_files import discard, made_whole, new_folder_beside, taken
 from studio.sessions.background_files import (
@@ -181,7 +181,7 @@ class ImportReport:
 
 
 def import_source(
-    source: Path, into: Path, options: ImportOptions | None = None, *, progress: Progress = unheard
+    source: Path, into: Path, options: ImportOptions | None = None, *, progress: Progress = no_progress
 ) -> ImportReport:
     """Make a session at `into` from a source folder, or an archive of one; see `known_layouts`,
     `folder_layout` and `bodytrack` for the layouts.
@@ -243,7 +243,7 @@ def add_footage(
     source: Path,
     options: ImportOptions | None = None,
     *,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
 ) -> ImportReport:
     """Add the footage (with masks and backgrounds) of a folder, or of an archive of one, to a session.
 

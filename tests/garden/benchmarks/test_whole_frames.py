@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from studio.cli.bench_commands import bench_command
-from studio.foundations.progress import unheard
+from studio.foundations.progress import no_progress
 from studio.garden.benchmarks.results_table import in_lines, remember, rows_of, this_machine
 from studio.garden.benchmarks.timing import IdleShare, resident_megabytes
 from studio.garden.benchmarks.whole_frames import BODYTRACK, DEFAULT, IMPROVED, SWARM, measure_frames
@@ -22,7 +22,7 @@ def stages(figures: dict[str, object]) -> set[tuple[str, str]]:
 
 
 def test_a_whole_frame_has_all_its_stages() -> None:
-    figures = measure_frames(DEFAULT, unheard, frames=2).figures()
+    figures = measure_frames(DEFAULT, no_progress, frames=2).figures()
     assert (figures["frames"], figures["evaluations"]) == (2, 1000)
     main = {"search", "refine", "conclude", "wait for the frame"}
     assert {("MainThread", stage) for stage in main} <= stages(figures)
@@ -34,7 +34,7 @@ def test_a_whole_frame_has_all_its_stages() -> None:
 
 @pytest.mark.parametrize(("workload", "evaluations"), [(IMPROVED, 2000), (SWARM, 1000)])
 def test_the_papers_searches_refine_nothing(workload: str, evaluations: int) -> None:
-    figures = measure_frames(workload, unheard, frames=2).figures()
+    figures = measure_frames(workload, no_progress, frames=2).figures()
     assert figures["evaluations"] == evaluations
     assert not any(stage in ("refine", "distances") for _, stage in stages(figures))
 
@@ -97,7 +97,7 @@ def test_the_trace_and_the_history(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 
 def _short(kind: str):
-    return measure_frames(kind, unheard, frames=2)
+    return measure_frames(kind, no_progress, frames=2)
 
 
 def test_bars_are_full_where_the_aim_is_reached() -> None:

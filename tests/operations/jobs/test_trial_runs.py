@@ -8,7 +8,7 @@ from tracked_runs import finish
 
 from studio.body.motion_files.trc import read_trc
 from studio.foundations.errors import NotFoundError
-from studio.foundations.progress import unheard
+from studio.foundations.progress import no_progress
 from studio.operations.comparison_folders import new_comparison, place_of
 from studio.operations.jobs.comparison_run import run_comparison
 from studio.operations.trial_runs import run_of_trial, trial_lines
@@ -36,7 +36,7 @@ def kept(walk: Session) -> KeptComparison:
     made = new_comparison(
         place_of(walk, "small"), plan_comparison(walk, lineup, (3, 4), first=FIRST, last=LAST)
     )
-    run_comparison(made, walk, unheard, conclude, processes=1)
+    run_comparison(made, walk, no_progress, conclude, processes=1)
     return made
 
 
