@@ -94,6 +94,7 @@ def state(identifier: str, app: App) -> UploadState:
 
 @router.delete("/{identifier}", status_code=204)
 def give_up(identifier: str, app: App) -> None:
+    """Remove an upload."""
     forget(app, identifier)
 
 
