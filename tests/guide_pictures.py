@@ -44,11 +44,7 @@ class Picture:
 
 WALK = "session=walk&run="
 PICTURES = (
-    Picture(
-        "course-particles.jpg",
-        f"{WALK}course-annealed&frame=9&layer=0&panel=views&view=weights",
-        SCENE,
-    ),
+    Picture("course-particles.jpg", f"{WALK}course-annealed&frame=9&layer=0&panel=views&view=weights", SCENE),
     Picture("course-one-layer.jpg", f"{WALK}course-one-layer&frame=9&panel=why", PANEL),
     Picture("course-schedule.jpg", f"{WALK}course-annealed&frame=9&panel=views&view=schedule", PANEL),
     Picture(

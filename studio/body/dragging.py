@@ -35,9 +35,7 @@ MOST_STEPS = 40
 
 @dataclass(frozen=True, slots=True)
 class Grip:
-    """A point to drag: the far end of a drawn limb. limb : its index among the drawn. root : whether only the
-    root moves it.
-    """
+    """A point to drag: the far end of a drawn limb. limb : its index. root : whether only the root moves it."""
 
     name: str
     limb: int
@@ -171,9 +169,7 @@ class Dragger:
         goal: Array,
         held: tuple[int, ...],
     ) -> Array:
-        """The pose with its `free` parameters at the least squares: the grip at `goal`, the held ends as in `start`,
-        everything near `start`.
-        """
+        """The pose with its `free` parameters fitted: the grip at `goal`, the held ends and all else near `start`."""
         held = tuple(at for at in held if at != grip.limb)
         weights = np.array([1.0, *[HOLD] * len(held)])[:, None]
         places = np.concatenate([goal[None], self.points(start)[list(held)]])

@@ -21,10 +21,7 @@ STEEPEST = np.radians(70.0)  # of a foot on its toes
 BENT_UP, BENT_DOWN = np.radians(-30.0), np.radians(65.0)
 TOES = 0.70  # of the toes in front of the ankle, as a share of the foot's length
 HAND_CLEARANCE, ARM_SPREAD_S = 40.0, 0.2  # mm of the fingers' ends above the floor
-ON_TOES, IN_THE_AIR = (
-    0.8,
-    1.4,
-)  # of the toes' reach: greatest height of a standing ankle; least in the air
+ON_TOES, IN_THE_AIR = (0.8, 1.4)  # of the toes' reach: greatest height of a standing ankle; least in the air
 LOST_BELOW, LOST_ABOVE, LOST_SHARE = float(np.radians(-40.0)), float(np.radians(75.0)), 0.05
 
 

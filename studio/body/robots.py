@@ -236,8 +236,7 @@ def _speeds(root: ElementTree.Element) -> dict[str, float]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Part:
-    """A cone in its link's frame: start (3,) mm, turn (3, 3) whose z runs along it, sizes in mm. guessed : its radii
-    are estimates."""
+    """A cone in its link's frame: start (3,) mm, turn (3, 3) with z along it, sizes (mm). guessed : its radii are."""
 
     start: Array
     turn: Array

@@ -65,11 +65,7 @@ class ShapeSpace:
 
 
 def shape_space(
-    body: BodyModel,
-    *,
-    symmetric: bool = True,
-    lengths: bool | Literal["ends"] = True,
-    radii: bool = True,
+    body: BodyModel, *, symmetric: bool = True, lengths: bool | Literal["ends"] = True, radii: bool = True
 ) -> ShapeSpace:
     """The shape space of a body read from a file.
 

@@ -180,9 +180,7 @@ def _proportions(body: BodyModel, height: float, known: Mapping[str, float]) -> 
 
 
 def _levelled(body: BodyModel, given: Mapping[str, float]) -> dict[str, float]:
-    """The body's own dimensions with the mean of left and right on either side, unless they were
-    given.
-    """
+    """The body's own dimensions with the mean of left and right on either side, unless they were given."""
     levelled: dict[str, float] = {}
     for name, value in body.dimensions.items():
         other = name.replace("left_", "right_") if "left_" in name else name.replace("right_", "left_")

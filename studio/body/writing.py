@@ -14,9 +14,7 @@ GROUPS = ("parameters", "joints", "limbs", "markers")
 
 
 def body_text(body: BodyModel) -> str:
-    """The body as a file that the reader reads back, with its present dimensions. Raises BodyError without a
-    definition.
-    """
+    """The body as a file for the reader, with its present dimensions. Raises BodyError without a definition."""
     definition = sized_definition(body)
     entries = {
         key: value

@@ -73,10 +73,7 @@ PARTS: dict[str, Callable[[Progress], dict[str, object]]] = {
 
 @click.command("bench")
 @click.option(
-    "--only",
-    type=click.Choice((*PARTS, FRAMES)),
-    multiple=True,
-    help="Measure this alone; may be repeated.",
+    "--only", type=click.Choice((*PARTS, FRAMES)), multiple=True, help="Measure this alone; may be repeated."
 )
 @click.option(
     "--workload",

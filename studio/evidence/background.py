@@ -91,8 +91,7 @@ class GaussianBackground:
         return settings.mask_shadow_test and not self.is_grey
 
     def gain(self, picture: Bytes) -> Floats:
-        """(3,) factor on each colour of the background, from the median pixel (people cover less than
-        half)."""
+        """(3,) factor on each colour of the background, from the median pixel (people cover less than half)."""
         ratios, counts = gain_ratios(picture, self._samples)
         gains, (least, most) = np.ones(3, np.float32), GAIN_RANGE
         for channel, count in enumerate(counts):
@@ -144,8 +143,7 @@ class SubtractorBackground:
 
 
 def gaussian_from_frames(frames: Sequence[Bytes]) -> GaussianBackground:
-    """Mean and standard deviation of an empty clip; a single picture gives a deviation of 0 (the noise knob
-    rules)."""
+    """Mean and standard deviation of an empty clip; a single picture gives a deviation of 0 (the noise knob rules)."""
     if len(frames) == 1:
         return GaussianBackground(frames[0])
     total = np.zeros(frames[0].shape, np.float64)
@@ -171,8 +169,7 @@ def gaussian_from_median(frames: Bytes) -> GaussianBackground:
 
 @njit(**KERNEL)
 def median_and_distance(values: Bytes) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Median of each column and the median distance from it. values : (K, P) uint8. Returns two (P,)
-    float32."""
+    """Median of each column and the median distance from it. values : (K, P) uint8. Returns two (P,) float32."""
     count, pixels = values.shape
     median = np.empty(pixels, np.float32)
     distance = np.empty(pixels, np.float32)

@@ -113,9 +113,7 @@ def fewest_of(frames: Bytes) -> int:
 def combination(
     plate: Bytes, frames: Bytes, factor: float = 1.0
 ) -> tuple[GaussianBackground, NDArray[np.bool_], Combination]:
-    """`combine`, with its decisions. factor : by which these pictures were reduced; numbers of pixels here refer to the
-    original size.
-    """
+    """`combine`, with its decisions. factor : by which these pictures were reduced."""
     gains, offsets = fitted_line(plate, frames)
     fitted = np.asarray(plate * gains + offsets, dtype=np.float32)
     square = np.ones((3, 3), np.uint8)

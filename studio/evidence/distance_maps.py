@@ -105,9 +105,7 @@ def distances_of(
 
 @njit(**KERNEL)
 def box_of(picture: Bytes, least: np.uint8) -> tuple[int, int, int, int]:
-    """Left, top, right and bottom (one past the last) of what is at least so bright in a picture (H, W); 0 if nothing
-    is.
-    """
+    """Left, top, right and bottom (one past the last) of pixels at least so bright in (H, W); 0 if there are none."""
     height, width = picture.shape
     columns = np.zeros(width, np.uint8)
     top = bottom = 0

@@ -14,8 +14,7 @@ from studio.foundations.geometry.camera import Camera
 
 
 def cleaned(mask: Bytes, settings: EvidenceSettings) -> Bytes:
-    """A mask after opening, closing, filling of small holes and dropping of small pieces. mask : (H, W) 0
-    or 255."""
+    """A mask after opening, closing, filling of small holes and dropping of small pieces. mask : (H, W) 0 or 255."""
     if settings.mask_opening > 1:
         mask = _morphed(mask, cv2.MORPH_OPEN, settings.mask_opening)
     left, top, width, height = cv2.boundingRect(mask)

@@ -84,9 +84,7 @@ class EvidenceMaker:
         return self.of_mask(camera, frame, mask, self.footage.hidden(camera, frame) if given else None)
 
     def of_mask(self, camera: str, frame: int, mask: Bytes, hidden: Bytes | None) -> ViewEvidence:
-        """One camera's evidence with a mask (H, W), 0 or 255, in place of the one that is made of its picture. hidden :
-        as in `ViewEvidence`.
-        """
+        """One camera's evidence with a given mask (H, W), 0 or 255. hidden : as in `ViewEvidence`."""
         picture = self.footage.picture(camera, frame)
         with span("edges", frame):
             return ViewEvidence(camera, picture, mask, self._edges(picture, mask), hidden=hidden)

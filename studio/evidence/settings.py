@@ -167,17 +167,10 @@ class EvidenceSettings:
         help="Connected pieces smaller than this area are dropped; 0 = off.",
     )
     mask_keep_components: int = next_frame_knob(
-        0,
-        0,
-        20,
-        1,
-        label="pieces kept",
-        help="Only this many largest pieces are kept; 0 = all.",
+        0, 0, 20, 1, label="pieces kept", help="Only this many largest pieces are kept; 0 = all."
     )
     mask_clean_given: bool = next_frame_knob(
-        False,
-        label="clean given masks",
-        help="Apply the clean-up also to masks that came with the footage.",
+        False, label="clean given masks", help="Apply the clean-up also to masks that came with the footage."
     )
     edge_threshold: float = next_frame_knob(
         6.0,

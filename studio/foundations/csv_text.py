@@ -10,8 +10,7 @@ FRAME = "frame"
 
 
 def poses_csv(names: tuple[str, ...], frames: Indices, poses: Array) -> str:
-    """Poses as CSV text: a column `frame`, then one a parameter. frames : (K,). poses : (K, D) radians and
-    mm."""
+    """Poses as CSV text: a column `frame`, then one a parameter. frames : (K,). poses : (K, D) radians and mm."""
     rows = [
         [str(int(frame)), *(repr(float(value)) for value in pose)]
         for frame, pose in zip(frames, poses, strict=True)

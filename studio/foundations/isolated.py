@@ -64,10 +64,7 @@ def isolated(
                 raise wrong(f"'{path.name}' cannot be read ({reason}).", REMEDY)
     except _Ended as ended:
         child.kill()
-        raise wrong(
-            f"'{path.name}' cannot be read: its reader {ended}.",
-            REMEDY,
-        ) from None
+        raise wrong(f"'{path.name}' cannot be read: its reader {ended}.", REMEDY) from None
     except BaseException:
         if child.busy:
             child.kill()

@@ -111,9 +111,7 @@ class KernelCache:
         self._give_up_turn(place)
 
     def _take_turn(self, place: Path) -> bool:
-        """Wait until this process is the one that compiles it; whether that is new. The system frees what is held by a
-        process that dies.
-        """
+        """Wait until this process is the one that compiles it; whether that is new."""
         if place in self._turns:
             return False
         try:

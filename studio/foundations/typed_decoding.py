@@ -31,9 +31,7 @@ def is_list(value: object) -> TypeGuard[Sequence[Any]]:
 
 @contextmanager
 def _refusals_as_one_kind() -> Generator[None]:
-    """What parsers raise of bytes that are no UTF-8, texts that are nested too deep, or numbers with thousands of
-    digits, as DecodeError.
-    """
+    """What parsers raise of bad UTF-8, deep nesting or endless numbers, as DecodeError."""
     try:
         yield
     except msgspec.DecodeError:

@@ -133,8 +133,7 @@ CROUCHING = Stretch(
     },
 )
 BOX = Stretch(
-    "box",
-    options={"height_mm": (90.0, 150.0), "speed_mm_s": (900.0, 1100.0), "before_mm": (750.0, 850.0)},
+    "box", options={"height_mm": (90.0, 150.0), "speed_mm_s": (900.0, 1100.0), "before_mm": (750.0, 850.0)}
 )
 
 
@@ -308,11 +307,7 @@ def _person(half: str, kind: Kind, index: int, seed: int, rng: np.random.Generat
         proportions=proportions,
         colours=clothes,
         room=room,
-        picture=Picture(
-            samples=1,
-            noise=noise,
-            quality=round(float(rng.uniform(*QUALITY)), 0),
-        ),
+        picture=Picture(samples=1, noise=noise, quality=round(float(rng.uniform(*QUALITY)), 0)),
         include=Include(start_pose_noise_mm=4.0),
     )
 

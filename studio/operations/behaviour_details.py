@@ -108,9 +108,7 @@ class EntropyLine:
 
 @dataclass(frozen=True, slots=True)
 class Entropies:
-    """The automaton learnt again from four of five recordings (or four fifths of each, if there are fewer), tested on
-    the rest.
-    """
+    """The automaton learnt again from four of five recordings (or of fifths), tested on the rest."""
 
     lines: list[EntropyLine]
 

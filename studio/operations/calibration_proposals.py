@@ -209,9 +209,7 @@ class BoardFootage:
 
 
 def checked_board(session: Session, text: str, options: BoardOptions) -> Board:
-    """The board of a text. Raises CalibrationError for an impossible one, or for offsets of a camera that does not
-    exist.
-    """
+    """The board of a text. Raises CalibrationError for an impossible one, or offsets of unknown cameras."""
     how_taken(session, options.offsets or {})
     return board_from_text(text, options.thickness_mm)
 

@@ -278,9 +278,7 @@ def sweep(
 
 
 def expected_sweep(session: Session, request: SweepRequest) -> SweepExpected:
-    """How many runs a sweep has beside the studio, and about how long they take. Raises StudioError for what cannot be
-    swept.
-    """
+    """How many runs a sweep has, and about how long they take. Raises StudioError for what cannot be swept."""
     return expected(session, request.plan(session), processes_beside(), cores())
 
 
@@ -349,7 +347,6 @@ def _same(folder: Path, plan: Plan) -> KeptComparison:
     other = differences(plan, kept.plan())
     if other:
         raise RunError(
-            f"'{folder}' holds a comparison with other {', '.join(other)}.",
-            "Choose another folder or name.",
+            f"'{folder}' holds a comparison with other {', '.join(other)}.", "Choose another folder or name."
         )
     return kept

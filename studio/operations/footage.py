@@ -30,13 +30,7 @@ from studio.sessions.footage_changes import (
     stale_runs,
     synchrony_of,
 )
-from studio.sessions.importers.importing import (
-    ImportOptions,
-    ImportReport,
-    Offsets,
-    Rotations,
-    import_source,
-)
+from studio.sessions.importers.importing import ImportOptions, ImportReport, Offsets, Rotations, import_source
 from studio.sessions.importers.importing import add_footage as add_to_session
 from studio.sessions.recordings import SpreadFigures, calibration_given, check_cameras, import_recording
 from studio.sessions.session import Session
@@ -64,9 +58,7 @@ def new_session(
     ],
     *,
     title: Annotated[
-        str,
-        Field(max_length=200, description="The title that people see; default: the name."),
-        Web(kind=str),
+        str, Field(max_length=200, description="The title that people see; default: the name."), Web(kind=str)
     ] = "",
     body: Annotated[Body, Field(description="The body that is tracked; default: the studio's own.")] = "",
 ) -> Session:

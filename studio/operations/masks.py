@@ -74,8 +74,7 @@ class MaskRequest:
         Web(left_out=True),
     ] = None
     run: Annotated[
-        str,
-        Field(max_length=64, description="A tracked run whose projected model helps to carry strokes."),
+        str, Field(max_length=64, description="A tracked run whose projected model helps to carry strokes.")
     ] = ""
     knobs: Annotated[
         Values,

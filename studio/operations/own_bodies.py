@@ -97,9 +97,7 @@ class BodyChanges:
 @keeping_in_place
 def edit_body(
     body: Annotated[
-        str,
-        Field(description="A body by its name, or the path of its file."),
-        Terminal(metavar="BODY"),
+        str, Field(description="A body by its name, or the path of its file."), Terminal(metavar="BODY")
     ],
     *,
     text: Annotated[

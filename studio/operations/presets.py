@@ -92,9 +92,7 @@ def preset(name: str, folder: Path) -> Preset:
 
 
 def _own(folder: Path) -> dict[str, Preset]:
-    """A person's own presets by name; none where their file is damaged: it stays, and keeping another preset
-    says why.
-    """
+    """A person's own presets by name; none where their file is damaged, which keeping another preset reports."""
     try:
         kept = _read_kept(folder)
     except StudioError:

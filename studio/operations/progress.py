@@ -64,9 +64,7 @@ def say(progress: Reporting, lines: Iterable[str], once_in: Path | None = None) 
 
 
 def _new_in(folder: Path, lines: list[str]) -> list[str]:
-    """Lines that were not shown of a session before; they are remembered. A line that cannot be remembered is shown
-    again.
-    """
+    """Lines that were not shown of a session before; they are remembered if possible."""
     known = set[str]()
     with suppress(OSError, StudioError, msgspec.DecodeError):
         known = set(decode_json(read_file(folder / SAID), list[str]))

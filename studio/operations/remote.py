@@ -62,10 +62,7 @@ def runs_there(place: str | None = None) -> RunsThere:
 @operation
 @keeping_in_place
 def upload(
-    session: SessionName,
-    to: Annotated[Address, Terminal("--to", "ADDRESS")],
-    *,
-    progress: Reporting = None,
+    session: SessionName, to: Annotated[Address, Terminal("--to", "ADDRESS")], *, progress: Reporting = None
 ) -> str:
     """Put a session with its runs into an object store, from which any machine can track it, and return its address.
 

@@ -295,8 +295,5 @@ def verify(
             remove_left_behind(opened)
     say(progress, [f"damaged: {fault.place}: {fault.what}. {fault.remedy}" for fault in verification.faults])
     done = "removed" if mend else "to be removed by --repair"
-    say(
-        progress,
-        [f"left behind by interrupted work, {done}: {place}" for place in verification.left],
-    )
+    say(progress, [f"left behind by interrupted work, {done}: {place}" for place in verification.left])
     return Verified(verification, repaired)

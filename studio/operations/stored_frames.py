@@ -14,11 +14,7 @@ from studio.foundations.arrays import Array
 from studio.foundations.errors import NotFoundError, StudioError
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.knobs import Value
-from studio.operations.overview import (
-    ParameterView,
-    describe,
-    parameter_views,
-)
+from studio.operations.overview import ParameterView, describe, parameter_views
 from studio.operations.run_errors import evaluation_of
 from studio.operations.run_settings import SettingsChange, changes_of, history_of
 from studio.results.evaluation.errors import Evaluation

@@ -371,9 +371,7 @@ def branch(
     ],
     *,
     knobs: Annotated[
-        Values,
-        Field(description="Any other knob."),
-        Knobs(own_knobs, others=True, with_defaults=False),
+        Values, Field(description="Any other knob."), Knobs(own_knobs, others=True, with_defaults=False)
     ] = None,
     name: Annotated[
         str, Field(description="Name of the new run; default: the old name and the changed knobs.")

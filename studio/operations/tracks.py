@@ -127,9 +127,7 @@ def _line(session: Session, run: StoredRun, name: str) -> TrackLine:
 
 
 def shown_track(run: StoredRun, track: str) -> tuple[str, int]:
-    """The track to show when `track` is requested, raw if it does not exist, and a number that changes when it is made
-    again.
-    """
+    """The track to show when `track` is requested (raw if it does not exist), and a number that a new one changes."""
     if track == RAW or track not in track_names(run):
         return RAW, 0
     return track, track_stamp(run, track)

@@ -43,9 +43,7 @@ class TrialLine:
 
 
 def trial_lines(session: Session, kept: KeptComparison) -> list[TrialLine]:
-    """The trials of a finished comparison, tracker by tracker; none of an unfinished one or of a sweep, whose trials
-    are runs.
-    """
+    """The trials of a finished comparison, tracker by tracker; none of a sweep, whose trials are runs."""
     result = kept.result()
     if result is None or kept.plan(session).vary:
         return []

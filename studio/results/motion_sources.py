@@ -37,9 +37,7 @@ def read_sources(
     workspace: Workspace | None = None,
     progress: Progress = no_progress,
 ) -> tuple[Recording, ...]:
-    """The recordings of all sources in order, folders expanded. progress : called with the source's name. Raises
-    StudioError.
-    """
+    """The recordings of all sources in order, folders expanded. Raises StudioError."""
     names = [name for source in sources for name in expand(source)]
     if not names:
         raise StudioError("There is no recording to learn from.", "Name motion files or runs.")

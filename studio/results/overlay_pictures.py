@@ -178,14 +178,7 @@ class ViewComposer:
             outlined = replace(NO_MARKS, contours=limb_contours(body, (lens,), pose)[0], sides=sides)
             return replace(outlined, clouds=dots, truth=truth)
         seen = overlay_points(body, (lens,), pose, self._settings.weighting)[0]
-        return ViewMarks(
-            seen.contours,
-            sides,
-            seen.edge_samples,
-            seen.region_samples,
-            dots,
-            truth,
-        )
+        return ViewMarks(seen.contours, sides, seen.edge_samples, seen.region_samples, dots, truth)
 
     def _dots(
         self, camera: Camera, clouds: Sequence[LayerRecord], limbs: Sequence[int]

@@ -113,9 +113,7 @@ class RunCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
     @property
     def covered_mean(self) -> float:
-        """Mean share of the masks' pixels under the model, over all checked frames and cameras; NaN if there
-        is none.
-        """
+        """Mean share of the masks' pixels under the model, over all checked frames and cameras, or NaN."""
         known = [share for row in self.covered for share in row if share is not None]
         return float(np.mean(known)) if known else float("nan")
 

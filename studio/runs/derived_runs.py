@@ -73,9 +73,7 @@ def new_folder(
     last: int | None,
     complete: Callable[[StoredRun], None] = lambda made: None,
 ) -> StoredRun:
-    """A run's folder with the old run's snapshots and its frames before `last`; atomic. complete : called with it
-    before it is there.
-    """
+    """A run's folder with the old snapshots and the frames before `last`; atomic. complete : called before that."""
     place = run.folder.parent / checked_name(record.name, "run")
     if place.exists():
         raise taken(place)

@@ -141,9 +141,7 @@ class LimbsElsewhere:
 def _covered(
     quads: Array, names: NDArray[np.str_], shape: tuple[int, ...], far: float
 ) -> tuple[dict[str, Bytes], NDArray[np.bool_]]:
-    """By limb (H, W) 1 where it covers a pixel; (H, W) whether a pixel lies within `far` pixels of one. quads : (L, 4,
-    2).
-    """
+    """By limb (H, W) 1 where it covers a pixel; (H, W) whether one lies within `far` pixels. quads : (L, 4, 2)."""
     drawn = {name: np.zeros(shape, np.uint8) for name in dict.fromkeys(names.tolist())}
     for name, quad in zip(names.tolist(), quads, strict=True):
         if np.isfinite(quad).all():

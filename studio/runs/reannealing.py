@@ -10,8 +10,7 @@ from studio.search.trackers.tracker import FrameResult, LayerRecord
 
 
 class Reannealing:
-    """A stored frame, or the next one, annealed again layer by layer. Raises NotFoundError for any other
-    frame."""
+    """A stored frame, or the next one, annealed again layer by layer. Raises NotFoundError for any other frame."""
 
     def __init__(self, tracking: TrackingRun, frame: int, version: int, settings: RunSettings) -> None:
         self.frame, self.version, self.settings = frame, version, settings

@@ -150,9 +150,7 @@ def jitter(run: StoredRun, track: Track) -> float:
 
 
 def check_making(run: StoredRun, source: str, into: str, replace: bool) -> None:
-    """Check that a derived track can be stored. source : "" for the default one. Raises RunError, SessionError,
-    NotFoundError.
-    """
+    """Check that a derived track can be stored. source : "" for the default. Raises RunError, SessionError."""
     source = track_named(run, source)
     if checked_name(into, "track").lower() == RAW or into == source:
         raise RunError(

@@ -394,13 +394,7 @@ class TrackingRun:
             repeats = self._settings_at(frame)[1].tracker.start_repeats
         space = space_after(space, carried, self._settings_at(frame)[1].refinement)
         return FrameSearch(
-            self.tracker,
-            carried,
-            space,
-            seed=self.record.seed,
-            frame=frame,
-            repeats=repeats,
-            state=state,
+            self.tracker, carried, space, seed=self.record.seed, frame=frame, repeats=repeats, state=state
         )
 
     def carried_into(self, frame: int) -> FilterState:

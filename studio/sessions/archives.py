@@ -36,9 +36,7 @@ class ArchiveError(StudioError, status=422, code="archive"):
 
 @dataclass(frozen=True, slots=True)
 class ArchiveLimits:
-    """entries : files and folders. total : bytes unpacked. ratio : of unpacked to packed, beyond `free`
-    bytes.
-    """
+    """entries : files and folders. total : bytes unpacked. ratio : of unpacked to packed, beyond `free` bytes."""
 
     entries: int = 20_000
     total: int = 40 * GIGABYTE

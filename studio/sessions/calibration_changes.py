@@ -38,13 +38,7 @@ from studio.sessions.file_checksums import forget_files
 from studio.sessions.manifest import SessionManifest
 from studio.sessions.names import inside
 from studio.sessions.run_record import CAMERAS_NAME
-from studio.sessions.session import (
-    CAMERAS_PATH,
-    THUMBNAIL_NAME,
-    Session,
-    check_unchanged,
-    redescribe,
-)
+from studio.sessions.session import CAMERAS_PATH, THUMBNAIL_NAME, Session, check_unchanged, redescribe
 from studio.sessions.work_under_way import one_at_a_time
 
 EARLIER = "earlier"

@@ -34,13 +34,7 @@ from studio.sessions.background_files import (
 from studio.sessions.importers.measuring import checked_turn, in_step
 from studio.sessions.provenance import adopt
 from studio.sessions.run_record import FILE_NAME as RUN_FILE_NAME
-from studio.sessions.session import (
-    THUMBNAIL_NAME,
-    Session,
-    check_unchanged,
-    redescribe,
-    start_pose_files,
-)
+from studio.sessions.session import THUMBNAIL_NAME, Session, check_unchanged, redescribe, start_pose_files
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.stroke_files import OUTDATED, STROKES_NAME
 from studio.sessions.work_under_way import one_at_a_time

@@ -36,8 +36,7 @@ def read_pose(path: Path, names: tuple[str, ...], frame: int | None = None) -> A
     if len(rows) > 1:
         if FRAME not in header:
             raise BodyError(
-                f"'{path.name}' has {len(rows)} rows and no column 'frame'.",
-                "Keep one row, the start pose.",
+                f"'{path.name}' has {len(rows)} rows and no column 'frame'.", "Keep one row, the start pose."
             )
         column = header.index(FRAME)
         row = next(

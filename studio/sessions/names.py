@@ -52,8 +52,7 @@ def name_from(text: str, fallback: str = "session") -> str:
 
 
 def free_name(wanted: str, taken: set[str]) -> str:
-    """`wanted`, or `wanted-2`, `wanted-3`, … if it is taken (also in another case: some disks see no
-    difference)."""
+    """`wanted`, or `wanted-2`, `wanted-3`, … if it is taken (also in another case: some disks see no difference)."""
     used = {name.lower() for name in taken}
     if wanted.lower() not in used:
         return wanted

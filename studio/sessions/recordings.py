@@ -59,11 +59,7 @@ def check_cameras(calibration: Path, names: Sequence[str]) -> None:
 
 
 def import_recording(
-    folder: Path,
-    into: Path,
-    calibration: Path,
-    notes: Sequence[str] = (),
-    progress: Progress = no_progress,
+    folder: Path, into: Path, calibration: Path, notes: Sequence[str] = (), progress: Progress = no_progress
 ) -> tuple[ImportReport, SpreadFigures]:
     """Make a session at `into` from a recording, which is then removed; an interrupted recording is repaired first.
 

@@ -242,8 +242,7 @@ class ResultsWriter:
     def write_partial(
         self, frame: int, next_layer: int, state: Mapping[str, Array], layers: Iterable[LayerRecord]
     ) -> None:
-        """Store where the search stopped inside a frame: its state (named arrays, whole) and its layers so
-        far."""
+        """Store where the search stopped inside a frame: its state (named arrays, whole) and its layers so far."""
         statements: list[tuple[str, tuple[object, ...]]] = list(_FORGET_PARTIAL)
         blob = pack(dict(state))
         statements.append(("INSERT INTO partial VALUES (1, ?, ?, ?)", (frame, next_layer, blob)))

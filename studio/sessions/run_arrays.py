@@ -18,9 +18,7 @@ LARGEST_BYTES = 4 << 30
 
 
 def particles_dataset(
-    record: RunRecord,
-    frames: Sequence[int],
-    stored: Iterable[tuple[Sequence[LayerRecord], FrameResult]],
+    record: RunRecord, frames: Sequence[int], stored: Iterable[tuple[Sequence[LayerRecord], FrameResult]]
 ) -> Any:  # noqa: ANN401 - xarray.Dataset
     """The frames (K) with at most L layers of at most N stored particles each.
 

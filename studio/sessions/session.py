@@ -40,8 +40,7 @@ QUALITY = 5
 
 
 def thumbnail_of(session: "Session") -> bytes | None:
-    """JPEG bytes, at most 320 pixels on the longer side; None if the footage or a calibration cannot be
-    read."""
+    """JPEG bytes, at most 320 pixels on the longer side; None if the footage or a calibration cannot be read."""
     try:
         turns = session.cameras()[0].quarter_turns if session.is_calibrated else 0
         footage = session.footage()
@@ -179,8 +178,7 @@ class Session:
         return read_subject(path, self.manifest.body) if path.exists() else None
 
     def body(self, name: str | None = None, subject: Subject | None = None) -> BodyModel:
-        """The body `name` (default: the session's) scaled to `subject` (default: the session's). Raises
-        BodyError."""
+        """The body `name` (default: the session's) scaled to `subject` (default: the session's). Raises BodyError."""
         return self.body_with_notes(name, subject)[0]
 
     def body_with_notes(
@@ -248,8 +246,7 @@ class Session:
         return files[0] if files else None
 
     def thumbnail(self) -> Path | None:
-        """A small picture of the session (JPEG), made on first use; None if the footage cannot be
-        read."""
+        """A small picture of the session (JPEG), made on first use; None if the footage cannot be read."""
         path = self.path / THUMBNAIL_NAME
         if not path.exists():
             content = thumbnail_of(self)

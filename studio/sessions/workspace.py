@@ -155,8 +155,7 @@ class Workspace:
             return redescribe(moved, msgspec.structs.replace(moved.manifest, name=new_name, title=title))
 
     def retitle(self, name: str, title: str) -> Session:
-        """Change the text that people see. Raises SessionError if it is empty or longer than 200
-        characters."""
+        """Change the text that people see. Raises SessionError if it is empty or longer than 200 characters."""
         words = " ".join(title.split())
         if not 0 < len(words) <= 200:
             raise SessionError(
@@ -189,8 +188,7 @@ class Workspace:
         return Session(place)
 
     def trash(self, name: str) -> Path:
-        """Move a session to the trash folder and return where it lies. Raises SessionError while it is
-        tracked."""
+        """Move a session to the trash folder and return where it lies. Raises SessionError while it is tracked."""
         with moving(self.session(name).path):
             return self.to_trash(self._idle(name).path, name)
 

@@ -75,8 +75,7 @@ def show(window: StudioPage, view: str, **changes: object) -> list[dict]:
     until(window.page, lambda: str(body.get_attribute("data-drawn")).startswith(f"{name} dark"))
     window.page.wait_for_timeout(400)
     until(
-        window.page,
-        lambda: window.page.locator("#panel-views .figure").get_attribute("aria-busy") != "true",
+        window.page, lambda: window.page.locator("#panel-views .figure").get_attribute("aria-busy") != "true"
     )
     return window.page.evaluate(OPTION, FIGURE)
 

@@ -26,14 +26,8 @@ def picture() -> np.ndarray:
     [
         ({"mask_darkest": 110}, (True, False, False, True)),
         ({"mask_darkest": 0, "mask_brightest": 119}, (False, True, True, False)),
-        (
-            COLOURED | {"mask_hue": 350.0},
-            (False, True, False, True),
-        ),
-        (
-            COLOURED | {"mask_hue": 240.0},
-            (False, False, True, False),
-        ),
+        (COLOURED | {"mask_hue": 350.0}, (False, True, False, True)),
+        (COLOURED | {"mask_hue": 240.0}, (False, False, True, False)),
         ({"mask_darkest": 0, "mask_saturation": 0.5}, (False, True, True, False)),
     ],
 )

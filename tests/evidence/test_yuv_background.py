@@ -4,12 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from studio.evidence.yuv_background import (
-    YUV_OF_BGR,
-    YuvBackground,
-    independent_background,
-    learn_background,
-)
+from studio.evidence.yuv_background import YUV_OF_BGR, YuvBackground, independent_background, learn_background
 
 
 def clip(rng: np.random.Generator, frames: int = 400) -> np.ndarray:

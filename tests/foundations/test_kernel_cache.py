@@ -157,10 +157,7 @@ def test_what_a_change_reaches_is_compiled_anew(
 
 
 def test_a_damaged_file_and_a_folder_that_cannot_be_written_cost_a_compilation(
-    compiled: list[str],
-    checkout: Callable[..., ModuleType],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    compiled: list[str], checkout: Callable[..., ModuleType], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     answer(checkout("one"))
     (kept,) = (tmp_path / "kept").glob("kernels.total-*")
@@ -230,10 +227,7 @@ def test_in_a_shared_folder_each_user_has_one_of_his_own(
 
 
 def test_who_compiles_it_just_now_is_waited_for(
-    compiled: list[str],
-    checkout: Callable[..., ModuleType],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    compiled: list[str], checkout: Callable[..., ModuleType], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     answer(checkout("one"))
     assert not list((tmp_path / "kept").glob("*.turn"))
@@ -294,9 +288,7 @@ def test_what_has_no_key_is_named() -> None:
 
 
 def test_what_was_not_used_for_longest_goes_where_the_folder_is_full(
-    checkout: Callable[..., ModuleType],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    checkout: Callable[..., ModuleType], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(kernel_cache, "folder", lambda: tmp_path / "kept")
     answer(checkout("one"))

@@ -267,11 +267,7 @@ SERVED: Mapping[str, Callable[[Given], Request]] = {
     "served smooth": lambda at: ("POST", f"{RUN}/smooth", {"into": at.called("smoothed")}),
     "served check": lambda at: ("POST", f"{RUN}/check", {"track": "raw"}),
     "served export": lambda at: ("POST", f"{RUN}/exports", {"format": "trc"}),
-    "served make a run": lambda at: (
-        "POST",
-        "/runs",
-        {"start_pose": POSE, "settings": QUICK},
-    ),
+    "served make a run": lambda at: ("POST", "/runs", {"start_pose": POSE, "settings": QUICK}),
     "served track": lambda at: ("POST", f"/runs/{NEW}/start", None),
     "served branch": lambda at: (
         "POST",

@@ -137,10 +137,7 @@ def test_a_run_begins_with_the_sessions_knobs(session: Session) -> None:
     assert run.record.settings["mask_threshold"] == 9.0
     assert run.record.settings["background_model"] == "median"
     other = prepare_run(
-        session,
-        body="human31",
-        start_pose=session.body("human31").neutral,
-        knobs={"mask_threshold": 5.0},
+        session, body="human31", start_pose=session.body("human31").neutral, knobs={"mask_threshold": 5.0}
     )
     assert other.record.settings["mask_threshold"] == 5.0
 

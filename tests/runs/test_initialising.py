@@ -17,14 +17,7 @@ from studio.results.drawing_footage.person import marker_lengths, skeleton_of_he
 from studio.results.drawing_footage.recipe_file import Picture, Recipe
 from studio.runs.new_run import prepare_run
 from studio.runs.search_space import default_sigma, parameter_names, search_space
-from studio.runs.setup.initialising import (
-    InitialPose,
-    hull_of,
-    initialise,
-    keep_pose,
-    seek,
-    whole_problem,
-)
+from studio.runs.setup.initialising import InitialPose, hull_of, initialise, keep_pose, seek, whole_problem
 from studio.runs.setup.start_pose_file import start_pose_from_file
 from studio.search.settings import default_settings
 from studio.search.trackers.initialisation import QUICK

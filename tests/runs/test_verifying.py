@@ -214,12 +214,7 @@ def test_first_settings_and_a_half_searched_frame(session_on_disk: Session, run:
     assert verify(session_on_disk).faults == ()
 
     other = prepare_run(
-        session_on_disk,
-        name="b",
-        seed=7,
-        start_pose=true_poses()[0] + 0.02,
-        last=LAST,
-        knobs=QUICK,
+        session_on_disk, name="b", seed=7, start_pose=true_poses()[0] + 0.02, last=LAST, knobs=QUICK
     )
     finish(session_on_disk, other, layers=3)
     change(other, "UPDATE partial SET blob = zeroblob(30)")

@@ -60,9 +60,7 @@ class BodyView:
     def show(
         self, pose: Array | None, tokens: ColourTokens, opacity: float = 1.0, chosen: str | None = None
     ) -> None:
-        """Move every limb to a pose (radians, mm); None hides the body. chosen : a limb as errors are counted by; the
-        others are dimmed.
-        """
+        """Move every limb to a pose (radians, mm); None hides the body. chosen : the only limb that is not dimmed."""
         shown = (pose if pose is None else pose.tobytes(), tokens.name, opacity, chosen, self.colour)
         if shown == self._shown:
             return

@@ -63,9 +63,7 @@ class PicturePlane:
         return Rotation.from_quat(self.wxyz, scalar_first=True).as_matrix()[:, 2]
 
     def field_of_view(self, aspect: float) -> float:
-        """Vertical angle (radians) with which a viewer of this width/height sees the whole picture, centred
-        on the optical axis.
-        """
+        """Vertical angle (radians) with which a viewer of this width/height sees the whole picture."""
         across = max(abs(self.left), abs(self.right)) / max(aspect, 1e-6)
         return 2.0 * float(np.arctan(_VIEW_MARGIN * max(across, abs(self.top), abs(self.bottom))))
 
@@ -132,9 +130,7 @@ def straight_picture(camera: Camera, source_width: int, longest_side: int) -> St
 
 
 def _scaled(matrix: Array, scale: float) -> Array:
-    """An intrinsic matrix for a picture resized by `scale`, pixel (0, 0) being the centre of the top-left
-    pixel.
-    """
+    """An intrinsic matrix for a picture resized by `scale`, pixel (0, 0) being the centre of the top-left pixel."""
     result = matrix.copy()
     result[:2] *= scale
     result[0, 2] = (matrix[0, 2] + 0.5) * scale - 0.5

@@ -32,9 +32,7 @@ _ASIDE = np.array([0.0, 0.0, 1.0])
 
 
 class CameraView:
-    """One camera. on_click : called when the camera or its picture is clicked, in a thread of viser's, with whether
-    that was the second click of two.
-    """
+    """One camera. on_click : called in a thread of viser's with whether it was the second click of two."""
 
     def __init__(
         self, server: viser.ViserServer, camera: Camera, on_click: Callable[[bool], None] = lambda _: None
@@ -109,9 +107,7 @@ class CameraView:
 
 
 class CameraViews:
-    """All cameras of a session. clicked : called with a camera's name and whether it was clicked twice, in a thread of
-    viser's.
-    """
+    """All cameras of a session. clicked : called in a thread of viser's with a camera's name and whether twice."""
 
     def __init__(
         self,

@@ -328,11 +328,7 @@ class SceneController:
         session = self.opened.session
         keep_start_pose(session, self.opened.body, model.edit.pose)
         frame = session.start_pose_frame()
-        notify(
-            self._server,
-            "Start pose saved",
-            f"New runs begin with it, in frame {frame}.",
-        )
+        notify(self._server, "Start pose saved", f"New runs begin with it, in frame {frame}.")
         return edit_pose(model, saved)
 
     def refine_pose(self, model: Model) -> Model:

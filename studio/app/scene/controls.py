@@ -67,9 +67,7 @@ _removing = threading.Lock()
 
 
 def take_out(handle: Any) -> None:  # noqa: ANN401 - an input or a folder of them
-    """Take an input, or a folder with all its inputs, out of the panel: nothing is written to them any more, for the
-    browser knows them no longer.
-    """
+    """Remove an input, or a folder with all its inputs, from the panel; nothing is written to them any more."""
     with _removing:
         handle.remove()
 

@@ -56,9 +56,7 @@ def light(server: viser.ViserServer, shadows: bool) -> None:
 
 
 def floor_extent(points: Sequence[Array], scale: float = 1.0) -> tuple[tuple[float, float], float]:
-    """Middle (x, y) and half width in metres of a square floor under all points (mm), on half-metre lines times the
-    scale.
-    """
+    """Middle (x, y) and half width (m) of a square floor under all points (mm), on half-metre lines times the scale."""
     centres = np.array(points)[:, :2] * METRES_PER_MM / scale
     low: Array = centres.min(axis=0)
     high: Array = centres.max(axis=0)

@@ -137,8 +137,7 @@ class FrameVolumes:
         try:
             if len(opened.cameras) < FEWEST_VIEWS and len(root_parameters(opened.body)):
                 raise StudioError(
-                    "One camera makes no visual hull.",
-                    "Visual hulls need two cameras or more.",
+                    "One camera makes no visual hull.", "Visual hulls need two cameras or more."
                 )
             problems = problems or ProblemSource(opened.session, opened.body, opened.cameras)
             made = _volume(problems, request)

@@ -22,9 +22,7 @@ _CONSOLE = threading.Lock()
 
 
 class GuardedServer(viser.ViserServer):
-    """viser on 127.0.0.1 at a free port, behind a secret. Building it blocks for some milliseconds: use a
-    thread.
-    """
+    """viser on 127.0.0.1 at a free port, behind a secret. Building it blocks for some milliseconds: use a thread."""
 
     def __init__(self) -> None:
         self._relay_secret = secrets.token_urlsafe(32)

@@ -452,10 +452,7 @@ def point_at(model: Model, particle: int | None) -> Model:
 
 
 def set_playback(
-    model: Model,
-    playing: bool | None = None,
-    speed: float | None = None,
-    loop: bool | None = None,
+    model: Model, playing: bool | None = None, speed: float | None = None, loop: bool | None = None
 ) -> Model:
     """Play or stop, and how; None leaves it."""
     now = model.playback
@@ -527,9 +524,7 @@ def stop_layers(model: Model) -> Model:
 
 
 def scrub(model: Model, layer: int | None) -> Model:
-    """Show one layer's cloud (None: all together), by hand: layers are no longer played. From one layer to the next the
-    particles travel.
-    """
+    """Show one layer's cloud (None: all) by hand: playing stops, and particles travel from layer to layer."""
     before = model.selection.layer
     model = select(stop_layers(model), layer=layer)
     is_next = layer is not None and before is not None and layer == before + 1

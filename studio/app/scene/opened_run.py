@@ -157,9 +157,7 @@ class OpenedRun:
         return self._track[1]
 
     def truth_at(self, frame: int) -> Array | None:
-        """(M, 3) mm: the truth's markers at a frame (rows by time × fps, the first row being frame 0), else
-        None.
-        """
+        """(M, 3) mm: the truth's markers at a frame (rows by time × fps, the first row being frame 0), else None."""
         if self.truth is None:
             return None
         rows = self._truth_rows

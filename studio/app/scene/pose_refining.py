@@ -40,13 +40,7 @@ class PoseRefining:
 
         def search() -> None:
             try:
-                result = better_pose(
-                    session,
-                    frame,
-                    pose,
-                    run=run,
-                    progress=report,
-                )
+                result = better_pose(session, frame, pose, run=run, progress=report)
             except StudioError as problem:
                 result = problem
             except Exception:

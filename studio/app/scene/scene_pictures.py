@@ -247,9 +247,7 @@ def png_of(picture: Bytes) -> bytes:
 
 
 def write_film(place: Path, pictures: Iterator[Bytes], fps: float, kind: str, *, hold: float = 0.0) -> int:
-    """Write (H, W, 4) pictures as H.264 in mp4, or as a GIF that loops; how many there are. hold : seconds for which
-    the last one stays.
-    """
+    """Write (H, W, 4) pictures as H.264 or a looping GIF; their number. hold : seconds that the last one stays."""
     return _write_gif(place, pictures, fps, hold) if kind == GIF else _write_mp4(place, pictures, fps, hold)
 
 

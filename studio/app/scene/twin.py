@@ -22,9 +22,7 @@ Eye = tuple[float, ...]
 
 
 def following(model: Model, leader: Model) -> Model:
-    """The follower's model after a change of the leader's: the same moment, drawn in the same way; each keeps whether
-    it shows trials.
-    """
+    """The follower's model after a change of the leader's; each keeps whether it shows trials."""
     own = {name: getattr(model.options, name) for name in OWN_OPTIONS}
     return replace(
         model,

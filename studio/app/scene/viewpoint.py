@@ -42,9 +42,7 @@ def axes(eye: Eye) -> tuple[Array, Array, Array]:
 
 
 def on_screen(points: Array, eye: Eye, fov: float, aspect: float) -> Array:
-    """(K, 3): points (K, 3) metres as shares of the view, x to the right and y down, each 0..1 inside it, and metres
-    before the eye.
-    """
+    """(K, 3): points (K, 3) metres as shares of the view (x right, y down), and metres before the eye."""
     right, up, forward = axes(eye)
     away = points - np.array(eye[:3])
     depth = away @ forward
@@ -62,10 +60,7 @@ def framed(points: Array, toward: Array, fov: float, aspect: float, filled: floa
     """The eye that sees points (K, 3) metres fill the view. toward : (3,) from them to the eye."""
     right, up, forward = axes((*toward, 0.0, 0.0, 0.0))
     along = points @ forward
-    ways = (
-        (points @ right, np.tan(fov / 2.0) * aspect * WIDEST),
-        (points @ up, np.tan(fov / 2.0) * filled),
-    )
+    ways = ((points @ right, np.tan(fov / 2.0) * aspect * WIDEST), (points @ up, np.tan(fov / 2.0) * filled))
     # Of every point the view's edges say how far behind 0 the eye has to be: least where both edges touch.
     behind = max(
         float(((side / slope - along).max() + (-side / slope - along).max()) / 2.0) for side, slope in ways
@@ -95,9 +90,7 @@ def is_in_sight(points: Array, eye: Eye, fov: float, aspect: float) -> bool:
 
 
 def direction(preset: Preset, body: BodyModel, ends: Array) -> Array:
-    """(3,) from a body to the eye of a preset. ends : (L, 2, 3) of its drawn limbs; a body without sides is seen from
-    where y is least.
-    """
+    """(3,) from a body to the eye of a preset. ends : (L, 2, 3) of its limbs; without sides it is seen from least y."""
     forward = facing(body, ends)
     if preset == "top":
         return np.cos(_TOP_ELEVATION) * forward + np.sin(_TOP_ELEVATION) * np.array([0.0, 0.0, 1.0])

@@ -116,9 +116,7 @@ NOTHING = (np.zeros((0, 3)), np.zeros((0, 4)), np.zeros((0, 3)), np.zeros((0, 3)
 
 
 class _Instances:
-    """Many of one mesh. A set of another size is a new handle: a viewer never sees places and colours that do not
-    belong together.
-    """
+    """Many of one mesh. A set of another size is a new handle, so that places and colours always match."""
 
     def __init__(
         self, server: viser.ViserServer, name: str, mesh: trimesh.Trimesh, *, look: str = SMOOTH

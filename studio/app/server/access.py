@@ -152,9 +152,7 @@ def _address(name: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
 
 
 class AccessGuard:
-    """ASGI middleware: refuses what the module's text refuses, before anything else runs. viewers_token : of those who
-    may only look; "" lets none in.
-    """
+    """ASGI middleware that refuses as the module's text says. viewers_token : "" lets no viewers in."""
 
     def __init__(self, app: ASGIApp, *, token: str, hosts: HostRule, viewers_token: str = "") -> None:
         self.app = app

@@ -42,10 +42,7 @@ class AlignmentJob(SessionJob):
 
 
 ALIGNMENT = JobKind(
-    "alignment",
-    "comparison of the cameras",
-    AlignmentJob,
-    page="/way?session={session}&step=background",
+    "alignment", "comparison of the cameras", AlignmentJob, page="/way?session={session}&step=background"
 )
 
 

@@ -63,9 +63,7 @@ def edit(
     ],
     app: App,
 ) -> BodyDetail:
-    """Change a body, and save it as one's own where a name is given; a page sends the text that it has, with one change
-    after the other.
-    """
+    """Change a body, and save it where a name is given; a page sends its text with one change after the other."""
     session = session_or_none(app, arguments.more["session"] or "")
     edit = edit_body(name, **arguments, session=session, folder=bodies_folder(app.workspace, session))
     if edit.file is not None and session is not None:

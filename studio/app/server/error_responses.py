@@ -122,9 +122,7 @@ def _moved_meanwhile(request: Request) -> StudioError | None:
 
 
 class ErrorsInWords:
-    """ASGI middleware, outermost: what was not caught becomes a 500 in words and a traceback in the log
-    file.
-    """
+    """ASGI middleware, outermost: what was not caught becomes a 500 in words and a traceback in the log file."""
 
     def __init__(self, app: ASGIApp, *, log_path: Path | None) -> None:
         self.app = app

@@ -107,9 +107,7 @@ class _AsSent(GenerateJsonSchema):
 
 
 def event_schemas(kinds: Sequence[JobKind[Any]]) -> dict[str, Any]:
-    """Schemas by name: `EventMessage`, one of all messages, and what they are made of. kinds : of jobs, whose states
-    are sent.
-    """
+    """Schemas by name: `EventMessage` of all messages, and its parts. kinds : of jobs, whose states are sent."""
     contents = MESSAGES | {kind.event: kind.states for kind in kinds}
     adapters: list[tuple[str, JsonSchemaMode, TypeAdapter[Any]]] = [
         (name, "serialization", TypeAdapter(content)) for name, content in contents.items()

@@ -101,9 +101,7 @@ async def begin_synchrony(
     app: App,
     arguments: Annotated[Arguments, body_of(synchronise, "SynchronyRequest", only=("within",))],
 ) -> SynchronyState:
-    """Begin to estimate the offsets from what moves in the pictures. Ask for its state, or wait for `synchrony`
-    events.
-    """
+    """Begin to estimate the offsets from motion. Ask for its state, or wait for `synchrony` events."""
     known = app.jobs.known(SYNCHRONY, session.name)
     if known is not None and known.state.is_going:
         return known

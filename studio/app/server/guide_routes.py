@@ -122,9 +122,7 @@ def guide(page: str = "") -> HTMLResponse:
 
 @cache
 def rendered(name: str, title: str, in_course: bool = False) -> dict[str, str]:
-    """What is a page's own, made once. name : of its text among the guide's. in_course : its contents are the course's
-    pages.
-    """
+    """The text of a page, made once. name : among the guide's texts. in_course : with the course's contents."""
     markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
     folder = assets_folder() / "guide"
     text = (folder / name).read_text(encoding="utf-8")

@@ -54,9 +54,7 @@ def jobs(
     session: Annotated[str | None, Query(max_length=64, description="Of this session only.")] = None,
     kind: Annotated[str, Query(max_length=64, description="Of this kind only.")] = "",
 ) -> JobList:
-    """What is under way, and what is over since the studio was started: how a page that was loaded again, or another
-    one, finds it.
-    """
+    """Jobs under way, and those that ended since the studio started: so a page that is loaded again finds its own."""
     return JobList([_line(job) for job in app.jobs.jobs(session, kind)])
 
 

@@ -148,9 +148,7 @@ def _kind(content: bytes | None) -> str:
 
 
 async def _outwards(browser: WebSocket, inner: ClientConnection) -> None:
-    """viser to browser; a slow browser slows this reading, and viser then keeps only the newest of each
-    property.
-    """
+    """viser to browser; a slow browser slows this reading, and viser then keeps only the newest of each property."""
     try:
         async for content in inner:
             await (browser.send_text(content) if isinstance(content, str) else browser.send_bytes(content))

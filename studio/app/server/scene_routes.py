@@ -80,9 +80,7 @@ class SceneRequest(Request):
 
 @router.post("/show", status_code=204)
 def show(request: SceneRequest, app: App, scene: Scene, window: Window = "") -> None:
-    """Show a moment of a run (or a session without one) in the asking window's scene. Names are checked before
-    anything changes.
-    """
+    """Show a moment of a run (or a session alone) in the asking window's scene; names are checked first."""
     given = request.model_fields_set
     if request.body is not None:
         body = parse_body(request.body, "body", "body.toml")
@@ -233,12 +231,7 @@ def report_moves(app: AppState) -> None:
 
     def moved(window: str, shown: Selection, layers: LayerPlayback) -> None:
         app.events.publish(
-            {
-                "type": "scene",
-                **dataclasses.asdict(shown),
-                "layers": _layers_answer(layers),
-            },
-            window,
+            {"type": "scene", **dataclasses.asdict(shown), "layers": _layers_answer(layers)}, window
         )
 
     app.scenes.watch(moved)

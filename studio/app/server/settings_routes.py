@@ -69,8 +69,7 @@ class PresetRequest(Request):
 
 @router.get("/choices")
 def choices(
-    app: App,
-    session: Annotated[str, Query(max_length=64, description="Whose own bodies count too.")] = "",
+    app: App, session: Annotated[str, Query(max_length=64, description="Whose own bodies count too.")] = ""
 ) -> Choices:
     """Trackers, weightings, bodies, behaviour models and presets that a new run can be made of."""
     opened = app.workspace.session(session) if session else None
@@ -90,9 +89,7 @@ def pace(
     weighting: str = DEFAULT_WEIGHTING,
     evaluations: Annotated[int, Query(ge=1, description="Of a frame.")] = 1000,
 ) -> StoredPace:
-    """How long an evaluated pose and a frame take, by a stored run of the session with that likelihood; null where
-    there is none.
-    """
+    """How long a pose and a frame take, by a stored run of the session with that likelihood; null without one."""
     return expected_pace(session, tracker, weighting, evaluations)
 
 
@@ -132,9 +129,7 @@ def reset_settings(run: OpenRun, request: ResetRequest, app: App) -> SettingsInU
 
 @router.post(RUN + "/settings/preset")
 def use_preset(run: OpenRun, request: PresetChoice, app: App) -> SettingsInUse:
-    """Change the knobs that a preset sets, but for those that a run keeps; refused where it is made for another tracker
-    or likelihood.
-    """
+    """Change the knobs of a preset that a run allows; refused where it is made for another tracker or likelihood."""
     return _change(app, run, values_of_preset(run, request.name, app.state_folder))
 
 

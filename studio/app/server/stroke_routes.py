@@ -16,9 +16,7 @@ router = Router(prefix="/api/sessions/{session}/strokes", tags=["masks"])
 
 
 class StrokeEntry(Request):
-    """One stroke. width: of the brush, pixels; points: [x, y] pixels of the picture as the footage gives it (not turned
-    upright).
-    """
+    """One stroke. width: of the brush, pixels; points: [x, y] pixels of the picture as the footage gives it."""
 
     frame: int = Field(ge=0, le=LARGEST)
     kind: StrokeKind

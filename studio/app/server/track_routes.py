@@ -72,11 +72,7 @@ class TrackJobState(NumberedJob):
 
 
 TRACK = JobKind(
-    "track",
-    "job",
-    TrackJobState,
-    at="/api/track-jobs/{identifier}",
-    page="/?session={session}&run={run}",
+    "track", "job", TrackJobState, at="/api/track-jobs/{identifier}", page="/?session={session}&run={run}"
 )
 
 

@@ -115,8 +115,7 @@ add_job_routes(router, "/seeds/{identifier}", SEEDS)
 
 @router.get("/compared-runs")
 def compared_runs(
-    app: App,
-    run: Annotated[list[str], Query(max_length=6, description="Two to six runs, as SESSION/RUN.")],
+    app: App, run: Annotated[list[str], Query(max_length=6, description="Two to six runs, as SESSION/RUN.")]
 ) -> RunsCompared:
     """Stored runs side by side: curves over frames, settings that differ, the worst frame of each."""
     folders: list[str] = []

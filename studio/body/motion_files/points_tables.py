@@ -128,10 +128,7 @@ def _qualisys(path: Path, rows: list[list[str]]) -> Rows:
             ahead = len(body[0]) - 3 * len(names)
             header = ["frame", *(f"{name}_{axis}_mm" for name in names for axis in AXES)]
             ahead = 2 if ahead >= 2 else 0
-            return [
-                header,
-                *([str(at), *row[ahead : ahead + 3 * len(names)]] for at, row in enumerate(body)),
-            ]
+            return [header, *([str(at), *row[ahead : ahead + 3 * len(names)]] for at, row in enumerate(body))]
     raise TruthError(
         f"'{path.name}' is not Qualisys' table of markers.", "Export 3D data as TSV with its header."
     )

@@ -176,8 +176,7 @@ def _header(path: Path, lines: list[str]) -> _Header:
     unit = UNIT_WORDS.get(named, named)
     if unit not in MM_PER_UNIT:
         raise TruthError(
-            f"'{path.name}' line 3 gives the unit '{fields.get('Units', '')}'.",
-            "Use one of: mm, cm, m.",
+            f"'{path.name}' line 3 gives the unit '{fields.get('Units', '')}'.", "Use one of: mm, cm, m."
         )
     rate = _header_number(path, fields, "DataRate")
     if rate <= 0.0:

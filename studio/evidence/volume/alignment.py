@@ -43,9 +43,7 @@ class Axes:
         return axes
 
     def heading(self) -> float:
-        """Angle of the longer horizontal axis from x, radians, within a half turn (opposite directions are the same
-        axis).
-        """
+        """Angle of the longer horizontal axis from x, radians, within a half turn."""
         flat = self.covariance[:2, :2]
         return 0.5 * float(np.arctan2(2.0 * flat[0, 1], flat[0, 0] - flat[1, 1]))
 
@@ -131,9 +129,7 @@ def _axis_turns(seen: Axes, own: Axes) -> list[Array]:
 
 
 def with_root_at(body: BodyModel, root: int, parameters: IntArray, pose: Array, target: Array) -> Array:
-    """The pose (D,) with the `parameters` of the root such that the frame of joint `root` comes nearest to
-    `target` (3, 4), mm.
-    """
+    """The pose (D,) with the root's `parameters` that bring the frame of joint `root` nearest to `target` (3, 4)."""
     length = MM_OF_ROTATION * scale_of(body)
     scale = np.array([[length] * 3 + [1.0]] * 3)
     angles = body.angles[parameters]

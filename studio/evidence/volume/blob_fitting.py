@@ -91,13 +91,7 @@ class Fitted:
 
 
 def fit_blobs(
-    hull: Hull,
-    model: BlobModel,
-    body: BodyModel,
-    starts: Array,
-    iterations: int = 8,
-    *,
-    moved: bool = True,
+    hull: Hull, model: BlobModel, body: BodyModel, starts: Array, iterations: int = 8, *, moved: bool = True
 ) -> Fitted:
     """The model's blobs fitted to a hull that is not empty, from poses (S, D); iterations : at most, of each fit.
     moved : also from each pose moved so that its mean is the hull's, where that is further than NEAR_ENOUGH.

@@ -28,12 +28,7 @@ CHUNK = 512
 
 
 @njit(**EXACT)
-def assign(
-    voxels: Floats,
-    factors: Floats,
-    labels: NDArray[np.int32],
-    distances: Floats,
-) -> None:
+def assign(voxels: Floats, factors: Floats, labels: NDArray[np.int32], distances: Floats) -> None:
     """The nearest blob of each voxel: labels (K,) int32, and its squared Mahalanobis distance, distances (K,) float32.
 
     voxels : (6, K) float32. factors : (B, FACTORS) float32. Equal distances go to the first blob.
@@ -118,10 +113,7 @@ def precision_of(blob, inverse):
 
 
 @njit(**KERNEL)
-def fill_factors(
-    state: Array,
-    factors: Floats,
-) -> None:
+def fill_factors(state: Array, factors: Floats) -> None:
     """The rows of `assign`, factors (B, FACTORS), of blobs (B, STATE): the root is Lᵀ of Σ⁻¹ = L Lᵀ (Cholesky)."""
     inverse = np.empty(6)
     for b in range(state.shape[0]):

@@ -60,9 +60,7 @@ class BlobModel:
     weight: Array
 
     def mixture(self, body: BodyModel, poses: Array) -> BlobMixture:
-        """The mixtures of poses (N, D): means (N, B, 3), covariances (N, B, 3, 3). Raises BodyError for poses that are
-        not the body's.
-        """
+        """The mixtures of poses (N, D): means (N, B, 3), covariances (N, B, 3, 3). Raises BodyError for other poses."""
         frames = limb_frames(body, poses)[:, self.limb]
         axes = frames[..., :3]
         means = frames[..., 3] + axes[..., 2] * self.offset[:, None]

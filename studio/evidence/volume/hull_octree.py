@@ -66,10 +66,7 @@ def first_look(
 
 
 @njit(**KERNEL)
-def kept_nodes(
-    nodes: NDArray[np.int32],
-    verdicts: Bytes,
-) -> NDArray[np.int32]:
+def kept_nodes(nodes: NDArray[np.int32], verdicts: Bytes) -> NDArray[np.int32]:
     """(K, 3) the voxels kept at this depth."""
     out = np.empty((np.count_nonzero(verdicts == KEPT), 3), np.int32)
     count = 0
@@ -82,10 +79,7 @@ def kept_nodes(
 
 @njit(**KERNEL)
 def children(
-    nodes: NDArray[np.int32],
-    states: NDArray[np.uint32],
-    verdicts: Bytes,
-    limits: NDArray[np.int32],
+    nodes: NDArray[np.int32], states: NDArray[np.uint32], verdicts: Bytes, limits: NDArray[np.int32]
 ) -> tuple[NDArray[np.int32], NDArray[np.uint32]]:
     """The octants (M, 3) of the voxels that are split, and their states (M, 3), in the order of their parents.
 
@@ -112,10 +106,7 @@ def children(
 
 
 @njit(**KERNEL)
-def summed_areas(
-    mask: Bytes,
-    sums: NDArray[np.int32],
-) -> None:
+def summed_areas(mask: Bytes, sums: NDArray[np.int32]) -> None:
     """How many pixels of a mask (H, W) lie above and left of each corner. sums : ((H + 1) (W + 1),) filled."""
     height, width = mask.shape
     row_length = width + 1

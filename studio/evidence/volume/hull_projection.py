@@ -122,8 +122,7 @@ def set_centres(place, centres, edges, first, end):
 
 @njit(**EXACT)
 def count_samples(place, lanes, sampling):
-    """Fill in the number of each voxel's samples: the square root of its pixels, at least one. Returns the most of the
-    first lanes."""
+    """Fill in each voxel's number of samples: the square root of its pixels, at least one; returns the most."""
     for lane in range(LANES):
         area = place[AREA * LANES + lane]
         place[COUNT * LANES + lane] = max(1.0, np.ceil(sampling * np.sqrt(area) - 1e-9))

@@ -186,9 +186,7 @@ class HullFollower:
 
 
 class _Followed:
-    """A subject's voxels (K, 3) in the last frame that showed it. stretch : mm that it may reach farther from its
-    middle than in the first.
-    """
+    """A subject's voxels (K, 3) when last seen. stretch : mm that it may reach farther than in the first frame."""
 
     def __init__(self, centres: Array, stretch: float) -> None:
         self.middle, self.velocity = np.median(centres[:, :2], axis=0), np.zeros(2)

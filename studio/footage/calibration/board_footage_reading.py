@@ -111,9 +111,7 @@ def look_for_lens(
     progress: Progress = no_progress,
     taken: HowTaken = AS_IT_IS,
 ) -> list[Seen]:
-    """The board in one camera's pictures, or in up to 60 frames of its video spread over all of it; frames count as
-    the recording's do.
-    """
+    """The board in one camera's pictures, or in up to 60 frames spread over its video."""
     count = frame_count(footage)
     frames = np.arange(count) if footage.video is None else frames_in_step([count], LENS_FRAMES)
     return _examine(finder, camera, footage, count, frames, progress, taken)
@@ -161,9 +159,7 @@ def frames_in_step(counts: Sequence[int], most: int) -> Indices:
 
 
 def chosen_for_lens(seen: Sequence[Seen], most: int = LENS_PICTURES) -> tuple[list[Sighting], int]:
-    """Sharp ones that together cover the picture, most informative first, in order of frames; and how many were
-    blurred.
-    """
+    """Sharp ones that together cover the picture, most informative first; and how many were blurred."""
     if len(seen) <= most // 2:
         return [entry.sighting for entry in seen], 0
     usual = float(np.median([entry.sharpness for entry in seen]))

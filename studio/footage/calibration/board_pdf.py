@@ -117,9 +117,7 @@ def write_board_pdf(board: Board, path: Path, page: str = "a4") -> None:
     document.rect(MARGIN, foot, CHECK_BAR, 1.2, style="F")
     document.set_font("Helvetica", size=8)
     document.text(
-        MARGIN,
-        foot + 5.0,
-        "This bar is 100 mm long: print at 100 %, not fitted to the page, and measure it.",
+        MARGIN, foot + 5.0, "This bar is 100 mm long: print at 100 %, not fitted to the page, and measure it."
     )
     document.text(MARGIN, foot + 9.0, _words(board))
     path.write_bytes(bytes(document.output()))

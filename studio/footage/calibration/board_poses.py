@@ -46,9 +46,7 @@ class PairPose:
 
 
 def view_of(board: Board, sighting: Sighting, lens: Lens) -> BoardView | None:
-    """The poses of a board that explain a sighting, most likely first (a plane seen from afar has two); None if its
-    corners lie on a line.
-    """
+    """The poses of a board that explain a sighting, most likely first; None if its corners lie on a line."""
     poses: list[Array] = []
     turned: list[bool] = []
     count = len(board.points)

@@ -204,9 +204,7 @@ class ClickedFloor:
 
 
 def clicked_floor(clicks: Clicks, cameras: Sequence[Camera]) -> ClickedFloor:
-    """The clicked points in space, and the world that they make. Raises CalibrationError, also where known lengths
-    contradict.
-    """
+    """The clicked points in space, and their world. Raises CalibrationError, also for contradicting lengths."""
     names = sorted({name for click in clicks.points for name in click.pixels})
     pixels = {
         name: np.array([click.pixels.get(name, (np.nan, np.nan)) for click in clicks.points])

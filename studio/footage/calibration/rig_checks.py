@@ -359,9 +359,7 @@ def scale_finding(ratio: float, known: str, board: Board | None = None) -> Findi
 
 
 def height_finding(seen_mm: float, known_mm: float, known: str, board: Board | None = None) -> Finding:
-    """The finding for a standing person's height that does not match: it, or the calibration's size, is wrong. known :
-    the height as text.
-    """
+    """The finding for a standing person's height that does not match the calibration. known : the height as text."""
     ratio = seen_mm / known_mm
     return unit_finding(ratio, known) or Finding(
         "square-size",

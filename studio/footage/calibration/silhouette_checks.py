@@ -61,9 +61,7 @@ def stature_findings(
     board: Board | None = None,
     scale: float = 1.0,
 ) -> tuple[Finding, ...]:
-    """Findings from the size of a person. A wrong unit shows in any posture; other faults only in the height of a
-    standing person.
-    """
+    """Findings from a person's size: a wrong unit in any posture, other faults only when the person stands."""
     usual = USUAL_HEIGHT * scale
     known, words = (
         (usual, f"a usual height (about {0.001 * usual:.2g} m)")

@@ -53,9 +53,7 @@ class Posture:
 
     @property
     def stands(self) -> bool:
-        """Whether this can only be a person who stands upright: legs under the trunk, nothing over the head, on the
-        floor.
-        """
+        """Whether this can only be an upright person: legs under the trunk, nothing over the head, on the floor."""
         return (
             abs(self.feet) <= FEET
             and self.legs <= LEGS
@@ -74,9 +72,7 @@ def postures(cameras: Sequence[Camera], masks: Mapping[int, Mapping[str, Bytes]]
 
 
 def standing_height(measured: Sequence[Posture]) -> float | None:
-    """The height of a person who stands in several of the frames and is as tall in each, mm; None if that is not
-    certain.
-    """
+    """The height (mm) of a person who stands in several frames and is as tall in each; None if not certain."""
     heights = [one.height_mm for one in measured if one.stands]
     if len(heights) < LEAST_FRAMES:
         return None

@@ -249,9 +249,7 @@ class _Solving:
     def placed(
         self, together: Sequence[Sighting], lenses: Mapping[str, Lens], refine: bool
     ) -> tuple[Rig, str, list[Finding]]:
-        """The rig on its floor, how that was set, and the findings of pairs. Raises CalibrationError for mirrored
-        ones.
-        """
+        """The rig on its floor, how that was set, and findings of pairs. Raises CalibrationError for mirrored ones."""
         names = sorted({sighting.camera for sighting in together}, key=natural_key)
         silent = [name for name in lenses if name not in names]
         if silent:

@@ -57,9 +57,7 @@ def is_label3d(path: Path) -> bool:
 
 
 def read_dannce(path: Path) -> FoundCameras:
-    """The cameras of label3d's file, or of a folder of one file a camera. Raises CalibrationError naming file, camera
-    and entry.
-    """
+    """The cameras of label3d's file, or of a folder of one file a camera. Raises CalibrationError naming the entry."""
     files = dannce_files(path) if path.is_dir() else (path,)
     cameras: list[Camera] = []
     for file in files:

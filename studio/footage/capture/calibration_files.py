@@ -14,12 +14,7 @@ import numpy as np
 
 from studio.footage.capture.calibration_bouguet import BOUGUET_SUFFIX, bouguet_files, read_bouguet
 from studio.footage.capture.calibration_dannce import DANNCE_SUFFIX, dannce_files, is_label3d, read_dannce
-from studio.footage.capture.calibration_easymocap import (
-    EXTRINSICS,
-    INTRINSICS,
-    is_easymocap,
-    read_easymocap,
-)
+from studio.footage.capture.calibration_easymocap import EXTRINSICS, INTRINSICS, is_easymocap, read_easymocap
 from studio.footage.capture.calibration_opencap import FILE_NAME as OPENCAP_NAME
 from studio.footage.capture.calibration_opencap import opencap_files, read_opencap
 from studio.footage.capture.calibration_opencv import opencv_files, read_opencv

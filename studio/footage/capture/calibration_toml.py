@@ -26,8 +26,7 @@ CANONICAL, VERSION = "capture-studio", 1
 
 
 def looks_like_calibration(path: Path) -> bool:
-    """Whether a TOML file holds cameras (or cannot be parsed but it, or its folder, is named after
-    calibration)."""
+    """Whether a TOML file holds cameras (or cannot be parsed but it, or its folder, is named after calibration)."""
     try:
         document = _document(path)
     except CalibrationError:

@@ -103,9 +103,7 @@ def replayed_video(
     clock: Callable[[], float] = time.monotonic,
     released: Callable[[], bool] = lambda: True,
 ) -> Iterator[Shot]:
-    """A video replayed as a camera: each picture at its time, the first one repeatedly until it is released. Raises
-    FootageError.
-    """
+    """A video replayed as a camera, its first picture repeated until it is released. Raises FootageError."""
     try:
         with open_video(path) as container:
             stream = container.streams.video[0]

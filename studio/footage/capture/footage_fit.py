@@ -73,8 +73,7 @@ def _run(levels: Bytes) -> int:
 
 
 def _shrunk_by(camera: Camera, width: int, height: int, bars: Margins) -> float:
-    """The scale at which the whole calibrated picture lies between the footage's black bars; 1 if it does
-    not."""
+    """The scale at which the whole calibrated picture lies between the footage's black bars; 1 if it does not."""
     left, top, right, bottom = bars
     for scale in (width / camera.width, height / camera.height):
         wide, tall = (width - scale * camera.width) / 2.0, (height - scale * camera.height) / 2.0

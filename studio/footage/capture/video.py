@@ -282,8 +282,7 @@ def _measure(path: Path, on_frame: Callable[[int, int], None]) -> VideoMeasure:
 
 
 class VideoReader:
-    """Random access to the frames of one measured video; reading onwards keeps the decoder open.
-    Thread-safe."""
+    """Random access to the frames of one measured video; reading onwards keeps the decoder open. Thread-safe."""
 
     def __init__(self, path: Path, frame_count: int, fields: Fields = "") -> None:
         """frame_count : as measured, 0 where it is not known. fields : which field of each picture is its first frame

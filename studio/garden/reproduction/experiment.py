@@ -84,13 +84,7 @@ def listed(
 ) -> Experiment:
     """The experiment that the table lists under a name."""
     return Experiment(
-        **TABLE[name],
-        name=name,
-        trials=trials,
-        measure=measure,
-        shown=shown,
-        footage=footage,
-        alone=alone,
+        **TABLE[name], name=name, trials=trials, measure=measure, shown=shown, footage=footage, alone=alone
     )
 
 

@@ -94,10 +94,7 @@ def write_overview(out: Path, experiments: Iterable[Experiment], software: str, 
 
 def summary_markdown(results: Document) -> str:
     """A table: every experiment with its verdict and its numbers."""
-    lines = [
-        "| experiment | source | verdict | numbers: ours [95 % interval], paper |",
-        "|---|---|---|---|",
-    ]
+    lines = ["| experiment | source | verdict | numbers: ours [95 % interval], paper |", "|---|---|---|---|"]
     for document in results["experiments"]:
         numbers = "<br>".join(number_in_words(number) for number in document["numbers"])
         verdict = document["verdict"] + (

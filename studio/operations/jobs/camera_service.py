@@ -18,11 +18,7 @@ from studio.foundations.words import counted
 from studio.operations.jobs.camera_readers import CameraReaders
 from studio.operations.jobs.camera_tracking import LiveRecordingRequest, discard_recording, open_recording
 from studio.operations.jobs.job_runner import Job, JobKind, JobRunner, SessionJob
-from studio.operations.jobs.stream_recording import (
-    RecordingStanding,
-    StreamRecording,
-    recording_folder,
-)
+from studio.operations.jobs.stream_recording import RecordingStanding, StreamRecording, recording_folder
 from studio.runs.new_run import prepare_run
 from studio.sessions.recordings import calibration_given, check_cameras, import_recording
 from studio.sessions.session import Session

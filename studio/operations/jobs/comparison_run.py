@@ -151,8 +151,7 @@ def _measure(
     def on_result(job: TrialJob, result: TrialResult) -> None:
         if result.measured is None:
             raise RunError(
-                f"{job.label} could not be tracked: {result.failure}",
-                "Change what it says and try again.",
+                f"{job.label} could not be tracked: {result.failure}", "Change what it says and try again."
             )
         outcome = KeptOutcome(
             result.measured, "", result.seconds, measured_by(), now(), job.label, job.arguments

@@ -126,8 +126,7 @@ class FrameFinished(Event):
 
 @dataclass(frozen=True, slots=True)
 class SettingsApplied(Event):
-    """The settings in use since (frame, layer). values : every knob by name. changed : the names that
-    moved."""
+    """The settings in use since (frame, layer). values : every knob by name. changed : the names that moved."""
 
     version: int
     frame: int

@@ -118,9 +118,7 @@ class JobKind(Generic[SomeState]):
     page: str = ""
 
     def entries(self, record: object, **own: object) -> dict[str, object]:
-        """What goes into the state of what was found, by the names of the entries. own : those that differ, or that it
-        lacks.
-        """
+        """The entries of the state that a record has. own : those that differ, or that it lacks."""
         names = self.states.model_fields.keys() - SessionJob.model_fields.keys() - own.keys()
         return {name: getattr(record, name) for name in names if hasattr(record, name)} | own
 
@@ -262,9 +260,7 @@ class JobRunner:
 
     @contextmanager
     def moving(self, session: str, run: str = "") -> Generator[None]:
-        """Inside, a session (or a run of it) may be renamed or deleted: no job of it begins. Raises RunError while one
-        is under way.
-        """
+        """Inside, no job of a session (or a run of it) begins. Raises RunError while one is under way."""
         with self._lock:
             for kind, state in self._going_on(session):
                 if not run or getattr(state, "run", run) in ("", run):

@@ -44,9 +44,7 @@ Sources = Annotated[
 
 
 class LearningProgress(SessionJob):
-    """How the learning stands. learnt: frames, clusters, states, entropies and the frames that fitted badly, when it is
-    done.
-    """
+    """How the learning stands. learnt: its numbers, and the frames that fitted badly, when it is done."""
 
     name: str
     body: str

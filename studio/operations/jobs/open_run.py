@@ -66,8 +66,7 @@ class SettingsMailbox:
             for name in moved:
                 if name in fixed:
                     raise SettingsError(
-                        f"Setting '{name}' cannot change inside a run.",
-                        "Start a new run with that value.",
+                        f"Setting '{name}' cannot change inside a run.", "Start a new run with that value."
                     )
             if moved:
                 self._check(following)
@@ -164,8 +163,7 @@ class OpenRun:
         self.tracking.when_stored(action)
 
     def target(self, frame: int = -1) -> int:
-        """The frame to anneal again: the one named, else the selected, else the unfinished or last
-        one."""
+        """The frame to anneal again: the one named, else the selected, else the unfinished or last one."""
         if frame >= 0:
             return frame
         if self.selected >= 0:
@@ -200,8 +198,7 @@ class OpenRun:
         self.reannealing, self.keep_result, self.reanneal_again = None, False, False
 
     def select(self, frame: int) -> None:
-        """Make `frame` the one to anneal again. Raises NotFoundError if it cannot be annealed
-        yet."""
+        """Make `frame` the one to anneal again. Raises NotFoundError if it cannot be annealed yet."""
         self.tracking.search_again(frame)
         self.selected = frame
 

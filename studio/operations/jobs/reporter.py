@@ -78,8 +78,7 @@ class Reporter:
         self.state(run, self.state_name, *self._words)
 
     def settings(self, run: OpenRun, version: int, settings: RunSettings, frame: int, layer: int) -> None:
-        """Say which settings are in use since (frame, layer), and which of them differ from those said
-        before."""
+        """Say which settings are in use since (frame, layer), and which of them differ from those said before."""
         now = dict(values(settings))
         changed = tuple(name for name, value in now.items() if self._values.get(name, value) != value)
         self._values = now

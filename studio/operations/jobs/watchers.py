@@ -53,8 +53,7 @@ class Subscription(Generic[T]):
             self._wake()
 
     def get(self, block: bool = True, timeout: float | None = None) -> T:
-        """The oldest entry that still stands. Raises queue.Empty after `timeout` seconds, or when closed and
-        empty."""
+        """The oldest entry that still stands. Raises queue.Empty after `timeout` seconds, or when closed and empty."""
         with self._something:
             if block:
                 self._something.wait_for(lambda: self._waiting or self.closed, timeout)

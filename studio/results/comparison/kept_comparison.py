@@ -64,10 +64,7 @@ RECORD = RecordFile(
     "Start a new one.",
     ("There is no comparison '{name}'.", "Start one with 'studio compare'."),
     SCHEMA_VERSION,
-    {
-        1: _plan_renamed(entrants="candidates"),
-        2: _plan_renamed(despite_findings="allow_inconsistent"),
-    },
+    {1: _plan_renamed(entrants="candidates"), 2: _plan_renamed(despite_findings="allow_inconsistent")},
 )
 
 
@@ -147,9 +144,7 @@ class KeptComparison:
 
 
 def trial_key(trial: Trial) -> str:
-    """The name of a trial's outcome: made from its arguments, except the paths of the session and the comparison's
-    behaviour model.
-    """
+    """The name of a trial's outcome, from its arguments without paths."""
     elsewhere = ("footage", "behaviour")
     arguments = {name: value for name, value in plain(trial.arguments).items() if name not in elsewhere}
     return hashlib.sha256(json.dumps(arguments, sort_keys=True).encode()).hexdigest()[:24]

@@ -141,9 +141,7 @@ def verdict_of(
 
 
 def overall(verdicts: Iterable[str]) -> str:
-    """The verdict of the hardest of several claims: the first of HARDEST_FIRST that one of them has; "answered" where
-    nothing is compared.
-    """
+    """The hardest verdict of several claims: the first of HARDEST_FIRST that one has; else "answered"."""
     given = set(verdicts)
     return next((verdict for verdict in HARDEST_FIRST if verdict in given), "answered")
 

@@ -70,9 +70,7 @@ class TrackingTrial:
     shape_frames: int = 0
 
     def plain(self) -> dict[str, Any]:
-        """As a trial's arguments; fields added later are left out at their defaults, so that stored outcomes stay
-        valid.
-        """
+        """As a trial's arguments; later fields are left out at their defaults, so that stored outcomes stay valid."""
         return {
             name: value
             for name, value in asdict(self).items()

@@ -161,9 +161,7 @@ class _Bearing:
 
 
 def path_length(times: Array, speed: float, halt: Halt) -> Array:
-    """(F,) mm along the path: steady walking that ends at the halt's begin and restarts at its end, each change taking
-    SLOWING seconds.
-    """
+    """(F,) mm along the path: steady walking with a halt, each change taking SLOWING seconds."""
 
     def ramp(share: Array) -> Array:
         """Integral of a smooth step from 0 to 1."""
@@ -176,9 +174,7 @@ def path_length(times: Array, speed: float, halt: Halt) -> Array:
 
 
 def footfalls(gait: Gait, halt: Halt, *, left: bool, until: float) -> Footfalls:
-    """One foot's stances from before time 0 to after `until`. The right foot lands last before the halt, the left lifts
-    first after it.
-    """
+    """One foot's stances from before time 0 to after `until`; the right foot lands last before the halt."""
     stand, swing = gait.duty * gait.cycle, (1.0 - gait.duty) * gait.cycle
     arrive = halt.begin - SETTLING - (0.5 * gait.cycle if left else 0.0)
     leave = halt.end + GOING + (0.0 if left else 0.5 * gait.cycle)

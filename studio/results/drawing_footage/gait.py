@@ -107,13 +107,7 @@ class FootTrack:
 
 
 def foot_track(
-    gait: Gait,
-    path: Path,
-    times: Array,
-    skeleton: Skeleton,
-    *,
-    left: bool,
-    obstacle: Obstacle | None = None,
+    gait: Gait, path: Path, times: Array, skeleton: Skeleton, *, left: bool, obstacle: Obstacle | None = None
 ) -> FootTrack:
     """The foot's journey over footprints laid beside the path.
 
@@ -252,8 +246,7 @@ NEARLY_STRAIGHT = 0.994
 
 
 def allowed_height(skeleton: Skeleton, root: Array, pelvis: Array, feet: list[FootTrack]) -> Array:
-    """(F,) greatest height above `root` of a pelvis from which both ankles are reached with slightly bent
-    knees."""
+    """(F,) greatest height above `root` of a pelvis from which both ankles are reached with slightly bent knees."""
     allowed = np.full(len(root), np.inf)
     for sign, index, track in ((1.0, 0, feet[0]), (-1.0, 1, feet[1])):
         leg = NEARLY_STRAIGHT * (skeleton.thigh[index] + skeleton.shin[index])

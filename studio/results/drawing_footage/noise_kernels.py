@@ -41,12 +41,7 @@ def value_noise(x, y, z):
 
 
 @njit(error_model="numpy", fastmath=True, parallel=True)
-def add_sensor_noise(
-    picture: Floats,
-    deviation: float,
-    stream: int,
-    out: Bytes,
-) -> None:
+def add_sensor_noise(picture: Floats, deviation: float, stream: int, out: Bytes) -> None:
     """Gaussian noise by Box and Muller on hashed counters, then 8 bits.
 
     picture : (H, W, 3) float32, 0...255. deviation : grey levels at mid grey (shot noise: grows with

@@ -71,10 +71,7 @@ def write_footage(
 
 
 def recipe_renderer(
-    recipe: Recipe,
-    motion: PersonMotion,
-    cameras: tuple[Camera, ...],
-    beside: Sequence[RenderedPerson] = (),
+    recipe: Recipe, motion: PersonMotion, cameras: tuple[Camera, ...], beside: Sequence[RenderedPerson] = ()
 ) -> Renderer:
     """The renderer of a recipe's room and person: the pictures of its footage, and their exact masks."""
     height = recipe.options.get("height_mm", STEPPED_OVER_HEIGHT) if recipe.motion == STEPPED_OVER else 0.0

@@ -148,8 +148,7 @@ def find_recipe(name_or_path: str | Path) -> Path:
     if bundled.parent == RECIPES and bundled.is_file():
         return bundled
     raise StudioError(
-        f"There is no recipe '{name_or_path}'.",
-        f"Give a TOML file or one of {', '.join(recipe_names())}.",
+        f"There is no recipe '{name_or_path}'.", f"Give a TOML file or one of {', '.join(recipe_names())}."
     )
 
 

@@ -82,10 +82,7 @@ def synthesize(
             _write_beside(person, motion, into / BESIDE / str(number))
     manifest = read_manifest(into)
     changed = msgspec.structs.replace(
-        manifest,
-        title=parsed.title,
-        weighting=parsed.weighting,
-        imported_from=f"recipe {path.name}",
+        manifest, title=parsed.title, weighting=parsed.weighting, imported_from=f"recipe {path.name}"
     )
     write_manifest(into, changed)
     (into / RECIPE_COPY).write_bytes(path.read_bytes())
@@ -174,9 +171,7 @@ def render_source(
 def people_beside(
     recipe: Recipe, recipe_folder: Path, frames: int | None = None
 ) -> list[tuple[Recipe, PersonMotion]]:
-    """Who else is in a recipe's room: their recipes and motions. Raises StudioError, also where they do not move over
-    the same frames.
-    """
+    """The other people in a recipe's room: recipes and motions. Raises StudioError, also for other frames."""
     people: list[tuple[Recipe, PersonMotion]] = []
     for name in recipe.beside:
         path = named_recipe(name, recipe_folder)

@@ -75,9 +75,7 @@ class Renderer:
         shutter: float = 0.0,
         beside: Sequence[RenderedPerson] = (),
     ) -> None:
-        """shutter : exposure time, centred on the frame, as a share of the time from frame to frame. beside : others in
-        the same room, over as many frames; pictures and masks show all of them.
-        """
+        """tables, labels : (F, M, P, COLUMNS) and (P, 2) of `flesh.piece_tables`, at M moments of each exposure."""
         self._room, self._noise, self._samples, self._seed = room, noise, samples, seed
         people = [RenderedPerson(motion, girth, wardrobe), *beside]
         self._wardrobe = np.concatenate([person.wardrobe for person in people])

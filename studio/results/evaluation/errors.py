@@ -298,9 +298,7 @@ def _keep_mean(means: dict[str, float], name: str, values: Array) -> None:
 
 
 def rows_of_frames(truth: MarkerMotion, fps: float) -> dict[int, int]:
-    """Frame to the truth's row that is nearest to it in time; frames without a row within half a frame are
-    absent.
-    """
+    """Frame to the truth's row that is nearest to it in time; frames without a row within half a frame are absent."""
     at = truth.times * fps
     rows: dict[int, int] = {}
     for row, place in enumerate(at):
@@ -348,9 +346,7 @@ def _limb_of_joints(body: BodyModel) -> dict[int, str]:
 def _common_markers(
     body: BodyModel, truth: MarkerMotion
 ) -> tuple[tuple[str, ...], list[int], list[int], tuple[str, ...]]:
-    """Names in the body's order, their places in the body and in the truth, and the names of only one of
-    both.
-    """
+    """Names in the body's order, their places in the body and in the truth, and the names of only one of both."""
     known = [marker.name for marker in body.markers]
     names = tuple(name for name in known if name in truth.names)
     if not names:
@@ -390,9 +386,7 @@ def _common_frames(
 
 
 def _root_aligned(tracked_points: Array, truth_points: Array, seen: NDArray[np.bool_]) -> float:
-    """Mean over frames of the markers' mean distance, mm, the root (the first marker seen, in the body's
-    order) laid on the true one.
-    """
+    """Mean over frames of the markers' mean distance, mm, with the root (first seen marker) on the true one."""
     means: list[float] = []
     for points, goal, present in zip(tracked_points, truth_points, seen, strict=True):
         laid = moved_to_root(points[present], goal[present], 0)

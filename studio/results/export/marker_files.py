@@ -111,7 +111,5 @@ def write_cameras(task: ExportTask) -> Written:
     turned = max(turned_apart(camera.rotation[None], read[camera.name].rotation[None]) for camera in cameras)
     checked = agreed(task.place, apart_mm, turned)
     return Written(
-        tuple(written.files),
-        f"{counted(len(cameras), 'camera')}, {checked}",
-        tuple(written.notes),
+        tuple(written.files), f"{counted(len(cameras), 'camera')}, {checked}", tuple(written.notes)
     )

@@ -53,9 +53,7 @@ def write_mot(task: ExportTask) -> Written:
         )
     off = np.abs(read.values - values)
     checked = agreed(
-        task.place,
-        float(off[:, ~angle].max(initial=0.0)) * MM_PER_M,
-        float(off[:, angle].max(initial=0.0)),
+        task.place, float(off[:, ~angle].max(initial=0.0)) * MM_PER_M, float(off[:, angle].max(initial=0.0))
     )
     notes = (
         f"Coordinates of body '{motion.body.name}', angles in degrees, lengths in m, world z up: an OpenSim model of"

@@ -55,9 +55,7 @@ class Motion:
 
 
 def motion_of(run: StoredRun, options: ExportOptions) -> Motion:
-    """A run's track as the options want it. Raises ExportError where no frame is left, NotFoundError for a track that
-    there is not.
-    """
+    """A run's track as the options want it. Raises ExportError where no frame is left, NotFoundError."""
     return even_motion(run.body(), run.record.fps, read_track(run, options.track), options)
 
 

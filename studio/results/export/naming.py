@@ -31,9 +31,7 @@ class PlaceEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class NameMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """points : by the program's name, the places in order of preference. joints : the program's name of a body's
-    joint.
-    """
+    """points : by the program's name, the places in order of preference. joints : its names of the body's joints."""
 
     title: str
     source: str

@@ -112,9 +112,7 @@ def explained_pose(frame: InspectedFrame, track: str = "") -> Array:
 
 
 def reference_pose(frame: InspectedFrame, track: str = "") -> ReferencePose:
-    """What the pose is compared with: the truth, else what a refinement or a later track made of it, else the best
-    particle.
-    """
+    """The pose to compare with: the truth, else of a refinement or a later track, else the best particle."""
     truth = true_pose(frame.of, frame.number)
     if truth is not None:
         return ReferencePose("truth", truth.pose)

@@ -83,9 +83,7 @@ def _verdicts(run: InspectedRun, distances: dict[int, Array]) -> dict[int, Verdi
 
 
 def limb_rows(run: InspectedRun, selection: Selection) -> dict[str, list[Row]]:
-    """The run's tables of view `why`: the map of limbs, and its colours, which are those of every frame and run of a
-    body of that size.
-    """
+    """The run's tables of view `why`: the map of limbs, and its colours, the same for all bodies of that size."""
     distances = _distances(run, selection.track)
     errors, shares, verdicts = _means(run, distances), disagreements_of(run), _verdicts(run, distances)
     table: list[Row] = []

@@ -84,9 +84,7 @@ class Mode:
 
 
 def modes_of(body: BodyModel, poses: Array, weights: Array) -> list[Mode]:
-    """The clusters of weighted poses (N, D), the heaviest first; those of less than a hundredth of the weight join the
-    nearest.
-    """
+    """The clusters of weighted poses (N, D), heaviest first; those under a hundredth of the weight join the nearest."""
     points = body_points(body, poses)
     return [
         Mode(

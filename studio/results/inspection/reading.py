@@ -40,9 +40,7 @@ class TriedFrame:
 
 
 class InspectedRun:
-    """A run of a session with what does not change from frame to frame. tried : stands in the place of the stored
-    frame of its number.
-    """
+    """A run of a session with what all frames share. tried : stands in the place of the stored frame of its number."""
 
     def __init__(self, session: Session, run: StoredRun, tried: TriedFrame | None = None) -> None:
         self.session, self.run, self.tried = session, run, tried

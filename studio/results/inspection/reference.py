@@ -62,9 +62,7 @@ def limbs_of_points(body: BodyModel) -> tuple[str, ...]:
 
 
 def limb_group(body: BodyModel, limb: str) -> str:
-    """The limb that a parameter's limb is counted with: itself where it is left or right or the body has no sides, else
-    head and trunk.
-    """
+    """The limb that a parameter counts with: itself if sided or the body has no sides, else head and trunk."""
     return limb if "left" in limb or "right" in limb or not has_sides(body) else TRUNK
 
 

@@ -52,9 +52,7 @@ class Retracking:
             self._problems[frame] = self._source.problem(frame, self._settings[frame])
 
     def results(self, change: Change, start: Array | None = None) -> list[FrameResult]:
-        """The results of all frames. start : (D,) a pose at which the first begins. Raises SettingsError,
-        LeftError.
-        """
+        """The results of all frames. start : (D,) a pose at which the first begins. Raises SettingsError, LeftError."""
         carried = self._carried if start is None else _state_at(start, self._carried)
         seed = self.run.run.record.seed + change.seed
         refiner = FrameRefiner(self.run.body, self._source.cameras, seed)

@@ -511,10 +511,7 @@ def _explain(case: Case) -> ViewResult:
         remedies.append(BY_HAND)
     table: list[Row] = [(one.kind, one.words, one.limb, one.layer, one.camera, one.term) for one in findings]
     return ViewResult(
-        {"findings": table, "nearest": case.clouds},
-        (_compared_with(case),),
-        tuple(findings),
-        tuple(remedies),
+        {"findings": table, "nearest": case.clouds}, (_compared_with(case),), tuple(findings), tuple(remedies)
     )
 
 

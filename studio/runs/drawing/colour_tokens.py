@@ -29,9 +29,7 @@ class ColourTokens:
     colours: dict[str, Colour]
 
     def __getitem__(self, token: str) -> Colour:
-        """The RGB of a token such as "limb-left". Raises StudioError for one that the file does not
-        declare.
-        """
+        """The RGB of a token such as "limb-left". Raises StudioError for one that the file does not declare."""
         if token not in self.colours:
             raise StudioError(
                 f"The colour '--{token}' is not declared for the {self.name} theme.",

@@ -515,9 +515,7 @@ def _trials(source: BackgroundSource) -> tuple[dict[str, Knob], ...]:
 def _tune(
     session: Session, own: dict[str, Knob], wanted: Sequence[dict[str, Knob]], report: Progress
 ) -> tuple[dict[str, Knob], MaskQuality]:
-    """The knobs of the wanted trials, then TRIED_CLEANING (`own` stay fixed) whose worst camera agrees best, and its
-    quality.
-    """
+    """The knobs of the trial, then TRIED_CLEANING (`own` fixed), whose worst camera agrees best; its quality."""
     cameras, footage = session.cameras(), session.footage()
     small = tuple(camera.reduced(JUDGED_SIDE) for camera in cameras)
     scale = scale_of(session.body())

@@ -80,10 +80,7 @@ class CleanPlate:
 
 
 def clean_plates(
-    session: Session,
-    settings: EvidenceSettings,
-    *,
-    progress: Progress = no_progress,
+    session: Session, settings: EvidenceSettings, *, progress: Progress = no_progress
 ) -> Mapping[str, CleanPlate]:
     """Clean backgrounds by camera, from the session's plates, clips or medians.
 
@@ -98,11 +95,7 @@ def clean_plates(
         )
     with closing(session.footage()) as footage:
         cleaning = _Cleaning(
-            cameras,
-            footage,
-            dataclasses.replace(settings, **CLEARED),
-            progress,
-            scale_of(session.body()),
+            cameras, footage, dataclasses.replace(settings, **CLEARED), progress, scale_of(session.body())
         )
         return cleaning.run(session.path)
 

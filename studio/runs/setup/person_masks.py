@@ -21,14 +21,7 @@ from typing import TypeVar
 import cv2
 import numpy as np
 
-from studio.evidence.person_network import (
-    HIPS_ROW,
-    PRESENT,
-    SHOULDERS_ROW,
-    Crop,
-    PersonNetwork,
-    Sighting,
-)
+from studio.evidence.person_network import HIPS_ROW, PRESENT, SHOULDERS_ROW, Crop, PersonNetwork, Sighting
 from studio.footage.calibration.floor import triangulated
 from studio.footage.capture.footage import Footage
 from studio.foundations.arrays import Array, Bytes

@@ -123,12 +123,7 @@ def can_be_fitted(body: BodyModel) -> bool:
 
 
 def _fitted_now(
-    session: Session,
-    body: BodyModel,
-    settings: RunSettings,
-    start: Array,
-    frames: range,
-    progress: Progress,
+    session: Session, body: BodyModel, settings: RunSettings, start: Array, frames: range, progress: Progress
 ) -> _Kept:
     with closing(ProblemSource(session, body)) as problems:
         wanted = _judging(settings)

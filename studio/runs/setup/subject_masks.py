@@ -243,9 +243,7 @@ def _cut(
 
 
 @contextlib.contextmanager
-def subject_masks_of(
-    session: Session,
-) -> Generator[Callable[[int, Sequence[Mapping[str, Bytes]]], None]]:
+def subject_masks_of(session: Session) -> Generator[Callable[[int, Sequence[Mapping[str, Bytes]]], None]]:
     """Writes masks of a subject that the session uses afterwards: called with a frame and pictures by camera, its
     masks, those of all who are in view, and where its masks say nothing of it.
     """

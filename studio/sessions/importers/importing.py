@@ -239,11 +239,7 @@ def _staying(source: Path, into: Path) -> AbstractContextManager[None]:
 
 
 def add_footage(
-    session: Session,
-    source: Path,
-    options: ImportOptions | None = None,
-    *,
-    progress: Progress = no_progress,
+    session: Session, source: Path, options: ImportOptions | None = None, *, progress: Progress = no_progress
 ) -> ImportReport:
     """Add the footage (with masks and backgrounds) of a folder, or of an archive of one, to a session.
 

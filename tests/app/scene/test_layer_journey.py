@@ -7,14 +7,7 @@ import pytest
 from swaying_session import LAYERS, PARTICLES, cloud_record
 
 from studio.app.scene.guarded_server import GuardedServer
-from studio.app.scene.layer_journey import (
-    Journeys,
-    glow,
-    journey,
-    lines_back,
-    parent_rows,
-    travelled,
-)
+from studio.app.scene.layer_journey import Journeys, glow, journey, lines_back, parent_rows, travelled
 from studio.app.scene.particle_view import CloudStyle, ParticleView
 from studio.app.scene.search_view import SearchLook, SearchView
 from studio.app.scene.viewpoint import framed, on_screen
@@ -65,9 +58,7 @@ def test_parents_are_rows_of_what_was_kept(records: list[LayerRecord]) -> None:
         for one in records[:2]
     ]
     np.testing.assert_array_equal(
-        parent_rows(thin[0], thin[1]),
-        [[0, 0, NO_PARENT], [1, NO_PARENT, NO_PARENT]],
-        "number 1 was not kept",
+        parent_rows(thin[0], thin[1]), [[0, 0, NO_PARENT], [1, NO_PARENT, NO_PARENT]], "number 1 was not kept"
     )
     assert (parent_rows(records[0], records[2]) == NO_PARENT).all(), "not the layer after"
     assert (parent_rows(records[3], records[3]) == NO_PARENT).all()

@@ -19,11 +19,7 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
-from studio.app.scene.controller import (
-    ANNEALED_PICTURES_WAIT,
-    PICTURES_WAIT,
-    Due,
-)
+from studio.app.scene.controller import ANNEALED_PICTURES_WAIT, PICTURES_WAIT, Due
 from studio.app.scene.model import Model, Selection
 from studio.app.scene.panel import Panel
 from studio.app.scene.scene_server import SceneServer

@@ -11,13 +11,7 @@ from studio.app.scene.camera_views import BACKDROP_DEPTH, DEPTH, CameraViews
 from studio.app.scene.floor_view import floor_extent
 from studio.app.scene.guarded_server import GuardedServer
 from studio.app.scene.line_views import TrailView, TruthView, trail_segments
-from studio.app.scene.particle_view import (
-    MOST_DRAWN,
-    CloudStyle,
-    ParticleView,
-    cloud_points,
-    weight_shares,
-)
+from studio.app.scene.particle_view import MOST_DRAWN, CloudStyle, ParticleView, cloud_points, weight_shares
 from studio.body.catalogue import load_body
 from studio.body.dimensions import with_dimensions
 from studio.body.forward_kinematics import limb_ends, limb_frames, marker_points

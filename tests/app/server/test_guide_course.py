@@ -10,15 +10,7 @@ from web_doubles import Studio
 import studio
 from studio.app.server.guide_routes import COURSE, TEXTS
 from studio.operations import course as room
-from studio.operations.course import (
-    BEGINNING,
-    BEGINNING_RUN,
-    FRAMES,
-    RUNS,
-    SAMPLE,
-    CourseRun,
-    make_course,
-)
+from studio.operations.course import BEGINNING, BEGINNING_RUN, FRAMES, RUNS, SAMPLE, CourseRun, make_course
 from studio.results.inspection.views import VIEWS
 from studio.search.settings import knob_table
 from studio.sessions.workspace import Workspace

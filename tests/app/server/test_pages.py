@@ -231,10 +231,7 @@ def test_layers_are_played_as_asked_and_what_is_left_out_stays(studio: Studio) -
     assert studio.client.get(path).json() == {"playing": False, "rate": 3.0, "mode": "loop"}
     assert studio.client.post(path, json={"playing": True, "rate": 10}).status_code == 204
     assert studio.client.post(path, json={"mode": "pingpong"}).status_code == 204
-    assert studio.stage.calls == [
-        ("play layers", True, 10.0, None),
-        ("play layers", None, None, "pingpong"),
-    ]
+    assert studio.stage.calls == [("play layers", True, 10.0, None), ("play layers", None, None, "pingpong")]
     for wrong in ({"rate": 0.5}, {"rate": 11}, {"mode": "random"}, {"speed": 1}):
         assert studio.client.post(path, json=wrong).status_code == 422
 

@@ -8,14 +8,7 @@ from posed_hulls import empty_hull, hull_of, learn_blobs, limb_colours, near, pl
 
 from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
-from studio.evidence.volume.blob_acquisition import (
-    BINS,
-    SUMS,
-    Profiles,
-    blobs_of,
-    colour_change,
-    parts_of,
-)
+from studio.evidence.volume.blob_acquisition import BINS, SUMS, Profiles, blobs_of, colour_change, parts_of
 from studio.evidence.volume.blob_model import cone_blobs
 
 Array = np.ndarray

@@ -151,8 +151,7 @@ def test_the_bundles_own_projection_is_the_studios() -> None:
     bundle = Bundle(pose[None], board[None], lens[None])
     mine = predicted(bundle, Observations(zeros, zeros, points, np.zeros((len(points), 2))))
     import_free = moved(
-        Rig((camera,), {0: rigid(np.eye(3), np.zeros(3))}, {}, {}),
-        rigid(np.eye(3), np.zeros(3)),
+        Rig((camera,), {0: rigid(np.eye(3), np.zeros(3))}, {}, {}), rigid(np.eye(3), np.zeros(3))
     )
     from_world = transform(rigid(_turn(board[:3]), board[3:]), points)
     np.testing.assert_allclose(mine, project(import_free.cameras[0], from_world)[0], atol=1e-8)

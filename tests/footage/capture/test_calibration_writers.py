@@ -8,11 +8,7 @@ import numpy as np
 import pytest
 from toy_footage import rig
 
-from studio.footage.capture.calibration_files import (
-    CALIBRATION_FORMATS,
-    export_calibration,
-    read_calibration,
-)
+from studio.footage.capture.calibration_files import CALIBRATION_FORMATS, export_calibration, read_calibration
 from studio.footage.capture.calibration_writers import without_k3
 from studio.foundations.errors import CalibrationError, SettingsError
 from studio.foundations.geometry.camera import Camera

@@ -97,9 +97,7 @@ def test_joints_are_localised_from_the_root_outwards(measured: dict[str, Outcome
     assert len(found.charts[0].series) == 4 * (1 + len(SEEDS.seeds))
 
 
-def test_noise_undoes_the_gain_only_without_adaptive_diffusion(
-    measured: dict[str, Outcome],
-) -> None:
+def test_noise_undoes_the_gain_only_without_adaptive_diffusion(measured: dict[str, Outcome]) -> None:
     found = concluded(FIGURES["deutscher-fig-12"], measured)
     numbers = {entry.name: entry.ours for entry in found.numbers}
     assert numbers["variance of x1 after drawing"] < 0.5 * numbers["variance of x2 after drawing"]

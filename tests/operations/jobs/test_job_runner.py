@@ -190,10 +190,7 @@ def stopped_by_asking(job: Job) -> Mapping[str, object]:
 
 @pytest.mark.parametrize(
     ("work", "message"),
-    [
-        (stopped_by_its_report, "The weighing was cancelled."),
-        (stopped_by_asking, "Nobody waits any more."),
-    ],
+    [(stopped_by_its_report, "The weighing was cancelled."), (stopped_by_asking, "Nobody waits any more.")],
 )
 def test_a_job_can_be_cancelled(office: Office, work: Work, message: str) -> None:
     begun = office.begin(work)

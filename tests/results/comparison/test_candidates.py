@@ -4,13 +4,7 @@ import pytest
 
 from studio.cli.reading import read_assignments
 from studio.foundations.errors import SettingsError, StudioError
-from studio.results.comparison.candidates import (
-    LINEUPS,
-    VARIANTS,
-    Candidate,
-    Lineup,
-    candidates,
-)
+from studio.results.comparison.candidates import LINEUPS, VARIANTS, Candidate, Lineup, candidates
 from studio.search.settings import changed_settings, default_settings
 from studio.search.trackers.catalogue import TRACKERS
 

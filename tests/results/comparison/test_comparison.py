@@ -14,13 +14,7 @@ from studio.foundations.errors import RunError, SessionError, StudioError, Truth
 from studio.results.comparison.candidates import Lineup
 from studio.results.comparison.comparison_findings import document, findings, frames_csv, table_text
 from studio.results.comparison.footage_cache import FootageCache
-from studio.results.comparison.plan import (
-    Comparison,
-    Plan,
-    conclude,
-    plan_comparison,
-    trials,
-)
+from studio.results.comparison.plan import Comparison, Plan, conclude, plan_comparison, trials
 from studio.results.comparison.tracked import measure_tracking
 from studio.results.comparison.trials import Outcome
 from studio.search.settings import DEFAULT_WEIGHTING

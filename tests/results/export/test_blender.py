@@ -38,10 +38,7 @@ def blender() -> list[str]:
             "no Blender is installed: install the package 'blender' (and 'python3-numpy' for its GLB importer), or let"
             " STUDIO_BPY name a Python that has its module 'bpy'"
         )
-    return [
-        *(found, "--background", "--factory-startup", "--python-exit-code", "3", "--python"),
-        str(SCRIPT),
-    ]
+    return [*(found, "--background", "--factory-startup", "--python-exit-code", "3", "--python"), str(SCRIPT)]
 
 
 def opened(blender: list[str], path: Path, *through: Path) -> dict:

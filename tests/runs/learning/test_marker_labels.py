@@ -23,13 +23,7 @@ def of(labels: dict[str, str]) -> tuple[list[str], np.ndarray]:
 
 @pytest.mark.parametrize(
     "style",
-    [
-        "{side}{joint}",
-        "Jane:{side}_{joint}",
-        "{long} {low}",
-        "{low}_{letter}",
-        "mixamorig:{Long}{bone}",
-    ],
+    ["{side}{joint}", "Jane:{side}_{joint}", "{long} {low}", "{low}_{letter}", "mixamorig:{Long}{bone}"],
 )
 def test_joints_have_many_names(style: str) -> None:
     bones = {

@@ -15,13 +15,7 @@ from scipy.stats import chi2
 
 from studio.body.catalogue import load_body
 from studio.foundations.arrays import Array
-from studio.garden.reproduction.caillette.setting import (
-    TEST,
-    TEST_2,
-    UNSEEN,
-    training,
-    training_words,
-)
+from studio.garden.reproduction.caillette.setting import TEST, TEST_2, UNSEEN, training, training_words
 from studio.garden.reproduction.caillette.training_set import POINTING, Training, learnt, recorded
 from studio.garden.reproduction.claims import share
 from studio.garden.reproduction.drawing import heat_chart, line_chart

@@ -220,11 +220,7 @@ FIRST, SECOND = "first pass, learning {}", "second pass, taught {}"
 TRUTH = "the true poses"
 GATES = {UNGATED: {"learning_overlap": 0.0}, GATED: {}}
 """What a first pass learns: all frames that are well tracked beside the rest of it, or those that agree."""
-PASSES = (
-    PLAIN,
-    *(words.format(gate) for gate in GATES for words in (FIRST, SECOND)),
-    SECOND.format(TRUTH),
-)
+PASSES = (PLAIN, *(words.format(gate) for gate in GATES for words in (FIRST, SECOND)), SECOND.format(TRUTH))
 
 
 def _online_trials(scale: Scale) -> tuple[Trial, ...]:

@@ -143,12 +143,7 @@ def blob_fitting(session: Session, hulls: Sequence[Hull], truth: Array) -> float
 
 
 def searching(
-    session: Session,
-    hulls: Sequence[Hull],
-    truth: Array,
-    particles: int,
-    model: BehaviourModel,
-    seed: int,
+    session: Session, hulls: Sequence[Hull], truth: Array, particles: int, model: BehaviourModel, seed: int
 ) -> float:
     """Milliseconds of a frame of the guided tracker whose blobs are fitted already: prediction, evaluation, drawing."""
     body, fps = session.body(), session.manifest.fps

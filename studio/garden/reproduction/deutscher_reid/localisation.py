@@ -324,10 +324,7 @@ CUTS: Mapping[str, Mapping[str, Any]] = {
     "cut by parameters, planned noise": {"crossover_by": "parameters", "adaptive_diffusion": False},
     "cut by parameters, adaptive noise": {"crossover_by": "parameters", **ARM_EQ_18},
     "cut by limbs, adaptive noise": {"crossover_by": "limbs", **ARM_EQ_18},
-    "absolute angles, cut by parameters, adaptive noise": {
-        "crossover_by": "parameters",
-        **ARM_EQ_18,
-    },
+    "absolute angles, cut by parameters, adaptive noise": {"crossover_by": "parameters", **ARM_EQ_18},
 }
 ABSOLUTE = "absolute angles"
 """Of a cut: every link's angle is measured from the picture's axis, so that what is exchanged does not turn the links

@@ -80,10 +80,7 @@ ENTRIES = (
     Entry(_usual("swarm", "swarm"), fields=AS_A_RUN),
     Entry(_usual("condensation", "condensation"), fields=AS_A_RUN),
     Entry(_usual("behaviour", "behaviour"), kinds=WALKS, fields=AS_A_RUN, training=TRAINING),
-    Entry(
-        _usual("annealed, default, height alone"),
-        fields={**AS_A_RUN, "subject": SUBJECT_OF_HEIGHT},
-    ),
+    Entry(_usual("annealed, default, height alone"), fields={**AS_A_RUN, "subject": SUBJECT_OF_HEIGHT}),
 )
 """The candidates; knobs to switch on or off are among a candidate's changes."""
 

@@ -248,9 +248,7 @@ def _trials(question: Question, scale: Scale) -> tuple[Trial, ...]:
         for candidate in CANDIDATES
         for degree in question.degrees
         for trial in each_seed(
-            f"{candidate.name}, {question.shown(degree)}",
-            scale.seeds,
-            partial(arguments, candidate, degree),
+            f"{candidate.name}, {question.shown(degree)}", scale.seeds, partial(arguments, candidate, degree)
         )
     )
 
