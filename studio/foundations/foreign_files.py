@@ -81,9 +81,7 @@ def foreign_file(
 def read_file(
     path: Path, most: int = LARGEST, wrong: type[StudioError] = SessionError, *, footage: bool = False
 ) -> bytes:
-    """A file's bytes. footage : as of `check_file`. Raises OSError, and `wrong` for what `check_file` refuses or for
-    more bytes than `most`.
-    """
+    """A file's bytes. footage : as of `check_file`. Raises OSError, and `wrong` for a refused or too large file."""
     with open_file(path, wrong, footage=footage) as stream:
         size = os.fstat(stream.fileno()).st_size
         content = b"" if size > most else stream.read(size + 1)
@@ -153,9 +151,7 @@ def check_file(path: Path, wrong: type[StudioError], *, footage: bool = False) -
 
 
 def check_links(folder: Path, wrong: type[StudioError] = SessionError, beside: Iterable[str] = ()) -> None:
-    """Raises `wrong` where an entry of a session's folder is a link that leads out of the session. beside : names that
-    may.
-    """
+    """Raises `wrong` for an entry of a session's folder that is a link out of it. beside : names that may be."""
     with suppress(FileNotFoundError, NotADirectoryError), os.scandir(folder) as entries:
         for entry in entries:
             if entry.is_symlink() and entry.name not in beside:

@@ -190,9 +190,7 @@ def _user() -> int:
 
 
 def _fault_of(status: os.stat_result) -> str:
-    """Why what is kept there may be another's, a clause; "" if it is this user's alone. A kept kernel is a pickle,
-    which can run anything.
-    """
+    """Why a stored kernel, a pickle that can run anything, may be another user's, a clause; "" if it is ours."""
     if not hasattr(os, "geteuid"):
         return ""
     if status.st_uid != _user():

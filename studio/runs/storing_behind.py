@@ -9,9 +9,7 @@ MOST_WAITING = 60
 
 
 class StoringBehind:
-    """Stores results in order in another thread. executor : of one thread; None: everything is done at once. Not
-    thread-safe.
-    """
+    """Stores results in order in another thread. executor : of one thread; None: at once. Not thread-safe."""
 
     def __init__(self, executor: Executor | None) -> None:
         self._executor = executor

@@ -106,9 +106,7 @@ def unpack(archive: Path, folder: Path, limits: ArchiveLimits | None = None) -> 
 
 
 def check_archive(archive: Path, limits: ArchiveLimits) -> tuple[int, int]:
-    """The number of an archive's files and their bytes, as its index says; nothing is unpacked. Raises ArchiveError,
-    PathRefused.
-    """
+    """The number of an archive's files and their bytes, by its index. Raises ArchiveError, PathRefused."""
     words = ("an archive that can be unpacked", "Pack the folder again.")
     with foreign_file(archive, ArchiveError, *words), _entries(archive) as listed_entries:
         entries = [entry for entry in _check(listed_entries, limits) if not entry.is_folder]

@@ -104,9 +104,7 @@ def copy_part(source: Path, target: Path) -> None:
 
 
 def copy_database(source: Path, target: Path) -> None:
-    """A copy of an SQLite database, also of one that is being written, with all that was committed. Raises
-    SessionError.
-    """
+    """A copy of an SQLite database, even while it is written, with all commits. Raises SessionError."""
     reading = open_database(source, "rw", patience=30.0)
     writing = open_database(target)
     try:
@@ -140,9 +138,7 @@ def new_folder_beside(path: Path, parents: bool = True) -> Path:
 
 
 def move_into_place(folder: Path, path: Path) -> None:
-    """Rename a finished folder to its place. Raises FileExistsError if something is there (nothing is overwritten),
-    SessionError.
-    """
+    """Rename a finished folder to its place. Raises FileExistsError if something is there, SessionError."""
     check_inside(path.parent)
     if path.exists() or path.is_symlink():
         raise FileExistsError(path)

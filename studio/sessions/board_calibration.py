@@ -69,9 +69,7 @@ class BoardOptions:
 
 @dataclass(frozen=True, slots=True)
 class BoardPlace:
-    """A session or folder to calibrate. folder : the session's, or that of the board footage. session : None for a
-    folder.
-    """
+    """A session or folder to calibrate. folder : of the board footage. session : None for a folder."""
 
     folder: Path
     session: Session | None = None

@@ -42,9 +42,7 @@ from studio.sessions.work_under_way import one_at_a_time
 
 @dataclass(frozen=True, slots=True)
 class FootageChange:
-    """A change of offsets or turns. session : after it. notes : its consequences, sentences. stale_runs : names of
-    runs.
-    """
+    """A change of offsets or turns. session : after it. notes : sentences. stale_runs : names of runs."""
 
     session: Session
     notes: tuple[str, ...]

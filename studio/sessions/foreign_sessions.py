@@ -38,9 +38,7 @@ MOST_FILES = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class Oddity:
-    """place : a path in what was looked at. what : a clause. footage : a link or place of footage elsewhere, which is
-    allowed.
-    """
+    """place : a path in the source. what : a clause. footage : a link to footage elsewhere, which is allowed."""
 
     place: str
     what: str

@@ -284,9 +284,7 @@ class Sums:
 
 
 class CheckedStore:
-    """Which frames of a store were found intact, and which damaged. Every method is one step of a dictionary, so
-    threads may share it.
-    """
+    """Which frames of a store were found intact, and which damaged. Each method is one step of a dictionary."""
 
     def __init__(self) -> None:
         self._rows: dict[int, int] = {}

@@ -69,9 +69,7 @@ class PartialFrame:
 
 @dataclass(frozen=True, slots=True)
 class TimeTaken:
-    """Seconds that tracking so many frames took, their evidence and the look at the whole run included, in a process of
-    so many threads.
-    """
+    """Seconds that tracking so many frames took, all included, in a process of so many threads."""
 
     seconds: float
     frames: int
@@ -217,9 +215,7 @@ class ResultsReader:
         return self._unpacked(frame, RESULT, unpack_result, rows[0][0])
 
     def layers(self, frame: int) -> list[LayerRecord]:
-        """The layers of a frame in the order they ran; of the unfinished frame those done. Raises DamagedError if one
-        is damaged.
-        """
+        """The layers of a frame in the order they ran; of an unfinished one those done. Raises DamagedError."""
         blobs = self._layer_blobs(frame)
         if not blobs:
             raise self._missing(f"layers of frame {frame}")
@@ -339,9 +335,7 @@ class ResultsReader:
         return parts
 
     def _rows(self, frame: int | None = None, after: int = -1) -> list[Row]:
-        """Numbers and pose of every finished frame after one, or of one alone, without blobs; columns missing in older
-        stores are NULL.
-        """
+        """Numbers and pose of finished frames after one, or of one alone; columns missing in older stores are NULL."""
         columns, joined = ROWS, ""
         for table, names in LATER_TABLES:
             known = self._has_table(table)
@@ -353,9 +347,7 @@ class ResultsReader:
         )
 
     def _sums(self, what: str, number: int | None = None, after: int = -1) -> dict[int, str]:
-        """The stored checksums of what has a number above `after`, or this one; nothing in stores that are older than
-        these.
-        """
+        """The stored checksums with a number above `after`, or of this one; none in older stores."""
         if not self._has_table("checksums"):
             return {}
         condition = f"> {int(after)}" if number is None else f"= {int(number)}"
@@ -474,9 +466,7 @@ class ResultsReader:
         return rows[0][0] if rows else None
 
     def arrivals(self) -> tuple[Indices, Array]:
-        """The finished frames (K,) of a live run, and the times (K, 2) of their pictures and of their poses, seconds;
-        empty for other runs.
-        """
+        """The finished frames (K,) of a live run, and the times (K, 2) of their pictures and poses, s; else empty."""
         if not self._has_table("arrivals"):
             return np.zeros(0, dtype=np.int64), np.zeros((0, 2))
         rows = self._query("SELECT frame, arrived, ready FROM arrivals ORDER BY frame")

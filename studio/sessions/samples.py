@@ -54,9 +54,7 @@ def install_prepared_runs(session: Session, sample: str) -> None:
 
 
 def install_sample(workspace: Workspace, name: str = "walk", into: str = "") -> Session:
-    """The sample as a session of the workspace (named `into`, or like itself), copied whole or not at all; one that is
-    there is left alone.
-    """
+    """The sample as a session of the workspace (named `into`, or like itself); an existing one is left alone."""
     place = workspace.root / (into or name)
     if (place / FILE_NAME).is_file():
         return workspace.session(place.name)

@@ -313,9 +313,7 @@ class Session:
         return StoredRun(place)
 
     def calibration_of_footage(self) -> bytes:
-        """The calibration's file; where it names cameras without footage, the same without them. Raises
-        CalibrationError.
-        """
+        """The calibration's file, without cameras that have no footage. Raises CalibrationError."""
         path = self.path / CAMERAS_PATH
         known = read_calibration(path)
         filmed = {source.name for source in self.manifest.footage.cameras}

@@ -75,9 +75,7 @@ def open_database(
 
 
 def check_tables(connection: sqlite3.Connection, path: Path, schema: str = "main") -> None:
-    """Raise SessionError where a database declares anything but ordinary tables and their indexes. Raises
-    sqlite3.DatabaseError.
-    """
+    """Raise SessionError where a database declares anything but ordinary tables and indexes."""
     rows: Iterable[tuple[Any, ...]] = connection.execute(
         f"SELECT type, name, COALESCE(sql, '') FROM {schema}.sqlite_master"
     )

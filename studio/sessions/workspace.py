@@ -79,9 +79,7 @@ class Workspace:
         return tuple(_summary(folder) for folder in _named_folders(self.root, FILE_NAME))
 
     def usual_body(self) -> str:
-        """The body that most of the sessions have, of several the newest session's; that of a new session where there
-        is none.
-        """
+        """The body of most sessions, of several the newest session's; else that of a new session."""
         usable = [entry for entry in self.sessions() if not entry.problem]
         count = Counter(entry.body for entry in usable)
         usable.sort(key=lambda entry: (count[entry.body], entry.created))

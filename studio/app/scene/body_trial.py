@@ -31,9 +31,7 @@ class TrialView:
 
 
 def trial_pose(body: BodyModel, opened: OpenedRun | None) -> Array:
-    """(D,) where a body that is being made stands: the session's start pose, if it has one for such a body; else the
-    rest pose, where the cameras look.
-    """
+    """(D,) where an edited body stands: the session's start pose if it fits, else the rest pose before cameras."""
     rest = body.neutral
     if opened is None:
         return rest

@@ -39,9 +39,7 @@ router = Router(prefix="/api", tags=["poses"])
 
 
 class StartPoseRequest(Request):
-    """The session's start pose from now on; the one it had stays beside it. frame: that it is of, in which tracking
-    begins; null: as before.
-    """
+    """The session's new start pose; the old one is kept beside it. frame: that it is of; null: as before."""
 
     pose: list[float]
     frame: int | None = Field(None, ge=0, le=LARGEST)

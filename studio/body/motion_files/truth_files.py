@@ -37,9 +37,7 @@ def read_truth(path: Path, fps: float, frame_count: int = 0, up: str = "") -> Ma
 
 
 def _counted_from_0(path: Path, motion: MarkerMotion, fps: float, frame_count: int) -> MarkerMotion:
-    """Rows that count the footage's frames from 1, as its last one shows, a frame earlier; a note where it is
-    unknown.
-    """
+    """Rows that count the footage's frames from 1, moved a frame earlier; a note where that is unknown."""
     rows = np.flatnonzero(np.asarray(np.isfinite(motion.positions).all(axis=2)).any(axis=1))
     if not len(rows):
         return motion

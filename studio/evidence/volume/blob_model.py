@@ -82,9 +82,7 @@ class BlobModel:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConeMoments:
-    """Of each drawn limb: volume (L,) mm³, offset (L,) mm along z of its centre of mass, variances (L, 3) mm² about it
-    along x, y, z.
-    """
+    """Of each drawn limb: volume (L,) mm³, offset (L,) mm along z of its centre, variances (L, 3) mm² about it."""
 
     volume: Array
     offset: Array

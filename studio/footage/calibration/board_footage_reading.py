@@ -97,9 +97,7 @@ def by_camera(footage: Sequence[BoardFootage], names: Sequence[str]) -> dict[str
 
 
 def plain_names(names: Sequence[str]) -> tuple[str, ...]:
-    """Cameras' names from those of their board footage, without words for its purpose ("ext_cam1_img" is "cam1") where
-    names stay distinct.
-    """
+    """Cameras' names from their board footage, without words for its purpose, if they stay distinct."""
     plain = tuple(AFFIXES.sub("", name) or name for name in names)
     return plain if len(set(plain)) == len(plain) else tuple(names)
 

@@ -201,9 +201,7 @@ HEADER, LONG_HEADER = 8, 16
 
 
 def whole_boxes(path: Path) -> int:
-    """Bytes of a file's boxes (ISO/IEC 14496-12, 4.2) up to the last fragment that is whole; a `moof` without its
-    `mdat` does not count.
-    """
+    """Bytes of a file's boxes (ISO/IEC 14496-12, 4.2) up to the last complete fragment (`moof` with its `mdat`)."""
     size, place, whole = path.stat().st_size, 0, 0
     with open_file(path, FootageError) as file:
         while place + HEADER <= size:

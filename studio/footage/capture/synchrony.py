@@ -221,9 +221,7 @@ def _correlation(a: Array, b: Array, lag: int) -> float:
 def _along_best_pairs(
     names: tuple[str, ...], pairs: tuple[PairLag, ...]
 ) -> tuple[dict[str, int], dict[str, float], dict[str, int], list[PairLag]]:
-    """Places in time, the weakest ratio and widest breadth on each camera's way, and the pairs used: the most trusted
-    spanning tree.
-    """
+    """Places in time, weakest ratio and widest breadth on each camera's way, and the most trusted spanning tree."""
     ranked = sorted(pairs, key=lambda pair: (pair.sure, pair.peak * min(pair.ratio, 3.0)), reverse=True)
     root = ranked[0]
     placed, confidence, within = {root.first: 0}, {root.first: root.ratio}, {root.first: root.within}

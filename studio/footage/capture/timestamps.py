@@ -70,9 +70,7 @@ def read_timestamps(path: Path) -> dict[str, Array]:
 
 
 def offsets_from_times(times: dict[str, Array]) -> TimedOffsets:
-    """Offsets of cameras whose frames were taken at these times, seconds. Raises FootageError if they never overlap
-    or their rates differ.
-    """
+    """Offsets of cameras with frames at these times (s). Raises FootageError for no overlap or different rates."""
     rates = {name: 1.0 / float(np.median(np.diff(moments))) for name, moments in times.items()}
     fps = float(np.median(list(rates.values())))
     # A short take's times scatter: what matters is that the cameras fall a frame apart.

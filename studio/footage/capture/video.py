@@ -67,9 +67,7 @@ class VideoProbe:
 
 
 def probe_video(path: Path) -> VideoProbe:
-    """The header of a video; only its first frame is decoded, in a separate process. Raises FootageError for refused
-    files and non-videos.
-    """
+    """The header of a video; its first frame is decoded in another process. Raises FootageError for refused files."""
     check_regular(path, FootageError)
     return isolated(FootageError, _probed, path)
 
@@ -104,9 +102,7 @@ def _probed(path: Path) -> VideoProbe:
 
 
 def open_video(path: Path) -> av.container.InputContainer:
-    """The container, its first video stream checked and set to stop at damage. Raises FootageError, also for what is no
-    regular file.
-    """
+    """The container, its first video stream set to stop at damage. Raises FootageError."""
     check_regular(path, FootageError)
     try:
         container = av.open(str(path), options={"protocol_whitelist": "file"}, metadata_errors="replace")

@@ -54,9 +54,7 @@ def outward_limit(camera: Camera) -> float:
 
 
 def picture_limit(camera: Camera) -> float:
-    """As far as the polynomial moves points outwards, but no farther than 1.3 times the radius of the picture's
-    farthest corner.
-    """
+    """As far as the polynomial moves points outwards, at most 1.3 times the radius of the farthest corner."""
     k1, k2, _, _, k3 = camera.distortion
     bent = RADII * distorted(RADII, 0.0, (k1, k2, 0.0, 0.0, k3))[2]
     falling = np.flatnonzero(np.diff(bent) <= 0.0)

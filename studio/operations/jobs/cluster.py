@@ -239,9 +239,7 @@ class _Marker:
 
 @dataclass(frozen=True, slots=True)
 class _Needs:
-    """What a worker must have. software : versions by name. marker : which it must see. topic : under which reports are
-    sent, "" for none.
-    """
+    """What a worker must have. software : versions. marker : which it must see. topic : of reports, "" for none."""
 
     software: Mapping[str, str]
     marker: _Marker

@@ -79,9 +79,7 @@ def number(
     better: str = "",
     statistic: Statistic = np.mean,
 ) -> Number:
-    """A number over seeds with its interval and verdict; values : one a seed, those that are not finite are left
-    out (and not counted).
-    """
+    """A number over seeds with its interval and verdict. values : one a seed; only finite ones count."""
     kept = [float(value) for value in values if math.isfinite(value)]
     ours = float(np.asarray(statistic(np.array(kept)))) if kept else math.nan
     low, high = bootstrap_interval(kept, statistic)

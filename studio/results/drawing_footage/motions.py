@@ -371,9 +371,7 @@ def _along(
     lean: float,
     obstacle: Obstacle | None = None,
 ) -> PersonMotion:
-    """A gait along a path, arms swinging against the legs (`swing`, `elbow`, `lean` in radians), less where the
-    path is one that slows down.
-    """
+    """A gait along a path, arms swinging against the legs (`swing`, `elbow`, `lean` in radians), less when slow."""
     phase = 2.0 * np.pi * times / gait.cycle
     pace = path.pace(gait.speed * times) if isinstance(path, Journey) else np.ones_like(times)
     stride = (0.3 + 0.7 * pace) * np.cos(phase + 0.1)

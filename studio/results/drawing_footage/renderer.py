@@ -179,9 +179,7 @@ class SurfaceRenderer(Renderer):
         seed: int,
         wardrobe: Array = STRIPED,
     ) -> None:
-        """tables, labels : (F, M, P, COLUMNS) and (P, 2) as `flesh.piece_tables` has them, at the M moments of each
-        frame's exposure.
-        """
+        """tables, labels : (F, M, P, COLUMNS) and (P, 2) of `flesh.piece_tables`, at M moments of an exposure."""
         self._room, self._noise, self._samples, self._seed = room, noise, samples, seed
         self._wardrobe, self._moments = wardrobe, tables.shape[1]
         self._tables, self._labels = tables, labels

@@ -109,9 +109,7 @@ class InspectedRun:
             return results.frames()
 
     def frame(self, frame: int, results: ResultsReader | None = None) -> "InspectedFrame":
-        """A frame with its layers, finished or not. results : a reader to use. Raises NotFoundError, DamagedError,
-        LeftError.
-        """
+        """A frame with its layers, finished or not. results : a reader. Raises NotFoundError, DamagedError."""
         stop_if_left()
         if tried := self.tried_at(frame):
             return InspectedFrame(self, frame, tried.layers, tried.result)

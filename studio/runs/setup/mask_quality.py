@@ -151,9 +151,7 @@ class MaskQuality:
 
     @property
     def worst(self) -> Annotated[str, Field()]:
-        """The camera to check first, "" where all are usable: one that removes what the others see, else the one that
-        agrees least.
-        """
+        """The camera to check first, "" for none: one that removes what the others see, else the least agreeing."""
         if all(view.usable for view in self.views):
             return ""
         denying = max(self.views, key=lambda view: view.denied)
@@ -297,9 +295,7 @@ def _faults_by_silhouettes(session: Session, progress: Progress) -> tuple[Findin
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameCounts:
-    """Pixels of one frame, (V,) each: of mask, silhouette, both; denied[v]: of the other masks, removed only by v.
-    pixels : of the picture.
-    """
+    """Pixels of one frame, (V,) each: of mask, silhouette, both, and of other masks removed only by this camera."""
 
     mask: NDArray[np.int64]
     hull: NDArray[np.int64]

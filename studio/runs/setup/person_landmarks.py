@@ -129,9 +129,7 @@ def _meeting(cameras: Mapping[str, Camera], pixels: Mapping[str, Array]) -> Arra
 def _without_outliers(
     cameras: Mapping[str, Camera], pixels: Mapping[str, Array], seen: Sightings, points: Array
 ) -> Array:
-    """The points, each without the cameras that contradict the others; NaN where only two are left that contradict
-    each other.
-    """
+    """The points without the cameras that contradict the others; NaN where two contradict each other."""
     cleaned = points.copy()
     for row in range(len(points)):
         rays = {name: places[row : row + 1] for name, places in pixels.items()}

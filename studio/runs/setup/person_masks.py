@@ -53,9 +53,7 @@ Made = TypeVar("Made")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PersonMasks:
-    """One frame. masks : (H, W) uint8, 0 or 255, by camera. unseen : cameras that see no person; their masks are
-    empty.
-    """
+    """One frame. masks : (H, W) uint8, 0 or 255, by camera. unseen : cameras that see no person (empty masks)."""
 
     frame: int
     masks: Mapping[str, Bytes]
@@ -182,9 +180,7 @@ class _Follower:
         return self._complete(pictures, agreed, points)
 
     def search(self, frame: int, pictures: Mapping[str, Bytes]) -> Sightings:
-        """The person in pictures of which nothing is known: first who is where he was last, then whom most cameras see,
-        then the largest.
-        """
+        """The person in new pictures: the one at the last place, then whom most cameras see, then the largest."""
         self._searched = frame
 
         def find(name: str) -> list[Sighting]:

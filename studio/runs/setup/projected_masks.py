@@ -15,9 +15,7 @@ from studio.sessions.session import Session
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ProjectedMasks:
-    """made_of : words that change when the poses do. of : camera and frame to (H, W) 0 or 255, None where the frame was
-    not tracked.
-    """
+    """made_of : words that change when the poses do. of : camera and frame to (H, W) 0 or 255, or None."""
 
     made_of: str
     of: Callable[[str, int], Bytes | None]

@@ -74,9 +74,7 @@ class FittedShape:
 
 
 class _Kept(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A stored fit. dimensions : of the fitted body, mm. words : for a run's notes; a failed fit has its reason there
-    and no dimensions.
-    """
+    """A stored fit. dimensions : of the fitted body, mm; none after a failure. words : for a run's notes."""
 
     schema: int = SCHEMA_VERSION
     dimensions: dict[str, float] = {}

@@ -84,9 +84,7 @@ def make_subject_sessions(
 
 
 def _linked(session: Session, place: Path, number: int, owner: Path | None) -> Session:
-    """A copy of a session without its runs, whose footage is linked. owner : the folder of what is known of the
-    subject; None for nothing.
-    """
+    """A copy of a session without runs, its footage linked. owner : folder of what is known of the subject."""
     if place.exists():
         raise SessionError(f"'{place}' exists already.", "Name the new sessions with --into.")
     with atomic_files.made_whole(place) as folder:

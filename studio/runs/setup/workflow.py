@@ -235,9 +235,7 @@ def newest_run(session: Session) -> StoredRun | None:
 
 
 def run_to_use(session: Session) -> StoredRun | None:
-    """The run that is checked and exported: the newest with frames, unless it was cancelled and an older one is whole;
-    None without one.
-    """
+    """The run to check and export: the newest with frames, unless cancelled and an older one is complete."""
     cancelled = None
     for run in reversed(_runs_once(session)):
         summary = run.summary()

@@ -177,9 +177,7 @@ def _opencap_cameras(source: Path) -> list[Path]:
 
 
 def _opencap_trials(source: Path) -> dict[str, Layout]:
-    """The trials that every camera has a video of, without that of the board. Of a trial's videos the synchronised one
-    is taken.
-    """
+    """The trials that every camera has a video of, without the board's; synchronised videos are preferred."""
     cameras = _opencap_cameras(source)
     videos: dict[str, dict[str, Path]] = {}
     for camera in cameras:

@@ -103,9 +103,7 @@ Up = Annotated[
 
 @dataclass(frozen=True, slots=True)
 class ImportOptions:
-    """How footage is read into a session. Offsets and rotations, by camera or its footage's name, override the source's
-    own.
-    """
+    """How footage is read into a session. Offsets and rotations, by camera or footage name, override the source's."""
 
     calibration: Annotated[
         str | Path | None,

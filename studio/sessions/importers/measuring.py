@@ -136,9 +136,7 @@ def check_before_decoding(footage: Sequence[Path], fps: float | None, by_time: b
 def common_frame_count(
     measured: tuple[MeasuredCamera, ...], warnings: list[str], aligned: bool = False
 ) -> int:
-    """The frames that all cameras have after their offsets. aligned : the offsets are known, so that footage may end
-    at different moments.
-    """
+    """The frames that all cameras have after their offsets. aligned : the offsets are known; ends may differ."""
     counts = {entry.footage.name: entry.measure.frame_count - entry.offset for entry in measured}
     shortest, longest = min(counts.values()), max(counts.values())
     if shortest == longest:
@@ -379,9 +377,7 @@ def _turned_by_files(measured: tuple[MeasuredCamera, ...]) -> tuple[str, ...]:
 
 
 def _interlaced(measured: tuple[MeasuredCamera, ...], *, guess: bool) -> list[str]:
-    """Warnings of videos whose pictures hold two moments, and of those split in an order that nothing shows (guess) or
-    that is wrong.
-    """
+    """Warnings of videos with two moments in a picture, and of those split in a guessed or wrong order."""
     videos = {
         entry.footage.name: (entry.measure, entry.fields)
         for entry in measured
