@@ -36,18 +36,23 @@ if __name__ == "__main__":
 """
 
 
-@pytest.fixture
-def served(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """The studio in a process of its own, as a command would start it, and its printed address."""
-    script = tmp_path / "serving.py"
-    script.write_text(SERVE)
-    process = subprocess.Popen(
-        [sys.executable, str(script), str(tmp_path / "workspace")],
+def started(folder: Path, text: str) -> subprocess.Popen[str]:
+    """A process that runs a script, as a command would."""
+    script = folder / "serving.py"
+    script.write_text(text)
+    return subprocess.Popen(
+        [sys.executable, str(script), str(folder / "workspace")],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
         env=os.environ | {"PYTHONPATH": str(Path(launch.__file__).parents[2])},
     )
+
+
+@pytest.fixture
+def served(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """The studio in a process of its own, as a command would start it, and its printed address."""
+    process = started(tmp_path, SERVE)
     assert process.stdout is not None
     line = process.stdout.readline()
     try:
@@ -85,17 +90,9 @@ def test_the_printed_address_opens_the_studio_and_ctrl_c_closes_everything(
 
 @pytest.mark.slow
 def test_it_ends_whatever_a_thread_waits_for(tmp_path: Path) -> None:
-    script = tmp_path / "serving.py"
     waiting = "import threading\nfrom studio.sessions.workspace import Workspace\n"
     waiting += "Workspace.sessions = lambda self: threading.Event().wait()\n"
-    script.write_text(waiting + SERVE)
-    process = subprocess.Popen(
-        [sys.executable, str(script), str(tmp_path / "workspace")],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        env=os.environ | {"PYTHONPATH": str(Path(launch.__file__).parents[2])},
-    )
+    process = started(tmp_path, waiting + SERVE)
     try:
         assert process.stdout is not None
         printed = process.stdout.readline().removeprefix("Open ").strip()

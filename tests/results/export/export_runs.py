@@ -15,6 +15,8 @@ from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 
 FRAMES = 450
+LOST = range(200, 215)
+STATES = tuple("no evidence" if frame in LOST else "tracked" for frame in range(FRAMES))
 MADE = "moved"
 
 

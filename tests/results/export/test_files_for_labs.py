@@ -3,40 +3,22 @@
 import csv
 import json
 import sys
-from pathlib import Path
 
 import h5py
 import numpy as np
 import pandas
 import pynwb
 import pytest
-from export_runs import FRAMES, MADE, moving_poses, track_of
+from export_runs import FRAMES, LOST, moving_poses
 
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
 from studio.body.motion_files.truth_files import read_truth
 from studio.foundations.errors import ExportError, StudioError
-from studio.results.export.exporting import export_run
-from studio.results.export.formats import FORMATS
 from studio.results.export.naming import points_of
 
 LEAST_MM = 0.1
 CAMERAS = 1
-LOST = range(200, 215)
-STATES = tuple("no evidence" if frame in LOST else "tracked" for frame in range(FRAMES))
-
-
-@pytest.fixture
-def exported(make_run, tmp_path: Path):
-    """Exports a run of human29 with fifteen lost frames."""
-    session, run = make_run("human29", lambda body: track_of(moving_poses(body), states=STATES))
-
-    def export(name: str, **requested: object) -> Path:
-        return export_run(
-            session, run, FORMATS[name], {"track": MADE, **requested}, tmp_path / f"walk.{name}"
-        ).files[0]
-
-    return export
 
 
 def wanted() -> tuple[list[str], np.ndarray]:

@@ -2,34 +2,16 @@
 
 import csv
 import json
-from pathlib import Path
 
 import duckdb
 import numpy as np
 import pytest
-from export_runs import FRAMES, MADE, moving_poses, track_of
+from export_runs import FRAMES, LOST, MADE, moving_poses
 
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import joint_frames, marker_points
-from studio.results.export.exporting import export_run
-from studio.results.export.formats import FORMATS
 
 LEAST_MM = 0.1
-LOST = range(200, 215)
-STATES = tuple("no evidence" if frame in LOST else "tracked" for frame in range(FRAMES))
-
-
-@pytest.fixture
-def exported(make_run, tmp_path: Path):
-    """Exports a run of human29 with fifteen lost frames."""
-    session, run = make_run("human29", lambda body: track_of(moving_poses(body), states=STATES))
-
-    def export(name: str, **requested: object) -> Path:
-        return export_run(
-            session, run, FORMATS[name], {"track": MADE, **requested}, tmp_path / f"walk.{name}"
-        ).files[0]
-
-    return export
 
 
 @pytest.mark.parametrize(
