@@ -246,7 +246,7 @@ AXES = "xyz"
 def assemble(definition: BodyDefinition, name: str, dimensions: Mapping[str, float]) -> BodyModel:
     """The body with these dimensions (mm, ratios).
 
-    definition : already checked (`validation.check_definition`), so every name in it exists.
+    definition : already checked (`check_definition`), so every name in it exists.
     """
     parameter_index = {entry.name: index for index, entry in enumerate(definition.parameters)}
     joint_index = {entry.name: index for index, entry in enumerate(definition.joints)}

@@ -37,7 +37,7 @@ def prepare_correction(
     backwards_to: int | None = None,
     name: str = "",
 ) -> StoredRun:
-    """Make the corrected run's folder; then track it (`worker.batch.track_to_end`), or call `track_backwards`.
+    """Make the corrected run's folder; then track it (`operations.jobs.batch.track_to_end`), or call `track_backwards`.
 
     frame : of the run, or (forwards) the one after its last. pose : (D,) radians and mm, in that frame. source : of the
     pose, as text. backwards_to : the last frame to track backwards; it may lie before the run's first frame; None:

@@ -91,7 +91,7 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     motion : "walk", "run", "box", "handstand", "stand", "circuit" and others (`motions.py`); or "arm", which shows
     `body` itself, seen by one camera, as in Deutscher & Reid 6.1; or "recorded", the motion of `motion_file` (.amc,
     .bvh, .npz; `skeleton_file` for an .amc whose ASF is not beside it); or "joined", several `clips` of such motion one
-    after the other (`joined_clips.py`); or "keys", which moves `body` (a name, or a body, URDF or MJCF file) through
+    after the other (`recorded_clips.py`); or "keys", which moves `body` (a name, or a body, URDF or MJCF file) through
     `keys` in the room (`body_footage.py`; option spread_degrees: the largest random change of a key's angles), rendered
     `magnify` times as large, its cones with flat ends whose edges are rounded by `edge_mm`, or by 0 with wholly rounded
     ones. options : numbers of the motion. weighting : what runs of the session use by

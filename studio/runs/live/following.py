@@ -1,5 +1,4 @@
-"""Consecutive frames searched one after the other in memory: a run without its store, events and "
-"recovery."""
+"""Consecutive frames searched one after the other in memory: a run without store, events and recovery."""
 
 import dataclasses
 from collections.abc import Callable, Mapping

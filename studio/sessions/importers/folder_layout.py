@@ -1,4 +1,4 @@
-"""Folders of footage and calibration: the studio's own layout and those of `known_layouts`.
+"""Folders of footage and calibration: the studio's own layout and those of other tools.
 
     SOURCE/videos/*.mp4            or videos/<camera>/*.png, pictures/<camera>/*.png, or <camera>/*.png
     SOURCE/masks/                  videos or one folder of pictures a camera

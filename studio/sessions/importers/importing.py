@@ -181,8 +181,8 @@ class ImportReport:
 def import_source(
     source: Path, into: Path, options: ImportOptions | None = None, *, progress: Progress = no_progress
 ) -> ImportReport:
-    """Make a session at `into` from a source folder, or an archive of one; see `known_layouts`,
-    `folder_layout` and `bodytrack` for the layouts.
+    """Make a session at `into` from a source folder, or an archive of one; see `folder_layout` and
+    `bodytrack` for the layouts.
 
     All is checked before anything is written; whatever fails, nothing is left and nothing that was stored is touched.
     Raises StudioError.
