@@ -1,12 +1,10 @@
-"""Names of sessions and runs, which are folder names and parts of URLs.
+"""Names of sessions and runs, which are folder names and parts of URLs, and names inside uploads and archives.
 
 A name is `[A-Za-z0-9_-]{1,64}` and none of the device names that Windows reserves; a path made from one is
 resolved and must still lie inside its root, so that neither `..` nor a link leads out.
 
-Names inside an upload or an archive, which come from outside.
-
-Everything that could lead elsewhere is refused, not repaired: `..`, absolute names, backslashes, drive letters, NUL and
-other control characters, names of devices, links.
+Names inside an upload or an archive come from outside: whatever could lead elsewhere is refused, not repaired (`..`,
+absolute names, backslashes, drive letters, NUL and other control characters, names of devices, links).
 """
 
 import re

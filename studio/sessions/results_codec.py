@@ -1,14 +1,12 @@
-"""Layers, frames and checkpoints as compressed blobs, and back, bit for bit.
+"""Layers, frames and checkpoints as compressed blobs, and back, bit for bit; and their checksums.
 
 A blob is a zstd frame around named arrays in MessagePack, each its type, its shape and its bytes: a frame of eleven
-blobs is packed in a tenth of the time that as many npz archives take. The numbers of a record that are single values
-share one array and those that are per parameter another. Stores of the first version hold npz archives
-(`allow_pickle=False`); nothing in either can run.
-
-Checksums of a results store's content, and which parts this process has already found intact.
+blobs is packed in a tenth of the time that as many npz archives take. The single numbers of a record share one array,
+and those per parameter another. Stores of the first version hold npz archives (`allow_pickle=False`); nothing in
+either can run.
 
 A frame's checksums lie in one row: of its numbers and pose ("row"), of its result's blob ("result") and of each layer's
-("layers"). Rows of stores that were written before there were checksums have none: they count as unchecked.
+("layers"). Older rows have none and count as unchecked. `Verified` remembers which parts this process found intact.
 """
 
 import io

@@ -1,14 +1,10 @@
-"""Live cameras: a reader each, their newest pictures and states, and the sets they form.
+"""Live cameras: a reader each, their newest pictures and states, and the sets that they form.
 
 The caller of `LiveCamera.run` provides the reader's thread. A stream that breaks is opened again after a while
-that grows; a stream that gives nothing for long enough counts as stopped whether or not its reader has noticed, and the
-others go on without it.
+that grows; one that gives nothing for long enough counts as stopped, and the others continue without it.
 
-Pairing of pictures, and their time spread.
-
-Cameras that run on their own take their pictures at any time; of the newest ones those are paired that lie nearest to
-the newest picture of the camera that is behind. So pictures of one set are at most half a frame apart unless a camera
-lags or loses pictures, and then that is reported with its name.
+Cameras take their pictures at any time; those nearest to the newest picture of the camera that is behind are paired.
+So pictures of one set are at most half a frame apart unless a camera lags or loses pictures, which is reported.
 """
 
 import threading

@@ -1,9 +1,7 @@
-"""Folders of pictures, one file a frame, in natural order.
+"""Folders of pictures, one file a frame, in natural order or by number.
 
-Pictures of a live camera, a file a frame, named by its number: `000041.jpg`.
-
-The folder may still grow while it is read. A number may be missing because its camera gave no picture then, or because
-no set of pictures was complete; in its place stands the last picture before it.
+A live camera's pictures are named by their numbers (`000041.jpg`), and their folder may grow while it is read. A number
+may be missing because the camera gave no picture, or no set of pictures was complete; the picture before it stands in.
 """
 
 import re

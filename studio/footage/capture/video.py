@@ -1,20 +1,15 @@
-"""Video files, frame by frame and exactly: damage is reported, never skipped over.
+"""Video files, frame by frame and exactly: damage is reported, never skipped.
 
-Headers are not believed: a video is measured by decoding every frame once (`measure_video`). The
-decoder stops at damage (`err_detect=explode`), frames that it marks as corrupt count as
-damage, and fewer frames than the container announces mean that the file was cut. Damage that leaves a
-lawful bit stream cannot be seen by any decoder.
+Headers are not believed: a video is measured by decoding every frame once (`measure_video`). The decoder stops at
+damage (`err_detect=explode`), frames that it marks as corrupt count as damage, and fewer frames than the container
+announces mean that the file was cut. Damage that leaves a lawful bit stream cannot be seen by any decoder.
 
-Headers of video files, and what is refused by them before decoding.
-
-Small files can ask for very much memory or time, so size, length and codec are checked first and the decoder gets
-the same limit. Headers are believed no further: `video.measure_video` counts by decoding.
-
-Memory released by a video's decoder, returned to the system.
+Small files can ask for very much memory or time, so size, length and codec are checked before decoding, and the decoder
+gets the same limit.
 
 Reading a frame's side data makes it part of a cycle, so it stays, 3 MB of full HD, until Python collects cycles, which
-it does seldom where few objects are made (`video` reads that of one frame of each file); and glibc keeps memory freed
-by a thread for that thread.
+it seldom does (`video` reads that of one frame of each file); and glibc keeps memory freed by a thread for that thread.
+So released memory is returned to the system explicitly.
 """
 
 import threading

@@ -10,7 +10,7 @@
 
 Everything but footage and calibration may be missing. A session's own folder has this layout as well.
 
-Layouts of other tools, and the places of footage, calibration, masks and times in them.
+Layouts of other tools:
 
     FreeMoCap   videos/synchronized/ (formerly synchronized_videos/) and *calibration*.toml beside it
     Caliscope   recordings/<take>/ with calibration/extrinsic/capture_volume/ or camera_array.toml above; or a take with
