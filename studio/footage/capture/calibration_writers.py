@@ -27,7 +27,11 @@ SEEN = 0.01
 
 @dataclass(frozen=True, slots=True)
 class WrittenCalibration:
-    """files : what was written, in the cameras' order where it is one each. notes : what the format cannot hold."""
+    """A calibration for another tool.
+
+    files : that were written, in the cameras' order where it is one each.
+    notes : what the format cannot hold.
+    """
 
     files: tuple[Path, ...]
     notes: tuple[str, ...] = ()
