@@ -45,7 +45,7 @@ STEP = 0.35
 """Distance between tried crops, as a share of their side."""
 MOST_FOUND = 4
 SAME_PERSON = 0.3
-"""Two sightings whose middles are nearer than this share of the larger one's side are of one person."""
+"""Two detections whose middles are nearer than this share of the larger one's side are of one person."""
 GUIDED_RADIUS = 6
 """Of the guided filter: pixels of the network's mask. By the overlap with the true masks of three rendered clips (walk,
 dance, kick of the choosing half): 3 or 6 pixels, ε of 1e-5 or 1e-4 differ by 0.003."""
@@ -70,7 +70,7 @@ class Crop:
 
 
 @dataclass(frozen=True, eq=False)
-class Sighting:
+class Detection:
     """What the network sees in a crop.
 
     presence : 0 to 1. logits : (256, 256), above 0 where a pixel of the crop rather shows the person. points : (39, 2)
@@ -146,7 +146,7 @@ class PersonNetwork:
             self._net = cv2.dnn.readNetFromTFLite(str(path), **engine)
         self._lock = threading.Lock()
 
-    def look(self, picture: Bytes, crop: Crop) -> Sighting:
+    def look(self, picture: Bytes, crop: Crop) -> Detection:
         """What a crop of a picture (H, W, 3) BGR shows."""
         to_picture = crop.to_picture()
         square = cv2.warpAffine(
@@ -156,21 +156,21 @@ class PersonNetwork:
             self._net.setInput(cv2.dnn.blobFromImage(square, 1.0 / 255.0, swapRB=True))
             landmarks, presence, logits = self._net.forward(("Identity", "Identity_1", "Identity_2"))
         points = np.asarray(landmarks, np.float64).reshape(-1, 5)[:, :2]
-        return Sighting(
+        return Detection(
             float(np.asarray(presence).ravel()[0]),
             np.asarray(logits, np.float32)[0, 0],
             points @ to_picture[:, :2].T + to_picture[:, 2],
             crop,
         )
 
-    def find(self, picture: Bytes, quarter_turns: int = 0) -> list[Sighting]:
+    def find(self, picture: Bytes, quarter_turns: int = 0) -> list[Detection]:
         """The persons of a picture (H, W, 3), at most four, the most certain first; each looked at in its own crop.
 
         quarter_turns : as of the camera; the tried crops are upright in the picture turned by them.
         """
         crops = _crops_over(picture.shape[1], picture.shape[0], -0.5 * math.pi * quarter_turns)
         first = [seen for seen in (self.look(picture, crop) for crop in crops) if seen.presence >= PRESENT]
-        persons: list[Sighting] = []
+        persons: list[Detection] = []
         # How much of a crop the person fills tells a crop around him from one that cuts him off.
         for seen in sorted(first, key=lambda one: -one.presence * float((one.logits > 0.0).mean())):
             if len(persons) == MOST_FOUND:
@@ -200,6 +200,6 @@ def _crops_over(width: int, height: int, angle: float) -> Iterator[Crop]:
                 yield Crop(float(x), float(y), side, angle)
 
 
-def _same(one: Sighting, other: Sighting) -> bool:
+def _same(one: Detection, other: Detection) -> bool:
     apart = math.hypot(one.next_crop.x - other.next_crop.x, one.next_crop.y - other.next_crop.y)
     return apart < SAME_PERSON * max(one.next_crop.side, other.next_crop.side)

@@ -265,12 +265,12 @@ def draw_coverage(session: Session, proposal: Proposal, camera: str) -> bytes:
         raise NotFoundError(
             f"Camera '{name}' was not calibrated from a board here.", "Calibrate it from boards."
         )
-    lens, seen = lenses[name], solved.sightings.get(name, ())
+    lens, seen = lenses[name], solved.detections.get(name, ())
     dropped = {residual.frame for residual in lens.residuals if residual.dropped}
     picture = coverage_picture(
         lens.coverage,
-        [sighting for sighting in seen if sighting.frame not in dropped],
-        [sighting for sighting in seen if sighting.frame in dropped],
+        [detection for detection in seen if detection.frame not in dropped],
+        [detection for detection in seen if detection.frame in dropped],
     )
     return bytes(cv2.imencode(".png", picture)[1])
 

@@ -43,7 +43,7 @@ SHORT_GAP_S = 0.1
 
 
 @runtime_checkable
-class Sightings(Protocol):
+class FrameSource(Protocol):
     """A source of problems and their evidence (`ProblemSource`)."""
 
     @property
@@ -96,9 +96,9 @@ class RunWatch:
         fps: float,
         restarted: Callable[[int], bool] = lambda frame: False,
     ) -> None:
-        self._problems = problems if isinstance(problems, Sightings) else None
+        self._problems = problems if isinstance(problems, FrameSource) else None
         self._onlooker = (
-            Onlooker(problems.body, problems.cameras) if isinstance(problems, Sightings) else None
+            Onlooker(problems.body, problems.cameras) if isinstance(problems, FrameSource) else None
         )
         self._results, self._settings_in = results, settings_in
         self._seed, self._first, self._fps, self._restarted = seed, first, fps, restarted

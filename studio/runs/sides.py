@@ -15,7 +15,7 @@ from studio.evidence.frame_evidence import FrameEvidence
 from studio.foundations.arrays import Array
 from studio.foundations.geometry.camera import Camera
 from studio.runs.refined_frames import MaskSettings
-from studio.runs.run_watch import Sightings
+from studio.runs.run_watch import FrameSource
 from studio.runs.tracks import (
     RAW,
     SIDES,
@@ -40,7 +40,7 @@ EXCHANGED = "exchanged"
 
 
 def put_sides_right(
-    run: StoredRun, problems: Sightings, read: Callable[[int], None] = lambda frame: None
+    run: StoredRun, problems: FrameSource, read: Callable[[int], None] = lambda frame: None
 ) -> tuple[str, ...]:
     """Check a run's sides and store the track "sides" if any were exchanged; returns the exchanges.
 
@@ -113,7 +113,7 @@ def in_words(words: tuple[str, ...]) -> str:
 
 
 def _look_at(
-    problems: Sightings, settings: MaskSettings, read: Callable[[int], None], frame: int
+    problems: FrameSource, settings: MaskSettings, read: Callable[[int], None], frame: int
 ) -> FrameEvidence:
     read(frame)
     return problems.evidence(frame, settings.of(frame))

@@ -25,7 +25,7 @@ from studio.foundations.tracing import span
 from studio.runs.frame_steps import FrameHistory, space_over
 from studio.runs.pace import Pace, Progress
 from studio.runs.run_behaviour import RunBehaviour
-from studio.runs.run_watch import RunWatch, Sightings
+from studio.runs.run_watch import FrameSource, RunWatch
 from studio.runs.storing_behind import StoringBehind
 from studio.search.likelihood.problem import BaseFrameLikelihood
 from studio.search.settings import RunSettings, SettingsEntry, SettingsHistory, settings_from_values, values
@@ -84,7 +84,7 @@ class TrackingRun:
             fps=self.record.fps,
             restarted=self.record.is_restarted,
         )
-        self._seen = problems if isinstance(problems, Sightings) else None
+        self._seen = problems if isinstance(problems, FrameSource) else None
         self._check_cameras()
         self._refiner = (
             None

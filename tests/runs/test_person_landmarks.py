@@ -7,7 +7,7 @@ import pytest
 from rendered_people import FPS, Rendered, rendered_walk
 
 from studio.body.person import marker_motion
-from studio.evidence.person_network import INPUT, Crop, Sighting
+from studio.evidence.person_network import INPUT, Crop, Detection
 from studio.foundations.arrays import Array, Bytes
 from studio.foundations.errors import FootageError
 from studio.foundations.geometry.camera import Camera
@@ -27,7 +27,7 @@ CAMERAS = RIGS["corners"]((480, 360), np.random.default_rng(1))
 JOINTS = np.random.default_rng(2).uniform((-300.0, -300.0, 100.0), (300.0, 300.0, 1500.0), (12, 3))
 
 
-def sighting(camera: Camera, exchanged: bool = False, wrong: int | None = None) -> Sighting:
+def detection(camera: Camera, exchanged: bool = False, wrong: int | None = None) -> Detection:
     """What a camera sees of JOINTS. wrong : a joint that it sees elsewhere."""
     pixels = project(camera, JOINTS)[0]
     if wrong is not None:
@@ -35,22 +35,22 @@ def sighting(camera: Camera, exchanged: bool = False, wrong: int | None = None) 
     points = np.zeros((39, 2))
     points[RIGHT_AND_LEFT if exchanged else LEFT_AND_RIGHT] = pixels
     points[33], points[34] = (240.0, 180.0), (240.0, 60.0)
-    return Sighting(1.0, np.ones((INPUT, INPUT), np.float32), points, Crop(240.0, 180.0, 300.0))
+    return Detection(1.0, np.ones((INPUT, INPUT), np.float32), points, Crop(240.0, 180.0, 300.0))
 
 
-def found(seen: dict[str, Sighting], before: Array | None = None) -> Array:
+def found(seen: dict[str, Detection], before: Array | None = None) -> Array:
     joints = _joints({camera.name: camera for camera in CAMERAS}, seen, before)
     assert joints is not None
     return joints[0]
 
 
 def test_joints_lie_where_the_rays_meet() -> None:
-    seen = {camera.name: sighting(camera) for camera in CAMERAS}
+    seen = {camera.name: detection(camera) for camera in CAMERAS}
     np.testing.assert_allclose(found(seen), JOINTS, atol=0.1)
 
 
 def test_a_camera_that_exchanges_sides_is_put_right() -> None:
-    seen = {camera.name: sighting(camera, number == 2) for number, camera in enumerate(CAMERAS)}
+    seen = {camera.name: detection(camera, number == 2) for number, camera in enumerate(CAMERAS)}
     np.testing.assert_allclose(found(seen), JOINTS, atol=0.1)
 
 
@@ -61,9 +61,9 @@ def test_the_left_side_is_what_most_cameras_call_left_in_all_frames(
 ) -> None:
     """One camera exchanges the sides, the first one too: in every frame, or all of them in the first frame alone."""
 
-    def seen(frame: int) -> dict[str, Sighting]:
+    def seen(frame: int) -> dict[str, Detection]:
         return {
-            camera.name: sighting(camera, number == wrong if always else frame == 0)
+            camera.name: detection(camera, number == wrong if always else frame == 0)
             for number, camera in enumerate(CAMERAS)
         }
 
@@ -75,13 +75,13 @@ def test_the_left_side_is_what_most_cameras_call_left_in_all_frames(
 
 
 def test_sides_go_on_from_the_frame_before_where_every_camera_exchanges_them() -> None:
-    seen = {camera.name: sighting(camera, exchanged=True) for camera in CAMERAS}
+    seen = {camera.name: detection(camera, exchanged=True) for camera in CAMERAS}
     np.testing.assert_allclose(found(seen, before=JOINTS + 5.0), JOINTS, atol=0.1)
 
 
 def test_a_joint_that_one_camera_sees_elsewhere_is_that_of_the_others() -> None:
     seen = {
-        camera.name: sighting(camera, wrong=4 if number == 1 else None)
+        camera.name: detection(camera, wrong=4 if number == 1 else None)
         for number, camera in enumerate(CAMERAS)
     }
     np.testing.assert_allclose(found(seen), JOINTS, atol=0.1)
@@ -89,7 +89,7 @@ def test_a_joint_that_one_camera_sees_elsewhere_is_that_of_the_others() -> None:
 
 def test_two_cameras_that_contradict_each_other_say_nothing_of_a_joint() -> None:
     one, other = CAMERAS[:2]
-    points = found({one.name: sighting(one), other.name: sighting(other, wrong=4)})
+    points = found({one.name: detection(one), other.name: detection(other, wrong=4)})
     assert np.isnan(points[4]).all()
     np.testing.assert_allclose(np.delete(points, 4, axis=0), np.delete(JOINTS, 4, axis=0), atol=0.5)
 

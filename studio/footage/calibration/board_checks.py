@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from studio.footage.calibration.board_poses import BoardView, pair_pose, view_of
-from studio.footage.calibration.boards import Board, Sighting
+from studio.footage.calibration.boards import Board, Detection
 from studio.footage.calibration.extrinsics import Rig
 from studio.footage.calibration.fault_hypotheses import explained
 from studio.footage.calibration.findings import Finding
@@ -25,28 +25,28 @@ CONTRADICTED, AGREED, FEWEST_SHARED = 0.5, 0.8, 3
 
 
 def board_findings(
-    cameras: Sequence[Camera], board: Board, sightings: Sequence[Sighting]
+    cameras: Sequence[Camera], board: Board, detections: Sequence[Detection]
 ) -> tuple[Finding, ...]:
-    """Checks cameras against their sightings of a board: identity, mirroring, resolution, rotation, size of squares."""
-    backwards = mirrored_sightings(sightings)
+    """Check cameras against their detections of a board: identity, mirroring, resolution, rotation, size of squares."""
+    backwards = mirrored_detections(detections)
     if backwards:
         return backwards
     findings = explained(
-        cameras, lambda tried: board_disagreement(tried, board, sightings), GOOD_PX, "board's pictures"
+        cameras, lambda tried: board_disagreement(tried, board, detections), GOOD_PX, "board's pictures"
     )
     if findings:
         return findings
-    size = square_size(cameras, board, sightings)
+    size = square_size(cameras, board, detections)
     if size is None or abs(size / board.square_mm - 1.0) <= SIZE_TOLERANCE:
         return ()
     return (scale_finding(size / board.square_mm, f"the board's squares ({board.square_mm:g} mm)", board),)
 
 
-def mirrored_sightings(sightings: Sequence[Sighting]) -> tuple[Finding, ...]:
+def mirrored_detections(detections: Sequence[Detection]) -> tuple[Finding, ...]:
     """Cameras whose ChArUco boards could be read in the mirrored picture only."""
     findings: list[Finding] = []
-    for name in sorted({sighting.camera for sighting in sightings}):
-        mine = [sighting.mirrored for sighting in sightings if sighting.camera == name]
+    for name in sorted({detection.camera for detection in detections}):
+        mine = [detection.mirrored for detection in detections if detection.camera == name]
         if 2 * sum(mine) > len(mine):
             message = f"The pictures of camera {name} are mirrored: its markers are read in the mirrored picture only."
             remedy = "Switch mirroring off in the camera's program, or flip the footage."
@@ -55,7 +55,7 @@ def mirrored_sightings(sightings: Sequence[Sighting]) -> tuple[Finding, ...]:
 
 
 def mirrored_cameras(
-    board: Board, sightings: Sequence[Sighting], lenses: Mapping[str, Lens], rig_names: Sequence[str]
+    board: Board, detections: Sequence[Detection], lenses: Mapping[str, Lens], rig_names: Sequence[str]
 ) -> tuple[Finding, ...]:
     """Cameras that agree with the others only once their pictures are mirrored; a chessboard itself has no handedness.
 
@@ -63,14 +63,14 @@ def mirrored_cameras(
     """
     views: dict[str, dict[int, BoardView]] = {name: {} for name in rig_names}
     backwards: dict[str, dict[int, BoardView]] = {name: {} for name in rig_names}
-    for sighting in sightings:
-        if sighting.camera not in views:
+    for detection in detections:
+        if detection.camera not in views:
             continue
-        view = view_of(board, sighting, lenses[sighting.camera])
-        other = view_of(board, *unmirrored(board, sighting, lenses[sighting.camera]))
+        view = view_of(board, detection, lenses[detection.camera])
+        other = view_of(board, *unmirrored(board, detection, lenses[detection.camera]))
         if view is not None and other is not None:
-            views[sighting.camera][sighting.frame] = view
-            backwards[sighting.camera][sighting.frame] = other
+            views[detection.camera][detection.frame] = view
+            backwards[detection.camera][detection.frame] = other
     odd: dict[str, int] = dict.fromkeys(rig_names, 0)
     compared = 0
     for first, second in combinations(rig_names, 2):
@@ -92,18 +92,18 @@ def mirrored_cameras(
     return (Finding("mirrored-video", "blocks", message, remedy, guilty),)
 
 
-def unmirrored(board: Board, sighting: Sighting, lens: Lens) -> tuple[Sighting, Lens]:
-    """A chessboard sighting and its lens with left and right of the picture exchanged."""
+def unmirrored(board: Board, detection: Detection, lens: Lens) -> tuple[Detection, Lens]:
+    """A chessboard detection and its lens with left and right of the picture exchanged."""
     across, down = board.corners
-    row, column = np.divmod(sighting.ids, across)
+    row, column = np.divmod(detection.ids, across)
     # The corner from which the board counts has a black square outside; mirroring along the even side keeps it.
     along = across % 2 == 0 or board.turn_symmetric
     ids = row * across + (across - 1 - column) if along else (down - 1 - row) * across + column
-    pixels = np.column_stack([sighting.size[0] - 1.0 - sighting.pixels[:, 0], sighting.pixels[:, 1]])
+    pixels = np.column_stack([detection.size[0] - 1.0 - detection.pixels[:, 0], detection.pixels[:, 1]])
     matrix, distortion = lens.matrix.copy(), lens.distortion.copy()
-    matrix[0, 2] = sighting.size[0] - 1.0 - matrix[0, 2]
+    matrix[0, 2] = detection.size[0] - 1.0 - matrix[0, 2]
     distortion[3] = -distortion[3]
-    flipped = Sighting(sighting.camera, sighting.frame, sighting.picture, sighting.size, ids, pixels)
+    flipped = Detection(detection.camera, detection.frame, detection.picture, detection.size, ids, pixels)
     changed = Lens(
         lens.camera, lens.size, matrix, distortion, lens.rms, lens.focal_deviation, lens.centre_deviation,
         lens.model, lens.residuals, lens.coverage,
@@ -126,11 +126,11 @@ def pair_findings(rig: Rig) -> tuple[Finding, ...]:
     return (Finding("out-of-step", "blocks", message, remedy, bad),)
 
 
-def board_disagreement(cameras: Sequence[Camera], board: Board, sightings: Sequence[Sighting]) -> float:
+def board_disagreement(cameras: Sequence[Camera], board: Board, detections: Sequence[Detection]) -> float:
     """Pixels per 1000 of width by which two-view intersections miss the corners: mean over pairs of the clipped median;
     NaN if no two cameras share a frame.
     """
-    pairs = _shared_frames(cameras, sightings)
+    pairs = _shared_frames(cameras, detections)
     values: list[float] = []
     for one, two, frames in pairs:
         errors = [_two_views(cameras[one], cameras[two], *couple, board)[1] for couple in frames]
@@ -138,10 +138,10 @@ def board_disagreement(cameras: Sequence[Camera], board: Board, sightings: Seque
     return float(np.mean(values)) if values else float("nan")
 
 
-def square_size(cameras: Sequence[Camera], board: Board, sightings: Sequence[Sighting]) -> float | None:
+def square_size(cameras: Sequence[Camera], board: Board, detections: Sequence[Detection]) -> float | None:
     """Side of a square as these cameras measure it, mm (median); None if no two share a frame."""
     sizes: list[Array] = []
-    for one, two, frames in _shared_frames(cameras, sightings):
+    for one, two, frames in _shared_frames(cameras, detections):
         for first, second in frames:
             points, _, ids = _two_views(cameras[one], cameras[two], first, second, board)
             apart = np.linalg.norm(points[:, None] - points[None], axis=-1)
@@ -153,11 +153,11 @@ def square_size(cameras: Sequence[Camera], board: Board, sightings: Sequence[Sig
 
 
 def _shared_frames(
-    cameras: Sequence[Camera], sightings: Sequence[Sighting]
-) -> list[tuple[int, int, list[tuple[Sighting, Sighting]]]]:
+    cameras: Sequence[Camera], detections: Sequence[Detection]
+) -> list[tuple[int, int, list[tuple[Detection, Detection]]]]:
     """Pairs of cameras with the frames that both saw, with four common corners or more."""
-    seen = {(sighting.camera, sighting.frame): sighting for sighting in sightings}
-    shared: list[tuple[int, int, list[tuple[Sighting, Sighting]]]] = []
+    seen = {(detection.camera, detection.frame): detection for detection in detections}
+    shared: list[tuple[int, int, list[tuple[Detection, Detection]]]] = []
     for one, two in combinations(range(len(cameras)), 2):
         names = cameras[one].name, cameras[two].name
         frames = sorted({frame for name, frame in seen if name == names[0] and (names[1], frame) in seen})
@@ -170,7 +170,7 @@ def _shared_frames(
 
 
 def _two_views(
-    one: Camera, two: Camera, first: Sighting, second: Sighting, board: Board
+    one: Camera, two: Camera, first: Detection, second: Detection, board: Board
 ) -> tuple[Array, Array, Indices]:
     """(K, 3) common corners in the world, (K,) pixels per 1000 by which they miss the views, (K,) ids."""
     best: tuple[Array, Array, Indices] | None = None

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from studio.footage.calibration.boards import Sighting
+from studio.footage.calibration.boards import Detection
 from studio.footage.calibration.detection import BoardFinder, sharpness
 from studio.footage.capture.footage import background_turn, turned_picture
 from studio.footage.capture.naming import match_names, natural_key
@@ -57,9 +57,9 @@ AS_IT_IS = HowTaken()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Seen:
-    """A sighting and how sharp its picture is."""
+    """A detection and how sharp its picture is."""
 
-    sighting: Sighting
+    detection: Detection
     sharpness: float
 
 
@@ -156,15 +156,15 @@ def frames_in_step(counts: Sequence[int], most: int) -> Indices:
     return np.arange(0, least, step)
 
 
-def chosen_for_lens(seen: Sequence[Seen], most: int = LENS_PICTURES) -> tuple[list[Sighting], int]:
+def chosen_for_lens(seen: Sequence[Seen], most: int = LENS_PICTURES) -> tuple[list[Detection], int]:
     """Sharp ones that together cover the picture, most informative first; and how many were blurred."""
     if len(seen) <= most // 2:
-        return [entry.sighting for entry in seen], 0
+        return [entry.detection for entry in seen], 0
     usual = float(np.median([entry.sharpness for entry in seen]))
     sharp = [entry for entry in seen if entry.sharpness >= BLURRED * usual]
-    cells = [_cells(entry.sighting) for entry in sharp]
+    cells = [_cells(entry.detection) for entry in sharp]
     covered: dict[int, int] = {}
-    left, chosen = list(range(len(sharp))), list[Sighting]()
+    left, chosen = list(range(len(sharp))), list[Detection]()
     while left and len(chosen) < most:
         gains = [
             sum(0.5 ** covered.get(cell, 0) for cell in cells[k]) * min(sharp[k].sharpness / usual, 1.2)
@@ -173,14 +173,14 @@ def chosen_for_lens(seen: Sequence[Seen], most: int = LENS_PICTURES) -> tuple[li
         best = left.pop(int(np.argmax(gains)))
         for cell in cells[best]:
             covered[cell] = covered.get(cell, 0) + 1
-        chosen.append(sharp[best].sighting)
-    return sorted(chosen, key=lambda sighting: sighting.frame), len(seen) - len(sharp)
+        chosen.append(sharp[best].detection)
+    return sorted(chosen, key=lambda detection: detection.frame), len(seen) - len(sharp)
 
 
-def _cells(sighting: Sighting) -> set[int]:
-    """Cells of an 8 by 8 grid that a sighting's corners lie in, distinguished by the tilt of the board."""
-    places = np.clip(8 * sighting.pixels / np.array(sighting.size), 0, 7).astype(int)
-    first, last = sighting.pixels[0], sighting.pixels[-1]
+def _cells(detection: Detection) -> set[int]:
+    """Cells of an 8 by 8 grid that a detection's corners lie in, distinguished by the tilt of the board."""
+    places = np.clip(8 * detection.pixels / np.array(detection.size), 0, 7).astype(int)
+    first, last = detection.pixels[0], detection.pixels[-1]
     lean = int(np.degrees(np.arctan2(last[1] - first[1], last[0] - first[0])) // 20) % 18
     return {int(place) + 64 * lean for place in 8 * places[:, 1] + places[:, 0]}
 
@@ -199,9 +199,9 @@ def _examine(
     for done, (frame, name, raw) in enumerate(_pictures(footage, count, frames + begin)):
         progress(f"Looking for the board, camera {camera}", done, len(frames))
         picture = taken.upright(camera, raw)
-        sighting = finder.find(picture, camera, frame - begin, name)
-        if sighting is not None:
-            seen.append(Seen(sighting, sharpness(picture, sighting)))
+        detection = finder.find(picture, camera, frame - begin, name)
+        if detection is not None:
+            seen.append(Seen(detection, sharpness(picture, detection)))
     return seen
 
 

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.footage.calibration.boards import Board, Sighting
+from studio.footage.calibration.boards import Board, Detection
 from studio.footage.calibration.intrinsics import Lens
 from studio.foundations.arrays import Array
 from studio.foundations.geometry.rigid import compose, inverse, rigid
@@ -20,11 +20,11 @@ MOST_VOTES = 240
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BoardView:
-    """One sighting with the poses that explain it. poses : (P, 3, 4) camera_from_board, mm, of which one is right;
+    """One detection with the poses that explain it. poses : (P, 3, 4) camera_from_board, mm, of which one is right;
     turned : (P,) whether the corners are counted from the other end (boards that look alike after half a turn).
     """
 
-    sighting: Sighting
+    detection: Detection
     poses: Array
     turned: NDArray[np.bool_]
 
@@ -45,20 +45,20 @@ class PairPose:
         return self.agreeing * self.agreeing / max(self.shared, 1)
 
 
-def view_of(board: Board, sighting: Sighting, lens: Lens) -> BoardView | None:
-    """The poses of a board that explain a sighting, most likely first; None if its corners lie on a line."""
+def view_of(board: Board, detection: Detection, lens: Lens) -> BoardView | None:
+    """The poses of a board that explain a detection, most likely first; None if its corners lie on a line."""
     poses: list[Array] = []
     turned: list[bool] = []
     count = len(board.points)
     for other_end in (False, True) if board.turn_symmetric else (False,):
-        ids = count - 1 - sighting.ids if other_end else sighting.ids
+        ids = count - 1 - detection.ids if other_end else detection.ids
         points = board.points[ids]
         spread = np.linalg.svd(points[:, :2] - points[:, :2].mean(axis=0), compute_uv=False)
         if spread[1] < 0.5 * board.square_mm:
             return None
         try:
             _, turns, shifts, _ = cv2.solvePnPGeneric(
-                points, sighting.pixels, lens.matrix, lens.distortion, flags=cv2.SOLVEPNP_IPPE
+                points, detection.pixels, lens.matrix, lens.distortion, flags=cv2.SOLVEPNP_IPPE
             )
         except cv2.error:
             return None
@@ -69,19 +69,19 @@ def view_of(board: Board, sighting: Sighting, lens: Lens) -> BoardView | None:
             if np.isfinite(pose).all() and pose[2, 3] > 0.0:
                 poses.append(pose)
                 turned.append(other_end)
-    return BoardView(sighting, np.array(poses), np.array(turned)) if poses else None
+    return BoardView(detection, np.array(poses), np.array(turned)) if poses else None
 
 
 def views_by_camera(
-    board: Board, sightings: Sequence[Sighting], lenses: Mapping[str, Lens]
+    board: Board, detections: Sequence[Detection], lenses: Mapping[str, Lens]
 ) -> dict[str, dict[int, BoardView]]:
     """Camera → frame → view."""
     views: dict[str, dict[int, BoardView]] = {name: {} for name in lenses}
-    for sighting in sightings:
-        if sighting.camera in lenses:
-            view = view_of(board, sighting, lenses[sighting.camera])
+    for detection in detections:
+        if detection.camera in lenses:
+            view = view_of(board, detection, lenses[detection.camera])
             if view is not None:
-                views[sighting.camera][sighting.frame] = view
+                views[detection.camera][detection.frame] = view
     return views
 
 

@@ -152,7 +152,7 @@ def board_from_text(text: str, thickness_mm: float = 0.0) -> Board:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sighting:
+class Detection:
     """One board in one picture.
 
     camera : whose. frame : equal numbers are the same moment in all cameras. picture : what to call it in messages.
@@ -170,10 +170,10 @@ class Sighting:
     mirrored: bool = False
 
 
-def of_camera(sightings: Iterable[Sighting], camera: str) -> tuple[Sighting, ...]:
+def of_camera(detections: Iterable[Detection], camera: str) -> tuple[Detection, ...]:
     """Those of one camera, by frame."""
-    own = [sighting for sighting in sightings if sighting.camera == camera]
-    return tuple(sorted(own, key=lambda sighting: sighting.frame))
+    own = [detection for detection in detections if detection.camera == camera]
+    return tuple(sorted(own, key=lambda detection: detection.frame))
 
 
 def rays_of(camera: Camera, pixels: Array) -> Array:

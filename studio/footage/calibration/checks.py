@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from studio.footage.calibration.board_checks import board_findings
-from studio.footage.calibration.boards import Board, Sighting
+from studio.footage.calibration.boards import Board, Detection
 from studio.footage.calibration.findings import Finding, Severity, blocking
 from studio.footage.calibration.rig_checks import distance_findings, rig_findings, size_findings
 from studio.footage.calibration.silhouette_checks import Masks, silhouette_findings
@@ -19,7 +19,7 @@ def check_calibration(
     *,
     footage_sizes: Mapping[str, tuple[int, int]] | None = None,
     board: Board | None = None,
-    sightings: Sequence[Sighting] = (),
+    detections: Sequence[Detection] = (),
     masks: Masks | None = None,
     height_mm: float | None = None,
     scale: float = 1.0,
@@ -27,17 +27,17 @@ def check_calibration(
 ) -> tuple[Finding, ...]:
     """All findings on a calibration, blocking ones first; none for a good one.
 
-    footage_sizes : (width, height) of each camera's footage. board, sightings : board footage taken with these
+    footage_sizes : (width, height) of each camera's footage. board, detections : board footage taken with these
     cameras. masks : silhouettes of one person, frame → camera → (H, W), nonzero = person. height_mm : the person's.
     scale : of the body beside a person (`scale_of`).
     distances_mm : measured distances between two cameras' lenses. Each argument adds checks.
     """
-    sizes = {sighting.camera: sighting.size for sighting in sightings} | dict(footage_sizes or {})
+    sizes = {detection.camera: detection.size for detection in detections} | dict(footage_sizes or {})
     findings = [*size_findings(cameras, sizes), *rig_findings(cameras)]
     # Where sizes or rotations are wrong, views disagree for that reason; nothing more is to be learnt from them.
     if not any(finding.code in FIRST_CAUSES for finding in findings):
-        if board is not None and sightings:
-            findings += board_findings(cameras, board, sightings)
+        if board is not None and detections:
+            findings += board_findings(cameras, board, detections)
         if masks and not blocking(findings):
             findings += silhouette_findings(cameras, masks, height_mm, board, scale)
         if not any(finding.code in ("scale", "square-size") for finding in findings):

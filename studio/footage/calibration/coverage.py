@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from studio.footage.calibration.boards import Sighting
+from studio.footage.calibration.boards import Detection
 from studio.foundations.arrays import Bytes, Indices
 
 CELLS_ACROSS = 10
@@ -43,20 +43,20 @@ class Coverage:
         )
 
 
-def coverage_of(sightings: Sequence[Sighting], size: tuple[int, int]) -> Coverage:
-    """Count the corners of one camera's sightings in cells as square as can be. size : width, height."""
+def coverage_of(detections: Sequence[Detection], size: tuple[int, int]) -> Coverage:
+    """Count the corners of one camera's detections in cells as square as can be. size : width, height."""
     cell = max(size) / CELLS_ACROSS
     columns, rows = max(3, round(size[0] / cell)), max(3, round(size[1] / cell))
     counts = np.zeros((rows, columns), np.int64)
-    for sighting in sightings:
-        across = np.clip(sighting.pixels[:, 0] * columns // size[0], 0, columns - 1).astype(int)
-        down = np.clip(sighting.pixels[:, 1] * rows // size[1], 0, rows - 1).astype(int)
+    for detection in detections:
+        across = np.clip(detection.pixels[:, 0] * columns // size[0], 0, columns - 1).astype(int)
+        down = np.clip(detection.pixels[:, 1] * rows // size[1], 0, rows - 1).astype(int)
         np.add.at(counts, (down, across), 1)
     return Coverage(counts, size)
 
 
 def coverage_picture(
-    coverage: Coverage, sightings: Sequence[Sighting], dropped: Sequence[Sighting] = ()
+    coverage: Coverage, detections: Sequence[Detection], dropped: Sequence[Detection] = ()
 ) -> Bytes:
     """(H, W, 3) BGR: cells from dark (none) to green (enough), used corners as white dots, dropped ones red."""
     scale = WIDTH / coverage.size[0]
@@ -65,8 +65,8 @@ def coverage_picture(
     shade = cv2.resize(full, (WIDTH, height), interpolation=cv2.INTER_NEAREST)[..., None]
     low, high = np.array([46.0, 38.0, 34.0]), np.array([96.0, 150.0, 60.0])
     picture = np.ascontiguousarray((low + shade * (high - low)).astype(np.uint8))
-    for group, colour in ((sightings, (245, 245, 245)), (dropped, (60, 60, 230))):
-        for sighting in group:
-            for x, y in sighting.pixels * scale:
+    for group, colour in ((detections, (245, 245, 245)), (dropped, (60, 60, 230))):
+        for detection in group:
+            for x, y in detection.pixels * scale:
                 cv2.circle(picture, (round(float(x)), round(float(y))), 2, colour, -1, cv2.LINE_AA)
     return picture

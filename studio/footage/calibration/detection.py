@@ -14,7 +14,7 @@ import cv2.aruco
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.footage.calibration.boards import Board, Sighting
+from studio.footage.calibration.boards import Board, Detection
 from studio.foundations.arrays import Array, Bytes, Floats, Indices
 
 FEWEST_CORNERS = 6
@@ -37,7 +37,7 @@ class BoardFinder:
         self._mirrored_too = mirrored_too and board.kind == "charuco"
         self._charuco = _charuco_detector(board) if board.kind == "charuco" else None
 
-    def find(self, picture: Bytes, camera: str, frame: int, name: str = "") -> Sighting | None:
+    def find(self, picture: Bytes, camera: str, frame: int, name: str = "") -> Detection | None:
         """The board in a (H, W, 3) BGR or (H, W) grey picture, None if fewer than six of its corners are seen."""
         grey = picture
         if picture.ndim == 3:
@@ -48,7 +48,7 @@ class BoardFinder:
         if corners is None:
             return None
         size = (int(grey.shape[1]), int(grey.shape[0]))
-        return Sighting(camera, frame, name or f"frame {frame}", size, *corners, mirrored=mirrored)
+        return Detection(camera, frame, name or f"frame {frame}", size, *corners, mirrored=mirrored)
 
     def _corners(self, grey: Bytes) -> tuple[Indices, Array] | None:
         if self._charuco is not None:
@@ -57,10 +57,10 @@ class BoardFinder:
         return None if pixels is None else (np.arange(len(pixels), dtype=np.int64), pixels)
 
 
-def sharpness(picture: Bytes, sighting: Sighting) -> float:
+def sharpness(picture: Bytes, detection: Detection) -> float:
     """How sharp the board is: the mean gradient over its standard deviation of grey levels, inside its bounds."""
-    low = np.maximum(np.floor(sighting.pixels.min(axis=0)).astype(int) - 2, 0)
-    high = np.ceil(sighting.pixels.max(axis=0)).astype(int) + 3
+    low = np.maximum(np.floor(detection.pixels.min(axis=0)).astype(int) - 2, 0)
+    high = np.ceil(detection.pixels.max(axis=0)).astype(int) + 3
     part = picture[low[1] : high[1], low[0] : high[0]]
     grey = (part.mean(axis=2) if part.ndim == 3 else part).astype(np.float32)
     steps = np.hypot(cv2.Sobel(grey, cv2.CV_32F, 1, 0), cv2.Sobel(grey, cv2.CV_32F, 0, 1))

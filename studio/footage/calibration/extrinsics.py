@@ -11,7 +11,7 @@ from itertools import combinations
 import numpy as np
 
 from studio.footage.calibration.board_poses import BoardView, PairPose, pair_pose, views_by_camera
-from studio.footage.calibration.boards import Board, Sighting
+from studio.footage.calibration.boards import Board, Detection
 from studio.footage.calibration.bundle import Bundle, Observations, adjusted, errors_of, kept_inliers
 from studio.footage.calibration.intrinsics import Lens
 from studio.footage.capture.naming import listed, natural_key
@@ -47,7 +47,7 @@ class Rig:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Seen:
-    """The input of the solver. views : camera → frame → its sighting of the board."""
+    """The input of the solver. views : camera → frame → its detection of the board."""
 
     board: Board
     names: tuple[str, ...]
@@ -57,18 +57,18 @@ class _Seen:
 
 def solve_rig(
     board: Board,
-    sightings: Sequence[Sighting],
+    detections: Sequence[Detection],
     lenses: Mapping[str, Lens],
     *,
     refine_lenses: bool = False,
     progress: Progress = no_progress,
 ) -> Rig:
-    """The cameras named by `lenses`, from their sightings at the same frame numbers.
+    """The cameras named by `lenses`, from their detections at the same frame numbers.
 
     Raises CalibrationError naming the cameras that share no board view with the others.
     """
     names = tuple(sorted(lenses, key=natural_key))
-    seen = _Seen(board, names, lenses, views_by_camera(board, sightings, lenses))
+    seen = _Seen(board, names, lenses, views_by_camera(board, detections, lenses))
     pairs: list[PairPose] = []
     couples = list(combinations(names, 2))
     for number, (first, second) in enumerate(couples):
@@ -161,16 +161,16 @@ def _board_poses(
 
 def _cost(board: Board, pose: Array, camera: Array, lens: Lens, view: BoardView) -> tuple[float, float]:
     """Clipped mean pixels between a board's pose and a view, and the same counted from the board's other end."""
-    sighting = view.sighting
+    detection = view.detection
     costs: list[float] = []
-    for ids in (sighting.ids, len(board.points) - 1 - sighting.ids):
+    for ids in (detection.ids, len(board.points) - 1 - detection.ids):
         local = board.points[ids] @ pose[:, :3].T + pose[:, 3]
         seen = local @ camera[:, :3].T + camera[:, 3]
         ahead = np.maximum(seen[:, 2:], 1.0)
         flat = seen[:, :2] / ahead
         # The lens's bending is left out on both sides alike: a coarse measure to choose by.
         centre, focal = lens.matrix[:2, 2], np.diag(lens.matrix)[:2]
-        off = np.linalg.norm(flat * focal + centre - sighting.pixels, axis=1)
+        off = np.linalg.norm(flat * focal + centre - detection.pixels, axis=1)
         costs.append(float(np.minimum(off, CLIPPED_PX).mean()))
         if not board.turn_symmetric:
             return costs[0], np.inf
@@ -189,10 +189,10 @@ def _bundle(
     for number, name in enumerate(seen.names):
         for moment, frame in enumerate(frames):
             if frame in seen.views[name]:
-                sighting = seen.views[name][frame].sighting
-                ids = len(points) - 1 - sighting.ids if (name, frame) in turned else sighting.ids
+                detection = seen.views[name][frame].detection
+                ids = len(points) - 1 - detection.ids if (name, frame) in turned else detection.ids
                 one = np.full(len(ids), 1)
-                parts.append((one * number, one * moment, points[ids], sighting.pixels))
+                parts.append((one * number, one * moment, points[ids], detection.pixels))
     camera, moment, corners, pixels = (np.concatenate(column) for column in zip(*parts, strict=True))
     bundle = Bundle(
         np.array([_vector(poses[name]) for name in seen.names]),

@@ -18,7 +18,7 @@ import msgspec
 import numpy as np
 
 from studio.footage.calibration.board_poses import view_of
-from studio.footage.calibration.boards import Board, Sighting
+from studio.footage.calibration.boards import Board, Detection
 from studio.footage.calibration.extrinsics import Rig
 from studio.footage.calibration.intrinsics import Lens
 from studio.foundations.arrays import Array
@@ -48,18 +48,18 @@ def floor_from_board(pose: Array, thickness_mm: float = 0.0) -> Array:
 
 
 def board_on_floor(
-    rig: Rig, board: Board, sightings: Sequence[Sighting], lenses: Mapping[str, Lens]
+    rig: Rig, board: Board, detections: Sequence[Detection], lenses: Mapping[str, Lens]
 ) -> Array:
     """(3, 4) world_from_board of a still board that several cameras saw, or one: the pose that fits all best.
 
     Raises CalibrationError if none of the rig's cameras saw it.
     """
     cameras = {camera.name: camera for camera in rig.cameras}
-    seen = [sighting for sighting in sightings if sighting.camera in cameras]
+    seen = [detection for detection in detections if detection.camera in cameras]
     best, least = None, np.inf
-    for sighting in seen:
-        view = view_of(board, sighting, lenses[sighting.camera])
-        camera = cameras[sighting.camera]
+    for detection in seen:
+        view = view_of(board, detection, lenses[detection.camera])
+        camera = cameras[detection.camera]
         for pose in view.poses[~view.turned] if view is not None else ():
             candidate = compose(inverse(rigid(camera.rotation, camera.translation)), pose)
             cost = sum(_off(board, cameras[other.camera], candidate, other) for other in seen)
@@ -151,15 +151,17 @@ def world_from_points(points: Array, world: Array) -> tuple[Array, float]:
     return best_fit(points, world), ratio
 
 
-def _off(board: Board, camera: Camera, pose: Array, sighting: Sighting) -> float:
-    """Root mean square pixels between a board's pose and a sighting (either end of a board that looks alike)."""
+def _off(board: Board, camera: Camera, pose: Array, detection: Detection) -> float:
+    """Root mean square pixels between a board's pose and a detection (either end of a board that looks alike)."""
     world = transform(pose, board.points)
     local = world @ camera.rotation.T + camera.translation
     if np.any(local[:, 2] <= 0.0):
         return 1e6
     pixels = cv2.projectPoints(local, np.zeros(3), np.zeros(3), camera.matrix, camera.distortion)[0][:, 0]
-    ends = (sighting.ids, len(board.points) - 1 - sighting.ids) if board.turn_symmetric else (sighting.ids,)
-    return min(float(np.sqrt(((pixels[ids] - sighting.pixels) ** 2).sum(axis=1).mean())) for ids in ends)
+    ends = (
+        (detection.ids, len(board.points) - 1 - detection.ids) if board.turn_symmetric else (detection.ids,)
+    )
+    return min(float(np.sqrt(((pixels[ids] - detection.pixels) ** 2).sum(axis=1).mean())) for ids in ends)
 
 
 def _lines(camera: Camera, pixel: Array) -> Array:

@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from studio.footage.calibration.boards import Board, Sighting
+from studio.footage.calibration.boards import Board, Detection
 from studio.footage.calibration.coverage import Coverage, coverage_of
 from studio.footage.capture.calibration_files import read_intrinsics
 from studio.footage.capture.naming import match_names
@@ -77,15 +77,15 @@ class _Solution:
     turns: Array
 
 
-def solve_lens(board: Board, sightings: Sequence[Sighting]) -> Lens:
-    """The lens of the one camera that all sightings are of.
+def solve_lens(board: Board, detections: Sequence[Detection]) -> Lens:
+    """The lens of the one camera that all detections are of.
 
     Raises CalibrationError for fewer than three pictures, or pictures of several sizes.
     """
-    camera, size = _check(sightings)
-    used, dropped = list(sightings), dict[int, str]()
+    camera, size = _check(detections)
+    used, dropped = list(detections), dict[int, str]()
     solution, model = _fit(board, used, size)
-    least = max(FEWEST_PICTURES, int(np.ceil(KEPT_SHARE * len(sightings))))
+    least = max(FEWEST_PICTURES, int(np.ceil(KEPT_SHARE * len(detections))))
     for _ in range(DROP_ROUNDS):
         limit = max(OUTLYING * float(np.median(solution.rms_of)), LEAST_OUTLYING_PX * size[0] / 1000.0)
         worst = int(np.argmax(solution.rms_of))
@@ -100,17 +100,17 @@ def solve_lens(board: Board, sightings: Sequence[Sighting]) -> Lens:
     turns: list[Array] = list(solution.turns)
     upright = [abs(float(np.asarray(cv2.Rodrigues(turn)[0], dtype=np.float64)[2, 2])) for turn in turns]
     tilts = np.degrees(np.arccos(np.clip(upright, 0, 1)))
-    place = {id(sighting): number for number, sighting in enumerate(used)}
+    place = {id(detection): number for number, detection in enumerate(used)}
     residuals = tuple(
-        PictureResidual(sighting.picture, sighting.frame, np.nan, np.nan, dropped[id(sighting)])
-        if id(sighting) in dropped
+        PictureResidual(detection.picture, detection.frame, np.nan, np.nan, dropped[id(detection)])
+        if id(detection) in dropped
         else PictureResidual(
-            sighting.picture,
-            sighting.frame,
-            float(solution.rms_of[place[id(sighting)]]),
-            float(tilts[place[id(sighting)]]),
+            detection.picture,
+            detection.frame,
+            float(solution.rms_of[place[id(detection)]]),
+            float(tilts[place[id(detection)]]),
         )
-        for sighting in sightings
+        for detection in detections
     )
     return Lens(
         camera,
@@ -126,13 +126,13 @@ def solve_lens(board: Board, sightings: Sequence[Sighting]) -> Lens:
     )
 
 
-def _check(sightings: Sequence[Sighting]) -> tuple[str, tuple[int, int]]:
-    names = sorted({sighting.camera for sighting in sightings})
-    sizes = sorted({sighting.size for sighting in sightings})
+def _check(detections: Sequence[Detection]) -> tuple[str, tuple[int, int]]:
+    names = sorted({detection.camera for detection in detections})
+    sizes = sorted({detection.size for detection in detections})
     name = names[0] if names else "?"
-    if len(sightings) < FEWEST_PICTURES:
+    if len(detections) < FEWEST_PICTURES:
         raise CalibrationError(
-            f"The board is found in {len(sightings)} pictures of camera {name}; {FEWEST_PICTURES} are the least.",
+            f"The board is found in {len(detections)} pictures of camera {name}; {FEWEST_PICTURES} are the least.",
             "Check the board's kind and numbers, and take pictures in which the whole board is sharp.",
         )
     if len(sizes) > 1:
@@ -143,9 +143,9 @@ def _check(sightings: Sequence[Sighting]) -> tuple[str, tuple[int, int]]:
     return name, sizes[0]
 
 
-def _fit(board: Board, sightings: Sequence[Sighting], size: tuple[int, int]) -> tuple[_Solution, str]:
+def _fit(board: Board, detections: Sequence[Detection], size: tuple[int, int]) -> tuple[_Solution, str]:
     """The richest model that the pictures carry, and its name in words."""
-    share, count = coverage_of(sightings, size).share, len(sightings)
+    share, count = coverage_of(detections, size).share, len(detections)
     flags = cv2.CALIB_FIX_K3
     words = ["focal length", "two radial terms"]
     if count < MANY:
@@ -157,17 +157,17 @@ def _fit(board: Board, sightings: Sequence[Sighting], size: tuple[int, int]) -> 
     else:
         words.append("aspect")
     if count >= SOME:
-        free = _best_start(board, sightings, size, flags)
+        free = _best_start(board, detections, size, flags)
         if np.max(free.deviations[2:4]) <= CENTRE_DEVIATION * size[0] and _inside(free, size):
             return free, ", ".join([*words, "centre"]) + " free"
     flags |= cv2.CALIB_FIX_PRINCIPAL_POINT | cv2.CALIB_ZERO_TANGENT_DIST | cv2.CALIB_FIX_ASPECT_RATIO
     flags |= cv2.CALIB_FIX_K2
-    fixed = _best_start(board, sightings, size, flags)
+    fixed = _best_start(board, detections, size, flags)
     return fixed, "focal length and one radial term free, centre held in the middle"
 
 
 def _profiled_deviation(
-    board: Board, sightings: Sequence[Sighting], size: tuple[int, int], solution: _Solution
+    board: Board, detections: Sequence[Detection], size: tuple[int, int], solution: _Solution
 ) -> float:
     """One standard deviation of the focal length, pixels, from how much worse the pictures fit beside it.
 
@@ -175,12 +175,12 @@ def _profiled_deviation(
     solver may be sure of a wrong one. Here the focal length is held a few percent off and all else solved again.
     """
     flags = cv2.CALIB_FIX_FOCAL_LENGTH | cv2.CALIB_FIX_PRINCIPAL_POINT | cv2.CALIB_FIX_K3
-    flags |= cv2.CALIB_ZERO_TANGENT_DIST if len(sightings) < MANY else 0
-    count = sum(len(sighting.ids) for sighting in sightings)
+    flags |= cv2.CALIB_ZERO_TANGENT_DIST if len(detections) < MANY else 0
+    count = sum(len(detection.ids) for detection in detections)
     focal = float(np.mean(np.diag(solution.matrix)[:2]))
     rises: list[float] = []
     for share in (1.0 - PROFILED, 1.0 + PROFILED):
-        held = _solved(board, sightings, size, flags, share * focal, solution.matrix[:2, 2])
+        held = _solved(board, detections, size, flags, share * focal, solution.matrix[:2, 2])
         rises.append(2.0 * count * max((held.rms / max(solution.rms, 1e-9)) ** 2 - 1.0, 1e-12))
     return PROFILED * focal / float(np.sqrt(min(rises)))
 
@@ -190,11 +190,13 @@ def _inside(solution: _Solution, size: tuple[int, int]) -> bool:
     return bool(np.all((share > 0.25) & (share < 0.75)))
 
 
-def _best_start(board: Board, sightings: Sequence[Sighting], size: tuple[int, int], flags: int) -> _Solution:
+def _best_start(
+    board: Board, detections: Sequence[Detection], size: tuple[int, int], flags: int
+) -> _Solution:
     """The least residual over a few guesses of the focal length; the first that is good is enough."""
     best: _Solution | None = None
     for guess in FOCAL_GUESSES:
-        solution = _solved(board, sightings, size, flags, guess * max(size))
+        solution = _solved(board, detections, size, flags, guess * max(size))
         if best is None or solution.rms < best.rms:
             best = solution
         if best.rms < size[0] / 1000.0:
@@ -206,7 +208,7 @@ def _best_start(board: Board, sightings: Sequence[Sighting], size: tuple[int, in
 
 def _solved(
     board: Board,
-    sightings: Sequence[Sighting],
+    detections: Sequence[Detection],
     size: tuple[int, int],
     flags: int,
     focal: float,
@@ -216,8 +218,8 @@ def _solved(
     middle = (np.array(size) - 1.0) / 2.0 if centre is None else centre
     start = np.array([[focal, 0.0, middle[0]], [0.0, focal, middle[1]], [0.0, 0.0, 1.0]])
     rms, matrix, distortion, turns, _, deviations, _, of_picture = cv2.calibrateCameraExtended(
-        [points[sighting.ids].astype(np.float32) for sighting in sightings],
-        [sighting.pixels.astype(np.float32) for sighting in sightings],
+        [points[detection.ids].astype(np.float32) for detection in detections],
+        [detection.pixels.astype(np.float32) for detection in detections],
         size,
         start,
         np.zeros(5),

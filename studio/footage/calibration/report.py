@@ -79,11 +79,11 @@ def write_calibrated(calibrated: Calibrated, path: Path, *, anyway: bool = False
     written.append(report)
     for name, lens in calibrated.lenses.items():
         dropped = {residual.frame for residual in lens.residuals if residual.dropped}
-        sightings = calibrated.sightings.get(name, ())
+        detections = calibrated.detections.get(name, ())
         picture = coverage_picture(
             lens.coverage,
-            [sighting for sighting in sightings if sighting.frame not in dropped],
-            [sighting for sighting in sightings if sighting.frame in dropped],
+            [detection for detection in detections if detection.frame not in dropped],
+            [detection for detection in detections if detection.frame in dropped],
         )
         place = path.with_name(f"{path.stem}.coverage-{name}.png")
         place.write_bytes(bytes(cv2.imencode(".png", picture)[1]))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from studio.footage.calibration.board_checks import mirrored_cameras, mirrored_sightings, pair_findings
+from studio.footage.calibration.board_checks import mirrored_cameras, mirrored_detections, pair_findings
 from studio.footage.calibration.board_footage_reading import (
     AS_IT_IS,
     HowTaken,
@@ -17,7 +17,7 @@ from studio.footage.calibration.board_footage_reading import (
     look_together,
     plain_names,
 )
-from studio.footage.calibration.boards import Board, Sighting, of_camera
+from studio.footage.calibration.boards import Board, Detection, of_camera
 from studio.footage.calibration.checks import check_calibration
 from studio.footage.calibration.detection import BoardFinder
 from studio.footage.calibration.extrinsics import Rig, moved, solve_rig
@@ -37,14 +37,14 @@ from studio.foundations.progress import Progress, no_progress
 class Calibrated:
     """The result of a calibration.
 
-    lenses : camera → lens. rig : the placed cameras, None if only lenses were requested. sightings : camera → those
+    lenses : camera → lens. rig : the placed cameras, None if only lenses were requested. detections : camera → those
     that its lens came from. findings : blocking ones first. floor : how it was set, as text; "" if it was not.
     """
 
     board: Board
     lenses: Mapping[str, Lens]
     rig: Rig | None
-    sightings: Mapping[str, tuple[Sighting, ...]]
+    detections: Mapping[str, tuple[Detection, ...]]
     findings: tuple[Finding, ...]
     floor: str = ""
 
@@ -107,14 +107,16 @@ def _solved(
     """The calibration by one board; parameters as of `calibrate`."""
     board, names = solving.board, solving.names
     together = solving.together(extrinsics) if extrinsics is not None else []
-    used: dict[str, tuple[Sighting, ...]] = {}
+    used: dict[str, tuple[Detection, ...]] = {}
     if lenses is None and intrinsics is not None and intrinsics.is_file():
         lenses = lenses_of_file(intrinsics, names)
     if lenses is None:
-        used = solving.lens_sightings(intrinsics, together)
+        used = solving.lens_detections(intrinsics, together)
         lenses = solving.lenses(used)
     findings = [finding for lens in lenses.values() for finding in lens_findings(lens)]
-    findings += mirrored_sightings([*together, *(sighting for group in used.values() for sighting in group)])
+    findings += mirrored_detections(
+        [*together, *(detection for group in used.values() for detection in group)]
+    )
     if extrinsics is None:
         return Calibrated(board, lenses, None, used, _sorted(findings))
     missing = [name for name in names if name not in lenses]
@@ -209,19 +211,19 @@ class _Solving:
             )
         return int(number)
 
-    def together(self, folder: Path) -> list[Sighting]:
+    def together(self, folder: Path) -> list[Detection]:
         footage = by_camera(list_footage(folder), self.names)
         finder = BoardFinder(self.board, thorough=all(entry.video is None for entry in footage.values()))
         also = () if self.floor_frame is None else (self.floor_frame,)
-        return [entry.sighting for entry in look_together(finder, footage, self.progress, also, self.taken)]
+        return [entry.detection for entry in look_together(finder, footage, self.progress, also, self.taken)]
 
-    def lens_sightings(
-        self, folder: Path | None, together: Sequence[Sighting]
-    ) -> dict[str, tuple[Sighting, ...]]:
-        """Camera → the sightings for its lens; cameras without any are left out only if their footage is missing."""
+    def lens_detections(
+        self, folder: Path | None, together: Sequence[Detection]
+    ) -> dict[str, tuple[Detection, ...]]:
+        """Camera → the detections for its lens; cameras without any are left out only if their footage is missing."""
         if folder is None:
             return {name: of_camera(together, name) for name in self.names}
-        chosen: dict[str, tuple[Sighting, ...]] = {}
+        chosen: dict[str, tuple[Detection, ...]] = {}
         for name, entry in by_camera(list_footage(folder), self.names).items():
             finder = BoardFinder(self.board, thorough=entry.video is None)
             seen = look_for_lens(finder, name, entry, self.progress, self.taken)
@@ -234,34 +236,34 @@ class _Solving:
             chosen[name] = tuple(chosen_for_lens(seen)[0])
         return chosen
 
-    def lenses(self, used: Mapping[str, tuple[Sighting, ...]]) -> dict[str, Lens]:
+    def lenses(self, used: Mapping[str, tuple[Detection, ...]]) -> dict[str, Lens]:
         solved: dict[str, Lens] = {}
-        for number, (name, sightings) in enumerate(used.items()):
+        for number, (name, detections) in enumerate(used.items()):
             self.progress(f"Solving the lens of camera {name}", number, len(used))
-            if not sightings:
+            if not detections:
                 raise _NotFound(
                     f"The board {self.board.text} is found in no picture of camera {name}.",
                     "Check the board's kind and numbers, or show it to this camera.",
                 )
-            solved[name] = solve_lens(self.board, sightings)
+            solved[name] = solve_lens(self.board, detections)
         return solved
 
     def placed(
-        self, together: Sequence[Sighting], lenses: Mapping[str, Lens], refine: bool
+        self, together: Sequence[Detection], lenses: Mapping[str, Lens], refine: bool
     ) -> tuple[Rig, str, list[Finding]]:
         """The rig on its floor, how that was set, and findings of pairs. Raises CalibrationError for mirrored ones."""
-        names = sorted({sighting.camera for sighting in together}, key=natural_key)
+        names = sorted({detection.camera for detection in together}, key=natural_key)
         silent = [name for name in lenses if name not in names]
         if silent:
             raise _NotFound(
                 f"The board is found in no picture of camera {listed(silent)} in the common footage.",
                 "Carry the board through this camera's view.",
             )
-        for sighting in together:
-            if sighting.size != lenses[sighting.camera].size:
-                (a, b), (c, d) = sighting.size, lenses[sighting.camera].size
+        for detection in together:
+            if detection.size != lenses[detection.camera].size:
+                (a, b), (c, d) = detection.size, lenses[detection.camera].size
                 raise CalibrationError(
-                    f"Camera {sighting.camera} recorded {a}x{b} pixels, its lens was calibrated at {c}x{d}.",
+                    f"Camera {detection.camera} recorded {a}x{b} pixels, its lens was calibrated at {c}x{d}.",
                     "Record both with one mode of the camera.",
                 )
         chessboard = self.board.kind == "chessboard"
@@ -281,13 +283,15 @@ class _Solving:
             findings.append(Finding("no-floor", "warns", message, remedy))
         return replace(rig, cameras=upright), words, findings
 
-    def _floor(self, rig: Rig, together: Sequence[Sighting], lenses: Mapping[str, Lens]) -> tuple[Array, str]:
+    def _floor(
+        self, rig: Rig, together: Sequence[Detection], lenses: Mapping[str, Lens]
+    ) -> tuple[Array, str]:
         number = self.floor_frame
         if self.floor is None:
             return _guessed_floor(rig), ""
         path = Path(self.floor)
         if number is not None:
-            lying = [sighting for sighting in together if sighting.frame == number]
+            lying = [detection for detection in together if detection.frame == number]
             if not lying:
                 raise CalibrationError(
                     f"No camera sees the board in frame {number}.", "Name a frame in which one does."
@@ -298,12 +302,12 @@ class _Solving:
         elif path.suffix.lower() == ".json":
             return clicked_floor(read_clicks(path), rig.cameras).new_from_old, f"points of {path.name}"
         else:
-            seen: list[Sighting] = []
+            seen: list[Detection] = []
             finder = BoardFinder(self.board)
             footage = by_camera(list_footage(path), [camera.name for camera in rig.cameras])
             for name, entry in footage.items():
                 looks = look_for_lens(finder, name, entry, self.progress, self.taken)
-                seen += [max(looks, key=lambda each: each.sharpness).sighting] if looks else []
+                seen += [max(looks, key=lambda each: each.sharpness).detection] if looks else []
             pose = board_on_floor(rig, self.board, seen, lenses)
             words = f"board on the floor in '{path.name}', {len(seen)} cameras"
         return floor_from_board(pose, self.board.thickness_mm), words

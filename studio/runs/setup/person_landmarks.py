@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from studio.body.motion_files.trc import MarkerMotion
-from studio.evidence.person_network import Sighting
+from studio.evidence.person_network import Detection
 from studio.footage.calibration.floor import triangulated
 from studio.footage.capture.footage import Footage
 from studio.foundations.arrays import Array
@@ -22,7 +22,7 @@ from studio.foundations.errors import CalibrationError, FootageError
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.projection import project
 from studio.foundations.progress import Progress
-from studio.runs.setup.person_masks import Sightings, followed_person
+from studio.runs.setup.person_masks import Detections, followed_person
 
 PAIRS = {
     "Shoulder": (11, 12),
@@ -73,7 +73,9 @@ def person_landmarks(cameras: Sequence[Camera], footage: Footage, progress: Prog
     return MarkerMotion(NAMES, times, positions, "mm", footage.fps)
 
 
-def _joints(cameras: Mapping[str, Camera], seen: Sightings, before: Array | None) -> tuple[Array, int] | None:
+def _joints(
+    cameras: Mapping[str, Camera], seen: Detections, before: Array | None
+) -> tuple[Array, int] | None:
     """(12, 3) mm, and how many more cameras see the left side as the left one than as the right one; None where fewer
     than two cameras see the person. before : those of the last frame; without it both sides may be exchanged.
     """
@@ -101,7 +103,7 @@ def _joints(cameras: Mapping[str, Camera], seen: Sightings, before: Array | None
     return other, -vote
 
 
-def _pixels(seen: Sighting, exchanged: bool) -> Array:
+def _pixels(seen: Detection, exchanged: bool) -> Array:
     return seen.points[RIGHT_AND_LEFT if exchanged else LEFT_AND_RIGHT]
 
 
@@ -127,7 +129,7 @@ def _meeting(cameras: Mapping[str, Camera], pixels: Mapping[str, Array]) -> Arra
 
 
 def _without_outliers(
-    cameras: Mapping[str, Camera], pixels: Mapping[str, Array], seen: Sightings, points: Array
+    cameras: Mapping[str, Camera], pixels: Mapping[str, Array], seen: Detections, points: Array
 ) -> Array:
     """The points without the cameras that contradict the others; NaN where two contradict each other."""
     cleaned = points.copy()
@@ -138,7 +140,7 @@ def _without_outliers(
 
 
 def _of_those_that_agree(
-    cameras: Mapping[str, Camera], rays: Mapping[str, Array], seen: Sightings, point: Array
+    cameras: Mapping[str, Camera], rays: Mapping[str, Array], seen: Detections, point: Array
 ) -> Array:
     """(1, 3) where the rays (1, 2 pixels each) of the largest set of cameras meet that agree on the point."""
 

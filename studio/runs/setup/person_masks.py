@@ -21,7 +21,7 @@ from typing import TypeVar
 import cv2
 import numpy as np
 
-from studio.evidence.person_network import HIPS_ROW, PRESENT, SHOULDERS_ROW, Crop, PersonNetwork, Sighting
+from studio.evidence.person_network import HIPS_ROW, PRESENT, SHOULDERS_ROW, Crop, Detection, PersonNetwork
 from studio.footage.calibration.floor import triangulated
 from studio.footage.capture.footage import Footage
 from studio.foundations.arrays import Array, Bytes
@@ -47,7 +47,7 @@ PRESENT_BESIDE = 0.2
 """Presence from which he counts as seen where the others' points lie, in the better of two looks: that of people upside
 down falls, while their masks stay good."""
 
-Sightings = dict[str, Sighting]
+Detections = dict[str, Detection]
 Made = TypeVar("Made")
 
 
@@ -90,7 +90,7 @@ def person_masks(cameras: Sequence[Camera], footage: Footage, progress: Progress
 
 def followed_person(
     cameras: Sequence[Camera], footage: Footage, progress: Progress
-) -> Iterator[tuple[int, Sightings]]:
+) -> Iterator[tuple[int, Detections]]:
     """Of every frame who is seen in each camera, frames in the order in which that is known."""
     with _network_threads(cameras) as threads:
         for done, (frame, _, seen) in enumerate(_follow_all(cameras, footage, threads, progress), 1):
@@ -104,7 +104,7 @@ def _network_threads(cameras: Sequence[Camera]) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(min(len(cameras), os.cpu_count() or 1), "person network")
 
 
-Followed = tuple[int, Mapping[str, Bytes], Sightings]
+Followed = tuple[int, Mapping[str, Bytes], Detections]
 """A frame, its pictures by camera, and who is seen in them."""
 
 
@@ -164,7 +164,7 @@ class _Follower:
         names = [name for name in self._cameras if name not in absent]
         return _each(self._threads, names, partial(footage.picture, frame=frame))
 
-    def follow(self, frame: int, pictures: Mapping[str, Bytes], searches: bool = True) -> Sightings:
+    def follow(self, frame: int, pictures: Mapping[str, Bytes], searches: bool = True) -> Detections:
         """Where each camera sees the person near where it saw him last; cameras that do not are missing.
 
         searches : whether all pictures are searched, now and then, while only one of several cameras sees him.
@@ -179,11 +179,11 @@ class _Follower:
             agreed = dict(seen)
         return self._complete(pictures, agreed, points)
 
-    def search(self, frame: int, pictures: Mapping[str, Bytes]) -> Sightings:
+    def search(self, frame: int, pictures: Mapping[str, Bytes]) -> Detections:
         """The person in new pictures: the one at the last place, then whom most cameras see, then the largest."""
         self._searched = frame
 
-        def find(name: str) -> list[Sighting]:
+        def find(name: str) -> list[Detection]:
             return self._networks[name].find(pictures[name], self._cameras[name].quarter_turns)
 
         persons = _each(self._threads, pictures, find)
@@ -191,7 +191,7 @@ class _Follower:
             ((name, candidates),) = persons.items()
             largest = max(candidates, key=lambda one: _share_of(one, pictures[name]), default=None)
             return self._complete(pictures, {} if largest is None else {name: largest}, None)
-        best: tuple[tuple[bool, int, float], Sightings, Array | None] = ((False, 0, 0.0), {}, None)
+        best: tuple[tuple[bool, int, float], Detections, Array | None] = ((False, 0, 0.0), {}, None)
         for one, other in itertools.combinations(pictures, 2):
             for pair in itertools.product(persons[one], persons[other]):
                 seen = {one: pair[0], other: pair[1]}
@@ -212,8 +212,10 @@ class _Follower:
                     best = score, seen, points
         return self._complete(pictures, best[1], best[2])
 
-    def _complete(self, pictures: Mapping[str, Bytes], agreed: Sightings, points: Array | None) -> Sightings:
-        """These sightings, and those of cameras that saw no person, or another, where the others' points (5, 3) lie."""
+    def _complete(
+        self, pictures: Mapping[str, Bytes], agreed: Detections, points: Array | None
+    ) -> Detections:
+        """These detections, and new ones at the others' points (5, 3) where a camera saw no person, or another."""
         if points is not None:
             size = _size(self._cameras, agreed, points)
             again = {
@@ -233,8 +235,8 @@ class _Follower:
 
     def _look(
         self, pictures: Mapping[str, Bytes], crops: Mapping[str, Crop], least: float = PRESENT
-    ) -> Sightings:
-        def look(name: str) -> Sighting:
+    ) -> Detections:
+        def look(name: str) -> Detection:
             return self._networks[name].look(pictures[name], crops[name])
 
         looks = _each(self._threads, crops, look)
@@ -246,15 +248,15 @@ def _each(threads: ThreadPoolExecutor, names: Iterable[str], make: Callable[[str
     return dict(zip(chosen, threads.map(make, chosen), strict=True))
 
 
-def _mask(seen: Sightings, pictures: Mapping[str, Bytes], name: str) -> Bytes:
+def _mask(seen: Detections, pictures: Mapping[str, Bytes], name: str) -> Bytes:
     return seen[name].mask(pictures[name])
 
 
-def _agreeing(cameras: Mapping[str, Camera], seen: Sightings) -> tuple[Sightings, Array | None]:
-    """The largest set of sightings that are of one person, and his points; all of them where there is one camera."""
+def _agreeing(cameras: Mapping[str, Camera], seen: Detections) -> tuple[Detections, Array | None]:
+    """The largest set of detections that are of one person, and his points; all of them where there is one camera."""
     if len(cameras) == 1:
         return dict(seen), None
-    best: tuple[tuple[int, float], Sightings, Array | None] = ((0, 0.0), {}, None)
+    best: tuple[tuple[int, float], Detections, Array | None] = ((0, 0.0), {}, None)
     for names in [tuple(seen), *itertools.combinations(seen, 2)]:
         points = _triangulated(cameras, {name: seen[name] for name in names}) if len(names) > 1 else None
         if points is None:
@@ -269,8 +271,8 @@ def _agreeing(cameras: Mapping[str, Camera], seen: Sightings) -> tuple[Sightings
     return best[1], best[2]
 
 
-def _triangulated(cameras: Mapping[str, Camera], seen: Sightings) -> Array | None:
-    """(5, 3) `Sighting.middles` in the world, None if they are nowhere."""
+def _triangulated(cameras: Mapping[str, Camera], seen: Detections) -> Array | None:
+    """(5, 3) `Detection.middles` in the world, None if they are nowhere."""
     try:
         points = triangulated(
             [cameras[name] for name in seen], {name: one.middles() for name, one in seen.items()}
@@ -280,7 +282,7 @@ def _triangulated(cameras: Mapping[str, Camera], seen: Sightings) -> Array | Non
     return points if np.isfinite(points).all() else None
 
 
-def _distance(camera: Camera, points: Array, seen: Sighting) -> float:
+def _distance(camera: Camera, points: Array, seen: Detection) -> float:
     """Mean distance of points (5, 3) from those a camera sees, as a share of its crop; inf behind the camera."""
     pixels, depths = project(camera, points)
     if (depths <= 0.0).any():
@@ -288,13 +290,13 @@ def _distance(camera: Camera, points: Array, seen: Sighting) -> float:
     return float(np.linalg.norm(pixels - seen.middles(), axis=1).mean()) / seen.next_crop.side
 
 
-def _nearest(camera: Camera, points: Array, persons: Sequence[Sighting]) -> Sighting | None:
+def _nearest(camera: Camera, points: Array, persons: Sequence[Detection]) -> Detection | None:
     """The one whose points lie nearest to points (5, 3) of the world, None if none is near."""
     nearest = min(persons, key=lambda one: _distance(camera, points, one), default=None)
     return nearest if nearest is not None and _distance(camera, points, nearest) < APART else None
 
 
-def _size(cameras: Mapping[str, Camera], seen: Sightings, points: Array) -> float:
+def _size(cameras: Mapping[str, Camera], seen: Detections, points: Array) -> float:
     """Side (mm) of a crop around the person whose points (5, 3) these are, by those who see him."""
     sizes: list[float] = []
     for name, one in seen.items():
@@ -322,5 +324,5 @@ def _beside(one: Crop, expected: Crop) -> bool:
     return apart < BESIDE and abs(math.log(one.side / expected.side)) < math.log(SIZE_RATIO)
 
 
-def _share_of(seen: Sighting, picture: Bytes) -> float:
+def _share_of(seen: Detection, picture: Bytes) -> float:
     return float((seen.logits > 0.0).mean()) * seen.crop.side**2 / (picture.shape[0] * picture.shape[1])

@@ -1,11 +1,11 @@
-"""Rigs, board sightings and silhouettes with known truth, without rendering."""
+"""Rigs, board detections and silhouettes with known truth, without rendering."""
 
 import cv2
 import numpy as np
 from board_footage import waved_boards
 from numpy.typing import NDArray
 
-from studio.footage.calibration.boards import Board, Sighting
+from studio.footage.calibration.boards import Board, Detection
 from studio.footage.calibration.coverage import coverage_of
 from studio.footage.calibration.intrinsics import Lens
 from studio.foundations.arrays import Array
@@ -45,7 +45,7 @@ def ring(count: int, seed: int = 3, radius: float = 4000.0) -> tuple[Camera, ...
 
 def seen(
     board: Board, cameras: tuple[Camera, ...], poses: Array, noise: float = 0.12, seed: int = 0
-) -> list[Sighting]:
+) -> list[Detection]:
     """What the cameras see of boards whose face is towards them and whole in the picture."""
     rng = np.random.default_rng(seed)
     found = []
@@ -62,13 +62,13 @@ def seen(
             ids = np.arange(len(world))
             if board.turn_symmetric and spoilt[0].sum() > spoilt[-1].sum():
                 spoilt = spoilt[::-1].copy()
-            found.append(Sighting(camera.name, frame, f"frame {frame}", SIZE, ids, spoilt))
+            found.append(Detection(camera.name, frame, f"frame {frame}", SIZE, ids, spoilt))
     return found
 
 
 def waved(
     board: Board, cameras: tuple[Camera, ...], each: int = 10, seed: int = 1
-) -> tuple[Array, list[Sighting]]:
+) -> tuple[Array, list[Detection]]:
     """Boards waved about, `each` times the number of cameras, and what was seen."""
     poses = waved_boards(np.random.default_rng(seed), board, cameras, each * len(cameras))
     return poses, seen(board, cameras, poses)

@@ -39,13 +39,13 @@ def test_videos_are_read_in_step_and_by_name(tmp_path: Path) -> None:
     footage = by_camera(list_footage(tmp_path / "extrinsics"), ["Camera 1", "Camera 2"])
     found = look_together(BoardFinder(BOARD), footage)
     frames = {
-        name: {each.sighting.frame for each in found if each.sighting.camera == name} for name in footage
+        name: {each.detection.frame for each in found if each.detection.camera == name} for name in footage
     }
     assert frames["Camera 1"] == frames["Camera 2"] <= {0, 1, 2, 3, 4}
     assert len(frames["Camera 1"]) >= 3
     for each in found:
-        truth, _ = project(camera, transform(poses[each.sighting.frame], BOARD.points))
-        assert np.median(np.linalg.norm(truth[each.sighting.ids] - each.sighting.pixels, axis=1)) < 0.6
+        truth, _ = project(camera, transform(poses[each.detection.frame], BOARD.points))
+        assert np.median(np.linalg.norm(truth[each.detection.ids] - each.detection.pixels, axis=1)) < 0.6
 
 
 def test_frames_are_spread_over_the_shortest_recording() -> None:
@@ -56,15 +56,17 @@ def test_frames_are_spread_over_the_shortest_recording() -> None:
 def test_lens_pictures_are_sharp_and_cover_the_view() -> None:
     camera = ring(1)[0]
     poses = close_boards(np.random.default_rng(0), CHARUCO, camera, 60)
-    sightings = seen(CHARUCO, (camera,), poses)
-    entries = [Seen(sighting, 0.2 if number % 5 == 0 else 1.0) for number, sighting in enumerate(sightings)]
+    detections = seen(CHARUCO, (camera,), poses)
+    entries = [
+        Seen(detection, 0.2 if number % 5 == 0 else 1.0) for number, detection in enumerate(detections)
+    ]
     chosen, blurred = chosen_for_lens(entries, most=12)
-    assert blurred == len(range(0, len(sightings), 5))
+    assert blurred == len(range(0, len(detections), 5))
     assert len(chosen) == 12
-    soft = {sighting.frame for number, sighting in enumerate(sightings) if number % 5 == 0}
-    assert not soft & {sighting.frame for sighting in chosen}
-    middles = np.array([sighting.pixels.mean(axis=0) for sighting in chosen])
-    everything = np.array([sighting.pixels.mean(axis=0) for sighting in sightings])
+    soft = {detection.frame for number, detection in enumerate(detections) if number % 5 == 0}
+    assert not soft & {detection.frame for detection in chosen}
+    middles = np.array([detection.pixels.mean(axis=0) for detection in chosen])
+    everything = np.array([detection.pixels.mean(axis=0) for detection in detections])
     assert np.all(np.ptp(middles, axis=0) > 0.7 * np.ptp(everything, axis=0))
 
 

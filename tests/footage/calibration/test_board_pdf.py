@@ -30,11 +30,11 @@ def test_a_printed_board_has_its_true_size_and_is_found(tmp_path: Path, kind: st
     picture = rasterised(tmp_path / "board.pdf")
     long, short = PAGES[page]
     assert picture.shape == pytest.approx((short * PER_MM, long * PER_MM), abs=2)
-    sighting = BoardFinder(board).find(picture, "printer", 0)
-    assert sighting is not None
-    assert len(sighting.ids) == len(board.points)
-    plan = board.points[sighting.ids][:, :2]
-    size = np.linalg.norm(sighting.pixels[-1] - sighting.pixels[0]) / np.linalg.norm(plan[-1] - plan[0])
+    detection = BoardFinder(board).find(picture, "printer", 0)
+    assert detection is not None
+    assert len(detection.ids) == len(board.points)
+    plan = board.points[detection.ids][:, :2]
+    size = np.linalg.norm(detection.pixels[-1] - detection.pixels[0]) / np.linalg.norm(plan[-1] - plan[0])
     assert size == pytest.approx(PER_MM, rel=2e-3)
     row = picture[round((short - 8.0 - 16.0 + 6.6) * PER_MM)]
     assert np.count_nonzero(row < 128) / PER_MM == pytest.approx(CHECK_BAR, abs=0.6)

@@ -32,17 +32,17 @@ def test_corners_to_a_fraction_of_a_pixel(board: Board) -> None:
     renderer, finder = BoardRenderer(board, [CAMERA]), BoardFinder(board)
     found = 0
     for frame, pose in enumerate(poses):
-        sighting = finder.find(renderer.picture(0, frame, pose), "cam1", frame)
-        if sighting is None:
+        detection = finder.find(renderer.picture(0, frame, pose), "cam1", frame)
+        if detection is None:
             continue
         found += 1
         truth, _ = project(CAMERA, transform(pose, board.points))
-        ends = (sighting.ids, len(truth) - 1 - sighting.ids) if board.turn_symmetric else (sighting.ids,)
-        misses = [np.linalg.norm(truth[ids] - sighting.pixels, axis=1) for ids in ends]
+        ends = (detection.ids, len(truth) - 1 - detection.ids) if board.turn_symmetric else (detection.ids,)
+        misses = [np.linalg.norm(truth[ids] - detection.pixels, axis=1) for ids in ends]
         assert min(np.sqrt(np.mean(miss**2)) for miss in misses) < 0.25
         nearest = misses[int(np.argmin([np.mean(miss) for miss in misses]))]
         assert np.median(nearest) < 0.2
-        assert sighting.size == (640, 480)
+        assert detection.size == (640, 480)
     assert found >= 4
 
 
@@ -95,7 +95,7 @@ def test_blur_is_less_sharp() -> None:
     values = []
     for blur in (0.4, 0.9):
         picture = BoardRenderer(board, [CAMERA], Footage(blur=blur)).picture(0, 0, pose)
-        sighting = BoardFinder(board).find(picture, "c", 0)
-        assert sighting is not None
-        values.append(sharpness(picture, sighting))
+        detection = BoardFinder(board).find(picture, "c", 0)
+        assert detection is not None
+        values.append(sharpness(picture, detection))
     assert values[0] > 1.1 * values[1]

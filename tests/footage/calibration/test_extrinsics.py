@@ -43,9 +43,9 @@ def position_errors(rig: Rig, cameras: tuple[Camera, ...], board: Board, poses: 
 )
 def test_positions_within_ten_millimetres_at_four_metres(count: int) -> None:
     cameras = half_ring(count) if count < 4 else ring(count)
-    poses, sightings = waved(CHARUCO, cameras, each=12)
+    poses, detections = waved(CHARUCO, cameras, each=12)
     lenses = {camera.name: true_lens(camera) for camera in cameras}
-    rig = solve_rig(CHARUCO, sightings, lenses)
+    rig = solve_rig(CHARUCO, detections, lenses)
     assert len(rig.cameras) == count
     assert position_errors(rig, cameras, CHARUCO, poses).max() < 10.0
     assert max(rig.rms.values()) < 0.3
@@ -57,13 +57,13 @@ def test_a_board_that_looks_alike_after_half_a_turn() -> None:
     board = Board("chessboard", 7, 5, 90.0)
     assert board.turn_symmetric
     cameras = ring(5)
-    _, sightings = waved(board, cameras)
+    _, detections = waved(board, cameras)
     rng = np.random.default_rng(0)
-    sightings = [
-        dataclasses.replace(sighting, pixels=sighting.pixels[::-1]) if rng.random() < 0.5 else sighting
-        for sighting in sightings
+    detections = [
+        dataclasses.replace(detection, pixels=detection.pixels[::-1]) if rng.random() < 0.5 else detection
+        for detection in detections
     ]
-    rig = solve_rig(board, sightings, {camera.name: true_lens(camera) for camera in cameras})
+    rig = solve_rig(board, detections, {camera.name: true_lens(camera) for camera in cameras})
     names = {camera.name: camera for camera in rig.cameras}
     solved = np.array([names[camera.name].centre for camera in cameras])
     true = np.array([camera.centre for camera in cameras])
@@ -73,10 +73,10 @@ def test_a_board_that_looks_alike_after_half_a_turn() -> None:
 @pytest.mark.slow
 def test_wrong_views_are_left_out() -> None:
     cameras = ring(4)
-    poses, sightings = waved(CHARUCO, cameras)
+    poses, detections = waved(CHARUCO, cameras)
     spoilt = [
-        dataclasses.replace(sighting, pixels=sighting.pixels + 25.0) if number % 13 == 0 else sighting
-        for number, sighting in enumerate(sightings)
+        dataclasses.replace(detection, pixels=detection.pixels + 25.0) if number % 13 == 0 else detection
+        for number, detection in enumerate(detections)
     ]
     rig = solve_rig(CHARUCO, spoilt, {camera.name: true_lens(camera) for camera in cameras})
     assert rig.dropped >= 4
@@ -87,18 +87,18 @@ def test_wrong_views_are_left_out() -> None:
 def test_refining_lenses_leads_towards_the_truth_and_never_far_from_a_good_start() -> None:
     """Boards at four metres say little of a focal length: the prior keeps the result of the close ones."""
     cameras = ring(4)
-    poses, sightings = waved(CHARUCO, cameras, each=14)
+    poses, detections = waved(CHARUCO, cameras, each=14)
     lenses = {camera.name: true_lens(camera) for camera in cameras}
     matrix = lenses["cam2"].matrix * np.array([[1.006, 1.0, 1.0], [1.0, 1.006, 1.0], [1.0, 1.0, 1.0]])
     lenses["cam2"] = dataclasses.replace(lenses["cam2"], matrix=matrix)
-    rig = solve_rig(CHARUCO, sightings, lenses, refine_lenses=True)
+    rig = solve_rig(CHARUCO, detections, lenses, refine_lenses=True)
     off = {
         camera.name: abs(solved.matrix[0, 0] / camera.matrix[0, 0] - 1.0)
         for camera, solved in zip(cameras, rig.cameras, strict=True)
     }
     assert off["cam2"] < 0.9 * 0.006
     assert max(off["cam1"], off["cam3"], off["cam4"]) < 2e-3
-    held = solve_rig(CHARUCO, sightings, lenses)
+    held = solve_rig(CHARUCO, detections, lenses)
     assert rig.rms["cam2"] < held.rms["cam2"]
     assert (
         position_errors(rig, cameras, CHARUCO, poses)[1] < position_errors(held, cameras, CHARUCO, poses)[1]
@@ -107,12 +107,12 @@ def test_refining_lenses_leads_towards_the_truth_and_never_far_from_a_good_start
 
 def test_cameras_that_share_no_view_are_named() -> None:
     cameras = ring(4)
-    _, sightings = waved(CHARUCO, cameras)
+    _, detections = waved(CHARUCO, cameras)
     apart = [
-        dataclasses.replace(sighting, frame=sighting.frame + 10_000)
-        if sighting.camera in ("cam3", "cam4")
-        else sighting
-        for sighting in sightings
+        dataclasses.replace(detection, frame=detection.frame + 10_000)
+        if detection.camera in ("cam3", "cam4")
+        else detection
+        for detection in detections
     ]
     with pytest.raises(
         CalibrationError, match="Camera cam3, cam4 saw the board in no frame together with camera cam1"
@@ -123,10 +123,10 @@ def test_cameras_that_share_no_view_are_named() -> None:
 @pytest.mark.slow
 def test_unsynchronised_footage_is_reported() -> None:
     cameras = ring(4)
-    _, sightings = waved(CHARUCO, cameras, each=14)
+    _, detections = waved(CHARUCO, cameras, each=14)
     late = [
-        dataclasses.replace(sighting, frame=sighting.frame + 4) if sighting.camera == "cam2" else sighting
-        for sighting in sightings
+        dataclasses.replace(detection, frame=detection.frame + 4) if detection.camera == "cam2" else detection
+        for detection in detections
     ]
     lenses = {camera.name: true_lens(camera) for camera in cameras}
     with pytest.raises(CalibrationError, match="cam2") as refused:
@@ -165,6 +165,6 @@ def _turn(vector: np.ndarray) -> np.ndarray:
 def test_seen_boards_are_few_enough_to_be_real() -> None:
     """The scenes' boards are seen by the cameras they face only."""
     cameras = ring(4)
-    poses, sightings = waved(CHARUCO, cameras)
-    assert 1.2 < len(sightings) / len(poses) < 3.0
+    poses, detections = waved(CHARUCO, cameras)
+    assert 1.2 < len(detections) / len(poses) < 3.0
     assert seen(CHARUCO, cameras, poses[:0]) == []

@@ -31,8 +31,8 @@ FLOOR_POINTS = np.array(
 @pytest.fixture(scope="module")
 def rig() -> Rig:
     """A solved rig in the frame of its first camera."""
-    _, sightings = waved(CHARUCO, CAMERAS)
-    return solve_rig(CHARUCO, sightings, {camera.name: true_lens(camera) for camera in CAMERAS})
+    _, detections = waved(CHARUCO, CAMERAS)
+    return solve_rig(CHARUCO, detections, {camera.name: true_lens(camera) for camera in CAMERAS})
 
 
 def clicks_file(path: Path, world: bool, scale: float = 1.0) -> Path:
@@ -47,16 +47,16 @@ def clicks_file(path: Path, world: bool, scale: float = 1.0) -> Path:
 @pytest.mark.parametrize("thickness", [0.0, 12.0])
 def test_a_board_on_the_floor_sets_the_world(rig: Rig, thickness: float) -> None:
     lying = floor_board((300.0, -200.0), 0.4, thickness)
-    sightings = seen(CHARUCO, CAMERAS, lying[None])
-    assert len(sightings) >= 3
+    detections = seen(CHARUCO, CAMERAS, lying[None])
+    assert len(detections) >= 3
     lenses = {camera.name: true_lens(camera) for camera in CAMERAS}
-    pose = board_on_floor(rig, CHARUCO, sightings, lenses)
+    pose = board_on_floor(rig, CHARUCO, detections, lenses)
     placed = moved(rig, floor_from_board(pose, thickness))
     turn = np.array([[np.cos(0.4), -np.sin(0.4)], [np.sin(0.4), np.cos(0.4)]])
     for camera, solved in zip(CAMERAS, placed.cameras, strict=True):
         expected = np.append(turn.T @ (camera.centre[:2] - [300.0, -200.0]), camera.centre[2])
         np.testing.assert_allclose(solved.centre, expected, atol=15.0)
-    alone = board_on_floor(rig, CHARUCO, sightings[:1], lenses)
+    alone = board_on_floor(rig, CHARUCO, detections[:1], lenses)
     np.testing.assert_allclose(alone[:, 3], pose[:, 3], atol=40.0)
 
 
@@ -106,9 +106,9 @@ def test_no_camera_sees_the_floor_board(rig: Rig) -> None:
 
 def test_a_symmetric_board_lies_the_same_way_for_all() -> None:
     board = Board("chessboard", 7, 5, 90.0)
-    _, sightings = waved(board, CAMERAS)
+    _, detections = waved(board, CAMERAS)
     lenses = {camera.name: true_lens(camera) for camera in CAMERAS}
-    solved = solve_rig(board, sightings, lenses)
+    solved = solve_rig(board, detections, lenses)
     pose = board_on_floor(solved, board, seen(board, CAMERAS, floor_board()[None]), lenses)
     heights = [camera.centre[2] for camera in moved(solved, floor_from_board(pose)).cameras]
     np.testing.assert_allclose(heights, [camera.centre[2] for camera in CAMERAS], atol=15.0)

@@ -8,7 +8,7 @@ import pytest
 from board_footage import BoardRenderer, close_boards
 from calibrated_scenes import CHARUCO, SIZE, ring
 
-from studio.footage.calibration.boards import Board, Sighting, board_from_text
+from studio.footage.calibration.boards import Board, Detection, board_from_text
 from studio.footage.calibration.coverage import coverage_of, coverage_picture
 from studio.footage.calibration.detection import BoardFinder
 from studio.footage.calibration.findings import blocking
@@ -26,7 +26,7 @@ CAMERA = ring(1)[0]
 
 def sightings_of(
     camera: Camera, poses: np.ndarray, board: Board = CHARUCO, noise: float = 0.1
-) -> list[Sighting]:
+) -> list[Detection]:
     rng = np.random.default_rng(7)
     found = []
     for frame, pose in enumerate(poses):
@@ -36,7 +36,7 @@ def sightings_of(
         if inside.sum() >= 6:
             size = (camera.width, camera.height)
             ids = np.flatnonzero(inside)
-            found.append(Sighting(camera.name, frame, f"p{frame}", size, ids, spoilt[inside]))
+            found.append(Detection(camera.name, frame, f"p{frame}", size, ids, spoilt[inside]))
     return found
 
 
@@ -66,22 +66,22 @@ def test_a_rendered_board_gives_the_lens_within_half_a_percent() -> None:
     poses = close_boards(np.random.default_rng(1), CHARUCO, camera, 18)
     renderer, finder = BoardRenderer(CHARUCO, [camera]), BoardFinder(CHARUCO)
     seen = [finder.find(renderer.picture(0, frame, pose), "cam1", frame) for frame, pose in enumerate(poses)]
-    lens = solve_lens(CHARUCO, [sighting for sighting in seen if sighting is not None])
+    lens = solve_lens(CHARUCO, [detection for detection in seen if detection is not None])
     np.testing.assert_allclose(np.diag(lens.matrix)[:2], 800.0, rtol=5e-3)
     assert lens.rms < 0.3
 
 
 def test_an_outlier_is_dropped_with_the_reason() -> None:
     poses = close_boards(np.random.default_rng(0), CHARUCO, CAMERA, 14)
-    sightings = sightings_of(CAMERA, poses)
-    moved = sightings[4].pixels.copy()
+    detections = sightings_of(CAMERA, poses)
+    moved = detections[4].pixels.copy()
     moved[: len(moved) // 2] += 9.0
-    sightings[4] = dataclasses.replace(sightings[4], pixels=moved)
-    lens = solve_lens(CHARUCO, sightings)
+    detections[4] = dataclasses.replace(detections[4], pixels=moved)
+    lens = solve_lens(CHARUCO, detections)
     dropped = [residual for residual in lens.residuals if residual.dropped]
-    assert [residual.picture for residual in dropped] == [sightings[4].picture]
+    assert [residual.picture for residual in dropped] == [detections[4].picture]
     assert "its residual is" in dropped[0].dropped
-    assert len(lens.used) == len(sightings) - 1
+    assert len(lens.used) == len(detections) - 1
     np.testing.assert_allclose(lens.matrix[0, 0], CAMERA.matrix[0, 0], rtol=1e-2)
 
 
@@ -101,21 +101,21 @@ def test_too_few_pictures_are_reported() -> None:
 
 
 def test_too_few_pictures_and_two_sizes_are_refused() -> None:
-    sightings = sightings_of(CAMERA, close_boards(np.random.default_rng(0), CHARUCO, CAMERA, 4))
+    detections = sightings_of(CAMERA, close_boards(np.random.default_rng(0), CHARUCO, CAMERA, 4))
     with pytest.raises(CalibrationError, match="2 pictures of camera cam1"):
-        solve_lens(CHARUCO, sightings[:2])
+        solve_lens(CHARUCO, detections[:2])
     with pytest.raises(CalibrationError, match="640x480"):
-        solve_lens(CHARUCO, [dataclasses.replace(sightings[0], size=(640, 480)), *sightings[1:]])
+        solve_lens(CHARUCO, [dataclasses.replace(detections[0], size=(640, 480)), *detections[1:]])
 
 
 def test_coverage_names_the_parts_that_were_not_seen() -> None:
     rng = np.random.default_rng(0)
     pixels = rng.uniform([0, 0], [SIZE[0] / 2, SIZE[1]], (800, 2))
-    sighting = Sighting("cam1", 0, "p", SIZE, np.arange(800), pixels)
-    coverage = coverage_of([sighting], SIZE)
+    detection = Detection("cam1", 0, "p", SIZE, np.arange(800), pixels)
+    coverage = coverage_of([detection], SIZE)
     assert coverage.share == pytest.approx(0.5, abs=0.06)
     assert coverage.empty_parts == ("top right", "right", "bottom right")
-    picture = coverage_picture(coverage, [sighting])
+    picture = coverage_picture(coverage, [detection])
     assert picture.shape == (360, 480, 3)
     assert picture[:, :200].mean() > picture[:, 280:].mean() + 30
 
@@ -134,7 +134,7 @@ def test_seven_real_pictures(real_data: Path, camera: str, focal: float) -> None
         finder.find(read_picture(path), camera, frame, path.name)
         for frame, path in enumerate(list_pictures(folder))
     ]
-    found = [sighting for sighting in seen if sighting is not None]
+    found = [detection for detection in seen if detection is not None]
     assert len(found) >= 6
     lens = solve_lens(board, found)
     assert np.diag(lens.matrix)[:2] == pytest.approx([focal, focal], rel=0.03)

@@ -8,7 +8,7 @@ import pytest
 from calibrated_scenes import CHARUCO, CHESS, person_masks, ring, seen, true_lens, waved
 
 from studio.footage.calibration.board_checks import mirrored_cameras
-from studio.footage.calibration.boards import Board, Sighting
+from studio.footage.calibration.boards import Board, Detection
 from studio.footage.calibration.checks import Finding, check_calibration
 from studio.footage.calibration.fault_hypotheses import inverted, rescaled, transposed, upside_down
 from studio.footage.calibration.silhouette_checks import Masks
@@ -16,7 +16,7 @@ from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.rotations import rotation_from_vector
 
 RIG = ring(4)
-POSES, SIGHTINGS = waved(CHARUCO, RIG)
+POSES, DETECTIONS = waved(CHARUCO, RIG)
 MASKS = person_masks(RIG)
 
 
@@ -24,8 +24,8 @@ def checked(cameras: tuple[Camera, ...], **evidence: object) -> tuple[Finding, .
     return check_calibration(cameras, **evidence)  # type: ignore[arg-type]
 
 
-def with_board(cameras: tuple[Camera, ...], sightings: list[Sighting] = SIGHTINGS) -> tuple[Finding, ...]:
-    return check_calibration(cameras, board=CHARUCO, sightings=sightings)
+def with_board(cameras: tuple[Camera, ...], detections: list[Detection] = DETECTIONS) -> tuple[Finding, ...]:
+    return check_calibration(cameras, board=CHARUCO, detections=detections)
 
 
 def with_masks(cameras: tuple[Camera, ...], masks: object = MASKS) -> tuple[Finding, ...]:
@@ -58,16 +58,16 @@ def swapped(one: int, two: int) -> tuple[Camera, ...]:
     return tuple(cameras)
 
 
-def flipped(sightings: list[Sighting], names: set[str]) -> list[Sighting]:
+def flipped(detections: list[Detection], names: set[str]) -> list[Detection]:
     """What another program, which does not mind mirrored markers, would have seen in mirrored videos."""
     return [
         dataclasses.replace(
-            sighting,
-            pixels=np.column_stack([sighting.size[0] - 1 - sighting.pixels[:, 0], sighting.pixels[:, 1]]),
+            detection,
+            pixels=np.column_stack([detection.size[0] - 1 - detection.pixels[:, 0], detection.pixels[:, 1]]),
         )
-        if sighting.camera in names
-        else sighting
-        for sighting in sightings
+        if detection.camera in names
+        else detection
+        for detection in detections
     ]
 
 
@@ -84,7 +84,7 @@ def test_a_sound_calibration_raises_nothing() -> None:
     sizes = {camera.name: (camera.width, camera.height) for camera in RIG}
     assert (
         check_calibration(
-            RIG, footage_sizes=sizes, board=CHARUCO, sightings=SIGHTINGS, masks=MASKS, height_mm=1800.0
+            RIG, footage_sizes=sizes, board=CHARUCO, detections=DETECTIONS, masks=MASKS, height_mm=1800.0
         )
         == ()
     )
@@ -101,7 +101,7 @@ def test_swapped_cameras(look: Callable[..., tuple[Finding, ...]], one: int, two
 
 @pytest.mark.parametrize("names", [{"cam2"}, {"cam4"}, {"cam1", "cam2", "cam3", "cam4"}])
 def test_mirrored_video_by_a_board(names: set[str]) -> None:
-    findings = with_board(RIG, flipped(SIGHTINGS, names))
+    findings = with_board(RIG, flipped(DETECTIONS, names))
     assert code_of(findings) == "mirrored-video"
     assert set(findings[0].cameras) == (names if len(names) == 1 else set())
 
@@ -130,20 +130,20 @@ def test_cameras_that_were_knocked_have_no_other_fault(count: int) -> None:
 
 @pytest.mark.parametrize("board", [CHESS, Board("chessboard", 7, 5, 90.0)])
 def test_mirrored_video_while_calibrating_with_a_chessboard(board: Board) -> None:
-    _, sightings = waved(board, RIG)
+    _, detections = waved(board, RIG)
     lenses = {camera.name: true_lens(camera) for camera in RIG}
     names = tuple(lenses)
-    assert mirrored_cameras(board, sightings, lenses, names) == ()
+    assert mirrored_cameras(board, detections, lenses, names) == ()
     across, down = board.corners
     grid = np.arange(across * down).reshape(down, across)
     # A chessboard is its own mirror image: the finder counts the mirrored corners in an order that is not mirrored.
     recount = (grid[:, ::-1] if across % 2 == 0 or board.turn_symmetric else grid[::-1]).ravel()
     spoilt = []
-    for sighting in flipped(sightings, {"cam3"}):
-        pixels = sighting.pixels[recount] if sighting.camera == "cam3" else sighting.pixels
+    for detection in flipped(detections, {"cam3"}):
+        pixels = detection.pixels[recount] if detection.camera == "cam3" else detection.pixels
         if board.turn_symmetric and pixels[0].sum() > pixels[-1].sum():
             pixels = pixels[::-1]
-        spoilt.append(dataclasses.replace(sighting, pixels=pixels))
+        spoilt.append(dataclasses.replace(detection, pixels=pixels))
     lens = lenses["cam3"]
     matrix, distortion = lens.matrix.copy(), lens.distortion * np.array([1.0, 1.0, 1.0, -1.0, 1.0])
     matrix[0, 2] = lens.size[0] - 1 - matrix[0, 2]

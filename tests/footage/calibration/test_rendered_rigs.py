@@ -30,18 +30,18 @@ def test_focal_lengths_and_positions(count: int) -> None:
             finder.find(renderer.picture(number, 1000 + frame, pose), camera.name, frame)
             for frame, pose in enumerate(poses)
         ]
-        lens = solve_lens(CHARUCO, [sighting for sighting in seen if sighting is not None])
+        lens = solve_lens(CHARUCO, [detection for detection in seen if detection is not None])
         assert blocking(lens_findings(lens)) == ()
         np.testing.assert_allclose(np.diag(lens.matrix)[:2], np.diag(camera.matrix)[:2], rtol=5e-3)
         lenses[camera.name] = lens
     poses = waved_boards(rng, CHARUCO, cameras, 14 * count)
-    sightings = [
-        sighting
+    detections = [
+        detection
         for frame, pose in enumerate(poses)
         for number, camera in enumerate(cameras)
-        if (sighting := finder.find(renderer.picture(number, frame, pose), camera.name, frame)) is not None
+        if (detection := finder.find(renderer.picture(number, frame, pose), camera.name, frame)) is not None
     ]
-    rig = solve_rig(CHARUCO, sightings, lenses)
+    rig = solve_rig(CHARUCO, detections, lenses)
     frames = list(rig.boards)
     solved = np.concatenate([transform(rig.boards[frame], CHARUCO.points) for frame in frames])
     true = np.concatenate([transform(poses[frame], CHARUCO.points) for frame in frames])
