@@ -2,212 +2,239 @@
 // computer.
 
 import { fault, fetchJson, post, remove, sessionPath } from "./api.js";
-import {
-  actions,
-  button,
-  check,
-  drawProgress,
-  element,
-  failure,
-  field,
-  files,
-  fill,
-  hint,
-  number,
-  optional,
-  select,
-  text,
-} from "./elements.js";
 import { CANCELLED, jobDone, shareOf, standing } from "./jobs.js";
 import { complain } from "./messages.js";
+import { html, signal } from "./studio/component.js";
+import { Action, Failure, Progress, Select } from "./studio/parts.js";
 import { uploadFiles } from "./uploading.js";
 
 /** @import { Schemas } from "./api_types" */
 
 const MOST_FOLDERS = 60;
+/** @type {[string, string][]} */
+const FIELDS = [
+  ["", "no"],
+  ["auto", "into fields"],
+  ["top", "top field first"],
+  ["bottom", "bottom field first"],
+];
 
 /**
- * Draw the form in `place` (a details element); `done(job)` is called when footage was taken in.
+ * What is being taken in, and what can be; `done(job)` is called when footage was.
  * @param {import("./setup.js").Setup} setup
+ * @param {boolean} isOpened whether the form is shown at first
+ * @param {(job: any) => Promise<void>} done
  */
-export function adder(place, setup, done) {
-  let abort = null;
-  let stopped = false;
-  const going = optional();
-  const wrong = optional();
-  const videos = files({
-    multiple: true,
-    name: "files",
-    accept: "video/*,image/*,.zip,.tar,.gz,.tgz,.bz2,.xz,.toml,.csv,.yml,.json",
-  });
-  const folder = files({ multiple: true, name: "folder", folder: true });
-  const source = text({ name: "source", placeholder: "full path" });
-  const refer = check("refer to it where it lies instead of copying it", { name: "refer" });
-  const fps = number("", { name: "fps", min: 1, placeholder: "as the files say" });
-  const trial = text({ name: "trial", placeholder: "the only one" });
-  const fields = select(
-    [
-      ["", "no"],
-      ["auto", "into fields"],
-      ["top", "top field first"],
-      ["bottom", "bottom field first"],
-    ],
-    "",
-    { name: "fields" },
-  );
-  const byTime = check(
-    "pair frames by their times",
-    { name: "by_time" },
-    "Not by their numbers: for cameras of other rates, drift and lost frames.",
-  );
-  const inverted = check("black is the person in the masks", { name: "inverted" });
-  const replace = check(
-    "replace all cameras",
-    { name: "replace" },
-    "Cameras that are not in the new footage are removed.",
-  );
-  const submit = button("Add footage", begin);
-  const summary = element("summary", {}, "Add or replace footage");
-  const elsewhere = hint(
-    "Connected cameras (USB, RTSP, MJPEG) can be viewed and recorded under ",
-    element("a", { href: "/recording" }, "Live cameras"),
-    ".",
-  );
-  const folders = element("div", { className: "folder-list" });
-  fill(
-    place,
-    summary,
-    element(
-      "div",
-      { className: "footage-form" },
-      field("Videos, one per camera (or a zip or tar of all)", videos),
-      field(
-        "or a folder: videos/, pictures, masks/, background/, calibration/; Pose2Sim, FreeMoCap, Caliscope, anipose, EasyMocap, OpenCap and DANNCE layouts too",
-        folder,
-      ),
-      field("or a folder of the computer that the studio runs on", source),
-      folders,
-      refer,
-      element(
-        "div",
-        { className: "step-row" },
-        field("Frames per second", fps),
-        field("Trial", trial, { title: "For a folder with several trials." }),
-        field("Split interlaced videos", fields, {
-          title: "A frame of each field, twice as many.",
-        }),
-      ),
-      byTime,
-      inverted,
-      replace,
-      actions(submit),
-      going,
-      wrong,
-      elsewhere,
-    ),
-  );
-  source.onfocus = () => browse(source.value).catch(() => fill(folders));
+export function addingOf(setup, isOpened, done) {
+  const isOpen = signal(isOpened);
+  /** A folder of the studio's computer. */
+  const source = signal("");
+  /** The folders below it. */
+  const folders = signal(/** @type {any} */ (null));
+  const progress = signal(/** @type {Parameters<typeof Progress>[0] | null} */ (null));
+  const failed = signal(/** @type {any} */ (null));
+  /** Rises when the chosen files were taken: none is chosen then. */
+  const taken = signal(0);
+  /** What the other fields hold, by their names. @type {Record<string, any>} */
+  const values = {};
+  let abort = new AbortController();
+  let isLeft = false;
 
-  /** Folders below the one that is typed, to be chosen by a click. */
-  async function browse(path) {
-    const found = await fetchJson(`/api/folders?path=${encodeURIComponent(path)}`);
-    const open = (name, next) =>
-      button(
-        name,
-        () => {
-          source.value = next;
-          browse(next).catch(complain);
-        },
-        "quiet small",
-      );
-    fill(
-      folders,
-      found.path && found.parent !== null && open("‹ up", found.parent),
-      found.folders
-        .slice(0, MOST_FOLDERS)
-        .map((name) => open(name, found.path ? `${found.path}/${name}` : name)),
-    );
-  }
-
-  /** @type {File[]} */
-  let dropped = []; // from the computer's own windows
-
-  async function chosenSource() {
-    const picked = videos.files?.length ? videos.files : folder.files;
-    const chosen = dropped.length ? dropped : (picked ?? []);
-    if (chosen.length)
-      return {
-        upload: await uploadFiles(
-          chosen,
-          (words, share) => drawProgress(going, { words, share, cancel: () => abort.abort() }),
-          abort.signal,
-        ),
+  /** @param {ArrayLike<File>} files */
+  async function sourceOf(files) {
+    if (files.length) {
+      const cancel = () => abort.abort();
+      const report = (/** @type {string} */ words, /** @type {number} */ share) => {
+        progress.value = { words, share, cancel };
       };
+      return { upload: await uploadFiles(files, report, abort.signal) };
+    }
     if (source.value.trim()) return { source: source.value.trim() };
     throw fault("Nothing is chosen.", "Choose the cameras' videos, or a folder.");
   }
 
-  async function begin() {
-    fill(wrong);
+  /** Take footage in, and follow that to its end. @param {ArrayLike<File>} files */
+  async function begin(files) {
+    failed.value = null;
     abort = new AbortController();
-    const checked = (box) => box.querySelector("input").checked;
     try {
       /** @type {Omit<Schemas["FootageAddition"], "source" | "upload">} */
       const request = {
-        copy: !checked(refer),
-        replace: checked(replace),
-        fps: fps.value ? Number(fps.value) : null,
-        fields: /** @type {Schemas["FootageAddition"]["fields"]} */ (fields.value),
-        by_time: checked(byTime),
-        masks: checked(inverted) ? "inverted" : "",
-        trial: trial.value.trim() || null,
+        copy: !values.refer,
+        replace: Boolean(values.replace),
+        fps: values.fps ? Number(values.fps) : null,
+        fields: values.fields ?? "",
+        by_time: Boolean(values.by_time),
+        masks: values.inverted ? "inverted" : "",
+        trial: values.trial?.trim() || null,
       };
       const { identifier } = await post(`${sessionPath(setup.session)}/footage`, {
         ...request,
-        ...(await chosenSource()),
+        ...(await sourceOf(files)),
       });
       const cancel = () => remove(`/api/imports/${identifier}`).catch(complain);
       const job = await jobDone(
         `/api/imports/${identifier}`,
-        (state) =>
-          drawProgress(going, {
-            words: standing(state, "beginning"),
-            share: shareOf(state),
-            cancel,
-          }),
-        () => stopped,
+        (state) => {
+          progress.value = { words: standing(state, "beginning"), share: shareOf(state), cancel };
+        },
+        () => isLeft,
       );
       if (job) {
-        videos.value = folder.value = "";
-        place.open = false;
+        values.files = values.folder = null;
+        taken.value += 1;
+        isOpen.value = false;
         await done(job);
       }
     } catch (error) {
-      if (error.name !== "AbortError" && error.code !== CANCELLED) fill(wrong, failure(error));
+      if (error.name !== "AbortError" && error.code !== CANCELLED) failed.value = error;
     }
-    dropped = [];
-    drawProgress(going, null);
+    progress.value = null;
+  }
+
+  /** @param {string} path */
+  async function browse(path) {
+    folders.value = await fetchJson(`/api/folders?path=${encodeURIComponent(path)}`);
   }
 
   return {
+    isOpen,
+    source,
+    folders,
+    progress,
+    failed,
+    taken,
+    /** A field was changed. */
+    hear: ({ target: { name, type, checked, files, value } }) => {
+      values[name] = type === "checkbox" ? checked : type === "file" ? files : value;
+    },
+    begin: () => begin(values.files?.length ? values.files : (values.folder ?? [])),
     /** Take files that were dropped on the page. @param {File[]} files */
-    take(files) {
-      dropped = files;
-      place.open = true;
-      return begin();
+    take: (files) => {
+      isOpen.value = true;
+      return begin(files);
     },
-    /** there: whether the session has footage; then the form is folded away. */
-    draw(there) {
-      summary.textContent = there ? "Add or replace footage" : "Your cameras' footage";
-      place.open = !there || place.contains(document.activeElement);
-      place.classList.toggle("alone", !there);
-      submit.className = there ? "" : "primary";
-      elsewhere.hidden = there;
-      replace.hidden = !there;
+    look: () =>
+      browse(source.value).catch(() => {
+        folders.value = null;
+      }),
+    /** @param {string} path */
+    choose: (path) => {
+      source.value = path;
+      return browse(path).catch(complain);
     },
-    stop() {
-      stopped = true;
-      abort?.abort();
+    stop: () => {
+      isLeft = true;
+      abort.abort();
     },
   };
 }
+
+/** @typedef {ReturnType<typeof addingOf>} Model */
+
+/** Folders below the one that is typed, to be chosen by a click. @param {{ model: Model }} properties */
+function Folders({ model }) {
+  const listed = model.folders.value;
+  if (!listed) return null;
+  const open = (/** @type {string} */ name, /** @type {string} */ path) =>
+    html`<${Action} key=${path} kind="quiet small" act=${() => model.choose(path)}>${name}</${Action}>`;
+  return html`<div class="folder-list">
+    ${listed.path && listed.parent !== null && open("‹ up", listed.parent)}
+    ${listed.folders
+      .slice(0, MOST_FOLDERS)
+      .map((name) => open(name, listed.path ? `${listed.path}/${name}` : name))}
+  </div>`;
+}
+
+/** @param {{ model: Model }} properties */
+const Source = ({ model }) => html`
+  <label key=${`files-${model.taken.value}`}>
+    Videos, one per camera (or a zip or tar of all)
+    <input
+      type="file"
+      name="files"
+      multiple
+      accept="video/*,image/*,.zip,.tar,.gz,.tgz,.bz2,.xz,.toml,.csv,.yml,.json"
+    />
+  </label>
+  <label key=${`folder-${model.taken.value}`}>
+    or a folder: videos/, pictures, masks/, background/, calibration/; Pose2Sim, FreeMoCap,
+    Caliscope, anipose, EasyMocap, OpenCap and DANNCE layouts too
+    <input type="file" name="folder" multiple webkitdirectory />
+  </label>
+  <label>
+    or a folder of the computer that the studio runs on
+    <input
+      type="text"
+      name="source"
+      placeholder="full path"
+      value=${model.source.value}
+      onInput=${({ target }) => {
+        model.source.value = target.value;
+      }}
+      onFocus=${model.look}
+    />
+  </label>
+  <${Folders} model=${model} />
+  <${Box} name="refer">refer to it where it lies instead of copying it</${Box}>
+`;
+
+const Box = ({ name, title = "", children }) => html`<label class="check" title=${title}>
+  <input type="checkbox" name=${name} />${children}
+</label>`;
+
+/**
+ * The form, folded away where the session has footage.
+ * @param {{ model: Model, isFirst: boolean }} properties
+ */
+export const AddingForm = ({ model, isFirst }) => html`<details
+  class=${isFirst ? "footage-add alone" : "footage-add"}
+  open=${model.isOpen.value}
+  onToggle=${({ currentTarget }) => {
+    model.isOpen.value = currentTarget.open;
+  }}
+>
+  <summary>${isFirst ? "Your cameras' footage" : "Add or replace footage"}</summary>
+  <div class="footage-form" onInput=${model.hear}>
+    <${Source} model=${model} />
+    <div class="step-row">
+      <label>
+        Frames per second
+        <input type="number" name="fps" min="1" step="any" placeholder="as the files say" />
+      </label>
+      <label title="For a folder with several trials.">
+        Trial
+        <input type="text" name="trial" placeholder="the only one" />
+      </label>
+      <label title="A frame of each field, twice as many.">
+        Split interlaced videos
+        <${Select} name="fields" options=${FIELDS} />
+      </label>
+    </div>
+    <${Box}
+      name="by_time"
+      title="Not by their numbers: for cameras of other rates, drift and lost frames."
+    >
+      pair frames by their times
+    </${Box}>
+    <${Box} name="inverted">black is the person in the masks</${Box}>
+    ${
+      !isFirst &&
+      html`<${Box} name="replace" title="Cameras that are not in the new footage are removed.">
+        replace all cameras
+      </${Box}>`
+    }
+    <div class="step-actions">
+      <${Action} kind=${isFirst ? "primary" : ""} act=${model.begin}>Add footage</${Action}>
+    </div>
+    ${model.progress.value && html`<${Progress} ...${model.progress.value} />`}
+    <${Failure} error=${model.failed.value} />
+    ${
+      isFirst &&
+      html`<p class="hint">
+        Connected cameras (USB, RTSP, MJPEG) can be viewed and recorded under${" "}
+        <a href="/recording">Live cameras</a>.
+      </p>`
+    }
+  </div>
+</details>`;

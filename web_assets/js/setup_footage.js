@@ -1,20 +1,14 @@
 // Step Footage: what the cameras recorded, how it is turned, and whether it is in step.
 
 import { fetchJson, patch, sessionPath } from "./api.js";
-import {
-  button,
-  dotted,
-  element,
-  fill,
-  hint,
-  notice,
-  optional,
-  spring,
-  table,
-} from "./elements.js";
+import { dotted } from "./elements.js";
 import { complain, say } from "./messages.js";
-import { adder } from "./setup_adding.js";
-import { synchroniser } from "./setup_synchrony.js";
+import { AddingForm, addingOf } from "./setup_adding.js";
+import { Synchronisation, synchronyOf } from "./setup_synchrony.js";
+import { batch, html, mount as render, signal, useEffect, useState } from "./studio/component.js";
+import { Action, Table } from "./studio/parts.js";
+
+/** @import { Schemas } from "./api_types" */
 
 const THUMB_HEIGHT = 420;
 const FRAME_MILLISECONDS = 120;
@@ -22,173 +16,173 @@ const FRAME_MILLISECONDS = 120;
 /** @param {string} session */
 export const load = (session) => fetchJson(`${sessionPath(session)}/footage`);
 
-/** @type {import("./setup.js").Mount<typeof load>} */
-export function mount(place, setup, loaded) {
+/**
+ * What the step knows, and what can be done.
+ * @param {import("./setup.js").Setup} setup
+ * @param {Awaited<ReturnType<typeof load>>} loaded
+ */
+function modelOf(setup, loaded) {
   const here = sessionPath(setup.session);
-  const list = element("section", { className: "footage-cameras" });
-  const step = element("section", { className: "footage-step" });
-  const add = element("details", { className: "footage-add" });
-  const warnings = optional();
-  let footage = loaded;
-  let shown = 0; // the frame that is looked at
-  let age = 0; // rises when the pictures changed
-  let wait = 0;
-  const sync = synchroniser(step, setup, (offsets) => change({ offsets }));
-  place.append(list, warnings, step, add);
-
-  const adding = adder(add, setup, async (job) => {
-    age += 1;
-    for (const note of job.notes) say(note);
-    footage = await load(setup.session);
-    show(job.warnings);
-    await setup.refresh();
-  });
+  const footage = signal(loaded);
+  const warnings = signal(setup.detail.warnings ?? []);
+  /** Rises when the pictures changed. */
+  const age = signal(0);
 
   async function change(changes) {
     try {
-      footage = await patch(`${here}/footage`, changes);
-      for (const note of footage.notes)
-        say(note, { kind: footage.stale_runs.length ? "warning" : "info" });
-      age += 1;
+      const changed = await patch(`${here}/footage`, changes);
+      for (const note of changed.notes)
+        say(note, { kind: changed.stale_runs.length ? "warning" : "info" });
+      batch(() => {
+        footage.value = changed;
+        age.value += 1;
+      });
     } catch (error) {
       complain(error);
     }
-    draw();
     await setup.refresh();
   }
 
-  function drawList() {
-    const { cameras, fps, frame_count: count } = footage;
-    fill(
-      list,
-      cameras.length > 0 && [
-        hint(`${count} frames at ${Number(fps.toFixed(3))} a second are in all cameras.`),
-        element(
-          "div",
-          { className: "scrolls" },
-          table(
-            ["camera", "size", "frames", "turned"],
-            cameras.map((camera) => [
-              camera.name,
-              `${camera.width}×${camera.height}`,
-              camera.frame_count,
-              camera.turned ? `${camera.turned}°` : "–",
-            ]),
-          ),
-        ),
-      ],
-    );
-  }
+  return {
+    footage,
+    warnings,
+    age,
+    here,
+    sync: synchronyOf(setup, (offsets) => change({ offsets })),
+    adding: addingOf(setup, !loaded.cameras.length, async (job) => {
+      for (const note of job.notes) say(note);
+      const taken = await load(setup.session);
+      batch(() => {
+        footage.value = taken;
+        warnings.value = job.warnings;
+        age.value += 1;
+      });
+      await setup.refresh();
+    }),
+    turn: ({ name, turned }) => change({ rotations: { [name]: (turned + 90) % 360 } }),
+  };
+}
 
-  const pictureOf = (camera) =>
-    `${here}/footage/${encodeURIComponent(camera.name)}/${Math.min(shown, footage.frame_count - 1)}.jpg?height=${THUMB_HEIGHT}&age=${age}`;
+/** @typedef {ReturnType<typeof modelOf>} Model */
 
-  function drawPictures() {
-    const { cameras, frame_count: count } = footage;
-    if (!cameras.length)
-      return fill(
-        setup.aside,
-        element(
-          "div",
-          { className: "aside-empty" },
-          element("p", {}, "The pictures of your cameras will be here."),
-          hint(
-            "Two cameras at least, better four: around the subject, each seeing all of it all the time.",
-          ),
-        ),
-      );
-    const images = cameras.map((camera) =>
-      element("img", {
-        src: pictureOf(camera),
-        alt: `Camera ${camera.name}`,
-        onerror: ({ target }) => {
-          target.alt = `The footage of ${camera.name} cannot be read.`;
-        },
-      }),
-    );
-    const figures = cameras.map((camera, at) =>
-      element(
-        "figure",
-        { className: "picture", dataset: { camera: camera.name } },
-        images[at],
-        element(
-          "figcaption",
-          {},
-          element(
-            "div",
-            { className: "step-actions" },
-            element("b", {}, camera.name),
-            spring(),
-            button(
-              "↻ Turn",
-              () => change({ rotations: { [camera.name]: (camera.turned + 90) % 360 } }),
-              "small",
-              { ariaLabel: `Turn ${camera.name} by 90 degrees clockwise` },
-            ),
-          ),
-          dotted(
-            `${camera.width}×${camera.height}`,
-            `${camera.frame_count} frames`,
-            camera.kind,
-            camera.has_masks && "masks",
-            camera.has_background && "background",
-          ),
-        ),
-      ),
-    );
-    const label = element("output", {}, `frame ${shown}`);
-    const slider = element("input", {
-      type: "range",
-      min: 0,
-      max: count - 1,
-      value: shown,
-      ariaLabel: "Frame",
-    });
-    slider.oninput = () => {
-      shown = Number(slider.value);
-      label.textContent = `frame ${shown}`;
-      clearTimeout(wait);
-      wait = setTimeout(() => {
-        for (const [at, camera] of cameras.entries()) images[at].src = pictureOf(camera);
-      }, FRAME_MILLISECONDS);
-    };
-    fill(
-      setup.aside,
-      element(
-        "div",
-        { className: "pictures-bar" },
-        slider,
-        label,
-        element("span", { className: "hint" }, "The same moment in every camera?"),
-      ),
-      element("div", { className: "pictures" }, figures),
-    );
-  }
+/** @param {{ footage: Model["footage"]["value"] }} properties */
+const Cameras = ({ footage: { cameras, fps, frame_count: count } }) =>
+  cameras.length > 0 &&
+  html`<section class="footage-cameras">
+    <p class="hint">${count} frames at ${Number(fps.toFixed(3))} a second are in all cameras.</p>
+    <div class="scrolls">
+      <${Table}
+        heads=${["camera", "size", "frames", "turned"]}
+        rows=${cameras.map((camera) => [
+          camera.name,
+          `${camera.width}×${camera.height}`,
+          camera.frame_count,
+          camera.turned ? `${camera.turned}°` : "–",
+        ])}
+      />
+    </div>
+  </section>`;
 
-  function draw() {
-    shown = Math.min(shown, Math.max(0, footage.frame_count - 1));
-    drawList();
-    drawPictures();
-    sync.draw(footage);
-    adding.draw(footage.cameras.length > 0);
-  }
+/** @param {{ model: Model }} properties */
+const Panel = ({ model }) => html`
+  <${Cameras} footage=${model.footage.value} />
+  ${model.warnings.value.map((words) => html`<p class="notice">${words}</p>`)}
+  <${Synchronisation} model=${model.sync} footage=${model.footage.value} />
+  <${AddingForm} model=${model.adding} isFirst=${!model.footage.value.cameras.length} />
+`;
 
-  function show(words) {
-    fill(
-      warnings,
-      words.map((each) => notice(each)),
-    );
-    draw();
-  }
+/** A camera's picture of a frame. @param {{ model: Model, frame: number, camera: any }} properties */
+function CameraPicture({ model, frame, camera }) {
+  const { name } = camera;
+  const [isBroken, setBroken] = useState(false);
+  const address = `${model.here}/footage/${encodeURIComponent(name)}/${frame}.jpg`;
+  return html`<figure class="picture" data-camera=${name}>
+    <img
+      src=${`${address}?height=${THUMB_HEIGHT}&age=${model.age.value}`}
+      alt=${isBroken ? `The footage of ${name} cannot be read.` : `Camera ${name}`}
+      onLoad=${() => setBroken(false)}
+      onError=${() => setBroken(true)}
+    />
+    <figcaption>
+      <div class="step-actions">
+        <b>${name}</b><span class="spring"></span>
+        <${Action}
+          kind="small"
+          act=${() => model.turn(camera)}
+          aria-label=${`Turn ${name} by 90 degrees clockwise`}
+        >
+          ↻ Turn
+        </${Action}>
+      </div>
+      ${dotted(
+        `${camera.width}×${camera.height}`,
+        `${camera.frame_count} frames`,
+        camera.kind,
+        camera.has_masks && "masks",
+        camera.has_background && "background",
+      )}
+    </figcaption>
+  </figure>`;
+}
 
-  const takeDropped = ({ detail }) => adding.take(detail);
+/** The pictures of a frame, which follow its slider. @param {{ model: Model }} properties */
+function Pictures({ model }) {
+  const { cameras, frame_count: count } = model.footage.value;
+  const last = Math.max(0, count - 1);
+  const [chosen, setChosen] = useState(0);
+  const [pictured, setPictured] = useState(0);
+  useEffect(() => {
+    const wait = setTimeout(() => setPictured(chosen), FRAME_MILLISECONDS);
+    return () => clearTimeout(wait);
+  }, [chosen]);
+  if (!cameras.length)
+    return html`<div class="aside-empty">
+      <p>The pictures of your cameras will be here.</p>
+      <p class="hint">
+        Two cameras at least, better four: around the subject, each seeing all of it all the time.
+      </p>
+    </div>`;
+  const frame = Math.min(chosen, last);
+  return html`
+    <div class="pictures-bar">
+      <input
+        type="range"
+        min="0"
+        max=${last}
+        value=${frame}
+        aria-label="Frame"
+        onInput=${({ target }) => setChosen(Number(target.value))}
+      />
+      <output>frame ${frame}</output>
+      <span class="hint">The same moment in every camera?</span>
+    </div>
+    <div class="pictures">
+      ${cameras.map(
+        (camera) =>
+          html`<${CameraPicture}
+            key=${camera.name}
+            model=${model}
+            frame=${Math.min(pictured, last)}
+            camera=${camera}
+          />`,
+      )}
+    </div>
+  `;
+}
+
+/** @type {import("./setup.js").Mount<typeof load>} */
+export function mount(place, setup, loaded) {
+  const model = modelOf(setup, loaded);
+  render(place, html`<${Panel} model=${model} />`);
+  render(setup.aside, html`<${Pictures} model=${model} />`);
+  const takeDropped = ({ detail }) => model.adding.take(detail);
   document.addEventListener("footage", /** @type {any} */ (takeDropped));
-  show(setup.detail.warnings ?? []);
-  if (setup.asked.dropped) adding.take(setup.asked.dropped).catch(complain);
+  if (setup.asked.dropped) model.adding.take(setup.asked.dropped).catch(complain);
   return () => {
     document.removeEventListener("footage", /** @type {any} */ (takeDropped));
-    clearTimeout(wait);
-    sync.stop();
-    adding.stop();
+    model.sync.stop();
+    model.adding.stop();
+    render(place, null);
+    render(setup.aside, null);
   };
 }

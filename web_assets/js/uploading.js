@@ -48,12 +48,14 @@ async function sendFile(identifier, file, path, arrived, signal) {
 }
 
 /**
- * Send files; report(words, share) says how far. Resolves with the upload's identifier. signal: of
- * an AbortController.
+ * Send files; report(words, share) says how far. Resolves with the upload's identifier.
+ * @param {ArrayLike<File>} files
+ * @param {(words: string, share: number) => void} report
+ * @param {AbortSignal} [signal]
  */
-export async function uploadFiles(files, report, signal = undefined) {
+export async function uploadFiles(files, report, signal) {
   const { identifier } = await post("/api/uploads");
-  const total = [...files].reduce((sum, file) => sum + file.size, 0) || 1;
+  const total = Array.from(files).reduce((sum, file) => sum + file.size, 0) || 1;
   const begun = performance.now();
   let sent = 0;
   const reach = (at, bytes) => {
@@ -68,7 +70,7 @@ export async function uploadFiles(files, report, signal = undefined) {
     );
   };
   try {
-    for (const [at, file] of [...files].entries()) {
+    for (const [at, file] of Array.from(files).entries()) {
       reach(at, sent);
       await sendFile(
         identifier,

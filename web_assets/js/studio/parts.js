@@ -1,5 +1,5 @@
-// Small components that pages share: a button that waits for what it does, an error with its remedy, a bar of
-// progress, a box to be checked.
+// Small components that pages share: a button that waits for what it does, an error with its
+// remedy, a bar of progress, a box to be checked, a choice, a table.
 
 import { html, useLayoutEffect, useRef, useState } from "./component.js";
 
@@ -61,6 +61,31 @@ export const Check = ({
   <input type="checkbox" checked=${checked} onChange=${({ target }) => take(target.checked)} />
   ${children}
 </label>`;
+
+/**
+ * A choice; `take(value)` hears of it.
+ * @param {{ options: ([string, string] | string)[], value?: string, take?: (value: string) => void,
+ *   [more: string]: any }} properties `options`: values with their words, or words alone
+ */
+export const Select = ({ options, value, take, ...more }) => html`<select
+  onChange=${({ target }) => take?.(target.value)}
+  ...${more}
+>
+  ${options.map((one) => {
+    const [own, words] = Array.isArray(one) ? one : [one, one];
+    return html`<option key=${own} value=${own} selected=${own === value}>${words}</option>`;
+  })}
+</select>`;
+
+/** @param {{ heads: string[], rows: any[][], kind?: string }} properties */
+export const Table = ({ heads, rows, kind = "figures" }) => html`<table class=${kind}>
+  <thead>
+    <tr>${heads.map((head) => html`<th>${head}</th>`)}</tr>
+  </thead>
+  <tbody>
+    ${rows.map((cells) => html`<tr>${cells.map((cell) => html`<td>${cell}</td>`)}</tr>`)}
+  </tbody>
+</table>`;
 
 /** An element that was made by hand, among components. @param {{ what: Element }} properties */
 export function Made({ what }) {
