@@ -98,7 +98,7 @@ def test_leaps_are_called_out_and_an_old_export_is(page: Page, studio: StudioSer
     page.get_by_role("button", name="Check the motion").click()
     chip = page.get_by_role("button", name=re.compile("^5 left arm$"))
     chip.click()
-    expect(chip).to_have_attribute("aria-current", "")
+    expect(chip).to_have_attribute("aria-current", "true")
     expect(page.locator("#aside")).to_contain_text("frame 5")
     expect(page.locator("#stepper [data-step=check]")).to_contain_text("frame 5, left arm")
     page.screenshot(path=artefacts / "setup-check-jumps.png")

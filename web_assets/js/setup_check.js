@@ -2,23 +2,16 @@
 // track is exported.
 
 import { fetchJson, post, remove, runPath } from "./api.js";
-import {
-  actions,
-  button,
-  drawProgress,
-  element,
-  failure,
-  fill,
-  hint,
-  optional,
-  percent,
-  table,
-} from "./elements.js";
+import { percent } from "./elements.js";
 import { followJob, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
-import { viewWall } from "./setup_views.js";
+import { ViewWall } from "./setup_views.js";
+import { batch, html, mount as render, signal } from "./studio/component.js";
+import { Action, Failure, Progress, Table } from "./studio/parts.js";
 
 /** @import { Schemas } from "./api_types" */
+/** @typedef {Schemas["CheckAnswer"]} Answer */
+/** @typedef {NonNullable<Answer["check"]>} Check */
 
 const MOST_CHIPS = 24;
 const GOOD = 0.85;
@@ -28,87 +21,44 @@ const GOING = {
   check: "comparing",
   landmarks: "looking for joints",
 };
-const millimetres = (value) => (value === null ? "–" : `${value.toFixed(1)} mm`);
+const millimetres = (/** @type {number | null} */ value) =>
+  value === null ? "–" : `${value.toFixed(1)} mm`;
+const meanOf = (/** @type {(number | null)[]} */ shares) => {
+  const known = shares.filter((share) => share !== null);
+  return known.length ? known.reduce((sum, share) => sum + share, 0) / known.length : null;
+};
 
-/** @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
-export function mount(place, setup) {
+/**
+ * What the step knows, and what can be done.
+ * @param {import("./setup.js").Setup} setup
+ */
+function modelOf(setup) {
   const run = setup.detail.runs.find((one) => one.name === setup.step?.run) ?? setup.detail.runs[0];
   const here = runPath(setup.session, run.name);
-  const found = element("section", { className: "footage-step" });
-  const witness = element("section", { className: "footage-step" });
-  const better = element("section", { className: "footage-step" });
-  const going = optional();
-  place.append(
-    found,
-    going,
-    ...(setup.detail.body.by_height && setup.detail.cameras.length > 1 ? [witness] : []),
-    better,
-  );
-  const wall = viewWall(setup);
-  /** @type {Schemas["CheckAnswer"] | null} */
-  let answer = null;
-  /** @type {Schemas["TrackList"]["tracks"]} */
-  let tracks = [];
-  let job = null;
-  let track = "";
-  let shown = run.first; // the frame that is looked at
-  let failed = null;
-  /** @type {Schemas["LandmarksLine"] | null} */
-  let seen = null; // how far the track lies from a network's joints
-  let stopped = false;
+  const answer = signal(/** @type {Answer | null} */ (null));
+  const tracks = signal(/** @type {Schemas["TrackList"]["tracks"]} */ ([]));
+  const track = signal("");
+  /** What is being done. */
+  const job = signal(/** @type {any} */ (null));
+  const failed = signal(/** @type {any} */ (null));
+  /** The frame that is looked at. */
+  const frame = signal(run.first);
+  /** How far the track lies from a network's joints. */
+  const seen = signal(/** @type {Schemas["LandmarksLine"] | null} */ (null));
+  let isLeft = false;
 
-  const picker = element("input", {
-    type: "range",
-    min: 0,
-    max: 0,
-    value: 0,
-    ariaLabel: "Checked frame",
-  });
-  wall.tools.append(picker);
-  picker.oninput = () => show(framesToSee()[Number(picker.value)]);
-
+  const checkOf = (/** @type {string} */ name) =>
+    fetchJson(name ? `${here}/check?track=${encodeURIComponent(name)}` : `${here}/check`);
   const everyTenth = () =>
     Array.from(
       { length: Math.ceil(Math.max(run.tracked_to - run.first, 1) / 10) },
       (_, at) => run.first + 10 * at,
     );
-  const framesToSee = () => answer?.check?.frames ?? everyTenth();
+  const framesToSee = () => answer.value?.check?.frames ?? everyTenth();
 
-  function show(frame) {
-    if (frame === undefined) return;
-    shown = frame;
-    const frames = framesToSee();
-    picker.max = String(frames.length - 1);
-    if (frames.includes(frame)) picker.value = String(frames.indexOf(frame));
-    wall.show({ run: run.name, frame, track: track === "raw" ? "" : track, show: "outline" });
-    const check = answer?.check;
-    const row = check?.frames.indexOf(frame) ?? -1;
-    for (const camera of setup.detail.cameras) {
-      const view = row < 0 ? -1 : (check?.cameras.indexOf(camera.name) ?? -1);
-      const inside = check && view >= 0 ? check.inside[row][view] : null;
-      wall.note(
-        camera.name,
-        view < 0
-          ? ""
-          : `${percent(inside)} of the model in the mask, ${percent(check?.covered[row][view])} of the mask under the model`,
-        inside !== null && inside < GOOD ? "bad" : "",
-      );
-    }
-    markShown();
-  }
-
-  /** The chips and bars of the frame that is looked at. */
-  function markShown() {
-    for (const chip of /** @type {NodeListOf<HTMLElement>} */ (
-      found.querySelectorAll("[data-frame]")
-    ))
-      chip.toggleAttribute("aria-current", Number(chip.dataset.frame) === shown);
-  }
-
-  /** The frame that is looked at, as long as there is something to see in it. */
+  /** The frame that is looked at stays as long as there is something to see in it. */
   function showAgain() {
-    const frames = framesToSee();
-    const check = answer?.check;
+    const check = answer.value?.check;
     const named = check
       ? [
           ...check.lost,
@@ -118,304 +68,374 @@ export function mount(place, setup) {
           ...Object.values(check.lost_limbs).flat(),
         ]
       : [];
-    show([...frames, ...named].includes(shown) ? shown : frames[0]);
+    const frames = framesToSee();
+    if (![...frames, ...named].includes(frame.value)) frame.value = frames[0] ?? run.first;
   }
 
-  /** Frames to be looked at by a click. entries: {frame, words, title}. */
-  function chips(words, entries) {
-    if (!entries.length) return null;
-    const more =
-      entries.length > MOST_CHIPS ? ` (the first ${MOST_CHIPS} of ${entries.length})` : "";
-    return element(
-      "div",
-      {},
-      hint(`${words}${more}:`),
-      element(
-        "div",
-        { className: "chips" },
-        entries.slice(0, MOST_CHIPS).map(({ frame, limb = "", title = "" }) => {
-          const chip = button("", () => show(frame), "small quiet", { title, dataset: { frame } });
-          chip.append(...(limb ? [element("b", {}, frame), ` ${limb}`] : [String(frame)]));
-          return chip;
-        }),
-      ),
-    );
-  }
-
-  const plain = (frames) => frames.map((frame) => ({ frame }));
-  const jumpsOf = (check) =>
-    check.jumps.map(({ frame, limb, mm, usual_mm: usual }) => ({
-      frame,
-      limb,
-      title: `The ${limb} jumps into frame ${frame}: its markers bend by ${mm.toFixed(0)} mm from a straight course, usually by ${usual.toFixed(1)} mm.`,
-    }));
-
-  /** A bar a looked-at frame: how much of the model lies in the masks, over all cameras. */
-  function strip(check) {
-    return element(
-      "div",
-      {
-        className: "share-strip",
-        role: "group",
-        ariaLabel: "Share of the model in the masks, by frame",
-      },
-      check.frames.map((frame, row) => {
-        const shares = check.inside[row].filter((share) => share !== null);
-        const mean = shares.length
-          ? shares.reduce((sum, share) => sum + share, 0) / shares.length
-          : 0;
-        const words = `frame ${frame}: ${percent(mean)}`;
-        return element(
-          "button",
-          {
-            type: "button",
-            className: mean < GOOD ? "poor" : "",
-            title: words,
-            ariaLabel: `${words} of the model in the masks`,
-            dataset: { frame },
-            onclick: () => show(frame),
-          },
-          element("i", { style: `height: ${Math.round(100 * mean)}%` }),
-        );
-      }),
-    );
-  }
-
-  function verdict(check) {
-    const seen = check.covered.flat().filter((share) => share !== null);
-    const covered = seen.reduce((sum, share) => sum + share, 0) / seen.length;
-    const parts = [
-      check.good ? "The motion fits the pictures." : "Check the marked frames.",
-      `${percent(check.inside_mean)} of the model lies in the masks${seen.length ? `, ${percent(covered)} of the masks under the model: where it is little, a limb is elsewhere` : ""}.`,
-      check.turned.length
-        ? `The body turns round suddenly ${check.turned.length} times: left and right may be exchanged.`
-        : "No sudden turn: left and right were not exchanged.",
-      check.jumps.length
-        ? `A limb jumps ${check.jumps.length === 1 ? "once" : `${check.jumps.length} times`}: it was lost or taken for another.`
-        : "",
-      check.jitter_mm !== null ? `The markers jitter by ${check.jitter_mm.toFixed(1)} mm.` : "",
-    ];
-    return element("p", { className: check.good ? "" : "notice" }, parts.filter(Boolean).join(" "));
-  }
-
-  function drawFound() {
-    const check = answer?.check;
-    const measure = actions(
-      button(
-        check ? "Measure again" : "Check the motion",
-        () => begin("check", { track }),
-        check ? "quiet small" : "primary",
-        { disabled: Boolean(job) },
-      ),
-    );
-    if (!check)
-      return fill(
-        found,
-        hint(
-          `Track "${track}" of ${run.name}: every tenth frame is compared with the masks, in every view.`,
-        ),
-        measure,
-      );
-    fill(
-      found,
-      verdict(check),
-      strip(check),
-      chips("Too little of the model in the masks", plain(check.poor)),
-      chips("Lost", plain(check.lost)),
-      Object.entries(check.lost_limbs).map(([limb, frames]) =>
-        chips(`The ${limb} is not where masks or pictures show it`, plain(frames)),
-      ),
-      chips("Doubtful", plain(check.doubtful)),
-      chips("Sudden turns", plain(check.turned)),
-      chips("Jumps", jumpsOf(check)),
-      measure,
-    );
-    markShown();
-  }
-
-  function drawBetter() {
-    const has = (name) => tracks.some((line) => line.name === name);
-    const act = (verb, words, name) =>
-      button(words, () => begin(verb, { replace: has(name) }), "small", { disabled: Boolean(job) });
-    const truth = setup.detail.has_truth;
-    fill(
-      better,
-      element("h2", {}, "Improve the track"),
-      table(
-        ["track", "jitter", ...(truth ? ["from truth"] : [])],
-        tracks.map((line) => [
-          element(
-            "td",
-            {},
-            element(
-              "label",
-              { className: "check" },
-              element("input", {
-                type: "radio",
-                name: "setup-track",
-                value: line.name,
-                checked: line.name === track,
-                ariaLabel: `Show ${line.name}`,
-                onchange: () => choose(line.name).catch(complain),
-              }),
-              line.name === "raw" ? "raw (as searched)" : line.name,
-            ),
-            Array.isArray(line.made_by.exchanged) && hint(line.made_by.exchanged.join("; ")),
-            line.name === answer?.usual &&
-              element(
-                "span",
-                {
-                  className: "badge good",
-                  title: "Step Export takes this one, unless you choose another.",
-                },
-                "for export",
-              ),
-          ),
-          millimetres(line.jitter_mm),
-          ...(truth ? [millimetres(line.mean_mm)] : []),
-        ]),
-      ),
-      actions(
-        act("refine", has("refined") ? "Refine again" : "Refine on the silhouettes", "refined"),
-        act("smooth", has("smoothed") ? "Smooth again" : "Smooth in time", "smoothed"),
-      ),
-      hint(
-        "Each is stored beside the tracked one. The smoothed one is exported if there is one, else the refined one, else the one with corrected sides.",
-      ),
-      failure(failed),
-    );
-  }
-
-  /** Another witness than the masks, of people: joints that a network sees, triangulated. */
-  function drawWitness() {
-    const file =
-      seen &&
-      element(
-        "a",
-        { href: `${here}/exports/${encodeURIComponent(seen.file)}`, download: seen.file },
-        seen.file,
-      );
-    fill(
-      witness,
-      element("h2", {}, "Another witness"),
-      seen
-        ? element(
-            "p",
-            {},
-            `Track "${track}" lies ${millimetres(seen.mean_mm)} from a network's joints, ${millimetres(seen.without_offsets_mm)} without each joint's constant offset; all of them are seen in ${percent(seen.seen)} of the frames. `,
-            file,
-          )
-        : hint(
-            "A network that knows people, and nothing of this body or its search, sees shoulders, elbows, wrists, hips, knees and ankles in every view; coarse by some centimetres.",
-          ),
-      actions(
-        button(
-          seen ? "Look again" : "Compare with a network's joints",
-          () => begin("landmarks", { track }),
-          "small",
-          { disabled: Boolean(job) },
-        ),
-      ),
-    );
-  }
-
-  async function choose(name) {
-    track = name;
-    seen = null;
-    answer = await fetchJson(`${here}/check?track=${encodeURIComponent(name)}`);
-    draw();
-    showAgain();
-  }
-
-  function draw() {
-    drawFound();
-    drawWitness();
-    drawBetter();
-    drawProgress(
-      going,
-      job &&
-        progressOf(job, GOING[job.verb] || "working", () =>
-          remove(`/api/track-jobs/${job.identifier}`).catch(complain),
-        ),
-    );
-  }
-
-  /**
-   * Begin refining, smoothing or measuring, and follow it to its end; nothing else can be begun
-   * meanwhile.
-   * @param {"refine" | "smooth" | "check" | "landmarks"} verb
-   */
-  function begin(verb, request) {
-    failed = null;
-    job = { verb, state: "running" };
-    draw();
-    return carry(() => post(`${here}/${verb}`, request));
-  }
-
-  /**
-   * Follow a job, and what follows from it: a track that was made is looked at, whether it is
-   * better is the next question.
-   */
-  async function carry(begun) {
-    try {
-      for (let start = begun; start && !stopped; ) {
-        job = await start();
-        draw();
-        const made = await follow();
-        start = made ? () => post(`${here}/check`, { track: made }) : null;
-      }
-    } catch (error) {
-      failed = error;
-    }
-    job = null;
-    if (!stopped) draw();
+  async function load(wanted = "") {
+    const [checked, listed] = await Promise.all([checkOf(wanted), fetchJson(`${here}/tracks`)]);
+    batch(() => {
+      answer.value = checked;
+      tracks.value = listed.tracks;
+      track.value = checked.track;
+      showAgain();
+    });
+    if (listed.running[0] && !job.value) carry(listed.running[0]);
   }
 
   /** Wait for the job's end; resolves with the name of the track that it made, "" for none. */
   async function follow() {
     let ended = null;
     try {
-      ended = await followJob(
-        `/api/track-jobs/${job.identifier}`,
-        (state) => {
-          job = state;
-          draw();
-        },
-        () => stopped,
-      );
+      const take = (/** @type {any} */ state) => {
+        job.value = state;
+      };
+      ended = await followJob(`/api/track-jobs/${job.value.identifier}`, take, () => isLeft);
     } catch (error) {
-      failed = error;
+      failed.value = error;
     }
-    if (stopped) return "";
+    if (isLeft) return "";
     const made =
       ended?.state === "done" && !["check", "landmarks"].includes(ended.verb) ? ended.track : "";
-    if (made) seen = null;
-    if (ended?.landmarks) seen = ended.landmarks;
-    await load(made || track);
+    if (made) seen.value = null;
+    if (ended?.landmarks) seen.value = ended.landmarks;
+    await load(made || track.value);
     await setup.refresh();
     return made;
   }
 
-  async function load(wanted = "") {
-    const [checked, listed] = await Promise.all([
-      wanted
-        ? fetchJson(`${here}/check?track=${encodeURIComponent(wanted)}`)
-        : fetchJson(`${here}/check`),
-      fetchJson(`${here}/tracks`),
-    ]);
-    [answer, tracks, track] = [checked, listed.tracks, checked.track];
-    const running = listed.running[0] ?? null;
-    if (running && !job) {
-      job = running;
-      carry(() => running);
+  /**
+   * Follow a job, and what follows from it: of a track that was made it is the next question
+   * whether it is better.
+   * @param {any} begun
+   */
+  async function carry(begun) {
+    try {
+      job.value = await begun;
+      const made = await follow();
+      if (made) {
+        job.value = await post(`${here}/check`, { track: made });
+        await follow();
+      }
+    } catch (error) {
+      failed.value = error;
     }
-    draw();
-    showAgain();
+    job.value = null;
   }
 
   load().catch(complain);
+  return {
+    setup,
+    run,
+    here,
+    answer,
+    tracks,
+    track,
+    job,
+    failed,
+    frame,
+    seen,
+    framesToSee,
+    /** Look at another track. @param {string} name */
+    choose: async (name) => {
+      const checked = await checkOf(name);
+      batch(() => {
+        track.value = name;
+        seen.value = null;
+        answer.value = checked;
+        showAgain();
+      });
+    },
+    /**
+     * Refine, smooth or measure, and follow it to its end; nothing else can be begun meanwhile.
+     * @param {"refine" | "smooth" | "check" | "landmarks"} verb
+     * @param {any} request
+     */
+    begin: (verb, request) => {
+      failed.value = null;
+      job.value = { verb, state: "running" };
+      return carry(post(`${here}/${verb}`, request));
+    },
+    stop: () => {
+      isLeft = true;
+    },
+  };
+}
+
+/** @typedef {ReturnType<typeof modelOf>} Model */
+
+/** A button that begins something, unless something is being done. */
+const Begin = (/** @type {any} */ { model, verb, request, kind, children }) => html`<${Action}
+  kind=${kind}
+  act=${() => model.begin(verb, request)}
+  disabled=${Boolean(model.job.value)}
+>
+  ${children}
+</${Action}>`;
+
+/**
+ * Frames to be looked at by a click; nothing where there are none.
+ * @param {{ model: Model, words: string, entries: ({ frame: number, limb?: string, title?: string }
+ *   | number)[] }} properties
+ */
+function Chips({ model, words, entries }) {
+  if (!entries.length) return null;
+  const more = entries.length > MOST_CHIPS ? ` (the first ${MOST_CHIPS} of ${entries.length})` : "";
+  return html`<div>
+    <p class="hint">${words}${more}:</p>
+    <div class="chips">
+      ${entries.slice(0, MOST_CHIPS).map((entry) => {
+        const {
+          frame,
+          limb = "",
+          title = "",
+        } = typeof entry === "number" ? { frame: entry } : entry;
+        return html`<${FrameButton} model=${model} frame=${frame} kind="small quiet" title=${title}>
+          ${limb ? html`<b>${frame}</b> ${limb}` : frame}
+        </${FrameButton}>`;
+      })}
+    </div>
+  </div>`;
+}
+
+/** Shows a frame; the one that is shown is marked. */
+const FrameButton = (/** @type {any} */ { model, frame, kind, children, ...more }) => html`<button
+  type="button"
+  class=${kind}
+  data-frame=${frame}
+  aria-current=${model.frame.value === frame ? "true" : null}
+  onClick=${() => {
+    model.frame.value = frame;
+  }}
+  ...${more}
+>
+  ${children}
+</button>`;
+
+/** A bar a looked-at frame: how much of the model lies in the masks, over all cameras. */
+const Strip = (/** @type {{ model: Model, check: Check }} */ { model, check }) => html`<div
+  class="share-strip"
+  role="group"
+  aria-label="Share of the model in the masks, by frame"
+>
+  ${check.frames.map((frame, row) => {
+    const mean = meanOf(check.inside[row]) ?? 0;
+    const words = `frame ${frame}: ${percent(mean)}`;
+    return html`<${FrameButton}
+      model=${model}
+      frame=${frame}
+      kind=${mean < GOOD ? "poor" : ""}
+      title=${words}
+      aria-label=${`${words} of the model in the masks`}
+    >
+      <i style=${{ height: `${Math.round(100 * mean)}%` }}></i>
+    </${FrameButton}>`;
+  })}
+</div>`;
+
+/** @param {Check} check */
+function verdictOf(check) {
+  const covered = meanOf(check.covered.flat());
+  const [turns, jumps] = [check.turned.length, check.jumps.length];
+  const parts = [
+    check.good ? "The motion fits the pictures." : "Check the marked frames.",
+    `${percent(check.inside_mean)} of the model lies in the masks${covered === null ? "" : `, ${percent(covered)} of the masks under the model: where it is little, a limb is elsewhere`}.`,
+    turns
+      ? `The body turns round suddenly ${turns} times: left and right may be exchanged.`
+      : "No sudden turn: left and right were not exchanged.",
+    jumps &&
+      `A limb jumps ${jumps === 1 ? "once" : `${jumps} times`}: it was lost or taken for another.`,
+    check.jitter_mm !== null && `The markers jitter by ${check.jitter_mm.toFixed(1)} mm.`,
+  ];
+  return parts.filter(Boolean).join(" ");
+}
+
+/** What was measured. @param {{ model: Model, check: Check }} properties */
+function Measured({ model, check }) {
+  const jumps = check.jumps.map(({ frame, limb, mm, usual_mm: usual }) => ({
+    frame,
+    limb,
+    title: `The ${limb} jumps into frame ${frame}: its markers bend by ${millimetres(mm)} from a straight course, usually by ${millimetres(usual)}.`,
+  }));
+  const chips = (/** @type {string} */ words, /** @type {any[]} */ entries) =>
+    html`<${Chips} model=${model} words=${words} entries=${entries} />`;
+  return html`
+    <p class=${check.good ? "" : "notice"}>${verdictOf(check)}</p>
+    <${Strip} model=${model} check=${check} />
+    ${chips("Too little of the model in the masks", check.poor)} ${chips("Lost", check.lost)}
+    ${Object.entries(check.lost_limbs).map(([limb, frames]) =>
+      chips(`The ${limb} is not where masks or pictures show it`, frames),
+    )}
+    ${chips("Doubtful", check.doubtful)} ${chips("Sudden turns", check.turned)}
+    ${chips("Jumps", jumps)}
+  `;
+}
+
+/** @param {{ model: Model }} properties */
+function Found({ model }) {
+  const check = model.answer.value?.check;
+  const track = model.track.value;
+  return html`<section class="footage-step">
+    ${
+      check
+        ? html`<${Measured} model=${model} check=${check} />`
+        : html`<p class="hint">
+            Track "${track}" of ${model.run.name}: every tenth frame is compared with the masks, in
+            every view.
+          </p>`
+    }
+    <div class="step-actions">
+      <${Begin} model=${model} verb="check" request=${{ track }} kind=${check ? "quiet small" : "primary"}>
+        ${check ? "Measure again" : "Check the motion"}
+      </${Begin}>
+    </div>
+  </section>`;
+}
+
+/** Another witness than the masks, of people: joints that a network sees, triangulated. */
+function Witness(/** @type {{ model: Model }} */ { model }) {
+  const seen = model.seen.value;
+  const track = model.track.value;
+  return html`<section class="footage-step">
+    <h2>Another witness</h2>
+    ${
+      seen
+        ? html`<p>
+            Track "${track}" lies ${millimetres(seen.mean_mm)} from a network's joints,
+            ${" "}${millimetres(seen.without_offsets_mm)} without each joint's constant offset; all
+            of them are seen in ${percent(seen.seen)} of the frames.${" "}
+            <a href=${`${model.here}/exports/${encodeURIComponent(seen.file)}`} download=${seen.file}>
+              ${seen.file}
+            </a>
+          </p>`
+        : html`<p class="hint">
+            A network that knows people, and nothing of this body or its search, sees shoulders,
+            elbows, wrists, hips, knees and ankles in every view; coarse by some centimetres.
+          </p>`
+    }
+    <div class="step-actions">
+      <${Begin} model=${model} verb="landmarks" request=${{ track }} kind="small">
+        ${seen ? "Look again" : "Compare with a network's joints"}
+      </${Begin}>
+    </div>
+  </section>`;
+}
+
+/** A track's name, by which it is looked at. */
+const TrackChoice = (/** @type {any} */ { model, line: { name, made_by: made } }) => html`
+  <label class="check">
+    <input
+      type="radio"
+      name="setup-track"
+      value=${name}
+      checked=${name === model.track.value}
+      aria-label=${`Show ${name}`}
+      onChange=${() => model.choose(name).catch(complain)}
+    />
+    ${name === "raw" ? "raw (as searched)" : name}
+  </label>
+  ${Array.isArray(made.exchanged) && html`<p class="hint">${made.exchanged.join("; ")}</p>`}
+  ${
+    name === model.answer.value?.usual &&
+    html`<span class="badge good" title="Step Export takes this one, unless you choose another.">
+      for export
+    </span>`
+  }
+`;
+
+/** The tracks, and what makes better ones. @param {{ model: Model }} properties */
+function Better({ model }) {
+  const tracks = model.tracks.value;
+  const hasTruth = model.setup.detail.has_truth;
+  const begin = (
+    /** @type {string} */ verb,
+    /** @type {string} */ made,
+    /** @type {string} */ words,
+    /** @type {string} */ again,
+  ) => {
+    const replace = tracks.some((line) => line.name === made);
+    return html`<${Begin} model=${model} verb=${verb} request=${{ replace }} kind="small">
+      ${replace ? again : words}
+    </${Begin}>`;
+  };
+  return html`<section class="footage-step">
+    <h2>Improve the track</h2>
+    <${Table}
+      heads=${["track", "jitter", ...(hasTruth ? ["from truth"] : [])]}
+      rows=${tracks.map((line) => [
+        html`<${TrackChoice} model=${model} line=${line} />`,
+        millimetres(line.jitter_mm),
+        ...(hasTruth ? [millimetres(line.mean_mm)] : []),
+      ])}
+    />
+    <div class="step-actions">
+      ${begin("refine", "refined", "Refine on the silhouettes", "Refine again")}
+      ${begin("smooth", "smoothed", "Smooth in time", "Smooth again")}
+    </div>
+    <p class="hint">
+      Each is stored beside the tracked one. The smoothed one is exported if there is one, else the
+      refined one, else the one with corrected sides.
+    </p>
+    <${Failure} error=${model.failed.value} />
+  </section>`;
+}
+
+/** @param {{ model: Model }} properties */
+function Panel({ model }) {
+  if (!model.answer.value) return null;
+  const job = model.job.value;
+  const { detail } = model.setup;
+  const cancel = () => remove(`/api/track-jobs/${job.identifier}`).catch(complain);
+  return html`
+    <${Found} model=${model} />
+    ${job && html`<${Progress} ...${progressOf(job, GOING[job.verb] || "working", cancel)} />`}
+    ${detail.body.by_height && detail.cameras.length > 1 && html`<${Witness} model=${model} />`}
+    <${Better} model=${model} />
+  `;
+}
+
+/** The pictures of the frame that is looked at. @param {{ model: Model }} properties */
+function Wall({ model }) {
+  if (!model.answer.value) return null;
+  const frame = model.frame.value;
+  const check = model.answer.value.check;
+  const row = check?.frames.indexOf(frame) ?? -1;
+  const noteOf = (/** @type {string} */ camera) => {
+    const view = row < 0 ? -1 : (check?.cameras.indexOf(camera) ?? -1);
+    if (!check || view < 0) return null;
+    const [inside, covered] = [check.inside[row][view], check.covered[row][view]];
+    return {
+      words: `${percent(inside)} of the model in the mask, ${percent(covered)} of the mask under the model`,
+      kind: inside !== null && inside < GOOD ? "bad" : "",
+    };
+  };
+  const frames = model.framesToSee();
+  return html`<${ViewWall}
+    setup=${model.setup}
+    shown=${{ run: model.run.name, frame, track: model.track.value }}
+    noteOf=${noteOf}
+  >
+    <input
+      type="range"
+      min="0"
+      max=${frames.length - 1}
+      value=${frames.findLastIndex((one) => one <= frame)}
+      aria-label="Checked frame"
+      onInput=${({ target }) => {
+        model.frame.value = frames[Number(target.value)];
+      }}
+    />
+  </${ViewWall}>`;
+}
+
+/** @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
+export function mount(place, setup) {
+  const model = modelOf(setup);
+  render(place, html`<${Panel} model=${model} />`);
+  render(setup.aside, html`<${Wall} model=${model} />`);
   return () => {
-    stopped = true;
-    wall.stop();
+    model.stop();
+    render(place, null);
+    render(setup.aside, null);
   };
 }

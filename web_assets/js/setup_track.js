@@ -2,33 +2,21 @@
 // are found.
 
 import { fetchJson, post, remove, runPath, sessionPath } from "./api.js";
-import { valuesOf } from "./studio/dialogs.js";
-import {
-  actions,
-  button,
-  check,
-  dotted,
-  drawProgress,
-  duration,
-  element,
-  failure,
-  field,
-  fill,
-  hint,
-  notice,
-  number,
-  optional,
-  select,
-  sends,
-} from "./elements.js";
+import { dotted, duration } from "./elements.js";
+import { listen } from "./events.js";
 import { findJob, followJob, isGoing, timeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
 import { studioPath } from "./sessions.js";
-import { viewWall } from "./setup_views.js";
+import { ViewWall } from "./setup_views.js";
+import { html, mount as render, signal, useEffect, useRef, useState } from "./studio/component.js";
+import { valuesOf } from "./studio/dialogs.js";
+import { Action, Failure, Progress, Select } from "./studio/parts.js";
 import { isBusy } from "./work_states.js";
 
+/** @import { Schemas } from "./api_types" */
+/** @import { Work } from "./work_states.js" */
+
 const PICTURE_MILLISECONDS = 700;
-const POLL_MILLISECONDS = 1500;
 /** @type {[string, string][]} */
 const EFFORTS = [
   ["1000", "quick · 1000 poses a frame"],
@@ -37,296 +25,343 @@ const EFFORTS = [
   ["0", "as the settings say"],
 ];
 
-/** @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
-export function mount(place, setup) {
+export const load = (/** @type {string} */ _session) => fetchJson("/api/choices");
+
+/**
+ * What the step knows, and what can be done.
+ * @param {import("./setup.js").Setup} setup
+ */
+function modelOf(setup) {
   const here = sessionPath(setup.session);
-  const status = element("section", { className: "track-status" });
-  const form = element("form", { className: "footage-form" });
-  const fold = element("details", {}, element("summary", {}, "Track again"), form);
-  place.append(status, fold);
-  let { runs } = setup.detail;
-  let work = null; // the tracking process's last state
-  let job = null; // what is tracked backwards
-  let latest = null; // the frame that was found last
-  let failed = null;
-  let stopped = false;
-  let timer = 0;
+  const runs = signal(setup.detail.runs);
+  /** What the tracking process said last. */
+  const work = signal(/** @type {Work | null} */ (null));
+  /** What is tracked backwards. */
+  const job = signal(/** @type {any} */ (null));
+  const failed = signal(/** @type {any} */ (null));
+  const isStale = () => setup.step?.state === "stale";
+  const isFormOpen = signal(!setup.detail.runs.length || isStale());
+  /** What the wall shows. */
+  const shown = signal(/** @type {{ run: string, frame: number } | null} */ (null));
+  /** The frame that was found last, of which run. */
+  let latest = shown.value;
   let shownAt = 0;
-  const wall = viewWall(setup);
-  const newest = () => runs[0] ?? null;
-  const path = () => runPath(setup.session, newest().name);
+  let isLeft = false;
+
+  const newest = () => runs.value[0] ?? null;
   const isHere = () =>
-    work && newest() && work.session === setup.session && work.run === newest().name;
-  const isTracked = () => isHere() && isBusy(work);
+    work.value?.session === setup.session && work.value.run === runs.value[0]?.name;
+  const isTracked = () => isHere() && isBusy(work.value);
+
+  function showNewest() {
+    const run = newest();
+    if (!run?.done && !isTracked()) shown.value = null;
+    else if (latest?.run === run.name) shown.value = latest;
+    else shown.value = { run: run.name, frame: Math.max(run.first, run.tracked_to - 1) };
+  }
 
   async function loadRuns() {
-    runs = (await fetchJson(here)).runs;
+    runs.value = (await fetchJson(here)).runs;
   }
 
-  const workWords = () =>
-    work.state === "compiling"
-      ? "compiling the kernels, once"
-      : dotted(
-          `${work.state} frame ${work.frame} of ${work.first}–${work.last - 1}`,
-          work.frames_per_second && `${work.frames_per_second.toPrecision(2)} a second`,
-          work.seconds_left != null && `${duration(work.seconds_left)} left`,
-        );
-
-  function drawStatus() {
-    const run = newest();
-    fold.open = !run || fold.open;
-    fold.classList.toggle("alone", !run);
-    if (!run) return fill(status);
-    if (job) {
-      const { identifier, done, total, seconds_left: left } = job;
-      return drawProgress(status, {
-        words: dotted(
-          `tracking backwards${total ? `, ${done} of ${total} frames` : ""}`,
-          timeLeft(left),
-        ),
-        share: total ? done / total : 0,
-        cancel: () => remove(`/api/track-jobs/${identifier}`).catch(complain),
-      });
-    }
-    if (isTracked())
-      return drawProgress(status, {
-        words: workWords(),
-        share: work.last > work.first ? work.done / (work.last - work.first) : 0,
-        cancel: () => post(`${path()}/cancel`).catch(complain),
-      });
-    const stale = setup.step?.state === "stale";
-    const complete = run.done >= run.last - run.first;
-    const which = run.first > 0 ? ` (from frame ${run.first} on)` : "";
-    fill(
-      status,
-      element(
-        "p",
-        {},
-        `${run.name}: ${run.done} of ${run.last - run.first} frames${which}, ${run.describe}${run.mean_mm != null ? `, ${run.mean_mm.toPrecision(3)} mm from the truth` : ""}.`,
-      ),
-      failure(isHere() && ["failed", "lost"].includes(work.state) ? work : failed),
-      actions(
-        !complete &&
-          !stale &&
-          button(run.done ? "Track on" : "Track", () => start(run.name), "primary"),
-        run.done > 0 &&
-          run.first > 0 &&
-          !stale &&
-          button("Track back to frame 0", goBack, "", {
-            title: `The run begins in frame ${run.first}. The frames before it are tracked backwards from there, into a new run; ${run.name} stays.`,
-          }),
-        element(
-          "a",
-          { className: "download", href: studioPath(setup.session, run.name) },
-          "Open in the studio",
-        ),
-      ),
-    );
-    fold.open ||= stale;
-  }
-
-  async function start(name) {
-    failed = null;
-    try {
-      await post(`${runPath(setup.session, name)}/start`);
-      work = {
-        session: setup.session,
-        run: name,
-        state: "compiling",
-        frame: 0,
-        first: 0,
-        last: 1,
-        done: 0,
-      };
-    } catch (error) {
-      failed = error;
-    }
-    drawStatus();
-  }
-
-  /** The frames before the first one, tracked backwards from it into a new run. */
-  async function goBack() {
-    failed = null;
-    try {
-      job = await post(`${path()}/correct`, { frame: newest().first, track: "raw", back_to: 0 });
-    } catch (error) {
-      failed = error;
-      return drawStatus();
-    }
-    await followBack();
-  }
-
-  async function followBack() {
-    drawStatus();
-    try {
-      await followJob(
-        `/api/track-jobs/${job.identifier}`,
-        (state) => {
-          job = state;
-          drawStatus();
-        },
-        () => stopped,
-      );
-    } catch (error) {
-      failed = error;
-    }
-    job = null;
-    if (stopped) return;
-    latest = null;
+  /** The run has ended: how far it came. */
+  async function end() {
     await loadRuns().catch(complain);
-    drawStatus();
+    if (isLeft) return;
     showNewest();
     setup.refresh().catch(complain);
   }
 
-  async function begin() {
-    const values = valuesOf(form);
-    const settings = Number(values.evaluations)
-      ? await fetchJson(
-          `/api/evaluations?tracker=${values.tracker}&evaluations=${values.evaluations}`,
-        )
-      : {};
-    const made = await post(`${here}/runs`, {
-      tracker: values.tracker,
-      weighting: values.weighting,
-      first: Number(values.first),
-      last: Number(values.last) + 1,
-      settings,
-      allow_inconsistent: Boolean(values.inconsistent),
-    });
-    fold.open = false;
-    await loadRuns();
-    await start(made.name);
-    await setup.refresh();
+  /** @param {Work} state */
+  function take(state) {
+    const isOurs = (/** @type {Work | null} */ one) =>
+      one?.session === setup.session && isBusy(one);
+    const wasOurs = isOurs(work.value);
+    work.value = state;
+    if (wasOurs && !isOurs(state)) end();
   }
 
-  async function drawForm() {
-    const { trackers, weightings } = await fetchJson("/api/choices");
-    const {
-      start_pose_frame: first,
-      frame_count: count,
-      has_start_pose: known,
-      doubts,
-    } = setup.detail;
-    /** @returns {[string, string][]} */
-    const named = (entries) => entries.map((one) => [one.name, one.label]);
-    const submit = element(
-      "button",
-      { type: "submit", className: "primary" },
-      newest() ? "Track again" : "Track",
-    );
-    const wrong = optional();
-    fill(
-      form,
-      field(
-        "Tracker",
-        select(named(trackers.filter((one) => !one.needs_behaviour)), setup.detail.tracker, {
-          name: "tracker",
-        }),
-      ),
-      field("Likelihood", select(named(weightings), setup.detail.weighting, { name: "weighting" })),
-      hint(
-        "Edges and silhouette suit a cluttered room, where edges inside the masks are often the room's.",
-      ),
-      field("Effort", select(EFFORTS, "2000", { name: "evaluations" })),
-      element(
-        "div",
-        { className: "step-row" },
-        field("First frame", number(first, { name: "first", max: count - 1, step: 1 })),
-        field("Last frame", number(count - 1, { name: "last", max: count - 1, step: 1 })),
-      ),
-      first > 0 &&
-        hint(
-          `The start pose is of frame ${first}: tracking begins there. The frames before it can be tracked backwards afterwards.`,
-        ),
-      !known &&
-        hint(
-          "There is no start pose yet: the first frame is searched for one, which takes a while.",
-        ),
-      doubts.length > 0 && [
-        notice(`The footage contradicts the calibration. ${doubts[0]}`),
-        check("track all the same", { name: "inconsistent", className: "inconsistent" }),
-      ],
-      actions(submit),
-      wrong,
-    );
-    sends(form, submit, wrong, begin);
-  }
-
-  function showNewest() {
-    const run = newest();
-    if (!run?.done && !isTracked())
-      return wall.empty("The outlines will be drawn over the pictures as they are found.");
-    wall.show({
-      run: run.name,
-      frame: latest ?? Math.max(run.first, run.tracked_to - 1),
-      show: "outline",
-    });
-  }
-
-  setup.on("state", async (event) => {
-    const wasBusy = isBusy(work);
-    work = event;
-    if (wasBusy && !isBusy(event)) {
-      await loadRuns().catch(complain);
-      showNewest();
-      setup.refresh().catch(() => {});
-    }
-    if (!stopped) drawStatus();
-  });
+  const stopListening = listen("state", take);
   setup.on("frame", (event) => {
-    if (!newest() || event.run !== newest().name || event.reannealed) return;
-    latest = event.frame;
+    if (event.run !== newest()?.name || event.reannealed) return;
+    latest = { run: event.run, frame: event.frame };
     if (performance.now() - shownAt < PICTURE_MILLISECONDS) return;
     shownAt = performance.now();
     showNewest();
   });
 
-  async function poll() {
-    if (stopped) return;
-    const was = isTracked();
-    work = await fetchJson("/api/worker").catch(() => work);
-    if (stopped) return;
-    if (was || isTracked()) drawStatus();
-    timer = setTimeout(poll, POLL_MILLISECONDS);
+  /** @param {() => Promise<void>} act */
+  async function attempt(act) {
+    failed.value = null;
+    try {
+      await act();
+    } catch (error) {
+      failed.value = error;
+    }
   }
 
-  /** What was begun before this step was shown goes on to be followed. */
-  async function findAgain() {
-    const known = await findJob(
-      { session: setup.session, kind: "track" },
-      (line) => line.verb === "correct",
-    );
-    if (stopped || job || !isGoing(known)) return;
-    job = known;
-    await followBack();
+  /** @param {string} run */
+  const start = (run) =>
+    attempt(async () => {
+      await post(`${runPath(setup.session, run)}/start`);
+      const begun = { session: setup.session, run, state: "compiling" };
+      work.value = /** @type {any} */ ({ ...begun, frame: 0, first: 0, last: 1, done: 0 });
+    });
+
+  /** Follow what is tracked backwards to its end. @param {any} begun */
+  async function followBack(begun) {
+    await attempt(async () => {
+      job.value = await begun;
+      const take = (/** @type {any} */ state) => {
+        job.value = state;
+      };
+      await followJob(`/api/track-jobs/${job.value.identifier}`, take, () => isLeft);
+    });
+    job.value = null;
+    if (!isLeft) await end();
   }
+
+  showNewest();
+  return {
+    setup,
+    work,
+    job,
+    failed,
+    isFormOpen,
+    shown,
+    newest,
+    isHere,
+    isTracked,
+    isStale,
+    start,
+    cancel: () => post(`${runPath(setup.session, newest().name)}/cancel`).catch(complain),
+    /** The frames before the first one, tracked backwards from it into a new run. */
+    goBack: () => {
+      const { name, first } = newest();
+      const request = { frame: first, track: "raw", back_to: 0 };
+      return followBack(post(`${runPath(setup.session, name)}/correct`, request));
+    },
+    /** Make a run as the form has it, and track it. @param {Record<string, any>} values */
+    begin: async (values) => {
+      const { tracker, weighting, evaluations } = values;
+      const settings = Number(evaluations)
+        ? await fetchJson(`/api/evaluations?tracker=${tracker}&evaluations=${evaluations}`)
+        : {};
+      const made = await post(`${here}/runs`, {
+        tracker,
+        weighting,
+        first: Number(values.first),
+        last: Number(values.last) + 1,
+        settings,
+        allow_inconsistent: Boolean(values.inconsistent),
+      });
+      isFormOpen.value = false;
+      await loadRuns();
+      await start(made.name);
+      await setup.refresh();
+    },
+    /** Ask how the tracking process stands; what it said by itself meanwhile is newer. */
+    ask: async () => {
+      const state = await fetchJson("/api/worker");
+      if (!work.value) take({ type: "state", ...state });
+    },
+    /** What was begun before this step was shown goes on to be followed. */
+    findAgain: async () => {
+      const which = { session: setup.session, kind: "track" };
+      const known = await findJob(which, (line) => line.verb === "correct");
+      if (!isLeft && !job.value && isGoing(known)) await followBack(known);
+    },
+    stop: () => {
+      isLeft = true;
+      stopListening();
+    },
+  };
+}
+
+/** @typedef {ReturnType<typeof modelOf>} Model */
+
+/** @param {Work} work */
+const workWords = (work) =>
+  work.state === "compiling"
+    ? "compiling the kernels, once"
+    : dotted(
+        `${work.state} frame ${work.frame} of ${work.first}–${work.last - 1}`,
+        work.frames_per_second && `${work.frames_per_second.toPrecision(2)} a second`,
+        work.seconds_left != null && `${duration(work.seconds_left)} left`,
+      );
+
+/** What is being done, as `Progress` takes it; null where nothing is. @param {Model} model */
+function doingOf(model) {
+  const [job, work] = [model.job.value, model.work.value];
+  if (job)
+    return {
+      words: dotted(
+        `tracking backwards${job.total ? `, ${job.done} of ${job.total} frames` : ""}`,
+        timeLeft(job.seconds_left),
+      ),
+      share: job.total ? job.done / job.total : 0,
+      cancel: () => remove(`/api/track-jobs/${job.identifier}`).catch(complain),
+    };
+  if (!work || !model.isTracked()) return null;
+  const share = work.last > work.first ? work.done / (work.last - work.first) : 0;
+  return { words: workWords(work), share, cancel: model.cancel };
+}
+
+/** The newest run: how far it is, and what can be done with it. @param {{ model: Model }} properties */
+function Status({ model }) {
+  const run = model.newest();
+  if (!run) return null;
+  const doing = doingOf(model);
+  if (doing) return html`<section class="track-status"><${Progress} ...${doing} /></section>`;
+  const work = model.work.value;
+  const count = run.last - run.first;
+  const isStale = model.isStale();
+  const from = run.first > 0 && ` (from frame ${run.first} on)`;
+  const truth = run.mean_mm != null && `, ${run.mean_mm.toPrecision(3)} mm from the truth`;
+  const isFailed = model.isHere() && ["failed", "lost"].includes(work?.state ?? "");
+  return html`<section class="track-status">
+    <p>${run.name}: ${run.done} of ${count} frames${from}, ${run.describe}${truth}.</p>
+    <${Failure} error=${isFailed ? work : model.failed.value} />
+    <div class="step-actions">
+      ${
+        run.done < count &&
+        !isStale &&
+        html`<${Action} kind="primary" act=${() => model.start(run.name)}>
+          ${run.done ? "Track on" : "Track"}
+        </${Action}>`
+      }
+      ${
+        run.done > 0 &&
+        run.first > 0 &&
+        !isStale &&
+        html`<${Action}
+          act=${model.goBack}
+          title=${`The run begins in frame ${run.first}. The frames before it are tracked backwards from there, into a new run; ${run.name} stays.`}
+        >
+          Track back to frame 0
+        </${Action}>`
+      }
+      <a class="download" href=${studioPath(model.setup.session, run.name)}>Open in the studio</a>
+    </div>
+  </section>`;
+}
+
+/**
+ * The fields of a run.
+ * @param {{ detail: import("./setup.js").Setup["detail"], choices: Schemas["Choices"] }} properties
+ */
+function Fields({ detail, choices }) {
+  const { start_pose_frame: first, frame_count: count, has_start_pose: isKnown, doubts } = detail;
+  /** @returns {[string, string][]} */
+  const named = (entries) => entries.map((one) => [one.name, one.label]);
+  const trackers = named(choices.trackers.filter((one) => !one.needs_behaviour));
+  const frame = (/** @type {string} */ name, /** @type {number} */ value) =>
+    html`<input type="number" name=${name} min="0" max=${count - 1} step="1" defaultValue=${value} />`;
+  return html`
+    <label>Tracker<${Select} name="tracker" options=${trackers} value=${detail.tracker} /></label>
+    <label>
+      Likelihood
+      <${Select} name="weighting" options=${named(choices.weightings)} value=${detail.weighting} />
+    </label>
+    <p class="hint">
+      Edges and silhouette suit a cluttered room, where edges inside the masks are often the room's.
+    </p>
+    <label>Effort<${Select} name="evaluations" options=${EFFORTS} value="2000" /></label>
+    <div class="step-row">
+      <label>First frame${frame("first", first)}</label>
+      <label>Last frame${frame("last", count - 1)}</label>
+    </div>
+    ${
+      first > 0 &&
+      html`<p class="hint">
+        The start pose is of frame ${first}: tracking begins there. The frames before it can be
+        tracked backwards afterwards.
+      </p>`
+    }
+    ${
+      !isKnown &&
+      html`<p class="hint">
+        There is no start pose yet: the first frame is searched for one, which takes a while.
+      </p>`
+    }
+    ${
+      doubts.length > 0 &&
+      html`<p class="notice">The footage contradicts the calibration. ${doubts[0]}</p>
+        <label class="check">
+          <input type="checkbox" name="inconsistent" class="inconsistent" />track all the same
+        </label>`
+    }
+  `;
+}
+
+/** The form of a run, folded away where there is one. */
+function RunForm(/** @type {{ model: Model, choices: Schemas["Choices"] }} */ { model, choices }) {
+  const [isSent, setSent] = useState(false);
+  const [wrong, setWrong] = useState(/** @type {any} */ (null));
+  const alert = useRef(/** @type {HTMLElement | null} */ (null));
+  useEffect(() => alert.current?.scrollIntoView({ block: "nearest" }), [wrong]);
+  const send = async (event) => {
+    event.preventDefault();
+    setSent(true);
+    setWrong(null);
+    await model.begin(valuesOf(event.currentTarget)).catch(setWrong);
+    setSent(false);
+  };
+  const isFirst = !model.newest();
+  return html`<details
+    class=${isFirst ? "alone" : ""}
+    open=${isFirst || model.isFormOpen.value}
+    onToggle=${({ currentTarget }) => {
+      model.isFormOpen.value = currentTarget.open;
+    }}
+  >
+    <summary>Track again</summary>
+    <form class="footage-form" onSubmit=${send}>
+      <${Fields} detail=${model.setup.detail} choices=${choices} />
+      <div class="step-actions">
+        <button type="submit" class="primary" disabled=${isSent}>
+          ${isFirst ? "Track" : "Track again"}
+        </button>
+      </div>
+      <div class="optional" ref=${alert}><${Failure} error=${wrong} /></div>
+    </form>
+  </details>`;
+}
+
+/** @param {{ model: Model }} properties */
+const Wall = ({ model }) => html`<${ViewWall}
+  setup=${model.setup}
+  shown=${model.shown.value}
+  words="The outlines will be drawn over the pictures as they are found."
+/>`;
+
+/** @type {import("./setup.js").Mount<typeof load>} */
+export function mount(place, setup, choices) {
+  const model = modelOf(setup);
+  render(
+    place,
+    html`
+      <${Status} model=${model} />
+      <${RunForm} model=${model} choices=${choices} />
+    `,
+  );
+  render(setup.aside, html`<${Wall} model=${model} />`);
 
   /** "Yes, track from here": the run that waits, else a new one as the form has it. */
-  async function trackNow() {
-    const run = newest();
-    if (
-      run &&
-      !run.done &&
-      run.first === setup.detail.start_pose_frame &&
-      setup.step?.state !== "stale"
-    )
-      return start(run.name);
-    return form.requestSubmit();
+  function trackNow() {
+    const run = model.newest();
+    const { start_pose_frame: first } = setup.detail;
+    if (run && !run.done && run.first === first && !model.isStale()) return model.start(run.name);
+    return place.querySelector("form")?.requestSubmit();
   }
 
-  drawForm()
-    .then(() => {
-      if (setup.asked.begin && !isTracked()) return trackNow();
-      return findAgain();
-    })
-    .then(poll)
+  model
+    .ask()
+    .then(() => (setup.asked.begin && !model.isTracked() ? trackNow() : model.findAgain()))
     .catch(complain);
-  drawStatus();
-  showNewest();
   return () => {
-    stopped = true;
-    clearTimeout(timer);
-    wall.stop();
+    model.stop();
+    render(place, null);
+    render(setup.aside, null);
   };
 }

@@ -2,106 +2,91 @@
 // scene instead.
 
 import { post, runPath } from "./api.js";
-import { openPicture } from "./studio/dialogs.js";
-import { check, element, fill, picture, showPicture, spring } from "./elements.js";
+import { showPicture } from "./elements.js";
 import { complain } from "./messages.js";
 import { loadScene } from "./scene_window.js";
 import { studioPath } from "./sessions.js";
+import { html, useEffect, useLayoutEffect, useRef, useState } from "./studio/component.js";
+import { openPicture } from "./studio/dialogs.js";
+import { Check } from "./studio/parts.js";
 
 const HEIGHT = 420;
 const LARGE = 1080;
 
+/** The 3-D scene. */
+export function SceneFrame({ kind = "" }) {
+  const frame = useRef(/** @type {HTMLIFrameElement | null} */ (null));
+  useLayoutEffect(() => {
+    loadScene(frame.current);
+  }, []);
+  return html`<iframe ref=${frame} title="3-D scene" class=${kind}></iframe>`;
+}
+
+/** A camera's picture; another replaces it once it is decoded. */
+function View({ name, address, note }) {
+  const image = useRef(/** @type {HTMLImageElement | null} */ (null));
+  const newest = address(HEIGHT);
+  useEffect(() => showPicture(image.current, newest), [newest]);
+  return html`<figure class="picture">
+    <img
+      ref=${image}
+      alt=${`View of ${name}`}
+      onClick=${() => openPicture(name, () => address(LARGE))}
+    />
+    <figcaption><b>${name}</b>${note && html`<span class=${note.kind}>${note.words}</span>`}</figcaption>
+  </figure>`;
+}
+
 /**
- * The wall in `setup.aside`. show({run, frame, track, show}) draws; empty(words) says why there is
- * nothing.
- * @param {import("./setup.js").Setup} setup
+ * The wall. `shown`: which frame of which run, in which track ("raw" unless said); without it
+ * `words` say why there is nothing. `noteOf(camera)`: what stands under its picture; `children`:
+ * tools over them.
+ * @param {{ setup: import("./setup.js").Setup, shown: { run: string, frame: number, track?: string }
+ *   | null, words?: string, noteOf?: (camera: string) => { words: string, kind: string } | null,
+ *   children?: any }} properties
  */
-export function viewWall(setup) {
-  let shown = null; // what is shown: run, frame, track, show
-  let stopped = false;
-  const label = element("output", {});
-  const slot = element("div", { className: "wall-tools" });
-  const wantsScene = check("3-D scene", { onchange: draw });
-  const open = element(
-    "a",
-    {
-      className: "link-button",
-      title: "This run and frame in the studio, where its search can be looked into",
-    },
-    "Open in the studio",
-  );
-  const bar = element(
-    "div",
-    { className: "pictures-bar" },
-    slot,
-    label,
-    spring(),
-    open,
-    wantsScene,
-  );
-  const views = setup.detail.cameras.map(({ name }) => {
-    const image = element("img", {
-      alt: `View of ${name}`,
-      onclick: () => openPicture(name, () => address(name, LARGE)),
-    });
-    const note = element("span", {});
-    return { name, image, note, figure: picture(image, name, note) };
-  });
-  const wall = element(
-    "div",
-    { className: "pictures" },
-    views.map((view) => view.figure),
-  );
-
-  const address = (camera, height) =>
-    `${runPath(setup.session, shown.run)}/frames/${shown.frame}/views/${encodeURIComponent(camera)}.jpg?show=${shown.show}&height=${height}${shown.track ? `&track=${shown.track}` : ""}`;
-
-  function draw() {
-    if (!shown || stopped) return;
-    const { run, frame, track } = shown;
-    label.textContent = `frame ${frame}`;
-    open.href = studioPath(setup.session, run, {
-      frame,
-      panel: "why",
-      ...(track ? { track } : {}),
-    });
-    if (!bar.isConnected) fill(setup.aside, bar);
-    if (wantsScene.querySelector("input")?.checked) {
-      wall.remove();
-      if (!setup.aside.querySelector("iframe"))
-        setup.aside.append(
-          loadScene(element("iframe", { title: "3-D scene", className: "below-bar" })),
-        );
-      post("/api/scene/show", {
-        session: setup.session,
-        run,
-        frame,
-        ...(track ? { options: { track } } : {}),
-      }).catch(complain);
-      return;
+export function ViewWall({ setup, shown, words = "", noteOf, children }) {
+  const [isScene, setScene] = useState(false);
+  const { run = "", frame = 0, track = "raw" } = shown ?? {};
+  /** @type {Record<string, string>} */
+  const chosen = track === "raw" ? {} : { track };
+  useEffect(() => {
+    if (shown && isScene)
+      post("/api/scene/show", { session: setup.session, run, frame, options: chosen }).catch(
+        complain,
+      );
+  }, [isScene, run, frame, track]);
+  if (!shown) return html`<div class="aside-empty"><p>${words}</p></div>`;
+  const address = (/** @type {string} */ camera, /** @type {number} */ height) =>
+    `${runPath(setup.session, run)}/frames/${frame}/views/${encodeURIComponent(camera)}.jpg?` +
+    new URLSearchParams({ show: "outline", height: String(height), ...chosen });
+  return html`
+    <div class="pictures-bar">
+      ${children && html`<div class="wall-tools">${children}</div>`}
+      <output>frame ${frame}</output><span class="spring"></span>
+      <a
+        class="link-button"
+        href=${studioPath(setup.session, run, { frame, panel: "why", ...chosen })}
+        title="This run and frame in the studio, where its search can be looked into"
+      >
+        Open in the studio
+      </a>
+      <${Check} checked=${isScene} take=${setScene}>3-D scene</${Check}>
+    </div>
+    ${
+      isScene
+        ? html`<${SceneFrame} kind="below-bar" />`
+        : html`<div class="pictures">
+            ${setup.detail.cameras.map(
+              ({ name }) =>
+                html`<${View}
+                  key=${name}
+                  name=${name}
+                  address=${(/** @type {number} */ height) => address(name, height)}
+                  note=${noteOf?.(name)}
+                />`,
+            )}
+          </div>`
     }
-    setup.aside.querySelector("iframe")?.remove();
-    if (!wall.isConnected) setup.aside.append(wall);
-    for (const { image, name } of views) showPicture(image, address(name, HEIGHT));
-  }
-
-  return {
-    tools: slot,
-    /** What stands under a camera's picture. */
-    note(camera, words, className = "") {
-      const view = views.find((one) => one.name === camera);
-      if (view) Object.assign(view.note, { textContent: words, className });
-    },
-    show(wanted) {
-      shown = wanted;
-      draw();
-    },
-    empty(words) {
-      shown = null;
-      fill(setup.aside, element("div", { className: "aside-empty" }, element("p", {}, words)));
-    },
-    stop() {
-      stopped = true;
-    },
-  };
+  `;
 }
