@@ -2,106 +2,103 @@
 // colour), corrected by hand in the scene or by a turn, made better by a short search.
 
 import { fault, fetchJson, post, put, remove, sessionPath } from "./api.js";
-import {
-  actions,
-  button,
-  drawProgress,
-  element,
-  failure,
-  field,
-  fill,
-  hint,
-  notice,
-  number,
-  percent,
-  picture,
-} from "./elements.js";
+import { percent } from "./elements.js";
 import { findJob, followJob, isGoing, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
+import { SceneFrame } from "./setup_views.js";
+import { html, mount as render, signal, useEffect, useState } from "./studio/component.js";
+import { Action, Failure, Progress } from "./studio/parts.js";
 import { foundWords, isUnsure } from "./studio/start_pose.js";
 
 const PICTURE_HEIGHT = 360;
 const REDRAW_MILLISECONDS = 250;
+const SEARCHES = "/api/initialisations";
+const REFINEMENTS = "/api/track-jobs";
 
 /** @param {string} session */
 export const load = (session) => fetchJson(`${sessionPath(session)}/start-pose`);
 
-/** @type {import("./setup.js").Mount<typeof load>} */
-export function mount(place, setup, loaded) {
+const isSame = (one, other) =>
+  one?.length === other.length && one.every((value, at) => Math.abs(value - other[at]) < 1e-6);
+
+/**
+ * What the step knows, and what can be done.
+ * @param {import("./setup.js").Setup} setup
+ * @param {Awaited<ReturnType<typeof load>>} loaded
+ */
+function modelOf(setup, loaded) {
   const here = sessionPath(setup.session);
   const last = Math.max(0, (setup.detail.frame_count ?? 1) - 1);
-  let pose = loaded;
-  let frame = Math.min(last, setup.detail.start_pose_frame ?? 0);
-  let found = null; // what the automatic search found
-  let better = null; // what the search around the pose found
-  let failed = null;
-  let editing = false;
-  let begun = false; // whether the scene lets it be edited already
-  let going = false;
-  let gone = false;
-  let age = 0;
-  let timer = 0;
-  const steps = element("section", { className: "start-pose-make" });
-  const progress = element("div", { className: "start-pose-progress" });
-  const verdicts = element("section", { className: "start-pose-check" });
-  place.append(steps, progress, verdicts);
+  const pose = signal(loaded);
+  const frame = signal(Math.min(last, setup.detail.start_pose_frame ?? 0));
+  /** What the automatic search found. */
+  const found = signal(/** @type {any} */ (null));
+  /** What the search around the pose found. */
+  const better = signal(/** @type {any} */ (null));
+  const failed = signal(/** @type {any} */ (null));
+  const progress = signal(/** @type {Parameters<typeof Progress>[0] | null} */ (null));
+  const isBusy = signal(false);
+  const isEditing = signal(false);
+  /** Rises when the pose may be another. */
+  const age = signal(0);
+  let isBegun = false; // whether the scene lets it be edited already
+  let isLeft = false;
 
-  /**
-   * Wait for a job of the background, its bar drawn meanwhile; what it found.
-   * @param {string} jobs
-   * @param {{ identifier?: string }} job
-   */
-  async function waited(jobs, { identifier }, words) {
-    const cancel = () => remove(`${jobs}/${identifier}`).catch(complain);
+  async function reload() {
     try {
-      // The job goes on when the step is left, and is found again when it is shown.
-      const ended = await followJob(
-        `${jobs}/${identifier}`,
-        (job) => drawProgress(progress, progressOf(job, words, cancel)),
-        () => gone,
-      );
-      return ended?.state === "done" ? ended : null;
-    } finally {
-      drawProgress(progress, null);
-    }
-  }
-
-  /** Do something that takes a while; its error is shown in place. */
-  async function during(work) {
-    failed = null;
-    going = true;
-    draw();
-    try {
-      await work();
+      const again = await load(setup.session);
+      if (isLeft) return;
+      pose.value = again;
+      age.value += 1;
     } catch (error) {
-      failed = error;
+      failed.value = error;
     }
-    going = false;
-    if (gone) return;
-    await loadAgain();
     setup.refresh().catch(complain);
   }
 
-  const SEARCHES = "/api/initialisations",
-    REFINEMENTS = "/api/track-jobs";
+  /** @param {() => Promise<any>} work */
+  async function attempt(work) {
+    failed.value = null;
+    try {
+      await work();
+    } catch (error) {
+      failed.value = error;
+    }
+  }
 
-  const find = () =>
-    during(async () => {
-      better = null;
-      await waitForFind(await post(`${here}/initialise`, { frame, replace: true }));
-    });
-  const waitForFind = async (job) => {
-    found = (await waited(SEARCHES, job, "looking at the frame")) ?? found;
+  /** Do something that takes a while. @param {() => Promise<any>} work */
+  async function during(work) {
+    isBusy.value = true;
+    await attempt(work);
+    isBusy.value = false;
+    if (!isLeft) await reload();
+  }
+
+  /**
+   * Wait for a job of the background; what it found, null where it was cancelled. The job goes on
+   * when the step is left, and is found again when it is shown.
+   * @param {string} jobs
+   * @param {any} job
+   * @param {string} words
+   */
+  async function waitFor(jobs, { identifier }, words) {
+    const cancel = () => remove(`${jobs}/${identifier}`).catch(complain);
+    try {
+      const report = (/** @type {any} */ job) => {
+        progress.value = progressOf(job, words, cancel);
+      };
+      const ended = await followJob(`${jobs}/${identifier}`, report, () => isLeft);
+      return ended?.state === "done" ? ended : null;
+    } finally {
+      progress.value = null;
+    }
+  }
+
+  const waitForFind = async (/** @type {any} */ job) => {
+    found.value = (await waitFor(SEARCHES, job, "looking at the frame")) ?? found.value;
   };
-
-  const refine = () =>
-    during(async () => {
-      await waitForRefine(
-        await post(`${here}/pose/refine`, { frame, pose: pose.pose, keep: true }),
-      );
-    });
-  const waitForRefine = async (job) => {
-    better = (await waited(REFINEMENTS, job, "searching around the pose")) ?? better;
+  const waitForRefine = async (/** @type {any} */ job) => {
+    better.value = (await waitFor(REFINEMENTS, job, "searching around the pose")) ?? better.value;
   };
 
   /**
@@ -116,227 +113,273 @@ export function mount(place, setup, loaded) {
         (line) => line.verb === "pose" && !line.run,
       ),
     ]);
-    if (gone || going) return;
+    if (isLeft || isBusy.value) return undefined;
     if (isGoing(search)) return during(() => waitForFind(search));
     if (isGoing(refinement)) return during(() => waitForRefine(refinement));
-    const isStored = (job) => job?.state === "done" && pose.stored && isSame(job.pose, pose.pose);
-    if (isStored(search)) found = search;
-    if (isStored(refinement)) better = refinement;
-    if (search?.state === "failed") failed = search;
-    draw();
-  }
-  const isSame = (one, other) =>
-    one?.length === other.length && one.every((value, at) => Math.abs(value - other[at]) < 1e-6);
-
-  const keep = (values) => put(`${here}/start-pose`, { pose: values, frame });
-  /** @param {"turned round" | "in place"} how */
-  const exchange = (how) =>
-    during(async () => {
-      await keep((await post(`${here}/pose/mirror`, { pose: pose.pose, how })).pose);
-      found = null;
-    });
-
-  async function edit() {
-    failed = null;
-    try {
-      await setup.scene({ frame });
-      await post("/api/scene/edit", { session: setup.session, frame });
-      editing = true;
-      begun = false;
-    } catch (error) {
-      failed = error;
-    }
-    draw();
+    const isStored = (/** @type {any} */ job) =>
+      job?.state === "done" && pose.value.stored && isSame(job.pose, pose.value.pose);
+    if (isStored(search)) found.value = search;
+    if (isStored(refinement)) better.value = refinement;
+    if (search?.state === "failed") failed.value = search;
+    return undefined;
   }
 
-  async function leave(kept) {
-    try {
-      if (kept) {
-        const edited = await fetchJson("/api/scene/edit");
-        if (!edited.editing)
-          throw fault("The editing was ended in the scene.", "Edit by hand again.");
-        await keep(edited.pose);
-        found = null;
-      }
-      editing = false;
-      await remove("/api/scene/edit");
-    } catch (error) {
-      failed = error;
-    }
-    await loadAgain();
-    setup.refresh().catch(complain);
-  }
-
-  // The panel.
-
-  function draw() {
-    const which = number(frame, { max: last, step: 1, ariaLabel: "Frame", disabled: going });
-    which.onchange = () => {
-      if (!which.checkValidity() || which.value === "") return;
-      frame = Number(which.value);
-      drawVerdicts();
-      drawPictures();
-    };
-    const disabled = going || editing;
-    fill(
-      steps,
-      field("In frame", which),
-      hint(
-        "The frame in which tracking begins: the whole subject in view, limbs away from the trunk if you can choose. Frames before it can be tracked backwards from it.",
-      ),
-      editing
-        ? editingBox()
-        : actions(
-            button("Find it automatically", find, pose.stored ? "" : "primary", { disabled }),
-            button("Edit by hand", edit, "", { disabled }),
-          ),
-      failure(failed),
-    );
-    drawVerdicts();
-    if (!editing) drawPictures();
-  }
-
-  function drawVerdicts() {
-    fill(verdicts, pose.stored && !editing && [verdict(), ...mending()]);
-  }
-
-  const editingBox = () =>
-    element(
-      "div",
-      { className: "step-place" },
-      element(
-        "p",
-        {},
-        "Drag the balls on the limbs: the body follows, its joints keep their limits. The rings turn the whole body; the tab Pose has a slider for every angle, undo and a local search.",
-      ),
-      actions(
-        button("Use this pose", () => leave(true), "primary"),
-        button("Discard", () => leave(false), "quiet"),
-      ),
-    );
-
-  /** How sure the pose is, in words. */
-  function verdict() {
-    const words = [
-      found && `Found in frame ${found.frame}: ${foundWords(found)}.`,
-      better &&
-        (better.gain > 0 && better.overlap !== null
-          ? `Improved: overlap with the masks ${percent(better.overlap_before)} → ${percent(better.overlap)}.`
-          : "The search found no better pose near it."),
-    ];
-    const unsure = found && isUnsure(found);
-    return element(
-      "div",
-      { className: "start-pose-verdict" },
-      element(
-        "p",
-        { className: unsure ? "notice" : "" },
-        words.filter(Boolean).join(" ") || `The session has a start pose, of frame ${pose.frame}.`,
-      ),
-      unsure && notice("It may face the other way: check left and right before you track."),
-      found?.note && hint(found.note),
-    );
-  }
-
-  function mending() {
-    if (frame !== pose.frame) {
-      return [
-        notice(
-          `The start pose is of frame ${pose.frame}, where tracking begins. To begin in frame ${frame}, find or edit it here.`,
-        ),
-        actions(
-          button(
-            `Show frame ${pose.frame}`,
-            () => {
-              frame = pose.frame;
-              draw();
-            },
-            "small",
-          ),
-        ),
-      ];
-    }
-    const swatch = (side) => element("i", { className: `side-swatch ${side}` });
-    const act = (label, work, className = "") =>
-      button(label, work, className, { disabled: going });
-    return [
-      ...(pose.has_sides
-        ? [
-            element("h2", {}, "Left and right"),
-            element(
-              "p",
-              { className: "side-check" },
-              swatch("left"),
-              "the subject's left, ",
-              swatch("right"),
-              "the subject's right. Is it so in every picture?",
-            ),
-          ]
-        : []),
-      actions(
-        act("Yes, track from here", () => setup.go("track", { begin: true }), "primary"),
-        pose.has_sides && [
-          act("No: facing the other way", () => exchange("turned round")),
-          act("Mirror", () => exchange("in place")),
-        ],
-        act("Refine from here", refine),
-      ),
-    ];
-  }
-
-  // The pictures of all views.
-
-  function drawPictures() {
-    clearTimeout(timer);
-    timer = setTimeout(() => {
-      if (gone || editing) return;
-      const stored = Boolean(pose.stored);
-      fill(
-        setup.aside,
-        element(
-          "div",
-          { className: "pictures" },
-          setup.detail.cameras.map(({ name }) =>
-            picture(
-              element("img", {
-                alt: `${name}, frame ${frame}${stored ? ", start pose" : ""}`,
-                loading: "lazy",
-                src: `${here}/frames/${frame}/views/${encodeURIComponent(name)}.jpg?show=outline&height=${PICTURE_HEIGHT}${stored ? "&pose=start" : ""}&age=${age}`,
-              }),
-              name,
-            ),
-          ),
-        ),
-      );
-    }, REDRAW_MILLISECONDS);
-  }
-
-  async function loadAgain() {
-    try {
-      const answer = await load(setup.session);
-      if (gone) return;
-      pose = answer;
-      age += 1;
-      draw();
-    } catch (error) {
-      if (!gone) fill(place, failure(error));
-    }
+  /** @param {any} values */
+  async function keep(values) {
+    await put(`${here}/start-pose`, { pose: values, frame: frame.value });
+    found.value = null;
   }
 
   // The editor may be left in the scene itself.
   setup.on("scene", (event) => {
-    if (!editing) return;
-    if (event.editing) begun = true;
-    else if (begun) {
-      editing = begun = false;
-      loadAgain();
+    if (!isEditing.value) return;
+    if (event.editing) isBegun = true;
+    else if (isBegun) {
+      isEditing.value = isBegun = false;
+      reload();
     }
   });
-  draw();
   findAgain().catch(complain);
+
+  return {
+    setup,
+    here,
+    last,
+    pose,
+    frame,
+    found,
+    better,
+    failed,
+    progress,
+    isBusy,
+    isEditing,
+    age,
+    find: () =>
+      during(async () => {
+        better.value = null;
+        const request = { frame: frame.value, replace: true };
+        await waitForFind(await post(`${here}/initialise`, request));
+      }),
+    refine: () =>
+      during(async () => {
+        const request = { frame: frame.value, pose: pose.value.pose, keep: true };
+        await waitForRefine(await post(`${here}/pose/refine`, request));
+      }),
+    /** @param {"turned round" | "in place"} how */
+    exchange: (how) =>
+      during(async () => {
+        const request = { pose: pose.value.pose, how };
+        await keep((await post(`${here}/pose/mirror`, request)).pose);
+      }),
+    edit: () =>
+      attempt(async () => {
+        isEditing.value = true;
+        isBegun = false;
+        const shown = { session: setup.session, frame: frame.value };
+        try {
+          await post("/api/scene/show", shown);
+          await post("/api/scene/edit", shown);
+        } catch (error) {
+          isEditing.value = false;
+          throw error;
+        }
+      }),
+    /** End the editing. @param {boolean} isKept */
+    leave: async (isKept) => {
+      await attempt(async () => {
+        if (isKept) {
+          const edited = await fetchJson("/api/scene/edit");
+          if (!edited.editing)
+            throw fault("The editing was ended in the scene.", "Edit by hand again.");
+          await keep(edited.pose);
+        }
+        isEditing.value = false;
+        await remove("/api/scene/edit");
+      });
+      await reload();
+    },
+    stop: () => {
+      isLeft = true;
+      if (isEditing.value) remove("/api/scene/edit").catch(() => {});
+    },
+  };
+}
+
+/** @typedef {ReturnType<typeof modelOf>} Model */
+
+/** Which frame, and what finds or edits its pose. @param {{ model: Model }} properties */
+function Make({ model }) {
+  const isBusy = model.isBusy.value;
+  const choose = ({ target }) => {
+    if (target.checkValidity() && target.value !== "") model.frame.value = Number(target.value);
+  };
+  return html`<section class="start-pose-make">
+    <label>
+      In frame
+      <input
+        type="number"
+        min="0"
+        max=${model.last}
+        step="1"
+        aria-label="Frame"
+        value=${model.frame.value}
+        disabled=${isBusy}
+        onChange=${choose}
+      />
+    </label>
+    <p class="hint">
+      The frame in which tracking begins: the whole subject in view, limbs away from the trunk if
+      you can choose. Frames before it can be tracked backwards from it.
+    </p>
+    ${
+      model.isEditing.value
+        ? html`<${Editing} model=${model} />`
+        : html`<div class="step-actions">
+            <${Action}
+              kind=${model.pose.value.stored ? "" : "primary"}
+              act=${model.find}
+              disabled=${isBusy}
+            >
+              Find it automatically
+            </${Action}>
+            <${Action} act=${model.edit} disabled=${isBusy}>Edit by hand</${Action}>
+          </div>`
+    }
+    <${Failure} error=${model.failed.value} />
+  </section>`;
+}
+
+/** @param {{ model: Model }} properties */
+const Editing = ({ model }) => html`<div class="step-place">
+  <p>
+    Drag the balls on the limbs: the body follows, its joints keep their limits. The rings turn the
+    whole body; the tab Pose has a slider for every angle, undo and a local search.
+  </p>
+  <div class="step-actions">
+    <${Action} kind="primary" act=${() => model.leave(true)}>Use this pose</${Action}>
+    <${Action} kind="quiet" act=${() => model.leave(false)}>Discard</${Action}>
+  </div>
+</div>`;
+
+/** How sure the pose is, in words. @param {{ model: Model }} properties */
+function Verdict({ model }) {
+  const [found, better] = [model.found.value, model.better.value];
+  const words = [
+    found && `Found in frame ${found.frame}: ${foundWords(found)}.`,
+    better &&
+      (better.gain > 0 && better.overlap !== null
+        ? `Improved: overlap with the masks ${percent(better.overlap_before)} → ${percent(better.overlap)}.`
+        : "The search found no better pose near it."),
+  ];
+  const isDoubted = found && isUnsure(found);
+  return html`<div class="start-pose-verdict">
+    <p class=${isDoubted ? "notice" : ""}>
+      ${
+        words.filter(Boolean).join(" ") ||
+        `The session has a start pose, of frame ${model.pose.value.frame}.`
+      }
+    </p>
+    ${
+      isDoubted &&
+      html`<p class="notice">
+        It may face the other way: check left and right before you track.
+      </p>`
+    }
+    ${found?.note && html`<p class="hint">${found.note}</p>`}
+  </div>`;
+}
+
+/** A pose of another frame than the chosen one. @param {{ model: Model }} properties */
+function OfAnotherFrame({ model }) {
+  const own = model.pose.value.frame;
+  const show = () => {
+    model.frame.value = own;
+  };
+  return html`
+    <p class="notice">
+      The start pose is of frame ${own}, where tracking begins. To begin in frame
+      ${" "}${model.frame.value}, find or edit it here.
+    </p>
+    <div class="step-actions">
+      <${Action} kind="small" act=${show}>Show frame ${own}</${Action}>
+    </div>
+  `;
+}
+
+/** Whether left and right are so, and what mends them. @param {{ model: Model }} properties */
+function Mending({ model }) {
+  const hasSides = model.pose.value.has_sides;
+  const act = (/** @type {string} */ words, /** @type {() => any} */ work, kind = "") =>
+    html`<${Action} kind=${kind} act=${work} disabled=${model.isBusy.value}>${words}</${Action}>`;
+  return html`
+    ${
+      hasSides &&
+      html`<h2>Left and right</h2>
+        <p class="side-check">
+          <i class="side-swatch left"></i>the subject's left,${" "}
+          <i class="side-swatch right"></i>the subject's right. Is it so in every picture?
+        </p>`
+    }
+    <div class="step-actions">
+      ${act("Yes, track from here", () => model.setup.go("track", { begin: true }), "primary")}
+      ${hasSides && act("No: facing the other way", () => model.exchange("turned round"))}
+      ${hasSides && act("Mirror", () => model.exchange("in place"))}
+      ${act("Refine from here", model.refine)}
+    </div>
+  `;
+}
+
+/** @param {{ model: Model }} properties */
+function Panel({ model }) {
+  const pose = model.pose.value;
+  const Next = model.frame.value === pose.frame ? Mending : OfAnotherFrame;
+  return html`
+    <${Make} model=${model} />
+    ${model.progress.value && html`<${Progress} ...${model.progress.value} />`}
+    ${
+      pose.stored &&
+      !model.isEditing.value &&
+      html`<section class="start-pose-check">
+        <${Verdict} model=${model} />
+        <${Next} model=${model} />
+      </section>`
+    }
+  `;
+}
+
+/** The pictures of all views, or the scene while it is edited. @param {{ model: Model }} properties */
+function Beside({ model }) {
+  const frame = model.frame.value;
+  const [pictured, setPictured] = useState(frame);
+  useEffect(() => {
+    const wait = setTimeout(() => setPictured(frame), REDRAW_MILLISECONDS);
+    return () => clearTimeout(wait);
+  }, [frame]);
+  if (model.isEditing.value) return html`<${SceneFrame} />`;
+  const isStored = Boolean(model.pose.value.stored);
+  const query = `show=outline&height=${PICTURE_HEIGHT}${isStored ? "&pose=start" : ""}&age=${model.age.value}`;
+  return html`<div class="pictures">
+    ${model.setup.detail.cameras.map(
+      ({ name }) => html`<figure key=${name} class="picture">
+        <img
+          alt=${`${name}, frame ${pictured}${isStored ? ", start pose" : ""}`}
+          loading="lazy"
+          src=${`${model.here}/frames/${pictured}/views/${encodeURIComponent(name)}.jpg?${query}`}
+        />
+        <figcaption><b>${name}</b></figcaption>
+      </figure>`,
+    )}
+  </div>`;
+}
+
+/** @type {import("./setup.js").Mount<typeof load>} */
+export function mount(place, setup, loaded) {
+  const model = modelOf(setup, loaded);
+  render(place, html`<${Panel} model=${model} />`);
+  render(setup.aside, html`<${Beside} model=${model} />`);
   return () => {
-    gone = true;
-    clearTimeout(timer);
-    if (editing) remove("/api/scene/edit").catch(() => {});
+    model.stop();
+    render(place, null);
+    render(setup.aside, null);
   };
 }

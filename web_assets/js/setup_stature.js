@@ -2,7 +2,7 @@
 // are seen from the front, animals and whatever else is longer than high from the side; all are
 // drawn as large as a person.
 
-import { element, fill, shape } from "./elements.js";
+import { html } from "./studio/component.js";
 
 const COLOURS = {
   left: "var(--limb-left)",
@@ -73,11 +73,28 @@ function turned(limbs, isLong, scale) {
   }));
 }
 
+/** A length in millimetres, and how much it differs from an earlier one. */
+function lengthWords(limb, earlier) {
+  const change = earlier ? Math.round(limb.long - earlier.long) : 0;
+  const sign = change > 0 ? "+" : "−";
+  return `${Math.round(limb.long)} mm${change ? `  (${sign}${Math.abs(change)})` : ""}`;
+}
+
+/** A limb's length and name beside the body at a height, and a line from its middle to them. */
+function Label({ limb, earlier, y, right }) {
+  const middle = `${(limb.start[1] + limb.end[1]) / 2},${-(limb.start[2] + limb.end[2]) / 2}`;
+  return html`
+    <polyline class="leader" fill="none" points=${`${middle} ${right - 30},${y} ${right},${y}`} />
+    <text x=${right + 14} y=${y + 9}>${lengthWords(limb, earlier)}</text>
+    <text class="name" x=${right + 14} y=${y + 40}>${limb.name.replace(/^left /, "")}</text>
+  `;
+}
+
 /**
- * Draw limbs in `place`; `before`: those drawn dashed beside them, and by how much their lengths
- * differ.
+ * A drawing of limbs, with words below; `before`: those drawn dashed beside them, and by how much
+ * their lengths differ.
  */
-export function drawStature(place, given, givenBefore, words) {
+export function Stature({ limbs: given, before: givenBefore = [], words }) {
   const tall = spanOf(given, 2);
   const isLong = spanOf(given, 0) > 1.2 * Math.max(tall, spanOf(given, 1));
   const longest = Math.max(tall, spanOf(given, 0), spanOf(given, 1)) || PERSON;
@@ -88,66 +105,44 @@ export function drawStature(place, given, givenBefore, words) {
   const xs = all.flatMap((limb) =>
     [limb.start[1], limb.end[1]].flatMap((y) => [y - limb.radii[0], y + limb.radii[0]]),
   );
-  const top = Math.max(...all.flatMap((limb) => [limb.start[2], limb.end[2]]));
-  const low = Math.min(0, ...all.flatMap((limb) => [limb.start[2], limb.end[2]]));
+  const heights = all.flatMap((limb) => [limb.start[2], limb.end[2]]);
+  const [top, low] = [Math.max(...heights), Math.min(0, ...heights)];
   const [left, right] = [Math.min(...xs) - MARGIN, Math.max(...xs) + MARGIN];
-  const svg = shape("svg", {
-    "aria-label": drawn.map((limb) => `${limb.name} ${Math.round(limb.long)} mm`).join(", "),
-    viewBox: `${left - LABEL_ROOM * 0.35} ${-top - MARGIN} ${right - left + LABEL_ROOM * 1.35} ${top - low + 2 * MARGIN}`,
-    role: "img",
-  });
-  svg.append(shape("line", { class: "floor", x1: left - 100, x2: right + 60, y1: -low, y2: -low }));
+  const [width, height] = [right - left + LABEL_ROOM * 1.35, top - low + 2 * MARGIN];
   const far = [...drawn].sort(
     (one, other) => Math.min(one.start[0], one.end[0]) - Math.min(other.start[0], other.end[0]),
   );
-  for (const limb of far)
-    svg.append(
-      shape("path", {
-        class: "bone",
-        d: outline(limb),
-        fill: COLOURS[limb.side] ?? COLOURS.middle,
-        stroke: "var(--scene-background)",
-        "stroke-width": 4,
-      }),
-    );
-  for (const limb of before)
-    if (length(limb) > 1) svg.append(shape("path", { class: "ghost", d: outline(limb) }));
   const named = drawn.filter((limb) => limb.side !== "right");
   const places = spread(named.map((limb) => -(limb.start[2] + limb.end[2]) / 2));
-  named.forEach((limb, index) => {
-    const middle = [(limb.start[1] + limb.end[1]) / 2, -(limb.start[2] + limb.end[2]) / 2];
-    const y = places[index];
-    const earlier = before.find((one) => one.name === limb.name);
-    const change = earlier ? Math.round(limb.long - earlier.long) : 0;
-    svg.append(
-      shape("polyline", {
-        class: "leader",
-        fill: "none",
-        points: `${middle[0]},${middle[1]} ${right - 30},${y} ${right},${y}`,
-      }),
-      shape(
-        "text",
-        { x: right + 14, y: y + 9 },
-        `${Math.round(limb.long)} mm${change ? `  (${change > 0 ? "+" : "−"}${Math.abs(change)})` : ""}`,
-      ),
-      shape("text", { class: "name", x: right + 14, y: y + 40 }, limb.name.replace(/^left /, "")),
-    );
-  });
-  svg.append(
-    shape("line", { class: "leader", x1: left - 40, x2: left - 40, y1: -low, y2: -top }),
-    shape(
-      "text",
-      { x: left - 54, y: -(top + low) / 2, "text-anchor": "end" },
-      longWords(scale * (top - low)),
-    ),
-  );
-  fill(
-    place,
-    element(
-      "figure",
-      { className: before.length ? "stature compared" : "stature" },
-      svg,
-      element("figcaption", {}, words),
-    ),
-  );
+  return html`<figure class=${before.length ? "stature compared" : "stature"}>
+    <svg
+      aria-label=${drawn.map((limb) => `${limb.name} ${Math.round(limb.long)} mm`).join(", ")}
+      viewBox=${`${left - LABEL_ROOM * 0.35} ${-top - MARGIN} ${width} ${height}`}
+      role="img"
+    >
+      <line class="floor" x1=${left - 100} x2=${right + 60} y1=${-low} y2=${-low} />
+      ${far.map(
+        (limb) =>
+          html`<path
+            class="bone"
+            d=${outline(limb)}
+            fill=${COLOURS[limb.side] ?? COLOURS.middle}
+            stroke="var(--scene-background)"
+            stroke-width="4"
+          />`,
+      )}
+      ${before
+        .filter((limb) => length(limb) > 1)
+        .map((limb) => html`<path class="ghost" d=${outline(limb)} />`)}
+      ${named.map((limb, at) => {
+        const earlier = before.find((one) => one.name === limb.name);
+        return html`<${Label} limb=${limb} earlier=${earlier} y=${places[at]} right=${right} />`;
+      })}
+      <line class="leader" x1=${left - 40} x2=${left - 40} y1=${-low} y2=${-top} />
+      <text x=${left - 54} y=${-(top + low) / 2} text-anchor="end">
+        ${longWords(scale * (top - low))}
+      </text>
+    </svg>
+    <figcaption>${words}</figcaption>
+  </figure>`;
 }
