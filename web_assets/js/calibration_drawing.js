@@ -1,8 +1,10 @@
 // A calibration drawn: the cameras from above, findings, residuals.
 
-import { dotted, element, shape } from "./elements.js";
+import { dotted } from "./elements.js";
+import { html } from "./studio/component.js";
 import { seriesColour, token } from "./theme.js";
 
+const [WIDTH, HEIGHT, MARGIN] = [620, 320, 46];
 const PERSON_MM = 250;
 const ROOM_MM = 1500; // cameras that stand closer together look at something smaller than a person
 const STEPS = [100, 250, 500, 1000, 2000, 5000, 10000, 20000, 50000];
@@ -14,13 +16,12 @@ export const plainNumbers = (value, digits = 1) =>
   value === null || value === undefined ? "–" : value.toFixed(digits);
 
 /**
- * The cameras seen from above: where they look, how high they stand, the axes, a person for scale
- * where there is room for one.
+ * Where the parts of the drawing are: a scale with all cameras and the origin in it, and how far
+ * apart the grid's lines are.
  */
-export function rigFromAbove(rig) {
-  const [width, height, margin] = [620, 320, 46];
-  const across = rig.cameras.map((camera) => camera.position[0]).concat(0);
-  const along = rig.cameras.map((camera) => camera.position[1]).concat(0);
+function planOf({ cameras }) {
+  const across = cameras.map((camera) => camera.position[0]).concat(0);
+  const along = cameras.map((camera) => camera.position[1]).concat(0);
   const [left, right, low, high] = [
     Math.min(...across),
     Math.max(...across),
@@ -28,185 +29,148 @@ export function rigFromAbove(rig) {
     Math.max(...along),
   ];
   const scale = Math.min(
-    (width - 2 * margin) / Math.max(right - left, 1e-3),
-    (height - 2 * margin) / Math.max(high - low, 1e-3),
+    (WIDTH - 2 * MARGIN) / Math.max(right - left, 1e-3),
+    (HEIGHT - 2 * MARGIN) / Math.max(high - low, 1e-3),
   );
-  const at = (x, y) => [
-    width / 2 + (x - (left + right) / 2) * scale,
-    height / 2 - (y - (low + high) / 2) * scale,
-  ];
-  const step = STEPS.find((one) => one * scale >= 40) ?? STEPS[STEPS.length - 1];
-  const lines = [];
-  for (let k = -60; k <= 60; k += 1) {
-    const [x] = at(k * step, 0);
-    const [, y] = at(0, k * step);
-    if (x >= 0 && x <= width)
-      lines.push(shape("line", { x1: x, x2: x, y1: 0, y2: height, class: "grid" }));
-    if (y >= 0 && y <= height)
-      lines.push(shape("line", { x1: 0, x2: width, y1: y, y2: y, class: "grid" }));
-  }
-  const [ox, oy] = at(0, 0);
-  const axis = (dx, dy, name, kind) => [
-    shape("line", { x1: ox, y1: oy, x2: ox + dx, y2: oy + dy, class: `axis ${kind}` }),
-    shape("text", { x: ox + dx * 1.35 - 3, y: oy + dy * 1.35 + 4, class: "name" }, name),
-  ];
-  const cameras = rig.cameras.flatMap((camera, index) => {
-    const [x, y] = at(camera.position[0], camera.position[1]);
-    const [fx, fy] = [camera.forward[0], -camera.forward[1]];
-    const flat = Math.hypot(fx, fy);
-    const [ux, uy] = flat > 0.05 ? [fx / flat, fy / flat] : [0, 0];
-    const half = Math.atan(camera.width / 2 / camera.focal_px[0]);
-    const ray = (turn) =>
-      `${x + 34 * (ux * Math.cos(turn) - uy * Math.sin(turn))},${y + 34 * (ux * Math.sin(turn) + uy * Math.cos(turn))}`;
-    const title = shape(
-      "title",
-      {},
-      `${camera.name}: ${(camera.position[2] / 1000).toFixed(2)} m over the floor`,
-    );
-    return [
-      shape(
-        "polygon",
-        {
-          points: `${x},${y} ${ray(-half)} ${ray(half)}`,
-          fill: seriesColour(index),
-          "fill-opacity": 0.28,
-          stroke: seriesColour(index),
-        },
-        title,
-      ),
-      shape("circle", { cx: x, cy: y, r: 4, fill: seriesColour(index) }),
-      shape(
-        "text",
-        { x: x - ux * 10, y: y - uy * ARROW, "text-anchor": side(ux), class: "name" },
-        camera.name,
-      ),
-      shape(
-        "text",
-        { x: x - ux * 10, y: y - uy * ARROW + 12, "text-anchor": side(ux), class: "quiet" },
-        `${(camera.position[2] / 1000).toFixed(2)} m high`,
-      ),
-    ];
-  });
-  const isRoom = Math.max(right - left, high - low) >= ROOM_MM;
-  const person = !isRoom
-    ? []
-    : [
-        shape(
-          "ellipse",
-          {
-            cx: ox,
-            cy: oy,
-            rx: Math.max(PERSON_MM * scale, 2),
-            ry: Math.max(0.55 * PERSON_MM * scale, 1.2),
-            class: "person",
-          },
-          shape("title", {}, "A person for scale: shoulders 0.5 m wide"),
-        ),
-        shape("circle", {
-          cx: ox,
-          cy: oy,
-          r: Math.max(0.36 * PERSON_MM * scale, 1),
-          class: "person",
-        }),
-      ];
-  const bar = [
-    shape("line", {
-      x1: 14,
-      x2: 14 + step * scale,
-      y1: height - 12,
-      y2: height - 12,
-      class: "bar",
-    }),
-    shape(
-      "text",
-      { x: 14, y: height - 18, class: "quiet" },
-      step >= 1000 ? `${step / 1000} m` : `${step} mm`,
-    ),
-  ];
-  const drawn = shape(
-    "svg",
-    {
-      viewBox: `0 0 ${width} ${height}`,
-      class: "rig",
-      role: "img",
-      "aria-label": `${rig.cameras.length} cameras from above`,
-    },
-    ...lines,
-    ...person,
-    ...axis(30, 0, "X", "x"),
-    ...axis(0, -30, "Y", "y"),
-    ...cameras,
-    ...bar,
+  return {
+    scale,
+    step: STEPS.find((one) => one * scale >= 40) ?? STEPS[STEPS.length - 1],
+    isRoom: Math.max(right - left, high - low) >= ROOM_MM,
+    at: (/** @type {number} */ x, /** @type {number} */ y) => [
+      WIDTH / 2 + (x - (left + right) / 2) * scale,
+      HEIGHT / 2 - (y - (low + high) / 2) * scale,
+    ],
+  };
+}
+
+/** @param {{ plan: ReturnType<typeof planOf> }} properties */
+const Grid = ({ plan: { step, at } }) =>
+  Array.from({ length: 121 }, (_, k) => at((k - 60) * step, (k - 60) * step)).map(
+    ([x, y]) => html`
+      ${x >= 0 && x <= WIDTH && html`<line x1=${x} x2=${x} y1="0" y2=${HEIGHT} class="grid" />`}
+      ${y >= 0 && y <= HEIGHT && html`<line x1="0" x2=${WIDTH} y1=${y} y2=${y} class="grid" />`}
+    `,
   );
-  return element(
-    "figure",
-    { className: "picture rig-picture" },
-    drawn,
-    element(
-      "figcaption",
-      {},
-      element("b", {}, "From above"),
-      dotted(
+
+const Axis = ({ from: [x, y], dx, dy, name }) => html`
+  <line x1=${x} y1=${y} x2=${x + dx} y2=${y + dy} class=${`axis ${name.toLowerCase()}`} />
+  <text x=${x + dx * 1.35 - 3} y=${y + dy * 1.35 + 4} class="name">${name}</text>
+`;
+
+/** A camera from above: what it sees, how high it stands. */
+function Camera({ plan, camera, colour }) {
+  const [x, y] = plan.at(camera.position[0], camera.position[1]);
+  const [fx, fy] = [camera.forward[0], -camera.forward[1]];
+  const flat = Math.hypot(fx, fy);
+  const [ux, uy] = flat > 0.05 ? [fx / flat, fy / flat] : [0, 0];
+  const half = Math.atan(camera.width / 2 / camera.focal_px[0]);
+  const ray = (/** @type {number} */ turn) => {
+    const [c, s] = [Math.cos(turn), Math.sin(turn)];
+    return `${x + 34 * (ux * c - uy * s)},${y + 34 * (ux * s + uy * c)}`;
+  };
+  const high = `${(camera.position[2] / 1000).toFixed(2)} m`;
+  const [tx, ty, anchor] = [x - ux * 10, y - uy * ARROW, side(ux)];
+  return html`
+    <polygon
+      points=${`${x},${y} ${ray(-half)} ${ray(half)}`}
+      fill=${colour}
+      fill-opacity="0.28"
+      stroke=${colour}
+    >
+      <title>${camera.name}: ${high} over the floor</title>
+    </polygon>
+    <circle cx=${x} cy=${y} r="4" fill=${colour} />
+    <text x=${tx} y=${ty} text-anchor=${anchor} class="name">${camera.name}</text>
+    <text x=${tx} y=${ty + 12} text-anchor=${anchor} class="quiet">${high} high</text>
+  `;
+}
+
+const Person = ({ at: [x, y], scale }) => html`
+  <ellipse
+    cx=${x}
+    cy=${y}
+    rx=${Math.max(PERSON_MM * scale, 2)}
+    ry=${Math.max(0.55 * PERSON_MM * scale, 1.2)}
+    class="person"
+  >
+    <title>A person for scale: shoulders 0.5 m wide</title>
+  </ellipse>
+  <circle cx=${x} cy=${y} r=${Math.max(0.36 * PERSON_MM * scale, 1)} class="person" />
+`;
+
+/**
+ * The cameras seen from above: where they look, how high they stand, the axes, a person for scale
+ * where there is room for one.
+ */
+export function RigFromAbove({ rig }) {
+  const plan = planOf(rig);
+  const { scale, step, isRoom } = plan;
+  const origin = plan.at(0, 0);
+  return html`<figure class="picture rig-picture">
+    <svg
+      viewBox=${`0 0 ${WIDTH} ${HEIGHT}`}
+      class="rig"
+      role="img"
+      aria-label=${`${rig.cameras.length} cameras from above`}
+    >
+      <${Grid} plan=${plan} />
+      ${isRoom && html`<${Person} at=${origin} scale=${scale} />`}
+      <${Axis} from=${origin} dx=${30} dy=${0} name="X" />
+      <${Axis} from=${origin} dx=${0} dy=${-30} name="Y" />
+      ${rig.cameras.map(
+        (camera, at) =>
+          html`<${Camera} plan=${plan} camera=${camera} colour=${seriesColour(at)} />`,
+      )}
+      <line x1="14" x2=${14 + step * scale} y1=${HEIGHT - 12} y2=${HEIGHT - 12} class="bar" />
+      <text x="14" y=${HEIGHT - 18} class="quiet">
+        ${step >= 1000 ? `${step / 1000} m` : `${step} mm`}
+      </text>
+    </svg>
+    <figcaption>
+      <b>From above</b>
+      ${dotted(
         rig.floor && `Floor: ${rig.floor}`,
         isRoom && "the shape at the origin is a person's shoulders and head",
-      ),
-    ),
-  );
+      )}
+    </figcaption>
+  </figure>`;
 }
 
 /**
  * The findings on a calibration, blocking ones first, each with its remedy.
- * @param {{ findings: any[] }} what
+ * @param {{ findings: any[] }} properties
  */
-export function findingList({ findings }) {
-  if (!findings.length)
-    return element("p", { className: "all-well" }, "✓ No fault found in this calibration.");
-  return element(
-    "ul",
-    { className: "findings" },
-    findings.map((one) =>
-      element(
-        "li",
-        { className: one.severity, dataset: { code: one.code } },
-        element("b", {}, one.severity === "blocks" ? "Wrong" : "Doubtful"),
-        element("p", {}, one.message),
-        element("p", { className: "remedy" }, one.remedy),
-      ),
-    ),
-  );
-}
+export const Findings = ({ findings }) =>
+  findings.length
+    ? html`<ul class="findings">
+        ${findings.map(
+          ({ severity, code, message, remedy }) => html`<li class=${severity} data-code=${code}>
+            <b>${severity === "blocks" ? "Wrong" : "Doubtful"}</b>
+            <p>${message}</p>
+            <p class="remedy">${remedy}</p>
+          </li>`,
+        )}
+      </ul>`
+    : html`<p class="all-well">✓ No fault found in this calibration.</p>`;
 
 /** A bar a picture: pixels that its corners are off; those left out are red. */
-export function residualBars(lens) {
-  const most = Math.max(...lens.pictures.map((one) => one.rms_px ?? 0), 0.2);
-  const bars = lens.pictures.map((one, index) => {
-    const tall = one.rms_px === null ? 34 : Math.max(2, (34 * one.rms_px) / most);
-    const bar = shape("rect", {
-      x: index * 8,
-      y: 36 - tall,
-      width: 6,
-      height: tall,
-      fill: one.dropped ? token("bad") : token("accent"),
-    });
-    bar.append(
-      shape(
-        "title",
-        {},
-        `${one.picture}: ${plainNumbers(one.rms_px, 2)} px${one.dropped ? `, left out (${one.dropped})` : ""}`,
-      ),
-    );
-    return bar;
-  });
-  const words = `${lens.name}: residuals of ${lens.pictures.length} pictures, the largest ${plainNumbers(most, 2)} px`;
-  return shape(
-    "svg",
-    {
-      viewBox: `0 0 ${Math.max(lens.pictures.length * 8, 80)} 38`,
-      class: "residuals",
-      role: "img",
-      "aria-label": words,
-      preserveAspectRatio: "xMinYMax meet",
-    },
-    ...bars,
-  );
+export function Residuals({ lens: { name, pictures } }) {
+  const most = Math.max(...pictures.map((one) => one.rms_px ?? 0), 0.2);
+  return html`<svg
+    viewBox=${`0 0 ${Math.max(pictures.length * 8, 80)} 38`}
+    class="residuals"
+    role="img"
+    aria-label=${`${name}: residuals of ${pictures.length} pictures, the largest ${plainNumbers(most, 2)} px`}
+    preserveAspectRatio="xMinYMax meet"
+  >
+    ${pictures.map(({ picture, rms_px: off, dropped }, at) => {
+      const tall = off === null ? 34 : Math.max(2, (34 * off) / most);
+      const fill = token(dropped ? "bad" : "accent");
+      return html`<rect x=${at * 8} y=${36 - tall} width="6" height=${tall} fill=${fill}>
+        <title>
+          ${`${picture}: ${plainNumbers(off, 2)} px${dropped ? `, left out (${dropped})` : ""}`}
+        </title>
+      </rect>`;
+    })}
+  </svg>`;
 }

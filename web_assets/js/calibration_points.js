@@ -1,16 +1,10 @@
 // The same points of the floor clicked in two views or more.
 
-import {
-  button,
-  element,
-  failure,
-  fill,
-  hint,
-  optional,
-  picture as pictureOf,
-} from "./elements.js";
+import { html, useState } from "./studio/component.js";
+import { Action, Failure } from "./studio/parts.js";
 
 const FEWEST = 3;
+const MOST = 32;
 
 /**
  * Pixels of the stored picture under a point of the upright image: shares x, y (0..1) from its top
@@ -27,7 +21,7 @@ function storedPixel(camera, x, y) {
 }
 
 /** And back: shares in the upright image of a stored pixel. */
-export function shownAt(camera, [u, v]) {
+function shownAt(camera, [u, v]) {
   const [a, b] = [(u + 0.5) / camera.width, (v + 0.5) / camera.height];
   return [
     [a, b],
@@ -37,109 +31,92 @@ export function shownAt(camera, [u, v]) {
   ][camera.quarter_turns % 4];
 }
 
-/** Let a person click in `aside`; returns what ends that. */
-export function clickFloor(aside, { cameras, picture, send, stop }) {
-  const points = [{ pixels: {} }];
-  let chosen = 0;
-  const list = element("div", { className: "point-list" });
-  const wrong = optional();
-  const complete = () => points.filter((point) => Object.keys(point.pixels).length > 1);
+/** In how many views a point was clicked. */
+const viewsOf = (point) => Object.keys(point.pixels).length;
 
-  const done = button(
-    "Set the floor",
-    async () => {
-      fill(wrong);
-      try {
-        await send(complete());
-      } catch (error) {
-        fill(wrong, failure(error));
-      }
-    },
-    "primary",
-  );
+/**
+ * Let a person click. `picture(name)`: the address of a camera's; `send(points)` takes those that
+ * are complete, `stop()` ends it.
+ * @param {{ cameras: any[], picture: (camera: string) => string,
+ *   send: (points: any[]) => Promise<void>, stop: () => void }} properties
+ */
+export function FloorClicks({ cameras, picture, send, stop }) {
+  const [points, setPoints] = useState(/** @type {any[]} */ ([{ pixels: {} }]));
+  const [chosen, setChosen] = useState(0);
+  const [wrong, setWrong] = useState(/** @type {any} */ (null));
+  const complete = points.filter((point) => viewsOf(point) > 1);
+  const isReady = complete.length >= FEWEST;
 
-  const views = cameras.map((camera) => {
-    const image = element("img", {
-      src: picture(camera.name),
-      alt: `Picture of ${camera.name}`,
-      draggable: false,
-    });
-    const marks = element("div", { className: "marks" });
-    const box = element("div", { className: "clickable" }, image, marks);
-    box.onclick = (event) => {
-      const shape = image.getBoundingClientRect();
-      const [x, y] = [
-        (event.clientX - shape.left) / shape.width,
-        (event.clientY - shape.top) / shape.height,
-      ];
-      if (x < 0 || y < 0 || x > 1 || y > 1) return;
-      points[chosen].pixels[camera.name] = storedPixel(camera, x, y);
-      draw();
-    };
-    return { camera, marks, figure: pictureOf(box, camera.name) };
-  });
+  const click = (/** @type {any} */ camera, /** @type {MouseEvent} */ event) => {
+    const box = /** @type {HTMLElement} */ (event.currentTarget);
+    const shape = /** @type {HTMLElement} */ (box.firstElementChild).getBoundingClientRect();
+    const x = (event.clientX - shape.left) / shape.width;
+    const y = (event.clientY - shape.top) / shape.height;
+    if (x < 0 || y < 0 || x > 1 || y > 1) return;
+    const pixels = { ...points[chosen].pixels, [camera.name]: storedPixel(camera, x, y) };
+    const next = points.with(chosen, { pixels });
+    const isFull = viewsOf(next[next.length - 1]) > 1 && next.length < MOST;
+    setPoints(isFull ? [...next, { pixels: {} }] : next);
+  };
+  const done = () => {
+    setWrong(null);
+    return send(complete).catch(setWrong);
+  };
 
-  function draw() {
-    const last = points.at(-1);
-    if (last && Object.keys(last.pixels).length > 1 && points.length < 32)
-      points.push({ pixels: {} });
-    for (const { camera, marks } of views) {
-      marks.replaceChildren(
-        ...points.flatMap((point, index) => {
-          if (!point.pixels[camera.name]) return [];
-          const [x, y] = shownAt(camera, point.pixels[camera.name]);
-          return [
-            element(
-              "i",
-              {
-                className: index === chosen ? "mark chosen" : "mark",
-                style: `left: ${100 * x}%; top: ${100 * y}%`,
-              },
-              index + 1,
-            ),
-          ];
-        }),
-      );
-    }
-    fill(
-      list,
-      points.map((point, index) => {
-        const seen = Object.keys(point.pixels).length;
-        return button(
-          `${index + 1} · ${seen > 1 ? `${seen} views` : seen ? "one view" : "new"}`,
-          () => {
-            chosen = index;
-            draw();
-          },
-          "toggle small",
-          { ariaPressed: String(index === chosen) },
-        );
-      }),
-    );
-    done.disabled = complete().length < FEWEST;
-    done.title = done.disabled
-      ? `Three points in two views each are needed (there are ${complete().length}).`
-      : "";
-  }
-
-  fill(
-    aside,
-    element(
-      "div",
-      { className: "calibrated" },
-      element("div", { className: "aside-actions" }, done, button("Cancel", stop, "quiet")),
-      hint(
-        "Click a point of the floor in one view and the same point in another; then choose the next number. The first becomes the origin, the second lies on X. Points far apart are best.",
-      ),
-      list,
-      wrong,
-      element(
-        "div",
-        { className: "pictures click-views" },
-        views.map((one) => one.figure),
-      ),
-    ),
-  );
-  draw();
-  return () => fill(aside);
+  return html`<div class="calibrated">
+    <div class="aside-actions">
+      <${Action}
+        kind="primary"
+        act=${done}
+        disabled=${!isReady}
+        title=${
+          isReady ? "" : `Three points in two views each are needed (there are ${complete.length}).`
+        }
+      >
+        Set the floor
+      </${Action}>
+      <${Action} kind="quiet" act=${stop}>Cancel</${Action}>
+    </div>
+    <p class="hint">
+      Click a point of the floor in one view and the same point in another; then choose the next
+      number. The first becomes the origin, the second lies on X. Points far apart are best.
+    </p>
+    <div class="point-list">
+      ${points.map((point, at) => {
+        const seen = viewsOf(point);
+        return html`<button
+          key=${at}
+          type="button"
+          class="toggle small"
+          aria-pressed=${String(at === chosen)}
+          onClick=${() => setChosen(at)}
+        >
+          ${at + 1} · ${seen > 1 ? `${seen} views` : seen ? "one view" : "new"}
+        </button>`;
+      })}
+    </div>
+    <${Failure} error=${wrong} />
+    <div class="pictures click-views">
+      ${cameras.map(
+        (camera) => html`<figure key=${camera.name} class="picture">
+          <div class="clickable" onClick=${(event) => click(camera, event)}>
+            <img src=${picture(camera.name)} alt=${`Picture of ${camera.name}`} draggable=${false} />
+            <div class="marks">
+              ${points.map(({ pixels: { [camera.name]: pixel } }, at) => {
+                if (!pixel) return null;
+                const [x, y] = shownAt(camera, pixel);
+                return html`<i
+                  class=${at === chosen ? "mark chosen" : "mark"}
+                  style=${{ left: `${100 * x}%`, top: `${100 * y}%` }}
+                >
+                  ${at + 1}
+                </i>`;
+              })}
+            </div>
+          </div>
+          <figcaption><b>${camera.name}</b></figcaption>
+        </figure>`,
+      )}
+    </div>
+  </div>`;
 }

@@ -2,19 +2,8 @@
 // measured, a board to print.
 
 import { fault, fetchJson, sessionPath } from "./api.js";
-import {
-  actions,
-  button,
-  check,
-  element,
-  field,
-  files,
-  fill,
-  hint,
-  number,
-  select,
-  text,
-} from "./elements.js";
+import { html, signal, useState } from "./studio/component.js";
+import { Action, Check, Select } from "./studio/parts.js";
 
 const DICTIONARIES = [
   ...[4, 5, 6, 7].flatMap((bits) =>
@@ -32,256 +21,40 @@ const KINDS = [
   ["charuco", "ChArUco"],
   ["chessboard", "Chessboard"],
 ];
+/** @type {[string, string][]} */
+const PAGES = [
+  ["a4", "A4"],
+  ["a3", "A3"],
+  ["letter", "Letter"],
+];
 const REMEMBERED = "calibration-board";
 
-/**
- * The fields that describe a board. `description()`: the board as `studio calibrate --board` takes
- * it, remembered for the next time.
- */
-function boardFields() {
-  const kept = JSON.parse(localStorage.getItem(REMEMBERED) ?? "null") ?? {
-    kind: "charuco",
-    columns: 7,
-    rows: 5,
-    square: 36,
-    marker: 27,
-  };
-  const kind = select(KINDS, kept.kind);
-  const columns = number(kept.columns, { step: 1, min: 2 });
-  const rows = number(kept.rows, { step: 1, min: 2 });
-  const square = number(kept.square, { title: "As measured on the print" });
-  const marker = number(kept.marker);
-  const markerField = field("Marker mm", marker, {
-    title: "Side of a marker as measured on the print",
-  });
-  const dictionary = select(
-    DICTIONARIES.map((name) => [
-      name,
-      name.replace("DICT_", "").replaceAll("_", " ").toLowerCase(),
-    ]),
-    kept.dictionary ?? "DICT_4X4_250",
-  );
-  const legacy = check(
-    "old pattern",
-    { checked: Boolean(kept.legacy) },
-    "Boards drawn by OpenCV before 4.6 with an even number of rows",
-  );
-  const markers = element(
-    "div",
-    { className: "step-row" },
-    field("Markers", dictionary, { title: "The dictionary of the markers" }),
-    legacy,
-  );
-  const count = element("span", { className: "hint" });
-  kind.onchange = () => {
-    markerField.hidden = markers.hidden = kind.value === "chessboard";
-    count.textContent =
-      kind.value === "chessboard"
-        ? "Columns and rows count inner corners."
-        : "Columns and rows count squares.";
-  };
-  kind.dispatchEvent(new Event("change"));
-  const description = () => {
-    const old = legacy.querySelector("input")?.checked ?? false;
-    localStorage.setItem(
-      REMEMBERED,
-      JSON.stringify({
-        kind: kind.value,
-        columns: columns.value,
-        rows: rows.value,
-        square: square.value,
-        marker: marker.value,
-        dictionary: dictionary.value,
-        legacy: old,
-      }),
-    );
-    const sizes = `${columns.value}x${rows.value},${square.value}`;
-    return kind.value === "chessboard"
-      ? `chessboard:${sizes}`
-      : `charuco:${sizes},${marker.value},${dictionary.value}${old ? ",legacy" : ""}`;
-  };
-  return {
-    lines: [
-      element(
-        "div",
-        { className: "step-row board-sizes" },
-        field("Board", kind),
-        field("Columns", columns),
-        field("Rows", rows),
-        field("Square mm", square),
-        markerField,
-      ),
-      markers,
-      count,
-    ],
-    description,
-  };
-}
+/** A board as it is remembered for the next time. */
+const BOARD = {
+  kind: "charuco",
+  columns: "7",
+  rows: "5",
+  square: "36",
+  marker: "27",
+  dictionary: "DICT_4X4_250",
+  legacy: false,
+};
+const EMPTY = {
+  files: /** @type {FileList | null} */ (null),
+  path: "",
+  floor: "",
+  thickness: "0",
+  intrinsics: "",
+  extrinsics: "",
+  floorFolder: "",
+  distances: /** @type {{ first: string, second: string, mm: string }[]} */ ([]),
+  offsets: /** @type {Record<string, number>} */ ({}),
+  refine: false,
+  own: false,
+  isOpen: false,
+};
 
-function printRow() {
-  const kind = select(KINDS);
-  const page = select([
-    ["a4", "A4"],
-    ["a3", "A3"],
-    ["letter", "Letter"],
-  ]);
-  const link = element("a", { className: "link-button" }, "Download the PDF");
-  const settle = () => {
-    link.href = `/api/calibration-boards.pdf?kind=${kind.value}&page=${page.value}`;
-  };
-  kind.onchange = page.onchange = settle;
-  settle();
-  return element(
-    "details",
-    { className: "print-board" },
-    element("summary", {}, "No board yet? Print one"),
-    hint("Print at 100 %, measure the bar and the squares, glue it on a flat, stiff plate."),
-    element("div", { className: "step-row" }, field("Board", kind), field("Paper", page)),
-    actions(link),
-  );
-}
-
-/** Distances between lenses as they were measured with a tape: rows of two cameras and mm. */
-function distanceRows(cameras, kept) {
-  const box = element("div", { className: "distances" });
-  const row = (each, index) => {
-    const pick = (key, ariaLabel) =>
-      select(cameras, each[key], {
-        ariaLabel,
-        onchange: ({ target }) => {
-          each[key] = target.value;
-        },
-      });
-    return element(
-      "div",
-      { className: "distance" },
-      pick("first", "First camera"),
-      pick("second", "Second camera"),
-      number(each.mm, {
-        placeholder: "mm",
-        ariaLabel: "Millimetres between their lenses",
-        oninput: ({ target }) => {
-          each.mm = target.value;
-        },
-      }),
-      button(
-        "×",
-        () => {
-          kept.splice(index, 1);
-          draw();
-        },
-        "quiet small",
-        { ariaLabel: "Leave this distance out" },
-      ),
-    );
-  };
-  const draw = () =>
-    fill(
-      box,
-      kept.map(row),
-      actions(
-        button(
-          kept.length ? "Another distance" : "Add a measured distance",
-          () => {
-            kept.push({ first: cameras[0], second: cameras[1], mm: "" });
-            draw();
-          },
-          "small",
-          {
-            title:
-              "Between two cameras' lenses, by tape. It checks the scale and so finds a wrong board size.",
-          },
-        ),
-      ),
-    );
-  draw();
-  return box;
-}
-
-/** Everything else that `studio calibrate` knows; what is entered stays in `inputs`. */
-function moreFields(cameras, inputs) {
-  const place = (key, placeholder) =>
-    text({
-      placeholder,
-      value: inputs[key] ?? "",
-      oninput: ({ target }) => {
-        inputs[key] = target.value;
-      },
-    });
-  const shifts = element(
-    "div",
-    { className: "shifts", hidden: Boolean(inputs.own) },
-    cameras.map((camera) =>
-      field(
-        `${camera} begins at`,
-        number(inputs.offsets[camera] ?? 0, {
-          step: 1,
-          min: "",
-          oninput: ({ target }) => {
-            inputs.offsets[camera] = Number(target.value);
-          },
-        }),
-        {
-          title: "Frame of this camera's common board footage that the others' frame 0 belongs to",
-        },
-      ),
-    ),
-  );
-  return element(
-    "details",
-    { className: "more-board", open: Boolean(inputs.open) },
-    element(
-      "summary",
-      {
-        onclick: () => {
-          inputs.open = !inputs.open;
-        },
-      },
-      "More",
-    ),
-    element(
-      "div",
-      { className: "more-fields" },
-      field("Lenses from", place("intrinsics", "a folder, or a calibration file"), {
-        title:
-          "Board footage for the lenses, a video or folder of pictures for each camera; or a calibration file that has them. Instead of intrinsics/",
-      }),
-      field("Positions from", place("extrinsics", "a folder"), {
-        title: "Synchronised board footage of all cameras at once. Instead of extrinsics/",
-      }),
-      field("Floor from pictures in", place("floorFolder", "a folder"), {
-        title:
-          "A picture a camera of the board that lies on the floor, face up; instead of a frame of the common footage",
-      }),
-      cameras.length > 1 && [
-        distanceRows(cameras, inputs.distances),
-        check(
-          "The board was recorded without stopping: use the session's offsets",
-          {
-            checked: Boolean(inputs.own),
-            onchange: ({ target }) => {
-              inputs.own = shifts.hidden = target.checked;
-            },
-          },
-          "Only where the board and the motion are one recording",
-        ),
-        shifts,
-      ],
-      check(
-        "let the lenses move a little in the last adjustment",
-        {
-          checked: Boolean(inputs.refine),
-          onchange: ({ target }) => {
-            inputs.refine = target.checked;
-          },
-        },
-        "Let the final adjustment of all cameras change the lenses a little; only with a board that was seen all over the pictures",
-      ),
-    ),
-  );
-}
-
-const sessionOffsets = async (session) =>
+const sessionOffsets = async (/** @type {string} */ session) =>
   Object.fromEntries(
     (await fetchJson(`${sessionPath(session)}/footage`)).cameras.map((camera) => [
       camera.name,
@@ -290,84 +63,346 @@ const sessionOffsets = async (session) =>
   );
 
 /**
- * The form. cameras: the footage's; inputs: what was entered so far, which it goes on with;
- * `solve(() => request)` begins; `uploaded(input)` uploads and resolves with the upload's
- * identifier.
+ * What was entered, and what is asked for by it.
+ * @param {string} session
  */
-export function boardForm(session, { cameras, inputs, hasFootage, isChief, uploaded, solve }) {
-  const board = boardFields();
-  const entered = (key, made) =>
-    Object.assign(made, {
-      oninput: () => {
-        inputs[key] = made.value;
-      },
-    });
-  const path = entered(
-    "path",
-    text({
-      placeholder: hasFootage ? "found in the session" : "full path of the folder",
-      value: inputs.path ?? "",
-    }),
-  );
-  const upload = files({ folder: true, multiple: true });
-  const floor = entered("floor", number(inputs.floor ?? "", { step: 1, placeholder: "not set" }));
-  const thickness = entered("thickness", number(inputs.thickness ?? 0));
+export function boardOf(session) {
+  const kept = JSON.parse(localStorage.getItem(REMEMBERED) ?? "{}");
+  const entered = signal({ ...BOARD, ...kept, ...EMPTY });
 
-  async function request() {
-    const distances = inputs.distances
-      .filter((each) => Number(each.mm) > 0)
-      .map((each) => ({ ...each, mm: Number(each.mm) }));
-    const same = distances.find((each) => each.first === each.second);
-    if (same)
-      throw fault(
-        `A distance from ${same.first} to itself cannot be measured.`,
-        "Choose two cameras.",
-      );
-    const shifted = Object.fromEntries(
-      Object.entries(inputs.offsets).filter(([, frames]) => frames),
+  /** The board as `studio calibrate --board` takes it. */
+  function description() {
+    const { kind, columns, rows, square, marker, dictionary, legacy } = entered.value;
+    localStorage.setItem(
+      REMEMBERED,
+      JSON.stringify({ kind, columns, rows, square, marker, dictionary, legacy }),
     );
-    return {
-      board: board.description(),
-      thickness_mm: Number(thickness.value),
-      refine_lenses: Boolean(inputs.refine),
-      distances,
-      floor: inputs.floorFolder || floor.value === "" ? "" : `frame:${floor.value}`,
-      ...(inputs.floorFolder ? { floor_footage: { path: inputs.floorFolder } } : {}),
-      ...(inputs.intrinsics ? { intrinsics: { path: inputs.intrinsics } } : {}),
-      ...(inputs.extrinsics ? { extrinsics: { path: inputs.extrinsics } } : {}),
-      ...(upload.files?.length
-        ? { footage: { upload: await uploaded(upload) } }
-        : path.value
-          ? { footage: { path: path.value } }
-          : {}),
-      ...(inputs.own
-        ? { offsets: await sessionOffsets(session) }
-        : Object.keys(shifted).length
-          ? { offsets: shifted }
-          : {}),
-    };
+    const sizes = `${columns}x${rows},${square}`;
+    return kind === "chessboard"
+      ? `chessboard:${sizes}`
+      : `charuco:${sizes},${marker},${dictionary}${legacy ? ",legacy" : ""}`;
   }
 
-  return [
-    hint(
-      "A folder with intrinsics/ (the board close to each camera) and extrinsics/ (all cameras at once): one video or folder of pictures for each camera. Either alone is enough if it shows the board well.",
-    ),
-    ...board.lines,
-    field("Upload a folder", upload),
-    field("or on this computer", path),
-    element(
-      "div",
-      { className: "step-row" },
-      field("Board on the floor in frame", floor, {
-        title:
-          "Frame of the common footage in which the board lies on the floor, face up; the floor can be clicked later instead",
-      }),
-      field("Plate thickness mm", thickness, {
-        title: "Of the plate that carries the board; matters where it lies on the floor",
-      }),
-    ),
-    moreFields(cameras, inputs),
-    actions(button("Calibrate", () => solve(request), isChief ? "primary" : "")),
-    printRow(),
-  ];
+  return {
+    entered,
+    /** @param {Record<string, any>} changes */
+    enter: (changes) => {
+      entered.value = { ...entered.value, ...changes };
+    },
+    /** @param {(files: FileList) => Promise<string>} upload resolves with its identifier */
+    request: async (upload) => {
+      const { files, path, floor, thickness, intrinsics, extrinsics, floorFolder, ...more } =
+        entered.value;
+      const distances = more.distances
+        .filter((each) => Number(each.mm) > 0)
+        .map((each) => ({ ...each, mm: Number(each.mm) }));
+      const same = distances.find((each) => each.first === each.second);
+      if (same)
+        throw fault(
+          `A distance from ${same.first} to itself cannot be measured.`,
+          "Choose two cameras.",
+        );
+      const shifted = Object.fromEntries(
+        Object.entries(more.offsets).filter(([, frames]) => frames),
+      );
+      return {
+        board: description(),
+        thickness_mm: Number(thickness),
+        refine_lenses: more.refine,
+        distances,
+        floor: floorFolder || floor === "" ? "" : `frame:${floor}`,
+        ...(floorFolder ? { floor_footage: { path: floorFolder } } : {}),
+        ...(intrinsics ? { intrinsics: { path: intrinsics } } : {}),
+        ...(extrinsics ? { extrinsics: { path: extrinsics } } : {}),
+        ...(files?.length
+          ? { footage: { upload: await upload(files) } }
+          : path
+            ? { footage: { path } }
+            : {}),
+        ...(more.own
+          ? { offsets: await sessionOffsets(session) }
+          : Object.keys(shifted).length
+            ? { offsets: shifted }
+            : {}),
+      };
+    },
+  };
 }
+
+/** @typedef {ReturnType<typeof boardOf>} Model */
+
+/** A field of text, or a number of 0 or more. */
+const Entry = (/** @type {any} */ { model, name, label, title, ...more }) => html`<label
+  title=${title}
+>
+  ${label}
+  <input
+    type="text"
+    value=${model.entered.value[name]}
+    onInput=${({ target }) => model.enter({ [name]: target.value })}
+    ...${more}
+  />
+</label>`;
+const NUMBER = { type: "number", step: "any", min: 0 };
+const COUNT = { type: "number", step: 1 };
+
+/** A box to be checked. */
+const Box = (/** @type {any} */ { model, name, title, children }) => html`<${Check}
+  checked=${model.entered.value[name]}
+  take=${(checked) => model.enter({ [name]: checked })}
+  title=${title}
+>
+  ${children}
+</${Check}>`;
+
+/** What describes a board. @param {{ model: Model }} properties */
+function Board({ model }) {
+  const { kind, dictionary } = model.entered.value;
+  const isChessboard = kind === "chessboard";
+  return html`
+    <div class="step-row board-sizes">
+      <label>
+        Board
+        <${Select} options=${KINDS} value=${kind} take=${(kind) => model.enter({ kind })} />
+      </label>
+      <${Entry} model=${model} name="columns" label="Columns" ...${COUNT} min="2" />
+      <${Entry} model=${model} name="rows" label="Rows" ...${COUNT} min="2" />
+      <${Entry}
+        model=${model}
+        name="square"
+        label="Square mm"
+        title="As measured on the print"
+        ...${NUMBER}
+      />
+      ${
+        !isChessboard &&
+        html`<${Entry}
+          model=${model}
+          name="marker"
+          label="Marker mm"
+          title="Side of a marker as measured on the print"
+          ...${NUMBER}
+        />`
+      }
+    </div>
+    ${
+      !isChessboard &&
+      html`<div class="step-row">
+        <label title="The dictionary of the markers">
+          Markers
+          <${Select}
+            options=${DICTIONARIES.map((name) => [
+              name,
+              name.replace("DICT_", "").replaceAll("_", " ").toLowerCase(),
+            ])}
+            value=${dictionary}
+            take=${(dictionary) => model.enter({ dictionary })}
+          />
+        </label>
+        <${Box}
+          model=${model}
+          name="legacy"
+          title="Boards drawn by OpenCV before 4.6 with an even number of rows"
+        >
+          old pattern
+        </${Box}>
+      </div>`
+    }
+    <span class="hint">Columns and rows count ${isChessboard ? "inner corners" : "squares"}.</span>
+  `;
+}
+
+function PrintRow() {
+  const [kind, setKind] = useState(KINDS[0][0]);
+  const [page, setPage] = useState(PAGES[0][0]);
+  return html`<details class="print-board">
+    <summary>No board yet? Print one</summary>
+    <p class="hint">
+      Print at 100 %, measure the bar and the squares, glue it on a flat, stiff plate.
+    </p>
+    <div class="step-row">
+      <label>Board<${Select} options=${KINDS} value=${kind} take=${setKind} /></label>
+      <label>Paper<${Select} options=${PAGES} value=${page} take=${setPage} /></label>
+    </div>
+    <div class="step-actions">
+      <a class="link-button" href=${`/api/calibration-boards.pdf?kind=${kind}&page=${page}`}>
+        Download the PDF
+      </a>
+    </div>
+  </details>`;
+}
+
+/** Distances between lenses as they were measured with a tape: rows of two cameras and mm. */
+function Distances(/** @type {{ model: Model, cameras: string[] }} */ { model, cameras }) {
+  const { distances } = model.entered.value;
+  const set = (/** @type {typeof distances} */ changed) => model.enter({ distances: changed });
+  return html`<div class="distances">
+    ${distances.map((each, at) => {
+      const change = (/** @type {Partial<typeof each>} */ changes) =>
+        set(distances.with(at, { ...each, ...changes }));
+      return html`<div key=${at} class="distance">
+        <${Select}
+          aria-label="First camera"
+          options=${cameras}
+          value=${each.first}
+          take=${(first) => change({ first })}
+        />
+        <${Select}
+          aria-label="Second camera"
+          options=${cameras}
+          value=${each.second}
+          take=${(second) => change({ second })}
+        />
+        <input
+          ...${NUMBER}
+          placeholder="mm"
+          aria-label="Millimetres between their lenses"
+          value=${each.mm}
+          onInput=${({ target }) => change({ mm: target.value })}
+        />
+        <${Action}
+          kind="quiet small"
+          act=${() => set(distances.toSpliced(at, 1))}
+          aria-label="Leave this distance out"
+        >
+          ×
+        </${Action}>
+      </div>`;
+    })}
+    <div class="step-actions">
+      <${Action}
+        kind="small"
+        act=${() => set([...distances, { first: cameras[0], second: cameras[1], mm: "" }])}
+        title="Between two cameras' lenses, by tape. It checks the scale and so finds a wrong board size."
+      >
+        ${distances.length ? "Another distance" : "Add a measured distance"}
+      </${Action}>
+    </div>
+  </div>`;
+}
+
+/** Where each camera's board footage begins. */
+const Shifts = (/** @type {{ model: Model, cameras: string[] }} */ { model, cameras }) => html`<div
+  class="shifts"
+>
+  ${cameras.map((camera) => {
+    const { offsets } = model.entered.value;
+    return html`<label
+      key=${camera}
+      title="Frame of this camera's common board footage that the others' frame 0 belongs to"
+    >
+      ${camera} begins at
+      <input
+        ...${COUNT}
+        defaultValue=${offsets[camera] ?? 0}
+        onInput=${({ target }) =>
+          model.enter({ offsets: { ...offsets, [camera]: Number(target.value) } })}
+      />
+    </label>`;
+  })}
+</div>`;
+
+/** Everything else that `studio calibrate` knows. */
+const More = (
+  /** @type {{ model: Model, cameras: string[] }} */ { model, cameras },
+) => html`<details
+  class="more-board"
+  open=${model.entered.value.isOpen}
+  onToggle=${({ currentTarget }) => model.enter({ isOpen: currentTarget.open })}
+>
+  <summary>More</summary>
+  <div class="more-fields">
+    <${Entry}
+      model=${model}
+      name="intrinsics"
+      label="Lenses from"
+      title="Board footage for the lenses, a video or folder of pictures for each camera; or a calibration file that has them. Instead of intrinsics/"
+      placeholder="a folder, or a calibration file"
+    />
+    <${Entry}
+      model=${model}
+      name="extrinsics"
+      label="Positions from"
+      title="Synchronised board footage of all cameras at once. Instead of extrinsics/"
+      placeholder="a folder"
+    />
+    <${Entry}
+      model=${model}
+      name="floorFolder"
+      label="Floor from pictures in"
+      title="A picture a camera of the board that lies on the floor, face up; instead of a frame of the common footage"
+      placeholder="a folder"
+    />
+    ${
+      cameras.length > 1 &&
+      html`<${Distances} model=${model} cameras=${cameras} />
+        <${Box}
+          model=${model}
+          name="own"
+          title="Only where the board and the motion are one recording"
+        >
+          The board was recorded without stopping: use the session's offsets
+        </${Box}>
+        ${!model.entered.value.own && html`<${Shifts} model=${model} cameras=${cameras} />`}`
+    }
+    <${Box}
+      model=${model}
+      name="refine"
+      title="Let the final adjustment of all cameras change the lenses a little; only with a board that was seen all over the pictures"
+    >
+      let the lenses move a little in the last adjustment
+    </${Box}>
+  </div>
+</details>`;
+
+/**
+ * The form. `cameras`: the footage's; `solve()` begins.
+ * @param {{ model: Model, cameras: string[], hasFootage: boolean, isChief: boolean,
+ *   solve: () => Promise<void> }} properties
+ */
+export const BoardForm = ({ model, cameras, hasFootage, isChief, solve }) => html`
+  <p class="hint">
+    A folder with intrinsics/ (the board close to each camera) and extrinsics/ (all cameras at
+    once): one video or folder of pictures for each camera. Either alone is enough if it shows the
+    board well.
+  </p>
+  <${Board} model=${model} />
+  <label>
+    Upload a folder
+    <input
+      type="file"
+      webkitdirectory
+      multiple
+      onChange=${({ target }) => model.enter({ files: target.files })}
+    />
+  </label>
+  <${Entry}
+    model=${model}
+    name="path"
+    label="or on this computer"
+    placeholder=${hasFootage ? "found in the session" : "full path of the folder"}
+  />
+  <div class="step-row">
+    <${Entry}
+      model=${model}
+      name="floor"
+      label="Board on the floor in frame"
+      title="Frame of the common footage in which the board lies on the floor, face up; the floor can be clicked later instead"
+      placeholder="not set"
+      ...${COUNT}
+      min="0"
+    />
+    <${Entry}
+      model=${model}
+      name="thickness"
+      label="Plate thickness mm"
+      title="Of the plate that carries the board; matters where it lies on the floor"
+      ...${NUMBER}
+    />
+  </div>
+  <${More} model=${model} cameras=${cameras} />
+  <div class="step-actions">
+    <${Action} kind=${isChief ? "primary" : ""} act=${solve}>Calibrate</${Action}>
+  </div>
+  <${PrintRow} />
+`;

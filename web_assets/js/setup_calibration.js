@@ -2,31 +2,23 @@
 // against it.
 
 import { accepted, fetchJson, post, remove, sessionPath } from "./api.js";
-import { findingList, plainNumbers, residualBars, rigFromAbove } from "./calibration_drawing.js";
-import { clickFloor } from "./calibration_points.js";
-import {
-  actions,
-  button,
-  check,
-  dotted,
-  download,
-  drawProgress,
-  element,
-  failure,
-  field,
-  files,
-  fill,
-  hint,
-  notice,
-  optional,
-  picture,
-  select,
-  text,
-} from "./elements.js";
+import { Findings, plainNumbers, Residuals, RigFromAbove } from "./calibration_drawing.js";
+import { FloorClicks } from "./calibration_points.js";
+import { dotted, download } from "./elements.js";
 import { findJob, isGoing, timeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
+import { BoardForm, boardOf } from "./setup_boards.js";
+import {
+  batch,
+  html,
+  mount as render,
+  signal,
+  useEffect,
+  useRef,
+  useState,
+} from "./studio/component.js";
+import { Action, Check, Failure, Progress, Select } from "./studio/parts.js";
 import { uploadFiles } from "./uploading.js";
-import { boardForm } from "./setup_boards.js";
 
 /** @import { Schemas } from "./api_types" */
 
@@ -46,7 +38,7 @@ const AXES = [
   ["-y", "−Y"],
   ["-x", "−X"],
 ];
-const savedAt = (name) =>
+const savedAt = (/** @type {string} */ name) =>
   `replaced ${name.slice(0, 4)}-${name.slice(4, 6)}-${name.slice(6, 8)} ${name.slice(9, 11)}:${name.slice(11, 13)} UTC`;
 
 /** @typedef {Omit<Schemas["CalibrationView"], "session">} View */
@@ -71,424 +63,499 @@ export async function load(session) {
   }
 }
 
-/** @type {import("./setup.js").Mount<typeof load>} */
-export function mount(place, setup, loaded) {
+/**
+ * What the step knows, and what can be done.
+ * @param {import("./setup.js").Setup} setup
+ * @param {Awaited<ReturnType<typeof load>>} loaded
+ */
+function modelOf(setup, loaded) {
   const here = /** @type {const} */ (`${sessionPath(setup.session)}/calibration`);
-  const progress = optional();
-  /** @type {View} */
-  let view = loaded.view;
-  /** @type {Schemas["ProposalView"] | null} */
-  let proposal = null;
-  let tab = view.present ? "used" : view.board_footage ? "boards" : "file";
-  let job = ""; // the identifier of the calibration that is being computed
-  let stopClicking = null;
-  let showsBoard = true; // whether the pictures are of the board, else of the recording
-  let failed = loaded.failed;
-  let gone = false;
+  const view = signal(/** @type {View} */ (loaded.view));
+  const proposal = signal(/** @type {Schemas["ProposalView"] | null} */ (null));
+  const tab = signal(loaded.view.present ? "used" : loaded.view.board_footage ? "boards" : "file");
+  const failed = signal(/** @type {any} */ (loaded.failed));
+  const progress = signal(/** @type {Parameters<typeof Progress>[0] | null} */ (null));
+  /** Whether the pictures are of the board, else of the recording. */
+  const showsBoard = signal(true);
+  /** Whether points of the floor are clicked. */
+  const isClicking = signal(false);
   /**
-   * @type {{ path: string, upload: string | null, unit: Schemas["CalibrationFileRequest"]["unit"], up:
-   *   Schemas["CalibrationFileRequest"]["up"] }}
+   * What is read from a file: files that are chosen, or what was uploaded of them, or a path.
+   * @type {import("@preact/signals").Signal<{ files: FileList | null, upload: string | null,
+   *   path: string, unit: Schemas["CalibrationFileRequest"]["unit"],
+   *   up: Schemas["CalibrationFileRequest"]["up"] }>}
    */
-  const fromFile = { path: "", upload: null, unit: "", up: "z" };
-  const fromBoard = { distances: [], offsets: {} };
+  const file = signal({ files: null, upload: null, path: "", unit: "", up: "z" });
+  const board = boardOf(setup.session);
+  /** The identifier of the calibration that is being computed. */
+  let job = "";
+  let isLeft = false;
 
-  const shown = () => proposal ?? view.present;
-  const identifier = () => proposal?.identifier ?? "current";
+  const clear = () =>
+    batch(() => {
+      failed.value = proposal.value = null;
+    });
 
-  /** Propose, and show what was answered; what went wrong stands where the button is. */
+  /** Propose what is answered. @param {() => Promise<Schemas["ProposalView"]>} work */
   async function propose(work) {
-    failed = proposal = null;
+    clear();
     try {
-      proposal = await work();
-      showsBoard = true;
+      proposal.value = await work();
+      showsBoard.value = true;
     } catch (error) {
-      failed = error;
-    }
-    draw();
-    // The form above it may be longer than the window.
-    place.querySelector(".proposal .step-actions")?.scrollIntoView({ block: "nearest" });
-  }
-
-  const uploaded = (input) =>
-    uploadFiles(input.files, (words, share) => drawProgress(progress, { words, share })).finally(
-      () => drawProgress(progress, null),
-    );
-
-  function fileForm() {
-    const path = text({
-      placeholder: "full path of a file or folder",
-      value: fromFile.path,
-      oninput: () => Object.assign(fromFile, { path: path.value, upload: null }),
-    });
-    const upload = files({
-      multiple: true,
-      onchange: () => {
-        path.value = "";
-        Object.assign(fromFile, { path: "", upload: null });
-      },
-    });
-    const read = () =>
-      propose(async () => {
-        if (upload.files?.length) fromFile.upload = await uploaded(upload);
-        const from = fromFile.upload ? { upload: fromFile.upload } : { path: path.value };
-        return post(`${here}/proposals`, { ...from, unit: fromFile.unit, up: fromFile.up });
-      });
-    // A unit or an axis that is corrected is seen at once.
-    const corrected =
-      (key) =>
-      ({ target }) => {
-        fromFile[key] = target.value;
-        if (proposal && (fromFile.upload || fromFile.path)) read();
-      };
-    return [
-      hint(
-        "Pose2Sim, anipose, FreeMoCap, Caliscope, EasyMocap, OpenCV, Qualisys or Bouguet files. Nothing changes before you use it.",
-      ),
-      field("Upload", upload),
-      field("or on this computer", path),
-      element(
-        "div",
-        { className: "step-row" },
-        field(
-          "Unit",
-          select(UNITS, fromFile.unit, {
-            title: "Lengths in the file",
-            onchange: corrected("unit"),
-          }),
-        ),
-        field(
-          "Points up",
-          select(AXES, fromFile.up, {
-            title: "The axis of the file's world that points up",
-            onchange: corrected("up"),
-          }),
-        ),
-      ),
-      actions(button("Read the file", read, proposal ? "" : "primary")),
-    ];
-  }
-
-  const boards = () =>
-    boardForm(setup.session, {
-      cameras: view.footage,
-      inputs: fromBoard,
-      hasFootage: view.board_footage,
-      isChief: !proposal,
-      uploaded,
-      solve,
-    });
-
-  async function solve(request) {
-    failed = proposal = null;
-    // What is entered stays: a file field that is drawn anew is empty.
-    for (const old of place.querySelectorAll(":scope > .wrong, :scope > .proposal")) old.remove();
-    try {
-      const begun = await post(`${here}/solve`, await request());
-      job = begun.identifier;
-      hear(begun);
-    } catch (error) {
-      failed = error;
-      draw();
+      failed.value = error;
     }
   }
 
-  /**
-   * Turn the world of the calibration in use to the vertical, with the floor under the person by
-   * the silhouettes.
-   */
-  async function level() {
-    failed = proposal = null;
-    try {
-      const begun = await post(`${here}/level`, {});
-      job = begun.identifier;
-      hear(begun);
-    } catch (error) {
-      failed = error;
-      draw();
-    }
-  }
+  /** @param {FileList} files */
+  const upload = (files) =>
+    uploadFiles(files, (words, share) => {
+      progress.value = { words, share };
+    }).finally(() => {
+      progress.value = null;
+    });
 
-  /** The calibration that is being computed got further. */
+  /** The calibration that is being computed got further. @param {any} state */
   async function hear(state) {
-    if (gone || state.identifier !== job) return;
+    if (isLeft || state.identifier !== job) return;
     if (isGoing(state)) {
-      const cancel = () => remove(`/api/calibrations/${job}`).catch(complain);
-      return drawProgress(progress, {
+      const left = timeLeft(state.seconds_left);
+      progress.value = {
         words: dotted(
           state.step || "Beginning",
           state.total > 1 && `${state.done} of ${state.total}`,
-          timeLeft(state.seconds_left) && `about ${timeLeft(state.seconds_left)}`,
+          left && `about ${left}`,
         ),
         share: state.share,
-        cancel,
-      });
+        cancel: () => remove(`/api/calibrations/${state.identifier}`).catch(complain),
+      };
+      return;
     }
     job = "";
-    drawProgress(progress, null);
+    progress.value = null;
     if (state.state === "done")
-      return propose(() => fetchJson(`${here}/proposals/${state.proposal}`));
-    failed = state.state === "failed" ? state : null;
-    draw();
+      await propose(() => fetchJson(`${here}/proposals/${state.proposal}`));
+    else failed.value = state.state === "failed" ? state : null;
   }
 
-  async function save(format) {
-    const answer = await accepted(await fetch(`${here}/export?format=${format}`));
-    const name = answer.headers.get("content-disposition").match(/filename="([^"]+)"/)[1];
-    download(name, await answer.blob());
-    const notes = decodeURIComponent(answer.headers.get("x-studio-notes") ?? "");
-    failed = notes ? { message: notes } : null;
-    if (notes) draw();
-  }
-
-  function usedForm() {
-    const { present, earlier, formats, notes, changed, stale_runs: stale } = view;
-    if (!present) return [hint("No calibration yet.")];
-    const format = select(Object.entries(formats));
-    const back = select(earlier.map((name) => [name, savedAt(name)]));
-    const row = (label, made, act) =>
-      element(
-        "div",
-        { className: "step-row" },
-        field(label, made),
-        element("div", { className: "step-actions at-end" }, act),
-      );
-    return [
-      element(
-        "p",
-        {},
-        element("b", {}, present.source || "imported with the footage"),
-        changed &&
-          element(
-            "span",
-            { className: "quiet-text" },
-            ` · since ${new Date(changed).toLocaleString()}`,
-          ),
-      ),
-      ...notes.map((note) => notice(note)),
-      !notes.length &&
-        stale.length > 0 &&
-        notice(`Tracked with another calibration: ${stale.join(", ")}.`),
-      row(
-        "Export for other tools",
-        format,
-        button("Download", () => save(format.value).catch(complain)),
-      ),
-      earlier.length > 0 &&
-        row(
-          "Earlier ones",
-          back,
-          button("Preview", () =>
-            propose(() => post(`${here}/proposals`, { earlier: back.value })),
-          ),
-        ),
-    ];
-  }
-
-  // What is proposed, and what is done with it.
-
-  async function apply(identifier, anyway) {
+  /** Begin to compute one. @param {() => Promise<any>} work */
+  async function begin(work) {
+    clear();
     try {
-      view = await post(`${here}/proposals/${String(identifier)}/apply`, { anyway });
-      failed = proposal = null;
-      tab = "used";
-      await setup.refresh();
+      const begun = await work();
+      job = begun.identifier;
+      await hear(begun);
     } catch (error) {
-      failed = error;
+      failed.value = error;
     }
-    draw();
   }
 
-  function pointWords(points) {
-    const off = Math.max(...points.flatMap((point) => Object.values(point.missed_px)));
-    const high = Math.max(...points.map((point) => Math.abs(point.place[2])));
-    return `${points.length} points: the clicks miss them by up to ${plainNumbers(off)} px, and they lie within ${plainNumbers(high, 0)} mm of one plane.`;
-  }
-
-  /** @param {Schemas["ProposalView"]} made */
-  function proposalBox(made) {
-    const blocked = made.findings.some((one) => one.severity === "blocks");
-    const use = button("Use this calibration", () => apply(made.identifier, blocked), "primary", {
-      disabled: blocked,
+  const read = () =>
+    propose(async () => {
+      const { files, path, unit, up } = file.value;
+      if (files?.length) file.value = { ...file.value, files: null, upload: await upload(files) };
+      const from = file.value.upload ? { upload: file.value.upload } : { path };
+      return post(`${here}/proposals`, { ...from, unit, up });
     });
-    return element(
-      "section",
-      { className: "proposal" },
-      element("h2", {}, made.source),
-      made.unit_note && hint(made.unit_note),
-      made.notes.map((note) => hint(note)),
-      made.points.length > 0 && hint(pointWords(made.points)),
-      blocked &&
-        made.cameras.length > 0 &&
-        check("Use it although results will be wrong", {
-          onchange: ({ target }) => {
-            use.disabled = !target.checked;
-          },
-        }),
-      actions(
-        use,
-        button(
-          "Discard",
-          () => {
-            proposal = null;
-            draw();
-          },
-          "quiet",
-        ),
-      ),
-    );
-  }
-
-  function startClicking() {
-    const end = () => {
-      stopClicking = null;
-      draw();
-    };
-    stopClicking = clickFloor(setup.aside, {
-      cameras: shown()?.cameras ?? [],
-      picture: (camera) =>
-        `${here}/proposals/${identifier()}/views/${encodeURIComponent(camera)}.jpg?height=720&board=${showsBoard}&axes=false`,
-      send: async (points) => {
-        proposal = await post(`${here}/floor`, { proposal: proposal?.identifier ?? "", points });
-        end();
-      },
-      stop: end,
-    });
-  }
-
-  function drawAside() {
-    const rig = shown();
-    if (!rig)
-      return fill(
-        setup.aside,
-        element(
-          "div",
-          { className: "aside-empty" },
-          element("p", {}, "The cameras are drawn here once there is a calibration."),
-        ),
-      );
-    const address = `${here}/proposals/${identifier()}`;
-    /** @type {any[]} */
-    const lenses = /** @type {any} */ (rig.report)?.cameras ?? [];
-    const figures = rig.cameras.map((camera) => {
-      const image = element("img", {
-        alt: `Floor and axes on the picture of ${camera.name}`,
-        src: `${address}/views/${encodeURIComponent(camera.name)}.jpg?height=480&board=${showsBoard}&at=${Date.now()}`,
-        onerror: () => {
-          image.hidden = true;
-        },
-      });
-      const made = picture(
-        image,
-        camera.name,
-        dotted(
-          `${camera.width}×${camera.height}, focal length ${plainNumbers(camera.focal_px[0], 0)} px`,
-          camera.rms_px !== null && `${plainNumbers(camera.rms_px, 2)} px`,
-        ),
-      );
-      made.classList.add("axes-picture");
-      return made;
-    });
-    const coverage = lenses
-      .filter((lens) => lens.pictures.length)
-      .map((lens) =>
-        element(
-          "figure",
-          { className: "picture coverage" },
-          element("img", {
-            alt: `Where the board was seen by ${lens.name}`,
-            src: `${address}/coverage/${encodeURIComponent(lens.name)}.png`,
-          }),
-          element(
-            "figcaption",
-            {},
-            element("b", {}, `${lens.name}: ${Math.round(100 * lens.coverage)} % covered`),
-            residualBars(lens),
-            element("span", {}, lens.verdict),
-          ),
-        ),
-      );
-    fill(
-      setup.aside,
-      element(
-        "div",
-        { className: "calibrated" },
-        element(
-          "div",
-          { className: "aside-actions" },
-          rig.cameras.length > 1 && button("Set the floor by clicks", startClicking, "small"),
-          !proposal &&
-            (view.present?.cameras.length ?? 0) > 1 &&
-            setup.detail.cameras.length > 0 &&
-            button("Level it", level, "small", {
-              title:
-                "Turn the world to the cameras' vertical and put z = 0 under the person's feet, by the silhouettes",
-            }),
-          proposal &&
-            lenses.length > 0 &&
-            setup.detail.cameras.length > 0 &&
-            button(
-              showsBoard ? "Show the recording" : "Show the board",
-              () => {
-                showsBoard = !showsBoard;
-                drawAside();
-              },
-              "small quiet",
-            ),
-        ),
-        rig.cameras.length > 0 && rigFromAbove(rig),
-        element("div", { className: "pictures" }, figures),
-        coverage.length > 0 && element("h2", {}, "Coverage of the board"),
-        element("div", { className: "pictures" }, coverage),
-      ),
-    );
-  }
-
-  function draw() {
-    if (gone) return;
-    const tabs = element(
-      "div",
-      { className: "group", role: "tablist" },
-      Object.entries(TABS).map(([name, words]) =>
-        button(
-          words,
-          () => {
-            tab = name;
-            failed = null;
-            draw();
-          },
-          "toggle",
-          { role: "tab", ariaSelected: String(tab === name) },
-        ),
-      ),
-    );
-    const rig = shown();
-    fill(
-      place,
-      tabs,
-      { file: fileForm, boards, used: usedForm }[tab](),
-      progress,
-      failure(failed),
-      proposal && proposalBox(proposal),
-      rig && (proposal || rig.findings.length || !setup.step?.why) && findingList(rig),
-    );
-    if (!stopClicking) drawAside();
-  }
 
   setup.on("calibration", hear);
   // A calibration that was begun before this step was shown goes on to be followed.
   findJob({ session: setup.session, kind: "calibration" })
     .then((known) => {
-      if (gone || job || !known) return undefined;
-      if (isGoing(known) || known.state === "failed") {
-        job = known.identifier;
-        return hear(known);
-      }
-      return undefined;
+      if (isLeft || job || !(isGoing(known) || known?.state === "failed")) return undefined;
+      job = known.identifier;
+      return hear(known);
     })
     .catch(complain);
-  draw();
+
+  return {
+    setup,
+    here,
+    view,
+    proposal,
+    tab,
+    failed,
+    progress,
+    showsBoard,
+    isClicking,
+    file,
+    board,
+    propose,
+    read,
+    shown: () => proposal.value ?? view.value.present,
+    /** Where the pictures of what is shown are. */
+    pictures: () => `${here}/proposals/${proposal.value?.identifier ?? "current"}`,
+    /** @param {keyof typeof TABS} name */
+    choose: (name) =>
+      batch(() => {
+        tab.value = name;
+        failed.value = null;
+      }),
+    /** @param {Record<string, any>} changes */
+    enter: (changes) => {
+      file.value = { ...file.value, ...changes };
+    },
+    solve: () => begin(async () => post(`${here}/solve`, await board.request(upload))),
+    /**
+     * Turn the world of the calibration in use to the vertical, with the floor under the person by
+     * the silhouettes.
+     */
+    level: () => begin(() => post(`${here}/level`, {})),
+    /** Keep it as a file of another program. @param {string} format */
+    save: async (format) => {
+      const answer = await accepted(await fetch(`${here}/export?format=${format}`));
+      const name = answer.headers.get("content-disposition").match(/filename="([^"]+)"/)[1];
+      download(name, await answer.blob());
+      const notes = decodeURIComponent(answer.headers.get("x-studio-notes") ?? "");
+      failed.value = notes ? { message: notes } : null;
+    },
+    /** @param {any[]} points of the floor */
+    setFloor: async (points) => {
+      const request = { proposal: proposal.value?.identifier ?? "", points };
+      proposal.value = await post(`${here}/floor`, request);
+      isClicking.value = false;
+    },
+    /** Use what is proposed. @param {boolean} anyway */
+    apply: async (anyway) => {
+      const identifier = String(proposal.value?.identifier);
+      try {
+        view.value = await post(`${here}/proposals/${identifier}/apply`, { anyway });
+        clear();
+        tab.value = "used";
+        await setup.refresh();
+      } catch (error) {
+        failed.value = error;
+      }
+    },
+    stop: () => {
+      isLeft = true;
+    },
+  };
+}
+
+/** @typedef {ReturnType<typeof modelOf>} Model */
+
+/** @param {{ model: Model }} properties */
+function FileForm({ model }) {
+  const { path, unit, up } = model.file.value;
+  // A unit or an axis that is corrected is seen at once.
+  const correct = (/** @type {Record<string, string>} */ changes) => {
+    model.enter(changes);
+    const { files, upload } = model.file.value;
+    if (model.proposal.value && (files?.length || upload || path)) model.read();
+  };
+  return html`
+    <p class="hint">
+      Pose2Sim, anipose, FreeMoCap, Caliscope, EasyMocap, OpenCV, Qualisys or Bouguet files. Nothing
+      changes before you use it.
+    </p>
+    <label>
+      Upload
+      <input
+        type="file"
+        multiple
+        onChange=${({ target }) => model.enter({ files: target.files, upload: null, path: "" })}
+      />
+    </label>
+    <label>
+      or on this computer
+      <input
+        type="text"
+        placeholder="full path of a file or folder"
+        value=${path}
+        onInput=${({ target }) => model.enter({ path: target.value, files: null, upload: null })}
+      />
+    </label>
+    <div class="step-row">
+      <label>
+        Unit
+        <${Select}
+          title="Lengths in the file"
+          options=${UNITS}
+          value=${unit}
+          take=${(unit) => correct({ unit })}
+        />
+      </label>
+      <label>
+        Points up
+        <${Select}
+          title="The axis of the file's world that points up"
+          options=${AXES}
+          value=${up}
+          take=${(up) => correct({ up })}
+        />
+      </label>
+    </div>
+    <div class="step-actions">
+      <${Action} kind=${model.proposal.value ? "" : "primary"} act=${model.read}>
+        Read the file
+      </${Action}>
+    </div>
+  `;
+}
+
+/** @param {{ model: Model }} properties */
+const Boards = ({ model }) => html`<${BoardForm}
+  model=${model.board}
+  cameras=${model.view.value.footage}
+  hasFootage=${model.view.value.board_footage}
+  isChief=${!model.proposal.value}
+  solve=${model.solve}
+/>`;
+
+/** A choice, and what is done with what is chosen. */
+function ChoiceRow(
+  /** @type {{ label: string, options: [string, string][], words: string,
+   *   act: (chosen: string) => any }} */ { label, options, words, act },
+) {
+  const [chosen, setChosen] = useState(options[0]?.[0] ?? "");
+  return html`<div class="step-row">
+    <label>${label}<${Select} options=${options} value=${chosen} take=${setChosen} /></label>
+    <div class="step-actions at-end"><${Action} act=${() => act(chosen)}>${words}</${Action}></div>
+  </div>`;
+}
+
+/** @param {{ model: Model }} properties */
+function Used({ model }) {
+  const { present, earlier, formats, notes, changed, stale_runs: stale } = model.view.value;
+  if (!present) return html`<p class="hint">No calibration yet.</p>`;
+  return html`
+    <p>
+      <b>${present.source || "imported with the footage"}</b>
+      ${
+        changed &&
+        html`<span class="quiet-text"> · since ${new Date(changed).toLocaleString()}</span>`
+      }
+    </p>
+    ${notes.map((note) => html`<p class="notice">${note}</p>`)}
+    ${
+      !notes.length &&
+      stale.length > 0 &&
+      html`<p class="notice">Tracked with another calibration: ${stale.join(", ")}.</p>`
+    }
+    <${ChoiceRow}
+      label="Export for other tools"
+      options=${Object.entries(formats)}
+      words="Download"
+      act=${(format) => model.save(format).catch(complain)}
+    />
+    ${
+      earlier.length > 0 &&
+      html`<${ChoiceRow}
+        key=${earlier[0]}
+        label="Earlier ones"
+        options=${earlier.map((name) => [name, savedAt(name)])}
+        words="Preview"
+        act=${(chosen) => model.propose(() => post(`${model.here}/proposals`, { earlier: chosen }))}
+      />`
+    }
+  `;
+}
+
+/** @param {any[]} points */
+function pointWords(points) {
+  const off = Math.max(...points.flatMap((point) => Object.values(point.missed_px)));
+  const high = Math.max(...points.map((point) => Math.abs(point.place[2])));
+  return `${points.length} points: the clicks miss them by up to ${plainNumbers(off)} px, and they lie within ${plainNumbers(high, 0)} mm of one plane.`;
+}
+
+/** What is proposed, and what is done with it. */
+function Proposal(/** @type {{ model: Model, made: Schemas["ProposalView"] }} */ { model, made }) {
+  const [isForced, setForced] = useState(false);
+  const buttons = useRef(/** @type {HTMLElement | null} */ (null));
+  // The form above it may be longer than the window.
+  useEffect(() => buttons.current?.scrollIntoView({ block: "nearest" }), []);
+  const isBlocked = made.findings.some((one) => one.severity === "blocks");
+  const notes = [made.unit_note, ...made.notes, made.points.length && pointWords(made.points)];
+  return html`<section class="proposal">
+    <h2>${made.source}</h2>
+    ${notes.filter(Boolean).map((note) => html`<p class="hint">${note}</p>`)}
+    ${
+      isBlocked &&
+      made.cameras.length > 0 &&
+      html`<${Check} checked=${isForced} take=${setForced}>
+        Use it although results will be wrong
+      </${Check}>`
+    }
+    <div class="step-actions" ref=${buttons}>
+      <${Action}
+        kind="primary"
+        act=${() => model.apply(isBlocked)}
+        disabled=${isBlocked && !isForced}
+      >
+        Use this calibration
+      </${Action}>
+      <${Action}
+        kind="quiet"
+        act=${() => {
+          model.proposal.value = null;
+        }}
+      >
+        Discard
+      </${Action}>
+    </div>
+  </section>`;
+}
+
+/** @param {{ model: Model }} properties */
+function Panel({ model }) {
+  const tab = model.tab.value;
+  const proposal = model.proposal.value;
+  const rig = model.shown();
+  const Form = { file: FileForm, boards: Boards, used: Used }[tab];
+  return html`
+    <div class="group" role="tablist">
+      ${Object.entries(TABS).map(
+        ([name, words]) =>
+          html`<button
+            key=${name}
+            type="button"
+            class="toggle"
+            role="tab"
+            aria-selected=${String(tab === name)}
+            onClick=${() => model.choose(/** @type {any} */ (name))}
+          >
+            ${words}
+          </button>`,
+      )}
+    </div>
+    <${Form} model=${model} />
+    ${model.progress.value && html`<${Progress} ...${model.progress.value} />`}
+    <${Failure} error=${model.failed.value} />
+    ${proposal && html`<${Proposal} key=${proposal.identifier} model=${model} made=${proposal} />`}
+    ${
+      rig &&
+      (proposal || rig.findings.length > 0 || !model.setup.step?.why) &&
+      html`<${Findings} findings=${rig.findings} />`
+    }
+  `;
+}
+
+/** The floor and the axes on a camera's picture. */
+function AxesPicture({ address, camera }) {
+  const [isMissing, setMissing] = useState(false);
+  return html`<figure class="picture axes-picture">
+    <img
+      alt=${`Floor and axes on the picture of ${camera.name}`}
+      src=${address}
+      hidden=${isMissing}
+      onLoad=${() => setMissing(false)}
+      onError=${() => setMissing(true)}
+    />
+    <figcaption>
+      <b>${camera.name}</b>
+      ${dotted(
+        `${camera.width}×${camera.height}, focal length ${plainNumbers(camera.focal_px[0], 0)} px`,
+        camera.rms_px !== null && `${plainNumbers(camera.rms_px, 2)} px`,
+      )}
+    </figcaption>
+  </figure>`;
+}
+
+/** Where the board was seen by a camera. */
+const Coverage = ({ at, lens }) => html`<figure class="picture coverage">
+  <img
+    alt=${`Where the board was seen by ${lens.name}`}
+    src=${`${at}/coverage/${encodeURIComponent(lens.name)}.png`}
+  />
+  <figcaption>
+    <b>${lens.name}: ${Math.round(100 * lens.coverage)} % covered</b>
+    <${Residuals} lens=${lens} />
+    <span>${lens.verdict}</span>
+  </figcaption>
+</figure>`;
+
+/** The cameras as they stand and what they see. @param {{ model: Model }} properties */
+function Beside({ model }) {
+  const rig = model.shown();
+  const at = model.pictures();
+  const showsBoard = model.showsBoard.value;
+  const { cameras } = model.setup.detail;
+  const view = (/** @type {string} */ camera, /** @type {string} */ query) =>
+    `${at}/views/${encodeURIComponent(camera)}.jpg?board=${showsBoard}&${query}`;
+  if (model.isClicking.value)
+    return html`<${FloorClicks}
+      cameras=${rig?.cameras ?? []}
+      picture=${(camera) => view(camera, "height=720&axes=false")}
+      send=${model.setFloor}
+      stop=${() => {
+        model.isClicking.value = false;
+      }}
+    />`;
+  if (!rig)
+    return html`<div class="aside-empty">
+      <p>The cameras are drawn here once there is a calibration.</p>
+    </div>`;
+  const isProposed = Boolean(model.proposal.value);
+  /** @type {any[]} */
+  const lenses = /** @type {any} */ (rig.report)?.cameras ?? [];
+  const covered = lenses.filter((lens) => lens.pictures.length);
+  const now = Date.now();
+  return html`<div class="calibrated">
+    <div class="aside-actions">
+      ${
+        rig.cameras.length > 1 &&
+        html`<${Action}
+          kind="small"
+          act=${() => {
+            model.isClicking.value = true;
+          }}
+        >
+          Set the floor by clicks
+        </${Action}>`
+      }
+      ${
+        !isProposed &&
+        rig.cameras.length > 1 &&
+        cameras.length > 0 &&
+        html`<${Action}
+          kind="small"
+          act=${model.level}
+          title="Turn the world to the cameras' vertical and put z = 0 under the person's feet, by the silhouettes"
+        >
+          Level it
+        </${Action}>`
+      }
+      ${
+        isProposed &&
+        lenses.length > 0 &&
+        cameras.length > 0 &&
+        html`<${Action}
+          kind="small quiet"
+          act=${() => {
+            model.showsBoard.value = !showsBoard;
+          }}
+        >
+          ${showsBoard ? "Show the recording" : "Show the board"}
+        </${Action}>`
+      }
+    </div>
+    ${rig.cameras.length > 0 && html`<${RigFromAbove} rig=${rig} />`}
+    <div class="pictures">
+      ${rig.cameras.map(
+        (camera) =>
+          html`<${AxesPicture}
+            key=${camera.name}
+            address=${view(camera.name, `height=480&at=${now}`)}
+            camera=${camera}
+          />`,
+      )}
+    </div>
+    ${covered.length > 0 && html`<h2>Coverage of the board</h2>`}
+    <div class="pictures">
+      ${covered.map((lens) => html`<${Coverage} key=${lens.name} at=${at} lens=${lens} />`)}
+    </div>
+  </div>`;
+}
+
+/** @type {import("./setup.js").Mount<typeof load>} */
+export function mount(place, setup, loaded) {
+  const model = modelOf(setup, loaded);
+  render(place, html`<${Panel} model=${model} />`);
+  render(setup.aside, html`<${Beside} model=${model} />`);
   return () => {
-    gone = true;
-    stopClicking?.();
+    model.stop();
+    render(place, null);
+    render(setup.aside, null);
   };
 }

@@ -2,10 +2,10 @@
 // first.
 
 import { sessionPath } from "./api.js";
-import { findingList } from "./calibration_drawing.js";
+import { Findings } from "./calibration_drawing.js";
 import { percent } from "./elements.js";
 import { html } from "./studio/component.js";
-import { Action, Made } from "./studio/parts.js";
+import { Action } from "./studio/parts.js";
 
 /** @import { Schemas } from "./api_types" */
 /** @typedef {Schemas["MaskQuality"]} Quality */
@@ -86,7 +86,7 @@ export function QualityList({ setup, quality, measured, source, paint }) {
       isDoubted &&
       html`<div>
         <p class="notice">The silhouettes contradict the calibration:</p>
-        <${Made} what=${findingList({ findings: quality.doubts })} />
+        <${Findings} findings=${quality.doubts} />
       </div>`
     }
     <${Unconfirmed} setup=${setup} quality=${quality} />

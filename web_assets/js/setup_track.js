@@ -25,17 +25,21 @@ const EFFORTS = [
   ["0", "as the settings say"],
 ];
 
-export const load = (/** @type {string} */ _session) => fetchJson("/api/choices");
+export const load = (/** @type {string} */ _session) =>
+  Promise.all([fetchJson("/api/choices"), fetchJson("/api/worker")]);
 
 /**
  * What the step knows, and what can be done.
  * @param {import("./setup.js").Setup} setup
+ * @param {any} state how the tracking process stood when the step was loaded
  */
-function modelOf(setup) {
+function modelOf(setup, state) {
   const here = sessionPath(setup.session);
   const runs = signal(setup.detail.runs);
   /** What the tracking process said last. */
-  const work = signal(/** @type {Work | null} */ (null));
+  const work = signal(/** @type {Work} */ (state));
+  /** Whether it said something since. */
+  let isHeard = false;
   /** What is tracked backwards. */
   const job = signal(/** @type {any} */ (null));
   const failed = signal(/** @type {any} */ (null));
@@ -50,7 +54,7 @@ function modelOf(setup) {
 
   const newest = () => runs.value[0] ?? null;
   const isHere = () =>
-    work.value?.session === setup.session && work.value.run === runs.value[0]?.name;
+    work.value.session === setup.session && work.value.run === runs.value[0]?.name;
   const isTracked = () => isHere() && isBusy(work.value);
 
   function showNewest() {
@@ -74,9 +78,9 @@ function modelOf(setup) {
 
   /** @param {Work} state */
   function take(state) {
-    const isOurs = (/** @type {Work | null} */ one) =>
-      one?.session === setup.session && isBusy(one);
+    const isOurs = (/** @type {Work} */ one) => one.session === setup.session && isBusy(one);
     const wasOurs = isOurs(work.value);
+    isHeard = true;
     work.value = state;
     if (wasOurs && !isOurs(state)) end();
   }
@@ -104,6 +108,7 @@ function modelOf(setup) {
   const start = (run) =>
     attempt(async () => {
       await post(`${runPath(setup.session, run)}/start`);
+      isHeard = true;
       const begun = { session: setup.session, run, state: "compiling" };
       work.value = /** @type {any} */ ({ ...begun, frame: 0, first: 0, last: 1, done: 0 });
     });
@@ -160,10 +165,10 @@ function modelOf(setup) {
       await start(made.name);
       await setup.refresh();
     },
-    /** Ask how the tracking process stands; what it said by itself meanwhile is newer. */
+    /** What the tracking process said before it was listened to. */
     ask: async () => {
-      const state = await fetchJson("/api/worker");
-      if (!work.value) take({ type: "state", ...state });
+      const now = await fetchJson("/api/worker");
+      if (!isHeard) take({ type: "state", ...now });
     },
     /** What was begun before this step was shown goes on to be followed. */
     findAgain: async () => {
@@ -202,7 +207,7 @@ function doingOf(model) {
       share: job.total ? job.done / job.total : 0,
       cancel: () => remove(`/api/track-jobs/${job.identifier}`).catch(complain),
     };
-  if (!work || !model.isTracked()) return null;
+  if (!model.isTracked()) return null;
   const share = work.last > work.first ? work.done / (work.last - work.first) : 0;
   return { words: workWords(work), share, cancel: model.cancel };
 }
@@ -218,7 +223,7 @@ function Status({ model }) {
   const isStale = model.isStale();
   const from = run.first > 0 && ` (from frame ${run.first} on)`;
   const truth = run.mean_mm != null && `, ${run.mean_mm.toPrecision(3)} mm from the truth`;
-  const isFailed = model.isHere() && ["failed", "lost"].includes(work?.state ?? "");
+  const isFailed = model.isHere() && ["failed", "lost"].includes(work.state);
   return html`<section class="track-status">
     <p>${run.name}: ${run.done} of ${count} frames${from}, ${run.describe}${truth}.</p>
     <${Failure} error=${isFailed ? work : model.failed.value} />
@@ -336,8 +341,8 @@ const Wall = ({ model }) => html`<${ViewWall}
 />`;
 
 /** @type {import("./setup.js").Mount<typeof load>} */
-export function mount(place, setup, choices) {
-  const model = modelOf(setup);
+export function mount(place, setup, [choices, state]) {
+  const model = modelOf(setup, state);
   render(
     place,
     html`
@@ -346,6 +351,7 @@ export function mount(place, setup, choices) {
     `,
   );
   render(setup.aside, html`<${Wall} model=${model} />`);
+  model.ask().catch(complain);
 
   /** "Yes, track from here": the run that waits, else a new one as the form has it. */
   function trackNow() {
@@ -355,10 +361,8 @@ export function mount(place, setup, choices) {
     return place.querySelector("form")?.requestSubmit();
   }
 
-  model
-    .ask()
-    .then(() => (setup.asked.begin && !model.isTracked() ? trackNow() : model.findAgain()))
-    .catch(complain);
+  if (setup.asked.begin && !model.isTracked()) trackNow();
+  else model.findAgain().catch(complain);
   return () => {
     model.stop();
     render(place, null);

@@ -1,7 +1,7 @@
 // Small components that pages share: a button that waits for what it does, an error with its
 // remedy, a bar of progress, a box to be checked, a choice, a table.
 
-import { html, useLayoutEffect, useRef, useState } from "./component.js";
+import { html, useState } from "./component.js";
 
 /**
  * A button that cannot be pressed again while what it does is being done.
@@ -86,10 +86,3 @@ export const Table = ({ heads, rows, kind = "figures" }) => html`<table class=${
     ${rows.map((cells) => html`<tr>${cells.map((cell) => html`<td>${cell}</td>`)}</tr>`)}
   </tbody>
 </table>`;
-
-/** An element that was made by hand, among components. @param {{ what: Element }} properties */
-export function Made({ what }) {
-  const place = useRef(/** @type {HTMLElement | null} */ (null));
-  useLayoutEffect(() => place.current?.replaceChildren(what), [what]);
-  return html`<div ref=${place}></div>`;
-}
