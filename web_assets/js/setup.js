@@ -1,32 +1,21 @@
 // The guided set-up: the stepper, the step's panel, pictures or the scene beside it.
 //
-// A step's module `setup_<step>.js` (start-pose: setup_start_pose.js) exports `mount(place, setup,
-// loaded) -> () => void`. `place` is empty and the panel's; `loaded` is what its `load(session)`
-// resolves with, where it exports one; what `mount` returns releases everything when another step
-// is shown. One `button.primary` a step: Enter presses the first that is shown.
+// A step's module `setup_<step>.js` (start-pose: setup_start_pose.js) exports `modelOf(setup,
+// loaded)`, what the step knows and what can be done, and what shows it, two components of
+// `{ model }`: `Panel`, and `Beside` for the pictures at the right. `loaded` is what its
+// `load(session)` resolves with, where it exports one; the model's `stop` ends what must not go on
+// when another step is shown. One `button.primary` a step: Enter presses the first that is shown.
 
 import { fetchJson, post, sessionPath } from "./api.js";
-import { closeDialog, openForm } from "./studio/dialogs.js";
-import {
-  actions,
-  button,
-  byId,
-  element,
-  failure,
-  fill,
-  lead,
-  NAME,
-  nothing,
-  notice,
-  offer,
-  spring,
-} from "./elements.js";
+import { byId, NAME, offer } from "./elements.js";
 import { listen, listenToAll, startEvents } from "./events.js";
 import { isGoing } from "./jobs.js";
 import { acceptDrops } from "./dropping.js";
 import { complain } from "./messages.js";
-import { loadScene } from "./scene_window.js";
 import { sessionWords } from "./sessions.js";
+import { batch, effect, html, mount, signal } from "./studio/component.js";
+import { closeDialog, openForm } from "./studio/dialogs.js";
+import { Action, Failure } from "./studio/parts.js";
 import { startWorkList } from "./studio/work_list.js";
 import { startTheme } from "./theme.js";
 
@@ -36,27 +25,17 @@ import { startTheme } from "./theme.js";
  *   files that were dropped
  * @typedef Setup what a step is given
  * @property {string} session
- * @property {Schemas["SessionDetail"]} detail the session as it was when the step was mounted (no
+ * @property {Schemas["SessionDetail"]} detail the session as it was when the step was shown (no
  *   cameras before the calibration)
- * @property {HTMLElement} aside the empty element at the right, for pictures (class "pictures" with
- *   `picture`s in it, if it fits)
  * @property {Schemas["Workflow"]["steps"][number] | undefined} step this step as the server sees it
  *   now
  * @property {() => Promise<any>} refresh load the steps again, after something was made
  * @property {(step: string, asked?: Asked) => Promise<void>} go show another step; `asked`: to do
  *   at once
  * @property {Asked} asked what the step is asked to do at once
- * @property {(shown?: object) => Promise<void>} scene show the 3-D scene in `aside` instead, moved
- *   to what is to be shown
  * @property {<T extends MessageType>(type: T, handler: (event: MessageOf<T>) => void) => void} on
  *   hear events of this session while the step is shown
  */
-/**
- * What mounts a step of which something is loaded first, by its `load(session)`.
- * @template {(session: string) => Promise<any>} L
- * @typedef {(place: HTMLElement, setup: Setup, loaded: Awaited<ReturnType<L>>) => () => void} Mount
- */
-
 /** What changes how far a session is. @type {MessageType[]} */
 const CHANGING = ["sessions", "track", "subject", "initialise", "export", "state", "import"];
 /** @typedef {Schemas["Workflow"]["steps"][number]} StepStatus */
@@ -92,100 +71,116 @@ const STATES = {
   running: "running",
 };
 
+/** @type {HTMLElement} */
 const stepper = byId("stepper");
+/** @type {HTMLElement} */
 const panel = byId("step");
-const aside = byId("aside");
 const which = byId("which");
 
 let session = "";
-/** @type {StepStatus[]} */
-let steps = [];
-let shown = ""; // the step whose panel is mounted
-let mounting = 0; // rises with every mount, so that a slow one knows that it is too late
-let releases = []; // what the mounted step has to release
+/** How far the session is. */
+const steps = signal(/** @type {StepStatus[]} */ ([]));
+/** The step that is shown. */
+const shown = signal("");
+/** What is shown instead of a step: markup. */
+const instead = signal(/** @type {any} */ (null));
+/** The step's module and model once they are there, or why they are not. */
+const opened = signal(/** @type {{ module?: any, model?: any, error?: any }} */ ({}));
+let opening = 0; // rises with every step, so that a slow one knows that it is too late
+let releases = []; // what the step hears, and what stops it
 let isRestoring = true; // whether the step that is shown next follows from the address
 
-const statusOf = (name) => steps.find((one) => one.step === name);
-const beside = (by) => steps[steps.findIndex((one) => one.step === shown) + by]?.step;
+const statusOf = (name) => steps.value.find((one) => one.step === name);
+const beside = (by) =>
+  steps.value[steps.value.findIndex((one) => one.step === shown.value) + by]?.step;
 const moduleOf = (name) => import(`./setup_${name.replaceAll("-", "_")}.js`);
 
-function drawStepper() {
-  fill(
-    stepper,
-    element(
-      "ol",
-      {},
-      steps.map((one) => {
-        const title = `${STEPS[one.step].name}: ${STATES[one.state]}${one.optional ? " (optional)" : ""}`;
-        const row = element(
-          "button",
-          {
-            type: "button",
-            title,
-            ariaLabel: [title, one.words, one.why].filter(Boolean).join(". "),
-            dataset: {
-              key: one.step,
-              step: one.step,
-              state: one.state,
-              ...(one.state === "done" && one.why ? { doubt: "" } : {}),
-            },
-            onclick: () => go(one.step),
-          },
-          element("i", { className: "step-dot" }),
-          element("span", { className: "name" }, STEPS[one.step].name),
-          one.words && element("span", { className: "words" }, one.words),
-          one.why && element("span", { className: "why" }, one.why),
-        );
-        if (one.step === shown) row.ariaCurrent = "step";
-        return element("li", {}, row);
-      }),
-    ),
-  );
+/** @param {{ status: StepStatus }} properties */
+function StepEntry({ status: { step, state, optional, words, why } }) {
+  const title = `${STEPS[step].name}: ${STATES[state]}${optional ? " (optional)" : ""}`;
+  return html`<button
+    type="button"
+    title=${title}
+    aria-label=${[title, words, why].filter(Boolean).join(". ")}
+    aria-current=${step === shown.value ? "step" : null}
+    data-step=${step}
+    data-state=${state}
+    data-doubt=${state === "done" && why ? "" : null}
+    onClick=${() => go(step)}
+  >
+    <i class="step-dot"></i><span class="name">${STEPS[step].name}</span>
+    ${words && html`<span class="words">${words}</span>`}
+    ${why && html`<span class="why">${why}</span>`}
+  </button>`;
 }
+
+const Stepper = () =>
+  steps.value.length > 0 &&
+  html`<ol>
+    ${steps.value.map(
+      (status) => html`<li key=${status.step}><${StepEntry} status=${status} /></li>`,
+    )}
+  </ol>`;
+
+/** The step, between its heading and the ways to those before and after. */
+function Step() {
+  if (instead.value) return instead.value;
+  const status = statusOf(shown.value);
+  if (!status) return null;
+  const [before, next] = [beside(-1), beside(1)];
+  const { module, model, error } = opened.value;
+  return html`
+    <header class="step-head">
+      <h1>${STEPS[status.step].name}</h1>
+      <p class="lead">${STEPS[status.step].lead}</p>
+      ${status.why && html`<p class="notice">${status.why}</p>`}
+    </header>
+    <div class="step-place">
+      ${module && html`<${module.Panel} model=${model} />`}
+      ${error && html`<p>This step cannot be shown.</p><${Failure} error=${error} />`}
+    </div>
+    <div class="step-foot">
+      ${before && html`<${Action} kind="quiet" act=${() => go(before)}>‹ ${STEPS[before].name}</${Action}>`}
+      <span class="spring"></span>
+      ${
+        next &&
+        html`<${Action} kind="quiet next-step" act=${() => go(next)}>${STEPS[next].name} ›</${Action}>`
+      }
+    </div>
+  `;
+}
+
+function Beside() {
+  const { module, model } = opened.value;
+  return module && html`<${module.Beside} model=${model} />`;
+}
+
+effect(() => {
+  panel.dataset.state = statusOf(shown.value)?.state ?? "";
+});
 
 /** Load how far the session is. */
 async function refresh() {
   const wanted = session;
   const answer = await fetchJson(`${sessionPath(wanted)}/way`);
-  if (wanted !== session) return;
-  steps = answer.steps;
-  drawStepper();
-  drawHead();
+  if (wanted === session) steps.value = answer.steps;
 }
 
 function release() {
   for (const each of releases) each();
   releases = [];
-  fill(aside);
-}
-
-/** The scene beside the panel, moved to what is to be shown. */
-async function scene(wanted = {}) {
-  if (!aside.querySelector("iframe"))
-    fill(aside, loadScene(element("iframe", { title: "3-D scene" })));
-  await post("/api/scene/show", { session, ...wanted });
-}
-
-function drawHead() {
-  const head = panel.querySelector(".step-head");
-  const status = statusOf(shown);
-  if (!head || !status) return;
-  panel.dataset.state = status.state;
-  fill(
-    head,
-    element("h1", {}, STEPS[shown].name),
-    lead(STEPS[shown].lead),
-    status.why && notice(status.why),
-  );
+  opened.value = {};
 }
 
 /** Show a step; "back" leads to the one before. @param {Asked} [asked] */
 async function go(name, asked = {}) {
   if (!statusOf(name)) return;
-  const turn = ++mounting;
-  release();
-  shown = name;
-  drawStepper();
+  const turn = ++opening;
+  batch(() => {
+    release();
+    instead.value = null;
+    shown.value = name;
+  });
   const address = `?session=${encodeURIComponent(session)}&step=${name}`;
   if (location.search !== address) {
     if (isRestoring) history.replaceState(null, "", address);
@@ -193,32 +188,19 @@ async function go(name, asked = {}) {
   }
   isRestoring = false;
   document.title = `${STEPS[name].name} · ${session} · Capture studio`;
-  const place = element("div", { className: "step-place" });
-  const [before, next] = [beside(-1), beside(1)];
-  fill(
-    panel,
-    element("header", { className: "step-head" }),
-    place,
-    element(
-      "div",
-      { className: "step-foot" },
-      before && button(`‹ ${STEPS[before].name}`, () => go(before), "quiet"),
-      spring(),
-      next && button(`${STEPS[next].name} ›`, () => go(next), "quiet next-step"),
-    ),
-  );
   panel.scrollTop = 0;
-  drawHead();
   if (statusOf(name)?.state === "blocked") return;
   try {
     const [[module, loaded], detail] = await Promise.all([
       moduleOf(name).then(async (one) => [one, await one.load?.(session)]),
       fetchJson(sessionPath(session)),
     ]);
-    if (turn !== mounting) return;
-    releases.push(module.mount(place, setupOf(detail, asked), loaded));
+    if (turn !== opening) return;
+    const model = module.modelOf(setupOf(detail, asked), loaded);
+    if (model.stop) releases.push(model.stop);
+    opened.value = { module, model };
   } catch (error) {
-    fill(place, element("p", {}, "This step cannot be shown."), failure(error));
+    opened.value = { error };
   }
 }
 
@@ -226,13 +208,11 @@ async function go(name, asked = {}) {
 const setupOf = (detail, asked) => ({
   session,
   detail,
-  aside,
   refresh,
   go,
-  scene,
   asked,
   get step() {
-    return statusOf(shown);
+    return statusOf(shown.value);
   },
   on: (type, handler) => {
     releases.push(
@@ -246,16 +226,20 @@ const setupOf = (detail, asked) => ({
 /** Open a session at its next step, or the one that is wanted. */
 async function open(name, wanted = "") {
   session = name;
-  shown = "";
   which.value = name;
   try {
     const answer = await fetchJson(`${sessionPath(name)}/way`);
-    steps = answer.steps;
+    batch(() => {
+      shown.value = "";
+      steps.value = answer.steps;
+    });
     await go(statusOf(wanted) ? wanted : answer.next || "footage");
   } catch (error) {
-    release();
-    fill(stepper);
-    fill(panel, failure(error));
+    batch(() => {
+      release();
+      steps.value = [];
+      instead.value = html`<${Failure} error=${error} />`;
+    });
   }
 }
 
@@ -341,16 +325,15 @@ function takeKey(event) {
   if (next) {
     event.preventDefault();
     go(next);
-    stepper.querySelector(`[data-step="${next}"]`)?.focus();
+    /** @type {HTMLElement | null} */ (stepper.querySelector(`[data-step="${next}"]`))?.focus();
   } else if (
     event.key === "Enter" &&
     !(event.target.closest?.("button, a, summary") && !event.target.closest("#stepper"))
   ) {
-    const own = [...panel.querySelectorAll("button.primary")].find(
-      (one) => one.offsetParent && !one.disabled,
-    );
-    const primary =
-      own ?? (panel.dataset.state === "done" ? panel.querySelector(".next-step") : null);
+    const buttons = (/** @type {string} */ kind) =>
+      /** @type {HTMLButtonElement[]} */ ([...panel.querySelectorAll(`button.${kind}`)]);
+    const own = buttons("primary").find((one) => one.offsetParent && !one.disabled);
+    const primary = own ?? (panel.dataset.state === "done" ? buttons("next-step")[0] : null);
     if (!primary) return;
     event.preventDefault();
     primary.click();
@@ -368,18 +351,25 @@ async function restore() {
 
 /** What a link names that is not in this workspace. */
 function sayMissing(name, names) {
-  fill(
-    panel,
-    nothing(
-      `Session “${name}” is not here`,
-      lead("It was renamed or deleted, or the link comes from another studio."),
-      names.length > 0 && actions(button(`Open ${names[0]}`, () => open(names[0]), "primary")),
-      actions(button("New session", () => beginForm(), names.length ? "" : "primary")),
-    ),
-  );
+  instead.value = html`<div class="nothing">
+    <h1>Session “${name}” is not here</h1>
+    <p class="lead">It was renamed or deleted, or the link comes from another studio.</p>
+    ${
+      names.length > 0 &&
+      html`<div class="step-actions">
+        <${Action} kind="primary" act=${() => open(names[0])}>Open ${names[0]}</${Action}>
+      </div>`
+    }
+    <div class="step-actions">
+      <${Action} kind=${names.length ? "" : "primary"} act=${() => beginForm()}>New session</${Action}>
+    </div>
+  </div>`;
 }
 
 async function start() {
+  mount(stepper, html`<${Stepper} />`);
+  mount(panel, html`<${Step} />`);
+  mount(byId("aside"), html`<${Beside} />`);
   startTheme();
   startEvents();
   startWorkList();
@@ -389,7 +379,7 @@ async function start() {
   document.addEventListener("keydown", takeKey);
   byId("begin").onclick = () => beginForm();
   acceptDrops("Drop your cameras' videos, or a folder", (files) => {
-    if (shown === "footage")
+    if (shown.value === "footage")
       return document.dispatchEvent(new CustomEvent("footage", { detail: files }));
     return session && statusOf("footage") ? go("footage", { dropped: files }) : beginForm(files);
   });
@@ -404,16 +394,16 @@ async function start() {
     const wanted = query.get("session") ?? names[0];
     if (wanted && !names.includes(wanted)) return sayMissing(wanted, names);
     if (wanted && !query.has("new")) return await open(wanted, query.get("step") ?? "");
-    fill(
-      panel,
-      nothing(
-        "From your own cameras",
-        lead(
-          "From the raw footage of your cameras to a motion file, step by step. Start with an empty session.",
-        ),
-        actions(button("New session", () => beginForm(), "primary")),
-      ),
-    );
+    instead.value = html`<div class="nothing">
+      <h1>From your own cameras</h1>
+      <p class="lead">
+        From the raw footage of your cameras to a motion file, step by step. Start with an empty
+        session.
+      </p>
+      <div class="step-actions">
+        <${Action} kind="primary" act=${() => beginForm()}>New session</${Action}>
+      </div>
+    </div>`;
     if (query.has("new")) beginForm();
   } catch (error) {
     complain(error);

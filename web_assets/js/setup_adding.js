@@ -4,7 +4,7 @@
 import { fault, fetchJson, post, remove, sessionPath } from "./api.js";
 import { CANCELLED, jobDone, shareOf, standing } from "./jobs.js";
 import { complain } from "./messages.js";
-import { html, signal } from "./studio/component.js";
+import { html, into, signal } from "./studio/component.js";
 import { Action, Failure, Progress, Select } from "./studio/parts.js";
 import { uploadFiles } from "./uploading.js";
 
@@ -169,9 +169,7 @@ const Source = ({ model }) => html`
       name="source"
       placeholder="full path"
       value=${model.source.value}
-      onInput=${({ target }) => {
-        model.source.value = target.value;
-      }}
+      onInput=${({ target }) => into(model.source)(target.value)}
       onFocus=${model.look}
     />
   </label>
@@ -190,9 +188,7 @@ const Box = ({ name, title = "", children }) => html`<label class="check" title=
 export const AddingForm = ({ model, isFirst }) => html`<details
   class=${isFirst ? "footage-add alone" : "footage-add"}
   open=${model.isOpen.value}
-  onToggle=${({ currentTarget }) => {
-    model.isOpen.value = currentTarget.open;
-  }}
+  onToggle=${({ currentTarget }) => into(model.isOpen)(currentTarget.open)}
 >
   <summary>${isFirst ? "Your cameras' footage" : "Add or replace footage"}</summary>
   <div class="footage-form" onInput=${model.hear}>

@@ -5,7 +5,7 @@ import { fetchJson, post, remove, sessionPath } from "./api.js";
 import { dotted, percent } from "./elements.js";
 import { isGoing, timeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
-import { html, signal } from "./studio/component.js";
+import { attempting, html, signal } from "./studio/component.js";
 import { Action, Failure, Progress } from "./studio/parts.js";
 
 /** @import { Schemas } from "./api_types" */
@@ -28,18 +28,9 @@ export function alignmentOf(setup, changed) {
   const here = /** @type {const} */ (`${sessionPath(setup.session)}/alignment`);
   const alignment = signal(/** @type {Schemas["AlignmentAnswer"] | null} */ (null));
   const failed = signal(/** @type {any} */ (null));
+  const attempt = attempting(failed);
   /** Whether the person asked for the measurement: what was measured unasked raises no alarm. */
   const isRequested = signal(false);
-
-  /** @param {() => Promise<void>} work */
-  async function attempt(work) {
-    failed.value = null;
-    try {
-      await work();
-    } catch (error) {
-      failed.value = error;
-    }
-  }
 
   const measure = () =>
     attempt(async () => {

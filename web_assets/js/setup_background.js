@@ -5,11 +5,11 @@ import { fetchJson, post, put, remove, sessionPath } from "./api.js";
 import { isGoing, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
 import { AlignmentBox, alignmentOf } from "./setup_alignment.js";
-import { brush } from "./setup_brush.js";
+import { Brush, loadExcluded } from "./setup_brush.js";
 import { MaskPictures, shownMasks } from "./setup_masks.js";
 import { QualityList, SourceTable } from "./setup_quality.js";
-import { paintStrokes } from "./setup_strokes.js";
-import { batch, html, mount as render, signal, useRef, useState } from "./studio/component.js";
+import { Strokes } from "./setup_strokes.js";
+import { attempting, batch, html, into, signal, useRef, useState } from "./studio/component.js";
 import { Action, Check, Failure, Progress } from "./studio/parts.js";
 import { uploadFiles } from "./uploading.js";
 
@@ -69,7 +69,7 @@ function recommended({ background, strokes }, isPerson) {
  * @param {import("./setup.js").Setup} setup
  * @param {Awaited<ReturnType<typeof load>>} loaded
  */
-function modelOf(setup, loaded) {
+export function modelOf(setup, loaded) {
   const here = sessionPath(setup.session);
   const isPerson = setup.detail.body.by_height;
   const isSet = Object.keys(loaded.background.own).length || loaded.background.source === "masks";
@@ -90,6 +90,9 @@ function modelOf(setup, loaded) {
   const failed = signal(
     /** @type {any} */ (loaded.background.job?.state === "failed" ? loaded.background.job : null),
   );
+  const attempt = attempting(failed);
+  /** The editor over a camera's picture, with its properties. */
+  const painted = signal(/** @type {any} */ (null));
   const shown = shownMasks(setup, loaded.background.frame_count);
   // Turned cameras see the same masks otherwise: whether they agree now is measured at once, else
   // the step waits for it.
@@ -116,16 +119,6 @@ function modelOf(setup, loaded) {
     changed.value = knobs;
     clearTimeout(timer);
     timer = window.setTimeout(() => shown.preview(knobs), milliseconds);
-  }
-
-  /** @param {() => Promise<void>} work */
-  async function attempt(work) {
-    failed.value = null;
-    try {
-      await work();
-    } catch (error) {
-      failed.value = error;
-    }
   }
 
   /** @param {Background["source"]} name */
@@ -221,52 +214,45 @@ function modelOf(setup, loaded) {
   /** @param {string} camera */
   const lensOf = (camera) => setup.detail.cameras.find((one) => one.name === camera);
 
+  /** The editor is left: what it kept is seen in the pictures. */
+  function leave() {
+    painted.value = null;
+    shown.refresh();
+  }
+
   /** Paint what does not count of a camera, over its picture. @param {string} camera */
-  function exclude(camera) {
+  async function exclude(camera) {
     const known = background.value.cameras.find((one) => one.name === camera);
-    const lens = { ...lensOf(camera), frame: shown.frame.value, excluded: known?.excluded };
-    render(setup.aside, null);
-    brush(setup, lens, async (/** @type {boolean} */ isSaved) => {
+    const before = known?.excluded ? await loadExcluded(setup.session, camera) : null;
+    const done = async (/** @type {boolean} */ isSaved) => {
       if (isSaved) {
         quality.value = null;
         await reload().catch(complain);
         setup.refresh().catch(complain);
       }
-      showPictures();
-    });
+      leave();
+    };
+    const frame = shown.frame.value;
+    painted.value = { Editor: Brush, setup, lens: lensOf(camera), frame, before, done };
   }
 
   /** Paint strokes on a camera's picture. @param {string} camera */
-  function paint(camera) {
-    render(setup.aside, null);
-    const count = background.value.frame_count;
-    paintStrokes(setup, lensOf(camera), shown.frame.value, count, async (isSaved, frame) => {
+  async function paint(camera) {
+    const { cameras } = await fetchJson(`${here}/strokes`);
+    const before = cameras.find((one) => one.camera === camera)?.strokes ?? [];
+    const done = async (/** @type {boolean} */ isSaved, /** @type {number} */ frame) => {
       shown.frame.value = frame;
       if (isSaved) {
         source.value = "strokes";
         await reload().catch(complain);
       }
-      showPictures();
-    }).catch(complain);
-  }
-
-  const Pictures = () => html`<${MaskPictures}
-    shown=${shown}
-    cameras=${background.value.cameras}
-    quality=${quality.value}
-    exclude=${exclude}
-    paint=${paint}
-  />`;
-
-  function showPictures() {
-    if (isLeft) return;
-    shown.refresh();
-    setup.aside.replaceChildren();
-    render(setup.aside, html`<${Pictures} />`);
+      leave();
+    };
+    const [frame, count] = [shown.frame.value, background.value.frame_count];
+    painted.value = { Editor: Strokes, setup, lens: lensOf(camera), frame, count, before, done };
   }
 
   shown.cut(isUnderWay());
-  showPictures();
   alignment.load().catch(complain);
 
   return {
@@ -283,6 +269,8 @@ function modelOf(setup, loaded) {
     subject,
     failed,
     alignment,
+    shown,
+    painted,
     isUnderWay,
     tryKnobs,
     choose,
@@ -290,13 +278,12 @@ function modelOf(setup, loaded) {
     setUp,
     give,
     keep,
-    exclude,
-    paint,
+    exclude: (/** @type {string} */ camera) => exclude(camera).catch(complain),
+    paint: (/** @type {string} */ camera) => paint(camera).catch(complain),
     cancel: () => remove(`${here}/background`).catch(complain),
-    close: () => {
+    stop: () => {
       isLeft = true;
       clearTimeout(timer);
-      render(setup.aside, null);
     },
   };
 }
@@ -347,9 +334,7 @@ function SubjectList({ model }) {
   );
   const words = (/** @type {Subject} */ one) =>
     `at ${one.at.map((value) => value.toFixed(2)).join(", ")} m`;
-  const pick = (/** @type {Subject} */ one) => {
-    model.subject.value = one;
-  };
+  const pick = into(model.subject);
   const chosen = model.subject.value;
   return html`<section class="plates">
     <p class="hint">Click whom the masks shall be of.</p>
@@ -516,9 +501,7 @@ function Make({ model }) {
       sources.find((one) => one.name === source)?.has_knobs &&
       html`<${Check}
         checked=${model.isTuned.value}
-        take=${(checked) => {
-          model.isTuned.value = checked;
-        }}
+        take=${into(model.isTuned)}
         title="Knobs that you set below stay fixed."
       >
         tune the knobs for the best agreement of the views
@@ -528,9 +511,7 @@ function Make({ model }) {
       source === "combined" &&
       html`<${Check}
         checked=${model.isUnusedExcluded.value}
-        take=${(checked) => {
-          model.isUnusedExcluded.value = checked;
-        }}
+        take=${into(model.isUnusedExcluded)}
         title="A bystander, a monitor, a window: motion there is not the subject."
       >
         exclude regions that the subject never comes near
@@ -653,20 +634,23 @@ function Knobs({ model }) {
   </details>`;
 }
 
-/** @type {import("./setup.js").Mount<typeof load>} */
-export function mount(place, setup, loaded) {
-  const model = modelOf(setup, loaded);
-  render(
-    place,
-    html`
-      <${Make} model=${model} />
-      <${Agreement} model=${model} />
-      <${AlignmentBox} model=${model.alignment} />
-      <${Knobs} model=${model} />
-    `,
-  );
-  return () => {
-    model.close();
-    render(place, null);
-  };
+/** @param {{ model: Model }} properties */
+export const Panel = ({ model }) => html`
+  <${Make} model=${model} />
+  <${Agreement} model=${model} />
+  <${AlignmentBox} model=${model.alignment} />
+  <${Knobs} model=${model} />
+`;
+
+/** The masks, or the editor of one. @param {{ model: Model }} properties */
+export function Beside({ model }) {
+  const { Editor, ...properties } = model.painted.value ?? {};
+  if (Editor) return html`<${Editor} key=${properties.lens.name} ...${properties} />`;
+  return html`<${MaskPictures}
+    shown=${model.shown}
+    cameras=${model.background.value.cameras}
+    quality=${model.quality.value}
+    exclude=${model.exclude}
+    paint=${model.paint}
+  />`;
 }

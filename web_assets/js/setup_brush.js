@@ -2,168 +2,196 @@
 // a PNG of the footage's own size and orientation.
 
 import { fault, putBytes, sessionPath } from "./api.js";
-import { button, element, fill, penOf, spring } from "./elements.js";
+import { element, penOf } from "./elements.js";
 import { complain } from "./messages.js";
-import { painting, upright } from "./setup_painting.js";
+import { paintingOf, Sheet, Size } from "./setup_painting.js";
+import { html, signal, useLayoutEffect, useRef, useState } from "./studio/component.js";
+import { Action } from "./studio/parts.js";
 
 const UNDONE = 30;
 const HELP =
-  "Paint what is not the subject. Keys: arrows move, space paints, x paints or erases, [ and ] change the size, ctrl z undoes, enter keeps, escape leaves.";
+  "Paint what is not the subject. Keys: arrows move, space paints, x paints or erases, " +
+  "[ and ] change the size, ctrl z undoes, enter keeps, escape leaves.";
 
-/** Edit what is excluded of `lens` (name, picture_width, picture_height, quarter_turns, frame, excluded: whether there is
- * something already, shown before a stroke can be made: one that came after would undo what was
- * painted meanwhile); `done(saved)` when left. */
-export async function brush(setup, lens, done) {
-  const place = `${sessionPath(setup.session)}/exclusions/${encodeURIComponent(lens.name)}`;
+const placeOf = (/** @type {string} */ session, /** @type {string} */ camera) =>
+  `${sessionPath(session)}/exclusions/${encodeURIComponent(camera)}`;
+
+/**
+ * What is excluded of a camera already, as a picture: read before a stroke can be made, since one
+ * that came after would undo what was painted meanwhile.
+ * @param {string} session
+ * @param {string} camera
+ */
+export async function loadExcluded(session, camera) {
+  const answer = await fetch(placeOf(session, camera));
+  if (!answer.ok)
+    throw fault(`The excluded regions of ${camera} could not be read.`, "Open the brush again.");
+  return createImageBitmap(await answer.blob());
+}
+
+/**
+ * A picture turned clockwise by quarter turns.
+ * @param {HTMLCanvasElement | ImageBitmap} source
+ * @param {number} by
+ * @param {number[]} size
+ * @returns {[HTMLCanvasElement, CanvasRenderingContext2D]}
+ */
+function turned(source, by, [width, height]) {
+  const out = element("canvas", { width, height });
+  const drawn = penOf(out);
+  drawn.translate(width / 2, height / 2);
+  drawn.rotate((by * Math.PI) / 2);
+  drawn.drawImage(source, -source.width / 2, -source.height / 2);
+  return [out, drawn];
+}
+
+/**
+ * @typedef {{ setup: import("./setup.js").Setup, frame: number,
+ *   lens: import("./setup_painting.js").Lens, before: ImageBitmap | null,
+ *   done: (isSaved: boolean) => any }} Properties
+ *   `before`: what is excluded already; `done`: called when it is left
+ */
+
+/** What is painted, and what can be done. @param {Properties} properties */
+function brushOf({ setup, lens, before, done }) {
   const colour = getComputedStyle(document.documentElement).getPropertyValue("--accent").trim();
-  let erasing = false;
+  const isErasing = signal(false);
+  /** What undo brings back. */
+  const undone = signal(/** @type {ImageData[]} */ ([]));
+  /** @type {CanvasRenderingContext2D} */
+  let pen;
   /** Where the stroke is. @type {number[] | null} */
   let last = null;
-  /** @type {ImageData[]} */
-  const before = [];
-  const sheet = painting(setup, lens, {
-    label: `Excluded regions of ${lens.name}. ${HELP}`,
-    size: Math.round(upright(lens)[0] / 16),
-    least: 2,
-    most: Math.round(upright(lens)[0] / 4),
-    centre: 0,
-    slowness: 4,
-    begin: (at) => {
-      remember();
-      dab(at, at);
-      last = at;
-    },
-    to: (at) => {
-      dab(last ?? at, at);
-      last = at;
-    },
-    end: () => {
-      last = null;
-    },
-    dress: (ring) => ring.classList.toggle("erasing", erasing),
-    keys: { x: () => setErasing(!erasing), z: takeBack, Enter: save, Escape: () => done(false) },
-  });
-  const { canvas, width, height, turns, stored } = sheet;
-  const context = penOf(canvas, { willReadFrequently: true });
-  sheet.showFrame(lens.frame, "show=mask&");
 
-  function dab(from, to) {
-    context.globalCompositeOperation = erasing ? "destination-out" : "source-over";
-    context.strokeStyle = colour;
-    context.lineWidth = sheet.state.size;
-    context.lineCap = context.lineJoin = "round";
-    context.beginPath();
-    context.moveTo(from[0], from[1]);
-    context.lineTo(to[0] + 0.01, to[1]);
-    context.stroke();
+  const all = () => pen.getImageData(0, 0, painting.width, painting.height);
+  function remember() {
+    undone.value = [...undone.value, all()].slice(-UNDONE);
   }
 
-  function remember() {
-    before.push(context.getImageData(0, 0, width, height));
-    if (before.length > UNDONE) before.shift();
-    undo.disabled = false;
+  /** @param {number[]} at */
+  function dab(at) {
+    const from = last ?? at;
+    pen.globalCompositeOperation = isErasing.value ? "destination-out" : "source-over";
+    pen.strokeStyle = colour;
+    pen.lineWidth = painting.size.value;
+    pen.lineCap = pen.lineJoin = "round";
+    pen.beginPath();
+    pen.moveTo(from[0], from[1]);
+    pen.lineTo(at[0] + 0.01, at[1]);
+    pen.stroke();
+    last = at;
   }
 
   function takeBack() {
-    const picture = before.pop();
-    if (picture) context.putImageData(picture, 0, 0);
-    undo.disabled = !before.length;
+    const picture = undone.value.at(-1);
+    if (picture) pen.putImageData(picture, 0, 0);
+    undone.value = undone.value.slice(0, -1);
   }
 
-  const erase = button("Erase", () => setErasing(!erasing), "toggle small");
-  function setErasing(wanted) {
-    erasing = wanted;
-    erase.ariaPressed = String(wanted);
-    sheet.drawRing();
-  }
-  const undo = button("Undo", takeBack, "small");
-  const clear = button(
-    "Clear all",
-    () => {
-      remember();
-      context.clearRect(0, 0, width, height);
-    },
-    "quiet small",
-  );
-  const keep = button("Keep", save, "primary");
-  const leave = button("Leave", () => done(false), "quiet");
-
-  /**
-   * A picture turned clockwise by quarter turns.
-   * @returns {[HTMLCanvasElement, CanvasRenderingContext2D]}
-   */
-  function turned(source, by, size) {
-    const out = element("canvas", { width: size[0], height: size[1] });
-    const drawn = penOf(out);
-    drawn.translate(size[0] / 2, size[1] / 2);
-    drawn.rotate((by * Math.PI) / 2);
-    drawn.drawImage(source, -source.width / 2, -source.height / 2);
-    return [out, drawn];
+  function exchange() {
+    isErasing.value = !isErasing.value;
   }
 
   async function save() {
-    const [out, drawn] = turned(canvas, -turns, stored);
+    const [width, height] = painting.stored;
+    const [out, drawn] = turned(pen.canvas, -painting.turns, painting.stored);
     drawn.setTransform(1, 0, 0, 1, 0, 0);
     drawn.globalCompositeOperation = "source-in";
     drawn.fillStyle = "#fff";
-    drawn.fillRect(0, 0, stored[0], stored[1]);
-    const painted = drawn
-      .getImageData(0, 0, stored[0], stored[1])
+    drawn.fillRect(0, 0, width, height);
+    const isPainted = drawn
+      .getImageData(0, 0, width, height)
       .data.some((value, index) => index % 4 === 3 && value > 127);
-    const content = painted ? await new Promise((resolve) => out.toBlob(resolve, "image/png")) : "";
+    const content = isPainted
+      ? await new Promise((resolve) => out.toBlob(resolve, "image/png"))
+      : "";
     try {
-      await putBytes(place, content);
+      await putBytes(placeOf(setup.session, lens.name), content);
       await done(true);
     } catch (error) {
       complain(error);
     }
   }
 
-  /** Show what is excluded now. */
-  async function load() {
-    const answer = await fetch(place);
-    if (!answer.ok)
-      throw fault(
-        `The excluded regions of ${lens.name} could not be read.`,
-        "Open the brush again.",
-      );
-    const picture = await createImageBitmap(await answer.blob());
-    const [, drawn] = turned(picture, turns, [width, height]);
-    const read = drawn.getImageData(0, 0, width, height);
-    for (let k = 0; k < read.data.length; k += 4) read.data[k + 3] = read.data[k] > 127 ? 255 : 0;
-    context.putImageData(read, 0, 0);
-    context.globalCompositeOperation = "source-in";
-    context.fillStyle = colour;
-    context.fillRect(0, 0, width, height);
-  }
+  const painting = paintingOf(setup, lens, {
+    part: 16,
+    least: 2,
+    most: 4,
+    centre: 0,
+    slowness: 4,
+    begin: (at) => {
+      remember();
+      last = null;
+      dab(at);
+    },
+    to: dab,
+    end: () => {
+      last = null;
+    },
+    keys: { x: exchange, z: takeBack, Enter: save, Escape: () => done(false) },
+  });
 
-  undo.disabled = true;
-  setErasing(false);
-  const tools = element(
-    "div",
-    { className: "mask-bar" },
-    element("b", {}, lens.name),
-    sheet.sized,
-    erase,
-    undo,
-    clear,
-    spring(),
-    leave,
-    keep,
-  );
-  try {
-    if (lens.excluded) await load();
-  } catch (error) {
-    complain(error);
-    await done(false);
-    return;
-  }
-  fill(
-    setup.aside,
-    tools,
-    element("div", { className: "brush-room" }, sheet.sheet),
-    element("p", { className: "hint brush-help" }, HELP),
-  );
-  canvas.focus();
-  sheet.drawRing();
+  return {
+    painting,
+    isErasing,
+    undone,
+    takeBack,
+    exchange,
+    save,
+    clear: () => {
+      remember();
+      pen.clearRect(0, 0, painting.width, painting.height);
+    },
+    /** Begin on a canvas. @param {HTMLCanvasElement} canvas */
+    start: (canvas) => {
+      pen = penOf(canvas, { willReadFrequently: true });
+      canvas.focus();
+      if (!before) return;
+      const { turns, width, height } = painting;
+      const read = turned(before, turns, [width, height])[1].getImageData(0, 0, width, height);
+      for (let k = 0; k < read.data.length; k += 4) read.data[k + 3] = read.data[k] > 127 ? 255 : 0;
+      pen.putImageData(read, 0, 0);
+      pen.globalCompositeOperation = "source-in";
+      pen.fillStyle = colour;
+      pen.fillRect(0, 0, width, height);
+    },
+  };
+}
+
+/** Edit what is excluded of a camera. @param {Properties} properties */
+export function Brush(properties) {
+  const { lens, frame, done } = properties;
+  const [model] = useState(() => brushOf(properties));
+  const canvas = useRef(/** @type {any} */ (null));
+  useLayoutEffect(() => model.start(canvas.current), []);
+  const isErasing = model.isErasing.value;
+  return html`
+    <div class="mask-bar">
+      <b>${lens.name}</b>
+      <${Size} painting=${model.painting} />
+      <button
+        type="button"
+        class="toggle small"
+        aria-pressed=${String(isErasing)}
+        onClick=${model.exchange}
+      >
+        Erase
+      </button>
+      <${Action} kind="small" act=${model.takeBack} disabled=${!model.undone.value.length}>
+        Undo
+      </${Action}>
+      <${Action} kind="quiet small" act=${model.clear}>Clear all</${Action}>
+      <span class="spring"></span>
+      <${Action} kind="quiet" act=${() => done(false)}>Leave</${Action}>
+      <${Action} kind="primary" act=${model.save}>Keep</${Action}>
+    </div>
+    <${Sheet}
+      painting=${model.painting}
+      address=${model.painting.picture(frame, "show=mask&")}
+      label=${`Excluded regions of ${lens.name}. ${HELP}`}
+      canvas=${canvas}
+      ring=${{ class: isErasing ? "erasing" : "" }}
+    />
+    <p class="hint brush-help">${HELP}</p>
+  `;
 }

@@ -8,15 +8,7 @@ import { dotted, download } from "./elements.js";
 import { findJob, isGoing, timeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
 import { BoardForm, boardOf } from "./setup_boards.js";
-import {
-  batch,
-  html,
-  mount as render,
-  signal,
-  useEffect,
-  useRef,
-  useState,
-} from "./studio/component.js";
+import { batch, html, into, signal, useEffect, useRef, useState } from "./studio/component.js";
 import { Action, Check, Failure, Progress, Select } from "./studio/parts.js";
 import { uploadFiles } from "./uploading.js";
 
@@ -68,7 +60,7 @@ export async function load(session) {
  * @param {import("./setup.js").Setup} setup
  * @param {Awaited<ReturnType<typeof load>>} loaded
  */
-function modelOf(setup, loaded) {
+export function modelOf(setup, loaded) {
   const here = /** @type {const} */ (`${sessionPath(setup.session)}/calibration`);
   const view = signal(/** @type {View} */ (loaded.view));
   const proposal = signal(/** @type {Schemas["ProposalView"] | null} */ (null));
@@ -387,9 +379,7 @@ function Proposal(/** @type {{ model: Model, made: Schemas["ProposalView"] }} */
       </${Action}>
       <${Action}
         kind="quiet"
-        act=${() => {
-          model.proposal.value = null;
-        }}
+        act=${() => into(model.proposal)(null)}
       >
         Discard
       </${Action}>
@@ -398,7 +388,7 @@ function Proposal(/** @type {{ model: Model, made: Schemas["ProposalView"] }} */
 }
 
 /** @param {{ model: Model }} properties */
-function Panel({ model }) {
+export function Panel({ model }) {
   const tab = model.tab.value;
   const proposal = model.proposal.value;
   const rig = model.shown();
@@ -466,7 +456,7 @@ const Coverage = ({ at, lens }) => html`<figure class="picture coverage">
 </figure>`;
 
 /** The cameras as they stand and what they see. @param {{ model: Model }} properties */
-function Beside({ model }) {
+export function Beside({ model }) {
   const rig = model.shown();
   const at = model.pictures();
   const showsBoard = model.showsBoard.value;
@@ -478,9 +468,7 @@ function Beside({ model }) {
       cameras=${rig?.cameras ?? []}
       picture=${(camera) => view(camera, "height=720&axes=false")}
       send=${model.setFloor}
-      stop=${() => {
-        model.isClicking.value = false;
-      }}
+      stop=${() => into(model.isClicking)(false)}
     />`;
   if (!rig)
     return html`<div class="aside-empty">
@@ -495,12 +483,7 @@ function Beside({ model }) {
     <div class="aside-actions">
       ${
         rig.cameras.length > 1 &&
-        html`<${Action}
-          kind="small"
-          act=${() => {
-            model.isClicking.value = true;
-          }}
-        >
+        html`<${Action} kind="small" act=${() => into(model.isClicking)(true)}>
           Set the floor by clicks
         </${Action}>`
       }
@@ -520,12 +503,7 @@ function Beside({ model }) {
         isProposed &&
         lenses.length > 0 &&
         cameras.length > 0 &&
-        html`<${Action}
-          kind="small quiet"
-          act=${() => {
-            model.showsBoard.value = !showsBoard;
-          }}
-        >
+        html`<${Action} kind="small quiet" act=${() => into(model.showsBoard)(!showsBoard)}>
           ${showsBoard ? "Show the recording" : "Show the board"}
         </${Action}>`
       }
@@ -546,16 +524,4 @@ function Beside({ model }) {
       ${covered.map((lens) => html`<${Coverage} key=${lens.name} at=${at} lens=${lens} />`)}
     </div>
   </div>`;
-}
-
-/** @type {import("./setup.js").Mount<typeof load>} */
-export function mount(place, setup, loaded) {
-  const model = modelOf(setup, loaded);
-  render(place, html`<${Panel} model=${model} />`);
-  render(setup.aside, html`<${Beside} model=${model} />`);
-  return () => {
-    model.stop();
-    render(place, null);
-    render(setup.aside, null);
-  };
 }

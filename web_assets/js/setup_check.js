@@ -6,7 +6,7 @@ import { percent } from "./elements.js";
 import { followJob, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
 import { ViewWall } from "./setup_views.js";
-import { batch, html, mount as render, signal } from "./studio/component.js";
+import { batch, html, into, signal } from "./studio/component.js";
 import { Action, Failure, Progress, Table } from "./studio/parts.js";
 
 /** @import { Schemas } from "./api_types" */
@@ -32,7 +32,7 @@ const meanOf = (/** @type {(number | null)[]} */ shares) => {
  * What the step knows, and what can be done.
  * @param {import("./setup.js").Setup} setup
  */
-function modelOf(setup) {
+export function modelOf(setup) {
   const run = setup.detail.runs.find((one) => one.name === setup.step?.run) ?? setup.detail.runs[0];
   const here = runPath(setup.session, run.name);
   const answer = signal(/** @type {Answer | null} */ (null));
@@ -87,10 +87,7 @@ function modelOf(setup) {
   async function follow() {
     let ended = null;
     try {
-      const take = (/** @type {any} */ state) => {
-        job.value = state;
-      };
-      ended = await followJob(`/api/track-jobs/${job.value.identifier}`, take, () => isLeft);
+      ended = await followJob(`/api/track-jobs/${job.value.identifier}`, into(job), () => isLeft);
     } catch (error) {
       failed.value = error;
     }
@@ -204,9 +201,7 @@ const FrameButton = (/** @type {any} */ { model, frame, kind, children, ...more 
   class=${kind}
   data-frame=${frame}
   aria-current=${model.frame.value === frame ? "true" : null}
-  onClick=${() => {
-    model.frame.value = frame;
-  }}
+  onClick=${() => into(model.frame)(frame)}
   ...${more}
 >
   ${children}
@@ -381,7 +376,7 @@ function Better({ model }) {
 }
 
 /** @param {{ model: Model }} properties */
-function Panel({ model }) {
+export function Panel({ model }) {
   if (!model.answer.value) return null;
   const job = model.job.value;
   const { detail } = model.setup;
@@ -395,7 +390,7 @@ function Panel({ model }) {
 }
 
 /** The pictures of the frame that is looked at. @param {{ model: Model }} properties */
-function Wall({ model }) {
+export function Beside({ model }) {
   if (!model.answer.value) return null;
   const frame = model.frame.value;
   const check = model.answer.value.check;
@@ -421,21 +416,7 @@ function Wall({ model }) {
       max=${frames.length - 1}
       value=${frames.findLastIndex((one) => one <= frame)}
       aria-label="Checked frame"
-      onInput=${({ target }) => {
-        model.frame.value = frames[Number(target.value)];
-      }}
+      onInput=${({ target }) => into(model.frame)(frames[Number(target.value)])}
     />
   </${ViewWall}>`;
-}
-
-/** @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
-export function mount(place, setup) {
-  const model = modelOf(setup);
-  render(place, html`<${Panel} model=${model} />`);
-  render(setup.aside, html`<${Wall} model=${model} />`);
-  return () => {
-    model.stop();
-    render(place, null);
-    render(setup.aside, null);
-  };
 }

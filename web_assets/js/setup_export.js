@@ -4,43 +4,49 @@ import { fetchJson, runPath } from "./api.js";
 import { complain } from "./messages.js";
 import { ViewWall } from "./setup_views.js";
 import { set } from "./state.js";
-import { html, mount as render } from "./studio/component.js";
+import { html, into, signal } from "./studio/component.js";
 import { Exporting, startExporting } from "./studio/exporting.js";
+
+/** @import { Schemas } from "./api_types" */
+/** @typedef {ReturnType<typeof modelOf>} Model */
 
 let isStarted = false;
 
-/** @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
-export function mount(place, setup) {
+/**
+ * Which run is exported.
+ * @param {import("./setup.js").Setup} setup
+ */
+export function modelOf(setup) {
   const run = setup.detail.runs.find((one) => one.name === setup.step?.run) ?? setup.detail.runs[0];
-  const show = (words = "") =>
-    render(
-      place,
-      html`
-        <p class="hint">${words}</p>
-        <div class="panel export" id="panel-export"><${Exporting} /></div>
-      `,
-    );
-  show();
+  const checked = signal(/** @type {Schemas["CheckAnswer"] | null} */ (null));
   if (!isStarted) startExporting();
   isStarted = true;
   set({ session: setup.session, run: run.name, panel: "export" });
-  let isLeft = false;
   fetchJson(`${runPath(setup.session, run.name)}/check`)
-    .then(({ usual, note }) => {
-      if (isLeft) return;
-      show(
-        `${run.name}: track "${usual}" is exported unless you choose another. ${note} ` +
-          "Frames before the first and after the last tracked one are left out.",
-      );
-      const frame = Math.max(run.first, Math.floor((run.first + run.tracked_to) / 2));
-      const shown = { run: run.name, frame, track: usual };
-      render(setup.aside, html`<${ViewWall} setup=${setup} shown=${shown} />`);
-    })
+    .then(into(checked))
     .catch(complain);
-  return () => {
-    isLeft = true;
-    render(place, null);
-    render(setup.aside, null);
-    set({ run: null, panel: null });
-  };
+  return { setup, run, checked, stop: () => set({ run: null, panel: null }) };
+}
+
+/** @param {{ model: Model }} properties */
+export function Panel({ model: { run, checked } }) {
+  const { usual, note } = checked.value ?? {};
+  return html`
+    ${
+      usual &&
+      html`<p class="hint">
+        ${run.name}: track "${usual}" is exported unless you choose another. ${note} Frames before
+        the first and after the last tracked one are left out.
+      </p>`
+    }
+    <div class="panel export" id="panel-export"><${Exporting} /></div>
+  `;
+}
+
+/** @param {{ model: Model }} properties */
+export function Beside({ model: { setup, run, checked } }) {
+  if (!checked.value) return null;
+  const frame = Math.max(run.first, Math.floor((run.first + run.tracked_to) / 2));
+  const shown = { run: run.name, frame, track: checked.value.usual };
+  return html`<${ViewWall} setup=${setup} shown=${shown} />`;
 }

@@ -5,7 +5,7 @@ import { dotted } from "./elements.js";
 import { complain, say } from "./messages.js";
 import { AddingForm, addingOf } from "./setup_adding.js";
 import { Synchronisation, synchronyOf } from "./setup_synchrony.js";
-import { batch, html, mount as render, signal, useEffect, useState } from "./studio/component.js";
+import { batch, html, signal, useEffect, useState } from "./studio/component.js";
 import { Action, Table } from "./studio/parts.js";
 
 /** @import { Schemas } from "./api_types" */
@@ -21,7 +21,7 @@ export const load = (session) => fetchJson(`${sessionPath(session)}/footage`);
  * @param {import("./setup.js").Setup} setup
  * @param {Awaited<ReturnType<typeof load>>} loaded
  */
-function modelOf(setup, loaded) {
+export function modelOf(setup, loaded) {
   const here = sessionPath(setup.session);
   const footage = signal(loaded);
   const warnings = signal(setup.detail.warnings ?? []);
@@ -43,23 +43,34 @@ function modelOf(setup, loaded) {
     await setup.refresh();
   }
 
+  const sync = synchronyOf(setup, (offsets) => change({ offsets }));
+  const adding = addingOf(setup, !loaded.cameras.length, async (job) => {
+    for (const note of job.notes) say(note);
+    const taken = await load(setup.session);
+    batch(() => {
+      footage.value = taken;
+      warnings.value = job.warnings;
+      age.value += 1;
+    });
+    await setup.refresh();
+  });
+  const takeDropped = ({ detail }) => adding.take(detail);
+  document.addEventListener("footage", /** @type {any} */ (takeDropped));
+  if (setup.asked.dropped) adding.take(setup.asked.dropped).catch(complain);
+
   return {
     footage,
     warnings,
     age,
     here,
-    sync: synchronyOf(setup, (offsets) => change({ offsets })),
-    adding: addingOf(setup, !loaded.cameras.length, async (job) => {
-      for (const note of job.notes) say(note);
-      const taken = await load(setup.session);
-      batch(() => {
-        footage.value = taken;
-        warnings.value = job.warnings;
-        age.value += 1;
-      });
-      await setup.refresh();
-    }),
+    sync,
+    adding,
     turn: ({ name, turned }) => change({ rotations: { [name]: (turned + 90) % 360 } }),
+    stop: () => {
+      document.removeEventListener("footage", /** @type {any} */ (takeDropped));
+      sync.stop();
+      adding.stop();
+    },
   };
 }
 
@@ -84,7 +95,7 @@ const Cameras = ({ footage: { cameras, fps, frame_count: count } }) =>
   </section>`;
 
 /** @param {{ model: Model }} properties */
-const Panel = ({ model }) => html`
+export const Panel = ({ model }) => html`
   <${Cameras} footage=${model.footage.value} />
   ${model.warnings.value.map((words) => html`<p class="notice">${words}</p>`)}
   <${Synchronisation} model=${model.sync} footage=${model.footage.value} />
@@ -126,7 +137,7 @@ function CameraPicture({ model, frame, camera }) {
 }
 
 /** The pictures of a frame, which follow its slider. @param {{ model: Model }} properties */
-function Pictures({ model }) {
+export function Beside({ model }) {
   const { cameras, frame_count: count } = model.footage.value;
   const last = Math.max(0, count - 1);
   const [chosen, setChosen] = useState(0);
@@ -168,21 +179,4 @@ function Pictures({ model }) {
       )}
     </div>
   `;
-}
-
-/** @type {import("./setup.js").Mount<typeof load>} */
-export function mount(place, setup, loaded) {
-  const model = modelOf(setup, loaded);
-  render(place, html`<${Panel} model=${model} />`);
-  render(setup.aside, html`<${Pictures} model=${model} />`);
-  const takeDropped = ({ detail }) => model.adding.take(detail);
-  document.addEventListener("footage", /** @type {any} */ (takeDropped));
-  if (setup.asked.dropped) model.adding.take(setup.asked.dropped).catch(complain);
-  return () => {
-    document.removeEventListener("footage", /** @type {any} */ (takeDropped));
-    model.sync.stop();
-    model.adding.stop();
-    render(place, null);
-    render(setup.aside, null);
-  };
 }

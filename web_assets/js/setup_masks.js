@@ -3,7 +3,7 @@
 
 import { sessionPath } from "./api.js";
 import { agreementOf } from "./setup_quality.js";
-import { batch, html, signal, useEffect, useRef, useState } from "./studio/component.js";
+import { batch, html, into, signal, useEffect, useRef, useState } from "./studio/component.js";
 import { Action, Check } from "./studio/parts.js";
 
 /** @import { Schemas } from "./api_types" */
@@ -106,9 +106,7 @@ export function MaskPictures({ shown, cameras, ...more }) {
       <output>frame ${frame}</output>
       <${Check}
         checked=${shown.isBare.value}
-        take=${(checked) => {
-          shown.isBare.value = checked;
-        }}
+        take=${into(shown.isBare)}
       >
         picture alone
       </${Check}>

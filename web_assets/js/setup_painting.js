@@ -2,164 +2,165 @@
 // have in common.
 
 import { sessionPath } from "./api.js";
-import { element } from "./elements.js";
+import { html, into, signal } from "./studio/component.js";
 
 const PICTURE_HEIGHT = 1080;
+/** @type {Record<string, [number, number]>} */
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
-/** Width and height of a camera's picture, upright. @returns {[number, number]} */
-export function upright({
-  picture_width: width,
-  picture_height: height,
-  quarter_turns: turns = 0,
-}) {
-  return turns % 2 ? [height, width] : [width, height];
-}
+/** @typedef {{ name: string, picture_width: number, picture_height: number, quarter_turns?: number }} Lens */
 
 /**
- * The picture of `lens` (name, picture_width, picture_height, quarter_turns) under a canvas. Places
- * are pixels of the upright picture, whose first pixel has its middle at `-centre + 0.5`; an arrow
- * key goes a `slowness`-th of the brush. `begin(at)`, `to(at, isKey)` and `end()` paint a stroke,
- * `dress(ring)` shows on the brush what it paints, `keys` are other keys' doings.
+ * A brush on the upright picture of `lens`: where it is and how large, and what moves it. Places
+ * are pixels of that picture, whose first pixel has its middle at `-centre + 0.5`; an arrow key
+ * goes a `slowness`-th of the brush. `begin(at)`, `to(at, isKey)` and `end()` paint a stroke; the
+ * brush is at first a `part`-th of the picture wide, and between `least` and a `most`-th of it;
+ * `keys` are other keys' doings.
  * @param {import("./setup.js").Setup} setup
- * @param {{ name: string, picture_width: number, picture_height: number, quarter_turns?: number }}
- *   lens
- * @param {{ label: string, className?: string, size: number, least: number, most: number, centre:
- *   number, slowness: number, layers?: HTMLElement[], begin: (at: number[]) => void, to: (at:
- *   number[], isKey: boolean) => void, end: () => void, dress: (ring: HTMLElement) => void, keys:
- *   Record<string, (event: KeyboardEvent) => void> }} brush
+ * @param {Lens} lens
+ * @param {{ part: number, least: number, most: number, centre: number, slowness: number,
+ *   begin: (at: number[]) => void, to: (at: number[], isKey: boolean) => void, end: () => void,
+ *   keys: Record<string, () => void> }} brush
  */
-export function painting(setup, lens, brush) {
+export function paintingOf(setup, lens, brush) {
   const turns = (((lens.quarter_turns ?? 0) % 4) + 4) % 4;
   const stored = [lens.picture_width, lens.picture_height];
-  const [width, height] = upright(lens);
-  const most = [width - 2 * brush.centre, height - 2 * brush.centre];
-  const canvas = element("canvas", {
-    width,
-    height,
-    tabIndex: 0,
-    className: `brush-canvas ${brush.className ?? ""}`,
-    role: "application",
-    ariaLabel: brush.label,
-  });
-  const ring = element("div", { className: "brush-ring" });
-  const photo = element("img", {
-    alt: `Picture of ${lens.name}`,
-    className: "brush-photo",
-    draggable: false,
-  });
-  const sheet = element(
-    "div",
-    { className: "brush-sheet" },
-    photo,
-    ...(brush.layers ?? []),
-    canvas,
-    ring,
-  );
-  sheet.style.aspectRatio = `${width} / ${height}`;
-  sheet.style.setProperty("--sheet-ratio", String(width / height));
-  const size = element("input", {
-    type: "range",
-    min: brush.least,
-    max: brush.most,
-    value: brush.size,
-    ariaLabel: "Size of the brush",
-  });
-  const state = { size: brush.size, at: [width / 2, height / 2], drawing: false, holding: false };
+  const [width, height] = turns % 2 ? [stored[1], stored[0]] : stored;
+  const end = [width - 2 * brush.centre, height - 2 * brush.centre];
+  const most = Math.round(width / brush.most);
+  const size = signal(Math.max(brush.least, Math.round(width / brush.part)));
+  const at = signal([width / 2, height / 2]);
+  let isDrawing = false;
+  let isHolding = false; // the space bar
 
-  function drawRing() {
-    const scale = canvas.clientWidth / width;
-    ring.style.width = ring.style.height = `${state.size * scale}px`;
-    ring.style.left = `${state.at[0] * scale}px`;
-    ring.style.top = `${state.at[1] * scale}px`;
-    brush.dress(ring);
-  }
-  size.oninput = () => {
-    state.size = Number(size.value);
-    drawRing();
+  const resize = (/** @type {number} */ wanted) => {
+    size.value = Math.min(most, Math.max(brush.least, Math.round(wanted)));
   };
-  const resize = (wanted) => {
-    size.value = wanted;
-    size.dispatchEvent(new Event("input"));
-  };
-
-  const point = (event) => {
-    const box = canvas.getBoundingClientRect();
-    return [
-      ((event.clientX - box.left) / box.width) * width - brush.centre,
-      ((event.clientY - box.top) / box.height) * height - brush.centre,
-    ];
-  };
-  canvas.onpointerdown = (event) => {
-    if (event.button !== 0) return;
-    release();
-    canvas.setPointerCapture(event.pointerId);
-    canvas.focus();
-    state.drawing = true;
-    state.at = point(event);
-    brush.begin(state.at);
-    drawRing();
-  };
-  canvas.onpointermove = (event) => {
-    state.at = point(event);
-    if (state.drawing) brush.to(state.at, false);
-    drawRing();
-  };
-  canvas.onpointerup = canvas.onpointercancel = () => {
-    if (state.drawing) brush.end();
-    state.drawing = false;
-  };
-
   function release() {
-    if (!state.holding) return;
-    state.holding = false;
-    brush.end();
+    if (isHolding) brush.end();
+    isHolding = false;
   }
-  canvas.onkeydown = (event) => {
-    const by = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[
-      event.key
+  function lift() {
+    if (isDrawing) brush.end();
+    isDrawing = false;
+  }
+  /** @param {PointerEvent} event */
+  function follow({ clientX, clientY, currentTarget }) {
+    const box = /** @type {HTMLElement} */ (currentTarget).getBoundingClientRect();
+    at.value = [
+      ((clientX - box.left) / box.width) * width - brush.centre,
+      ((clientY - box.top) / box.height) * height - brush.centre,
     ];
-    const far = Math.max(1, (state.size * (event.shiftKey ? 4 : 1)) / brush.slowness);
-    if (by) {
-      state.at = state.at.map((value, axis) =>
-        Math.min(most[axis], Math.max(0, value + by[axis] * far)),
-      );
-      if (state.holding) brush.to(state.at, true);
-    } else if (event.key === " ") {
-      if (!event.repeat && !state.holding) {
-        state.holding = true;
-        brush.begin(state.at);
-      }
-    } else if (event.key === "[") resize(0.8 * state.size);
-    else if (event.key === "]") resize(Math.max(state.size + 1, 1.25 * state.size));
-    else if (event.key in brush.keys && (event.key !== "z" || event.ctrlKey || event.metaKey))
-      brush.keys[event.key](event);
-    else return;
-    event.preventDefault();
-    drawRing();
-  };
-  canvas.onkeyup = (event) => {
-    if (event.key === " ") release();
-  };
-  canvas.onblur = release;
-
-  /**
-   * Show a frame's picture.
-   * @param {number} frame
-   * @param {string} [show] of its address: "show=mask&"
-   */
-  function showFrame(frame, show = "") {
-    photo.src = `${sessionPath(setup.session)}/frames/${frame}/views/${encodeURIComponent(lens.name)}.jpg?${show}height=${turns % 2 ? stored[1] : Math.min(PICTURE_HEIGHT, stored[1])}`;
   }
+
+  /** Whether a key was the brush's. @param {KeyboardEvent} event */
+  function take({ key, shiftKey, ctrlKey, metaKey, repeat }) {
+    if (key in ARROWS) {
+      const far = Math.max(1, (size.value * (shiftKey ? 4 : 1)) / brush.slowness);
+      at.value = at.value.map((value, axis) =>
+        Math.min(end[axis], Math.max(0, value + ARROWS[key][axis] * far)),
+      );
+      if (isHolding) brush.to(at.value, true);
+    } else if (key === " ") {
+      if (!repeat && !isHolding) {
+        isHolding = true;
+        brush.begin(at.value);
+      }
+    } else if (key === "[") resize(0.8 * size.value);
+    else if (key === "]") resize(Math.max(size.value + 1, 1.25 * size.value));
+    else if (key in brush.keys && (key !== "z" || ctrlKey || metaKey)) brush.keys[key]();
+    else return false;
+    return true;
+  }
+
   return {
+    lens,
     turns,
     stored,
     width,
     height,
-    canvas,
-    sheet,
-    state,
-    drawRing,
-    showFrame,
-    sized: element("label", { className: "check" }, "size", size),
+    size,
+    least: brush.least,
+    most,
+    at,
+    /** The address of a frame's picture. @param {number} frame @param {string} [show] */
+    picture: (frame, show = "") =>
+      `${sessionPath(setup.session)}/frames/${frame}/views/${encodeURIComponent(lens.name)}.jpg?${show}height=${turns % 2 ? stored[1] : Math.min(PICTURE_HEIGHT, stored[1])}`,
+    /** What the canvas hears. */
+    heard: {
+      onPointerDown: (/** @type {PointerEvent} */ event) => {
+        if (event.button !== 0) return;
+        const canvas = /** @type {HTMLElement} */ (event.currentTarget);
+        release();
+        canvas.setPointerCapture(event.pointerId);
+        canvas.focus();
+        isDrawing = true;
+        follow(event);
+        brush.begin(at.value);
+      },
+      onPointerMove: (/** @type {PointerEvent} */ event) => {
+        follow(event);
+        if (isDrawing) brush.to(at.value, false);
+      },
+      onPointerUp: lift,
+      onPointerCancel: lift,
+      onKeyDown: (/** @type {KeyboardEvent} */ event) => {
+        if (take(event)) event.preventDefault();
+      },
+      onKeyUp: ({ key }) => key === " " && release(),
+      onBlur: release,
+    },
   };
+}
+
+/** @typedef {ReturnType<typeof paintingOf>} Painting */
+
+/** @param {{ painting: Painting }} properties */
+export const Size = ({ painting }) => html`<label class="check">
+  size
+  <input
+    type="range"
+    min=${painting.least}
+    max=${painting.most}
+    value=${painting.size.value}
+    aria-label="Size of the brush"
+    onInput=${({ target }) => into(painting.size)(Number(target.value))}
+  />
+</label>`;
+
+/**
+ * The picture at an address under the canvas, which `canvas` refers to; `ring`: the brush's looks,
+ * `children`: what lies between picture and canvas, `more`: the sheet's own properties.
+ * @param {{ painting: Painting, address: string, label: string, canvas: { current: any },
+ *   kind?: string, ring: Record<string, any>, isWaiting?: boolean, children?: any }} properties
+ */
+export function Sheet({ painting, address, label, canvas, kind = "", ring, isWaiting, children }) {
+  const { width, height, lens } = painting;
+  const [x, y] = painting.at.value;
+  const share = (/** @type {number} */ part, /** @type {number} */ whole) =>
+    `${(100 * part) / whole}%`;
+  const place = { left: share(x, width), top: share(y, height) };
+  return html`<div class="brush-room">
+    <div
+      class=${isWaiting ? "brush-sheet waiting" : "brush-sheet"}
+      style=${{ aspectRatio: `${width} / ${height}`, "--sheet-ratio": String(width / height) }}
+    >
+      <img alt=${`Picture of ${lens.name}`} class="brush-photo" draggable=${false} src=${address} />
+      ${children}
+      <canvas
+        ref=${canvas}
+        width=${width}
+        height=${height}
+        tabindex="0"
+        class=${`brush-canvas ${kind}`}
+        role="application"
+        aria-label=${label}
+        ...${painting.heard}
+      ></canvas>
+      <div
+        class=${`brush-ring ${ring.class ?? ""}`}
+        style=${{ ...place, width: share(painting.size.value, width), ...ring.style }}
+      ></div>
+    </div>
+  </div>`;
 }

@@ -6,7 +6,7 @@ import { percent } from "./elements.js";
 import { findJob, followJob, isGoing, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
 import { SceneFrame } from "./setup_views.js";
-import { html, mount as render, signal, useEffect, useState } from "./studio/component.js";
+import { attempting, html, into, signal, useEffect, useState } from "./studio/component.js";
 import { Action, Failure, Progress } from "./studio/parts.js";
 import { foundWords, isUnsure } from "./studio/start_pose.js";
 
@@ -26,7 +26,7 @@ const isSame = (one, other) =>
  * @param {import("./setup.js").Setup} setup
  * @param {Awaited<ReturnType<typeof load>>} loaded
  */
-function modelOf(setup, loaded) {
+export function modelOf(setup, loaded) {
   const here = sessionPath(setup.session);
   const last = Math.max(0, (setup.detail.frame_count ?? 1) - 1);
   const pose = signal(loaded);
@@ -36,6 +36,7 @@ function modelOf(setup, loaded) {
   /** What the search around the pose found. */
   const better = signal(/** @type {any} */ (null));
   const failed = signal(/** @type {any} */ (null));
+  const attempt = attempting(failed);
   const progress = signal(/** @type {Parameters<typeof Progress>[0] | null} */ (null));
   const isBusy = signal(false);
   const isEditing = signal(false);
@@ -54,16 +55,6 @@ function modelOf(setup, loaded) {
       failed.value = error;
     }
     setup.refresh().catch(complain);
-  }
-
-  /** @param {() => Promise<any>} work */
-  async function attempt(work) {
-    failed.value = null;
-    try {
-      await work();
-    } catch (error) {
-      failed.value = error;
-    }
   }
 
   /** Do something that takes a while. @param {() => Promise<any>} work */
@@ -292,16 +283,13 @@ function Verdict({ model }) {
 /** A pose of another frame than the chosen one. @param {{ model: Model }} properties */
 function OfAnotherFrame({ model }) {
   const own = model.pose.value.frame;
-  const show = () => {
-    model.frame.value = own;
-  };
   return html`
     <p class="notice">
       The start pose is of frame ${own}, where tracking begins. To begin in frame
       ${" "}${model.frame.value}, find or edit it here.
     </p>
     <div class="step-actions">
-      <${Action} kind="small" act=${show}>Show frame ${own}</${Action}>
+      <${Action} kind="small" act=${() => into(model.frame)(own)}>Show frame ${own}</${Action}>
     </div>
   `;
 }
@@ -330,7 +318,7 @@ function Mending({ model }) {
 }
 
 /** @param {{ model: Model }} properties */
-function Panel({ model }) {
+export function Panel({ model }) {
   const pose = model.pose.value;
   const Next = model.frame.value === pose.frame ? Mending : OfAnotherFrame;
   return html`
@@ -348,7 +336,7 @@ function Panel({ model }) {
 }
 
 /** The pictures of all views, or the scene while it is edited. @param {{ model: Model }} properties */
-function Beside({ model }) {
+export function Beside({ model }) {
   const frame = model.frame.value;
   const [pictured, setPictured] = useState(frame);
   useEffect(() => {
@@ -370,16 +358,4 @@ function Beside({ model }) {
       </figure>`,
     )}
   </div>`;
-}
-
-/** @type {import("./setup.js").Mount<typeof load>} */
-export function mount(place, setup, loaded) {
-  const model = modelOf(setup, loaded);
-  render(place, html`<${Panel} model=${model} />`);
-  render(setup.aside, html`<${Beside} model=${model} />`);
-  return () => {
-    model.stop();
-    render(place, null);
-    render(setup.aside, null);
-  };
 }

@@ -2,84 +2,97 @@
 // that they give there follows each stroke. Kept with the session; all frames are made of them by
 // "Set up the background".
 
-import { accepted, fetchJson, put, sessionPath } from "./api.js";
-import { button, element, fill, penOf, spring } from "./elements.js";
+import { accepted, put, sessionPath } from "./api.js";
+import { penOf } from "./elements.js";
 import { complain } from "./messages.js";
-import { painting, upright } from "./setup_painting.js";
+import { paintingOf, Sheet, Size } from "./setup_painting.js";
+import {
+  batch,
+  html,
+  into,
+  signal,
+  useLayoutEffect,
+  useRef,
+  useState,
+} from "./studio/component.js";
+import { Action } from "./studio/parts.js";
 import { windowName } from "./window.js";
 
 /** @import { Schemas } from "./api_types" */
 
 const COLOURS = { inside: "#3ddc84", outside: "#ff5a4f" };
 const HELP =
-  "Paint over the subject, and over what is not the subject: a few lines each are enough. Keys: arrows move, space paints, x changes between inside and outside, [ and ] change the size, , and . go a frame back and on, ctrl z undoes, enter keeps, escape leaves.";
+  "Paint over the subject, and over what is not the subject: a few lines each are enough. Keys: " +
+  "arrows move, space paints, x changes between inside and outside, [ and ] change the size, " +
+  ", and . go a frame back and on, ctrl z undoes, enter keeps, escape leaves.";
+const MOST_FRAMES = 8;
 
+/** @typedef {Schemas["StrokeEntry"]} Stroke */
 /**
- * Paint strokes of `lens` (name, picture_width, picture_height, quarter_turns), beginning in
- * `frame`, of `count` frames; `done(saved, frame)` when left.
- * @param {import("./setup.js").Setup} setup
+ * @typedef {{ setup: import("./setup.js").Setup, lens: import("./setup_painting.js").Lens,
+ *   frame: number, count: number, before: Stroke[],
+ *   done: (isSaved: boolean, frame: number) => any }} Properties
+ *   `frame`: to begin in, of `count`; `before`: strokes that are kept already; `done`: called when
+ *   it is left
  */
-export async function paintStrokes(setup, lens, frame, count, done) {
-  const place = `${sessionPath(setup.session)}/strokes`;
-  const own = /** @type {`${typeof place}/${string}`} */ (
-    `${place}/${encodeURIComponent(lens.name)}`
+
+/** What is painted, and what can be done. @param {Properties} properties */
+function strokesOf({ setup, lens, frame: first, count, before, done }) {
+  const own = /** @type {`/api/sessions/${string}/strokes/${string}`} */ (
+    `${sessionPath(setup.session)}/strokes/${encodeURIComponent(lens.name)}`
   );
-  const known = await fetchJson(place);
-  /** @type {Schemas["StrokeEntry"][]} */
-  let strokes = [...(known.cameras.find((one) => one.camera === lens.name)?.strokes ?? [])];
-  /** What undo brings back. @type {Schemas["StrokeEntry"][][]} */
-  const before = [];
-  /** @type {"inside" | "outside"} */
-  let kind = "inside";
+  const frame = signal(first);
+  const strokes = signal(before);
+  /** What undo brings back. */
+  const undone = signal(/** @type {Stroke[][]} */ ([]));
+  const kind = signal(/** @type {"inside" | "outside"} */ ("inside"));
+  /** The address of the mask by these strokes in this frame, "" for none. */
+  const mask = signal("");
+  const isWaiting = signal(false);
+  /** @type {CanvasRenderingContext2D} */
+  let pen;
   /** The stroke that is being painted. @type {number[][] | null} */
   let line = null;
-  let busy = false,
-    again = false,
-    gone = false,
-    shown = "";
+  let isBusy = false;
+  let isAgain = false;
+  let isLeft = false;
 
-  const mask = element("img", {
-    alt: `Mask of ${lens.name} by the strokes`,
-    className: "brush-photo strokes-mask",
-    draggable: false,
-    hidden: true,
+  const painting = paintingOf(setup, lens, {
+    part: 90,
+    least: 1,
+    most: 10,
+    centre: 0.5,
+    slowness: 2,
+    begin: (at) => {
+      line = [at];
+      draw();
+    },
+    to: (at, isKey) => {
+      if (!line) return;
+      const [x, y] = line[line.length - 1];
+      if (!isKey && Math.hypot(at[0] - x, at[1] - y) <= 0.25 * painting.size.value) return;
+      line.push(at);
+      draw();
+    },
+    end: () => {
+      if (!line) return;
+      const points = line.map(asStored).map(rounded);
+      line = null;
+      const width = painting.size.value;
+      change([...strokes.value, { frame: frame.value, kind: kind.value, width, points }]);
+    },
+    keys: {
+      x: () => {
+        kind.value = kind.value === "inside" ? "outside" : "inside";
+      },
+      ",": () => go(frame.value - 1),
+      ".": () => go(frame.value + 1),
+      z: takeBack,
+      Enter: save,
+      Escape: () => done(false, frame.value),
+    },
   });
-  const { sheet, canvas, width, height, turns, stored, state, drawRing, showFrame, sized } =
-    painting(setup, lens, {
-      label: `Strokes of ${lens.name}. ${HELP}`,
-      className: "strokes-canvas",
-      layers: [mask],
-      size: Math.max(2, Math.round(upright(lens)[0] / 90)),
-      least: 1,
-      most: Math.round(upright(lens)[0] / 10),
-      centre: 0.5,
-      slowness: 2,
-      begin: (at) => {
-        line = [at];
-        draw();
-      },
-      to: (at, isKey) => {
-        if (!line) return;
-        const [x, y] = line[line.length - 1];
-        if (isKey || Math.hypot(at[0] - x, at[1] - y) > 0.25 * state.size) {
-          line.push(at);
-          draw();
-        }
-      },
-      end: finish,
-      dress: (ring) => {
-        ring.style.borderColor = COLOURS[kind];
-      },
-      keys: {
-        x: () => setKind(kind === "inside" ? "outside" : "inside"),
-        ",": () => go(frame - 1),
-        ".": () => go(frame + 1),
-        z: takeBack,
-        Enter: save,
-        Escape: () => close(false),
-      },
-    });
-  const context = penOf(canvas);
+  const { stored, turns } = painting;
 
   // Strokes are kept in pixels of the stored picture; the canvas shows it upright.
   /** @param {number[]} point */
@@ -98,164 +111,198 @@ export async function paintStrokes(setup, lens, frame, count, done) {
       [stored[0] - 1 - x, stored[1] - 1 - y],
       [stored[0] - 1 - y, x],
     ][turns];
-  const rounded = (point) =>
+  const rounded = (/** @type {number[]} */ point) =>
     /** @type {[number, number]} */ (point.map((value) => Math.round(10 * value) / 10));
 
-  function drawLine(points, kind, size) {
-    context.strokeStyle = COLOURS[kind];
-    context.lineWidth = size;
-    context.lineCap = context.lineJoin = "round";
-    context.beginPath();
-    context.moveTo(points[0][0] + 0.5, points[0][1] + 0.5);
-    for (const [x, y] of points) context.lineTo(x + 0.51, y + 0.5);
-    context.stroke();
+  function drawLine(
+    /** @type {number[][]} */ points,
+    /** @type {"inside" | "outside"} */ kind,
+    /** @type {number} */ size,
+  ) {
+    pen.strokeStyle = COLOURS[kind];
+    pen.lineWidth = size;
+    pen.lineCap = pen.lineJoin = "round";
+    pen.beginPath();
+    pen.moveTo(points[0][0] + 0.5, points[0][1] + 0.5);
+    for (const [x, y] of points) pen.lineTo(x + 0.51, y + 0.5);
+    pen.stroke();
   }
 
   function draw() {
-    context.clearRect(0, 0, width, height);
-    for (const stroke of strokes)
-      if (stroke.frame === frame) drawLine(stroke.points.map(turned), stroke.kind, stroke.width);
-    if (line) drawLine(line, kind, state.size);
-    undo.disabled = !before.length;
-    clear.disabled = !strokes.some((stroke) => stroke.frame === frame);
-    const painted = [...new Set(strokes.map((stroke) => stroke.frame))].sort((a, b) => a - b);
-    words.textContent = painted.length
-      ? `strokes in frame${painted.length > 1 ? "s" : ""} ${painted.slice(0, 8).join(", ")}${painted.length > 8 ? ", …" : ""}`
-      : "no strokes yet";
+    pen.clearRect(0, 0, painting.width, painting.height);
+    for (const stroke of strokes.value)
+      if (stroke.frame === frame.value)
+        drawLine(stroke.points.map(turned), stroke.kind, stroke.width);
+    if (line) drawLine(line, kind.value, painting.size.value);
+  }
+
+  /** @param {string} address */
+  function showMask(address) {
+    if (mask.value) URL.revokeObjectURL(mask.value);
+    mask.value = address;
   }
 
   /** Show the mask of this frame by the strokes as they are; one request at a time. */
   async function preview() {
-    if (busy) {
-      again = true;
-      return;
-    }
-    busy = true;
-    again = false;
-    const wanted = frame;
-    sheet.classList.add("waiting");
+    isAgain = isBusy;
+    if (isBusy) return;
+    isBusy = isWaiting.value = true;
+    const wanted = frame.value;
     try {
       const answer = await accepted(
         await fetch(`${own}/preview`, {
           method: "POST",
           headers: { "content-type": "application/json", "x-studio-window": windowName },
-          body: JSON.stringify({ frame: wanted, strokes }),
+          body: JSON.stringify({ frame: wanted, strokes: strokes.value }),
         }),
       );
       const picture = answer.status === 204 ? null : await answer.blob();
-      if (gone) return;
-      if (shown) URL.revokeObjectURL(shown);
-      shown = picture && wanted === frame ? URL.createObjectURL(picture) : "";
-      mask.hidden = !shown;
-      if (shown) mask.src = shown;
+      if (isLeft) return;
+      showMask(picture && wanted === frame.value ? URL.createObjectURL(picture) : "");
     } catch (error) {
       complain(error);
     } finally {
-      busy = false;
-      sheet.classList.toggle("waiting", again);
-      if (again && !gone) preview();
+      isBusy = false;
+      isWaiting.value = isAgain;
+      if (isAgain && !isLeft) preview();
     }
   }
 
+  /** @param {number} to */
   function go(to) {
-    frame = Math.min(count - 1, Math.max(0, to));
-    slider.value = String(frame);
-    output.textContent = `frame ${frame}`;
-    showFrame(frame);
-    mask.hidden = true;
+    batch(() => {
+      frame.value = Math.min(count - 1, Math.max(0, to));
+      showMask("");
+    });
     draw();
     preview();
   }
 
+  /** @param {Stroke[]} next */
+  function set(next) {
+    strokes.value = next;
+    draw();
+    preview();
+  }
+
+  /** @param {Stroke[]} next */
   function change(next) {
-    before.push(strokes);
-    strokes = next;
-    draw();
-    preview();
-  }
-
-  function finish() {
-    if (!line) return;
-    const points = line.map(asStored).map(rounded);
-    line = null;
-    change([...strokes, { frame, kind, width: state.size, points }]);
+    undone.value = [...undone.value, strokes.value];
+    set(next);
   }
 
   function takeBack() {
-    const last = before.pop();
-    if (!last) return;
-    strokes = last;
-    draw();
-    preview();
+    const last = undone.value.at(-1);
+    undone.value = undone.value.slice(0, -1);
+    if (last) set(last);
   }
-
-  const kinds = /** @type {const} */ (["inside", "outside"]).map((one) =>
-    button(one === "inside" ? "Inside" : "Outside", () => setKind(one), "toggle small", {
-      ariaPressed: "false",
-    }),
-  );
-  function setKind(wanted) {
-    kind = wanted;
-    kinds[0].ariaPressed = String(kind === "inside");
-    kinds[1].ariaPressed = String(kind === "outside");
-    drawRing();
-  }
-  const undo = button("Undo", takeBack, "small");
-  const clear = button(
-    "Clear this frame",
-    () => change(strokes.filter((stroke) => stroke.frame !== frame)),
-    "quiet small",
-  );
-  const keep = button("Keep", save, "primary");
-  const leave = button("Leave", () => close(false), "quiet");
-  const slider = element("input", {
-    type: "range",
-    min: 0,
-    max: Math.max(0, count - 1),
-    value: frame,
-    ariaLabel: "Frame",
-    oninput: ({ target }) => go(Number(target.value)),
-  });
-  const output = element("output", {}, `frame ${frame}`);
-  const words = element("span", { className: "hint" });
 
   async function save() {
     try {
-      await put(own, { strokes });
-      close(true);
+      await put(own, { strokes: strokes.value });
+      await done(true, frame.value);
     } catch (error) {
       complain(error);
     }
   }
 
-  function close(saved) {
-    gone = true;
-    if (shown) URL.revokeObjectURL(shown);
-    done(saved, frame);
-  }
+  return {
+    painting,
+    frame,
+    strokes,
+    undone,
+    kind,
+    mask,
+    isWaiting,
+    go,
+    takeBack,
+    save,
+    clear: () => change(strokes.value.filter((stroke) => stroke.frame !== frame.value)),
+    /** Begin on a canvas; what ends it. @param {HTMLCanvasElement} canvas */
+    start: (canvas) => {
+      pen = penOf(canvas);
+      canvas.focus();
+      go(first);
+      return () => {
+        isLeft = true;
+        showMask("");
+      };
+    },
+  };
+}
 
-  setKind("inside");
-  const tools = element(
-    "div",
-    { className: "mask-bar" },
-    element("b", {}, lens.name),
-    kinds,
-    sized,
-    undo,
-    clear,
-    spring(),
-    leave,
-    keep,
-  );
-  const frames = element("div", { className: "mask-bar strokes-frames" }, slider, output, words);
-  fill(
-    setup.aside,
-    tools,
-    element("div", { className: "brush-room" }, sheet),
-    frames,
-    element("p", { className: "hint brush-help" }, HELP),
-  );
-  canvas.focus();
-  go(frame);
-  drawRing();
+/** @param {Stroke[]} strokes */
+function framesWords(strokes) {
+  const painted = [...new Set(strokes.map((stroke) => stroke.frame))].sort((a, b) => a - b);
+  if (!painted.length) return "no strokes yet";
+  const more = painted.length > MOST_FRAMES ? ", …" : "";
+  const named = painted.slice(0, MOST_FRAMES).join(", ");
+  return `strokes in frame${painted.length > 1 ? "s" : ""} ${named}${more}`;
+}
+
+/** Paint strokes of a camera. @param {Properties} properties */
+export function Strokes(properties) {
+  const { lens, count, done } = properties;
+  const [model] = useState(() => strokesOf(properties));
+  const canvas = useRef(/** @type {any} */ (null));
+  useLayoutEffect(() => model.start(canvas.current), []);
+  const [frame, kind, strokes] = [model.frame.value, model.kind.value, model.strokes.value];
+  const toggle = (/** @type {"inside" | "outside"} */ one, /** @type {string} */ words) =>
+    html`<button
+      type="button"
+      class="toggle small"
+      aria-pressed=${String(kind === one)}
+      onClick=${() => into(model.kind)(one)}
+    >
+      ${words}
+    </button>`;
+  return html`
+    <div class="mask-bar">
+      <b>${lens.name}</b>
+      ${toggle("inside", "Inside")} ${toggle("outside", "Outside")}
+      <${Size} painting=${model.painting} />
+      <${Action} kind="small" act=${model.takeBack} disabled=${!model.undone.value.length}>
+        Undo
+      </${Action}>
+      <${Action}
+        kind="quiet small"
+        act=${model.clear}
+        disabled=${!strokes.some((stroke) => stroke.frame === frame)}
+      >
+        Clear this frame
+      </${Action}>
+      <span class="spring"></span>
+      <${Action} kind="quiet" act=${() => done(false, frame)}>Leave</${Action}>
+      <${Action} kind="primary" act=${model.save}>Keep</${Action}>
+    </div>
+    <${Sheet}
+      painting=${model.painting}
+      address=${model.painting.picture(frame)}
+      label=${`Strokes of ${lens.name}. ${HELP}`}
+      canvas=${canvas}
+      kind="strokes-canvas"
+      ring=${{ style: { borderColor: COLOURS[kind] } }}
+      isWaiting=${model.isWaiting.value}
+    >
+      <img
+        alt=${`Mask of ${lens.name} by the strokes`}
+        class="brush-photo strokes-mask"
+        draggable=${false}
+        hidden=${!model.mask.value}
+        src=${model.mask.value || null}
+      />
+    </${Sheet}>
+    <div class="mask-bar strokes-frames">
+      <input
+        type="range"
+        min="0"
+        max=${Math.max(0, count - 1)}
+        value=${frame}
+        aria-label="Frame"
+        onInput=${({ target }) => model.go(Number(target.value))}
+      />
+      <output>frame ${frame}</output><span class="hint">${framesWords(strokes)}</span>
+    </div>
+    <p class="hint brush-help">${HELP}</p>
+  `;
 }

@@ -6,7 +6,7 @@ import { percent } from "./elements.js";
 import { findJob, followJob, isGoing, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
 import { Stature } from "./setup_stature.js";
-import { batch, html, mount as render, signal, useState } from "./studio/component.js";
+import { batch, html, into, signal, useState } from "./studio/component.js";
 import { Action, Failure, Progress, Select, Table } from "./studio/parts.js";
 
 /** @import { Schemas } from "./api_types" */
@@ -37,7 +37,7 @@ export const load = (session) =>
  * @param {import("./setup.js").Setup} setup
  * @param {Awaited<ReturnType<typeof load>>} loaded
  */
-function modelOf(setup, [stored, choices, known]) {
+export function modelOf(setup, [stored, choices, known]) {
   const here = sessionPath(setup.session);
   const subject = signal(stored);
   const body = signal(stored.body);
@@ -95,11 +95,9 @@ function modelOf(setup, [stored, choices, known]) {
     try {
       const begun = await begin();
       fit.value = begun;
-      const take = (/** @type {Fit} */ job) => {
-        fit.value = job;
-      };
-      const ended = await followJob(`/api/subject-fits/${begun.identifier}`, take, () => isLeft);
-      if (ended) take(ended);
+      const path = `/api/subject-fits/${begun.identifier}`;
+      const ended = await followJob(path, into(fit), () => isLeft);
+      if (ended) fit.value = ended;
     } catch (error) {
       fit.value = null;
       unfitted.value = error;
@@ -407,7 +405,7 @@ function FitPictures(/** @type {{ model: Model, fit: Fit }} */ { model, fit }) {
 }
 
 /** The body as it stands, or as it is fitted. @param {{ model: Model }} properties */
-function Beside({ model }) {
+export function Beside({ model }) {
   const [fit, subject] = [model.fit.value, model.subject.value];
   if (fit && isGoing(fit) && fit.frames.length)
     return html`
@@ -439,20 +437,8 @@ function Beside({ model }) {
   />`;
 }
 
-/** @type {import("./setup.js").Mount<typeof load>} */
-export function mount(place, setup, loaded) {
-  const model = modelOf(setup, loaded);
-  render(
-    place,
-    html`
-      <${Who} model=${model} />
-      <${Fitting} model=${model} />
-    `,
-  );
-  render(setup.aside, html`<${Beside} model=${model} />`);
-  return () => {
-    model.stop();
-    render(place, null);
-    render(setup.aside, null);
-  };
-}
+/** @param {{ model: Model }} properties */
+export const Panel = ({ model }) => html`
+  <${Who} model=${model} />
+  <${Fitting} model=${model} />
+`;

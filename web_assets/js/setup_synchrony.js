@@ -4,7 +4,7 @@
 import { accepted, post, remove, sessionPath } from "./api.js";
 import { findJob, followJob, isGoing, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
-import { html, signal, useRef } from "./studio/component.js";
+import { attempting, html, into, signal, useRef } from "./studio/component.js";
 import { Action, Failure, Progress, Table } from "./studio/parts.js";
 
 /**
@@ -17,35 +17,21 @@ export function synchronyOf(setup, use) {
   /** Its job, or what a recorder's times say. */
   const estimate = signal(/** @type {any} */ (null));
   const failed = signal(/** @type {any} */ (null));
+  const attempt = attempting(failed);
   /** Offsets that were typed and not yet applied. */
   const entered = signal(/** @type {Record<string, string>} */ ({}));
   let isLeft = false;
 
-  async function follow() {
-    try {
-      const ended = await followJob(
-        `${here}/synchrony`,
-        (job) => {
-          estimate.value = job;
-        },
-        () => isLeft,
-      );
-      if (!isLeft) estimate.value = ended;
-    } catch (error) {
-      estimate.value = null;
-      failed.value = error;
-    }
-  }
-
-  /** @param {() => Promise<void>} work */
-  async function attempt(work) {
-    failed.value = null;
-    try {
-      await work();
-    } catch (error) {
-      failed.value = error;
-    }
-  }
+  const follow = () =>
+    attempt(async () => {
+      try {
+        const ended = await followJob(`${here}/synchrony`, into(estimate), () => isLeft);
+        if (!isLeft) estimate.value = ended;
+      } catch (error) {
+        estimate.value = null;
+        throw error;
+      }
+    });
 
   // An estimate that was begun before this step was shown: how far it is, or what it found.
   findJob({ session: setup.session, kind: "synchrony" })

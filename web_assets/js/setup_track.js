@@ -8,7 +8,16 @@ import { findJob, followJob, isGoing, timeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
 import { studioPath } from "./sessions.js";
 import { ViewWall } from "./setup_views.js";
-import { html, mount as render, signal, useEffect, useRef, useState } from "./studio/component.js";
+import {
+  attempting,
+  html,
+  into,
+  signal,
+  useEffect,
+  useLayoutEffect,
+  useRef,
+  useState,
+} from "./studio/component.js";
 import { valuesOf } from "./studio/dialogs.js";
 import { Action, Failure, Progress, Select } from "./studio/parts.js";
 import { isBusy } from "./work_states.js";
@@ -31,18 +40,19 @@ export const load = (/** @type {string} */ _session) =>
 /**
  * What the step knows, and what can be done.
  * @param {import("./setup.js").Setup} setup
- * @param {any} state how the tracking process stood when the step was loaded
+ * @param {Awaited<ReturnType<typeof load>>} loaded
  */
-function modelOf(setup, state) {
+export function modelOf(setup, [choices, state]) {
   const here = sessionPath(setup.session);
   const runs = signal(setup.detail.runs);
   /** What the tracking process said last. */
-  const work = signal(/** @type {Work} */ (state));
+  const work = signal(/** @type {Work} */ ({ type: "state", ...state }));
   /** Whether it said something since. */
   let isHeard = false;
   /** What is tracked backwards. */
   const job = signal(/** @type {any} */ (null));
   const failed = signal(/** @type {any} */ (null));
+  const attempt = attempting(failed);
   const isStale = () => setup.step?.state === "stale";
   const isFormOpen = signal(!setup.detail.runs.length || isStale());
   /** What the wall shows. */
@@ -94,16 +104,6 @@ function modelOf(setup, state) {
     showNewest();
   });
 
-  /** @param {() => Promise<void>} act */
-  async function attempt(act) {
-    failed.value = null;
-    try {
-      await act();
-    } catch (error) {
-      failed.value = error;
-    }
-  }
-
   /** @param {string} run */
   const start = (run) =>
     attempt(async () => {
@@ -117,18 +117,31 @@ function modelOf(setup, state) {
   async function followBack(begun) {
     await attempt(async () => {
       job.value = await begun;
-      const take = (/** @type {any} */ state) => {
-        job.value = state;
-      };
-      await followJob(`/api/track-jobs/${job.value.identifier}`, take, () => isLeft);
+      await followJob(`/api/track-jobs/${job.value.identifier}`, into(job), () => isLeft);
     });
     job.value = null;
     if (!isLeft) await end();
   }
 
+  /** What the tracking process said before it was listened to. */
+  async function ask() {
+    const now = await fetchJson("/api/worker");
+    if (!isHeard) take({ type: "state", ...now });
+  }
+
+  /** What was begun before this step was shown goes on to be followed. */
+  async function findAgain() {
+    const which = { session: setup.session, kind: "track" };
+    const known = await findJob(which, (line) => line.verb === "correct");
+    if (!isLeft && !job.value && isGoing(known)) await followBack(known);
+  }
+
   showNewest();
+  ask().then(findAgain).catch(complain);
+
   return {
     setup,
+    choices,
     work,
     job,
     failed,
@@ -164,17 +177,6 @@ function modelOf(setup, state) {
       await loadRuns();
       await start(made.name);
       await setup.refresh();
-    },
-    /** What the tracking process said before it was listened to. */
-    ask: async () => {
-      const now = await fetchJson("/api/worker");
-      if (!isHeard) take({ type: "state", ...now });
-    },
-    /** What was begun before this step was shown goes on to be followed. */
-    findAgain: async () => {
-      const which = { session: setup.session, kind: "track" };
-      const known = await findJob(which, (line) => line.verb === "correct");
-      if (!isLeft && !job.value && isGoing(known)) await followBack(known);
     },
     stop: () => {
       isLeft = true;
@@ -299,10 +301,11 @@ function Fields({ detail, choices }) {
   `;
 }
 
-/** The form of a run, folded away where there is one. */
-function RunForm(/** @type {{ model: Model, choices: Schemas["Choices"] }} */ { model, choices }) {
+/** The form of a run, folded away where there is one. @param {{ model: Model }} properties */
+function RunForm({ model }) {
   const [isSent, setSent] = useState(false);
   const [wrong, setWrong] = useState(/** @type {any} */ (null));
+  const form = useRef(/** @type {HTMLFormElement | null} */ (null));
   const alert = useRef(/** @type {HTMLElement | null} */ (null));
   useEffect(() => alert.current?.scrollIntoView({ block: "nearest" }), [wrong]);
   const send = async (event) => {
@@ -313,16 +316,21 @@ function RunForm(/** @type {{ model: Model, choices: Schemas["Choices"] }} */ { 
     setSent(false);
   };
   const isFirst = !model.newest();
+  // "Yes, track from here": the run that waits, else a new one as the form has it.
+  useLayoutEffect(() => {
+    if (!model.setup.asked.begin || model.isTracked()) return;
+    const [run, first] = [model.newest(), model.setup.detail.start_pose_frame];
+    if (run && !run.done && run.first === first && !model.isStale()) model.start(run.name);
+    else form.current?.requestSubmit();
+  }, []);
   return html`<details
     class=${isFirst ? "alone" : ""}
     open=${isFirst || model.isFormOpen.value}
-    onToggle=${({ currentTarget }) => {
-      model.isFormOpen.value = currentTarget.open;
-    }}
+    onToggle=${({ currentTarget }) => into(model.isFormOpen)(currentTarget.open)}
   >
     <summary>Track again</summary>
-    <form class="footage-form" onSubmit=${send}>
-      <${Fields} detail=${model.setup.detail} choices=${choices} />
+    <form ref=${form} class="footage-form" onSubmit=${send}>
+      <${Fields} detail=${model.setup.detail} choices=${model.choices} />
       <div class="step-actions">
         <button type="submit" class="primary" disabled=${isSent}>
           ${isFirst ? "Track" : "Track again"}
@@ -334,38 +342,14 @@ function RunForm(/** @type {{ model: Model, choices: Schemas["Choices"] }} */ { 
 }
 
 /** @param {{ model: Model }} properties */
-const Wall = ({ model }) => html`<${ViewWall}
+export const Panel = ({ model }) => html`
+  <${Status} model=${model} />
+  <${RunForm} model=${model} />
+`;
+
+/** @param {{ model: Model }} properties */
+export const Beside = ({ model }) => html`<${ViewWall}
   setup=${model.setup}
   shown=${model.shown.value}
   words="The outlines will be drawn over the pictures as they are found."
 />`;
-
-/** @type {import("./setup.js").Mount<typeof load>} */
-export function mount(place, setup, [choices, state]) {
-  const model = modelOf(setup, state);
-  render(
-    place,
-    html`
-      <${Status} model=${model} />
-      <${RunForm} model=${model} choices=${choices} />
-    `,
-  );
-  render(setup.aside, html`<${Wall} model=${model} />`);
-  model.ask().catch(complain);
-
-  /** "Yes, track from here": the run that waits, else a new one as the form has it. */
-  function trackNow() {
-    const run = model.newest();
-    const { start_pose_frame: first } = setup.detail;
-    if (run && !run.done && run.first === first && !model.isStale()) return model.start(run.name);
-    return place.querySelector("form")?.requestSubmit();
-  }
-
-  if (setup.asked.begin && !model.isTracked()) trackNow();
-  else model.findAgain().catch(complain);
-  return () => {
-    model.stop();
-    render(place, null);
-    render(setup.aside, null);
-  };
-}

@@ -54,6 +54,29 @@ export function follow(name) {
 }
 
 /**
+ * What puts a value into a signal: for what calls back with it.
+ * @template T
+ * @param {import("@preact/signals").Signal<T>} held
+ * @returns {(value: T) => void}
+ */
+export const into = (held) => (value) => {
+  held.value = value;
+};
+
+/**
+ * What does work and leaves in a signal what went wrong, null while nothing did.
+ * @param {import("@preact/signals").Signal<any>} failed
+ */
+export const attempting = (failed) => async (/** @type {() => any} */ work) => {
+  failed.value = null;
+  try {
+    await work();
+  } catch (error) {
+    failed.value = error;
+  }
+};
+
+/**
  * Show a component in an element of the page, in place of what stands there.
  * @param {Element} place
  * @param {any} markup
