@@ -139,15 +139,6 @@ export const table = (heads, rows, className = "figures") =>
     ),
   );
 
-/** A camera's picture under its name. */
-export const picture = (image, name, ...words) =>
-  element(
-    "figure",
-    { className: "picture" },
-    image,
-    element("figcaption", {}, element("b", {}, name), ...words),
-  );
-
 // Buttons and fields.
 
 /**
