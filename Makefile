@@ -10,7 +10,7 @@ TOOLS := node_modules/.package-lock.json
 # Compiled modules are kept: every process that a test starts would compile some 500 of them anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: env as-before browser demo gallery-pictures test test-fast test-slow faults fuzz hostile races soak watching audit test-opencv-4 check check-types check-style check-pages bench growth lock guide pictures wheel-test clean
+.PHONY: env as-before browser demo gallery-pictures test test-fast test-slow faults fuzz hostile races soak watching audit test-opencv-4 check check-types check-style check-pages bench card growth lock guide pictures wheel-test clean
 
 env: $(READY)
 
@@ -118,6 +118,10 @@ $(TOOLS): package-lock.json $(READY)
 
 bench: env
 	$(BIN)/studio bench
+
+# What a graphics card does, beside what is aimed at; in words where there is none. About two minutes.
+card: env
+	$(BIN)/studio bench --only gpu
 
 # How cost grows with particles, cameras, limbs, pixels, frames, runs; makes studio/SCALE.md. About ten minutes.
 growth: env

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 from numba import cuda as _cuda
+from numba.core import config
 
 __all__ = ["cuda", "missing", "record_launches"]
 
@@ -30,6 +31,8 @@ def record_launches(launches: Callable[[], None], stream: Any) -> Callable[[], N
     launches : makes them on the stream, all of which have been made before, so that nothing is compiled or allocated.
     They are recorded, not made. What they read and write has to stay where it is as long as the call is kept.
     """
+    if config.ENABLE_CUDASIM:
+        return None
     try:
         driver: Any = importlib.import_module("cuda.bindings.driver")
     except ImportError:

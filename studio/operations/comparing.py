@@ -48,6 +48,7 @@ from studio.results.comparison.trials import Outcome
 from studio.runs.behaviour_models import needs_model
 from studio.runs.new_run import own_knobs
 from studio.search.likelihood.catalogue import WEIGHTINGS
+from studio.search.likelihood.edge_region import CPU, DEVICES
 from studio.search.trackers.catalogue import TRACKERS
 from studio.sessions.names import checked_name
 from studio.sessions.object_stores import below
@@ -81,6 +82,9 @@ class CompareRequest:
     weighting: Annotated[
         str, Field(description="The likelihood of all; default: the session's own."), OneOf(WEIGHTINGS)
     ] = ""
+    device: Annotated[
+        str, Field(description="What weighs poses, where the likelihood lets it be chosen."), OneOf(DEVICES)
+    ] = CPU
     body: Body = ""
     behaviour: Annotated[
         Model, Field(description="Behaviour model, by name or file, for trackers that need one.")
@@ -99,7 +103,9 @@ class CompareRequest:
 
     def plan(self, session: Session) -> Plan:
         """The checked plan. Raises StudioError for what cannot be compared."""
-        changes = cast("Mapping[str, Mapping[str, Value]]", self.changes or {})
+        changes = dict(cast("Mapping[str, Mapping[str, Value]]", self.changes or {}))
+        if self.device != CPU:
+            changes[""] = {"device": self.device, **changes.get("", {})}
         lineup = Lineup(tuple(self.trackers), self.weighting, self.evaluations, self.layers, changes)
         return plan_comparison(
             session,

@@ -32,6 +32,7 @@ from studio.runs.setup.subject_fitting import (
     keep_subject,
 )
 from studio.search.likelihood.catalogue import WEIGHTINGS
+from studio.search.likelihood.edge_region import CPU, DEVICES
 from studio.sessions.atomic_files import check_writable
 from studio.sessions.provenance import origin_of
 from studio.sessions.session import SUBJECT_NAME, Session
@@ -185,6 +186,9 @@ class StartPoseRequest:
     body: Body = ""
     behaviour: Annotated[Model, Field(description="Its prototypes are poses to try.")] = ""
     weighting: Annotated[str, Field(description="The likelihood."), OneOf(WEIGHTINGS)] = WEIGHTING
+    device: Annotated[
+        str, Field(description="What weighs poses, where the likelihood lets it be chosen."), OneOf(DEVICES)
+    ] = CPU
     seed: Seed = 0
     keep: Annotated[bool, Field(description="Write the pose to a file.")] = True
     replace: Annotated[
@@ -221,6 +225,7 @@ def initialise(
             body=tree,
             behaviour=request.behaviour,
             weighting=request.weighting,
+            device=request.device,
             seed=request.seed,
             progress=report,
         )

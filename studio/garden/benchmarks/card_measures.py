@@ -24,7 +24,7 @@ from studio.search.trackers.frame_loop import search_frame
 from studio.search.trackers.settings import AnnealedSettings
 from studio.search.trackers.tracker import FilterState, ParticleSet, SearchSpace
 
-LAYERS, SMALL = 10, 100
+LAYERS, SMALL, LAUNCHES = 10, 100, 10
 LOADS, WORDS, ROUNDS = 64, 1 << 20, 256
 
 
@@ -83,10 +83,10 @@ def resident_rates(
     return found
 
 
-def called_rates(problem: Any, poses: Array, sizes: Sequence[int], repeats: int) -> dict[str, int]:  # noqa: ANN401
-    """Evaluations a second of the weighting's own call: poses of the host in, log-weights of the host out."""
+def called_rates(problem: Any, poses: Array, sizes: Sequence[int], repeats: int) -> dict[str, float]:  # noqa: ANN401
+    """Million evaluations a second of the weighting's own call: poses of the host in, log-weights of the host out."""
     best = quickest({size: lambda size=size: problem.log_likelihood(poses[:size]) for size in sizes}, repeats)
-    return {str(size): round(size / best[size]) for size in sizes}
+    return {str(size): round(1e-6 * size / best[size], 3) for size in sizes}
 
 
 def agreement(there: Any, here: Any, poses: Array) -> dict[str, float]:  # noqa: ANN401
@@ -175,9 +175,10 @@ def copy_times(likelihood: EdgeRegionSilhouetteLikelihood, evidence: Any, repeat
     }
 
 
-def card_limits(repeats: int) -> dict[str, object]:
+def card_limits(samples: int, repeats: int) -> dict[str, object]:
     """The card's name, and what limits it in the same run: milliseconds of an empty launch, billion bytes loaded one by
-    one from its cache a second, billion words of 64 bits counted.
+    one from its cache a second, billion words of 64 bits counted; what these allow: million evaluations of so many
+    samples a second where none shares what it loads with a neighbour, milliseconds of a frame's launches.
     """
 
     @cuda.jit
@@ -219,4 +220,6 @@ def card_limits(repeats: int) -> dict[str, object]:
         "launch_ms": round(launch, 5),
         "loads_G_per_s": round(WORDS * LOADS / loads / 1e6, 1),
         "words_counted_G_per_s": round(WORDS * ROUNDS / counts / 1e6, 1),
+        "loads_allow_M_per_s": round(1e-3 * WORDS * LOADS / loads / samples, 1),
+        "launches_take_ms": round(LAUNCHES * LAYERS * launch, 3),
     }

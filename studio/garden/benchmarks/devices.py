@@ -52,12 +52,12 @@ def run_device_benchmark(
     on_host = here.problem(evidence)
     space = search_space(body, default_sigma(body, FRAMES_PER_SECOND))
     steps: dict[str, Callable[[], object]] = {
-        "card": lambda: measures.card_limits(repeats),
+        "card": lambda: measures.card_limits(there.edge_region.samples_per_evaluation, repeats),
         "resident": lambda: {
             str(size): measures.resident_rates(problem, poses[:size], repeats) for size in sizes
         },
-        "evaluations_per_second": lambda: measures.called_rates(problem, poses, sizes, repeats),
-        "host_evaluations_per_second": lambda: measures.called_rates(on_host, poses, sizes[:1], repeats),
+        "called": lambda: measures.called_rates(problem, poses, sizes, repeats),
+        "host": lambda: measures.called_rates(on_host, poses, sizes[:1], repeats),
         "agreement": lambda: measures.agreement(problem, on_host, poses[:COMPARED]),
         "frame_ms": lambda: {
             str(count): measures.frame_time(problem, space, body.neutral, count, repeats)

@@ -45,6 +45,12 @@ def _kernel(name: str, key: str, aim: float) -> Measure:
     return Measure(name, figure, "M/s", aim, limit=limit, scale=1e-6, of_limit=True)
 
 
+def _on_card(name: str, figure: tuple[str, ...], unit: str, aim: float, better: str = MORE) -> Measure:
+    """A row of a graphics card, beside its limit where one was measured: loads of single bytes, empty launches."""
+    limit = {"M/s": ("gpu", "card", "loads_allow_M_per_s"), "ms": ("gpu", "card", "launches_take_ms")}
+    return Measure(f"card: {name}", ("gpu", *figure), unit, aim, better, limit.get(unit, ()))
+
+
 MEASURES = (
     Measure(
         "edge + region (limit: bare row-major loads)",
@@ -77,13 +83,13 @@ MEASURES = (
         limit=("limits_per_second", "bodytrack"),
         scale=1e-6,
     ),
-    Measure(
-        "edge + region on a card, a million poses",
-        ("gpu", "evaluations_per_second", "1000000"),
-        "M/s",
-        10.0,
-        scale=1e-6,
-    ),
+    _on_card("edge + region, 100 000 poses there", ("resident", "100000", "two_M_per_s"), "M/s", 70.0),
+    _on_card("three terms, 100 000 poses there", ("resident", "100000", "three_M_per_s"), "M/s", 40.0),
+    _on_card("three terms, 100 000 poses here", ("called", "100000"), "M/s", 20.0),
+    _on_card("annealed 10 × 10 000, a frame", ("frame_ms", "10000", "frame"), "ms", 15.0, LESS),
+    _on_card("annealed 10 × 100 000, a frame", ("frame_ms", "100000", "frame"), "ms", 60.0, LESS),
+    _on_card("64 runs of 10 × 100, times one", ("many_runs", "times_one"), "×", 20.0),
+    _on_card("largest difference of a log-weight", ("agreement", "largest"), "", 1e-3, LESS),
     Measure("a whole frame, default tracker", ("frames", "default", "ms"), "ms", 25.0, LESS),
     Measure("of it refinement, one thread", ("frames", "default", "refinement_ms"), "ms", 5.0, LESS),
     Measure("a whole frame, improved filter 10 × 200", ("frames", "improved", "ms"), "ms", 16.7, LESS),

@@ -34,7 +34,8 @@ from studio.runs.setup.person_facing import NETWORK_ODDS, facing_agreement
 from studio.runs.setup.session_settings import session_settings
 from studio.search.behaviour.model_file import read_model
 from studio.search.likelihood.catalogue import WEIGHTINGS
-from studio.search.settings import DEFAULT_TRACKER, RunSettings
+from studio.search.likelihood.edge_region import CPU
+from studio.search.settings import DEFAULT_TRACKER, RunSettings, changed_settings
 from studio.search.trackers.initialisation import (
     PER_FAMILY,
     THOROUGH,
@@ -114,16 +115,21 @@ def initialise(
     body: BodyModel | None = None,
     behaviour: str = "",
     weighting: str = WEIGHTING,
+    device: str = CPU,
     seed: int = 0,
     progress: Progress = no_progress,
 ) -> InitialPose:
     """The pose of the session's body in a frame.
 
-    body : the session's own by default. behaviour : name or path of a model whose prototypes are candidates. Raises
-    RunError where the frame shows no body, NotFoundError for an unknown frame.
+    body : the session's own by default. device : what weighs poses, where the weighting has that knob. behaviour : name
+    or path of a model whose prototypes are candidates.
+
+    Raises RunError where the frame shows no body, NotFoundError for an unknown frame.
     """
     tree = body or session.body()
     settings = session_settings(session, DEFAULT_TRACKER, weighting)
+    if device != CPU:
+        settings = changed_settings(settings, {"device": device})
     prototypes = None
     if behaviour:
         model = read_model(model_path(model_folders(session), behaviour))

@@ -1,12 +1,12 @@
 # pyright: standard
 """Kernels that weigh poses on a CUDA device: frames of the limbs, then edges, region and areas in one launch.
 
-`frames_kernel` gives a thread to each pose. `terms_kernel` makes the kernel that gives a block of threads to each pose in
-each view: it projects the limbs' outlines, samples edges and region (Eq. 14 and 15 of Deutscher & Reid 2005), and
-finds the area of the limbs' union and of what it shares with the silhouette (Fleischmann et al. 2012, section 2.2). The
-union is drawn into words that the block shares, limb by limb and a thread for each row, and no further than the body
-reaches: no two threads set bits of one word at once. What does not fit these words is drawn and counted in bands, so
-pictures and bodies may have any size.
+`frames_kernel` gives a thread to each pose. `terms_kernel` makes the kernel that gives a block of threads to each pose
+in each view: it projects the limbs' outlines, samples edges and region (Eq. 14 and 15 of Deutscher & Reid 2005), and
+finds the area of the limbs' union and of what it shares with the silhouette (Fleischmann et al. 2012, section 2.2).
+The union is drawn into words that the block shares, limb by limb and a thread for each row, and no further than the
+body reaches: no two threads set bits of one word at once. What does not fit these words is drawn and counted in bands,
+so pictures and bodies may have any size.
 `weigh_poses` adds up Eq. 16 and 17 with the third term.
 
 Outlines, lines, hidden samples and pixels come from the scalar helpers of `outline_kernels`, `edge_region_kernels` and
@@ -219,7 +219,7 @@ def terms_kernel(limbs: int, edge_chunks: int, region_chunks: int, areas: bool, 
             )  # fmt: skip
             start, axis, across = limb_axes(frame, shape, view)
             along, radius = ZERO, shape[1]
-            if corner == ONE_ON or corner == TWO_ON:
+            if corner in (ONE_ON, TWO_ON):
                 along, radius = ONE, shape[2]
             u, v, state = projected(view, start, axis, across, along, -radius if corner < TWO_ON else radius)
             corners[at, 0], corners[at, 1], corners[at, 2] = u, v, state

@@ -209,15 +209,16 @@ class WeighingDevice:
 
     def sum_maps(
         self,
-        poses: Any,
+        poses: Any,  # noqa: ANN401
         frame: FrameOnDevice,
-        edges: Any,
+        edges: Any,  # noqa: ANN401
         every: int,
-        stream: Any,
+        stream: Any,  # noqa: ANN401
         memory: Memory,
     ) -> Any:  # noqa: ANN401
-        """(N, V, 6) sums, there, of poses (D, N) there, `every` of them for each of the frame's problems. memory : gives
-        arrays to work in.
+        """(N, V, 6) sums, there, of poses (D, N) there, `every` of them for each of the frame's problems.
+
+        memory : gives arrays to work in.
         """
         count = poses.shape[1]
         frames = memory("frames", (count, self._joints * FRAME), np.float32)

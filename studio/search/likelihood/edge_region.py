@@ -62,6 +62,7 @@ IntArray = NDArray[np.int64]
 Words = NDArray[np.uint32]
 
 CPU, AUTO, GPU = "cpu", "auto", "gpu"
+DEVICES = CPU, AUTO, GPU
 DEVICE_MODULE = "studio.search.likelihood.device_weighing"
 NO_DEVICE_HINT = (
     "It needs an NVIDIA card, its driver and the extra `gpu` (pip install 'capture-studio[gpu]'), which `studio doctor`"
@@ -106,7 +107,7 @@ class EdgeRegionSettings:
 
     device: str = next_frame_knob(
         CPU,
-        choices=(CPU, AUTO, GPU),
+        choices=DEVICES,
         help="What weighs poses: the processor, or an NVIDIA card with CUDA (extra `gpu`), which agrees but for a"
         " sample in thousands; auto takes a card where there is one.",
     )

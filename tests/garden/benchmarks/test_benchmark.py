@@ -125,11 +125,20 @@ def test_without_a_card_the_bench_says_so(monkeypatch):
     assert rows_of({"gpu": found}) == []
 
 
-def test_a_cards_evaluations_are_of_every_size(monkeypatch):
-    """The processor in the card's place."""
+def test_a_cards_figures_are_rows_beside_their_limits(monkeypatch):
+    """The processor in the card's place, and what only a card has left out."""
+    measures = importlib.import_module("studio.garden.benchmarks.card_measures")
+    limits = {"loads_allow_M_per_s": 60.0, "launches_take_ms": 2.0}
+    alone = {"card_limits": limits, "resident_rates": {"three_M_per_s": 41.0}, "frame_time": {"frame": 70.0}}
+    for name in ("card_limits", "resident_rates", "frame_time", "many_runs", "copy_times"):
+        monkeypatch.setattr(measures, name, lambda *_, name=name: alone.get(name, {}))
     monkeypatch.setattr("studio.garden.benchmarks.devices.GPU", "cpu")
-    found = json.loads(json.dumps(run_device_benchmark(sizes=(16, 20), repeats=1)))
-    assert list(found["evaluations_per_second"]) == ["16", "20"]
-    assert found["largest_difference"] == 0.0
-    row = rows_of({"gpu": {"evaluations_per_second": {"1000000": 12e6}}})[0]
-    assert (row["value"], row["reached"]) == (12.0, 1.0)
+    found = json.loads(json.dumps(run_device_benchmark((16, 100_000), particles=(10_000,), repeats=1)))
+    assert list(found["called"]) == list(found["resident"]) == ["16", "100000"]
+    assert found["agreement"]["largest"] == found["agreement"]["again"] == 0.0
+    rows = {row["name"]: row for row in rows_of({"gpu": found})}
+    three = rows["card: three terms, 100 000 poses there"]
+    assert (three["value"], three["limit"], three["reached"]) == (41.0, 60.0, 1.0)
+    assert rows["card: annealed 10 × 10 000, a frame"]["reached"] == pytest.approx(15.0 / 70.0, abs=1e-3)
+    assert rows["card: largest difference of a log-weight"]["reached"] == 1.0
+    assert rows["card: three terms, 100 000 poses here"]["value"] > 0.0
