@@ -103,27 +103,12 @@ def taken_port(patch: pytest.MonkeyPatch, folder: Path) -> None:
     OPEN.append(taken)
 
 
-def a_card(patch: pytest.MonkeyPatch, add: Callable[..., object]) -> None:
-    """A card whose memory works; `add` stands for the kernel that adds up the samples."""
-
-    class Kernel:
-        def __init__(self, launched: Callable[..., object]) -> None:
-            self.launched = launched
-
-        def __getitem__(self, grid: object) -> Callable[..., object]:
-            return self.launched
-
-    class There(np.ndarray):
-        def copy_to_host(self) -> np.ndarray:
-            return np.asarray(self)
-
+def a_card(patch: pytest.MonkeyPatch, weights: Callable[..., object]) -> None:
+    """A card whose memory works; `weights` stands for what weighs poses on it."""
     device = importlib.import_module(DEVICE_MODULE)
-    memory = types.SimpleNamespace(
-        to_device=lambda values: values, device_array=lambda shape, kind: np.zeros(shape, kind).view(There)
-    )
     patch.setattr(device, "missing", lambda: "")
-    patch.setattr(device, "cuda", memory)
-    patch.setattr(device, "kernels", lambda: (Kernel(lambda *_: None), Kernel(add)))
+    there = types.SimpleNamespace(frame=lambda *_: object(), weights=weights)
+    patch.setattr(device, "WeighingDevice", lambda *_: there)
 
 
 def failing_card(patch: pytest.MonkeyPatch, folder: Path) -> None:
@@ -136,8 +121,8 @@ def failing_card(patch: pytest.MonkeyPatch, folder: Path) -> None:
 
 
 def forgetful_card(patch: pytest.MonkeyPatch, folder: Path) -> None:
-    """Its sums are all zero."""
-    a_card(patch, lambda *_: None)
+    """All that it weighs is nothing."""
+    a_card(patch, lambda poses, *_: (np.zeros(len(poses)), np.zeros(len(poses))))
 
 
 def broken_search(patch: pytest.MonkeyPatch, folder: Path) -> None:
@@ -186,22 +171,19 @@ def test_each_planted_fault_is_named(
 
 
 def test_a_card_that_agrees_with_the_processor_is_good(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Sums are whole numbers: 255 times the samples of the limbs times what the terms' means are."""
+    """The processor in the card's place: it weighs with another likelihood of the same frame."""
+    known = EdgeRegionFrameLikelihood.device_weights
 
-    def add(frames: np.ndarray, limbs: np.ndarray, *rest: np.ndarray) -> None:
-        samples = np.array([2 * rest[-3], 3 * rest[-2]])
-        rest[-1][:] = np.round(255 * samples * len(limbs) * expected)
-
-    a_card(monkeypatch, add)
-    expected, known = np.zeros(0), EdgeRegionFrameLikelihood.terms_there
-
-    def remembered(self: EdgeRegionFrameLikelihood, poses: np.ndarray, *limbs: np.ndarray) -> object:
-        nonlocal expected
+    def weighed(self: EdgeRegionFrameLikelihood, poses: np.ndarray, *rest: object) -> object:
+        given = known(self, poses, *rest)
+        if given is None:
+            return None
         outlines = self.likelihood.projector.blocks(poses)
-        expected = np.stack(self.terms_of(outlines, self.hidden(outlines), len(poses)), axis=2)
-        return known(self, poses, *limbs)
+        weights = self._evaluated(outlines, self.hidden(outlines), len(poses))[1]
+        return weights, weights
 
-    monkeypatch.setattr(EdgeRegionFrameLikelihood, "terms_there", remembered)
+    a_card(monkeypatch, lambda *_: ())
+    monkeypatch.setattr(EdgeRegionFrameLikelihood, "device_weights", weighed)
     assert examination._card() == "its kernels compile, run and agree with the processor"
 
 
