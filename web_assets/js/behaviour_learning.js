@@ -8,7 +8,6 @@ import {
   element,
   failure,
   field,
-  files,
   fill,
   hint,
   lead,
@@ -106,7 +105,8 @@ function read(form, knobs) {
  */
 export function showLearningForm(content, { choices, sessions, started }) {
   const wrong = optional();
-  const motions = files({ name: "files", multiple: true, accept: choices.endings.join(",") });
+  const accept = choices.endings.join(",");
+  const motions = element("input", { type: "file", name: "files", multiple: true, accept });
   const submit = element("button", { className: "primary" }, "Learn");
   const name = element("input", { name: "name", ...NAME });
   const form = element(

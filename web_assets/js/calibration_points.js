@@ -1,7 +1,7 @@
 // The same points of the floor clicked in two views or more.
 
 import { html, useState } from "./studio/component.js";
-import { Action, Failure } from "./studio/parts.js";
+import { Action, Failure, Toggle } from "./studio/parts.js";
 
 const FEWEST = 3;
 const MOST = 32;
@@ -84,15 +84,9 @@ export function FloorClicks({ cameras, picture, send, stop }) {
     <div class="point-list">
       ${points.map((point, at) => {
         const seen = viewsOf(point);
-        return html`<button
-          key=${at}
-          type="button"
-          class="toggle small"
-          aria-pressed=${String(at === chosen)}
-          onClick=${() => setChosen(at)}
-        >
+        return html`<${Toggle} key=${at} isOn=${at === chosen} act=${() => setChosen(at)}>
           ${at + 1} · ${seen > 1 ? `${seen} views` : seen ? "one view" : "new"}
-        </button>`;
+        </${Toggle}>`;
       })}
     </div>
     <${Failure} error=${wrong} />

@@ -218,12 +218,6 @@ export function download(name, content) {
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
-/** Files to be uploaded; `folder`: a whole one. @param {Properties} [properties] */
-export function files({ folder = false, ...properties } = {}) {
-  const made = element("input", { type: "file", ...properties });
-  made.toggleAttribute("webkitdirectory", folder);
-  return made;
-}
 /** What a session, a run or a track may be called. */
 export const NAME = {
   required: true,

@@ -202,10 +202,12 @@ export const AddingForm = ({ model, isFirst }) => html`<details
         Trial
         <input type="text" name="trial" placeholder="the only one" />
       </label>
-      <label title="A frame of each field, twice as many.">
-        Split interlaced videos
-        <${Select} name="fields" options=${FIELDS} />
-      </label>
+      <${Select}
+        label="Split interlaced videos"
+        title="A frame of each field, twice as many."
+        name="fields"
+        options=${FIELDS}
+      />
     </div>
     <${Box}
       name="by_time"

@@ -6,13 +6,14 @@ import { dotted, percent } from "./elements.js";
 import { isGoing, timeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
 import { attempting, html, signal } from "./studio/component.js";
-import { Action, Failure, Progress } from "./studio/parts.js";
+import { Action, Failure, Progress, Table } from "./studio/parts.js";
 
 /** @import { Schemas } from "./api_types" */
 /** @typedef {NonNullable<Schemas["AlignmentAnswer"]["job"]>} Job */
 
 const WHY =
-  "A tripod that was touched after the calibration turns a camera by a degree, or twenty pixels. Silhouettes show it, without a board.";
+  "A tripod that was touched after the calibration turns a camera by a degree, or twenty pixels. " +
+  "Silhouettes show it, without a board.";
 const pixels = (/** @type {number | null} */ value) =>
   value === null ? "–" : `${value.toFixed(1)} px`;
 const degrees = (/** @type {number | null} */ value) =>
@@ -87,27 +88,18 @@ function standingOf(job) {
 }
 
 /** @param {{ job: Job }} properties */
-const MissTable = ({ job }) => html`<table class="figures">
-    <thead>
-      <tr>
-        <th>camera</th>
-        <th>misses by</th>
-        <th>turned by</th>
-        <th>${job.kept ? "misses now by" : "would miss by"}</th>
-      </tr>
-    </thead>
-    <tbody>
-      ${job.cameras.map(
-        (line) => html`<tr key=${line.camera}>
-          <td>${line.camera}</td>
-          <td>${pixels(line.before_px)}</td>
-          <td>${degrees(line.turn_degrees)}</td>
-          <td>${pixels(line.after_px)}</td>
-        </tr>`,
-      )}
-    </tbody>
-  </table>
-  <p class=${job.needed && !job.kept ? "notice" : "hint"}>${verdictOf(job)}</p>`;
+const MissTable = ({ job }) => html`
+  <${Table}
+    heads=${["camera", "misses by", "turned by", job.kept ? "misses now by" : "would miss by"]}
+    rows=${job.cameras.map((line) => [
+      line.camera,
+      pixels(line.before_px),
+      degrees(line.turn_degrees),
+      pixels(line.after_px),
+    ])}
+  />
+  <p class=${job.needed && !job.kept ? "notice" : "hint"}>${verdictOf(job)}</p>
+`;
 
 /** The box. @param {{ model: ReturnType<typeof alignmentOf> }} properties */
 export function AlignmentBox({ model }) {

@@ -10,7 +10,7 @@ import { MaskPictures, shownMasks } from "./setup_masks.js";
 import { QualityList, SourceTable } from "./setup_quality.js";
 import { Strokes } from "./setup_strokes.js";
 import { attempting, batch, html, into, signal, useRef, useState } from "./studio/component.js";
-import { Action, Check, Failure, Progress } from "./studio/parts.js";
+import { Action, Check, Failure, Progress, Select } from "./studio/parts.js";
 import { uploadFiles } from "./uploading.js";
 
 /** @import { Schemas } from "./api_types" */
@@ -585,12 +585,12 @@ function KnobRow({ model, knob }) {
         onInput=${({ target }) => take(Number(target.value))}
       />`
     : knob.choices.length
-      ? html`<select aria-label=${knob.label} onChange=${({ target }) => take(target.value)}>
-          ${knob.choices.map(
-            (one) =>
-              html`<option key=${one} value=${one} selected=${one === value}>${one}</option>`,
-          )}
-        </select>`
+      ? html`<${Select}
+          aria-label=${knob.label}
+          options=${knob.choices}
+          value=${value}
+          take=${take}
+        />`
       : html`<input
           type="checkbox"
           aria-label=${knob.label}

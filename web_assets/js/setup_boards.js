@@ -5,17 +5,18 @@ import { fault, fetchJson, sessionPath } from "./api.js";
 import { html, signal, useState } from "./studio/component.js";
 import { Action, Check, Select } from "./studio/parts.js";
 
+/** Names with their words. @type {[string, string][]} */
 const DICTIONARIES = [
   ...[4, 5, 6, 7].flatMap((bits) =>
-    [50, 100, 250, 1000].map((count) => `DICT_${bits}X${bits}_${count}`),
+    [50, 100, 250, 1000].map((count) => `${bits}X${bits}_${count}`),
   ),
-  "DICT_ARUCO_ORIGINAL",
-  "DICT_ARUCO_MIP_36H12",
-  "DICT_APRILTAG_16H5",
-  "DICT_APRILTAG_25H9",
-  "DICT_APRILTAG_36H10",
-  "DICT_APRILTAG_36H11",
-];
+  "ARUCO_ORIGINAL",
+  "ARUCO_MIP_36H12",
+  "APRILTAG_16H5",
+  "APRILTAG_25H9",
+  "APRILTAG_36H10",
+  "APRILTAG_36H11",
+].map((name) => [`DICT_${name}`, name.replaceAll("_", " ").toLowerCase()]);
 /** @type {[string, string][]} */
 const KINDS = [
   ["charuco", "ChArUco"],
@@ -131,10 +132,14 @@ export function boardOf(session) {
 
 /** @typedef {ReturnType<typeof boardOf>} Model */
 
-/** A field of text, or a number of 0 or more. */
-const Entry = (/** @type {any} */ { model, name, label, title, ...more }) => html`<label
-  title=${title}
->
+/**
+ * A field under its label, of text unless said.
+ * @param {Model} model
+ * @param {string} name
+ * @param {string} label
+ * @param {Record<string, any>} more properties of its input; `title`
+ */
+const entry = (model, name, label, { title, ...more }) => html`<label title=${title}>
   ${label}
   <input
     type="text"
@@ -147,12 +152,17 @@ const NUMBER = { type: "number", step: "any", min: 0 };
 const COUNT = { type: "number", step: 1 };
 
 /** A box to be checked. */
-const Box = (/** @type {any} */ { model, name, title, children }) => html`<${Check}
+const box = (
+  /** @type {Model} */ model,
+  /** @type {string} */ name,
+  /** @type {string} */ words,
+  /** @type {string} */ title,
+) => html`<${Check}
   checked=${model.entered.value[name]}
   take=${(checked) => model.enter({ [name]: checked })}
   title=${title}
 >
-  ${children}
+  ${words}
 </${Check}>`;
 
 /** What describes a board. @param {{ model: Model }} properties */
@@ -161,51 +171,39 @@ function Board({ model }) {
   const isChessboard = kind === "chessboard";
   return html`
     <div class="step-row board-sizes">
-      <label>
-        Board
-        <${Select} options=${KINDS} value=${kind} take=${(kind) => model.enter({ kind })} />
-      </label>
-      <${Entry} model=${model} name="columns" label="Columns" ...${COUNT} min="2" />
-      <${Entry} model=${model} name="rows" label="Rows" ...${COUNT} min="2" />
-      <${Entry}
-        model=${model}
-        name="square"
-        label="Square mm"
-        title="As measured on the print"
-        ...${NUMBER}
+      <${Select}
+        label="Board"
+        options=${KINDS}
+        value=${kind}
+        take=${(kind) => model.enter({ kind })}
       />
+      ${entry(model, "columns", "Columns", { ...COUNT, min: 2 })}
+      ${entry(model, "rows", "Rows", { ...COUNT, min: 2 })}
+      ${entry(model, "square", "Square mm", { ...NUMBER, title: "As measured on the print" })}
       ${
         !isChessboard &&
-        html`<${Entry}
-          model=${model}
-          name="marker"
-          label="Marker mm"
-          title="Side of a marker as measured on the print"
-          ...${NUMBER}
-        />`
+        entry(model, "marker", "Marker mm", {
+          ...NUMBER,
+          title: "Side of a marker as measured on the print",
+        })
       }
     </div>
     ${
       !isChessboard &&
       html`<div class="step-row">
-        <label title="The dictionary of the markers">
-          Markers
-          <${Select}
-            options=${DICTIONARIES.map((name) => [
-              name,
-              name.replace("DICT_", "").replaceAll("_", " ").toLowerCase(),
-            ])}
-            value=${dictionary}
-            take=${(dictionary) => model.enter({ dictionary })}
-          />
-        </label>
-        <${Box}
-          model=${model}
-          name="legacy"
-          title="Boards drawn by OpenCV before 4.6 with an even number of rows"
-        >
-          old pattern
-        </${Box}>
+        <${Select}
+          label="Markers"
+          title="The dictionary of the markers"
+          options=${DICTIONARIES}
+          value=${dictionary}
+          take=${(dictionary) => model.enter({ dictionary })}
+        />
+        ${box(
+          model,
+          "legacy",
+          "old pattern",
+          "Boards drawn by OpenCV before 4.6 with an even number of rows",
+        )}
       </div>`
     }
     <span class="hint">Columns and rows count ${isChessboard ? "inner corners" : "squares"}.</span>
@@ -221,8 +219,8 @@ function PrintRow() {
       Print at 100 %, measure the bar and the squares, glue it on a flat, stiff plate.
     </p>
     <div class="step-row">
-      <label>Board<${Select} options=${KINDS} value=${kind} take=${setKind} /></label>
-      <label>Paper<${Select} options=${PAGES} value=${page} take=${setPage} /></label>
+      <${Select} label="Board" options=${KINDS} value=${kind} take=${setKind} />
+      <${Select} label="Paper" options=${PAGES} value=${page} take=${setPage} />
     </div>
     <div class="step-actions">
       <a class="link-button" href=${`/api/calibration-boards.pdf?kind=${kind}&page=${page}`}>
@@ -240,19 +238,15 @@ function Distances(/** @type {{ model: Model, cameras: string[] }} */ { model, c
     ${distances.map((each, at) => {
       const change = (/** @type {Partial<typeof each>} */ changes) =>
         set(distances.with(at, { ...each, ...changes }));
+      const pick = (/** @type {"first" | "second"} */ key, /** @type {string} */ label) =>
+        html`<${Select}
+          aria-label=${label}
+          options=${cameras}
+          value=${each[key]}
+          take=${(name) => change({ [key]: name })}
+        />`;
       return html`<div key=${at} class="distance">
-        <${Select}
-          aria-label="First camera"
-          options=${cameras}
-          value=${each.first}
-          take=${(first) => change({ first })}
-        />
-        <${Select}
-          aria-label="Second camera"
-          options=${cameras}
-          value=${each.second}
-          take=${(second) => change({ second })}
-        />
+        ${pick("first", "First camera")} ${pick("second", "Second camera")}
         <input
           ...${NUMBER}
           placeholder="mm"
@@ -312,46 +306,40 @@ const More = (
 >
   <summary>More</summary>
   <div class="more-fields">
-    <${Entry}
-      model=${model}
-      name="intrinsics"
-      label="Lenses from"
-      title="Board footage for the lenses, a video or folder of pictures for each camera; or a calibration file that has them. Instead of intrinsics/"
-      placeholder="a folder, or a calibration file"
-    />
-    <${Entry}
-      model=${model}
-      name="extrinsics"
-      label="Positions from"
-      title="Synchronised board footage of all cameras at once. Instead of extrinsics/"
-      placeholder="a folder"
-    />
-    <${Entry}
-      model=${model}
-      name="floorFolder"
-      label="Floor from pictures in"
-      title="A picture a camera of the board that lies on the floor, face up; instead of a frame of the common footage"
-      placeholder="a folder"
-    />
+    ${entry(model, "intrinsics", "Lenses from", {
+      title:
+        "Board footage for the lenses, a video or folder of pictures for each camera; " +
+        "or a calibration file that has them. Instead of intrinsics/",
+      placeholder: "a folder, or a calibration file",
+    })}
+    ${entry(model, "extrinsics", "Positions from", {
+      title: "Synchronised board footage of all cameras at once. Instead of extrinsics/",
+      placeholder: "a folder",
+    })}
+    ${entry(model, "floorFolder", "Floor from pictures in", {
+      title:
+        "A picture a camera of the board that lies on the floor, face up; " +
+        "instead of a frame of the common footage",
+      placeholder: "a folder",
+    })}
     ${
       cameras.length > 1 &&
       html`<${Distances} model=${model} cameras=${cameras} />
-        <${Box}
-          model=${model}
-          name="own"
-          title="Only where the board and the motion are one recording"
-        >
-          The board was recorded without stopping: use the session's offsets
-        </${Box}>
+        ${box(
+          model,
+          "own",
+          "The board was recorded without stopping: use the session's offsets",
+          "Only where the board and the motion are one recording",
+        )}
         ${!model.entered.value.own && html`<${Shifts} model=${model} cameras=${cameras} />`}`
     }
-    <${Box}
-      model=${model}
-      name="refine"
-      title="Let the final adjustment of all cameras change the lenses a little; only with a board that was seen all over the pictures"
-    >
-      let the lenses move a little in the last adjustment
-    </${Box}>
+    ${box(
+      model,
+      "refine",
+      "let the lenses move a little in the last adjustment",
+      "Let the final adjustment of all cameras change the lenses a little; " +
+        "only with a board that was seen all over the pictures",
+    )}
   </div>
 </details>`;
 
@@ -376,29 +364,22 @@ export const BoardForm = ({ model, cameras, hasFootage, isChief, solve }) => htm
       onChange=${({ target }) => model.enter({ files: target.files })}
     />
   </label>
-  <${Entry}
-    model=${model}
-    name="path"
-    label="or on this computer"
-    placeholder=${hasFootage ? "found in the session" : "full path of the folder"}
-  />
+  ${entry(model, "path", "or on this computer", {
+    placeholder: hasFootage ? "found in the session" : "full path of the folder",
+  })}
   <div class="step-row">
-    <${Entry}
-      model=${model}
-      name="floor"
-      label="Board on the floor in frame"
-      title="Frame of the common footage in which the board lies on the floor, face up; the floor can be clicked later instead"
-      placeholder="not set"
-      ...${COUNT}
-      min="0"
-    />
-    <${Entry}
-      model=${model}
-      name="thickness"
-      label="Plate thickness mm"
-      title="Of the plate that carries the board; matters where it lies on the floor"
-      ...${NUMBER}
-    />
+    ${entry(model, "floor", "Board on the floor in frame", {
+      ...COUNT,
+      min: 0,
+      title:
+        "Frame of the common footage in which the board lies on the floor, face up; " +
+        "the floor can be clicked later instead",
+      placeholder: "not set",
+    })}
+    ${entry(model, "thickness", "Plate thickness mm", {
+      ...NUMBER,
+      title: "Of the plate that carries the board; matters where it lies on the floor",
+    })}
   </div>
   <${More} model=${model} cameras=${cameras} />
   <div class="step-actions">

@@ -4,9 +4,9 @@
 import { fault, putBytes, sessionPath } from "./api.js";
 import { element, penOf } from "./elements.js";
 import { complain } from "./messages.js";
-import { paintingOf, Sheet, Size } from "./setup_painting.js";
+import { drawLine, paintingOf, Sheet, Size } from "./setup_painting.js";
 import { html, signal, useLayoutEffect, useRef, useState } from "./studio/component.js";
-import { Action } from "./studio/parts.js";
+import { Action, Toggle } from "./studio/parts.js";
 
 const UNDONE = 30;
 const HELP =
@@ -70,15 +70,8 @@ function brushOf({ setup, lens, before, done }) {
 
   /** @param {number[]} at */
   function dab(at) {
-    const from = last ?? at;
     pen.globalCompositeOperation = isErasing.value ? "destination-out" : "source-over";
-    pen.strokeStyle = colour;
-    pen.lineWidth = painting.size.value;
-    pen.lineCap = pen.lineJoin = "round";
-    pen.beginPath();
-    pen.moveTo(from[0], from[1]);
-    pen.lineTo(at[0] + 0.01, at[1]);
-    pen.stroke();
+    drawLine(pen, [last ?? at, at], colour, painting.size.value);
     last = at;
   }
 
@@ -169,14 +162,7 @@ export function Brush(properties) {
     <div class="mask-bar">
       <b>${lens.name}</b>
       <${Size} painting=${model.painting} />
-      <button
-        type="button"
-        class="toggle small"
-        aria-pressed=${String(isErasing)}
-        onClick=${model.exchange}
-      >
-        Erase
-      </button>
+      <${Toggle} isOn=${isErasing} act=${model.exchange}>Erase</${Toggle}>
       <${Action} kind="small" act=${model.takeBack} disabled=${!model.undone.value.length}>
         Undo
       </${Action}>

@@ -259,24 +259,20 @@ function FileForm({ model }) {
       />
     </label>
     <div class="step-row">
-      <label>
-        Unit
-        <${Select}
-          title="Lengths in the file"
-          options=${UNITS}
-          value=${unit}
-          take=${(unit) => correct({ unit })}
-        />
-      </label>
-      <label>
-        Points up
-        <${Select}
-          title="The axis of the file's world that points up"
-          options=${AXES}
-          value=${up}
-          take=${(up) => correct({ up })}
-        />
-      </label>
+      <${Select}
+        label="Unit"
+        title="Lengths in the file"
+        options=${UNITS}
+        value=${unit}
+        take=${(unit) => correct({ unit })}
+      />
+      <${Select}
+        label="Points up"
+        title="The axis of the file's world that points up"
+        options=${AXES}
+        value=${up}
+        take=${(up) => correct({ up })}
+      />
     </div>
     <div class="step-actions">
       <${Action} kind=${model.proposal.value ? "" : "primary"} act=${model.read}>
@@ -302,7 +298,7 @@ function ChoiceRow(
 ) {
   const [chosen, setChosen] = useState(options[0]?.[0] ?? "");
   return html`<div class="step-row">
-    <label>${label}<${Select} options=${options} value=${chosen} take=${setChosen} /></label>
+    <${Select} label=${label} options=${options} value=${chosen} take=${setChosen} />
     <div class="step-actions at-end"><${Action} act=${() => act(chosen)}>${words}</${Action}></div>
   </div>`;
 }
@@ -348,7 +344,8 @@ function Used({ model }) {
 function pointWords(points) {
   const off = Math.max(...points.flatMap((point) => Object.values(point.missed_px)));
   const high = Math.max(...points.map((point) => Math.abs(point.place[2])));
-  return `${points.length} points: the clicks miss them by up to ${plainNumbers(off)} px, and they lie within ${plainNumbers(high, 0)} mm of one plane.`;
+  const flat = `they lie within ${plainNumbers(high, 0)} mm of one plane`;
+  return `${points.length} points: the clicks miss them by up to ${plainNumbers(off)} px, and ${flat}.`;
 }
 
 /** What is proposed, and what is done with it. */

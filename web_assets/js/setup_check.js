@@ -231,10 +231,14 @@ const Strip = (/** @type {{ model: Model, check: Check }} */ { model, check }) =
 /** @param {Check} check */
 function verdictOf(check) {
   const covered = meanOf(check.covered.flat());
+  const under =
+    covered === null
+      ? ""
+      : `, ${percent(covered)} of the masks under the model: where it is little, a limb is elsewhere`;
   const [turns, jumps] = [check.turned.length, check.jumps.length];
   const parts = [
     check.good ? "The motion fits the pictures." : "Check the marked frames.",
-    `${percent(check.inside_mean)} of the model lies in the masks${covered === null ? "" : `, ${percent(covered)} of the masks under the model: where it is little, a limb is elsewhere`}.`,
+    `${percent(check.inside_mean)} of the model lies in the masks${under}.`,
     turns
       ? `The body turns round suddenly ${turns} times: left and right may be exchanged.`
       : "No sudden turn: left and right were not exchanged.",
@@ -250,7 +254,9 @@ function Measured({ model, check }) {
   const jumps = check.jumps.map(({ frame, limb, mm, usual_mm: usual }) => ({
     frame,
     limb,
-    title: `The ${limb} jumps into frame ${frame}: its markers bend by ${millimetres(mm)} from a straight course, usually by ${millimetres(usual)}.`,
+    title:
+      `The ${limb} jumps into frame ${frame}: its markers bend by ${millimetres(mm)} from a ` +
+      `straight course, usually by ${millimetres(usual)}.`,
   }));
   const chips = (/** @type {string} */ words, /** @type {any[]} */ entries) =>
     html`<${Chips} model=${model} words=${words} entries=${entries} />`;

@@ -53,7 +53,8 @@ export function shownMasks(setup, count) {
         ? `&settings=${encodeURIComponent(JSON.stringify(settings))}`
         : "";
       const show = shown.isBare.value || shown.isCutting.value ? "" : "mask";
-      return `${shown.here}/frames/${shown.frame.value}/views/${encodeURIComponent(camera)}.jpg?show=${show}&height=${HEIGHT}&age=${shown.age.value}${tried}`;
+      const view = `frames/${shown.frame.value}/views/${encodeURIComponent(camera)}.jpg`;
+      return `${shown.here}/${view}?show=${show}&height=${HEIGHT}&age=${shown.age.value}${tried}`;
     },
     /**
      * Before the first mask the picture alone, as it is recorded: a session's first masks take

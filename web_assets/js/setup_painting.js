@@ -85,7 +85,8 @@ export function paintingOf(setup, lens, brush) {
     at,
     /** The address of a frame's picture. @param {number} frame @param {string} [show] */
     picture: (frame, show = "") =>
-      `${sessionPath(setup.session)}/frames/${frame}/views/${encodeURIComponent(lens.name)}.jpg?${show}height=${turns % 2 ? stored[1] : Math.min(PICTURE_HEIGHT, stored[1])}`,
+      `${sessionPath(setup.session)}/frames/${frame}/views/${encodeURIComponent(lens.name)}.jpg?` +
+      `${show}height=${turns % 2 ? stored[1] : Math.min(PICTURE_HEIGHT, stored[1])}`,
     /** What the canvas hears. */
     heard: {
       onPointerDown: (/** @type {PointerEvent} */ event) => {
@@ -114,6 +115,23 @@ export function paintingOf(setup, lens, brush) {
 }
 
 /** @typedef {ReturnType<typeof paintingOf>} Painting */
+
+/**
+ * Draw a round line through places of the canvas.
+ * @param {CanvasRenderingContext2D} pen
+ * @param {number[][]} places
+ * @param {string} colour
+ * @param {number} width
+ */
+export function drawLine(pen, places, colour, width) {
+  pen.strokeStyle = colour;
+  pen.lineWidth = width;
+  pen.lineCap = pen.lineJoin = "round";
+  pen.beginPath();
+  pen.moveTo(places[0][0], places[0][1]);
+  for (const [x, y] of places) pen.lineTo(x + 0.01, y);
+  pen.stroke();
+}
 
 /** @param {{ painting: Painting }} properties */
 export const Size = ({ painting }) => html`<label class="check">

@@ -122,7 +122,8 @@ function Unconfirmed({ setup, quality: { contrast, unconfirmed: why } }) {
 function AlikePicture({ setup, view }) {
   const lens = setup.detail.cameras.find((one) => one.name === view.camera);
   const words = `${view.camera}, frame ${view.frame}: ${percent(view.share)} like the background`;
-  const source = `${sessionPath(setup.session)}/footage/${encodeURIComponent(view.camera)}/${view.frame}.jpg?height=420`;
+  const file = `${encodeURIComponent(view.camera)}/${view.frame}.jpg`;
+  const source = `${sessionPath(setup.session)}/footage/${file}?height=420`;
   return html`<figure>
     <div>
       <img src=${source} alt=${words} />
@@ -153,7 +154,10 @@ export function SourceTable({ choice }) {
       ${cameras.map(
         (camera) => html`<td
           class=${choice.by_camera[camera] === line.source ? "figure used" : "figure"}
-          title=${`Agreement of the views ${percent(line.agreements[camera])}, edge along the border ${percent(line.borders[camera])}`}
+          title=${
+            `Agreement of the views ${percent(line.agreements[camera])}, ` +
+            `edge along the border ${percent(line.borders[camera])}`
+          }
         >
           ${percent(line.agreements[camera])} · ${percent(line.borders[camera])}
         </td>`,
@@ -195,8 +199,14 @@ function remedy(line, source) {
   if (line.agreement === null)
     return `${first} Its mask is empty: lower “mask threshold”, or give a picture of its empty room.`;
   if ((line.denied ?? 0) > 0.05)
-    return `${first} Its mask has holes that carve the subject in all views: lower “mask threshold”, or switch “shadow test” off.`;
+    return (
+      `${first} Its mask has holes that carve the subject in all views: lower “mask threshold”, ` +
+      "or switch “shadow test” off."
+    );
   if (line.covered !== null && line.covered < USABLE)
-    return `${first} It holds something that no other view has: a bystander, a reflection, a shadow. Exclude the region, or raise “mask threshold”.`;
+    return (
+      `${first} It holds something that no other view has: a bystander, a reflection, a shadow. ` +
+      "Exclude the region, or raise “mask threshold”."
+    );
   return `${first} It lacks parts of the subject: lower “mask threshold”, or raise “close gaps”.`;
 }

@@ -5,7 +5,7 @@
 import { accepted, put, sessionPath } from "./api.js";
 import { penOf } from "./elements.js";
 import { complain } from "./messages.js";
-import { paintingOf, Sheet, Size } from "./setup_painting.js";
+import { drawLine, paintingOf, Sheet, Size } from "./setup_painting.js";
 import {
   batch,
   html,
@@ -15,7 +15,7 @@ import {
   useRef,
   useState,
 } from "./studio/component.js";
-import { Action } from "./studio/parts.js";
+import { Action, Toggle } from "./studio/parts.js";
 import { windowName } from "./window.js";
 
 /** @import { Schemas } from "./api_types" */
@@ -26,6 +26,16 @@ const HELP =
   "arrows move, space paints, x changes between inside and outside, [ and ] change the size, " +
   ", and . go a frame back and on, ctrl z undoes, enter keeps, escape leaves.";
 const MOST_FRAMES = 8;
+
+/**
+ * A pixel where it is once the picture is turned clockwise by quarter turns.
+ * @param {number[]} point
+ * @param {number[]} size of the picture
+ * @param {number} turns
+ * @returns {number[]}
+ */
+const turned = ([x, y], [width, height], turns) =>
+  turns ? turned([height - 1 - y, x], [height, width], turns - 1) : [x, y];
 
 /** @typedef {Schemas["StrokeEntry"]} Stroke */
 /**
@@ -95,45 +105,24 @@ function strokesOf({ setup, lens, frame: first, count, before, done }) {
   const { stored, turns } = painting;
 
   // Strokes are kept in pixels of the stored picture; the canvas shows it upright.
-  /** @param {number[]} point */
-  const turned = ([x, y]) =>
-    [
-      [x, y],
-      [stored[1] - 1 - y, x],
-      [stored[0] - 1 - x, stored[1] - 1 - y],
-      [y, stored[0] - 1 - x],
-    ][turns];
-  /** @param {number[]} point */
-  const asStored = ([x, y]) =>
-    [
-      [x, y],
-      [y, stored[1] - 1 - x],
-      [stored[0] - 1 - x, stored[1] - 1 - y],
-      [stored[0] - 1 - y, x],
-    ][turns];
+  const upright = (/** @type {number[]} */ point) => turned(point, stored, turns);
+  const asStored = (/** @type {number[]} */ point) =>
+    turned(point, [painting.width, painting.height], 4 - turns);
   const rounded = (/** @type {number[]} */ point) =>
     /** @type {[number, number]} */ (point.map((value) => Math.round(10 * value) / 10));
 
-  function drawLine(
-    /** @type {number[][]} */ points,
-    /** @type {"inside" | "outside"} */ kind,
-    /** @type {number} */ size,
-  ) {
-    pen.strokeStyle = COLOURS[kind];
-    pen.lineWidth = size;
-    pen.lineCap = pen.lineJoin = "round";
-    pen.beginPath();
-    pen.moveTo(points[0][0] + 0.5, points[0][1] + 0.5);
-    for (const [x, y] of points) pen.lineTo(x + 0.51, y + 0.5);
-    pen.stroke();
-  }
-
   function draw() {
     pen.clearRect(0, 0, painting.width, painting.height);
+    const show = (/** @type {number[][]} */ points, /** @type {Stroke["kind"]} */ kind, width) =>
+      drawLine(
+        pen,
+        points.map(([x, y]) => [x + 0.5, y + 0.5]),
+        COLOURS[kind],
+        width,
+      );
     for (const stroke of strokes.value)
-      if (stroke.frame === frame.value)
-        drawLine(stroke.points.map(turned), stroke.kind, stroke.width);
-    if (line) drawLine(line, kind.value, painting.size.value);
+      if (stroke.frame === frame.value) show(stroke.points.map(upright), stroke.kind, stroke.width);
+    if (line) show(line, kind.value, painting.size.value);
   }
 
   /** @param {string} address */
@@ -247,19 +236,11 @@ export function Strokes(properties) {
   const canvas = useRef(/** @type {any} */ (null));
   useLayoutEffect(() => model.start(canvas.current), []);
   const [frame, kind, strokes] = [model.frame.value, model.kind.value, model.strokes.value];
-  const toggle = (/** @type {"inside" | "outside"} */ one, /** @type {string} */ words) =>
-    html`<button
-      type="button"
-      class="toggle small"
-      aria-pressed=${String(kind === one)}
-      onClick=${() => into(model.kind)(one)}
-    >
-      ${words}
-    </button>`;
   return html`
     <div class="mask-bar">
       <b>${lens.name}</b>
-      ${toggle("inside", "Inside")} ${toggle("outside", "Outside")}
+      <${Toggle} isOn=${kind === "inside"} act=${() => into(model.kind)("inside")}>Inside</${Toggle}>
+      <${Toggle} isOn=${kind === "outside"} act=${() => into(model.kind)("outside")}>Outside</${Toggle}>
       <${Size} painting=${model.painting} />
       <${Action} kind="small" act=${model.takeBack} disabled=${!model.undone.value.length}>
         Undo

@@ -231,20 +231,24 @@ function Who({ model }) {
   const isSized = model.isSized();
   const query = new URLSearchParams({ session: model.setup.session, body });
   return html`<section class="subject-who background-make">
-    <label>
-      Body
-      <${Select}
-        options=${model.bodies.map((one) => [one.name, one.label])}
-        value=${body}
-        take=${model.choose}
-      />
-    </label>
+    <${Select}
+      label="Body"
+      options=${model.bodies.map((one) => [one.name, one.label])}
+      value=${body}
+      take=${model.choose}
+    />
     ${!isSized && html`<${Height} key=${subject.height_mm} model=${model} />`}
     <p class="hint">
       ${
         isSized
-          ? "As large as its file says: the run fits radii and ends to the first frames, a fit below finds the lengths too."
-          : `Every length follows from the height by published proportions. ${subject.fitted ? "A new height replaces the fitted measures." : "A guess within 3 cm will do; the fit finds the rest."}`
+          ? html`As large as its file says: the run fits radii and ends to the first frames, a fit
+            below finds the lengths too.`
+          : html`Every length follows from the height by published proportions.${" "}
+            ${
+              subject.fitted
+                ? "A new height replaces the fitted measures."
+                : "A guess within 3 cm will do; the fit finds the rest."
+            }`
       }
     </p>
     <div class="step-actions">
@@ -260,7 +264,9 @@ function Who({ model }) {
 /** What is fitted, and from where. @param {{ model: Model }} properties */
 function FitFields({ model }) {
   const { options } = model;
-  const runs = model.setup.detail.runs.filter((run) => run.done);
+  const runs = model.setup.detail.runs
+    .filter((run) => run.done)
+    .map(({ name }) => [name, `of ${name}`]);
   const box = (
     /** @type {string} */ name,
     /** @type {string} */ title,
@@ -284,16 +290,11 @@ function FitFields({ model }) {
         <input type="text" name="frames" placeholder="chosen for variety" pattern="[0-9, ]*" />
       </label>
     </div>
-    <label>
-      First poses
-      <${Select}
-        name="run"
-        options=${[
-          ["", "the newest run's, else searched for"],
-          ...runs.map(({ name }) => [name, `of ${name}`]),
-        ]}
-      />
-    </label>
+    <${Select}
+      label="First poses"
+      name="run"
+      options=${[["", "the newest run's, else searched for"], ...runs]}
+    />
     <div class="fit-boxes">
       ${box("symmetric", "Off: each side has its own lengths, which needs more frames.", "left and right alike")}
       ${box("lengths", "Of limbs", "lengths")} ${box("radii", "Of limbs", "radii")}
@@ -312,7 +313,8 @@ function Fitting({ model }) {
     <p class="hint">
       ${
         isReady
-          ? "Lengths and radii are found together with the poses of a few frames, on the silhouettes. Frames without a pose are searched first, which takes longest."
+          ? html`Lengths and radii are found together with the poses of a few frames, on the
+            silhouettes. Frames without a pose are searched first, which takes longest.`
           : model.isSized()
             ? "Take the body first."
             : "Set the height first: it is the one measure that the pictures alone cannot give."

@@ -224,6 +224,9 @@ function Status({ model }) {
   const count = run.last - run.first;
   const isStale = model.isStale();
   const from = run.first > 0 && ` (from frame ${run.first} on)`;
+  const backwards =
+    `The run begins in frame ${run.first}. The frames before it are tracked backwards from there, ` +
+    `into a new run; ${run.name} stays.`;
   const truth = run.mean_mm != null && `, ${run.mean_mm.toPrecision(3)} mm from the truth`;
   const isFailed = model.isHere() && ["failed", "lost"].includes(work.state);
   return html`<section class="track-status">
@@ -241,10 +244,7 @@ function Status({ model }) {
         run.done > 0 &&
         run.first > 0 &&
         !isStale &&
-        html`<${Action}
-          act=${model.goBack}
-          title=${`The run begins in frame ${run.first}. The frames before it are tracked backwards from there, into a new run; ${run.name} stays.`}
-        >
+        html`<${Action} act=${model.goBack} title=${backwards}>
           Track back to frame 0
         </${Action}>`
       }
@@ -262,18 +262,16 @@ function Fields({ detail, choices }) {
   /** @returns {[string, string][]} */
   const named = (entries) => entries.map((one) => [one.name, one.label]);
   const trackers = named(choices.trackers.filter((one) => !one.needs_behaviour));
+  const likelihoods = named(choices.weightings);
   const frame = (/** @type {string} */ name, /** @type {number} */ value) =>
     html`<input type="number" name=${name} min="0" max=${count - 1} step="1" defaultValue=${value} />`;
   return html`
-    <label>Tracker<${Select} name="tracker" options=${trackers} value=${detail.tracker} /></label>
-    <label>
-      Likelihood
-      <${Select} name="weighting" options=${named(choices.weightings)} value=${detail.weighting} />
-    </label>
+    <${Select} label="Tracker" name="tracker" options=${trackers} value=${detail.tracker} />
+    <${Select} label="Likelihood" name="weighting" options=${likelihoods} value=${detail.weighting} />
     <p class="hint">
       Edges and silhouette suit a cluttered room, where edges inside the masks are often the room's.
     </p>
-    <label>Effort<${Select} name="evaluations" options=${EFFORTS} value="2000" /></label>
+    <${Select} label="Effort" name="evaluations" options=${EFFORTS} value="2000" />
     <div class="step-row">
       <label>First frame${frame("first", first)}</label>
       <label>Last frame${frame("last", count - 1)}</label>

@@ -4,7 +4,8 @@
 
 import { fetchJson, post, readOnly } from "../api.js";
 import { complain } from "../messages.js";
-import { html, mount, signal, useEffect, useRef, useState } from "./component.js";
+import { html, into, mount, signal, useEffect, useRef, useState } from "./component.js";
+import { Select } from "./parts.js";
 import { visit } from "./visiting.js";
 import { useKnob } from "./knob.js";
 
@@ -215,16 +216,13 @@ function CourseColumn() {
   }, [isOpen.value, page.value]);
   if (!isOpen.value) return null;
   const at = PAGES.findIndex((one) => one.name === page.value);
-  const choose = (/** @type {any} */ event) => {
-    page.value = event.target.value;
-  };
   return html`<div class="course-head">
-      <select aria-label="Lesson" value=${page.value} onChange=${choose}>
-        ${PAGES.map(
-          ({ name, title }, index) =>
-            html`<option key=${name} value=${name} selected=${index === at}>${index + 1}. ${title}</option>`,
-        )}
-      </select>
+      <${Select}
+        aria-label="Lesson"
+        options=${PAGES.map(({ name, title }, index) => [name, `${index + 1}. ${title}`])}
+        value=${page.value}
+        take=${into(page)}
+      />
       <button
         class="icon"
         aria-label="Close the course"

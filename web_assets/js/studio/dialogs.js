@@ -2,6 +2,7 @@
 
 import { byId, showPicture } from "../elements.js";
 import { Fragment, html, mount, useEffect, useRef, useSignal } from "./component.js";
+import { Failure, Select } from "./parts.js";
 
 /** @type {HTMLDialogElement} */
 const dialog = byId("dialog");
@@ -88,14 +89,7 @@ export function Field(
   }
   const options = choices?.map((one) => [String(one.value ?? one), one.label ?? one]);
   const input = choices
-    ? html`<select name=${name}>
-        ${options.map(
-          ([own, words]) =>
-            html`<option key=${own} value=${own} selected=${own === String(value)}>
-              ${words}
-            </option>`,
-        )}
-      </select>`
+    ? html`<${Select} name=${name} options=${options} value=${String(value)} />`
     : kind === "file"
       ? html`<input type="file" name=${name} ...${more} />`
       : html`<input type=${kind} name=${name} defaultValue=${value} ...${more} />`;
@@ -152,15 +146,7 @@ export function Form({ heading, intro, action, danger = false, children, send, c
   return html`<form onSubmit=${submit} onChange=${change}>
     <h2>${heading}</h2>
     ${intro && html`<p class="hint">${intro}</p>`} ${children}
-    <div class="optional">
-      ${
-        wrong.value &&
-        html`<p ref=${alert} class="wrong" role="alert">
-          ${wrong.value.message}
-          ${wrong.value.hint && html`<span class="hint"> ${wrong.value.hint}</span>`}
-        </p>`
-      }
-    </div>
+    <div ref=${alert} class="optional"><${Failure} error=${wrong.value} /></div>
     <div class="actions">
       <button type="button" onClick=${closeDialog}>Cancel</button>
       <button class=${danger ? "danger" : "primary"} disabled=${isSent.value}>

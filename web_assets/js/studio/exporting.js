@@ -7,6 +7,7 @@ import { onEvent } from "../live.js";
 import { complain } from "../messages.js";
 import { get, watch } from "../state.js";
 import { follow, html, signal, useRef } from "./component.js";
+import { Failure, Select } from "./parts.js";
 
 /** @import { Schemas } from "../api_types" */
 /** @typedef {any} Option one of `ExportChoices.options` */
@@ -89,15 +90,13 @@ function OptionField({ option, form, list, calibrations }) {
   }
   if (option.kind === "str") {
     const usual = chosen ?? option.default;
-    return html`<label title=${option.help}>
-      ${label}
-      <select aria-label=${label} onChange=${({ currentTarget }) => keep(currentTarget.value)}>
-        ${offered(option, form, list, calibrations).map(
-          ([value, words]) =>
-            html`<option key=${value} value=${value} selected=${value === usual}>${words}</option>`,
-        )}
-      </select>
-    </label>`;
+    return html`<${Select}
+      label=${label}
+      title=${option.help}
+      options=${offered(option, form, list, calibrations)}
+      value=${usual}
+      take=${keep}
+    />`;
   }
   const keepNumber = ({ currentTarget: { value } }) => keep(value === "" ? "" : Number(value));
   return html`<label title=${option.help}>
@@ -153,15 +152,9 @@ function Actions({ form }) {
   };
   const job = going.value;
   if (!job) {
-    const { message, hint } = failed.value ?? {};
     return html`<div class="export-actions">
       <button type="button" class="primary" onClick=${begin}>Export</button>
-      ${
-        message &&
-        html`<p class="wrong" role="alert">
-          ${message}${hint && html`<span class="hint"> ${hint}</span>`}
-        </p>`
-      }
+      <${Failure} error=${failed.value} />
     </div>`;
   }
   const cancel = () => remove(`/api/exports/${job.identifier}`).catch(complain);

@@ -3,6 +3,7 @@
 
 import { byId } from "../elements.js";
 import { follow, html, mount, useEffect } from "./component.js";
+import { Select } from "./parts.js";
 import {
   command,
   loadSpeeds,
@@ -62,21 +63,15 @@ function Speed() {
   useEffect(() => {
     if (connected && !isOffered) loadSpeeds();
   }, [connected, isOffered]);
-  return html`<select
+  return html`<${Select}
     id="search-speed"
     aria-label="Search speed"
     title=${SPEED_TITLE}
     disabled=${!connected || !isOffered}
+    options=${speeds.value.map((one) => [String(one.seconds_a_layer), one.label])}
     value=${String(inUse)}
-    onChange=${({ currentTarget }) => setSpeed(Number(currentTarget.value))}
-  >
-    ${speeds.value.map(
-      ({ label, seconds_a_layer: seconds }) =>
-        html`<option key=${seconds} value=${String(seconds)} selected=${seconds === inUse}>
-          ${label}
-        </option>`,
-    )}
-  </select>`;
+    take=${(seconds) => setSpeed(Number(seconds))}
+  />`;
 }
 
 function Tracking() {

@@ -11,6 +11,7 @@ import { drawSoon } from "../pacing.js";
 import { get, watch } from "../state.js";
 import { layerColour, onTheme } from "../theme.js";
 import { follow, html, mount, signal, useMemo } from "./component.js";
+import { Select } from "./parts.js";
 import { LayerOutline, scaleOf } from "./layer_outline.js";
 import { layerPlayback, playLayers, RATES, scrubTo, toggleLayers } from "./layer_playback.js";
 import { layerWords, searchName, shownLayers, survivorsOf, varianceShare } from "./shown_layers.js";
@@ -192,14 +193,14 @@ function Tools() {
       >
         ${icon(playing ? PAUSE : PLAY)}
       </button>
-      <select
+      <${Select}
         id="layer-rate"
         aria-label="Layers a second"
         title="Layers a second"
-        onChange=${({ currentTarget }) => playLayers({ rate: Number(currentTarget.value) })}
-      >
-        ${RATES.map((one) => html`<option key=${one} value=${one} selected=${one === rate}>${one}/s</option>`)}
-      </select>
+        options=${RATES.map((one) => [String(one), `${one}/s`])}
+        value=${String(rate)}
+        take=${(chosen) => playLayers({ rate: Number(chosen) })}
+      />
       <button
         class="icon toggle"
         id="layer-mode"

@@ -52,30 +52,40 @@ export const Progress = ({ words, share, cancel }) => html`<div class="step-prog
  * A box to be checked before its label; `take(checked)` hears of it.
  * @param {{ checked: boolean, take: (checked: boolean) => void, title?: string, children?: any }} properties
  */
-export const Check = ({
-  checked,
-  take,
-  title = "",
-  children,
-}) => html`<label class="check" title=${title}>
-  <input type="checkbox" checked=${checked} onChange=${({ target }) => take(target.checked)} />
-  ${children}
-</label>`;
+export const Check = ({ checked, take, title = "", children }) => html`
+  <label class="check" title=${title}>
+    <input type="checkbox" checked=${checked} onChange=${({ target }) => take(target.checked)} />
+    ${children}
+  </label>
+`;
 
 /**
- * A choice; `take(value)` hears of it.
+ * A choice, under its label if it has one; `take(value)` hears of it.
  * @param {{ options: ([string, string] | string)[], value?: string, take?: (value: string) => void,
- *   [more: string]: any }} properties `options`: values with their words, or words alone
+ *   label?: string, title?: string, [more: string]: any }} properties `options`: values with their
+ *   words, or words alone
  */
-export const Select = ({ options, value, take, ...more }) => html`<select
-  onChange=${({ target }) => take?.(target.value)}
-  ...${more}
->
-  ${options.map((one) => {
-    const [own, words] = Array.isArray(one) ? one : [one, one];
-    return html`<option key=${own} value=${own} selected=${own === value}>${words}</option>`;
-  })}
-</select>`;
+export function Select({ options, value, take, label = "", title = "", ...more }) {
+  const made = html`<select
+    value=${take && value}
+    title=${label ? "" : title}
+    onChange=${({ target }) => take?.(target.value)}
+    ...${more}
+  >
+    ${options.map((one) => {
+      const [own, words] = Array.isArray(one) ? one : [one, one];
+      return html`<option key=${own} value=${own} selected=${own === value}>${words}</option>`;
+    })}
+  </select>`;
+  return label ? html`<label title=${title}>${label}${made}</label>` : made;
+}
+
+/** A small button that stays pressed. */
+export const Toggle = (/** @type {any} */ { isOn, act, children }) => html`
+  <button type="button" class="toggle small" aria-pressed=${String(isOn)} onClick=${() => act()}>
+    ${children}
+  </button>
+`;
 
 /** @param {{ heads: string[], rows: any[][], kind?: string }} properties */
 export const Table = ({ heads, rows, kind = "figures" }) => html`<table class=${kind}>

@@ -3,7 +3,8 @@
 
 import { goTo } from "../selection.js";
 import { get, set, watch } from "../state.js";
-import { effect, html, signal } from "./component.js";
+import { effect, html, into, signal } from "./component.js";
+import { Select } from "./parts.js";
 import { layerPlayback, playLayers } from "./layer_playback.js";
 
 const MOST_DRAWN_PER_SECOND = 30;
@@ -112,21 +113,14 @@ export const Playback = () => html`
       path=${LAST}
       act=${() => goTo(Infinity)}
     />
-    <select
+    <${Select}
       id="speed"
       aria-label="Speed"
       title="Speed"
-      onChange=${({ currentTarget }) => {
-        speed.value = Number(currentTarget.value);
-      }}
-    >
-      ${SPEEDS.map(
-        ([value, words]) =>
-          html`<option key=${value} value=${value} selected=${value === speed.value}>
-            ${words}
-          </option>`,
-      )}
-    </select>
+      options=${SPEEDS.map(([value, words]) => [String(value), words])}
+      value=${String(speed.value)}
+      take=${(value) => into(speed)(Number(value))}
+    />
     <${Button}
       id="loop"
       label="Loop"

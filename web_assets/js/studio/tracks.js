@@ -6,6 +6,7 @@ import { onEvent } from "../live.js";
 import { complain, say } from "../messages.js";
 import { get, set, watch } from "../state.js";
 import { follow, html, mount, signal } from "./component.js";
+import { Select } from "./parts.js";
 
 /** The track of the poses as searched. */
 export const RAW = "raw";
@@ -23,21 +24,15 @@ const errorWords = ({ mean_mm: mean }) => (mean == null ? "" : ` · ${mean.toPre
 /** Which track is shown: a choice, where there is more than the search's own. */
 function TrackChoice() {
   const shown = follow("track");
-  return html`<select
+  return html`<${Select}
     id="track-choice"
     hidden=${tracks.value.length < 2}
     aria-label="Track"
     title="Whose poses scene, charts and views show"
+    options=${tracks.value.map((one) => [one.name, trackWords(one.name) + errorWords(one)])}
     value=${shown}
-    onChange=${({ currentTarget }) => set({ track: currentTarget.value })}
-  >
-    ${tracks.value.map(
-      (track) =>
-        html`<option key=${track.name} value=${track.name} selected=${track.name === shown}>
-          ${trackWords(track.name)}${errorWords(track)}
-        </option>`,
-    )}
-  </select>`;
+    take=${(track) => set({ track })}
+  />`;
 }
 
 /** Load which tracks the run has. */

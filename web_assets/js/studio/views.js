@@ -11,6 +11,7 @@ import { followsSearch, isStored, layersShown, select } from "../selection.js";
 import { get, set, watch } from "../state.js";
 import { records } from "../view_sheet.js";
 import { follow, html, signal, useEffect, useRef } from "./component.js";
+import { Select } from "./parts.js";
 import { FigurePlace } from "./figure_place.js";
 import { liveView, triedView } from "./live_views.js";
 import { SeedTools, startSeeds } from "./seeds.js";
@@ -269,16 +270,12 @@ export const drawBeside = (ghosts) => post("/api/scene/show", { ghosts }).catch(
 
 /** A choice among a view's own values. */
 function Choice({ label, value, offered, choose: take }) {
-  return html`<select
+  return html`<${Select}
     aria-label=${label}
+    options=${offered}
     value=${value ?? ""}
-    onChange=${({ currentTarget }) => take(currentTarget.value || null)}
-  >
-    ${offered.map(
-      ([own, words]) =>
-        html`<option key=${own} value=${own} selected=${own === (value ?? "")}>${words}</option>`,
-    )}
-  </select>`;
+    take=${(chosen) => take(chosen || null)}
+  />`;
 }
 
 /** Whether the view is of the frame or of the run, where it has both. */
