@@ -215,7 +215,6 @@ function CourseColumn() {
     else localStorage.removeItem(KEPT);
   }, [isOpen.value, page.value]);
   if (!isOpen.value) return null;
-  const at = PAGES.findIndex((one) => one.name === page.value);
   return html`<div class="course-head">
       <${Select}
         aria-label="Lesson"
