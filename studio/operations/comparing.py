@@ -48,7 +48,7 @@ from studio.results.comparison.trials import Outcome
 from studio.runs.behaviour_models import needs_model
 from studio.runs.new_run import own_knobs
 from studio.search.likelihood.catalogue import WEIGHTINGS
-from studio.search.likelihood.edge_region import CPU, DEVICES
+from studio.search.likelihood.edge_region import CPU, Device
 from studio.search.trackers.catalogue import TRACKERS
 from studio.sessions.names import checked_name
 from studio.sessions.object_stores import below
@@ -83,7 +83,7 @@ class CompareRequest:
         str, Field(description="The likelihood of all; default: the session's own."), OneOf(WEIGHTINGS)
     ] = ""
     device: Annotated[
-        str, Field(description="What weighs poses, where the likelihood lets it be chosen."), OneOf(DEVICES)
+        Device, Field(description="What weighs poses, where the likelihood lets it be chosen.")
     ] = CPU
     body: Body = ""
     behaviour: Annotated[

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
@@ -35,18 +34,17 @@ from studio.runs.setup.session_settings import session_settings
 from studio.runs.setup.stroke_masks import unpainted_cameras
 from studio.search.settings import values
 from studio.sessions.background_files import (
+    change_evidence,
     given_masks_of,
     home_of_masks,
     polygon_exclusion,
     read_evidence,
     set_backgrounds,
     set_exclusion,
-    write_evidence,
 )
 from studio.sessions.provenance import origin_of
 from studio.sessions.session import Session
 from studio.sessions.stroke_files import read_strokes, strokes_of_file
-from studio.sessions.work_under_way import one_at_a_time
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -217,8 +215,7 @@ def mask_knobs(session: Session) -> MaskKnobs:
 def keep_mask_knobs(session: Session, knobs: Mapping[str, Value]) -> MaskKnobs:
     """Let new runs of a session begin with exactly these knobs; existing runs keep theirs. Raises SettingsError."""
     mask_settings(session, knobs)
-    with one_at_a_time(session.path):
-        write_evidence(session, msgspec.structs.replace(read_evidence(session), knobs=dict(knobs)))
+    change_evidence(session, knobs=dict(knobs))
     return mask_knobs(session)
 
 

@@ -32,7 +32,7 @@ from studio.runs.setup.subject_fitting import (
     keep_subject,
 )
 from studio.search.likelihood.catalogue import WEIGHTINGS
-from studio.search.likelihood.edge_region import CPU, DEVICES
+from studio.search.likelihood.edge_region import CPU, Device
 from studio.sessions.atomic_files import check_writable
 from studio.sessions.provenance import origin_of
 from studio.sessions.session import SUBJECT_NAME, Session
@@ -187,7 +187,7 @@ class StartPoseRequest:
     behaviour: Annotated[Model, Field(description="Its prototypes are poses to try.")] = ""
     weighting: Annotated[str, Field(description="The likelihood."), OneOf(WEIGHTINGS)] = WEIGHTING
     device: Annotated[
-        str, Field(description="What weighs poses, where the likelihood lets it be chosen."), OneOf(DEVICES)
+        Device, Field(description="What weighs poses, where the likelihood lets it be chosen.")
     ] = CPU
     seed: Seed = 0
     keep: Annotated[bool, Field(description="Write the pose to a file.")] = True

@@ -33,6 +33,7 @@ from studio.sessions import atomic_files
 from studio.sessions.names import free_name, name_from
 from studio.sessions.record_files import RecordFile
 from studio.sessions.session import Session, redescribe
+from studio.sessions.work_under_way import one_at_a_time
 
 EVIDENCE_NAME, BACKGROUND_NAME = "evidence.json", "background"
 PERSON_MASKS, STROKE_MASKS, CHOSEN_MASKS, SUBJECT_MASKS = HOMES = (
@@ -83,7 +84,7 @@ def given_backgrounds(session: Session) -> Session:
     evidence = read_evidence(session)
     if not evidence.given:
         return session
-    write_evidence(session, msgspec.structs.replace(evidence, given={}))
+    change_evidence(session, given={})
     return use_backgrounds(session, evidence.given)
 
 
@@ -99,13 +100,19 @@ def use_cleaned(session: Session, contents: Mapping[str, Bytes]) -> Session:
         place = folder / f"{session.camera_source(camera).name}-clean.png"
         atomic_files.write_bytes(place, png_of(picture))
         names[camera] = place.relative_to(session.path).as_posix()
-    write_evidence(session, msgspec.structs.replace(read_evidence(session), given=given))
+    change_evidence(session, given=given)
     return use_backgrounds(session, names)
 
 
 def write_evidence(session: Session, evidence: SessionEvidence) -> None:
     """Store a session's knobs for masks."""
     _RECORD.write(session.path / EVIDENCE_NAME, evidence)
+
+
+def change_evidence(session: Session, **entries: Mapping[str, Knob] | Mapping[str, str]) -> None:
+    """Change entries of what is stored of a session's masks, in a turn: what others change meanwhile is kept."""
+    with one_at_a_time(session.path):
+        write_evidence(session, msgspec.structs.replace(read_evidence(session), **entries))
 
 
 def set_backgrounds(session: Session, files: Mapping[str, Path]) -> Session:
@@ -135,9 +142,9 @@ def set_backgrounds(session: Session, files: Mapping[str, Path]) -> Session:
         if place.resolve() != path.resolve():
             atomic_files.copy_file(path, place)
         names[camera] = place.relative_to(session.path).as_posix()
-    evidence = read_evidence(session)
-    kept = {camera: name for camera, name in evidence.given.items() if camera not in names}
-    write_evidence(session, msgspec.structs.replace(evidence, given=kept))
+    with one_at_a_time(session.path):
+        given_before = read_evidence(session).given
+        change_evidence(session, given={key: given_before[key] for key in given_before if key not in names})
     return use_backgrounds(session, names)
 
 
@@ -222,8 +229,8 @@ def made_masks(session: Session, home: str) -> Generator[MadeMasks]:
     with atomic_files.made_whole(session.path / place, parents=False) as folder:
         made = MadeMasks(session, folder)
         yield made
-    evidence = read_evidence(session)
-    write_evidence(session, msgspec.structs.replace(evidence, given_masks=given_masks_of(session)))
+    with one_at_a_time(session.path):
+        change_evidence(session, given_masks=given_masks_of(session))
     use_masks(session, made.names(place))
 
 
@@ -261,7 +268,7 @@ def use_given_masks(session: Session) -> Session:
     if not any(map(has_made_masks, session.manifest.footage.cameras)):
         return session
     cameras = without_made_masks(session, session.manifest.footage.cameras)
-    write_evidence(session, msgspec.structs.replace(read_evidence(session), given_masks={}))
+    change_evidence(session, given_masks={})
     return use_masks(session, {source.name: source.masks for source in cameras})
 
 

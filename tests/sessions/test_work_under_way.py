@@ -21,7 +21,7 @@ from studio.runs.new_run import prepare_run
 from studio.runs.notes import notes_of, write_note
 from studio.runs.setup import background_setup
 from studio.runs.setup.initialising import InitialPose, keep_pose
-from studio.sessions import atomic_files, calibration_changes, work_under_way
+from studio.sessions import atomic_files, background_files, calibration_changes, work_under_way
 from studio.sessions import workspace as workspace_module
 from studio.sessions.atomic_files import NameTakenError
 from studio.sessions.background_files import use_masks
@@ -404,3 +404,37 @@ def test_a_session_that_is_imported_from_stays_where_it_is(
     ):
         with pytest.raises(RunError, match="Session 'toy' stays as it is while 'import' works on it"):
             work()
+
+
+def test_entries_of_a_masks_record_that_others_change_meanwhile_are_kept(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever reads the record to change it keeps all others out until it is written."""
+    reading, go_on, known = threading.Event(), threading.Event(), background_files.read_evidence
+
+    def read_slowly(one: Session) -> background_files.SessionEvidence:
+        found = known(one)
+        if threading.current_thread().name == "slow":
+            reading.set()
+            go_on.wait(10.0)
+        return found
+
+    monkeypatch.setattr(background_files, "read_evidence", read_slowly)
+    slow = threading.Thread(
+        name="slow",
+        target=background_files.change_evidence,
+        args=(session,),
+        kwargs={"given": {"cam1": "a.png"}},
+    )
+    other = threading.Thread(
+        target=background_files.change_evidence, args=(session,), kwargs={"knobs": {"n": 1}}
+    )
+    slow.start()
+    assert reading.wait(10.0)
+    other.start()
+    other.join(0.3)
+    go_on.set()
+    slow.join()
+    other.join()
+    kept = known(session)
+    assert (kept.given, kept.knobs) == ({"cam1": "a.png"}, {"n": 1})

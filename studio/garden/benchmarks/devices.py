@@ -10,7 +10,7 @@ import numpy as np
 
 from studio.body.catalogue import load_body
 from studio.foundations.errors import StudioError
-from studio.foundations.progress import Progress
+from studio.foundations.progress import Progress, no_progress
 from studio.garden.benchmarks.kernels import made_evidence, poses_around, ring_of_cameras
 from studio.runs.search_space import default_sigma, search_space
 from studio.search.likelihood.edge_region import CPU, GPU
@@ -43,7 +43,7 @@ def run_device_benchmark(
     except StudioError as error:
         return {"none": f"{error.message} {error.hint}"}
     measures = importlib.import_module(MEASURES)
-    report = progress or (lambda words, done, total: None)
+    report = progress or no_progress
     rng = np.random.default_rng(0)
     poses = poses_around(body, max(*sizes, COMPARED), rng)
     evidence = made_evidence(body, cameras, rng)["proximity"]

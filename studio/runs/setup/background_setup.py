@@ -55,6 +55,7 @@ from studio.sessions.background_files import (
     SUBJECT_MASKS,
     Knob,
     SessionEvidence,
+    change_evidence,
     forget_unused_masks,
     given_backgrounds,
     given_masks_of,
@@ -321,7 +322,7 @@ def _set_up(
         quality = _agreement(session, own, progress)
     elif tune and len(session.manifest.footage.cameras) > 1:
         own, quality = _tune(session, own, _trials(source), progress)
-    write_evidence(session, msgspec.structs.replace(read_evidence(session), knobs=own))
+    change_evidence(session, knobs=own)
     return BackgroundSetup(source, own, tuple(notes), quality)
 
 
@@ -362,7 +363,7 @@ def _cut_to_subject(
     lost = make_subject_masks(session, place, progress)
     session = Session(session.path)
     own: dict[str, Knob] = {"background_model": MASK_SOURCES["subject"].model}
-    write_evidence(session, msgspec.structs.replace(read_evidence(session), knobs=own))
+    change_evidence(session, knobs=own)
     notes = (*made.notes, *([f"The subject is not seen in {frames_in_words(lost)}."] if lost else []))
     return BackgroundSetup("subject", own, notes, _agreement(session, own, progress), made.choice)
 
@@ -464,7 +465,7 @@ def _set_up_best(session: Session, wanted: _Wanted, progress: Progress) -> Backg
         write_evidence(session, evidence)
     own: dict[str, Knob] = {"background_model": MASK_SOURCES["best"].model}
     now = Session(session.path)
-    write_evidence(now, msgspec.structs.replace(read_evidence(now), knobs=own))
+    change_evidence(now, knobs=own)
     notes.append(f"Together: {choice.mixed.in_words()}")
     notes += [f"{name}: masks of {source}." for name, source in choice.by_camera.items()]
     return BackgroundSetup("best", own, tuple(notes), _agreement(now, own, progress), choice)

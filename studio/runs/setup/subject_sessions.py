@@ -22,7 +22,7 @@ from studio.foundations.progress import Progress, no_progress
 from studio.runs.search_space import parameter_names
 from studio.runs.setup.subject_masks import MM, Place, cut_frames, subject_masks_of
 from studio.sessions import atomic_files
-from studio.sessions.background_files import SUBJECT_MASKS, read_evidence, write_evidence
+from studio.sessions.background_files import SUBJECT_MASKS, change_evidence
 from studio.sessions.manifest import write_manifest
 from studio.sessions.named_rows import pose_frame, read_pose
 from studio.sessions.session import (
@@ -68,9 +68,7 @@ def make_subject_sessions(
                 for label in cut.lost:
                     lost[label].append(cut.frame)
         for one in made:
-            write_evidence(
-                one, msgspec.structs.replace(read_evidence(one), knobs={"background_model": "auto"})
-            )
+            change_evidence(one, knobs={"background_model": "auto"})
         notes += [
             f"{one.name}: not seen in {len(frames)} frames, first in frame {frames[0]}."
             for one, frames in zip(made, lost, strict=True)

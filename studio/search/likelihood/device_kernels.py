@@ -201,6 +201,7 @@ def terms_kernel(limbs: int, edge_chunks: int, region_chunks: int, areas: bool, 
         problem = np.uint32(pose // np.uint32(every))
         wide, high = np.uint32(places[problem, number, WIDTH]), np.uint32(places[problem, number, HEIGHT])
         view = view_of(cameras[number])
+        across_all, down_all = ZERO, ZERO
         at = thread
         while at < corner_count:
             limb, corner = np.uint32(at >> TWO_ON), np.uint32(at & THREE_ON)

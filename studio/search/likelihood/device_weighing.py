@@ -164,7 +164,8 @@ class WeighingDevice:
         joined = values[0] if len(values) == 1 else np.concatenate(values)
         scale = 1.0 if given[0][1] is None else given[0][1].scale
         frame = FrameOnDevice(
-            *(copied(memory, name, array) for name, array in (("places", places), ("values", joined))),
+            copied(memory, "places", places),
+            copied(memory, "values", joined),
             copied(memory, "words", np.concatenate(words)),
             np.float32(scale),
             places[..., OBSERVED].astype(np.int64),
@@ -249,7 +250,11 @@ class WeighingDevice:
         )
 
     def weights(
-        self, poses: Array, frame: FrameOnDevice, limbs: NDArray[np.int64] | None, factors: tuple[float, ...]
+        self,
+        poses: Array,
+        frame: FrameOnDevice,
+        limbs: NDArray[np.int64] | None,
+        factors: tuple[float, float, float],
     ) -> tuple[Array, Array]:
         """(N,) fitness and (N,) log-weights of poses (N, D). Raises BodyError where one is not finite."""
         found = np.empty((2, len(poses)))
@@ -325,7 +330,7 @@ class WeighingDevice:
             used[turn].record(self._weighing)
             yield there
 
-    def _pinned(self, name: str, shape: tuple[int, ...]) -> Array:
+    def _pinned(self, name: str, shape: tuple[int, ...]) -> NDArray[np.float32]:
         key = name, shape
         if key not in self._memory:
             self._memory[key] = cuda.pinned_array(shape, np.float32)

@@ -28,7 +28,7 @@ left, Σe = 1.
 
 import importlib
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,6 +63,7 @@ Words = NDArray[np.uint32]
 
 CPU, AUTO, GPU = "cpu", "auto", "gpu"
 DEVICES = CPU, AUTO, GPU
+Device = Literal["cpu", "auto", "gpu"]
 DEVICE_MODULE = "studio.search.likelihood.device_weighing"
 NO_DEVICE_HINT = (
     "It needs an NVIDIA card, its driver and the extra `gpu` (pip install 'capture-studio[gpu]'), which `studio doctor`"

@@ -42,6 +42,7 @@ BEGINNINGS = 1 << 31
 SEEDS = (1 << 64) - 1
 
 if TYPE_CHECKING:
+    from studio.search.likelihood.device_weighing import ProblemOnDevice
     from studio.search.trackers.device_search import DeviceSearch
 
 # The current version of the settings and the tracker's own settings.
@@ -229,17 +230,11 @@ class FrameSearch:
             self._state, self._on_device = self.state, None
             return None
         try:
-            if self._on_device is None or layer == 0:
-                start = self.previous if repeat == 0 else FilterState(self.state.particles)
-                module = importlib.import_module(DEVICE_MODULE)
-                self._on_device = module.DeviceSearch(self.tracker, there, self.space, settings)
-                if layer > 0:
-                    self._on_device.take(state.particles)
-                elif start.particles is None:
-                    self._on_device.take(self._beginning(repeat, settings))
-                else:
-                    self._on_device.begin(start, self._key(BEGINNINGS + repeat), settings)
-            record = self._on_device.step(layer, self._key(state.layers_done), settings)
+            on_device = self._on_device
+            if on_device is None or layer == 0:
+                on_device = self._begun_on_device(there, repeat, layer, settings)
+            record = on_device.step(layer, self._key(state.layers_done), settings)
+            self._on_device = on_device
         except StudioError:
             raise
         except Exception as error:
@@ -254,6 +249,26 @@ class FrameSearch:
             return None
         self._prepared = problem, repeat, problem
         return record
+
+    def _begun_on_device(
+        self,
+        there: "ProblemOnDevice",
+        repeat: int,
+        layer: int,
+        settings: Any,  # noqa: ANN401
+    ) -> "DeviceSearch":
+        """A card's search with the set that a layer weighs."""
+        module = importlib.import_module(DEVICE_MODULE)
+        on_device: DeviceSearch = module.DeviceSearch(self.tracker, there, self.space, settings)
+        start = self.previous if repeat == 0 else FilterState(self.state.particles)
+        particles = self.state.particles
+        if layer > 0 and particles is not None:
+            on_device.take(particles)
+        elif start.particles is None:
+            on_device.take(self._beginning(repeat, settings))
+        else:
+            on_device.begin(start, self._key(BEGINNINGS + repeat), settings)
+        return on_device
 
     def _fits_device(self, layer: int, settings: Any) -> bool:  # noqa: ANN401
         """Whether a card can do a layer: the tracker has a plan for it, and no pose has to be drawn again."""
