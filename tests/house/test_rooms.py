@@ -26,6 +26,8 @@ BY_NAME = {
     "studio/cli/main.py": "the command that was called",
     "studio/foundations/isolated.py": "a function run in a child",
     "studio/search/likelihood/edge_region.py": "the card's kernels, of the same room",
+    "studio/search/trackers/frame_loop.py": "the card's search, of the same room",
+    "studio/garden/benchmarks/devices.py": "what is measured of a card, of the same room",
     "studio/cli/self_check.py": "what the card's kernels need",
 }
 """Modules that import a module of the studio by its name."""
