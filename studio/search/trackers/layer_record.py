@@ -69,8 +69,9 @@ def _all_equal(record: LayerRecord) -> bool:
 
 
 def _one_holds_all(record: LayerRecord) -> bool:
-    """NaN of a tracker without survival rates is no number below any."""
-    return record.alpha_reached * len(record.poses) < ALONE
+    """NaN of a tracker without survival rates is no number below any. Of a large set on a card some are recorded."""
+    count = int(record.rows[-1]) + 1 if len(record.rows) else len(record.poses)
+    return record.alpha_reached * count < ALONE
 
 
 def _one_pose(record: LayerRecord) -> bool:

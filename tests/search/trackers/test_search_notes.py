@@ -45,6 +45,14 @@ class Spike(Bowl):
         return np.where(np.arange(len(poses)) == 2, 0.0, -1e6)
 
 
+def test_of_a_set_that_is_recorded_in_part_all_particles_count() -> None:
+    """Fifty thousand of which two hundred survive, every hundredth recorded."""
+    (few,) = searched(Condensation(), Bowl(np.zeros(COUNT)), toy_space(COUNT), particles=500, scale_frames=1)
+    few = dataclasses.replace(few, alpha_reached=0.002)
+    assert search_notes([few]) == ("One particle held all the weight in layer 1.",)
+    assert search_notes([dataclasses.replace(few, rows=np.arange(0, 50_000, 100))]) == ()
+
+
 def test_one_particle_with_all_the_weight() -> None:
     records = searched(Condensation(), Spike(np.zeros(COUNT)), toy_space(COUNT), particles=50, scale_frames=1)
     assert search_notes(records) == ("One particle held all the weight in layer 1.",)
