@@ -117,7 +117,7 @@ def test_start_pose(guided: GuidedSetup) -> None:
     expect(guided.page.locator(".start-pose-verdict")).to_contain_text("Found in frame 0: confidence")
     expect(guided.page.locator("figure.picture img[alt*='start pose']")).to_have_count(4)
     guided.shoot("start-pose")
-    guided.press("Yes, track from here")
+    guided.to("track")
 
 
 def tracked(guided: GuidedSetup, frames: int, evaluations: int) -> None:

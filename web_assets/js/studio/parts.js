@@ -67,6 +67,7 @@ export const Check = ({ checked, take, title = "", children }) => html`
  */
 export function Select({ options, value, take, label = "", title = "", ...more }) {
   const made = html`<select
+    aria-label=${label || null}
     value=${take && value}
     title=${label ? "" : title}
     onChange=${({ target }) => take?.(target.value)}
