@@ -81,11 +81,18 @@ class FrameOnDevice:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ProblemOnDevice:
-    """One frame's weighting there. factors : of the edge, the region and the silhouette term."""
+    """One frame's weighting there.
+
+    factors : of the edge, the region and the silhouette term. trunk : the limbs, by number, whose edges count alone
+    while only the trunk is searched; None: all count. ranked : which row of the weights (2, N) a swarm maximises, 0 the
+    fitness, 1 the log-weight.
+    """
 
     device: "WeighingDevice"
     frame: FrameOnDevice
     factors: tuple[float, float, float]
+    trunk: NDArray[np.int64] | None = None
+    ranked: int = 0
 
 
 @functools.cache

@@ -231,14 +231,16 @@ class EdgeRegionFrameLikelihood(BaseFrameLikelihood):
     def on_device(self) -> "ProblemOnDevice | None":
         """This frame's weighting there, for a search that keeps its particles there; None where there is no device."""
         settings = self.likelihood.settings
-        return self.problem_there((settings.edge_weight, settings.region_weight, 0.0))
+        return self.problem_there((settings.edge_weight, settings.region_weight, 0.0), None, 1)
 
-    def problem_there(self, factors: tuple[float, float, float]) -> "ProblemOnDevice | None":
-        """As `on_device`, with the terms' factors."""
+    def problem_there(
+        self, factors: tuple[float, float, float], trunk: NDArray[np.int64] | None, ranked: int
+    ) -> "ProblemOnDevice | None":
+        """As `on_device`, with these fields."""
         device, frame = self.likelihood.device, self._on_device
         if device is None or frame is None:
             return None
-        return importlib.import_module(DEVICE_MODULE).ProblemOnDevice(device, frame, factors)
+        return importlib.import_module(DEVICE_MODULE).ProblemOnDevice(device, frame, factors, trunk, ranked)
 
     def _from_device(self, method: str, poses: Array, *further: Any) -> Any:  # noqa: ANN401 - the method's own
         device, frame = self.likelihood.device, self._on_device

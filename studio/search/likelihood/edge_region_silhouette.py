@@ -84,7 +84,7 @@ class EdgeRegionSilhouetteFrameLikelihood(BaseFrameLikelihood):
 
     def on_device(self) -> "ProblemOnDevice | None":
         """As that of edges and region."""
-        return self.edge_region.problem_there(self.likelihood.weights)
+        return self.edge_region.problem_there(self.likelihood.weights, self._edges_alone(TRUNK_FIRST), 0)
 
     def give_up_device(self, error: Exception) -> None:
         """As that of edges and region."""

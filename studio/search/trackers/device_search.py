@@ -8,22 +8,18 @@ layer alone (`counted_numbers`), so beside others it is searched as alone.
 Not here: behaviour models, redrawn or rejected poses and limbs kept apart, which the processor's search has.
 """
 
-import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from studio.foundations.arrays import Array
-from studio.foundations.numba_on_devices import cuda, record_launches
 from studio.search.likelihood.device_weighing import (
     ProblemOnDevice,
     WeighingDevice,
 )
-from studio.search.trackers import device_kernels
 from studio.search.trackers.device_kernels import (
     ANNEALED,
     BETA,
@@ -33,7 +29,6 @@ from studio.search.trackers.device_kernels import (
     KEPT,
     KNOWN,
     LOG_WEIGHT,
-    MOMENTS,
     MOST,
     OF_SAMPLE,
     SCALE,
@@ -45,10 +40,11 @@ from studio.search.trackers.device_kernels import (
     WEIGHED,
     WEIGHTED,
 )
+from studio.search.trackers.device_runs import RECORDED, THREADS, DeviceRuns, Moment, kernel, limits_there
 from studio.search.trackers.layer_plan import LayerPlan, Noise
 from studio.search.trackers.particle_kernels import places
+from studio.search.trackers.particles import ParticleFilter
 from studio.search.trackers.tracker import (
-    AnyTracker,
     Arrays,
     FilterState,
     LayerRecord,
@@ -56,24 +52,7 @@ from studio.search.trackers.tracker import (
     SearchSpace,
 )
 
-THREADS = 128
-RECORDED = 4096
-"""Particles of a layer's record at most."""
 CARRIED = {"weighted": 0, "resampled": 1, "mode": 2}
-
-
-@functools.cache
-def kernel(name: str) -> Any:  # noqa: ANN401 - Numba's
-    """A kernel of `device_kernels`, compiled by its first launch in a process."""
-    return cuda.jit(getattr(device_kernels, name))
-
-
-class Moment(NamedTuple):
-    """Which random numbers a run's layer uses."""
-
-    seed: int
-    frame: int
-    layer: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,7 +68,7 @@ class DeviceSet:
     annealed: Any = None
 
 
-class DeviceFilter:
+class DeviceFilter(DeviceRuns):
     """R runs of one body, side by side. A weighed set that it returns is valid until the next is weighed, another until
     the next but one is made.
     """
@@ -103,19 +82,11 @@ class DeviceFilter:
         clamped: bool = True,
     ) -> None:
         """by_limbs : whether children take whole limbs. clamped : whether poses are set on the limits."""
-        self.device, self.space, self.runs = device, space, runs
-        self._arrays = device.lend_arrays(self)
-        self._stream = self._arrays.setdefault("stream", None) or cuda.stream()
-        self._arrays["stream"] = self._stream
+        super().__init__(device, space, runs)
         size = len(space.names)
-        limits = np.array([[-np.inf], [np.inf]]).repeat(size, axis=1)
-        if clamped:
-            limits = np.stack([inwards(space.lower, np.inf), inwards(space.upper, -np.inf)])
-        self._limits = self._copied("limits", limits)
+        self._limits = self._copied("limits", limits_there(space, clamped))
         self._place = self._copied("place", places(space.limb) if by_limbs else np.arange(1, size + 1))
         self._root = self._memory("root", (runs, size, size), np.float64)
-        self._moments = self._memory("moments", (MOMENTS, runs, size), np.float64)
-        self._turn = 0
 
     def take(self, sets: Sequence[ParticleSet]) -> DeviceSet:
         """Sets of the host, one a run and of as many particles each, there. Raises BodyError where a pose is not
@@ -204,23 +175,12 @@ class DeviceFilter:
         weighed = DeviceSet(given.poses, count, cumulated, weights, annealed)
         return weighed, weighed if noise is None else DeviceSet(poses, count)
 
-    def _launch(self, key: tuple[object, ...], launch: Callable[[], None]) -> None:
-        """Launches one by one at their first time, recorded and made at once from the second on."""
-        key = "recorded", *key
-        again = self._arrays.get(key, False)
-        if again is False:
-            launch()
-            self._arrays[key] = None
-            return
-        if again is None:
-            again = self._arrays[key] = record_launches(launch, self._stream) or launch
-        again()
-
     def record(self, weighed: DeviceSet, plan: LayerPlan, layer: int, run: int = 0) -> LayerRecord:
         """The record of a run's layer, which `step` has just done with what was measured."""
         count, is_last = weighed.count, plan.noise is None
         step = -(-count // RECORDED)
-        poses, values, best = self._rows(weighed, run, step)
+        given = weighed.poses, weighed.weights, weighed.annealed, count
+        poses, values, best = self._rows(*given, run, step)
         annealed = self._fetched(weighed.annealed)[run]
         found = self._fetched(self._moments)[:, run]
         parents = np.zeros((2, 0), dtype=np.int64)
@@ -253,7 +213,7 @@ class DeviceFilter:
             return ParticleSet(
                 np.ascontiguousarray(poses.T, np.float64), np.full(there.count, -math.log(there.count))
             )
-        poses, values, _ = self._rows(there, run, 1)
+        poses, values, _ = self._rows(there.poses, there.weights, there.annealed, there.count, run, 1)
         beta, _, most, total, _ = self._fetched(there.annealed)[run]
         raw = values[LOG_WEIGHT]
         return ParticleSet(poses, -beta * (most - raw) - math.log(total), raw)
@@ -261,23 +221,6 @@ class DeviceFilter:
     def means(self) -> Array:
         """(R, D) weighted means (Eq. 8) of the layer last done, where it was measured."""
         return self._fetched(self._moments)[WEIGHTED]
-
-    def _fetched(self, there: Any) -> NDArray[Any]:  # noqa: ANN401
-        """An array on the host, when all that was launched is done."""
-        found = there.copy_to_host(stream=self._stream)
-        self._stream.synchronize()
-        return found
-
-    def _rows(self, weighed: DeviceSet, run: int, step: int) -> tuple[Array, Array, Array]:
-        """Every step-th particle (K, D), what these weigh (2, K), and the heaviest (D,)."""
-        count = -(-weighed.count // step)
-        poses = self._memory("rows", (count + 1, len(self.space.names)), np.float64)
-        values = self._memory("values", (2, count + 1), np.float64)
-        kernel("take_rows")[-(-(count + 1) // THREADS), THREADS, self._stream](
-            weighed.poses, weighed.weights, weighed.annealed, run, weighed.count, step, poses, values
-        )
-        found = self._fetched(poses)
-        return found[:-1], np.ascontiguousarray(self._fetched(values)[:, :-1]), found[-1]
 
     def _uploaded(self, moments: Sequence[Moment], plans: Sequence[LayerPlan]) -> tuple[Any, Any]:
         size = len(self.space.names)
@@ -292,41 +235,21 @@ class DeviceFilter:
                 row[SIGMA:] = 0.0 if one.noise.sigma is None else one.noise.sigma
         return self._copied("keys", keys), self._copied("dials", rows)
 
-    def _copied(self, name: str, values: NDArray[Any]) -> Any:  # noqa: ANN401
-        there = self._memory(name, values.shape, values.dtype.type)
-        there.copy_to_device(values, stream=self._stream)
-        return there
-
-    def _memory(self, name: str, shape: tuple[int, ...], kind: type[np.generic]) -> Any:  # noqa: ANN401
-        key = name, shape, kind
-        if key not in self._arrays:
-            self._arrays[key] = cuda.device_array(shape, kind)
-        return self._arrays[key]
-
-    def _next_poses(self, count: int) -> Any:  # noqa: ANN401
-        """Where the next set goes: never where the last one is."""
-        self._turn = 1 - self._turn
-        return self._memory(f"poses {self._turn}", (len(self.space.names), self.runs * count), np.float32)
-
-
-def inwards(limits: Array, towards: float) -> Array:
-    """Limits (D,) as single precision has them, none of them wider."""
-    rounded = limits.astype(np.float32)
-    wider = rounded < limits if towards > 0 else rounded > limits
-    return np.where(wider, np.nextafter(rounded, np.float32(towards)), rounded).astype(np.float64)
-
 
 class DeviceSearch:
-    """One frame's search on a device, a layer at a time, for `frame_loop`."""
+    """One frame's search on a device, a layer at a time, for `frame_loop`. evaluated : poses that the last one
+    weighed.
+    """
 
     def __init__(
         self,
-        tracker: AnyTracker,
+        tracker: ParticleFilter[Any],
         problem: ProblemOnDevice,
         space: SearchSpace,
         settings: Any,  # noqa: ANN401
     ) -> None:
         """settings : those that the frame begins with."""
+        self.evaluated = 0
         self._tracker, self._space = tracker, space
         self._problem = problem
         by_limbs = getattr(settings, "crossover_by", "limbs") == "limbs"
@@ -369,6 +292,7 @@ class DeviceSearch:
         weighed, self._set = self._filter.step(
             self._set, self._problem, [Moment(*key)], [plan], settings.resampling == "systematic"
         )
+        self.evaluated = weighed.count
         record = self._filter.record(weighed, plan, layer)
         self._extra = self._tracker.kept_of_layer(self._extra, record, settings)
         return record

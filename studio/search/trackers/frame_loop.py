@@ -29,12 +29,12 @@ from studio.search.trackers.tracker import (
     FrameResult,
     LayerRecord,
     ParticleSet,
+    SearchOnDevice,
     SearchSpace,
     generator,
     keyed_generator,
 )
 
-DEVICE_MODULE = "studio.search.trackers.device_search"
 DEVICE_PARAMETERS = 128
 """Most of a body whose particles a card keeps."""
 BEGINNINGS = 1 << 31
@@ -43,7 +43,6 @@ SEEDS = (1 << 64) - 1
 
 if TYPE_CHECKING:
     from studio.search.likelihood.device_weighing import ProblemOnDevice
-    from studio.search.trackers.device_search import DeviceSearch
 
 # The current version of the settings and the tracker's own settings.
 SettingsSource = Callable[[], tuple[int, Any]]
@@ -93,7 +92,7 @@ class FrameSearch:
         self.tracker, self.previous, self.space = tracker, previous, space
         self.seed, self.frame, self.repeats = seed, frame, repeats
         self._state = state or SearchState()
-        self._on_device: DeviceSearch | None = None
+        self._on_device: SearchOnDevice | None = None
         self._prepared: tuple[FrameLikelihood, int, FrameLikelihood] | None = None
 
     @property
@@ -134,11 +133,10 @@ class FrameSearch:
         repeat, layer = divmod(state.layers_done, count)
         record = self._step_on_device(problem, repeat, layer, in_use)
         particles, expected = None, state.expected
-        evaluations = self.tracker.evaluations(in_use) // count
         memory: Mapping[str, Array] = self.previous.memory
         if record is None:
             particles, expected, record, memory = self._step_here(problem, repeat, layer, in_use)
-            evaluations = len(record.poses)
+        evaluated = len(record.poses) if self._on_device is None else self._on_device.evaluated
         is_last = state.layers_done + 1 == self.repeats * count
         milliseconds = 1000.0 * (time.perf_counter() - began)
         self._state = SearchState(
@@ -147,7 +145,7 @@ class FrameSearch:
             particles=particles,
             settings=held,
             settings_version=version,
-            evaluations=state.evaluations + evaluations,
+            evaluations=state.evaluations + evaluated,
             milliseconds=state.milliseconds + milliseconds,
             expected=expected,
             memory=memory if is_last else {},
@@ -256,10 +254,10 @@ class FrameSearch:
         repeat: int,
         layer: int,
         settings: Any,  # noqa: ANN401
-    ) -> "DeviceSearch":
+    ) -> SearchOnDevice:
         """A card's search with the set that a layer weighs."""
-        module = importlib.import_module(DEVICE_MODULE)
-        on_device: DeviceSearch = module.DeviceSearch(self.tracker, there, self.space, settings)
+        module = importlib.import_module(self.tracker.device_module)
+        on_device: SearchOnDevice = module.DeviceSearch(self.tracker, there, self.space, settings)
         start = self.previous if repeat == 0 else FilterState(self.state.particles)
         particles = self.state.particles
         if layer > 0 and particles is not None:
@@ -271,14 +269,10 @@ class FrameSearch:
         return on_device
 
     def _fits_device(self, layer: int, settings: Any) -> bool:  # noqa: ANN401
-        """Whether a card can do a layer: the tracker has a plan for it, and no pose has to be drawn again."""
-        if settings.limbs_apart or settings.constraints not in ("clamp", "ignore"):
-            return False
+        """Whether a card can do a layer."""
         extra = self._state.particles.extra if self._state.particles is not None else {}
-        return (
-            len(self.space.names) <= DEVICE_PARAMETERS
-            and self.tracker.plan_layer(layer, self.space, settings, extra) is not None
-        )
+        fits = self.tracker.fits_device(layer, self.space, settings, extra)
+        return fits and len(self.space.names) <= DEVICE_PARAMETERS
 
     def _key(self, number: int) -> tuple[int, int, int]:
         """What a card's random numbers are counted from."""

@@ -70,6 +70,7 @@ class ParticleSwarm(Tracker[SwarmSettings]):
     label = "Particle swarm"
     settings_type = SwarmSettings
     size_knobs = (("stage1_particles", "stage1_iterations"), ("stage2_particles", "stage2_iterations"))
+    device_module = "studio.search.trackers.device_swarm"
     score = ("Best fitness", "f")
     variants = VARIANTS
     presets = PRESETS
@@ -115,10 +116,10 @@ class ParticleSwarm(Tracker[SwarmSettings]):
             spread = uniform_poses(rng, first.particles, space)
             drawn = Proposals(spread, _start_velocities(rng, spread.shape, sigma, settings))
             return _new_swarm(drawn, spread.mean(axis=0), freedom)
-        pose = _last_pose(previous, last)
         sigma = space.sigma * settings.diffusion_scale * first.freedom
-        starts, arrays = expected(pose[None], previous, settings.dynamics)[0], {}
+        starts, arrays = expected_pose(previous, settings), {}
         if is_guided(space, settings.prediction) and previous.estimate is not None:
+            pose = previous.estimate
             starts, arrays = predicted_starts(rng, previous, pose, first.particles, space, settings)
         drawn = _sampled(rng, starts, sigma, first.particles, settings)
         return _new_swarm(drawn, starts, first.freedom, arrays)
@@ -138,9 +139,8 @@ class ParticleSwarm(Tracker[SwarmSettings]):
         stage = stages[now.number]
         if layer == 0:
             particles = _kept_possible(rng, particles, problem, space, settings)
-        everything_moves = bool(particles.extra[FREEDOM].all())
-        looks_at = WHOLE_BODY if everything_moves else stage.looks_at
-        values = checked_values(problem.fitness(particles.poses, looks_at), len(particles.poses))
+        seen = seen_in(stage, particles.extra[FREEDOM])
+        values = checked_values(problem.fitness(particles.poses, seen), len(particles.poses))
         allowed = possible(problem, particles.poses, settings)
         free, extra = share_in(particles.extra), _with_bests(particles, values, allowed)
         if FREE in extra:
@@ -159,6 +159,12 @@ class ParticleSwarm(Tracker[SwarmSettings]):
             following = replace(weighed, extra=leader_arrived(rng, extra[LEADER], extra, space))
         return following, record
 
+    def fits_device(self, layer: int, space: SearchSpace, settings: SwarmSettings, extra: Arrays) -> bool:
+        """Whether no behaviour model guides the particles, and only joint limits make a pose impossible."""
+        rules = settings.constraints
+        limits_alone = rules == "ignore" or (rules in ("clamp", "redraw") and not settings.limbs_apart)
+        return limits_alone and FREE not in extra and not is_guided(space, settings.prediction)
+
     def expectations(self, particles: ParticleSet, space: SearchSpace, settings: SwarmSettings) -> Array:
         """(S, D) poses that the first stage's swarm expects: one unless a behaviour model guides it (`foreseen`)."""
         return foreseen(particles, space)
@@ -168,6 +174,25 @@ class ParticleSwarm(Tracker[SwarmSettings]):
         leader, mean = particles.extra[LEADER], particles.extra[BEST_POSES].mean(axis=0)
         pose = leader if settings.estimate == "mode" else mean
         return Estimate(pose, mean, leader, float(particles.extra[LEADER_VALUE][0]))
+
+
+def expected_pose(previous: FilterState, settings: SwarmSettings) -> Array:
+    """(D,) x̂ of a frame: the pose that the last one reported, in a repeated search p_g, in a run's first the start
+    pose; moved on at constant velocity where the settings say so.
+    """
+    last = previous.particles
+    assert last is not None
+    pose = previous.estimate
+    if pose is None and LEADER in last.extra:
+        pose = last.extra[LEADER]
+    if pose is None:
+        pose = last.poses[int(np.argmax(last.log_weights))]
+    return expected(pose[None], previous, settings.dynamics)[0]
+
+
+def seen_in(stage: Stage, freedom: Array) -> int:
+    """What the problem is to look at: the whole body while a stage's freedom (D,) leaves nothing fixed."""
+    return WHOLE_BODY if freedom.all() else stage.looks_at
 
 
 def acceleration(iteration: int, iterations: int, c_first: float, c_last: float) -> float:
@@ -297,15 +322,6 @@ def _with_bests(swarm: ParticleSet, values: Array, allowed: Mask) -> Arrays:
         bests[LEADER] = best_poses[first]
         bests[LEADER_VALUE], bests[LEADER_POSSIBLE] = best_values[[first]], best_allowed[[first]]
     return bests
-
-
-def _last_pose(previous: FilterState, last: ParticleSet) -> Array:
-    """x̂ of the frame before: the reported pose, in a repeated search p_g, in a run's first the start pose."""
-    if previous.estimate is not None:
-        return previous.estimate
-    if LEADER in last.extra:
-        return last.extra[LEADER]
-    return last.poses[int(np.argmax(last.log_weights))]
 
 
 def _record(

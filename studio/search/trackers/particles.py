@@ -8,12 +8,14 @@ from studio.foundations.arrays import Array
 from studio.foundations.errors import RunError
 from studio.search.trackers.diffusion import Spread, noise_about
 from studio.search.trackers.hard_priors import Proposals, possible, settled
+from studio.search.trackers.layer_plan import LayerPlan
 from studio.search.trackers.shared_knobs import SearchSettings
 from studio.search.trackers.tracker import (
     Arrays,
     Estimate,
     FilterState,
     FrameLikelihood,
+    LayerRecord,
     ParticleSet,
     SearchSpace,
     Tracker,
@@ -152,6 +154,27 @@ def estimate(particles: ParticleSet, kind: str) -> Estimate:
 
 class ParticleFilter(Tracker[Searching]):
     """A tracker that reports its last layer's weighted set."""
+
+    device_module = "studio.search.trackers.device_search"
+
+    def plan_layer(
+        self, layer: int, space: SearchSpace, settings: Searching, extra: Arrays
+    ) -> LayerPlan | None:
+        """What `step_layer` does in numbers, so that a card can do it; None where no plan says it.
+
+        extra : the set's arrays.
+        """
+        return None
+
+    def kept_of_layer(self, extra: Arrays, record: LayerRecord, settings: Searching) -> Arrays:
+        """The set's arrays after a layer that a card did."""
+        return extra
+
+    def fits_device(self, layer: int, space: SearchSpace, settings: Searching, extra: Arrays) -> bool:
+        """Whether there is a plan of the layer, and no pose has to be drawn again."""
+        if settings.limbs_apart or settings.constraints not in ("clamp", "ignore"):
+            return False
+        return self.plan_layer(layer, space, settings, extra) is not None
 
     def end_frame(self, particles: ParticleSet, space: SearchSpace, settings: Searching) -> Estimate:
         """The weighted mean (Eq. 1, 8) or the mode (Eq. 2)."""

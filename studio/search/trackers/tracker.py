@@ -9,7 +9,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,6 @@ from studio.foundations.arrays import Array, Indices
 from studio.foundations.knobs import Value
 from studio.search.behaviour.model import BehaviourModel
 from studio.search.likelihood.problem import FrameLikelihood
-from studio.search.trackers.layer_plan import LayerPlan
 
 Arrays = dict[str, NDArray[Any]]
 """What a tracker keeps of each particle, by name."""
@@ -268,6 +267,32 @@ class Variant:
     changes: Mapping[str, Value]
 
 
+class SearchOnDevice(Protocol):
+    """One frame's search on a card, a layer at a time, made of tracker, problem, space and the frame's settings.
+    evaluated : poses that the last layer weighed.
+    """
+
+    evaluated: int
+
+    def begin(self, previous: FilterState, key: tuple[int, int, int], settings: Any) -> None:  # noqa: ANN401
+        """Make the first layer's set from what the last frame left. key : seed, frame, and a number below those of
+        layers, one for each search of the frame.
+        """
+        ...
+
+    def take(self, particles: ParticleSet) -> None:
+        """Go on from a set of the host."""
+        ...
+
+    def step(self, layer: int, key: tuple[int, int, int], settings: Any) -> LayerRecord:  # noqa: ANN401
+        """Do a layer and return its record. key : seed, frame and layer."""
+        ...
+
+    def particles(self) -> ParticleSet:
+        """The set that the next layer weighs, or the last layer's with its weights, on the host."""
+        ...
+
+
 PARTICLES = "particles"
 """The knob that says how many poses a layer weighs, unless a tracker says otherwise."""
 S = TypeVar("S")
@@ -283,6 +308,7 @@ class Tracker(ABC, Generic[S]):
     size_knobs : knobs that say how much is searched, of each stage those that are multiplied.
     needs_behaviour : it requires a behaviour model.
     scales_likelihood : it multiplies log w by its own scale (`beta` of its records).
+    device_module : the module whose `DeviceSearch` (see `SearchOnDevice`) does its layers on a card; "" has none.
     score : name of the best particle's reported value, and its unit.
     variants : known changes, by label, for comparisons.
     presets : for the pages, offered where a run has all knobs that they set.
@@ -297,6 +323,7 @@ class Tracker(ABC, Generic[S]):
     size_knobs: ClassVar[tuple[tuple[str, ...], ...]] = (("particles",),)
     needs_behaviour: ClassVar[bool] = False
     scales_likelihood: ClassVar[bool] = False
+    device_module: ClassVar[str] = ""
     score: ClassVar[tuple[str, str]] = ("Best weight", "log w")
     variants: ClassVar[Mapping[str, Variant]] = {}
     presets: ClassVar[tuple[Preset, ...]] = ()
@@ -356,16 +383,9 @@ class Tracker(ABC, Generic[S]):
         settings : of the layer; a slider may have moved since the last one.
         """
 
-    def plan_layer(self, layer: int, space: SearchSpace, settings: S, extra: Arrays) -> LayerPlan | None:
-        """What `step_layer` does in numbers, so that a card can do it; None where no plan says it.
-
-        extra : the set's arrays.
-        """
-        return None
-
-    def kept_of_layer(self, extra: Arrays, record: LayerRecord, settings: S) -> Arrays:
-        """The set's arrays after a layer that a card did."""
-        return extra
+    def fits_device(self, layer: int, space: SearchSpace, settings: S, extra: Arrays) -> bool:
+        """Whether a card can do a layer. extra : the set's arrays."""
+        return False
 
     @abstractmethod
     def end_frame(self, particles: ParticleSet, space: SearchSpace, settings: S) -> Estimate:

@@ -198,7 +198,7 @@ def test_condensation_keeps_the_scale_that_its_first_frame_chose(simulated):
 class Failing:
     """In place of a search on a card: it fails in the layer given."""
 
-    fails = 0
+    fails, evaluated = 0, COUNT
 
     def __init__(self, *_):
         self.layer = 0
@@ -240,7 +240,7 @@ def searched(problem, space, poses, settings):
 
 def test_a_card_that_fails_leaves_the_search_to_the_processor(monkeypatch, problem):
     weighting, space, poses = problem
-    monkeypatch.setattr(frame_loop, "DEVICE_MODULE", __name__)
+    monkeypatch.setattr(AnnealedParticleFilter, "device_module", __name__)
     monkeypatch.setitem(globals(), "DeviceSearch", Failing)
     carded = Carded(weighting)
     found, expected = (searched(one, space, poses, SETTINGS) for one in (carded, weighting))
@@ -260,7 +260,7 @@ def test_a_card_that_fails_leaves_the_search_to_the_processor(monkeypatch, probl
 )
 def test_what_a_card_does_not_do_the_processor_does(monkeypatch, problem, knobs):
     weighting, space, poses = problem
-    monkeypatch.setattr(frame_loop, "DEVICE_MODULE", "studio.search.no_such_search")
+    monkeypatch.setattr(AnnealedParticleFilter, "device_module", "studio.search.no_such_search")
     settings = AnnealedSettings(layers=2, particles=COUNT, **knobs)
     found, expected = (searched(one, space, poses, settings) for one in (Carded(weighting), weighting))
     np.testing.assert_array_equal(found[-1].poses, expected[-1].poses)

@@ -1,0 +1,352 @@
+# pyright: standard
+"""Swarms whose particles stay on a CUDA device: bests are found and particles moved there.
+
+`DeviceSwarm` searches R runs side by side that have one body, one space and the same stages; their seeds, frames, knobs
+and pictures may differ. A run's numbers depend on its own seed, frame and layer alone (`counted_numbers`), so beside
+others it is searched as alone. Symbols and equations are those of `particle_swarm`.
+
+Not here: behaviour models, rejected poses and limbs kept apart, which the processor's search has.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.foundations.arrays import Array
+from studio.search.likelihood.device_weighing import ProblemOnDevice, WeighingDevice
+from studio.search.likelihood.problem import TRUNK_FIRST
+from studio.search.trackers.device_kernels import (
+    DIFFUSED,
+    MOST,
+    SUMMING,
+    SURVIVING,
+    WEIGHED,
+)
+from studio.search.trackers.device_runs import RECORDED, THREADS, DeviceRuns, Moment, kernel, limits_there
+from studio.search.trackers.device_swarm_kernels import (
+    MOVING,
+    POSSIBLE,
+    PULL,
+    SHRINK,
+    SIGMA,
+    STANDING,
+    VALUE,
+)
+from studio.search.trackers.particle_swarm import (
+    BEST_POSES,
+    BEST_POSSIBLE,
+    BEST_VALUES,
+    FREEDOM,
+    LEADER,
+    LEADER_POSSIBLE,
+    LEADER_VALUE,
+    START,
+    VELOCITIES,
+    ParticleSwarm,
+    acceleration,
+    constriction,
+    expected_pose,
+    seen_in,
+)
+from studio.search.trackers.particles import unweighted
+from studio.search.trackers.partitions import moment_of, stages_of
+from studio.search.trackers.swarm_settings import SwarmSettings
+from studio.search.trackers.tracker import FilterState, LayerRecord, ParticleSet, SearchSpace
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SwarmStep:
+    """A step of a run's swarm, or the sample of a new one. sigma : (D,) σ. pull : c = c1 = c2 of a step, NaN for a
+    sample. moving : whether a sample has velocities.
+    """
+
+    sigma: Array
+    pull: float = np.nan
+    moving: bool = True
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DeviceSwarmSet:
+    """Particles of R runs there, `count` = N a run: places, velocities and bests (D, R N), reached (2, R N); leaders
+    and starts (D, R), standing (R, 5), see `device_swarm_kernels`. weights : (2, R N) of places, of whose rows `row` is
+    f; None: not weighed.
+    """
+
+    count: int
+    places: Any
+    velocities: Any
+    bests: Any
+    reached: Any
+    leaders: Any
+    starts: Any
+    standing: Any
+    weights: Any = None
+    row: int = 0
+
+
+class DeviceSwarm(DeviceRuns):
+    """R runs of one body, side by side. A set that it returns has the places that it had then until the next but one is
+    made; its bests and leaders are those of the last weighing.
+    """
+
+    def __init__(self, device: WeighingDevice, space: SearchSpace, runs: int = 1) -> None:
+        super().__init__(device, space, runs)
+        self._inner = limits_there(space, kept=True)
+        self._limits = [
+            self._copied(f"limits {kept}", limits_there(space, kept=kept)) for kept in (False, True)
+        ]
+
+    def take(self, sets: Sequence[ParticleSet]) -> DeviceSwarmSet:
+        """Swarms of the host, one a run and of as many particles each, there."""
+        there = self._next(len(sets[0].poses))
+
+        def fill(array: Any, values: Sequence[Array], *, placed: bool = True) -> None:  # noqa: ANN401
+            joined = np.concatenate([np.atleast_2d(one) for one in values])
+            single = self._narrowed(joined) if placed else joined.astype(np.float32)
+            array.copy_to_device(np.ascontiguousarray(single.T), stream=self._stream)
+
+        extras = [one.extra for one in sets]
+        fill(there.places, [one.poses for one in sets])
+        fill(there.velocities, [extra[VELOCITIES] for extra in extras], placed=False)
+        fill(there.bests, [extra[BEST_POSES] for extra in extras])
+        fill(there.leaders, [extra[LEADER] for extra in extras])
+        fill(there.starts, [extra[START] for extra in extras])
+        reached = np.empty((2, self.runs * there.count))
+        reached[VALUE] = np.concatenate([extra[BEST_VALUES] for extra in extras])
+        reached[POSSIBLE] = np.concatenate([extra[BEST_POSSIBLE] for extra in extras])
+        standing = np.zeros((self.runs, STANDING))
+        standing[:, VALUE] = np.concatenate([extra[LEADER_VALUE] for extra in extras])
+        standing[:, POSSIBLE] = np.concatenate([extra[LEADER_POSSIBLE] for extra in extras])
+        there.reached.copy_to_device(reached, stream=self._stream)
+        there.standing.copy_to_device(standing, stream=self._stream)
+        return there
+
+    def sample(
+        self,
+        starts: Array,
+        moments: Sequence[Moment],
+        count: int,
+        steps: Sequence[SwarmStep],
+        constraints: str = "clamp",
+    ) -> DeviceSwarmSet:
+        """A stage's swarms of `count` particles a run, sampled about x̂ (R, D): x ← N(x̂, Σ), v ← U(-σ, σ) or zero."""
+        keys, dials = self._uploaded(moments, steps)
+        following = self._next(count)
+        following.leaders.copy_to_device(np.ascontiguousarray(self._narrowed(starts).T), stream=self._stream)
+        self._sample(following, keys, dials, constraints)
+        return following
+
+    def step(
+        self,
+        given: DeviceSwarmSet,
+        problem: ProblemOnDevice,
+        moments: Sequence[Moment],
+        steps: Sequence[SwarmStep] | None,
+        *,
+        constraints: str = "clamp",
+        trunk_first: bool = False,
+        sampled: int = 0,
+    ) -> tuple[DeviceSwarmSet, DeviceSwarmSet]:
+        """Weigh swarms, bring the bests up to date, and move them; or sample the next stage's, of `sampled` particles a
+        run, about the leaders: the set with its weights and what follows from it (the same where there are no steps).
+
+        constraints : what happens beyond a limit. trunk_first : whether only the trunk's edges count.
+        """
+        count, whole = given.count, self.runs * given.count
+        keys, dials = (None, None) if steps is None else self._uploaded(moments, steps)
+        edges = self.device.edges_of(problem.trunk if trunk_first else None)
+        every = count if len(problem.frame.observed) > 1 else whole
+        weights = self._memory("weights", (2, whole), np.float64)
+        following = given if steps is None else self._next(sampled or count)
+        limits = self._limits[constraints != "ignore"]
+        found, blocks = self._moments, ((len(self.space.names), self.runs), SUMMING, self._stream)
+
+        def launch() -> None:
+            self.device.weigh(given.places, problem, edges, every, weights, self._stream, self._memory)
+            kernel("find_bests")[self.runs, SUMMING, self._stream](
+                given.places, weights, problem.ranked, limits, count, given.bests, given.reached, given.leaders,
+                given.standing,
+            )  # fmt: skip
+            kernel("find_moments")[blocks](given.places, count, WEIGHED, found)
+            kernel("find_moments")[blocks](given.bests, count, SURVIVING, found)
+            if following is given:
+                return
+            if sampled:
+                self._sample(following, keys, dials, constraints)
+            else:
+                kernel("step_swarm")[self.runs, SUMMING, self._stream](
+                    given.places, given.velocities, given.bests, given.leaders, dials, keys, limits, False,
+                    constraints == "redraw", count, following.places, following.velocities,
+                )  # fmt: skip
+            kernel("find_moments")[blocks](following.places, following.count, DIFFUSED, found)
+
+        where = id(given.places), id(following.places), id(edges), problem.frame.memory, every
+        how = problem.factors, problem.frame.scale, problem.ranked, constraints, sampled, count
+        self._launch(("swarm", *where, *how), launch)
+        weighed = DeviceSwarmSet(
+            count, given.places, given.velocities, given.bests, given.reached, given.leaders, given.starts,
+            given.standing, weights, problem.ranked,
+        )  # fmt: skip
+        return weighed, weighed if following is given else following
+
+    def record(self, weighed: DeviceSwarmSet, layer: int, *, is_last: bool, run: int = 0) -> LayerRecord:
+        """The record of a run's layer, which `step` has just done."""
+        count = weighed.count
+        every = -(-count // RECORDED)
+        given = weighed.places, weighed.weights, weighed.standing, count
+        poses, values, best = self._rows(*given, run, every)
+        found = self._fetched(self._moments)[:, run]
+        return LayerRecord(
+            layer=layer,
+            variance_weighed=found[WEIGHED + 1],
+            variance_resampled=found[SURVIVING + 1],
+            variance_diffused=found[(SURVIVING if is_last else DIFFUSED) + 1],
+            best=best,
+            best_log_weight=float(self._fetched(weighed.standing)[run, MOST]),
+            mean=found[WEIGHED],
+            poses=poses,
+            log_weights=values[weighed.row],
+            rows=np.arange(0, count, every) if every > 1 else np.zeros(0, dtype=np.int64),
+        )
+
+    def give(self, there: DeviceSwarmSet, freedom: Array, run: int = 0) -> ParticleSet:
+        """A run's swarm on the host, with its values where it has been weighed. freedom : (D,) of its stage."""
+        own = slice(run * there.count, (run + 1) * there.count)
+
+        def rows(array: Any, columns: slice) -> Array:  # noqa: ANN401
+            return np.ascontiguousarray(self._fetched(array)[:, columns].T, np.float64)
+
+        reached, standing = self._fetched(there.reached)[:, own], self._fetched(there.standing)[run]
+        one = slice(run, run + 1)
+        swarm = unweighted(
+            rows(there.places, own),
+            {
+                VELOCITIES: rows(there.velocities, own),
+                BEST_POSES: rows(there.bests, own),
+                BEST_VALUES: np.ascontiguousarray(reached[VALUE]),
+                BEST_POSSIBLE: reached[POSSIBLE] > 0.0,
+                LEADER: rows(there.leaders, one)[0],
+                LEADER_VALUE: standing[[VALUE]],
+                LEADER_POSSIBLE: standing[[POSSIBLE]] > 0.0,
+                START: rows(there.starts, one)[0],
+                FREEDOM: freedom,
+            },
+        )
+        if there.weights is None:
+            return swarm
+        values = np.ascontiguousarray(self._fetched(there.weights)[there.row, own])
+        return ParticleSet(swarm.poses, swarm.log_weights, values, swarm.extra)
+
+    def _sample(self, following: DeviceSwarmSet, keys: Any, dials: Any, constraints: str) -> None:  # noqa: ANN401
+        """Launch the sampling of swarms about their leaders."""
+        count = following.count
+        whole = self.runs * count
+        shape = len(self.space.names), whole
+        at_start = self._memory("at start", shape, np.float32)
+        drawn = self._memory("drawn velocities", shape, np.float32)
+        kernel("line_up")[-(-whole // THREADS), THREADS, self._stream](
+            following.leaders, dials, keys, count, at_start, drawn, following.reached, following.starts,
+            following.standing,
+        )  # fmt: skip
+        kernel("step_swarm")[self.runs, SUMMING, self._stream](
+            at_start, drawn, following.bests, following.leaders, dials, keys, self._limits[constraints != "ignore"],
+            True, constraints == "redraw", count, following.places, following.velocities,
+        )  # fmt: skip
+
+    def _uploaded(self, moments: Sequence[Moment], steps: Sequence[SwarmStep]) -> tuple[Any, Any]:
+        keys = np.array([tuple(moment) for moment in moments], dtype=np.uint64)
+        rows = np.zeros((self.runs, SIGMA + len(self.space.names)))
+        for row, one in zip(rows, steps, strict=True):
+            row[PULL], row[MOVING], row[SIGMA:] = one.pull, one.moving, one.sigma
+            row[SHRINK] = constriction(one.pull)
+        return self._copied("keys", keys), self._copied("dials", rows)
+
+    def _next(self, count: int) -> DeviceSwarmSet:
+        """Where the next set goes: its places and velocities never where the last one has them."""
+        size, whole = len(self.space.names), self.runs * count
+        places = self._next_poses(count)
+        return DeviceSwarmSet(
+            count,
+            places,
+            self._memory(f"velocities {self._turn}", (size, whole), np.float32),
+            self._memory("bests", (size, whole), np.float32),
+            self._memory("reached", (2, whole), np.float64),
+            self._memory("leaders", (size, self.runs), np.float32),
+            self._memory("starts", (size, self.runs), np.float32),
+            self._memory("standing", (self.runs, STANDING), np.float64),
+        )
+
+    def _narrowed(self, poses: Array) -> NDArray[np.float32]:
+        """Poses (N, D) in single precision, such that none leaves its limits by being rounded."""
+        kept = (self.space.lower <= poses) & (poses <= self.space.upper)
+        return np.where(kept, np.clip(poses, *self._inner), poses).astype(np.float32)
+
+
+class DeviceSearch:
+    """One frame's search on a device, an iteration at a time, for `frame_loop`. evaluated : poses that the last one
+    weighed.
+    """
+
+    def __init__(
+        self, tracker: ParticleSwarm, problem: ProblemOnDevice, space: SearchSpace, settings: SwarmSettings
+    ) -> None:
+        self.evaluated = 0
+        self._space, self._problem = space, problem
+        self._swarm = DeviceSwarm(problem.device, space)
+        self._set: DeviceSwarmSet | None = None
+        self._freedom = np.ones(len(space.names))
+
+    def begin(self, previous: FilterState, key: tuple[int, int, int], settings: SwarmSettings) -> None:
+        """Sample the first stage's swarm about x̂. key : seed, frame, and a number below those of layers, one for each
+        search of the frame.
+        """
+        first = stages_of(self._space.hierarchy, settings)[0]
+        self._freedom = first.freedom
+        start = expected_pose(previous, settings)
+        self._set = self._swarm.sample(
+            start[None], [Moment(*key)], first.particles, [self._sampling(settings)], settings.constraints
+        )
+
+    def take(self, particles: ParticleSet) -> None:
+        """Go on from a swarm of the host."""
+        self._set, self._freedom = self._swarm.take([particles]), particles.extra[FREEDOM]
+
+    def step(self, layer: int, key: tuple[int, int, int], settings: SwarmSettings) -> LayerRecord:
+        """Do an iteration and return its record. key : seed, frame and layer."""
+        assert self._set is not None
+        stages = stages_of(self._space.hierarchy, settings)
+        now = moment_of(stages, layer)
+        stage = stages[now.number]
+        trunk_first = seen_in(stage, self._freedom) == TRUNK_FIRST
+        steps, sampled = None, 0
+        if now.iteration < stage.iterations:
+            c = acceleration(now.iteration + 1, stage.iterations, settings.c_first, settings.c_last)
+            steps = [SwarmStep(self._sampling(settings).sigma, c)]
+        elif now.number + 1 < len(stages):
+            following = stages[now.number + 1]
+            self._freedom, sampled = following.freedom, following.particles
+            steps = [self._sampling(settings)]
+        weighed, self._set = self._swarm.step(
+            self._set,
+            self._problem,
+            [Moment(*key)],
+            steps,
+            constraints=settings.constraints,
+            trunk_first=trunk_first,
+            sampled=sampled,
+        )
+        self.evaluated = weighed.count
+        return self._swarm.record(weighed, layer, is_last=steps is None)
+
+    def particles(self) -> ParticleSet:
+        """The swarm that the next iteration weighs, or the last one's with its values, on the host."""
+        assert self._set is not None
+        return self._swarm.give(self._set, self._freedom)
+
+    def _sampling(self, settings: SwarmSettings) -> SwarmStep:
+        """The sample of a swarm with this stage's freedom."""
+        sigma = self._space.sigma * settings.diffusion_scale * self._freedom
+        return SwarmStep(sigma, moving=settings.start_velocity == "uniform")
