@@ -57,7 +57,7 @@ NAMED = 4
 """Jumps named in one line."""
 
 
-class DeniedLimb(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class ContradictedLimb(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A limb contradicted by a frame. share : of its area that disagrees with the masks. elsewhere : what changed in
     the pictures contradicts it (`runs.limbs_elsewhere`), though the masks may not.
     """
@@ -93,7 +93,7 @@ class RunCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     turned: tuple[int, ...]
     jitter_mm: float
     jumps: tuple[Jump, ...] | None = None
-    denied: tuple[DeniedLimb, ...] | None = None
+    denied: tuple[ContradictedLimb, ...] | None = None
 
     @property
     def poor(self) -> tuple[int, ...]:
@@ -187,7 +187,7 @@ def check_run(
     settings = _settings(run)
 
     shares: list[tuple[tuple[float | None, ...], tuple[float | None, ...]]] = []
-    denied, agreement = list[DeniedLimb](), Agreement(body, cameras)
+    contradicted, agreement = list[ContradictedLimb](), Agreement(body, cameras)
     with contextlib.closing(footage_of(session, run)) as footage, run.results() as results:
         known = set(results.frames())
         backgrounds, knobs = Backgrounds(footage), settings.evidence
@@ -204,7 +204,7 @@ def check_run(
             off = _contradicted(agreement, pose, evidence, hidden)
             if off is not None:
                 changed = changed_pixels(evidence, with_shadows.evidence(frame))
-                denied += _with_elsewhere(frame, off, elsewhere.lost(pose, changed))
+                contradicted += _with_elsewhere(frame, off, elsewhere.lost(pose, changed))
     check = RunCheck(
         track=chosen.name,
         stamp=track_stamp(run, chosen.name),
@@ -218,7 +218,7 @@ def check_run(
         turned=sudden_turns(body, chosen, run.record.fps),
         jitter_mm=jitter(run, chosen),
         jumps=jumps_of(body, chosen),
-        denied=tuple(denied),
+        denied=tuple(contradicted),
     )
     # What was measured is told, also where the disk cannot keep it.
     with contextlib.suppress(OSError, SessionError):
@@ -272,10 +272,10 @@ def _contradicted(
     return agreement.of(pose, seen).shares()
 
 
-def _with_elsewhere(frame: int, off: Mapping[str, float], lost: Sequence[str]) -> list[DeniedLimb]:
+def _with_elsewhere(frame: int, off: Mapping[str, float], lost: Sequence[str]) -> list[ContradictedLimb]:
     """The limbs that masks or pictures contradict. off : as of `_contradicted`. lost : of `LimbsElsewhere`."""
     return [
-        DeniedLimb(frame, limb, round(share, 3), limb in lost)
+        ContradictedLimb(frame, limb, round(share, 3), limb in lost)
         for limb, share in off.items()
         if share > LIMB_LOST_SHARE or limb in lost
     ]

@@ -162,9 +162,9 @@ def initialise(
         note = f"{note} {TURNED}".strip()
     stands = limbs_put_right(tree, cameras, masks, start.pose, seed, draw=len(cameras) >= FEWEST_VIEWS)
     shares = stands.off.shares()
-    denied = [limb for limb, share in shares.items() if share > LIMB_LOST_SHARE]
-    if denied:
-        note = f"{note} The masks do not agree with the {enumerated(denied)}: check there.".strip()
+    contradicted = [limb for limb, share in shares.items() if share > LIMB_LOST_SHARE]
+    if contradicted:
+        note = f"{note} The masks do not agree with the {enumerated(contradicted)}: check there.".strip()
     return InitialPose(
         frame=evidence.frame,
         body=tree.name,

@@ -154,9 +154,9 @@ class MaskQuality:
         """The camera to check first, "" for none: one that removes what the others see, else the least agreeing."""
         if all(view.usable for view in self.views):
             return ""
-        denying = max(self.views, key=lambda view: view.denied)
-        if denying.denied > BLAMED:
-            return denying.camera
+        removing = max(self.views, key=lambda view: view.denied)
+        if removing.denied > BLAMED:
+            return removing.camera
         return min(self.views, key=lambda view: np.nan_to_num(view.agreement, nan=-1.0)).camera
 
     def in_words(self) -> str:
@@ -300,7 +300,7 @@ class FrameCounts:
     mask: NDArray[np.int64]
     hull: NDArray[np.int64]
     both: NDArray[np.int64]
-    denied: NDArray[np.int64]
+    removed: NDArray[np.int64]
     litres: float
     pixels: NDArray[np.int64] | None = None
 
@@ -322,27 +322,27 @@ def count_frame(
     mask = np.array([np.count_nonzero(one) for one in masks])
     covers = [covered(whole, camera) for camera in cameras]
     both = np.array([np.count_nonzero(one & cover) for one, cover in zip(masks, covers, strict=True)])
-    denied = np.zeros(len(cameras), dtype=np.int64)
+    removed = np.zeros(len(cameras), dtype=np.int64)
     if blame and len(cameras) > 2 and box is not None:
-        denied = denied_pixels(masks, cameras, Reconstructor(cameras, box, ROUGH))
+        removed = removed_pixels(masks, cameras, Reconstructor(cameras, box, ROUGH))
     hull = np.array([np.count_nonzero(cover) for cover in covers])
     pixels = np.array([one.size for one in masks])
-    return FrameCounts(mask, hull, both, denied, 0.0 if whole is None else whole.volume() * 1e-6, pixels)
+    return FrameCounts(mask, hull, both, removed, 0.0 if whole is None else whole.volume() * 1e-6, pixels)
 
 
-def denied_pixels(
+def removed_pixels(
     masks: Sequence[Bytes], cameras: tuple[Camera, ...], carver: Reconstructor
 ) -> NDArray[np.int64]:
     """(V,) pixels of the other cameras' masks that the hull covers only when a camera is left out."""
     whole = large_hull(carver, masks)
     open_yet = [mask & ~covered(whole, camera) for mask, camera in zip(masks, cameras, strict=True)]
-    denied = np.zeros(len(cameras), dtype=np.int64)
+    removed = np.zeros(len(cameras), dtype=np.int64)
     for left_out in range(len(cameras)):
         alone = large_hull(carver, without(masks, left_out))
         for other, camera in enumerate(cameras):
             if other != left_out:
-                denied[left_out] += np.count_nonzero(open_yet[other] & covered(alone, camera))
-    return denied
+                removed[left_out] += np.count_nonzero(open_yet[other] & covered(alone, camera))
+    return removed
 
 
 def without(masks: Sequence[Bytes], left_out: int) -> list[Bytes]:
@@ -355,7 +355,7 @@ def without(masks: Sequence[Bytes], left_out: int) -> list[Bytes]:
 def summed(frames: tuple[int, ...], names: tuple[str, ...], counted: Sequence[FrameCounts]) -> MaskQuality:
     """The quality over all frames' pixels. names : of the cameras. counted : one entry a frame."""
     mask, hull = np.stack([one.mask for one in counted]), np.stack([one.hull for one in counted])
-    both, denied = np.stack([one.both for one in counted]), np.stack([one.denied for one in counted])
+    both, removed = np.stack([one.both for one in counted]), np.stack([one.removed for one in counted])
     covered, inside = _share(both, mask), _share(both, hull)
     everything = mask.sum()
     pixels = np.sum([one.mask * 0 if one.pixels is None else one.pixels for one in counted], axis=0)
@@ -364,7 +364,7 @@ def summed(frames: tuple[int, ...], names: tuple[str, ...], counted: Sequence[Fr
             camera=name,
             covered=float(_share(both[:, v].sum(), mask[:, v].sum())),
             inside=float(_share(both[:, v].sum(), hull[:, v].sum())),
-            denied=float(_share(denied[:, v].sum(), everything - mask[:, v].sum())),
+            denied=float(_share(removed[:, v].sum(), everything - mask[:, v].sum())),
             frames=tuple((float(c), float(i)) for c, i in zip(covered[:, v], inside[:, v], strict=True)),
             filled=float(np.nan_to_num(_share(mask[:, v].sum(), pixels[v]))),
         )
