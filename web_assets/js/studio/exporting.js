@@ -7,7 +7,7 @@ import { onEvent } from "../live.js";
 import { complain } from "../messages.js";
 import { get, watch } from "../state.js";
 import { follow, html, signal, useRef } from "./component.js";
-import { Failure, Select } from "./parts.js";
+import { Check, Failure, Select } from "./parts.js";
 
 /** @import { Schemas } from "../api_types" */
 /** @typedef {any} Option one of `ExportChoices.options` */
@@ -80,13 +80,9 @@ function OptionField({ option, form, list, calibrations }) {
   };
   const chosen = changed[option.name];
   if (option.kind === "bool") {
-    return html`<label class="check" title=${option.help}>
-      <input
-        type="checkbox"
-        defaultChecked=${Boolean(chosen)}
-        onChange=${({ currentTarget }) => keep(currentTarget.checked)}
-      />${label}
-    </label>`;
+    return html`<${Check} checked=${Boolean(chosen)} take=${keep} title=${option.help}>
+      ${label}
+    </${Check}>`;
   }
   if (option.kind === "str") {
     const usual = chosen ?? option.default;

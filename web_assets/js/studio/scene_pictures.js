@@ -10,6 +10,7 @@ import { complain } from "../messages.js";
 import { get } from "../state.js";
 import { windowName } from "../window.js";
 import { follow, html, mount, signal, useEffect, useState } from "./component.js";
+import { Check, Select } from "./parts.js";
 
 const SCALE = 2;
 const PICTURE = "M2 3.5h12v9H2zM3.4 11h9.2L9.4 6.6 7 9.6 5.6 8z";
@@ -75,14 +76,7 @@ function PictureForm({ close }) {
   };
   return html`<div class="take-form" role="group" aria-label="Picture of the scene">
     <b>Picture of the scene</b>
-    <label class="check"
-      ><input
-        type="checkbox"
-        checked=${transparent}
-        onChange=${(/** @type {any} */ event) => setTransparent(event.target.checked)}
-      />
-      transparent background</label
-    >
+    <${Check} checked=${transparent} take=${setTransparent}>transparent background</${Check}>
     <p class="hint">As it stands, at twice the window's size, with its caption.</p>
     <button class="primary" disabled=${busy} onClick=${take}>${busy ? "Drawing…" : "Save PNG"}</button>
   </div>`;
@@ -90,6 +84,10 @@ function PictureForm({ close }) {
 
 const RATES = [1, 3, 10];
 const SPEEDS = [0.1, 0.25, 0.5, 1];
+const FILES = [
+  ["mp4", "MP4"],
+  ["gif", "GIF"],
+];
 
 function FilmForm() {
   const [of, setOf] = useState("layers");
@@ -107,48 +105,40 @@ function FilmForm() {
       complain(error);
     }
   };
-  const choose =
-    (/** @type {(value: any) => void} */ set, /** @type {(text: string) => any} */ read) =>
-    (/** @type {any} */ event) =>
-      set(read(event.target.value));
-  const number = (/** @type {string} */ text) => (text === "" ? null : Number(text));
+  const frame = (/** @type {(value: number | null) => void} */ set, /** @type {any} */ at) =>
+    html`<input
+      type="number"
+      min="0"
+      placeholder=${at?.frame ?? 0}
+      onChange=${({ target }) => set(target.value === "" ? null : Number(target.value))}
+    />`;
   const choices = of === "layers" ? RATES : SPEEDS;
   const words = (/** @type {number} */ one) =>
     of === "layers" ? `${one} layer${one === 1 ? "" : "s"}/s` : `${one}×`;
   return html`<div class="take-form" role="group" aria-label="Film of the scene">
     <b>Film of the scene</b>
-    <label
-      >of
-      <select
-        value=${of}
-        onChange=${choose((value) => {
-          setOf(value);
-          setRate(value === "layers" ? 3 : 0.25);
-        }, String)}
-      >
-        <option value="layers">this frame's layers</option>
-        <option value="frames">frames</option>
-      </select></label
-    >
+    <${Select}
+      label="of"
+      options=${[["layers", "this frame's layers"], "frames"]}
+      value=${of}
+      take=${(chosen) => {
+        setOf(chosen);
+        setRate(chosen === "layers" ? 3 : 0.25);
+      }}
+    />
     ${
       of === "frames" &&
-      html`<label
-        >from
-        <input type="number" min="0" placeholder=${frames[0]?.frame ?? 0} onChange=${choose(setFirst, number)} />
-        to
-        <input type="number" min="0" placeholder=${frames.at(-1)?.frame ?? 0} onChange=${choose(setLast, number)} />
-      </label>`
+      html`<label>from ${frame(setFirst, frames[0])} to ${frame(setLast, frames.at(-1))}</label>`
     }
-    <label
-      >at
-      <select value=${rate} onChange=${choose(setRate, Number)}>
-        ${choices.map((one) => html`<option key=${one} value=${one}>${words(one)}</option>`)}
-      </select>
-      <select aria-label="File" value=${kind} onChange=${choose(setKind, String)}>
-        <option value="mp4">MP4</option>
-        <option value="gif">GIF</option>
-      </select></label
-    >
+    <label>
+      at
+      <${Select}
+        options=${choices.map((one) => [String(one), words(one)])}
+        value=${String(rate)}
+        take=${(chosen) => setRate(Number(chosen))}
+      />
+      <${Select} aria-label="File" options=${FILES} value=${kind} take=${setKind} />
+    </label>
     <${FilmState} />
     ${!going && html`<button class="primary" onClick=${begin}>Make the film</button>`}
   </div>`;
