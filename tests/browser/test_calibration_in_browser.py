@@ -73,10 +73,10 @@ def test_cameras_from_a_board(window: StudioPage, studio: StudioServer, takes: P
     page.get_by_label("let the lenses move a little").check()
     with page.expect_request(lambda request: request.url.endswith("/calibration/solve")) as asked:
         page.get_by_role("button", name="Calibrate", exact=True).click()
-    wish = asked.value.post_data_json
+    sent = asked.value.post_data_json
     names = [camera.name for camera in CAMERAS]
-    assert wish["distances"] == [{"first": names[0], "second": names[1], "mm": round(apart)}]
-    assert wish["refine_lenses"] is True
+    assert sent["distances"] == [{"first": names[0], "second": names[1], "mm": round(apart)}]
+    assert sent["refine_lenses"] is True
     page.get_by_role("button", name="Use this calibration").wait_for()
     assert page.locator(".rig polygon").count() == 2
     assert page.locator(".residuals rect").count() >= 20

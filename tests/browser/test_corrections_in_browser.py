@@ -45,8 +45,8 @@ def put_right(window: StudioPage, studio: StudioServer, run: str, frame: int) ->
     window.page.locator("#correct").click()
     window.page.locator("#correcting").wait_for()
     edited(window, lambda response: response["frame"] == frame)
-    wish = {"session": "toy", "run": run, "frame": frame, "pose": true_poses()[frame].tolist()}
-    studio.post("/api/scene/edit", wish, window=window.name)
+    request = {"session": "toy", "run": run, "frame": frame, "pose": true_poses()[frame].tolist()}
+    studio.post("/api/scene/edit", request, window=window.name)
     edited(window, lambda response: response["moved"])
 
 

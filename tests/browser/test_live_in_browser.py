@@ -72,14 +72,14 @@ def test_what_a_browser_that_draws_in_software_costs(
     (place / "models").mkdir()
     learn_walk(place / "models" / "walk.behaviour")
     studio = StudioServer("serve", place)
-    wish = {
+    request = {
         "name": "drawn",
         "tracker": TRACKER,
         "weighting": WEIGHTING,
         "live": True,
         "settings": dict(CHANGES),
     }
-    studio.post("/api/sessions/live-walk/runs", {**wish, "behaviour": "walk"})
+    studio.post("/api/sessions/live-walk/runs", {**request, "behaviour": "walk"})
     window = StudioPage(browser, studio, open_at=f"{studio.address}&session=live-walk&run=drawn")
     window.scene.locator("canvas").first.wait_for()
     studio.post("/api/sessions/live-walk/runs/drawn/start")

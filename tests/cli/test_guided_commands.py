@@ -53,8 +53,8 @@ def test_track_with_a_model(started: Session, tmp_path: Path) -> None:
 
 
 def test_track_without_a_model_says_how_to_get_one(started: Session) -> None:
-    for wish in (("--tracker", "behaviour"), ("--set", "prediction=behaviour")):
-        result = run("track", "toy", *wish)
+    for request in (("--tracker", "behaviour"), ("--set", "prediction=behaviour")):
+        result = run("track", "toy", *request)
         assert result.exit_code == 2
         assert "none of body 'planar_arm4'" in result.stderr
         assert "studio learn" in result.stderr

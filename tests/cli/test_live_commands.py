@@ -51,7 +51,7 @@ def test_words_for_a_person(started: Session) -> None:
 
 
 @pytest.mark.parametrize(
-    ("wish", "cause"),
+    ("sent", "cause"),
     [
         (("--repeat",), "has no end"),
         (("--seconds", "0"), "0<x<=86400"),
@@ -61,8 +61,8 @@ def test_words_for_a_person(started: Session) -> None:
         (("--replay", "nobody"), "nobody"),
     ],
 )
-def test_refusals(started: Session, wish: tuple[str, ...], cause: str) -> None:
-    result = run("live", "toy", *QUICK, *wish)
+def test_refusals(started: Session, sent: tuple[str, ...], cause: str) -> None:
+    result = run("live", "toy", *QUICK, *sent)
     assert result.exit_code == 2
     assert cause in result.stderr
     assert not started.runs()

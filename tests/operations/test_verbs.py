@@ -201,8 +201,8 @@ def test_cameras_of_a_session_are_not_replaced_unasked(session_on_disk: Session)
 def test_nobody_looks_at_a_bar_in_a_log_and_a_bar_can_be_asked_for(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    for wish, shown in ((None, False), (False, False), (True, True)):
-        with shown_in(wish, "Rendering") as report:
+    for request, shown in ((None, False), (False, False), (True, True)):
+        with shown_in(request, "Rendering") as report:
             report("frames", 1, 2)
         assert ("frames" in capsys.readouterr().err) == shown
 

@@ -38,9 +38,9 @@ def black(walk: Session, tmp_path_factory: pytest.TempPathFactory) -> Session:
     return interrupted(walk, tmp_path_factory.mktemp("black") / "walk", frames, range(4, 9), BLACK, FPS)
 
 
-def made(session: Session, **wish: object) -> StoredRun:
-    changes = SMALL | dict(wish.pop("changes", {}))  # pyright: ignore[reportCallIssue, reportArgumentType]
-    return prepare_run(session, knobs=changes, **wish)  # pyright: ignore[reportArgumentType]
+def made(session: Session, **request: object) -> StoredRun:
+    changes = SMALL | dict(request.pop("changes", {}))  # pyright: ignore[reportCallIssue, reportArgumentType]
+    return prepare_run(session, knobs=changes, **request)  # pyright: ignore[reportArgumentType]
 
 
 def tracked(session: Session, run: StoredRun) -> list[FrameResult]:

@@ -125,8 +125,8 @@ def test_uploaded_plates_are_matched_by_name_or_as_said(studio: Studio) -> None:
     assert [camera["given"] for camera in response.json()["cameras"]] == ["plate"] * len(sources)
     assert "plate" in response.json()["possible"]
     named = plate_upload(studio, "whatever.png", picture)
-    wish = {"upload": named, "files": {source.name: "whatever.png"}}
-    assert studio.client.post(f"{PLACE}/backgrounds", json=wish).status_code == 200
+    request = {"upload": named, "files": {source.name: "whatever.png"}}
+    assert studio.client.post(f"{PLACE}/backgrounds", json=request).status_code == 200
     small = plate_upload(studio, f"{source.name}.png", picture[:10, :10])
     assert studio.client.post(f"{PLACE}/backgrounds", json={"upload": small}).status_code == 422
     outside = {"upload": plate_upload(studio, "a.png", picture), "files": {source.name: "../../a.png"}}

@@ -24,8 +24,8 @@ def uploaded(studio: Studio, name: str, content: bytes) -> str:
     return identifier
 
 
-def begin(studio: Studio, **wish: object):
-    return studio.client.post("/api/learning", json={"name": "sway", "body": "human31", **wish})
+def begin(studio: Studio, **request: object):
+    return studio.client.post("/api/learning", json={"name": "sway", "body": "human31", **request})
 
 
 def test_the_form_is_reported_every_knob_once(studio: Studio) -> None:
@@ -87,7 +87,7 @@ def test_cancelled_nothing_is_kept(studio: Studio) -> None:
 
 
 @pytest.mark.parametrize(
-    ("wish", "status"),
+    ("sent", "status"),
     [
         ({}, 422),
         ({"sources": ["/etc/passwd"]}, 422),
@@ -101,8 +101,8 @@ def test_cancelled_nothing_is_kept(studio: Studio) -> None:
         ({"sources": ["walk"], "upload": "nothing"}, 404),
     ],
 )
-def test_refusals(studio: Studio, wish: dict, status: int) -> None:
-    answer = begin(studio, **wish)
+def test_refusals(studio: Studio, sent: dict, status: int) -> None:
+    answer = begin(studio, **sent)
     assert answer.status_code == status, answer.text
     assert answer.json()["message"]
     assert studio.client.get("/api/learning").json()["progress"] is None

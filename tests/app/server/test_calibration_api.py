@@ -51,9 +51,9 @@ def uploaded(studio: Studio, files: dict[str, bytes]) -> str:
     return identifier
 
 
-def solved(studio: Studio, wish: dict, session: str = "fresh") -> dict:
+def solved(studio: Studio, request: dict, session: str = "fresh") -> dict:
     """The state of a calibration from boards when it has ended."""
-    begun = studio.client.post(f"/api/sessions/{session}/calibration/solve", json=wish)
+    begun = studio.client.post(f"/api/sessions/{session}/calibration/solve", json=request)
     assert begun.status_code == 202, begun.text
     return studio.ended(f"/api/calibrations/{begun.json()['identifier']}")
 
@@ -136,8 +136,8 @@ def test_a_file_is_shown_confirmed_and_kept_apart_from_the_one_before(
 def test_an_earlier_one_comes_back(studio: Studio, session: Session) -> None:
     original = (session.path / "calibration" / "cameras.toml").read_bytes()
     upload = uploaded(studio, {"Calib_other.toml": turned_up(session)})
-    wish = {"upload": upload, "up": "y"}
-    made = studio.client.post(f"{TAKE}/proposals", json=wish).json()
+    request = {"upload": upload, "up": "y"}
+    made = studio.client.post(f"{TAKE}/proposals", json=request).json()
     response = studio.client.post(f"{TAKE}/proposals/{made['identifier']}/apply", json={}).json()
     back = studio.client.post(f"{TAKE}/proposals", json={"earlier": response["earlier"][0]}).json()
     again = studio.client.post(f"{TAKE}/proposals/{back['identifier']}/apply", json={}).json()
@@ -155,7 +155,7 @@ def test_what_blocks_can_be_used_if_requested(studio: Studio, session: Session) 
 
 
 @pytest.mark.parametrize(
-    ("files", "wish", "status", "said"),
+    ("files", "sent", "status", "said"),
     [
         ({"a.pickle": b"x"}, {}, 422, "pickle"),
         ({"a.toml": b"x = ["}, {}, 422, "not TOML"),
@@ -168,18 +168,18 @@ def test_what_blocks_can_be_used_if_requested(studio: Studio, session: Session) 
     ],
 )
 def test_what_is_no_calibration(
-    studio: Studio, files: dict[str, bytes] | None, wish: dict, status: int, said: str
+    studio: Studio, files: dict[str, bytes] | None, sent: dict, status: int, said: str
 ) -> None:
     upload = {} if files is None else {"upload": uploaded(studio, files)}
-    answer = studio.client.post(f"{TAKE}/proposals", json={**upload, **wish})
+    answer = studio.client.post(f"{TAKE}/proposals", json={**upload, **sent})
     assert answer.status_code == status, answer.text
     assert said in answer.json()["message"]
     assert answer.json()["hint"]
 
 
 def test_boards_give_cameras_pictures_and_a_calibration(fresh: Studio, takes: Path, tmp_path: Path) -> None:
-    wish = {"board": BOARD.text, "footage": {"path": str(takes)}, "floor": f"frame:{FLOOR_FRAME}"}
-    response = solved(fresh, wish)
+    request = {"board": BOARD.text, "footage": {"path": str(takes)}, "floor": f"frame:{FLOOR_FRAME}"}
+    response = solved(fresh, request)
     assert response["state"] == "done", response
     assert response["share"] == 1.0
     here = f"{FRESH}/proposals/{response['proposal']}"

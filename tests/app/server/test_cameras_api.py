@@ -37,10 +37,10 @@ def until(studio: Studio, path: str, done: Callable[[dict], bool]) -> dict:
 
 def shown(studio: Studio, streams: Streams) -> dict:
     secret = streams.address("cam1").replace("http://", f"http://root:{SECRET}@")
-    wish = {
+    request = {
         "cameras": [{"name": "cam1", "address": secret}, {"name": "cam2", "address": streams.address("cam2")}]
     }
-    answer = studio.client.post("/api/cameras/preview", json=wish)
+    answer = studio.client.post("/api/cameras/preview", json=request)
     assert answer.status_code == 200, answer.text
     return until(
         studio,
@@ -129,18 +129,18 @@ def test_what_is_no_camera_is_refused(studio: Studio, address: str, status: int)
 
 
 def test_the_studio_does_not_look_at_itself(studio: Studio) -> None:
-    wish = {"cameras": [{"name": "cam1", "address": f"{studio.base}/api/sessions"}]}
-    answer = studio.client.post("/api/cameras/preview", json=wish)
+    request = {"cameras": [{"name": "cam1", "address": f"{studio.base}/api/sessions"}]}
+    answer = studio.client.post("/api/cameras/preview", json=request)
     assert (answer.status_code, answer.json()["code"]) == (422, "footage")
     assert "no camera" in answer.json()["message"]
 
 
 def test_nothing_is_recorded_without_cameras_or_of_other_names(studio: Studio, streams: Streams) -> None:
-    wish = {"name": "take2", "calibration": "take1"}
-    assert studio.client.post("/api/recordings", json=wish).status_code == 409
-    assert studio.client.post("/api/recordings", json=wish | {"name": "../x"}).status_code == 422
+    request = {"name": "take2", "calibration": "take1"}
+    assert studio.client.post("/api/recordings", json=request).status_code == 409
+    assert studio.client.post("/api/recordings", json=request | {"name": "../x"}).status_code == 422
     wrong = {"cameras": [{"name": "left", "address": streams.address("cam1")}]}
     assert studio.client.post("/api/cameras/preview", json=wrong).status_code == 200
-    answer = studio.client.post("/api/recordings", json=wish)
+    answer = studio.client.post("/api/recordings", json=request)
     assert answer.status_code == 422
     assert "Camera left is not in 'cameras.toml'" in answer.json()["message"]

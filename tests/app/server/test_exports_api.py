@@ -67,7 +67,7 @@ def test_the_scene_is_exported_as_a_page(studio: Studio, tracked: StoredRun) -> 
 
 
 @pytest.mark.parametrize(
-    ("wish", "status", "words"),
+    ("sent", "status", "words"),
     [
         ({"format": "fbx"}, 422, "no export format 'fbx'"),
         ({"format": "glb", "options": {"unit": "cm"}}, 422, "means nothing"),
@@ -76,9 +76,9 @@ def test_the_scene_is_exported_as_a_page(studio: Studio, tracked: StoredRun) -> 
     ],
 )
 def test_wrong_requests_are_refused_at_once(
-    studio: Studio, tracked: StoredRun, wish: dict, status: int, words: str
+    studio: Studio, tracked: StoredRun, sent: dict, status: int, words: str
 ) -> None:
-    answer = studio.client.post(f"{RUN}/exports", json=wish)
+    answer = studio.client.post(f"{RUN}/exports", json=sent)
     assert answer.status_code == status
     response = answer.json()
     assert words in response["message"]

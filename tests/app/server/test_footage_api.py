@@ -56,15 +56,15 @@ def test_a_change_is_written_and_says_what_it_makes_stale(studio: Studio, tracke
 
 
 @pytest.mark.parametrize(
-    ("wish", "said"),
+    ("sent", "said"),
     [
         ({"offsets": {"cam9": 1}}, "There is no camera 'cam9'"),
         ({"offsets": {"cam1": 4}}, "no frame is left"),
         ({"rotations": {"cam1": 90}}, "are 64x96, and its calibration is for 96x64"),
     ],
 )
-def test_what_cannot_be_changed(studio: Studio, wish: dict, said: str) -> None:
-    answer = studio.client.patch(HERE, json=wish)
+def test_what_cannot_be_changed(studio: Studio, sent: dict, said: str) -> None:
+    answer = studio.client.patch(HERE, json=sent)
     assert 400 <= answer.status_code < 500
     assert said in answer.json()["message"]
     assert answer.json()["hint"]
@@ -72,8 +72,8 @@ def test_what_cannot_be_changed(studio: Studio, wish: dict, said: str) -> None:
 
 
 def test_requests_that_make_no_sense(studio: Studio) -> None:
-    for wish in ({"rotations": {"cam1": 45}}, {"offsets": {"cam1": "x"}}, {"speed": 3}):
-        assert studio.client.patch(HERE, json=wish).status_code == 422
+    for request in ({"rotations": {"cam1": 45}}, {"offsets": {"cam1": "x"}}, {"speed": 3}):
+        assert studio.client.patch(HERE, json=request).status_code == 422
 
 
 def test_an_estimate_is_shown_and_not_applied(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -129,7 +129,7 @@ def test_an_estimate_can_be_stopped(studio: Studio, monkeypatch: pytest.MonkeyPa
 
 
 def test_an_import_puts_cameras_in_step_and_says_whose_layout_it_was(studio: Studio, source: Path) -> None:
-    wish = {
+    request = {
         "name": "stepped",
         "source": str(source),
         "fps": 25,
@@ -137,7 +137,7 @@ def test_an_import_puts_cameras_in_step_and_says_whose_layout_it_was(studio: Stu
         "rotations": {"cam1": 180},
         "unit": "mm",
     }
-    identifier = studio.client.post("/api/imports", json=wish).json()["identifier"]
+    identifier = studio.client.post("/api/imports", json=request).json()["identifier"]
     deadline = time.monotonic() + PATIENCE
     state = {"state": "running"}
     while state["state"] in ("queued", "running", "cancelling") and time.monotonic() < deadline:
@@ -148,4 +148,4 @@ def test_an_import_puts_cameras_in_step_and_says_whose_layout_it_was(studio: Stu
     assert [(camera["offset"], camera["turned"]) for camera in response["cameras"]] == [(0, 180), (1, 0)]
     assert response["frame_count"] == 3
     for bad in ({"trial": 3}, {"rotations": {"cam1": 30}}, {"unit": "inch"}, {"up": "w"}):
-        assert studio.client.post("/api/imports", json={**wish, "name": "other", **bad}).status_code == 422
+        assert studio.client.post("/api/imports", json={**request, "name": "other", **bad}).status_code == 422

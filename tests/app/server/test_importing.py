@@ -13,9 +13,9 @@ from studio.foundations.progress import Progress
 from studio.operations import footage
 
 
-def imported(studio: Studio, **wish: object) -> dict:
+def imported(studio: Studio, **request: object) -> dict:
     """Begin an import and wait for its end."""
-    answer = studio.client.post("/api/imports", json=wish)
+    answer = studio.client.post("/api/imports", json=request)
     assert answer.status_code == 202, answer.text
     return studio.ended(f"/api/imports/{answer.json()['identifier']}")
 
@@ -59,7 +59,7 @@ def test_what_went_wrong_is_reported_in_words_and_leaves_nothing(studio: Studio,
 
 
 def test_names_taken_and_places_forbidden_are_refused_at_once(studio: Studio, source: Path) -> None:
-    for wish, status in (
+    for request, status in (
         ({"name": "take1", "source": str(source)}, 409),
         ({"name": "a/b", "source": str(source)}, 422),
         ({"name": "x", "source": "/etc"}, 422),
@@ -71,8 +71,8 @@ def test_names_taken_and_places_forbidden_are_refused_at_once(studio: Studio, so
         ({"name": "x", "source": str(source), "fps": -1}, 422),
         ({"name": "x", "source": str(source), "unknown": 1}, 422),
     ):
-        answer = studio.client.post("/api/imports", json=wish)
-        assert answer.status_code == status, (wish, answer.text)
+        answer = studio.client.post("/api/imports", json=request)
+        assert answer.status_code == status, (request, answer.text)
         assert set(answer.json()) == {"code", "message", "hint", "status"}
 
 
@@ -180,7 +180,7 @@ def test_folders_can_be_looked_through_only_under_the_roots(studio: Studio, sour
 
 
 def test_an_import_can_be_cancelled(studio: Studio, source: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The importer sees the wish at its next report; nothing is left."""
+    """The importer sees the cancellation at its next report; nothing is left."""
 
     def slowly(*_: object, progress: Progress):
         while True:

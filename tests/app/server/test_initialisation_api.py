@@ -42,12 +42,12 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> dict[str, object]:
     """The search replaced by an answer; what it was asked."""
     asked: dict[str, object] = {}
 
-    def initialise(session: Session, frame: int, **wish: object) -> InitialPose:
-        asked.update(wish, frame=frame)
-        tell = wish["progress"]
+    def initialise(session: Session, frame: int, **request: object) -> InitialPose:
+        asked.update(request, frame=frame)
+        tell = request["progress"]
         assert callable(tell)
         tell("searching for the pose", 3, 10)
-        body = wish["body"]
+        body = request["body"]
         assert isinstance(body, BodyModel)
         return found_in(session, frame, body)
 
@@ -91,7 +91,7 @@ def test_replacing_keeps_the_old_pose_beside_the_new_one(
 
 
 @pytest.mark.parametrize(
-    ("wish", "status"),
+    ("sent", "status"),
     [
         ({"frame": 99}, 409),
         ({"weighting": "none-such"}, 422),
@@ -99,8 +99,8 @@ def test_replacing_keeps_the_old_pose_beside_the_new_one(
         ({"frame": -1}, 422),
     ],
 )
-def test_refusals(studio: Studio, quick: dict, wish: dict, status: int) -> None:
-    answer = studio.client.post("/api/sessions/take1/initialise", json=wish)
+def test_refusals(studio: Studio, quick: dict, sent: dict, status: int) -> None:
+    answer = studio.client.post("/api/sessions/take1/initialise", json=sent)
     assert answer.status_code == status, answer.text
     assert not quick
 

@@ -16,8 +16,8 @@ LIVE = "/api/sessions/take1/runs/now/live"
 
 
 def test_a_live_run_is_made_and_says_how_it_went(studio: Studio, session: Session) -> None:
-    wish = {"name": "now", "live": True, "ping_pong": True, "last": 50}
-    line = studio.client.post("/api/sessions/take1/runs", json=wish)
+    request = {"name": "now", "live": True, "ping_pong": True, "last": 50}
+    line = studio.client.post("/api/sessions/take1/runs", json=request)
     assert line.status_code == 201, line.text
     assert studio.client.get("/api/sessions/take1/runs/now").json()["live"] is True
     run = session.run("now")
@@ -63,8 +63,8 @@ def test_the_state_event_says_how_it_keeps_up() -> None:
 
 
 def test_frames_behind_the_footages_end_have_pictures(studio: Studio) -> None:
-    wish = {"name": "now", "live": True, "ping_pong": True, "last": 50}
-    studio.client.post("/api/sessions/take1/runs", json=wish)
+    request = {"name": "now", "live": True, "ping_pong": True, "last": 50}
+    studio.client.post("/api/sessions/take1/runs", json=request)
     place = "/api/sessions/take1/runs/now/frames/{}/views/cam1.jpg?show="
     inside, behind = (studio.client.get(place.format(frame)) for frame in (2, 4))
     assert inside.status_code == behind.status_code == 200

@@ -54,11 +54,11 @@ def test_a_start_pose_is_kept_and_the_old_one_stays_beside_it(studio: Studio, to
 def test_a_drag_brings_the_tip_to_its_target(studio: Studio, toy: Session) -> None:
     path = f"{TOY}/pose/drag"
     wanted = limb_ends(ARM, np.array([0.4, 0.2, -0.1, 0.3]))[0, -1, 1]
-    wish = {"pose": POSE, "limb": ARM.drawn[-1].name, "target": wanted.tolist()}
-    found = studio.client.post(path, json=wish).json()
+    request = {"pose": POSE, "limb": ARM.drawn[-1].name, "target": wanted.tolist()}
+    found = studio.client.post(path, json=request).json()
     assert found["left_mm"] < 1.0
     np.testing.assert_allclose(limb_ends(ARM, np.array(found["pose"]))[0, -1, 1], wanted, atol=1.0)
-    refused = studio.client.post(path, json=wish | {"limb": "wing"})
+    refused = studio.client.post(path, json=request | {"limb": "wing"})
     assert refused.status_code == 422
     assert "no limb 'wing'" in refused.json()["message"]
     mirrored = studio.client.post(path.replace("drag", "mirror"), json={"pose": POSE})
@@ -89,8 +89,8 @@ def test_the_editor_in_the_scene_is_opened_read_and_left(studio: Studio, toy: Se
     refused = client.post("/api/scene/edit", json={"session": name, "run": "one"})
     assert refused.status_code == 422
     assert "needs a frame" in refused.json()["message"]
-    wish = {"session": name, "run": "one", "frame": 1, "pose": POSE}
-    assert client.post("/api/scene/edit", json=wish).status_code == 202
+    request = {"session": name, "run": "one", "frame": 1, "pose": POSE}
+    assert client.post("/api/scene/edit", json=request).status_code == 202
     response = client.get("/api/scene/edit").json()
     assert (response["run"], response["frame"], response["pose"], response["moved"]) == ("one", 1, POSE, True)
     assert client.delete("/api/scene/edit").status_code == 202

@@ -22,11 +22,11 @@ def posted(studio: Studio) -> list[type]:
 
 
 def test_a_run_is_made_with_what_was_requested(studio: Studio) -> None:
-    wish = {
+    request = {
         "tracker": "condensation", "first": 1, "last": 3, "seed": 9, "settings": {"particles": 500}, "name": "c",
         "body": "human31",
     }  # fmt: skip
-    line = studio.client.post("/api/sessions/take1/runs", json=wish).json()
+    line = studio.client.post("/api/sessions/take1/runs", json=request).json()
     assert (line["name"], line["tracker"], line["first"], line["last"], line["seed"]) == (
         "c",
         "condensation",
@@ -42,7 +42,7 @@ def test_a_run_is_made_with_what_was_requested(studio: Studio) -> None:
 
 
 @pytest.mark.parametrize(
-    ("wish", "status"),
+    ("sent", "status"),
     [
         ({"tracker": "none"}, 422),
         ({"tracker": "../x"}, 422),
@@ -61,9 +61,9 @@ def test_a_run_is_made_with_what_was_requested(studio: Studio) -> None:
     ],
 )
 def test_what_cannot_be_is_refused_in_words_and_nothing_is_made(
-    studio: Studio, wish: dict[str, object], status: int
+    studio: Studio, sent: dict[str, object], status: int
 ) -> None:
-    answer = studio.client.post("/api/sessions/take1/runs", json=wish)
+    answer = studio.client.post("/api/sessions/take1/runs", json=sent)
     assert answer.status_code == status, answer.text
     assert set(answer.json()) == {"code", "message", "hint", "status"}
     assert answer.json()["message"]
@@ -284,7 +284,7 @@ def test_a_doubted_calibration_is_reported_and_tracked_only_if_requested(studio:
     assert refused.status_code == 422
     assert doubt in refused.json()["message"]
     assert studio.client.get("/api/sessions/take1/runs/refused").status_code == 404
-    wish = {"name": "wished", "allow_inconsistent": True}
-    assert studio.client.post("/api/sessions/take1/runs", json=wish).status_code == 201
+    request = {"name": "wished", "allow_inconsistent": True}
+    assert studio.client.post("/api/sessions/take1/runs", json=request).status_code == 201
     notes = studio.client.get("/api/sessions/take1/runs/wished").json()["notes"]
     assert f"Tracked despite: {doubt}" in notes

@@ -27,9 +27,9 @@ def run(studio: Studio, workspace: Workspace) -> StoredRun:
     return stored
 
 
-def begun(studio: Studio, verb: str, wish: dict) -> dict:
+def begun(studio: Studio, verb: str, request: dict) -> dict:
     """The job's state when it has ended."""
-    answer = studio.client.post(f"{RUN}/{verb}", json=wish)
+    answer = studio.client.post(f"{RUN}/{verb}", json=request)
     assert answer.status_code == 202, answer.text
     return studio.ended(f"/api/track-jobs/{answer.json()['identifier']}")
 
@@ -75,7 +75,7 @@ def test_a_track_is_drawn_over_the_pictures(studio: Studio, run: StoredRun) -> N
 
 
 @pytest.mark.parametrize(
-    ("verb", "wish", "status"),
+    ("verb", "sent", "status"),
     [
         ("smooth", {"settings": {"smoothing_frequency": 0.0}}, 422),
         ("smooth", {"settings": {"no_such": 1}}, 422),
@@ -88,8 +88,8 @@ def test_a_track_is_drawn_over_the_pictures(studio: Studio, run: StoredRun) -> N
         ("correct", {"frame": 2, "track": "raw", "back_to": 5}, 409),
     ],
 )
-def test_refusals(studio: Studio, run: StoredRun, verb: str, wish: dict, status: int) -> None:
-    answer = studio.client.post(f"{RUN}/{verb}", json=wish)
+def test_refusals(studio: Studio, run: StoredRun, verb: str, sent: dict, status: int) -> None:
+    answer = studio.client.post(f"{RUN}/{verb}", json=sent)
     assert answer.status_code == status, answer.text
     assert len(studio.client.get(f"{RUN}/tracks").json()["tracks"]) == 1
 

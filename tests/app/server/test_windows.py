@@ -65,8 +65,8 @@ class Windows:
         """The frame of a window in which its scene is seen."""
         return PanelReader(self.socket(f"/scene/{window}", VISER))
 
-    def show(self, window: str, **wish: object) -> None:
-        answer = self.client.post("/api/scene/show", json=wish, headers={"x-studio-window": window})
+    def show(self, window: str, **sent: object) -> None:
+        answer = self.client.post("/api/scene/show", json=sent, headers={"x-studio-window": window})
         assert answer.status_code == 204, answer.text
 
 

@@ -68,8 +68,8 @@ def test_names_are_refused_that_are_taken_or_no_names(studio: Studio, empty: str
 
 def test_footage_is_added_and_the_way_goes_on(studio: Studio, empty: str, source: Path) -> None:
     folder = bare(source, source.parent / "bare")
-    wish = {"source": str(folder), "fps": 30}
-    answer = studio.client.post(f"/api/sessions/{empty}/footage", json=wish)
+    request = {"source": str(folder), "fps": 30}
+    answer = studio.client.post(f"/api/sessions/{empty}/footage", json=request)
     assert answer.status_code == 202, answer.text
     response = studio.ended(f"/api/imports/{answer.json()['identifier']}")
     assert response["state"] == "done", response
