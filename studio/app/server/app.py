@@ -164,10 +164,16 @@ class Application(FastAPI):
             schemas |= {name: one for name, one in event_schemas(JOBS).items() if name not in schemas}
             schemas["ErrorAnswer"] = ErrorAnswer.model_json_schema()
             content = {"application/json": {"schema": {"$ref": "#/components/schemas/ErrorAnswer"}}}
-            errors = {str(one): {"description": HTTPStatus(one).phrase, "content": content} for one in ERRORS}
+
+            def described(statuses: tuple[int, ...]) -> dict[str, dict[str, Any]]:
+                return {
+                    str(one): {"description": HTTPStatus(one).phrase, "content": content} for one in statuses
+                }
+
             for operations in document["paths"].values():
                 for operation in operations.values():
-                    operation["responses"] |= errors
+                    too_large = (413,) if "requestBody" in operation else ()
+                    operation["responses"] |= described((*ERRORS, *too_large))
         return super().openapi()
 
 

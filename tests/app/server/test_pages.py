@@ -252,3 +252,4 @@ def test_the_api_describes_itself(studio: Studio) -> None:
         for method, operation in methods.items():
             assert operation.get("description"), (method, path)
             assert "ErrorAnswer" in str(operation["responses"]["422"]), (method, path)
+            assert ("requestBody" in operation) == ("413" in operation["responses"]), (method, path)

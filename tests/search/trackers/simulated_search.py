@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.append(str(Path(__file__).parents[1] / "likelihood"))
-from simulated_weighing import scene_of
+from simulated_weighing import scene_of, wait_politely
 
 from studio.body.catalogue import load_body
 from studio.runs.search_space import search_space
@@ -115,6 +115,7 @@ def searches(found):
 if __name__ == "__main__":
     from studio.search.trackers import device_kernels, device_search
 
+    wait_politely()
     # The simulator runs a thread of the processor for each of the card's.
     device_kernels.SUMMING = device_search.SUMMING = 8
     device_search.THREADS = 8

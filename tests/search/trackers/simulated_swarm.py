@@ -5,15 +5,13 @@ Writes it to the file named. Poses are weighed by NumPy, but for one frame that 
 import dataclasses
 import pickle
 import sys
-import time
 from dataclasses import dataclass, field
 from pathlib import Path
-from threading import Thread
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from simulated_weighing import scene_of
+from simulated_weighing import scene_of, wait_politely
 from toy_problems import toy_space
 
 from studio.runs.search_space import search_space
@@ -219,15 +217,7 @@ def everything() -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    # The simulator has a thread of Python for each of the device's, asks without a pause whether they are done, and
-    # records nothing.
-    from numba.cuda.simulator.kernel import BlockThread
-
-    def is_alive(thread: BlockThread) -> bool:
-        time.sleep(0)
-        return Thread.is_alive(thread)
-
-    BlockThread.is_alive = is_alive
+    wait_politely()
     device_kernels.SUMMING = device_swarm_kernels.SUMMING = device_swarm.SUMMING = 2
     device_runs.THREADS = device_swarm.THREADS = 8
     device_runs.record_launches = lambda launches, stream: None
